@@ -1,0 +1,1 @@
+"""The bundled case's building in EnergyPlus: layout, input file, thermostats, run, sensors."""

@@ -1,0 +1,189 @@
+"""Nonlinear least squares with bounds and priors by Ipopt, with the exact Gauss-Newton Hessian."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+#: Residuals (m,) and Jacobian (m, p) at a point (p,).
+ResidualFunction = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
+
+
+@dataclass(frozen=True)
+class LeastSquaresResult:
+    """Outcome of a least-squares solve.
+
+    Parameters
+    ----------
+    x : ndarray, shape (p,)
+        Best point found, also when the solver failed.
+    cost : float
+        ``½ Σ r²`` there [-].
+    jacobian : ndarray, shape (m, p)
+        Jacobian of the residuals there.
+    status : str
+        Ipopt's return status, such as ``Solve_Succeeded``.
+    success : bool
+        Whether Ipopt converged.
+    iterations : int
+        Number of Ipopt iterations.
+    """
+
+    x: FloatArray
+    cost: float
+    jacobian: FloatArray
+    status: str
+    success: bool
+    iterations: int
+
+
+class _Cache:
+    """The residual function with its last few values kept, and the best point seen."""
+
+    def __init__(self, function: ResidualFunction) -> None:
+        self.function = function
+        self.values: dict[bytes, tuple[FloatArray, FloatArray]] = {}
+        self.best: tuple[float, FloatArray] | None = None
+        self.error: Exception | None = None
+
+    def __call__(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        key = x.tobytes()
+        if key not in self.values:
+            if len(self.values) > 3:
+                self.values.pop(next(iter(self.values)))
+            try:
+                self.values[key] = self.function(x)
+            except Exception as error:  # kept: CasADi reports only that a callback failed
+                self.error = error
+                raise
+            r = self.values[key][0]
+            cost = 0.5 * float(r @ r)
+            if np.isfinite(cost) and (self.best is None or cost < self.best[0]):
+                self.best = (cost, x.copy())
+        return self.values[key]
+
+
+class _Objective(ca.Callback):  # type: ignore[misc]
+    """``½ r'r`` for Ipopt; its gradient and the Gauss-Newton Hessian come from the same cached residuals."""
+
+    def __init__(self, cache: _Cache, p: int, order: int) -> None:
+        ca.Callback.__init__(self)
+        self.cache, self.p, self.order = cache, p, order
+        self._kept: list[ca.Callback] = []  # CasADi holds no reference to the derivatives it is handed
+        self.construct(f"least_squares_{order}", {})
+
+    def get_n_in(self) -> int:
+        return 1 if self.order != 1 else 2
+
+    def get_n_out(self) -> int:
+        return 1
+
+    def get_sparsity_in(self, i: int) -> ca.Sparsity:
+        return ca.Sparsity.dense(self.p, 1) if i == 0 else ca.Sparsity(1, 1)
+
+    def get_sparsity_out(self, i: int) -> ca.Sparsity:
+        return [ca.Sparsity.dense(1, 1), ca.Sparsity.dense(1, self.p), ca.Sparsity.dense(self.p, self.p)][self.order]
+
+    def eval(self, arg: list[ca.DM]) -> list[ca.DM]:
+        residual, jacobian = self.cache(np.array(arg[0], dtype=float).ravel())
+        if self.order == 0:
+            return [ca.DM(0.5 * float(residual @ residual))]
+        if self.order == 1:
+            return [ca.DM((jacobian.T @ residual)[None, :])]
+        return [ca.DM(jacobian.T @ jacobian)]
+
+    def has_jacobian(self) -> bool:
+        return self.order == 0
+
+    def get_jacobian(self, name: str, inames: list[str], onames: list[str], opts: dict[str, object]) -> ca.Function:
+        self._kept.append(_Objective(self.cache, self.p, 1))
+        return self._kept[-1]
+
+
+def solve_least_squares(
+    function: ResidualFunction,
+    start: FloatArray,
+    lower: FloatArray,
+    upper: FloatArray,
+    tolerance: float = 1e-3,
+    iterations: int = 60,
+) -> LeastSquaresResult:
+    """Minimise ``½ Σ r(x)²`` within bounds by Ipopt.
+
+    Parameters
+    ----------
+    function : callable
+        Residuals (m,) and their Jacobian (m, p) at x.
+    start, lower, upper : ndarray, shape (p,)
+        Start and bounds; the start is moved inside.
+    tolerance : float
+        Ipopt's relative convergence tolerance.
+    iterations : int
+        Most iterations.
+
+    Returns
+    -------
+    LeastSquaresResult
+        With Ipopt's status; the best point seen when it stops early.
+
+    Raises
+    ------
+    Exception
+        Whatever ``function`` raises, unchanged.
+    """
+    p = start.size
+    cache = _Cache(function)
+    objective, hessian = _Objective(cache, p, 0), _Objective(cache, p, 2)
+    x, scale, empty = ca.MX.sym("x", p), ca.MX.sym("lam_f"), ca.MX.sym("p", 0)
+    multipliers = ca.MX.sym("lam_g", 0)
+    gauss_newton = ca.Function(
+        "nlp_hess_l",
+        [x, empty, scale, multipliers],
+        [ca.triu(scale * hessian(x))],
+        ["x", "p", "lam_f", "lam_g"],
+        ["triu_hess_gamma_x_x"],
+    )
+    first = cache(np.clip(start, lower, upper))
+    options = {
+        "print_time": False,
+        "hess_lag": gauss_newton,
+        "ipopt": {
+            "print_level": int(__import__("os").environ.get("IPL","0")),
+            "sb": "yes",
+            "tol": tolerance,
+            "compl_inf_tol": tolerance,
+            "acceptable_tol": 10 * tolerance,
+            "acceptable_iter": 4,
+            "max_iter": iterations,
+            "mu_init": 1e-4,
+            "bound_push": 1e-4,
+            "bound_frac": 1e-4,
+            "nlp_scaling_method": "none",
+        },
+    }
+    solver = ca.nlpsol("least_squares", "ipopt", {"x": x, "f": objective(x)}, options)
+    try:
+        solver(x0=start, lbx=lower, ubx=upper)
+    except Exception:
+        if cache.error is not None:
+            raise cache.error from None
+        raise
+    if cache.error is not None:
+        raise cache.error
+    stats = solver.stats()
+    best = cache.best if cache.best is not None else (0.5 * float(first[0] @ first[0]), start)
+    jacobian = cache(best[1])[1]
+    return LeastSquaresResult(
+        x=best[1],
+        cost=best[0],
+        jacobian=jacobian,
+        status=str(stats["return_status"]),
+        success=bool(stats["success"]),
+        iterations=int(stats["iter_count"]),
+    )

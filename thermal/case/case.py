@@ -1,0 +1,212 @@
+"""A case: a building with a stretch of its telemetry, and the signals that the model takes from it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from datetime import datetime
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from thermal.case.building import OUTDOOR, Building
+from thermal.case.points import (
+    DISCHARGE_TEMPERATURE,
+    HEATING_POWER,
+    OUTDOOR_TEMPERATURE,
+    SUPPLY_FLOW,
+    ZONE_TEMPERATURE,
+)
+from thermal.case.quality import QualityReport, assess, usable
+from thermal.case.remarks import TERMINAL_TYPES, remarks
+from thermal.case.schema import Device
+from thermal.case.telemetry import Telemetry
+from thermal.case.times import local_timestamp
+from thermal.errors import EmptyIntervalError, describe
+
+AIR_HEAT_CAPACITY = 1006.0  # J/kg/K, dry air at room temperature (case format)
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """A building and its telemetry.
+
+    Parameters
+    ----------
+    building
+        What stands where.
+    telemetry
+        What its sensors reported.
+    path
+        Folder it was loaded from; None for a case made in memory.
+    judged
+        Quality of the telemetry where it is known already, as for an interval of a longer case; default: judged when
+        first asked for.
+    """
+
+    building: Building
+    telemetry: Telemetry
+    path: Path | None = None
+    judged: QualityReport | None = field(default=None, repr=False)
+
+    @cached_property
+    def quality(self) -> QualityReport:
+        """Quality of the telemetry: `judged`, or else what `assess` finds."""
+        return self.judged if self.judged is not None else assess(self.telemetry, self.building)
+
+    @cached_property
+    def usable(self) -> pd.DataFrame:
+        """Telemetry with what `quality` flags set to NaN: shape (n_time, n_column), library's units."""
+        return usable(self.telemetry.frame, self.quality)
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What is valid in the case and yet worth a look, one sentence each."""
+        return remarks(self.building, self.telemetry)
+
+    @property
+    def step(self) -> float:
+        """Time from a stamp to the next [s]."""
+        return self.telemetry.step
+
+    @property
+    def stamps(self) -> pd.DatetimeIndex:
+        """Stamps of the telemetry, shape (n_time,), in the building's time zone."""
+        return pd.DatetimeIndex(self.telemetry.frame.index)
+
+    def slice(self, start: str | datetime | None = None, end: str | datetime | None = None) -> Case:
+        """Cut an interval out of the case.
+
+        Parameters
+        ----------
+        start, end
+            First and last time of the interval, both included; ISO 8601, local to the building without an offset.
+            Default: from the first, to the last stamp.
+
+        Returns
+        -------
+        Case
+            The same building, and the rows with ``start <= stamp <= end``. A value stands for the step that ends at
+            its stamp, so the first row speaks of the step before `start`. What was flagged in the whole stays flagged.
+
+        Raises
+        ------
+        InvalidTimeError
+            A time is not ISO 8601.
+        EmptyIntervalError
+            Fewer than two stamps lie in the interval.
+        """
+        stamps = self.stamps
+        first = stamps[0] if start is None else local_timestamp(start, self.building)
+        last = stamps[-1] if end is None else local_timestamp(end, self.building)
+        frame = self.telemetry.frame.loc[first:last]
+        if len(frame) < 2:
+            expected = f"an interval with stamps of the telemetry, {stamps[0]} to {stamps[-1]}"
+            raise EmptyIntervalError(describe("interval", expected, f"{first} to {last}"))
+        ends = (frame.index[0], frame.index[-1])
+        missing = tuple(stamp for stamp in self.telemetry.missing_rows if ends[0] <= stamp <= ends[1])
+        telemetry = Telemetry(frame=frame, step=self.step, missing_rows=missing)
+        return replace(self, telemetry=telemetry, judged=self.quality.restricted(*ends))
+
+    def weather(self) -> pd.DataFrame:
+        """Weather, as far as the station measures it.
+
+        Returns
+        -------
+        DataFrame
+            Shape (n_time, n_point), columns the point types present, such as ``direct_normal_irradiance_sensor``, in
+            the library's units ([K], [m/s], [deg], [W/m2]). NaN = missing or unusable.
+        """
+        prefix = f"{self.building.weather_station}/"
+        columns = [column for column in self.usable.columns if column.rpartition("/")[0] + "/" == prefix]
+        return self.usable[columns].rename(columns=lambda column: column.removeprefix(prefix))
+
+    def zone_temperatures(self) -> pd.DataFrame:
+        """Measured air temperature of each zone.
+
+        Returns
+        -------
+        DataFrame
+            Shape (n_time, n_zone) [K], columns `building.zone_names`. NaN = missing or unusable; the column of a zone
+            that nothing measures is all NaN. Where several sensors measure a zone (its devices', its own), it is the
+            mean of those that are usable at the stamp.
+        """
+        frame = self.usable
+        measured = {}
+        for zone in self.building.zone_names:
+            entities = [zone, *(device.name for device in self.building.devices_of(zone))]
+            columns = [f"{entity}/{ZONE_TEMPERATURE}" for entity in entities]
+            measured[zone] = frame.reindex(columns=[column for column in columns if column in frame]).mean(axis=1)
+        return pd.DataFrame(measured, index=frame.index, dtype=float)
+
+    def zone_heat(self) -> pd.DataFrame:
+        """Metered heat that each zone receives from its devices.
+
+        Returns
+        -------
+        DataFrame
+            Shape (n_time, n_zone) [W], columns `building.zone_names`, heating positive. 0 for a zone without devices;
+            NaN where an input is missing or unusable.
+
+        Notes
+        -----
+        ``q = flow * 1006 J/kg/K * (discharge - zone temperature) + heating_power``, of measured temperatures of the
+        same stamp. A flow of exactly zero brings no heat, whatever the discharge sensor says or fails to say. A
+        terminal unit or heater of a known type that reports neither flow nor power makes its zone's heat unknown: NaN.
+        """
+        temperatures = self.zone_temperatures()
+        heat = pd.DataFrame(0.0, index=temperatures.index, columns=temperatures.columns)
+        for device in self.building.devices:
+            if device.zone is not None:
+                heat[device.zone] = heat[device.zone] + self._device_heat(device, temperatures[device.zone])
+        return heat
+
+    def boundary_temperatures(self) -> pd.DataFrame:
+        """Temperatures that the zones look out on.
+
+        Returns
+        -------
+        DataFrame
+            Shape (n_time, 1 + n_boundary) [K]: ``outdoor``, then `building.measured_boundaries`. Outdoor is the weather
+            station's; without one, the mean of what devices (air handlers) report; all NaN when nothing does.
+        """
+        frame = self.usable
+        station = f"{self.building.weather_station}/{OUTDOOR_TEMPERATURE}"
+        outdoor = [c for c in frame.columns if c == station] or [
+            c for c in frame.columns if c.endswith(f"/{OUTDOOR_TEMPERATURE}")
+        ]
+        columns = {OUTDOOR: frame[outdoor].mean(axis=1)}
+        for boundary in self.building.measured_boundaries:
+            columns[boundary] = frame[f"{boundary}/{ZONE_TEMPERATURE}"]
+        return pd.DataFrame(columns, index=frame.index, dtype=float)
+
+    def airflow_rates(self) -> pd.DataFrame:
+        """Air that goes on from zone to zone.
+
+        Returns
+        -------
+        DataFrame
+            Shape (n_time, n_airflow) [kg/s], columns 0..n-1 in the order of `building.airflows`: the device's flow
+            times the fraction. NaN where the flow is missing or unusable.
+        """
+        frame = self.usable
+        rates = {}
+        for number, airflow in enumerate(self.building.airflows):
+            column = f"{airflow.device}/{SUPPLY_FLOW}"
+            flow = frame[column] if column in frame else pd.Series(np.nan, index=frame.index)
+            rates[number] = flow * airflow.fraction
+        return pd.DataFrame(rates, index=frame.index, columns=range(len(self.building.airflows)), dtype=float)
+
+    def _device_heat(self, device: Device, zone_temperature: pd.Series) -> pd.Series:
+        frame = self.usable
+        flow, discharge, power = (
+            frame.get(f"{device.name}/{point}") for point in (SUPPLY_FLOW, DISCHARGE_TEMPERATURE, HEATING_POWER)
+        )
+        heat = pd.Series(0.0, index=frame.index)
+        if flow is None and power is None and (discharge is not None or device.type in TERMINAL_TYPES):
+            return heat * np.nan
+        if flow is not None:
+            air = discharge if discharge is not None else heat * np.nan
+            heat = heat + (flow * AIR_HEAT_CAPACITY * (air - zone_temperature)).where(flow != 0.0, 0.0)
+        return heat if power is None else heat + power

@@ -1,0 +1,174 @@
+"""Saving a case folder: whole or not at all."""
+
+from __future__ import annotations
+
+import csv
+import os
+import re
+import tempfile
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import yaml
+
+from thermal.case.building import Building, FloorPlan, FloorPlans
+from thermal.case.building_file import NAME
+from thermal.case.case import Case
+from thermal.case.load import load_case
+from thermal.case.points import POINT_TYPES, split_column
+from thermal.case.telemetry import Telemetry
+from thermal.errors import CaseExistsError, describe
+from thermal.units import QUANTITIES, from_si
+
+FORMAT = 1
+TELEMETRY_FILE = "telemetry.parquet"
+
+
+def save_case(case: Case, path: str | PathLike[str], *, overwrite: bool = False) -> Path:
+    """Save a case as a folder.
+
+    Parameters
+    ----------
+    case
+        Case to save; all of its telemetry as measured, flaws included, in the units of the case format's table.
+    path
+        Folder to make; parents are made too.
+    overwrite
+        Whether a case that is there already is replaced, with every file in its folder. Default: refuse.
+
+    Returns
+    -------
+    Path
+        The folder.
+
+    Raises
+    ------
+    CaseExistsError
+        The folder holds something and `overwrite` is not set, or what it holds is not a case.
+    CaseError
+        One of its family: the case does not fit together. Nothing is written then.
+
+    Notes
+    -----
+    Everything is written beside the target, read back, and moved there in one step, so that no one ever sees a
+    half-written case, and every saved case loads.
+
+    Examples
+    --------
+    >>> save_case(case, "cases/pilot")  # doctest: +SKIP
+    PosixPath('cases/pilot')
+    """
+    target = Path(path)
+    _check_target(target, overwrite)
+    telemetry = Telemetry.from_frame(case.telemetry.frame)
+    reported = telemetry.frame.drop(index=pd.Index(case.telemetry.missing_rows))
+    target.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(prefix=f".{target.name}-", dir=target.parent) as work:
+        new = Path(work) / "new"
+        new.mkdir()
+        _write(case.building, reported, new)
+        load_case(new)  # what cannot be read back is not saved
+        if target.exists():
+            os.replace(target, Path(work) / "old")
+        try:
+            os.replace(new, target)
+        except OSError:
+            if (Path(work) / "old").exists():
+                os.replace(Path(work) / "old", target)
+            raise
+    return target
+
+
+def _check_target(target: Path, overwrite: bool) -> None:
+    if not target.exists():
+        return
+    if not target.is_dir():
+        raise CaseExistsError(describe(str(target), "a folder to make", "a file", "choose another path"))
+    if any(target.iterdir()):
+        if not overwrite:
+            advice = "choose another folder or pass overwrite=True"
+            raise CaseExistsError(
+                describe(str(target), "no folder or an empty one", "a folder that holds files", advice)
+            )
+        if not (target / NAME).is_file():
+            found = f"a folder without {NAME}"
+            raise CaseExistsError(describe(str(target), "a case to overwrite", found, "choose another folder"))
+
+
+def _write(building: Building, frame: pd.DataFrame, folder: Path) -> None:
+    content = _plain(_content(building, frame))
+    if isinstance(building.geometry, FloorPlans):
+        for floor, entry in zip(building.geometry.floors, content["floors"], strict=True):
+            _write_plan(floor, folder / entry["plan"])
+    with (folder / NAME).open("w", encoding="utf-8") as stream:
+        yaml.safe_dump(content, stream, sort_keys=False, allow_unicode=True, width=120)
+    columns = {}
+    for column in frame.columns:
+        quantity = POINT_TYPES[split_column(str(column), TELEMETRY_FILE)[1]].quantity
+        columns[str(column)] = from_si(frame[column].to_numpy(), QUANTITIES[quantity].file_unit, quantity)
+    pd.DataFrame(columns, index=frame.index).to_parquet(folder / TELEMETRY_FILE, compression="zstd")
+
+
+def _write_plan(floor: FloorPlan, path: Path) -> None:
+    with path.open("w", encoding="utf-8", newline="") as stream:
+        csv.writer(stream, lineterminator="\n").writerows(floor.tokens.tolist())
+
+
+def _content(building: Building, frame: pd.DataFrame) -> dict[str, Any]:
+    points = dict.fromkeys(split_column(str(column), TELEMETRY_FILE)[1] for column in frame.columns)
+    return {
+        "format": FORMAT,
+        "name": building.name,
+        "location": building.location.model_dump(),
+        "orientation": building.orientation,
+        **_geometry(building),
+        "devices": [device.model_dump(exclude_none=True) for device in building.devices],
+        "airflows": [airflow.model_dump(by_alias=True) for airflow in building.airflows],
+        "weather_station": building.weather_station,
+        "telemetry": TELEMETRY_FILE,
+        "units": {point: QUANTITIES[POINT_TYPES[point].quantity].file_unit for point in points},
+    }
+
+
+def _plain(content: Any) -> Any:
+    """Turn numpy's numbers and texts, which YAML does not know, into Python's."""
+    if isinstance(content, dict):
+        return {_plain(key): _plain(value) for key, value in content.items()}
+    if isinstance(content, list):
+        return [_plain(value) for value in content]
+    return str(content) if isinstance(content, str) else content.item() if isinstance(content, np.generic) else content
+
+
+def _geometry(building: Building) -> dict[str, Any]:
+    geometry = building.geometry
+    if isinstance(geometry, FloorPlans):
+        files = _plan_files(geometry)
+        return {
+            "cell_size": geometry.cell_size,
+            "floors": [
+                {"name": floor.name, "height": floor.height, "plan": file}
+                for floor, file in zip(geometry.floors, files, strict=True)
+            ],
+            "glazing": {zone: dict(by_facade) for zone, by_facade in geometry.glazing.items()},
+        }
+    return {
+        "zones": [zone.model_dump() for zone in geometry.zones],
+        "surfaces": [surface.model_dump(exclude_none=True) for surface in geometry.surfaces],
+        "constructions": {
+            name: [layer.model_dump() for layer in layers] for name, layers in geometry.constructions.items()
+        },
+    }
+
+
+def _plan_files(plans: FloorPlans) -> list[str]:
+    """Name a file for each floor: its own name as far as files allow it, numbered when two become the same."""
+    names: list[str] = []
+    for number, floor in enumerate(plans.floors, start=1):
+        stem = re.sub(r"[^A-Za-z0-9_-]+", "_", floor.name) or str(number)
+        taken = {name.casefold() for name in names}
+        file = f"plan_{stem}.csv"
+        names.append(f"plan_{stem}_{number}.csv" if file.casefold() in taken else file)
+    return names

@@ -1,0 +1,25 @@
+"""The symbolic model and what runs it."""
+
+from thermal.model._reduction import krylov_basis, reduced_model
+from thermal.model._replay import Inputs, free_runs, replay_inputs, spin_up
+from thermal.model._scheme import IMPLICIT_EULER, SCHEMES, TR_BDF2, Scheme, Stage
+from thermal.model._stepper import Stepper, factorise
+from thermal.model._symbolic import Matrices, SymbolicModel
+
+__all__ = [
+    "IMPLICIT_EULER",
+    "SCHEMES",
+    "TR_BDF2",
+    "Inputs",
+    "Matrices",
+    "Scheme",
+    "Stage",
+    "Stepper",
+    "SymbolicModel",
+    "factorise",
+    "free_runs",
+    "krylov_basis",
+    "reduced_model",
+    "replay_inputs",
+    "spin_up",
+]

@@ -1,0 +1,169 @@
+"""The symbolic model: class conductances κ(θ) and capacities c(θ), their derivatives, and the matrices they make."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from thermal.errors import ModelError
+from thermal.network import ThermalNetwork
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Matrices:
+    """The model at one θ: ``C dT/dt = -K T + B u + H q`` and its derivatives with respect to θ.
+
+    The boundary nodes are the last columns of ``flow = [K, -B]``, so that ``flow @ [T; u]`` is the heat that leaves each volume.
+
+    Parameters
+    ----------
+    capacity : sparse matrix or ndarray, shape (n, n)
+        C [J/K]; diagonal on the grid.
+    flow : sparse matrix or ndarray, shape (n, n + n_boundary)
+        ``[K, -B]`` [W/K].
+    heating : matrix, shape (n, n_zone)
+        H, distribution of a zone's heat; columns sum to 1 on the grid.
+    observation : matrix, shape (n_zone, n)
+        Zone means.
+    uniform : ndarray, shape (n,)
+        The state in which every volume is at 1 K.
+    capacity_slopes, flow_slopes : list of matrices
+        dC/dθ_j and d[K, -B]/dθ_j, one a parameter.
+    """
+
+    capacity: sp.csr_matrix | FloatArray
+    flow: sp.csr_matrix | FloatArray
+    heating: sp.csr_matrix | FloatArray
+    observation: sp.csr_matrix | FloatArray
+    uniform: FloatArray
+    capacity_slopes: list[sp.csr_matrix | FloatArray]
+    flow_slopes: list[sp.csr_matrix | FloatArray]
+
+    @property
+    def n(self) -> int:
+        """Number of states."""
+        return int(self.flow.shape[0])
+
+    @property
+    def n_boundary(self) -> int:
+        """Number of boundary temperatures."""
+        return int(self.flow.shape[1] - self.flow.shape[0])
+
+
+class SymbolicModel:
+    """A network's conductances and capacities as CasADi functions of θ, differentiated by CasADi.
+
+    Parameters
+    ----------
+    network : ThermalNetwork
+        Control volumes and faces.
+    projection : ndarray, shape (n_node, r), optional
+        Orthonormal basis of a Galerkin reduction: every class matrix is projected, so the model stays affine in κ(θ) and c(θ).
+
+    Examples
+    --------
+    >>> from thermal import load_bundled_case, build_network, SymbolicModel
+    >>> model = SymbolicModel(build_network(load_bundled_case().building, dx=1.0))
+    >>> model.matrices(model.network.start()).n > 100
+    True
+    """
+
+    def __init__(self, network: ThermalNetwork, projection: FloatArray | None = None) -> None:
+        self.network, self.projection = network, projection
+        kappa = ca.vertcat(*[c.value for c in network.conductances])
+        heat = ca.vertcat(*[c.value for c in network.capacities])
+        theta = network.symbols
+        jacobians = [ca.densify(ca.jacobian(e, theta)) for e in (kappa, heat)]
+        self.classes = ca.Function("classes", [theta], [kappa, heat], ["theta"], ["conductance", "capacity"])
+        self._slopes = ca.Function("slopes", [theta], jacobians)
+        laplacians = [class_laplacian(network, k) for k in range(len(network.conductances))]
+        masses = [class_mass(network, k) for k in range(len(network.capacities))]
+        self._heating: sp.csr_matrix | FloatArray = network.heating
+        self._observation: sp.csr_matrix | FloatArray = network.observation
+        self._uniform = np.ones(network.n_node)
+        self._flows: list[sp.csr_matrix] | list[FloatArray] = laplacians
+        self._masses: list[sp.csr_matrix] | list[FloatArray] = masses
+        if projection is not None:
+            self._project(projection, laplacians, masses)
+
+    def _project(self, v: FloatArray, laplacians: list[sp.csr_matrix], masses: list[sp.csr_matrix]) -> None:
+        n = self.network.n_node
+        self._flows = [np.hstack([v.T @ (m[:, :n] @ v), v.T @ m[:, n:].toarray()]) for m in laplacians]
+        self._masses = [v.T @ (m @ v) for m in masses]
+        self._uniform = v.T @ np.ones(n)
+        self._heating = v.T @ self.network.heating.toarray()
+        self._observation = self.network.observation @ v
+
+    def matrices(self, theta: FloatArray, slopes: bool = False) -> Matrices:
+        """Assemble the model at θ.
+
+        Parameters
+        ----------
+        theta : ndarray, shape (n_parameter,)
+            Parameter values in the units of `ThermalNetwork.parameters`.
+        slopes : bool
+            Also the derivatives with respect to θ.
+
+        Raises
+        ------
+        ModelError
+            When θ has the wrong length or a value that is not positive and finite.
+        """
+        theta = np.asarray(theta, dtype=float)
+        names = [p.name for p in self.network.parameters]
+        if theta.shape != (len(names),):
+            raise ModelError(f"theta: expected shape ({len(names)},) for {names}, came {theta.shape}")
+        bad = [n for n, t in zip(names, theta, strict=True) if not (np.isfinite(t) and t > 0)]
+        if bad:
+            raise ModelError(f"theta: expected positive finite values, came {theta[names.index(bad[0])]} for {bad[0]}")
+        kappa, heat = (np.asarray(v).ravel() for v in self.classes(theta))
+        flow_slopes: list[sp.csr_matrix | FloatArray] = []
+        capacity_slopes: list[sp.csr_matrix | FloatArray] = []
+        if slopes:
+            d_kappa, d_heat = (np.asarray(v) for v in self._slopes(theta))
+            flow_slopes = [_weighted(self._flows, d_kappa[:, j]) for j in range(theta.size)]
+            capacity_slopes = [_weighted(self._masses, d_heat[:, j]) for j in range(theta.size)]
+        return Matrices(
+            capacity=_weighted(self._masses, heat),
+            flow=_weighted(self._flows, kappa),
+            heating=self._heating,
+            observation=self._observation,
+            uniform=self._uniform,
+            capacity_slopes=capacity_slopes,
+            flow_slopes=flow_slopes,
+        )
+
+
+def _weighted(
+    terms: list[sp.csr_matrix] | list[FloatArray], weights: FloatArray
+) -> sp.csr_matrix | FloatArray:
+    """Sum of class matrices with weights; zero weights cost nothing."""
+    chosen = [w * m for w, m in zip(weights, terms, strict=True) if w != 0.0]
+    total = sum(chosen[1:], chosen[0]) if chosen else 0.0 * terms[0]
+    if sp.issparse(total):
+        total = sp.csr_matrix(total)
+        total.eliminate_zeros()
+    return total
+
+
+def class_laplacian(network: ThermalNetwork, k: int) -> sp.csr_matrix:
+    """Rows of the graph Laplacian of conductance class ``k`` at κ = 1, shape (n_node, n_node + n_boundary) [m2 or as the class says]."""
+    c = network.conductances[k]
+    n, total = network.n_node, network.n_node + network.n_boundary
+    rows = np.concatenate([c.first, c.second, c.first, c.second])
+    columns = np.concatenate([c.first, c.second, c.second, c.first])
+    values = np.concatenate([c.weight, c.weight, -c.weight, -c.weight])
+    return sp.csr_matrix((values, (rows, columns)), shape=(total, total))[:n]
+
+
+def class_mass(network: ThermalNetwork, k: int) -> sp.csr_matrix:
+    """Diagonal matrix of capacity class ``k`` at unit heat capacity, shape (n_node, n_node)."""
+    c = network.capacities[k]
+    n = network.n_node
+    return sp.csr_matrix(sp.diags(np.bincount(c.node, c.weight, minlength=n)))

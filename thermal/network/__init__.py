@@ -1,0 +1,21 @@
+"""Control volumes and faces of a building, as one graph."""
+
+from thermal.network._build import build_network
+from thermal.network._films import series, surface_mesh
+from thermal.network._graph import CapacityClass, ConductanceClass, GraphBuilder, ThermalNetwork
+from thermal.network._grid import FloorGrid, floor_grid
+from thermal.network._materials import AIR_HEAT_CAPACITY, air_density
+
+__all__ = [
+    "AIR_HEAT_CAPACITY",
+    "CapacityClass",
+    "ConductanceClass",
+    "FloorGrid",
+    "GraphBuilder",
+    "ThermalNetwork",
+    "air_density",
+    "build_network",
+    "floor_grid",
+    "series",
+    "surface_mesh",
+]

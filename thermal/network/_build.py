@@ -1,0 +1,50 @@
+"""One entry for both kinds of geometry."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermal.case import Building, ZoneTable
+from thermal.network._graph import ThermalNetwork
+from thermal.network._materials import SHUFFLE_STEP
+from thermal.network._plan import plan_network
+from thermal.network._table import table_network
+from thermal.parameters import Scope
+
+
+def build_network(
+    building: Building,
+    dx: float | None = None,
+    step: float = SHUFFLE_STEP,
+    reach: float | None = None,
+    scopes: Mapping[str, Scope] | None = None,
+    diffusers: Mapping[str, NDArray[np.bool_]] | None = None,
+) -> ThermalNetwork:
+    """Build the control volumes and faces of a building, from floor plans or from a zone table.
+
+    Parameters
+    ----------
+    building : Building
+        What the case folder describes.
+    dx : float, optional
+        Distance between control volumes of a plan [m]; its cell size by default. A zone table has none and ignores it.
+    step : float
+        Time step that the mean of the shuffle stands for [s].
+    reach : float, optional
+        Reach of the shuffle [m]; None is the whole zone.
+    scopes : mapping of str to {"global", "zone"}, optional
+        Parameters with one value a zone; the others are global.
+    diffusers : mapping of str to ndarray of bool, optional
+        Cells with a diffuser, per zone, at the plan's resolution; all air cells by default.
+
+    Returns
+    -------
+    ThermalNetwork
+        The baseline of the architecture: no sun, sky, leakage, gains, exchange between floors, ground or roof.
+    """
+    if isinstance(building.geometry, ZoneTable):
+        return table_network(building, scopes)
+    return plan_network(building, dx, step, reach, scopes, diffusers)

@@ -1,0 +1,141 @@
+"""A floor plan at a chosen cell size: refined by splitting cells, coarsened by merging cells of one token in a block."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermal.case import FloorPlan
+from thermal.errors import CellSizeError
+
+IntArray = NDArray[np.int64]
+
+#: Steps (row, column) towards the plan's sides; north is the first row.
+FACADES: dict[str, tuple[int, int]] = {"north": (-1, 0), "south": (1, 0), "west": (0, -1), "east": (0, 1)}
+
+
+@dataclass(frozen=True)
+class FloorGrid:
+    """One floor's cells and the control volume each belongs to.
+
+    Parameters
+    ----------
+    tokens : ndarray of str, shape (n_row + 2, n_column + 2)
+        Tokens of the cells, with a rim of outside cells around the plan.
+    cell : float
+        Side of a cell [m].
+    spacing : float
+        Distance between neighbouring control volumes [m]: ``cell``, or the block's side after coarsening.
+    volume : ndarray of int, shape like ``tokens``
+        Number of the cell's control volume on this floor, -1 outside.
+    place : ndarray, shape (n_volume, 2)
+        Row and column of each control volume in units of ``spacing``.
+    token : ndarray of str, shape (n_volume,)
+        What each control volume is.
+    """
+
+    tokens: NDArray[np.str_]
+    cell: float
+    spacing: float
+    volume: IntArray
+    place: IntArray
+    token: NDArray[np.str_]
+
+    def neighbours(self, step: tuple[int, int]) -> tuple[IntArray, IntArray]:
+        """Flat cell numbers of all pairs (cell, neighbour in direction ``step``)."""
+        index = np.arange(self.tokens.size).reshape(self.tokens.shape)
+        dr, dc = step
+        n_r, n_c = self.tokens.shape
+        here = index[max(0, -dr) : n_r - max(0, dr), max(0, -dc) : n_c - max(0, dc)]
+        there = index[max(0, dr) : n_r - max(0, -dr), max(0, dc) : n_c - max(0, -dc)]
+        return here.ravel(), there.ravel()
+
+
+def resolution(cell_size: float, dx: float | None) -> tuple[int, Fraction]:
+    """How to reach cells of ``dx`` from plan cells: split factor and merge ratio.
+
+    Parameters
+    ----------
+    cell_size : float
+        Side of the plan's cells [m].
+    dx : float or None
+        Wanted distance between control volumes [m]; None keeps the plan's.
+
+    Returns
+    -------
+    tuple of (int, Fraction)
+        Each cell is split into split x split, then blocks of merge x merge cells are merged.
+
+    Raises
+    ------
+    CellSizeError
+        When ``dx`` is not positive, or is finer than the plan but does not divide its cells.
+    """
+    if dx is None:
+        return 1, Fraction(1)
+    if not (np.isfinite(dx) and dx > 0):
+        raise CellSizeError(f"cell size: expected a positive number of metres, came {dx}")
+    ratio = Fraction(cell_size / dx).limit_denominator(1000)
+    if ratio > 1:
+        if ratio.denominator != 1:
+            split = max(2, round(cell_size / dx))
+            raise CellSizeError(
+                f"cell size {dx} m does not divide the plan's cells of {cell_size} m; nearest that does: {cell_size / split:g} m"
+            )
+        return int(ratio), Fraction(1)
+    return 1, 1 / ratio
+
+
+def floor_grid(plan: FloorPlan, cell_size: float, dx: float | None = None) -> FloorGrid:
+    """Cells and control volumes of one floor at distance ``dx``.
+
+    Merging keeps what the plan says: cells of different tokens in one block become different control volumes, so areas, volumes and
+    one-cell walls stay exact and zones never merge.
+
+    Parameters
+    ----------
+    plan : FloorPlan
+        The floor.
+    cell_size : float
+        Side of the plan's cells [m].
+    dx : float, optional
+        Distance between control volumes [m]; the plan's own by default.
+
+    Raises
+    ------
+    CellSizeError
+        See `resolution`; also when a block would swallow a whole zone together with a neighbour.
+    """
+    split, merge = resolution(cell_size, dx)
+    tokens = np.repeat(np.repeat(np.asarray(plan.tokens), split, axis=0), split, axis=1)
+    _refuse_swallowed_zones(plan, tokens, float(merge), cell_size)
+    tokens = np.pad(tokens, 1, constant_values=".")
+    rows, columns = np.indices(tokens.shape)
+    names, code = np.unique(tokens, return_inverse=True)
+    code = code.reshape(tokens.shape)
+    block_r = ((rows - 1 + 0.5) / float(merge)).astype(np.int64)
+    block_c = ((columns - 1 + 0.5) / float(merge)).astype(np.int64)
+    solid = tokens != "."
+    key = np.stack([block_r[solid], block_c[solid], code[solid]], axis=1)
+    unique, inverse = np.unique(key, axis=0, return_inverse=True)
+    volume = np.full(tokens.shape, -1, dtype=np.int64)
+    volume[solid] = inverse.ravel()
+    cell = cell_size / split
+    return FloorGrid(tokens, cell, cell * float(merge), volume, unique[:, :2], names[unique[:, 2]])
+
+
+def _refuse_swallowed_zones(plan: FloorPlan, tokens: NDArray[np.str_], merge: float, cell_size: float) -> None:
+    """Refuse blocks wider than the narrowest zone and its walls: the grid would no longer tell it from its neighbour."""
+    if merge <= 1.0:
+        return
+    for zone in sorted(set(np.unique(tokens)) - {".", "#", "+"}):
+        rows, columns = np.nonzero(tokens == zone)
+        extent = min(np.ptp(rows), np.ptp(columns)) + 1
+        if extent + 1 < merge:
+            raise CellSizeError(
+                f"cell size {merge * cell_size:g} m on floor {plan.name}: zone {zone} is only {extent * cell_size:g} m wide and would "
+                f"merge with its neighbour; use at most {(extent + 1) * cell_size:g} m"
+            )

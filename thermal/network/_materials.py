@@ -1,0 +1,47 @@
+"""Fixed values of the baseline's construction: what the parameters do not carry."""
+
+from __future__ import annotations
+
+import numpy as np
+
+#: Specific heat of air [J/kg/K]; the value of the metered heat (Digital Buildings flow meters, case-format contract).
+AIR_HEAT_CAPACITY = 1006.0
+
+#: Molecular conductivity of air at 20 degC [W/m/K] (Incropera, Fundamentals of Heat and Mass Transfer, Table A.4).
+AIR_CONDUCTIVITY = 0.026
+
+#: Resistance of the structural layer of an exterior wall [m2K/W], which carries its mass inside the insulation: 0.2 m of
+#: concrete or brick at 1.4 W/m/K (ISO 10456:2007 Table 3).
+STRUCTURE_RESISTANCE = 0.15
+
+#: Nominal areal mass of an exterior wall's structure and of a partition [kg/m2]; only mass times heat capacity is determined.
+EXTERIOR_WALL_MASS = 150.0
+INTERIOR_WALL_MASS = 60.0
+
+#: Inside surface resistance towards a space that is not simulated [m2K/W] (ISO 6946:2017 Table 7).
+BOUNDARY_FILM_RESISTANCE = 0.13
+
+#: Inside film that the rated u-value of a window contains [W/m2/K] (EN 673:2011, h_i).
+WINDOW_RATED_FILM = 7.7
+
+#: Combined outside film that rated u-values contain [W/m2/K] (EN 673:2011, h_e).
+RATED_OUTSIDE_FILM = 25.0
+
+#: Step of the paper's shuffle [s].
+SHUFFLE_STEP = 300.0
+
+
+def air_density(elevation: float) -> float:
+    """Density of dry air at 20 degC and the standard pressure of an elevation [kg/m3].
+
+    Parameters
+    ----------
+    elevation : float
+        Height above sea level [m].
+
+    Notes
+    -----
+    ASHRAE Handbook Fundamentals 2021, ch. 1 eq. 3; ideal gas with R = 287.05 J/kg/K.
+    """
+    pressure = 101325.0 * (1.0 - 2.25577e-5 * np.clip(elevation, -500.0, 9000.0)) ** 5.2559
+    return float(pressure / (287.05 * 293.15))

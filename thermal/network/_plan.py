@@ -1,0 +1,251 @@
+"""From floor plans to control volumes and faces."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from thermal.case import Building, FloorPlan, FloorPlans, zone_floor_areas
+from thermal.network._films import series
+from thermal.network._graph import GraphBuilder, ThermalNetwork
+from thermal.network._grid import FACADES, FloorGrid, floor_grid
+from thermal.network._interior import Zone
+from thermal.network._materials import (
+    AIR_CONDUCTIVITY,
+    AIR_HEAT_CAPACITY,
+    EXTERIOR_WALL_MASS,
+    INTERIOR_WALL_MASS,
+    SHUFFLE_STEP,
+    STRUCTURE_RESISTANCE,
+    air_density,
+)
+from thermal.parameters import Scope
+from thermal.shuffle import choose_equivalent, effective_diffusivity, mean_square_reach, mixing_rate
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+
+def plan_network(
+    building: Building,
+    dx: float | None = None,
+    step: float = SHUFFLE_STEP,
+    reach: float | None = None,
+    scopes: Mapping[str, Scope] | None = None,
+    diffusers: Mapping[str, NDArray[np.bool_]] | None = None,
+) -> ThermalNetwork:
+    """Build the network of a building given by floor plans.
+
+    Parameters
+    ----------
+    building : Building
+        With `FloorPlans` geometry.
+    dx : float, optional
+        Distance between control volumes [m]; the plan's cell size by default.
+    step : float
+        Time step that the mixing rate of the shuffle stands for [s].
+    reach : float, optional
+        Reach of the shuffle [m]; None is the whole zone.
+    scopes : mapping of str to {"global", "zone"}, optional
+        Parameters with one value a zone.
+    diffusers : mapping of str to ndarray of bool, optional
+        Per zone, a mask of the shape of its floor's plan with the cells that have a diffuser; all air cells by default.
+
+    Returns
+    -------
+    ThermalNetwork
+        Boundary ``outdoor``; slabs adiabatic at their back; no air exchange between zones (both are effects of the catalogue).
+    """
+    plans = building.geometry
+    assert isinstance(plans, FloorPlans)  # noqa: S101 - narrows the type; build_network chose this builder by it
+    graph = GraphBuilder(building.zone_names, ("outdoor",), scopes or {})
+    areas = zone_floor_areas(plans)
+    density = air_density(building.location.elevation)
+    diffuser_weight: dict[int, FloatArray] = {}
+    zones: dict[str, Zone] = {}
+    for number, plan in enumerate(plans.floors):
+        grid = floor_grid(plan, plans.cell_size, dx)
+        floor = _Floor(graph, plan, grid, number, plans.cell_size)
+        for name in (z for z in building.zone_names if (grid.token == z).any()):
+            zones[name] = floor.zone(name, areas[name], density, step, reach)
+            mask = (diffusers or {}).get(name)
+            diffuser_weight[zones[name].number] = floor.diffuser_weight(name, mask)
+        floor.walls(zones, plans.glazing)
+    n = graph.size
+    columns = [(z.air, np.full(z.air.size, z.number), diffuser_weight[z.number]) for z in zones.values()]
+    node = np.concatenate([c[0] for c in columns])
+    column = np.concatenate([c[1] for c in columns])
+    share = np.concatenate([c[2] for c in columns])
+    mean = np.concatenate([z.share for z in zones.values()])
+    shape = (n, len(graph.zones))
+    heating = sp.csr_matrix((share, (node, column)), shape=shape)
+    observation = sp.csr_matrix((mean, (column, node)), shape=shape[::-1])
+    flows = tuple((graph.zones.index(a.source), graph.zones.index(a.target)) for a in building.airflows)
+    return graph.finish(observation, heating, flows)
+
+
+class _Floor:
+    """Volumes and faces of one floor."""
+
+    def __init__(self, graph: GraphBuilder, plan: FloorPlan, grid: FloorGrid, number: int, wall: float) -> None:
+        self.graph, self.plan, self.grid, self.wall = graph, plan, grid, wall
+        token = grid.token
+        names = [z for z in graph.zones if (token == z).any()]
+        zone = np.full(token.size, -1, dtype=np.int64)
+        for name in names:
+            zone[token == name] = graph.zones.index(name)
+        kind = np.where(token == "#", "exterior_wall", np.where(token == "+", "interior_wall", "air"))
+        place = np.column_stack([np.full(token.size, number), grid.place])
+        self.node = np.empty(token.size, dtype=np.int64)
+        for k in ("air", "exterior_wall", "interior_wall"):
+            mask = kind == k
+            if mask.any():
+                self.node[mask] = graph.volumes(k, zone[mask], place[mask])
+        self.cells = np.bincount(grid.volume[grid.volume >= 0], minlength=token.size)
+
+    def zone(self, name: str, area: float, density: float, step: float, reach: float | None) -> Zone:
+        """Air of one zone with its shuffle, slabs and furniture."""
+        graph, grid = self.graph, self.grid
+        mine = grid.token == name
+        air, count = self.node[mine], self.cells[mine]
+        zone = Zone(graph, name, air, count / count.sum())
+        heat = density * AIR_HEAT_CAPACITY
+        graph.capacity("air", heat, air, area * self.plan.height * zone.share)
+        if air.size > 1:
+            self._shuffle(zone, area, heat, step, reach)
+        zone.slabs(2.0 * area)
+        zone.furniture(area)
+        return zone
+
+    def _shuffle(self, zone: Zone, area: float, heat: float, step: float, reach: float | None) -> None:
+        """Mean of the paper's random shuffle: a massless star node, or an effective diffusivity (see `thermal.shuffle`)."""
+        graph, grid = self.graph, self.grid
+        probability = graph.parameter("shuffle_probability", zone.name)
+        rows, columns = np.nonzero(grid.tokens == zone.name)
+        extent = ((np.ptp(columns) + 1) * grid.cell, (np.ptp(rows) + 1) * grid.cell)
+        conductivity = AIR_CONDUCTIVITY
+        name = graph.key("air-air", zone.name, "shuffle_probability")
+        if choose_equivalent(extent, reach) == "mixing" or reach is None:
+            star = graph.volumes("mixing", zone.number)
+            rate = mixing_rate(probability, SHUFFLE_STEP, step)
+            key = graph.key("mixing", zone.name, "shuffle_probability")
+            graph.face(key, rate * heat, zone.air, star, area * self.plan.height * zone.share)
+        else:
+            diffusivity = effective_diffusivity(probability, mean_square_reach(reach, grid.cell), SHUFFLE_STEP)
+            conductivity = AIR_CONDUCTIVITY + diffusivity * heat
+            name = f"{name} diffusing"
+        for step_ in (FACADES["south"], FACADES["east"]):
+            first, second, faces = self._pairs(step_, zone.name, zone.name)
+            graph.face(name, conductivity, first, second, faces * grid.cell * self.plan.height / grid.spacing)
+
+    def diffuser_weight(self, name: str, mask: NDArray[np.bool_] | None) -> FloatArray:
+        """Share of the zone's heat in each of its air volumes, sums to 1."""
+        grid = self.grid
+        split = (grid.tokens.shape[0] - 2) // self.plan.tokens.shape[0]
+        cells = grid.tokens == name
+        if mask is not None:
+            cells &= np.pad(np.repeat(np.repeat(mask, split, axis=0), split, axis=1), 1)
+        count = np.bincount(grid.volume[cells], minlength=grid.token.size)[grid.token == name]
+        return np.asarray(count / count.sum(), dtype=float)
+
+    def walls(self, zones: Mapping[str, Zone], glazing: Mapping[str, Mapping[str, float]]) -> None:
+        """Exterior and interior walls, windows and their faces."""
+        graph, grid, height = self.graph, self.grid, self.plan.height
+        present = {n: z for n, z in zones.items() if (grid.token == n).any()}
+        opaque = self._opaque_share(present, glazing)
+        w = self.wall
+        structure = w / STRUCTURE_RESISTANCE
+        half = 0.5 * grid.cell
+        inner = graph.parameter("interior_wall_conductivity", factor=w)
+        insulation = graph.parameter("exterior_wall_conductivity", factor=w) / w
+        film = graph.parameter("exterior_convection_coefficient")
+        solid_of = {"#": ("exterior_wall", structure / half), "+": ("interior_wall", inner / half)}
+        for facade, step in FACADES.items():
+            for token, (kind, conductance) in solid_of.items():
+                for name, zone in present.items():
+                    self._room_side(zone, kind, conductance, step, token, opaque[facade] if token == "#" else None)
+            face = grid.cell * height
+            self._outside(step, "#", "exterior_wall-outdoor", series(film, insulation, structure / half), opaque[facade])
+            self._outside(step, "+", "interior_wall-outdoor", series(film, inner / half), None)
+            if facade in ("south", "east"):
+                pairs = (("#", "#", structure / grid.spacing), ("+", "+", inner / grid.spacing))
+                mixed = series(structure / half, inner / half)
+                for a, b, value in (*pairs, ("#", "+", mixed), ("+", "#", mixed)):
+                    first, second, faces = self._pairs(step, a, b)
+                    if first.size:
+                        kinds = sorted({solid_of[a][0], solid_of[b][0]})
+                        graph.face("-".join(kinds if len(kinds) > 1 else kinds * 2), value, first, second, faces * face)
+        self._wall_mass(opaque)
+
+    def _wall_mass(self, opaque: Mapping[str, FloatArray]) -> None:
+        graph, grid = self.graph, self.grid
+        cube = grid.cell**2 * self.plan.height
+        least = np.minimum.reduce(list(opaque.values()))
+        for token, name, mass in (("#", "exterior_wall", EXTERIOR_WALL_MASS), ("+", "interior_wall", INTERIOR_WALL_MASS)):
+            mine = grid.token == token
+            if not mine.any():
+                continue
+            density = mass / self.wall
+            graph.nominal[f"{name}_density"] = (density, "kg/m^3")
+            cells = grid.tokens == token
+            weight = least[cells] if token == "#" else np.ones(cells.sum())
+            volume = np.bincount(grid.volume[cells], weight * cube, minlength=grid.token.size)[mine]
+            graph.capacity(name, density * graph.parameter(f"{name}_heat_capacity"), self.node[mine], volume)
+
+    def _pairs(self, step: tuple[int, int], a: str, b: str) -> tuple[IntArray, IntArray, FloatArray]:
+        """Pairs of different volumes of tokens a and b across faces in a direction, and how many cell faces they share."""
+        here, there = self.grid.neighbours(step)
+        tokens, volume = self.grid.tokens.ravel(), self.grid.volume.ravel()
+        keep = (tokens[here] == a) & (tokens[there] == b)
+        first, second = volume[here[keep]], volume[there[keep]]
+        apart = first != second
+        pairs, faces = np.unique(np.column_stack([first[apart], second[apart]]), axis=0, return_counts=True)
+        return self.node[pairs[:, 0]], self.node[pairs[:, 1]], faces.astype(float)
+
+    def _room_side(
+        self, zone: Zone, kind: str, conductance: object, step: tuple[int, int], token: str, share: FloatArray | None
+    ) -> None:
+        here, there = self.grid.neighbours(step)
+        tokens, volume = self.grid.tokens.ravel(), self.grid.volume.ravel()
+        keep = (tokens[here] == zone.name) & (tokens[there] == token)
+        if keep.any():
+            area = np.full(keep.sum(), self.grid.cell * self.plan.height)
+            if share is not None:
+                area *= share.ravel()[there[keep]]
+            zone.surface(kind, conductance, self.node[volume[there[keep]]], area, self.node[volume[here[keep]]],
+                         depends=(f"{kind}_conductivity",))  # fmt: skip
+
+    def _outside(self, step: tuple[int, int], token: str, key: str, value: object, share: FloatArray | None) -> None:
+        here, there = self.grid.neighbours(step)
+        tokens, volume = self.grid.tokens.ravel(), self.grid.volume.ravel()
+        keep = (tokens[here] == token) & (tokens[there] == ".")
+        if keep.any():
+            area = np.full(keep.sum(), self.grid.cell * self.plan.height)
+            if share is not None:
+                area *= share.ravel()[here[keep]]
+            self.graph.face(key, value, self.node[volume[here[keep]]], self.graph.boundary("outdoor"), area)
+
+    def _opaque_share(self, zones: Mapping[str, Zone], glazing: Mapping[str, Mapping[str, float]]) -> dict[str, FloatArray]:
+        """Per facade, the share of each exterior wall cell that is not glass; adds the windows themselves."""
+        grid, graph = self.grid, self.graph
+        shares = {}
+        tokens = grid.tokens
+        for facade, (dr, dc) in FACADES.items():
+            share = np.ones(tokens.shape)
+            for name, zone in zones.items():
+                area = float(glazing.get(name, {}).get(facade, 0.0))
+                cells = (tokens == name) & (np.roll(tokens, (-dr, -dc), (0, 1)) == "#")
+                if area <= 0.0 or not cells.any():
+                    continue
+                exposed = cells.sum() * grid.cell * self.plan.height
+                rows, columns = np.nonzero(cells)
+                air = self.node[grid.volume[rows, columns]]
+                zone.window(graph.parameter("window_u_value", name), area, graph.boundary("outdoor"), air, depends="window_u_value")
+                while (wall := tokens[rows + dr, columns + dc] == "#").any():
+                    rows, columns = rows[wall] + dr, columns[wall] + dc
+                    share[rows, columns] = max(0.0, 1.0 - area / exposed)
+            shares[facade] = share
+        return shares

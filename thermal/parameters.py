@@ -1,0 +1,104 @@
+"""The calibrated parameters of the baseline: name, unit, start, physical range and where the range comes from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+Scope = Literal["global", "zone"]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A physical parameter θ of the building model.
+
+    Parameters
+    ----------
+    name : str
+        Field term in full; a per-zone parameter is ``name@zone``.
+    unit : str
+        Unit as pint reads it.
+    start : float
+        Value before calibration [unit]; the centre of the prior.
+    lower, upper : float
+        Physical range [unit], ``0 < lower < start < upper``.
+    source : str
+        Where start and range come from.
+    logit : bool
+        True for a probability, estimated on the logit scale; every other parameter is estimated on the log scale.
+
+    Raises
+    ------
+    ValueError
+        When the range does not hold the start.
+    """
+
+    name: str
+    unit: str
+    start: float
+    lower: float
+    upper: float
+    source: str
+    logit: bool = False
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.lower < self.start < self.upper:
+            raise ValueError(
+                f"parameter {self.name}: expected 0 < lower < start < upper, came {self.lower}, {self.start}, {self.upper}"
+            )
+
+    @property
+    def prior_deviation(self) -> float:
+        """Standard deviation of the prior on the estimation scale [-]: the physical range is its 95 % interval."""
+        return float(self.transform(self.upper) - self.transform(self.lower)) / 4.0
+
+    def transform(self, value: float) -> float:
+        """Map a value to the estimation scale (log or logit)."""
+        return float(np.log(value / (1.0 - value))) if self.logit else float(np.log(value))
+
+    def inverse(self, z: float) -> float:
+        """Map a point of the estimation scale back to the value [unit]."""
+        return float(1.0 / (1.0 + np.exp(-z))) if self.logit else float(np.exp(z))
+
+    def slope(self, value: float) -> float:
+        """Derivative of the value with respect to the estimation scale [unit]."""
+        return value * (1.0 - value) if self.logit else value
+
+    def rescaled(self, factor: float) -> Parameter:
+        """Return the parameter with start and range multiplied by ``factor`` [-]."""
+        return replace(self, start=self.start * factor, lower=self.lower * factor, upper=self.upper * factor)
+
+
+_ISO6946 = "ISO 6946:2017 Annex C (surface resistances)"
+_ISO13786 = "ISO 13786:2017 and ISO 52016-1:2017 Table B.14 (areal heat capacity classes)"
+_ARCH = "ISO 52016-1:2017 Table 25 (interior convective coefficients 0.7-5 W/m2/K) and radiative 5.13 W/m2/K"
+
+#: Parameters of the baseline. Wall parameters stand for a wall 1 m thick and are rescaled to the plan's wall thickness.
+PARAMETERS: dict[str, Parameter] = {
+    p.name: p
+    for p in (
+        Parameter("exterior_convection_coefficient", "W/m^2/K", 20.0, 5.0, 60.0, f"{_ISO6946}: 4 + 4 v at 0.5-14 m/s"),
+        Parameter("exterior_wall_conductivity", "W/m/K", 0.55, 0.12, 4.0, "U-values of 0.12-2.5 W/m2/K: ISO 6946:2017"),
+        Parameter("exterior_wall_heat_capacity", "J/kg/K", 1000.0, 100.0, 4000.0, _ISO13786),
+        Parameter("interior_wall_conductivity", "W/m/K", 2.5, 0.4, 20.0, "partition resistances of 0.05-2.5 m2K/W: ISO 6946:2017"),
+        Parameter("interior_wall_heat_capacity", "J/kg/K", 1000.0, 100.0, 8000.0, _ISO13786),
+        Parameter("shuffle_probability", "1", 0.5, 0.02, 0.98, "probability per 300 s step; above 0.98 the mean factor vanishes", logit=True),
+        Parameter("interior_film_coefficient", "W/m^2/K", 2.5, 1.0, 6.0, _ARCH),
+        Parameter("radiant_coefficient", "W/m^2/K", 5.0, 1.5, 8.0, _ARCH),
+        Parameter("slab_heat_capacity", "J/m^2/K", 1.5e5, 2.0e4, 6.0e5, _ISO13786),
+        Parameter("slab_coupling", "W/m^2/K", 10.0, 0.8, 60.0, "conductivity over thickness: carpeted 0.2 m slab to bare 0.05 m screed"),
+        Parameter("furniture_heat_capacity", "J/m^2/K", 1.5e4, 5.0e2, 1.0e5, "Johra & Heiselberg (2017), doi:10.1016/j.rser.2016.11.145"),
+        Parameter("furniture_coupling", "W/m^2/K", 5.0, 0.5, 20.0, "Johra & Heiselberg (2017), doi:10.1016/j.rser.2016.11.145"),
+        Parameter("window_u_value", "W/m^2/K", 2.5, 0.6, 6.0, "EN 673: triple to single glazing"),
+        Parameter("opening_exchange_velocity", "m/s", 0.08, 0.01, 0.3, "Allard & Utsumi (1992), doi:10.1016/0378-7788(92)90020-G"),
+        Parameter("exterior_wall_conductivity_multiplier", "1", 1.0, 0.33, 3.0, "tabulated design conductivities: ISO 10456:2007"),
+        Parameter("exterior_wall_heat_capacity_multiplier", "1", 1.0, 0.33, 3.0, "tabulated design values: ISO 10456:2007"),
+        Parameter("interior_wall_conductivity_multiplier", "1", 1.0, 0.33, 3.0, "tabulated design conductivities: ISO 10456:2007"),
+        Parameter("interior_wall_heat_capacity_multiplier", "1", 1.0, 0.33, 3.0, "tabulated design values: ISO 10456:2007"),
+        Parameter("slab_conductivity_multiplier", "1", 1.0, 0.33, 3.0, "tabulated design conductivities: ISO 10456:2007"),
+        Parameter("slab_heat_capacity_multiplier", "1", 1.0, 0.33, 3.0, "tabulated design values: ISO 10456:2007"),
+        Parameter("window_u_value_multiplier", "1", 1.0, 0.5, 2.0, "EN 673 against in-situ values"),
+    )
+}

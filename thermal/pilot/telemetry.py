@@ -1,0 +1,231 @@
+"""Telemetry of a building that nobody measured: a plant under thermostats, through the eyes of its sensors."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+import pandas as pd
+
+from thermal.case import FloorPlans, Telemetry, zone_floor_areas
+from thermal.case.case import AIR_HEAT_CAPACITY
+from thermal.case.points import DISCHARGE_TEMPERATURE, OUTDOOR_TEMPERATURE, SUPPLY_FLOW, ZONE_TEMPERATURE
+from thermal.pilot._errors import ClosedLoopError
+from thermal.pilot.thermostat import Terminals, Thermostats, draw_thermostats, size_terminals
+
+Series = npt.NDArray[np.float64]
+Progress = Callable[[int, int], None]
+
+HEATING_SETPOINT = "zone_air_heating_temperature_setpoint"
+COOLING_SETPOINT = "zone_air_cooling_temperature_setpoint"
+_FREEZING = 273.15  # K
+_GAIN = 0.2  # of the design power per kelvin: 12 W/m2/K at 60 W/m2, stable at 5 minutes with the heat of the air alone
+_INTEGRAL_TIME = 1800.0  # s
+_INTEGRAL_RANGE = 1.0  # K, so that the recovery from a set-back does not wind it up
+
+
+class Plant(Protocol):
+    """What steps a building: a simulator, or another model of it."""
+
+    @property
+    def step_seconds(self) -> float:
+        """Length of a step [s]."""
+
+    @property
+    def zone_names(self) -> tuple[str, ...]:
+        """Names of the zones, in the order of its arrays."""
+
+    def reset(self, zone_temperatures: Series, /) -> Series:
+        """Start anew.
+
+        Parameters
+        ----------
+        zone_temperatures : numpy.ndarray, shape (n_zone,)
+            Air temperatures to start from [K].
+
+        Returns
+        -------
+        numpy.ndarray, shape (n_zone,)
+            Air temperatures of the zones [K].
+        """
+
+    def step(self, zone_heat: Series, boundary_temperatures: Series, /) -> Series:
+        """Go one step.
+
+        Parameters
+        ----------
+        zone_heat : numpy.ndarray, shape (n_zone,)
+            Heat that each zone receives during the step [W].
+        boundary_temperatures : numpy.ndarray, shape (n_boundary,)
+            Mean temperatures of what the building looks out on [K], outdoor first.
+
+        Returns
+        -------
+        numpy.ndarray, shape (n_zone,)
+            Mean air temperatures of the zones over the step [K].
+        """
+
+
+def generate_telemetry(
+    plant: Plant,
+    plans: FloorPlans,
+    weather: pd.DataFrame,
+    *,
+    seed: int = 0,
+    spin_up_days: float = 0.0,
+    thermostats: Thermostats | None = None,
+    terminals: Terminals | None = None,
+    station: str = "weather_station",
+    noise: float = 0.03,
+    resolution: float = 0.02,
+    progress: Progress | None = None,
+) -> Telemetry:
+    """Run a plant under thermostats and report what its sensors see.
+
+    Each step a thermostat compares its zone's last temperature with the schedule, and a proportional-integral loop asks
+    its terminal unit for heat or cold. The unit's flow goes from its minimum to its design flow, its discharge
+    temperature from 12 to 35 degC. The heat is constant over the step; the discharge temperature that is reported is
+    the one that belongs to this heat at the zone's mean temperature over the step, so that the metered heat ``flow *
+    1006 * (discharge - zone)`` of a stamp is the heat that the plant received in its interval, but for sensor noise. It
+    may leave the unit's range by as much as the zone drifts during the step.
+
+    Parameters
+    ----------
+    plant : Plant
+        The building's model.
+    plans : FloorPlans
+        The building.
+    weather : pandas.DataFrame
+        Shape (n_time, n_point), columns ``<station>/<point>`` in SI units, tz-aware index at the ends of steps of the
+        plant's length, as of `generate_weather`.
+    seed : int
+        Same seed, same thermostats, terminals and noise; 0 or more.
+    spin_up_days : float
+        Length at the start of the weather that is simulated but not reported [d], 0 or more.
+    thermostats : Thermostats, optional
+        Schedules in the order of the plant's zones; drawn by default.
+    terminals : Terminals, optional
+        Units in the order of the plant's zones; sized by floor area by default.
+    station : str
+        Entity that reports the weather.
+    noise : float
+        Standard deviation of the temperature sensors [K], 0 or more. Default as in the shared practice cases.
+    resolution : float
+        Steps of the temperature sensors [K], 0 or more; 0 reports every digit. Default as in the shared practice cases.
+    progress : callable, optional
+        Called as ``progress(steps_done, steps)`` after every step.
+
+    Returns
+    -------
+    Telemetry
+        Of the weather station and of a device ``VAV_<zone>`` a zone: zone and discharge temperature, both setpoints
+        [K], supply flow [kg/s]; of single precision, as building automation stores it.
+
+    Raises
+    ------
+    ClosedLoopError
+        When plant, plans and weather do not fit each other, or the plant returns what is no temperature.
+    """
+    skipped = _check(plant, plans, weather, station, seed, spin_up_days, noise, resolution)
+    areas = zone_floor_areas(plans)
+    floor_area = np.array([areas[zone] for zone in plant.zone_names])
+    thermostats = thermostats or draw_thermostats(seed, len(floor_area))
+    terminals = terminals or size_terminals(seed, floor_area)
+    index = pd.DatetimeIndex(weather.index)
+    setpoints = thermostats.setpoints(index - pd.Timedelta(seconds=plant.step_seconds))
+    outdoor = weather[f"{station}/{OUTDOOR_TEMPERATURE}"].to_numpy(dtype=float)
+    temperature, flow, heat = _run(plant, terminals, outdoor, setpoints, progress)
+    discharge = temperature + heat / (AIR_HEAT_CAPACITY * flow)
+    rng = np.random.default_rng([seed, 1])  # not the stream of the thermostats
+    points = {
+        ZONE_TEMPERATURE: _measured(rng, temperature, noise, resolution),
+        SUPPLY_FLOW: flow,
+        DISCHARGE_TEMPERATURE: _measured(rng, discharge, noise, resolution),
+        HEATING_SETPOINT: setpoints[0],
+        COOLING_SETPOINT: setpoints[1],
+    }
+    columns = {
+        f"VAV_{zone}/{point}": values[:, number]
+        for number, zone in enumerate(plant.zone_names)
+        for point, values in points.items()
+    }
+    frame = pd.concat([weather, pd.DataFrame(columns, index=index)], axis=1).astype(np.float32)
+    return Telemetry.from_frame(frame.iloc[skipped:], where="generated telemetry")
+
+
+def _run(
+    plant: Plant, terminals: Terminals, outdoor: Series, setpoints: tuple[Series, Series], progress: Progress | None
+) -> tuple[Series, Series, Series]:
+    """Close the loop: zone temperatures [K], supply flows [kg/s] and heats [W], each of shape (n_time, n_zone)."""
+    heating, cooling = setpoints
+    temperature, flow, heat = (np.empty_like(heating) for _ in range(3))
+    zone = _temperatures(plant.reset(heating[0].copy()), heating.shape[1], "reset")
+    integral = np.zeros((2, heating.shape[1]))  # heating, cooling [W]
+    rate = plant.step_seconds / _INTEGRAL_TIME
+    gain = _GAIN * terminals.design_heat
+    for k in range(len(outdoor)):
+        error = np.stack([heating[k] - zone, zone - cooling[k]])
+        growing = np.where(np.abs(error) <= _INTEGRAL_RANGE, rate * gain * error, 0.0)
+        integral = np.clip(integral + growing, 0.0, terminals.design_heat)
+        warm, cold = np.clip(gain * error + integral, 0.0, terminals.design_heat)
+        flow[k], heat[k] = terminals.supply(warm - cold, zone)
+        zone = _temperatures(plant.step(heat[k].copy(), outdoor[k : k + 1].copy()), len(zone), f"step {k}")
+        temperature[k] = zone
+        if progress is not None:
+            progress(k + 1, len(outdoor))
+    return temperature, flow, heat
+
+
+def _temperatures(values: Series, n_zone: int, where: str) -> Series:
+    """Refuse what a plant returns when it is not one temperature a zone."""
+    zone = np.asarray(values, dtype=float)
+    if zone.shape != (n_zone,) or not np.isfinite(zone).all():
+        raise ClosedLoopError(
+            f"plant: expected {n_zone} finite temperatures from {where}, found shape {zone.shape} with "
+            f"{int((~np.isfinite(zone)).sum())} that are not finite"
+        )
+    return zone
+
+
+def _measured(rng: np.random.Generator, temperature: Series, noise: float, resolution: float) -> Series:
+    """What a sensor reports [K]: with noise, in steps of its resolution counted from 0 degC."""
+    celsius = temperature - _FREEZING + noise * rng.standard_normal(temperature.shape)
+    if resolution > 0.0:
+        celsius = resolution * np.round(celsius / resolution)
+    return np.asarray(celsius + _FREEZING, dtype=float)
+
+
+def _check(
+    plant: Plant,
+    plans: FloorPlans,
+    weather: pd.DataFrame,
+    station: str,
+    seed: int,
+    spin_up_days: float,
+    noise: float,
+    resolution: float,
+) -> int:
+    """Refuse what does not fit; return the steps of the spin-up."""
+    if seed < 0 or spin_up_days < 0.0 or noise < 0.0 or resolution < 0.0:
+        raise ClosedLoopError(
+            "telemetry: expected seed, spin_up_days, noise and resolution of 0 or more, "
+            f"found {seed}, {spin_up_days} d, {noise} K and {resolution} K"
+        )
+    zones = {zone for floor in plans.floors for zone in floor.zone_names}
+    strange = sorted(zones.symmetric_difference(plant.zone_names))
+    if strange:
+        raise ClosedLoopError(f"plant: expected the zones of the plans, found a difference in {', '.join(strange[:5])}")
+    column = f"{station}/{OUTDOOR_TEMPERATURE}"
+    if column not in weather or not isinstance(weather.index, pd.DatetimeIndex) or weather.index.tz is None:
+        raise ClosedLoopError(f"weather: expected a column {column!r} on a tz-aware index, found {list(weather)[:3]}")
+    if not np.isfinite(weather[column].to_numpy(dtype=float)).all():
+        raise ClosedLoopError(f"weather: expected a value of {column!r} at every step, found gaps")
+    steps = np.unique(np.diff(weather.index.as_unit("us").asi8) / 1e6)
+    if not np.array_equal(steps, [plant.step_seconds]):
+        raise ClosedLoopError(f"weather: expected steps of the plant's {plant.step_seconds} s, found {steps[:3]} s")
+    skipped = round(spin_up_days * 86400.0 / plant.step_seconds)
+    if len(weather) < skipped + 2:
+        raise ClosedLoopError(f"weather: expected at least {skipped + 2} steps with the spin-up, found {len(weather)}")
+    return skipped

@@ -1,0 +1,28 @@
+"""The paper's randomized shuffling of air within zones, and the two terms of the model that equal its mean."""
+
+from thermal.shuffle._equivalent import (
+    choose_equivalent,
+    effective_diffusivity,
+    exchange_rate,
+    mean_square_reach,
+    mixing_factor,
+    mixing_rate,
+)
+from thermal.shuffle._errors import ShuffleCellError, ShuffleError, ShuffleParameterError, ShuffleStateError
+from thermal.shuffle._random import RandomShuffle
+from thermal.shuffle._swaps import apply_swaps
+
+__all__ = [
+    "RandomShuffle",
+    "ShuffleCellError",
+    "ShuffleError",
+    "ShuffleParameterError",
+    "ShuffleStateError",
+    "apply_swaps",
+    "choose_equivalent",
+    "effective_diffusivity",
+    "exchange_rate",
+    "mean_square_reach",
+    "mixing_factor",
+    "mixing_rate",
+]
