@@ -68,8 +68,9 @@ def test_floors_above_each_other_do_not_mix():
 
 
 def test_a_wide_and_almost_empty_zone_needs_no_wide_table():
-    points = np.array([[0.0, 0.0], [1e-3, 0.0], [500.0, 400.0], [500.001, 400.0]] * 1)
-    sampler = PartnerSampler([points], reach=0.0011)
-    partners = sampler.draw(np.random.default_rng(0), np.repeat(np.arange(4), 40))
-    np.testing.assert_array_equal(partners // 2, np.repeat([0, 0, 1, 1], 40))
-    assert getattr(sampler, "_slot_at").size < 1000
+    two = grid(3, 3, 0.001)
+    points = np.concatenate([two, np.add(two, [500.0, 400.0])])
+    sampler = PartnerSampler([points], reach=0.001)
+    slots = np.repeat(np.arange(18), 40)
+    np.testing.assert_array_equal(sampler.draw(np.random.default_rng(0), slots) // 9, slots // 9)
+    assert sampler._slot_at.size < 1000

@@ -1,5 +1,6 @@
 import doctest
 import json
+from itertools import pairwise
 from math import comb
 from time import perf_counter
 
@@ -103,7 +104,7 @@ def test_law_is_that_of_the_sequential_shuffle(probability, reach):
 
     def statistics(parcels):
         squared = np.square(points[parcels] - points).sum(axis=-1)
-        bins = [((squared > a) & (squared <= b)).mean(axis=1) for a, b in zip(edges, edges[1:], strict=False)]
+        bins = [((squared > a) & (squared <= b)).mean(axis=1) for a, b in pairwise(edges)]
         outcome = warm[parcels][:, [0, 5, n // 2, n - 1]]
         return np.column_stack([squared.mean(axis=1), *bins, outcome])
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import csv
 import re
-import warnings
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from decimal import Decimal
 from pathlib import Path
 
@@ -29,6 +28,7 @@ from thermal.errors import (
 from thermal.units import check_unit, to_si
 
 SUFFIXES = (".parquet", ".csv")
+MISSING = frozenset({"", "nan", "na", "n/a", "null", "none", "<na>"})  # in a CSV, in any case of letters
 _OFFSET = re.compile(r"(?:[zZ]|[+-]\d{2}:?\d{2}(?::\d{2})?|[+-]\d{2})$")
 
 
@@ -105,28 +105,47 @@ def _read_parquet(path: Path) -> pd.DataFrame:
 
 
 def _read_csv(path: Path) -> pd.DataFrame:
+    """Read a CSV as text; numbers are made of it later, where a message can name what stood there."""
     try:
         with path.open(encoding="utf-8-sig", newline="") as stream:
-            header = next(csv.reader(stream), [])
-        with warnings.catch_warnings():
-            warnings.simplefilter("error", pd.errors.ParserWarning)  # rows longer than the header
-            frame = pd.read_csv(
-                path, index_col=False, encoding="utf-8-sig", float_precision="round_trip", low_memory=False
-            )
-    except (OSError, UnicodeDecodeError, csv.Error, ValueError, pd.errors.ParserWarning) as error:
-        found = " ".join(str(error).split())
-        raise UnreadableFileError(describe(path.name, "a CSV with one header row, in UTF-8", found)) from error
-    frame.columns = pd.Index(header)
-    if INDEX not in header:
+            rows = [row for row in csv.reader(stream, strict=True) if row]
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise UnreadableFileError(describe(path.name, "a CSV in UTF-8", " ".join(str(error).split()))) from error
+    if not rows:
+        raise UnreadableFileError(describe(path.name, "a CSV with one header row", "an empty file"))
+    header = [name.strip() for name in rows.pop(0)]
+    if header.count(INDEX) != 1:
+        if INDEX in header:
+            raise DuplicateColumnError(describe(f"{path.name}: columns", "names of their own", f"{INDEX!r} twice"))
         raise TimestampError(describe(f"{path.name}: header", f"a column {INDEX!r}", ", ".join(header[:3])))
-    if header.count(INDEX) > 1:
-        raise DuplicateColumnError(describe(f"{path.name}: columns", "names of their own", f"{INDEX!r} twice"))
-    stamps = _parse_stamps(frame[INDEX], path.name)
-    return frame.drop(columns=INDEX).set_axis(stamps, axis=0)
+    for number, row in enumerate(rows, start=1):
+        if len(row) != len(header):
+            expected = f"{len(header)} cells as in the header"
+            raise UnreadableFileError(describe(f"{path.name}: data row {number}", expected, f"{len(row)} cells"))
+    columns = dict(enumerate(zip(*rows, strict=True))) if rows else dict.fromkeys(range(len(header)), ())
+    stamps = _parse_stamps(columns.pop(header.index(INDEX)), path.name)
+    names = [header[position] for position in columns]
+    values = [
+        _parse_numbers(texts, stamps, f"{path.name}: column {name!r}")
+        for name, texts in zip(names, columns.values(), strict=True)
+    ]
+    frame = pd.DataFrame(dict(enumerate(values)), index=stamps, columns=range(len(names)))
+    return frame.set_axis(names, axis=1)
 
 
-def _parse_stamps(texts: pd.Series, file: str) -> pd.DatetimeIndex:
-    listed = [str(text).strip() for text in texts]
+def _parse_numbers(texts: Sequence[str], stamps: pd.DatetimeIndex, where: str) -> NDArray[np.float64]:
+    values = np.full(len(texts), np.nan)
+    for position, text in enumerate(texts):
+        try:
+            if text.strip().casefold() not in MISSING:
+                values[position] = float(text)
+        except ValueError as error:
+            raise _not_numeric(where, stamps[position], text) from error
+    return values
+
+
+def _parse_stamps(texts: Iterable[str], file: str) -> pd.DatetimeIndex:
+    listed = [text.strip() for text in texts]
     for row, text in enumerate(listed, start=1):
         if not re.match(r"\d{4}-?\d{2}-?\d{2}", text):
             raise TimestampError(describe(f"{file}: data row {row}", "an ISO 8601 time stamp with offset", repr(text)))
@@ -148,9 +167,15 @@ def _numbers(column: pd.Series, where: str) -> NDArray[np.float64]:
         pd.api.types.is_bool_dtype(column.dtype) or pd.api.types.is_complex_dtype(column.dtype)
     ):
         return column.to_numpy(dtype=float, na_value=np.nan)
-    present = column[column.notna()]
-    for stamp, value in present.items():
-        if isinstance(value, bool) or not isinstance(value, int | float | Decimal):
-            advice = "leave a missing value blank or NaN"
-            raise NonNumericColumnError(describe(f"{where}, stamp {stamp}", "a number", repr(value), advice))
-    return np.array([np.nan if missing else float(value) for value, missing in zip(column, column.isna(), strict=True)])
+    values = np.full(len(column), np.nan)
+    for position, (stamp, value) in enumerate(column.items()):
+        if not pd.isna(value):
+            if isinstance(value, bool) or not isinstance(value, int | float | Decimal):
+                raise _not_numeric(where, stamp, value)
+            values[position] = float(value)
+    return values
+
+
+def _not_numeric(where: str, stamp: object, value: object) -> NonNumericColumnError:
+    advice = "leave a missing value blank or NaN"
+    return NonNumericColumnError(describe(f"{where}, stamp {stamp}", "a number", repr(value), advice))

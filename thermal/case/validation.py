@@ -222,7 +222,7 @@ def _check_kind(surface: Surface, zones: Collection[str], where: str) -> None:
         if key in needed and not given:
             raise InvalidSurfaceError(describe(f"{where}: {key}", f"a value, for a {surface.kind}", "none"))
         if given and key not in needed:
-            advice = f"a {surface.kind} has {', '.join(sorted(needed)) or 'an area only'}"
+            advice = f"of kind {surface.kind}: {', '.join(sorted(needed)) or 'only an area'}"
             raise InvalidSurfaceError(describe(f"{where}: {key}", "no such key", repr(getattr(surface, key)), advice))
     if surface.other == OUTDOOR and surface.kind in {"wall", "window"} and surface.azimuth is None:
         advice = "give the degrees clockwise from north that the outer face looks to"

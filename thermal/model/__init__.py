@@ -1,14 +1,16 @@
 """The symbolic model and what runs it."""
 
 from thermal.model._reduction import krylov_basis, reduced_model
-from thermal.model._replay import Inputs, free_runs, replay_inputs, spin_up
+from thermal.model._replay import LEAST_SPIN_UP, SPIN_UP, Inputs, free_runs, replay_inputs, spin_up
 from thermal.model._scheme import IMPLICIT_EULER, SCHEMES, TR_BDF2, Scheme, Stage
 from thermal.model._stepper import Stepper, factorise
 from thermal.model._symbolic import Matrices, SymbolicModel
 
 __all__ = [
     "IMPLICIT_EULER",
+    "LEAST_SPIN_UP",
     "SCHEMES",
+    "SPIN_UP",
     "TR_BDF2",
     "Inputs",
     "Matrices",

@@ -51,6 +51,8 @@ class Inputs:
         Directed airflows [kg/s].
     zone : ndarray, shape (n_time, n_zone)
         Measured zone temperatures [K], NaN where missing; an unmeasured zone is NaN throughout.
+    bridged : ndarray, shape (n_time, n_zone)
+        ``zone`` with gaps of at most 30 minutes bridged [K].
     held : ndarray, shape (n_time, n_zone)
         The same with every gap bridged by a straight line, to hold the zones at in a spin-up [K].
     complete : ndarray of bool, shape (n_time,)
@@ -63,6 +65,7 @@ class Inputs:
     boundary: FloatArray
     airflow: FloatArray
     zone: FloatArray
+    bridged: FloatArray
     held: FloatArray
     complete: NDArray[np.bool_]
 
@@ -111,6 +114,7 @@ def replay_inputs(case: Case, network: ThermalNetwork) -> Inputs:
         boundary=filled[1],
         airflow=filled[2],
         zone=zone.to_numpy(dtype=float),
+        bridged=_bridge(zone, limit).to_numpy(dtype=float),
         held=zone.interpolate(limit_direction="both").to_numpy(dtype=float),
         complete=complete,
     )

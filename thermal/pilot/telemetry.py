@@ -24,6 +24,7 @@ _FREEZING = 273.15  # K
 _GAIN = 0.2  # of the design power per kelvin: 12 W/m2/K at 60 W/m2, stable at 5 minutes with the heat of the air alone
 _INTEGRAL_TIME = 1800.0  # s
 _INTEGRAL_RANGE = 1.0  # K, so that the recovery from a set-back does not wind it up
+_RAMP_TIME = 1800.0  # s from nothing to design power, as valves and trim loops take it
 
 
 class Plant(Protocol):
@@ -85,11 +86,11 @@ def generate_telemetry(
     """Run a plant under thermostats and report what its sensors see.
 
     Each step a thermostat compares its zone's last temperature with the schedule, and a proportional-integral loop asks
-    its terminal unit for heat or cold. The unit's flow goes from its minimum to its design flow, its discharge
-    temperature from 12 to 35 degC. The heat is constant over the step; the discharge temperature that is reported is
-    the one that belongs to this heat at the zone's mean temperature over the step, so that the metered heat ``flow *
-    1006 * (discharge - zone)`` of a stamp is the heat that the plant received in its interval, but for sensor noise. It
-    may leave the unit's range by as much as the zone drifts during the step.
+    its terminal unit for heat or cold, which comes at a limited rate. The unit's flow goes from its minimum to its
+    design flow, its discharge temperature from 12 to 35 degC. The heat is constant over the step; the discharge
+    temperature that is reported is the one that belongs to this heat at the zone's mean temperature over the step, so
+    that the metered heat ``flow * 1006 * (discharge - zone)`` of a stamp is the heat that the plant received in its
+    interval, but for sensor noise.
 
     Parameters
     ----------
@@ -120,8 +121,8 @@ def generate_telemetry(
     Returns
     -------
     Telemetry
-        Of the weather station and of a device ``VAV_<zone>`` a zone: zone and discharge temperature, both setpoints
-        [K], supply flow [kg/s]; of single precision, as building automation stores it.
+        Of the weather station, as it came, and of a device ``VAV_<zone>`` a zone: zone and discharge temperature, both
+        setpoints [K], supply flow [kg/s] (of single precision, as building automation stores it).
 
     Raises
     ------
@@ -139,9 +140,9 @@ def generate_telemetry(
     temperature, flow, heat = _run(plant, terminals, outdoor, setpoints, progress)
     discharge = temperature + heat / (AIR_HEAT_CAPACITY * flow)
     rng = np.random.default_rng([seed, 1])  # not the stream of the thermostats
-    points = {
+    points: dict[str, Series] = {
         ZONE_TEMPERATURE: _measured(rng, temperature, noise, resolution),
-        SUPPLY_FLOW: flow,
+        SUPPLY_FLOW: flow.astype(np.float32).astype(float),
         DISCHARGE_TEMPERATURE: _measured(rng, discharge, noise, resolution),
         HEATING_SETPOINT: setpoints[0],
         COOLING_SETPOINT: setpoints[1],
@@ -151,7 +152,7 @@ def generate_telemetry(
         for number, zone in enumerate(plant.zone_names)
         for point, values in points.items()
     }
-    frame = pd.concat([weather, pd.DataFrame(columns, index=index)], axis=1).astype(np.float32)
+    frame = pd.concat([weather, pd.DataFrame(columns, index=index)], axis=1)
     return Telemetry.from_frame(frame.iloc[skipped:], where="generated telemetry")
 
 
@@ -164,13 +165,15 @@ def _run(
     zone = _temperatures(plant.reset(heating[0].copy()), heating.shape[1], "reset")
     integral = np.zeros((2, heating.shape[1]))  # heating, cooling [W]
     rate = plant.step_seconds / _INTEGRAL_TIME
-    gain = _GAIN * terminals.design_heat
+    gain, ramp = _GAIN * terminals.design_heat, plant.step_seconds / _RAMP_TIME * terminals.design_heat
+    demand = np.zeros(heating.shape[1])
     for k in range(len(outdoor)):
         error = np.stack([heating[k] - zone, zone - cooling[k]])
         growing = np.where(np.abs(error) <= _INTEGRAL_RANGE, rate * gain * error, 0.0)
         integral = np.clip(integral + growing, 0.0, terminals.design_heat)
         warm, cold = np.clip(gain * error + integral, 0.0, terminals.design_heat)
-        flow[k], heat[k] = terminals.supply(warm - cold, zone)
+        demand = demand + np.clip(warm - cold - demand, -ramp, ramp)
+        flow[k], heat[k] = terminals.supply(demand, zone)
         zone = _temperatures(plant.step(heat[k].copy(), outdoor[k : k + 1].copy()), len(zone), f"step {k}")
         temperature[k] = zone
         if progress is not None:
@@ -190,7 +193,7 @@ def _temperatures(values: Series, n_zone: int, where: str) -> Series:
 
 
 def _measured(rng: np.random.Generator, temperature: Series, noise: float, resolution: float) -> Series:
-    """What a sensor reports [K]: with noise, in steps of its resolution counted from 0 degC."""
+    """Report what a sensor does [K]: with noise, in steps of its resolution counted from 0 degC."""
     celsius = temperature - _FREEZING + noise * rng.standard_normal(temperature.shape)
     if resolution > 0.0:
         celsius = resolution * np.round(celsius / resolution)

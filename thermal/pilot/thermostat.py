@@ -56,7 +56,7 @@ class Thermostats:
             True while occupied.
         """
         hour = (times.hour + times.minute / 60.0 + times.second / 3600.0).to_numpy()[:, np.newaxis]
-        day = times.dayofweek.to_numpy()[:, np.newaxis]
+        day = times.day_of_week.to_numpy()[:, np.newaxis]
         weekday = (day < _SATURDAY) & (hour >= self.start) & (hour < self.stop)
         morning = (day == _SATURDAY) & self.saturday & (hour >= self.start) & (hour < _SATURDAY_STOP)
         return np.asarray(weekday | morning, dtype=bool)
@@ -82,8 +82,8 @@ class Thermostats:
 def draw_thermostats(seed: int, n_zone: int) -> Thermostats:
     """Draw schedules that differ between zones, as occupants set them.
 
-    Heating 20-22 degC and cooling 1.5-3 K above it, within the comfort range of ISO 7730 category B for sedentary work;
-    set back to 16-18.5 degC and 26.5-29 degC; occupied from between 5:30 and 8:00 to between 17:00 and 20:00, in quarter
+    Heating 20-22 degC (ISO 7730, category B, winter: 22 degC and 2 K to either side) and cooling 1.5-3 K above it; set
+    back to 16-18.5 degC and 26.5-29 degC; occupied from between 5:30 and 8:00 to between 17:00 and 20:00, in quarter
     hours, and in 15 % of the zones on Saturday mornings.
 
     Parameters
@@ -137,14 +137,15 @@ class Terminals:
     minimum_flow : numpy.ndarray, shape (n_zone,)
         Smallest supply flow [kg/s], positive, up to the design flow.
     coldest, warmest : float
-        Range of the discharge temperature [K].
+        Range of the discharge temperature [K] against the zone's temperature before a step. The default is a kelvin
+        within 12-35 degC, so that the zone's drift during the step leaves it in that range.
     """
 
     design_heat: Series
     design_flow: Series
     minimum_flow: Series
-    coldest: float = _FREEZING + 12.0
-    warmest: float = _FREEZING + 35.0
+    coldest: float = _FREEZING + 13.0
+    warmest: float = _FREEZING + 34.0
 
     def supply(self, demand: Series, zone_temperature: Series) -> tuple[Series, Series]:
         """Meet a demand for heat with as little air as can carry it.
@@ -185,13 +186,12 @@ def size_terminals(seed: int, floor_area: Series, heat_flux: float = 60.0, minim
         Design heating and cooling power per floor area [W/m2], positive; every zone gets 0.85 to 1.15 times that.
         The default suits offices in a mild climate.
     minimum_share : float
-        Smallest flow over design flow [-], above 0, up to 1. The default is the usual one of VAV boxes with reheat
-        (ASHRAE Guideline 36).
+        Smallest flow over design flow [-], above 0, up to 1. The default is usual for VAV boxes with reheat.
 
     Returns
     -------
     Terminals
-        Units whose design flow brings the design power at 15 K above the zone.
+        Units whose design flow brings the design power at 14 K above the zone: 34 degC into 20 degC.
 
     Raises
     ------
@@ -205,5 +205,5 @@ def size_terminals(seed: int, floor_area: Series, heat_flux: float = 60.0, minim
         )
     scatter = np.random.default_rng(seed).uniform(0.85, 1.15, len(floor_area))
     design_heat = heat_flux * scatter * floor_area
-    design_flow = design_heat / (AIR_HEAT_CAPACITY * 15.0)
+    design_flow = design_heat / (AIR_HEAT_CAPACITY * 14.0)
     return Terminals(design_heat, design_flow, minimum_share * design_flow)

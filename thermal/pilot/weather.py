@@ -16,7 +16,7 @@ Series = npt.NDArray[np.float64]
 MOUNTAIN_VIEW = Location(latitude=37.4, longitude=-122.1, elevation=20.0, timezone="Etc/GMT+8")
 _STEFAN_BOLTZMANN = 5.670374419e-8  # W/m2/K4, CODATA 2018
 _DAY = 86400.0  # s
-# Mountain View: monthly means from 9.5 degC in January to 20.5 degC in July, 11 K from night to afternoon (NOAA 1991-2020).
+# About the climate south of San Francisco Bay: 9.5 degC in January, 20.5 degC in July, 11 K from night to afternoon.
 _YEAR_MEAN, _YEAR_SWING, _COLDEST_DAY = 288.15, 5.5, 15.0  # K, K, day of the year
 _DAY_SWING, _WARMEST_HOUR = 5.5, 15.0  # K under a clear sky, h
 _FRONT_DEVIATION, _FRONT_TIME = 2.0, 2.0 * _DAY  # K, s: passing air masses
@@ -25,6 +25,7 @@ _PATCH_TIME, _PATCHES = 1200.0, 0.3  # s, -: single clouds before the sun
 _WIND_TIME, _BREEZE, _WIND_MEAN = 3.0 * 3600.0, 0.6, 2.5  # s, -, m/s: a sea breeze in the afternoon
 _WIND_FROM, _WIND_VEER = 300.0, 50.0  # deg, the north-westerly of the bay; deg, standard deviation
 _TURBIDITY, _VAPOUR = 0.10, 1.4  # aerosol optical depth at 700 nm [-], precipitable water [cm]: clean coastal air
+_DECIMALS = 3  # of every value that is reported
 
 
 def generate_weather(
@@ -77,7 +78,7 @@ def generate_weather(
     >>> weather.shape, str(weather.index[0])
     ((288, 7), '2023-10-02 00:05:00-08:00')
     """
-    n_time = int(round(days * _DAY / step_seconds)) if step_seconds > 0.0 else 0
+    n_time = round(days * _DAY / step_seconds) if step_seconds > 0.0 else 0
     if seed < 0 or n_time < 2 or step_seconds > 3600.0:
         raise ClosedLoopError(
             "weather: expected a seed of 0 or more and at least two steps of up to 3600 s, "
@@ -95,7 +96,8 @@ def generate_weather(
         **_sun(middle, location, cloud),
         "horizontal_infrared_irradiance_sensor": _sky_radiation(air, cloud, step_seconds),
     }
-    return pd.DataFrame({f"{station}/{point}": values for point, values in points.items()}, index=index)
+    reported = {f"{station}/{point}": np.round(values, _DECIMALS) for point, values in points.items()}
+    return pd.DataFrame(reported, index=index)
 
 
 def _process(rng: np.random.Generator, n_time: int, step: float, time_constant: float) -> Series:

@@ -68,9 +68,12 @@ class PartnerSampler:
         self._squared_reach = (reach * (1.0 + REACH_SLACK)) ** 2
         self._points = np.concatenate(positions)
         partial = np.array([diagonal > reach for diagonal in diagonals])
+        on_grid = np.zeros_like(partial)
         spacing = _spacing(positions)
-        self._offsets = disc_offsets(reach, spacing)
-        on_grid = partial & (self._sizes > len(self._offsets)) & self._build_grids(positions, spacing)
+        # cells off any grid seem to have a tiny spacing: list no disc that is larger than every zone anyway
+        if (2.0 * reach / spacing[0] + 1.0) * (2.0 * reach / spacing[1] + 1.0) < 2.0 * self._sizes.max():
+            self._offsets = disc_offsets(reach, spacing)
+            on_grid = partial & (self._sizes > len(self._offsets)) & self._build_grids(positions, spacing)
         for zones, propose in ((partial & ~on_grid, self._from_zone_in_reach), (on_grid, self._from_disc)):
             if zones.any():
                 self._proposals.append((zones[self._zones], propose))

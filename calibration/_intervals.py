@@ -1,0 +1,176 @@
+"""Tuning and held-out intervals, and the runs that start in them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from calibration.errors import HorizonError, IntervalError, NotEnoughDataError
+from thermal import Case, CaseError, Inputs, local_timestamp
+from thermal.model import LEAST_SPIN_UP, SPIN_UP
+
+IntArray = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Interval:
+    """A stretch of telemetry; a run belongs to the interval that holds its target.
+
+    Parameters
+    ----------
+    start, end : Timestamp
+        First and last stamp, both included, with a time zone.
+    """
+
+    start: pd.Timestamp
+    end: pd.Timestamp
+
+    def to_dict(self) -> dict[str, str]:
+        """ISO 8601 texts of both ends."""
+        return {"start": self.start.isoformat(), "end": self.end.isoformat()}
+
+
+def parse_interval(text: str, case: Case) -> Interval:
+    """Read ``START/END``.
+
+    Parameters
+    ----------
+    text : str
+        Two ISO 8601 times; a time without offset is local to the building.
+    case : Case
+        Whose telemetry the interval cuts.
+
+    Raises
+    ------
+    IntervalError
+        When it is not two ordered times, or holds no telemetry.
+    """
+    parts = text.split("/")
+    if len(parts) != 2:
+        raise IntervalError(f"interval: expected START/END in ISO 8601, came {text!r}; for example 2023-10-02/2023-10-09T12:00")
+    try:
+        start, end = (pd.Timestamp(local_timestamp(part.strip(), case.building)) for part in parts)
+    except CaseError as error:
+        raise IntervalError(f"interval {text!r}: {error}") from error
+    stamps = case.stamps
+    if not start < end:
+        raise IntervalError(f"interval {text!r}: expected the start before the end")
+    if end < stamps[0] or start > stamps[-1]:
+        raise IntervalError(f"interval {text!r}: outside of the telemetry, which goes from {stamps[0]} to {stamps[-1]}")
+    return Interval(start, end)
+
+
+def default_intervals(case: Case) -> tuple[Interval, Interval]:
+    """First two thirds of the telemetry to tune on, the last third held out.
+
+    Parameters
+    ----------
+    case : Case
+        With telemetry.
+    """
+    stamps = case.stamps
+    split = (2 * len(stamps)) // 3
+    return Interval(stamps[0], stamps[split - 1]), Interval(stamps[split], stamps[-1])
+
+
+def horizon_steps(horizon: str, step: float) -> int:
+    """Number of steps N of a horizon.
+
+    Parameters
+    ----------
+    horizon : str
+        Such as ``6h`` or ``30min``.
+    step : float
+        Step of the telemetry [s].
+
+    Raises
+    ------
+    HorizonError
+        When it is not a positive whole number of steps.
+    """
+    try:
+        seconds = pd.Timedelta(horizon).total_seconds()
+    except ValueError as error:
+        raise HorizonError(f"horizon: expected a duration such as 6h or 90min, came {horizon!r}") from error
+    steps = seconds / step
+    if not (np.isfinite(steps) and steps >= 1 and abs(steps - round(steps)) < 1e-9):
+        raise HorizonError(f"horizon {horizon!r}: expected a positive multiple of the telemetry's step of {step:g} s")
+    return round(steps)
+
+
+@dataclass(frozen=True)
+class Runs:
+    """N-step runs whose targets lie in one interval.
+
+    Parameters
+    ----------
+    begin : int
+        Stamp at which their common spin-up begins.
+    starts : ndarray of int, shape (n_run,)
+        Stamps t0, on the hour.
+    skipped : int
+        Runs left out because inputs, or every zone's temperature at start or target, are missing.
+    """
+
+    begin: int
+    starts: IntArray
+    skipped: int
+
+
+def select_runs(inputs: Inputs, interval: Interval, steps: int, every: float = 3600.0, spin_up: float = SPIN_UP) -> Runs:
+    """Find the runs of an interval.
+
+    Parameters
+    ----------
+    inputs : Inputs
+        The telemetry.
+    interval : Interval
+        Where targets must lie.
+    steps : int
+        N, steps from start to target.
+    every : float
+        Time between starts [s]; an hour in the contract of results.
+    spin_up : float
+        Telemetry before the interval that the spin-up may use [s].
+
+    Raises
+    ------
+    NotEnoughDataError
+        When the interval has no room for a single run.
+    """
+    stamps, step = inputs.stamps, inputs.step
+    first = int(stamps.searchsorted(interval.start))
+    last = int(stamps.searchsorted(interval.end, side="right")) - 1
+    begin = max(0, first - round(spin_up / step))
+    stride = max(1, round(every / step))
+    on_hour = np.flatnonzero((stamps.minute == 0) & (stamps.second == 0))
+    anchor = int(on_hour[0]) if on_hour.size else 0
+    least = begin + int(np.ceil(LEAST_SPIN_UP / step))
+    lowest = max(least, first - steps)
+    starts = np.arange(anchor, last - steps + 1, stride)
+    starts = starts[starts >= lowest]
+    if starts.size == 0:
+        raise NotEnoughDataError(
+            f"interval {interval.start} to {interval.end}: expected room for a run of {steps} steps of {step:g} s after "
+            f"{LEAST_SPIN_UP / 3600:g} h of spin-up, found {last - first + 1} stamps"
+        )
+    gaps = np.concatenate([[0], np.cumsum(~inputs.complete)])
+    whole = gaps[starts + steps + 1] == gaps[starts + 1]
+    seen = (np.isfinite(inputs.bridged[starts]) & np.isfinite(inputs.zone[starts + steps])).any(axis=1)
+    usable = whole & seen
+    return Runs(begin, starts[usable], int((~usable).sum()))
+
+
+def merge(intervals: Sequence[Interval]) -> list[Interval]:
+    """Order intervals by their start.
+
+    Parameters
+    ----------
+    intervals : sequence of Interval
+        In any order.
+    """
+    return sorted(intervals, key=lambda i: (i.start, i.end))
