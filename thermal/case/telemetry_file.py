@@ -57,6 +57,8 @@ def read_telemetry(path: Path, units: Mapping[str, str], location: Location) -> 
     if path.suffix.lower() not in SUFFIXES:
         raise UnknownFileTypeError(describe("building.yaml: telemetry", "a .parquet or a .csv file", repr(path.name)))
     raw = _read_csv(path) if path.suffix.lower() == ".csv" else _read_parquet(path)
+    if isinstance(raw.index, pd.DatetimeIndex) and raw.index.tz is not None:
+        raw = raw.tz_convert(location.timezone)
     columns = [str(column) for column in raw.columns]
     converted: dict[str, NDArray[np.float64]] = {}
     for position, column in enumerate(columns):
@@ -70,10 +72,7 @@ def read_telemetry(path: Path, units: Mapping[str, str], location: Location) -> 
         numbers = _numbers(raw.iloc[:, position], f"{path.name}: column {column!r}")
         quantity = POINT_TYPES[point].quantity
         converted[column] = to_si(numbers, units[point], quantity, elevation=location.elevation)
-    telemetry = Telemetry.from_frame(pd.DataFrame(converted, index=raw.index), where=path.name)
-    local = telemetry.frame.tz_convert(location.timezone)
-    missing = tuple(stamp.tz_convert(location.timezone) for stamp in telemetry.missing_rows)
-    return Telemetry(frame=local, step=telemetry.step, missing_rows=missing)
+    return Telemetry.from_frame(pd.DataFrame(converted, index=raw.index), where=path.name)
 
 
 def check_units(units: Mapping[str, str]) -> None:

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from thermal.case import Building, ZoneTable
 from thermal.network._graph import ThermalNetwork
-from thermal.network._materials import SHUFFLE_STEP
 from thermal.network._plan import plan_network
 from thermal.network._table import table_network
 from thermal.parameters import Scope
@@ -18,7 +17,6 @@ from thermal.parameters import Scope
 def build_network(
     building: Building,
     dx: float | None = None,
-    step: float = SHUFFLE_STEP,
     reach: float | None = None,
     scopes: Mapping[str, Scope] | None = None,
     diffusers: Mapping[str, NDArray[np.bool_]] | None = None,
@@ -31,8 +29,6 @@ def build_network(
         What the case folder describes.
     dx : float, optional
         Distance between control volumes of a plan [m]; its cell size by default. A zone table has none and ignores it.
-    step : float
-        Time step that the mean of the shuffle stands for [s].
     reach : float, optional
         Reach of the shuffle [m]; None is the whole zone.
     scopes : mapping of str to {"global", "zone"}, optional
@@ -47,4 +43,4 @@ def build_network(
     """
     if isinstance(building.geometry, ZoneTable):
         return table_network(building, scopes)
-    return plan_network(building, dx, step, reach, scopes, diffusers)
+    return plan_network(building, dx, reach, scopes, diffusers)

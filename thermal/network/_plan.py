@@ -23,7 +23,7 @@ from thermal.network._materials import (
     air_density,
 )
 from thermal.parameters import Scope
-from thermal.shuffle import choose_equivalent, effective_diffusivity, mean_square_reach, mixing_rate
+from thermal.shuffle import choose_equivalent, effective_diffusivity, exchange_rate, mean_square_reach
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -32,7 +32,6 @@ IntArray = NDArray[np.int64]
 def plan_network(
     building: Building,
     dx: float | None = None,
-    step: float = SHUFFLE_STEP,
     reach: float | None = None,
     scopes: Mapping[str, Scope] | None = None,
     diffusers: Mapping[str, NDArray[np.bool_]] | None = None,
@@ -45,8 +44,6 @@ def plan_network(
         With `FloorPlans` geometry.
     dx : float, optional
         Distance between control volumes [m]; the plan's cell size by default.
-    step : float
-        Time step that the mixing rate of the shuffle stands for [s].
     reach : float, optional
         Reach of the shuffle [m]; None is the whole zone.
     scopes : mapping of str to {"global", "zone"}, optional
@@ -70,7 +67,7 @@ def plan_network(
         grid = floor_grid(plan, plans.cell_size, dx)
         floor = _Floor(graph, plan, grid, number, plans.cell_size)
         for name in (z for z in building.zone_names if (grid.token == z).any()):
-            zones[name] = floor.zone(name, areas[name], density, step, reach)
+            zones[name] = floor.zone(name, areas[name], density, reach)
             mask = (diffusers or {}).get(name)
             diffuser_weight[zones[name].number] = floor.diffuser_weight(name, mask)
         floor.walls(zones, plans.glazing)
@@ -106,7 +103,7 @@ class _Floor:
                 self.node[mask] = graph.volumes(k, zone[mask], place[mask])
         self.cells = np.bincount(grid.volume[grid.volume >= 0], minlength=token.size)
 
-    def zone(self, name: str, area: float, density: float, step: float, reach: float | None) -> Zone:
+    def zone(self, name: str, area: float, density: float, reach: float | None) -> Zone:
         """Air of one zone with its shuffle, slabs and furniture."""
         graph, grid = self.graph, self.grid
         mine = grid.token == name
@@ -115,12 +112,12 @@ class _Floor:
         heat = density * AIR_HEAT_CAPACITY
         graph.capacity("air", heat, air, area * self.plan.height * zone.share)
         if air.size > 1:
-            self._shuffle(zone, area, heat, step, reach)
+            self._shuffle(zone, area, heat, reach)
         zone.slabs(2.0 * area)
         zone.furniture(area)
         return zone
 
-    def _shuffle(self, zone: Zone, area: float, heat: float, step: float, reach: float | None) -> None:
+    def _shuffle(self, zone: Zone, area: float, heat: float, reach: float | None) -> None:
         """Mean of the paper's random shuffle: a massless star node, or an effective diffusivity (see `thermal.shuffle`)."""
         graph, grid = self.graph, self.grid
         probability = graph.parameter("shuffle_probability", zone.name)
@@ -130,7 +127,7 @@ class _Floor:
         name = graph.key("air-air", zone.name, "shuffle_probability")
         if choose_equivalent(extent, reach) == "mixing" or reach is None:
             star = graph.volumes("mixing", zone.number)
-            rate = mixing_rate(probability, SHUFFLE_STEP, step)
+            rate = exchange_rate(probability, SHUFFLE_STEP)
             key = graph.key("mixing", zone.name, "shuffle_probability")
             graph.face(key, rate * heat, zone.air, star, area * self.plan.height * zone.share)
         else:

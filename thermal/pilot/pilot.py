@@ -14,8 +14,8 @@ from thermal.pilot.layout import devices, generate_office
 from thermal.pilot.telemetry import Plant, Progress, generate_telemetry
 from thermal.pilot.weather import MOUNTAIN_VIEW, generate_weather
 
+#: Makes the plant of a building that goes in steps of so many seconds [s].
 PlantFactory = Callable[[Building, float], Plant]
-"""What makes the plant of a building that is stepped in steps of so many seconds."""
 
 _STATION = "weather_station"  # as in the shared cases
 
@@ -57,8 +57,14 @@ def generate_pilot(
         Local time at which the first reported interval begins, ISO 8601 without offset.
     step_seconds : float
         Length of an interval [s], positive, up to 3600. The default is the paper's 5 minutes.
-    floor_area, zones, floors, cell_size
-        Size of the building [m2, -, -, m], as of `generate_office`; by default that of the paper's pilot building.
+    floor_area : float
+        Of all floors together [m2], positive; by default that of the paper's pilot building.
+    zones : int
+        On all floors together [-], at least one a floor; by default as many as the pilot has terminal units.
+    floors : int
+        Number of storeys [-], at least 1; two in the pilot building.
+    cell_size : float
+        Side of a plan cell [m], positive. Default as in the shared cases.
     orientation : float
         Direction of the plan's "up" [deg clockwise from north], -360 to 360.
     location : Location

@@ -16,6 +16,7 @@ from thermal.pilot._errors import ClosedLoopError
 from thermal.pilot.thermostat import Terminals, Thermostats, draw_thermostats, size_terminals
 
 Series = npt.NDArray[np.float64]
+#: Is told the steps that are done and all steps [-].
 Progress = Callable[[int, int], None]
 
 HEATING_SETPOINT = "zone_air_heating_temperature_setpoint"

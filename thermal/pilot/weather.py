@@ -13,6 +13,7 @@ from thermal.pilot._errors import ClosedLoopError
 
 Series = npt.NDArray[np.float64]
 
+#: The town of the paper's pilot building [degrees, m], without daylight saving.
 MOUNTAIN_VIEW = Location(latitude=37.4, longitude=-122.1, elevation=20.0, timezone="Etc/GMT+8")
 _STEFAN_BOLTZMANN = 5.670374419e-8  # W/m2/K4, CODATA 2018
 _DAY = 86400.0  # s

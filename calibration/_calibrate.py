@@ -1,0 +1,245 @@
+"""Calibration of a case: from telemetry to parameters, with errors before and after on tuning and held-out intervals."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from importlib.metadata import version
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibration._estimate import Estimate, Problem, estimate, random_starts, thin
+from calibration._evaluate import Evaluation, Progress, evaluate_model
+from calibration._intervals import Interval, default_intervals, horizon_steps, merge, select_runs
+from calibration._result import CalibrationResult, GridCheck, ParameterEstimate, SolverReport
+from calibration.errors import CalibrationError, NotEnoughDataError
+from thermal import Case, Inputs, Parameter, SymbolicModel, build_network, free_runs, reduced_model, replay_inputs, spin_up
+from thermal.model import SCHEMES, SPIN_UP, Scheme
+from thermal.parameters import Scope
+
+FloatArray = NDArray[np.float64]
+
+#: Runs of the final check of the reduced model on the grid.
+CHECK_RUNS = 6
+
+#: Largest difference between reduced model and grid that the reported errors may carry [K]; beyond it they come from the grid.
+CHECK_TOLERANCE = 0.01
+
+#: A bound counts as hit within this share of the range, on the estimation scale [-].
+BOUND_SHARE = 0.01
+
+
+def calibrate(
+    case: Case,
+    tune: Sequence[Interval] = (),
+    hold_out: Sequence[Interval] = (),
+    *,
+    dx: float | None = None,
+    fixed: Mapping[str, float] | None = None,
+    scopes: Mapping[str, Scope] | None = None,
+    horizon: str = "6h",
+    scheme: str = "implicit_euler",
+    reach: float | None = None,
+    spin_up_seconds: float = SPIN_UP,
+    starts: int = 1,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> CalibrationResult:
+    """Fit the physical parameters of a building to its telemetry by least squares.
+
+    Residuals are the errors of N-step runs that tile the tuning intervals; each zone's errors count as one observation a day
+    (they are strongly correlated in time), and every parameter has a log-normal prior whose 95 % interval is its physical range.
+    Ipopt solves on a reduced model with exact derivatives; the answer is checked on the grid.
+
+    Parameters
+    ----------
+    case : Case
+        Building and telemetry.
+    tune, hold_out : sequence of Interval
+        First two thirds and last third of the telemetry when both are empty.
+    dx : float, optional
+        Distance between control volumes of a plan [m]; the plan's cell size by default.
+    fixed : mapping of str to float, optional
+        Parameters that keep a given value [parameter units].
+    scopes : mapping of str to {"global", "zone"}, optional
+        Parameters with one value a zone.
+    horizon : str
+        Prediction horizon, such as ``6h``.
+    scheme : str
+        ``implicit_euler`` or ``tr_bdf2``.
+    reach : float, optional
+        Reach of the shuffle [m]; None is the whole zone.
+    spin_up_seconds : float
+        Length of the spin-up before an interval [s].
+    starts : int
+        Number of starts: the given one, then draws from the prior.
+    seed : int
+        Seed of the draws.
+    progress : callable, optional
+        Called with stage, done, total.
+
+    Returns
+    -------
+    CalibrationResult
+        With the solver's status, which says whether it converged.
+
+    Raises
+    ------
+    CalibrationError
+        When an interval has no usable run, a name is unknown, or every start failed.
+
+    Examples
+    --------
+    >>> from thermal import load_bundled_case
+    >>> result = calibrate(load_bundled_case(), dx=1.0)
+    >>> result.solver.success
+    True
+    """
+    began = time.perf_counter()
+    if scheme not in SCHEMES:
+        raise CalibrationError(f"scheme: expected one of {sorted(SCHEMES)}, came {scheme!r}")
+    if bool(tune) != bool(hold_out):
+        raise CalibrationError("intervals: give both tuning and held-out intervals, or neither")
+    if starts < 1:
+        raise CalibrationError(f"starts: expected at least 1, came {starts}")
+    first, second = default_intervals(case)
+    intervals = {"tuning": merge(tune or [first]), "held_out": merge(hold_out or [second])}
+    _refuse_overlap(intervals["tuning"], intervals["held_out"])
+    network = build_network(case.building, dx=dx, reach=reach, scopes=scopes)
+    grid = SymbolicModel(network)
+    inputs = replay_inputs(case, network)
+    given = network.values(fixed or {})
+    free = tuple(i for i, p in enumerate(network.parameters) if p.name not in (fixed or {}))
+    steps = horizon_steps(horizon, inputs.step)
+    runs = thin([select_runs(inputs, i, steps, spin_up=spin_up_seconds) for i in intervals["tuning"]], steps, inputs.step)
+    runs = tuple(r for r in runs if r.starts.size)
+    if not runs:
+        raise NotEnoughDataError("tuning: every run misses inputs or zone temperatures; see `buildingmpc check` for the gaps")
+    problem = Problem(grid, inputs, runs, steps, free, given, SCHEMES[scheme])
+    best, failures = _solve(problem, starts, seed, progress)
+
+    def evaluated(model: SymbolicModel, theta: FloatArray) -> dict[str, Evaluation]:
+        return {
+            name: evaluate_model(
+                model, theta, inputs, part, horizon, trajectories=True, scheme=SCHEMES[scheme], spin_up_seconds=spin_up_seconds
+            )
+            for name, part in intervals.items()
+        }
+
+    check = check_on_grid(grid, best.model, best.theta, inputs, intervals["held_out"], steps, SCHEMES[scheme])
+    trusted = check.max_difference <= CHECK_TOLERANCE
+    before = evaluated(reduced_model(grid, [given]) if trusted else grid, given)
+    after = evaluated(best.model if trusted else grid, best.theta)
+    return CalibrationResult(
+        case=case.building.name,
+        zones=network.zones,
+        parameters=_describe(best, network.nominal),
+        theta=best.theta,
+        tuning=tuple(intervals["tuning"]),
+        held_out=tuple(intervals["held_out"]),
+        uncalibrated=before,
+        calibrated=after,
+        solver=SolverReport(
+            "ipopt", best.solve.status, best.solve.success, best.iterations, time.perf_counter() - began, starts, tuple(failures)
+        ),
+        grid_check=check,
+        horizon=horizon,
+        dx=dx,
+        seed=seed,
+        version=version("buildingmpc"),
+    )
+
+
+def _refuse_overlap(tuning: Sequence[Interval], held_out: Sequence[Interval]) -> None:
+    for a in tuning:
+        for b in held_out:
+            if a.start <= b.end and b.start <= a.end:
+                raise CalibrationError(
+                    f"intervals: tuning {a.start}/{a.end} and held-out {b.start}/{b.end} overlap; a held-out target may not be tuned on"
+                )
+
+
+def _solve(problem: Problem, starts: int, seed: int, progress: Progress | None) -> tuple[Estimate, list[str]]:
+    """Best estimate over the starts; a start that fails costs that start only."""
+    best: Estimate | None = None
+    failures = []
+    for number, z in enumerate(random_starts(problem, starts, seed)):
+        try:
+            found = estimate(problem, z, progress)
+        except ArithmeticError as error:
+            failures.append(f"start {number}: {error}")
+            continue
+        if best is None or _objective(found) < _objective(best):
+            best = found
+    if best is None:
+        raise CalibrationError(f"every start failed: {'; '.join(failures)}")
+    return best, failures
+
+
+def _objective(found: Estimate) -> float:
+    """Negative log posterior up to a constant, the deviation profiled out, so that starts compare."""
+    size, deviation = found.problem.effective_size(), found.problem.deviation
+    return found.solve.cost + size * float(np.log(deviation))
+
+
+def check_on_grid(
+    grid: SymbolicModel,
+    reduced: SymbolicModel,
+    theta: FloatArray,
+    inputs: Inputs,
+    intervals: Sequence[Interval],
+    steps: int,
+    scheme: Scheme,
+) -> GridCheck:
+    """Replay a few runs on the reduced model and on the grid and compare zone means.
+
+    Parameters
+    ----------
+    grid, reduced : SymbolicModel
+        The two models.
+    theta : ndarray, shape (n_parameter,)
+        Where they are compared [parameter units].
+    inputs : Inputs
+        The telemetry.
+    intervals : sequence of Interval
+        The runs are spread over the first of them.
+    steps : int
+        N.
+    scheme : Scheme
+        Time stepping of the runs.
+    """
+    runs = select_runs(inputs, intervals[0], steps)
+    if runs.starts.size == 0:
+        raise NotEnoughDataError(f"held out: all {runs.skipped} runs of {intervals[0].start} to {intervals[0].end} miss telemetry")
+    starts = np.unique(runs.starts[np.linspace(0, runs.starts.size - 1, CHECK_RUNS).astype(int)])
+    means = []
+    for model in (grid, reduced):
+        matrices = model.matrices(theta)
+        states, _ = spin_up(matrices, inputs, runs.begin, starts)
+        means.append(free_runs(matrices, model.network, inputs, starts, steps, states, scheme=scheme)[0])
+    difference = np.abs(means[0] - means[1])
+    order = reduced.projection.shape[1] if reduced.projection is not None else reduced.network.n_node
+    return GridCheck(grid.network.n_node, order, starts.size, float(difference.max()), float(difference.mean()))
+
+
+def _describe(found: Estimate, nominal: Mapping[str, tuple[float, str]]) -> tuple[ParameterEstimate, ...]:
+    """Parameters with standard errors, bounds and what the data determine."""
+    deviations = dict(zip(found.problem.free, np.sqrt(np.diag(found.covariance)), strict=True))
+    described = [
+        _estimated(p, float(found.theta[i]), deviations.get(i)) for i, p in enumerate(found.problem.grid.network.parameters)
+    ]
+    for name, (value, unit) in nominal.items():
+        source = "nominal: enters only as a product with the heat capacity"
+        described.append(ParameterEstimate(name, unit, value, None, None, value, False, None, False, source))
+    return tuple(described)
+
+
+def _estimated(p: Parameter, value: float, deviation: float | None) -> ParameterEstimate:
+    if deviation is None:
+        return ParameterEstimate(p.name, p.unit, value, p.lower, p.upper, p.start, False, None, False, "fixed by the user")
+    low, high, z = p.transform(p.lower), p.transform(p.upper), p.transform(value)
+    at_bound = bool(min(z - low, high - z) < BOUND_SHARE * (high - low))
+    identifiable = bool(deviation < 0.5 * p.prior_deviation and not at_bound)
+    error = float(deviation * p.slope(value))
+    return ParameterEstimate(p.name, p.unit, value, p.lower, p.upper, p.start, at_bound, error, identifiable, p.source)
