@@ -197,8 +197,8 @@ def _line(unit: str, quantity: str, elevation: float, where: str) -> tuple[float
     if parsed.dimensionality != registry.parse_units(target.unit).dimensionality or is_angle != (quantity == "angle"):
         hint = {"C": "write degC", "F": "write degF"}.get(unit, f"use one of {target.examples}")
         raise IncompatibleUnitError(describe(where, f"a unit of {target.name}", repr(unit), hint))
-    zero, far = (float(registry.Quantity(x, parsed).to(target.unit).magnitude) for x in (0.0, 1000.0))
-    return (far - zero) / 1000.0, zero
+    zero, one = (float(registry.Quantity(x, parsed).to(target.unit).magnitude) for x in (0.0, 1.0))
+    return one - zero, zero
 
 
 def _parse(unit: str, target: Quantity, where: str) -> Any:

@@ -309,10 +309,17 @@ def test_csv_column_that_is_not_numeric(plan_draft: Any, value: str) -> None:
         load_case(path.parent)
 
 
-@pytest.mark.parametrize("values", [["off", "on"], ["20.5", "21.5"], [True, False], [b"1", b"2"]])
+@pytest.mark.parametrize("values", [["off", "on"], ["20.5", "21.5"], [True, False], [b"1", b"2"], [[1.0, 2.0], [3.0]]])
 def test_parquet_column_that_is_not_numeric(plan_draft: Any, values: list[object]) -> None:
     plan_draft.frame[FLOW] = values * 24
     refused(plan_draft, NonNumericColumnError, f"column '{FLOW}', stamp 2023-03-01 .*expected a number, found")
+
+
+def test_frame_that_is_not_numeric(plan_draft: Any) -> None:
+    frame = plan_draft.frame.astype({FLOW: object})
+    frame.loc[frame.index[3], FLOW] = "closed"
+    with pytest.raises(NonNumericColumnError, match=f"telemetry: column '{FLOW}': expected numbers, found .*closed"):
+        Telemetry.from_frame(frame)
 
 
 def test_column_of_time_stamps_is_not_numeric(plan_draft: Any) -> None:

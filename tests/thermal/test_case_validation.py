@@ -126,6 +126,12 @@ def test_plan_files_that_are_missing_or_elsewhere(plan_draft: Any, plan: str) ->
     assert isinstance(caught.value, OutsideCaseError) == outside
 
 
+@pytest.mark.parametrize("plan", ["a\0b.csv", "x" * 5000])
+def test_plan_files_that_no_disk_can_hold(plan_draft: Any, plan: str) -> None:
+    plan_draft.content["floors"][0]["plan"] = plan
+    refused(plan_draft, MissingFileError, r"floors\[0\]\.plan: expected the name of a file")
+
+
 def test_link_out_of_the_folder_is_outside(plan_draft: Any) -> None:
     folder = plan_draft.write()
     (folder / "plan_F1.csv").rename(folder.parent / "elsewhere.csv")

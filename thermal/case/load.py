@@ -83,12 +83,16 @@ def _building(parsed: BuildingFile, folder: Path) -> Building:
 def _inside(folder: Path, name: str, key: str) -> Path:
     """Resolve a file of the case; refuse one that lies elsewhere."""
     where = f"building.yaml: {key}"
-    target = (folder / name).resolve()
+    try:
+        target = (folder / name).resolve()
+        is_file = target.is_file()
+    except (OSError, ValueError, RuntimeError) as error:  # a NUL, a name too long, links in a circle
+        raise MissingFileError(describe(where, "the name of a file", repr(name))) from error
     if not target.is_relative_to(folder.resolve()):
         raise OutsideCaseError(
             describe(where, "a file inside the case folder", repr(name), "copy the file into the case")
         )
-    if not target.is_file():
+    if not is_file:
         raise MissingFileError(
             describe(where, "a file of the case folder", repr(name), "add the file or correct the name")
         )

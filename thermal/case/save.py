@@ -71,15 +71,20 @@ def save_case(case: Case, path: str | PathLike[str], *, overwrite: bool = False)
         new.mkdir()
         _write(case.building, reported, new)
         load_case(new)  # what cannot be read back is not saved
-        if target.exists():
-            os.replace(target, Path(work) / "old")
-        try:
-            os.replace(new, target)
-        except OSError:
-            if (Path(work) / "old").exists():
-                os.replace(Path(work) / "old", target)
-            raise
+        _move_in(new, target, Path(work) / "old")
     return target
+
+
+def _move_in(new: Path, target: Path, old: Path) -> None:
+    """Put `new` where `target` is; put what was there back when that fails."""
+    if target.exists():
+        os.replace(target, old)
+    try:
+        os.replace(new, target)
+    except OSError:
+        if old.exists():
+            os.replace(old, target)
+        raise
 
 
 def _check_target(target: Path, overwrite: bool) -> None:

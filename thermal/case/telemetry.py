@@ -13,6 +13,7 @@ from thermal.errors import (
     EmptyTelemetryError,
     IrregularStepError,
     MissingTimeZoneError,
+    NonNumericColumnError,
     StepTooLongError,
     TimestampError,
     UnorderedStampError,
@@ -67,6 +68,8 @@ class Telemetry:
             There are fewer than two rows, or no columns.
         DuplicateColumnError
             Two columns have the same name.
+        NonNumericColumnError
+            A column cannot be read as numbers.
         """
         doubled = frame.columns[frame.columns.duplicated()]
         if len(doubled):
@@ -79,12 +82,26 @@ class Telemetry:
         step = _regular_step(index, where)
         full = pd.date_range(index[0], index[-1], freq=pd.Timedelta(step, unit="s"), name=INDEX)
         full = full.as_unit("us")
-        numbers = frame.astype(float).set_axis(index, axis=0)
+        numbers = _as_numbers(frame, where).set_axis(index, axis=0)
         missing = tuple(full.difference(index)) if len(full) != len(index) else ()
         if missing:
             numbers = numbers.reindex(full)
         numbers.index = full
         return cls(frame=numbers, step=step, missing_rows=missing)
+
+
+def _as_numbers(frame: pd.DataFrame, where: str) -> pd.DataFrame:
+    try:
+        return frame.astype(float)
+    except (TypeError, ValueError):
+        for column in frame.columns:
+            try:
+                frame[column].astype(float)
+            except (TypeError, ValueError) as error:
+                at = f"{where}: column {str(column)!r}"
+                found = " ".join(str(error).split())
+                raise NonNumericColumnError(describe(at, "numbers", found)) from error
+        raise
 
 
 def _checked_index(index: pd.Index, where: str) -> pd.DatetimeIndex:

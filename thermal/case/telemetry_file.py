@@ -168,10 +168,10 @@ def _numbers(column: pd.Series, where: str) -> NDArray[np.float64]:
         return column.to_numpy(dtype=float, na_value=np.nan)
     values = np.full(len(column), np.nan)
     for position, (stamp, value) in enumerate(column.items()):
-        if not pd.isna(value):
-            if isinstance(value, bool) or not isinstance(value, int | float | Decimal):
-                raise _not_numeric(where, stamp, value)
+        if isinstance(value, int | float | Decimal) and not isinstance(value, bool):
             values[position] = float(value)
+        elif value is not None and value is not pd.NA and value is not pd.NaT:
+            raise _not_numeric(where, stamp, value)
     return values
 
 

@@ -2,7 +2,9 @@
 
 from thermal.model._reduction import krylov_basis, reduced_model
 from thermal.model._replay import LEAST_SPIN_UP, SPIN_UP, Inputs, free_runs, replay_inputs, spin_up
+from thermal.model._rollout import RolloutData, SparseRollout, rollout, symbolic_step
 from thermal.model._scheme import IMPLICIT_EULER, SCHEMES, TR_BDF2, Scheme, Stage
+from thermal.model._simulate import Simulation, simulate
 from thermal.model._stepper import Stepper, factorise
 from thermal.model._symbolic import Matrices, SymbolicModel
 
@@ -14,7 +16,10 @@ __all__ = [
     "TR_BDF2",
     "Inputs",
     "Matrices",
+    "RolloutData",
     "Scheme",
+    "Simulation",
+    "SparseRollout",
     "Stage",
     "Stepper",
     "SymbolicModel",
@@ -23,5 +28,8 @@ __all__ = [
     "krylov_basis",
     "reduced_model",
     "replay_inputs",
+    "rollout",
+    "simulate",
     "spin_up",
+    "symbolic_step",
 ]

@@ -11,11 +11,11 @@ from thermal.model._symbolic import Matrices, SymbolicModel
 
 FloatArray = NDArray[np.float64]
 
-#: Expansion points of the transfer function [1/s]: a month, eight hours, an hour, ten minutes and two minutes.
-SHIFTS = (1.0 / 2.6e6, 1.0 / 28800.0, 1.0 / 3600.0, 1.0 / 600.0, 1.0 / 120.0)
+#: Expansion points of the transfer function [1/s]: a month, a day, eight hours, an hour, ten minutes and two minutes.
+SHIFTS = (1.0 / 2.6e6, 1.0 / 86400.0, 1.0 / 28800.0, 1.0 / 3600.0, 1.0 / 600.0, 1.0 / 120.0)
 
 
-def krylov_basis(matrices: list[Matrices], shifts: tuple[float, ...] = SHIFTS, tolerance: float = 1e-7) -> FloatArray:
+def krylov_basis(matrices: list[Matrices], shifts: tuple[float, ...] = SHIFTS, tolerance: float = 1e-10) -> FloatArray:
     """Orthonormal basis of the responses to every input at several shifts, over one or more θ.
 
     The responses ``(K + s C)^-1 [H, B, C 1]`` interpolate the transfer function at ``s`` (Grimme 1997; Antoulas 2005, ch. 11); K and
@@ -28,7 +28,7 @@ def krylov_basis(matrices: list[Matrices], shifts: tuple[float, ...] = SHIFTS, t
     shifts : tuple of float
         Expansion points [1/s], positive.
     tolerance : float
-        Relative singular value below which a direction is dropped [-].
+        Relative eigenvalue of the Gram matrix below which a direction is dropped [-].
 
     Returns
     -------
@@ -49,7 +49,7 @@ def krylov_basis(matrices: list[Matrices], shifts: tuple[float, ...] = SHIFTS, t
     gram = (scale[:, None] * stacked).T @ (scale[:, None] * stacked)
     norms = np.sqrt(np.diag(gram))
     values, vectors = np.linalg.eigh(gram / np.outer(norms, norms))
-    keep = values > tolerance**1 * values[-1]
+    keep = values > tolerance * values[-1]
     basis = (stacked / norms) @ (vectors[:, keep] / np.sqrt(values[keep]))
     return np.asarray(np.linalg.qr(np.hstack([np.ones((basis.shape[0], 1)), basis]))[0])
 

@@ -66,6 +66,13 @@ class SymbolicModel:
     projection : ndarray, shape (n_node, r), optional
         Orthonormal basis of a Galerkin reduction: every class matrix is projected, so the model stays affine in κ(θ) and c(θ).
 
+    Attributes
+    ----------
+    classes : casadi.Function
+        θ to κ and c.
+    class_flows, class_masses : list of matrices
+        ``[K, -B]`` and C of each class at unit value.
+
     Examples
     --------
     >>> from thermal import load_bundled_case, build_network, SymbolicModel
@@ -87,15 +94,15 @@ class SymbolicModel:
         self._heating: sp.csr_matrix | FloatArray = network.heating
         self._observation: sp.csr_matrix | FloatArray = network.observation
         self._uniform = np.ones(network.n_node)
-        self._flows: list[sp.csr_matrix] | list[FloatArray] = laplacians
-        self._masses: list[sp.csr_matrix] | list[FloatArray] = masses
+        self.class_flows: list[sp.csr_matrix] | list[FloatArray] = laplacians
+        self.class_masses: list[sp.csr_matrix] | list[FloatArray] = masses
         if projection is not None:
             self._project(projection, laplacians, masses)
 
     def _project(self, v: FloatArray, laplacians: list[sp.csr_matrix], masses: list[sp.csr_matrix]) -> None:
         n = self.network.n_node
-        self._flows = [np.hstack([v.T @ (m[:, :n] @ v), v.T @ m[:, n:].toarray()]) for m in laplacians]
-        self._masses = [v.T @ (m @ v) for m in masses]
+        self.class_flows = [np.hstack([v.T @ (m[:, :n] @ v), v.T @ m[:, n:].toarray()]) for m in laplacians]
+        self.class_masses = [v.T @ (m @ v) for m in masses]
         self._uniform = v.T @ np.ones(n)
         self._heating = v.T @ self.network.heating.toarray()
         self._observation = self.network.observation @ v
@@ -127,11 +134,11 @@ class SymbolicModel:
         capacity_slopes: list[sp.csr_matrix | FloatArray] = []
         if slopes:
             d_kappa, d_heat = (np.asarray(v) for v in self._slopes(theta))
-            flow_slopes = [_weighted(self._flows, d_kappa[:, j]) for j in range(theta.size)]
-            capacity_slopes = [_weighted(self._masses, d_heat[:, j]) for j in range(theta.size)]
+            flow_slopes = [_weighted(self.class_flows, d_kappa[:, j]) for j in range(theta.size)]
+            capacity_slopes = [_weighted(self.class_masses, d_heat[:, j]) for j in range(theta.size)]
         return Matrices(
-            capacity=_weighted(self._masses, heat),
-            flow=_weighted(self._flows, kappa),
+            capacity=_weighted(self.class_masses, heat),
+            flow=_weighted(self.class_flows, kappa),
             heating=self._heating,
             observation=self._observation,
             uniform=self._uniform,

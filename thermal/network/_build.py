@@ -20,6 +20,7 @@ def build_network(
     reach: float | None = None,
     scopes: Mapping[str, Scope] | None = None,
     diffusers: Mapping[str, NDArray[np.bool_]] | None = None,
+    mean_shuffle: bool = True,
 ) -> ThermalNetwork:
     """Build the control volumes and faces of a building, from floor plans or from a zone table.
 
@@ -35,6 +36,8 @@ def build_network(
         Parameters with one value a zone; the others are global.
     diffusers : mapping of str to ndarray of bool, optional
         Cells with a diffuser, per zone, at the plan's resolution; all air cells by default.
+    mean_shuffle : bool
+        Whether the mean of the shuffle is a term of K; off for a simulator that shuffles at random.
 
     Returns
     -------
@@ -43,4 +46,4 @@ def build_network(
     """
     if isinstance(building.geometry, ZoneTable):
         return table_network(building, scopes)
-    return plan_network(building, dx, reach, scopes, diffusers)
+    return plan_network(building, dx, reach, scopes, diffusers, mean_shuffle)

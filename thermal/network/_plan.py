@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+import casadi as ca
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
@@ -35,6 +36,7 @@ def plan_network(
     reach: float | None = None,
     scopes: Mapping[str, Scope] | None = None,
     diffusers: Mapping[str, NDArray[np.bool_]] | None = None,
+    mean_shuffle: bool = True,
 ) -> ThermalNetwork:
     """Build the network of a building given by floor plans.
 
@@ -50,6 +52,8 @@ def plan_network(
         Parameters with one value a zone.
     diffusers : mapping of str to ndarray of bool, optional
         Per zone, a mask of the shape of its floor's plan with the cells that have a diffuser; all air cells by default.
+    mean_shuffle : bool
+        Whether the mean of the shuffle is a term of K; off for a simulator that shuffles at random.
 
     Returns
     -------
@@ -67,7 +71,7 @@ def plan_network(
         grid = floor_grid(plan, plans.cell_size, dx)
         floor = _Floor(graph, plan, grid, number, plans.cell_size)
         for name in (z for z in building.zone_names if (grid.token == z).any()):
-            zones[name] = floor.zone(name, areas[name], density, reach)
+            zones[name] = floor.zone(name, areas[name], density, reach, mean_shuffle)
             mask = (diffusers or {}).get(name)
             diffuser_weight[zones[name].number] = floor.diffuser_weight(name, mask)
         floor.walls(zones, plans.glazing)
@@ -103,7 +107,7 @@ class _Floor:
                 self.node[mask] = graph.volumes(k, zone[mask], place[mask])
         self.cells = np.bincount(grid.volume[grid.volume >= 0], minlength=token.size)
 
-    def zone(self, name: str, area: float, density: float, reach: float | None) -> Zone:
+    def zone(self, name: str, area: float, density: float, reach: float | None, mean_shuffle: bool) -> Zone:
         """Air of one zone with its shuffle, slabs and furniture."""
         graph, grid = self.graph, self.grid
         mine = grid.token == name
@@ -112,30 +116,31 @@ class _Floor:
         heat = density * AIR_HEAT_CAPACITY
         graph.capacity("air", heat, air, area * self.plan.height * zone.share)
         if air.size > 1:
-            self._shuffle(zone, area, heat, reach)
+            self._air(zone, area, heat, reach, mean_shuffle)
         zone.slabs(2.0 * area)
         zone.furniture(area)
         return zone
 
-    def _shuffle(self, zone: Zone, area: float, heat: float, reach: float | None) -> None:
-        """Mean of the paper's random shuffle: a massless star node, or an effective diffusivity (see `thermal.shuffle`)."""
+    def _air(self, zone: Zone, area: float, heat: float, reach: float | None, mean_shuffle: bool) -> None:
+        """Conduction between air volumes, and the mean of the shuffle: a massless star node or a diffusivity (`thermal.shuffle`)."""
         graph, grid = self.graph, self.grid
-        probability = graph.parameter("shuffle_probability", zone.name)
-        rows, columns = np.nonzero(grid.tokens == zone.name)
-        extent = ((np.ptp(columns) + 1) * grid.cell, (np.ptp(rows) + 1) * grid.cell)
-        conductivity = AIR_CONDUCTIVITY
-        name = graph.key("air-air", zone.name, "shuffle_probability")
-        if choose_equivalent(extent, reach) == "mixing" or reach is None:
-            star = graph.volumes("mixing", zone.number)
-            rate = exchange_rate(probability, SHUFFLE_STEP)
-            key = graph.key("mixing", zone.name, "shuffle_probability")
-            graph.face(key, rate * heat, zone.air, star, area * self.plan.height * zone.share)
-        else:
-            diffusivity = effective_diffusivity(probability, mean_square_reach(reach, grid.cell), SHUFFLE_STEP)
-            conductivity = AIR_CONDUCTIVITY + diffusivity * heat
-            name = f"{name} diffusing"
-        for step_ in (FACADES["south"], FACADES["east"]):
-            first, second, faces = self._pairs(step_, zone.name, zone.name)
+        conductivity = ca.SX(AIR_CONDUCTIVITY)
+        name = "air-air"
+        if mean_shuffle:
+            probability = graph.parameter("shuffle_probability", zone.name)
+            rows, columns = np.nonzero(grid.tokens == zone.name)
+            extent = ((np.ptp(columns) + 1) * grid.cell, (np.ptp(rows) + 1) * grid.cell)
+            if reach is None or choose_equivalent(extent, reach) == "mixing":
+                star = graph.volumes("mixing", zone.number)
+                rate = exchange_rate(probability, SHUFFLE_STEP)
+                key = graph.key("mixing", zone.name, "shuffle_probability")
+                graph.face(key, rate * heat, zone.air, star, area * self.plan.height * zone.share)
+            else:
+                diffusivity = effective_diffusivity(probability, mean_square_reach(reach, grid.cell), SHUFFLE_STEP)
+                conductivity = AIR_CONDUCTIVITY + diffusivity * heat
+                name = graph.key("air-air diffusing", zone.name, "shuffle_probability")
+        for step in (FACADES["south"], FACADES["east"]):
+            first, second, faces = self._pairs(step, zone.name, zone.name)
             graph.face(name, conductivity, first, second, faces * grid.cell * self.plan.height / grid.spacing)
 
     def diffuser_weight(self, name: str, mask: NDArray[np.bool_] | None) -> FloatArray:
