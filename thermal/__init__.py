@@ -3,7 +3,7 @@
 from thermal.case import Building, Case, FloorPlan, FloorPlans, Telemetry, ZoneTable, load_case, local_timestamp, save_case
 from thermal.data import load_bundled_case
 from thermal.errors import CaseError, ModelError, ThermalError
-from thermal.model import Inputs, SymbolicModel, free_runs, reduced_model, replay_inputs, spin_up
+from thermal.model import Inputs, Simulator, SymbolicModel, free_runs, reduced_model, replay_inputs, simulate, spin_up
 from thermal.network import ThermalNetwork, build_network
 from thermal.parameters import PARAMETERS, Parameter
 
@@ -17,6 +17,7 @@ __all__ = [
     "Inputs",
     "ModelError",
     "Parameter",
+    "Simulator",
     "SymbolicModel",
     "Telemetry",
     "ThermalError",
@@ -30,5 +31,6 @@ __all__ = [
     "reduced_model",
     "replay_inputs",
     "save_case",
+    "simulate",
     "spin_up",
 ]

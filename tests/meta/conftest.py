@@ -115,8 +115,10 @@ def _where(value: Any, otherwise: str) -> str:
 
 
 def _members(owner: Public) -> Iterator[Public]:
-    seen: set[str] = set()
-    for cls in (c for c in owner.value.__mro__ if c.__module__.partition(".")[0] in PACKAGES):
+    ours = [c for c in owner.value.__mro__ if c.__module__.partition(".")[0] in PACKAGES]
+    # what overrides a method of another library (casadi.Callback) is that library's to document
+    seen = {name for c in owner.value.__mro__ if c not in ours for name in vars(c)}
+    for cls in ours:
         for name, value in vars(cls).items():
             is_member = inspect.isfunction(value) or isinstance(value, MEMBER_KINDS)
             if is_member and not name.startswith("_") and name not in seen:

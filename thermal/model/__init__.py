@@ -5,6 +5,7 @@ from thermal.model._replay import LEAST_SPIN_UP, SPIN_UP, Inputs, free_runs, rep
 from thermal.model._rollout import RolloutData, SparseRollout, rollout, symbolic_step
 from thermal.model._scheme import IMPLICIT_EULER, SCHEMES, TR_BDF2, Scheme, Stage
 from thermal.model._simulate import Simulation, simulate
+from thermal.model._simulator import Simulator
 from thermal.model._stepper import Stepper, factorise
 from thermal.model._symbolic import Matrices, SymbolicModel
 
@@ -19,6 +20,7 @@ __all__ = [
     "RolloutData",
     "Scheme",
     "Simulation",
+    "Simulator",
     "SparseRollout",
     "Stage",
     "Stepper",

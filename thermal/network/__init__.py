@@ -4,7 +4,7 @@ from thermal.network._build import build_network
 from thermal.network._films import series, surface_mesh
 from thermal.network._graph import CapacityClass, ConductanceClass, GraphBuilder, ThermalNetwork
 from thermal.network._grid import FloorGrid, floor_grid
-from thermal.network._materials import AIR_HEAT_CAPACITY, air_density
+from thermal.network._materials import AIR_HEAT_CAPACITY
 
 __all__ = [
     "AIR_HEAT_CAPACITY",
@@ -13,7 +13,6 @@ __all__ = [
     "FloorGrid",
     "GraphBuilder",
     "ThermalNetwork",
-    "air_density",
     "build_network",
     "floor_grid",
     "series",

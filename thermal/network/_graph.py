@@ -81,6 +81,8 @@ class ThermalNetwork:
         Their symbols in the class expressions.
     nominal : mapping of str to (float, str)
         Values that enter only as a product with a parameter (densities), with their unit: reported, never estimated.
+    spacing : float or None
+        Distance between the volumes of a plan [m]; None for a zone table.
     """
 
     zones: tuple[str, ...]
@@ -96,6 +98,7 @@ class ThermalNetwork:
     parameters: tuple[Parameter, ...]
     symbols: ca.SX
     nominal: Mapping[str, tuple[float, str]] = field(default_factory=dict)
+    spacing: float | None = None
 
     @property
     def n_node(self) -> int:
@@ -205,7 +208,7 @@ class GraphBuilder:
         self._masses.setdefault(key, (ca.SX(value), []))[1].append((node, weight))
 
     def finish(
-        self, observation: sp.csr_matrix, heating: sp.csr_matrix, airflows: tuple[tuple[int, int], ...]
+        self, observation: sp.csr_matrix, heating: sp.csr_matrix, airflows: tuple[tuple[int, int], ...], spacing: float | None = None
     ) -> ThermalNetwork:
         """Make the network from what was added."""
 
@@ -234,4 +237,5 @@ class GraphBuilder:
             parameters=tuple(p for p, _ in self._parameters.values()),
             symbols=ca.vertcat(*[s for _, s in self._parameters.values()]) if self._parameters else ca.SX(0, 1),
             nominal=dict(self.nominal),
+            spacing=spacing,
         )

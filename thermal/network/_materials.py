@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 #: Specific heat of air [J/kg/K]; the value of the metered heat (Digital Buildings flow meters, case-format contract).
 AIR_HEAT_CAPACITY = 1006.0
 
@@ -30,18 +28,3 @@ RATED_OUTSIDE_FILM = 25.0
 #: Step of the paper's shuffle [s].
 SHUFFLE_STEP = 300.0
 
-
-def air_density(elevation: float) -> float:
-    """Density of dry air at 20 degC and the standard pressure of an elevation [kg/m3].
-
-    Parameters
-    ----------
-    elevation : float
-        Height above sea level [m].
-
-    Notes
-    -----
-    ASHRAE Handbook Fundamentals 2021, ch. 1 eq. 3; ideal gas with R = 287.05 J/kg/K.
-    """
-    pressure = 101325.0 * (1.0 - 2.25577e-5 * np.clip(elevation, -500.0, 9000.0)) ** 5.2559
-    return float(pressure / (287.05 * 293.15))

@@ -21,9 +21,9 @@ from thermal.network._materials import (
     INTERIOR_WALL_MASS,
     SHUFFLE_STEP,
     STRUCTURE_RESISTANCE,
-    air_density,
 )
 from thermal.parameters import Scope
+from thermal.units import air_density
 from thermal.shuffle import choose_equivalent, effective_diffusivity, exchange_rate, mean_square_reach
 
 FloatArray = NDArray[np.float64]
@@ -85,7 +85,7 @@ def plan_network(
     heating = sp.csr_matrix((share, (node, column)), shape=shape)
     observation = sp.csr_matrix((mean, (column, node)), shape=shape[::-1])
     flows = tuple((graph.zones.index(a.source), graph.zones.index(a.target)) for a in building.airflows)
-    return graph.finish(observation, heating, flows)
+    return graph.finish(observation, heating, flows, grid.spacing)
 
 
 class _Floor:

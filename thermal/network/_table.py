@@ -18,9 +18,9 @@ from thermal.network._materials import (
     BOUNDARY_FILM_RESISTANCE,
     RATED_OUTSIDE_FILM,
     WINDOW_RATED_FILM,
-    air_density,
 )
 from thermal.parameters import Scope
+from thermal.units import air_density
 
 #: Time that a sublayer must resolve [s]: its thickness is at most sqrt(diffusivity x this), a Fourier number of one.
 SUBLAYER_TIME = 1800.0

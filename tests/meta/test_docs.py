@@ -1,0 +1,49 @@
+"""The documentation names every parameter, unit and point, and everything that it points to exists."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+from thermal.case.points import POINT_TYPES
+from thermal.parameters import PARAMETERS
+from thermal.units import QUANTITIES
+
+Check = Callable[[list[str]], None]
+
+ROOT = Path(__file__).parents[2]
+DOCS = ROOT / "docs"
+NOMENCLATURE = DOCS / "nomenclature.md"
+CODE_PATH = re.compile(r"`((?:thermal|calibration|mpc|benchmarks|examples|tests)/[\w/.]+)`")
+LINK = re.compile(r"\]\((?!https?:|#)([^)#\s]+)")
+
+
+def cells(name: str) -> list[str]:
+    """Cells of the nomenclature's row of a name, backticks removed."""
+    rows = [line for line in NOMENCLATURE.read_text(encoding="utf-8").splitlines() if line.startswith(f"| `{name}` |")]
+    return [cell.strip(" `") for cell in rows[0].strip("|").split(" | ")] if rows else []
+
+
+def test_nomenclature_has_every_parameter_and_point_with_its_unit(expect_none: Check) -> None:
+    units = {name: p.unit for name, p in PARAMETERS.items()}
+    units |= {name: QUANTITIES[point.quantity].file_unit for name, point in POINT_TYPES.items()}
+    wrong = [name for name, unit in units.items() if unit not in cells(name)]
+    expect_none([f"docs/nomenclature.md:1: has no row '| `{n}` | ...' with a cell '{units[n]}'; add it" for n in wrong])
+
+
+def test_what_the_documentation_points_to_exists(expect_none: Check) -> None:
+    problems = []
+    for page in [*DOCS.glob("*.md"), ROOT / "README.md"]:
+        for number, line in enumerate(page.read_text(encoding="utf-8").splitlines(), 1):
+            targets = [*(page.parent / t for t in LINK.findall(line)), *(ROOT / t for t in CODE_PATH.findall(line))]
+            at = f"{page.relative_to(ROOT)}:{number}"
+            lost = [t.relative_to(ROOT) for t in targets if not t.exists()]
+            problems += [f"{at}: points to {t}, which is not there" for t in lost]
+    expect_none(problems)
+
+
+def test_the_index_links_every_page(expect_none: Check) -> None:
+    linked = set(LINK.findall((DOCS / "index.md").read_text(encoding="utf-8")))
+    missing = [page.name for page in sorted(DOCS.glob("*.md")) if page.name not in linked | {"index.md"}]
+    expect_none([f"docs/index.md:1: does not link {name}; add a row" for name in missing])

@@ -1,0 +1,289 @@
+"""The stepping simulator: the plant of closed-loop tests, with the paper's random shuffle or its mean."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermal.case import Building, Case
+from thermal.errors import InputShapeError, ModelError
+from thermal.model._replay import SPIN_UP, replay_inputs, spin_up
+from thermal.model._scheme import SCHEMES
+from thermal.model._stepper import Stepper
+from thermal.model._symbolic import Matrices, SymbolicModel
+from thermal.network import build_network
+from thermal.shuffle import RandomShuffle
+
+FloatArray = NDArray[np.float64]
+
+#: One long implicit step towards the steady state of a reset [s].
+_STEADY_STEP = 10 * 86400.0
+
+#: Temperatures outside of this range are refused as inputs [K].
+PLAUSIBLE = (173.15, 373.15)
+
+
+class Simulator:
+    """Steps a building from zone heats and boundary temperatures.
+
+    Parameters
+    ----------
+    building : Building
+        Floor plans or a zone table.
+    parameters : mapping of str to float, optional
+        Values by name [parameter units]; starts for the rest.
+    step_seconds : float
+        Time step [s].
+    dx : float, optional
+        Distance between control volumes of a plan [m].
+    scheme : str
+        ``implicit_euler`` or ``tr_bdf2``.
+    shuffle : {"mean", "random"}
+        The mean of the shuffle as a term of the model, or the paper's random one after each step.
+    probability : float
+        Shuffle probability of the random shuffle [-], in [0, 1]; with ``mean`` it is a parameter.
+    reach : float, optional
+        Reach of the shuffle [m]; None is the whole zone.
+    seed : int
+        Seed of the random shuffle.
+
+    Raises
+    ------
+    ModelError
+        When an option is unknown, or a parameter is not of this building.
+
+    Examples
+    --------
+    >>> from thermal import Simulator, load_bundled_case
+    >>> plant = Simulator(load_bundled_case().building, dx=1.0)
+    >>> start = plant.reset(np.full(5, 293.15), np.array([273.15]))
+    >>> bool((plant.step(np.zeros(5), np.array([273.15])) < start).all())
+    True
+    """
+
+    def __init__(
+        self,
+        building: Building,
+        parameters: Mapping[str, float] | None = None,
+        step_seconds: float = 300.0,
+        dx: float | None = None,
+        scheme: str = "implicit_euler",
+        shuffle: Literal["mean", "random"] = "mean",
+        probability: float = 0.5,
+        reach: float | None = None,
+        seed: int = 0,
+    ) -> None:
+        if scheme not in SCHEMES:
+            raise ModelError(f"scheme: expected one of {sorted(SCHEMES)}, came {scheme!r}")
+        if shuffle not in ("mean", "random"):
+            raise ModelError(f"shuffle: expected 'mean' or 'random', came {shuffle!r}")
+        if not (np.isfinite(step_seconds) and step_seconds > 0):
+            raise ModelError(f"step_seconds: expected a positive number of seconds, came {step_seconds}")
+        network = build_network(building, dx=dx, reach=reach, mean_shuffle=shuffle == "mean")
+        self.network = network
+        # a steady state or a spin-up needs the mean of the shuffle, also where the steps shuffle at random
+        self._start_model = SymbolicModel(
+            network if shuffle == "mean" else build_network(building, dx=dx, reach=reach, mean_shuffle=True)
+        )
+        self.probability = min(max(probability, 1e-3), 1.0)
+        self.step_seconds = float(step_seconds)
+        self.model = SymbolicModel(network)
+        self.theta = network.values(parameters or {})
+        self.matrices = self.model.matrices(self.theta)
+        self._stepper = Stepper(self.matrices, self.step_seconds, SCHEMES[scheme], network.airflows)
+        self._air = np.flatnonzero(network.kind == "air")
+        self._shuffle = _random_shuffle(network, self.matrices, self._air, probability, reach, seed) if shuffle == "random" else None
+        self._states: FloatArray | None = None
+
+    @property
+    def zone_names(self) -> tuple[str, ...]:
+        """Zones, the order of every zone axis."""
+        return self.network.zones
+
+    @property
+    def boundary_names(self) -> tuple[str, ...]:
+        """Boundaries, ``outdoor`` first."""
+        return self.network.boundaries
+
+    @property
+    def states(self) -> FloatArray:
+        """Temperatures of all control volumes, shape (n_node,) [K]; a copy."""
+        return self._current()[:, 0].copy()
+
+    @property
+    def zone_temperatures(self) -> FloatArray:
+        """Zone means now, shape (n_zone,) [K]."""
+        return np.asarray(self.network.observation @ self._current())[:, 0]
+
+    def reset(self, zone_temperatures: FloatArray, boundary_temperatures: FloatArray | None = None) -> FloatArray:
+        """Start from the steady state that holds the zones at given temperatures.
+
+        Parameters
+        ----------
+        zone_temperatures : ndarray, shape (n_zone,)
+            Zone means [K].
+        boundary_temperatures : ndarray, shape (n_boundary,), optional
+            Boundary temperatures [K]; the mean of the zones by default.
+
+        Returns
+        -------
+        ndarray, shape (n_zone,)
+            Zone means [K].
+        """
+        zone = self._checked("zone_temperatures", zone_temperatures, len(self.network.zones), PLAUSIBLE)
+        if boundary_temperatures is None:
+            boundary_temperatures = np.full(self.network.n_boundary, zone.mean())
+        boundary = self._checked("boundary_temperatures", boundary_temperatures, self.network.n_boundary, PLAUSIBLE)
+        matrices = self._start_matrices()
+        start = zone.mean() * matrices.uniform[:, None]
+        states, _, _ = Stepper(matrices, _STEADY_STEP).hold(start, boundary[:, None], zone[:, None])
+        self._states = self._without_stars(states)
+        return self.zone_temperatures
+
+    def reset_from(self, case: Case, stamp: int, spin_up_seconds: float = SPIN_UP) -> FloatArray:
+        """Start from telemetry: zones matched at a stamp, everything else from a spin-up over what precedes it.
+
+        Parameters
+        ----------
+        case : Case
+            Telemetry of this building at the simulator's step.
+        stamp : int
+            Row of the telemetry.
+        spin_up_seconds : float
+            Length of the spin-up [s].
+
+        Returns
+        -------
+        ndarray, shape (n_zone,)
+            Zone means [K].
+
+        Raises
+        ------
+        ModelError
+            When the telemetry has another step, or no such row.
+        """
+        inputs = replay_inputs(case, self._start_model.network)
+        if inputs.step != self.step_seconds:
+            raise ModelError(f"telemetry: expected a step of {self.step_seconds:g} s, came {inputs.step:g} s")
+        if not 0 < stamp < len(inputs):
+            raise ModelError(f"stamp: expected a row from 1 to {len(inputs) - 1}, came {stamp}")
+        begin = max(0, stamp - round(spin_up_seconds / inputs.step))
+        states, _ = spin_up(self._start_matrices(), inputs, begin, np.array([stamp]))
+        self._states = self._without_stars(states)
+        return self.zone_temperatures
+
+    def _start_matrices(self) -> Matrices:
+        given = dict(zip((p.name for p in self.network.parameters), self.theta, strict=True))
+        network = self._start_model.network
+        if self._shuffle is not None:
+            given |= {p.name: self.probability for p in network.parameters if p.name.startswith("shuffle_probability")}
+        return self._start_model.matrices(network.values(given))
+
+    def _without_stars(self, states: FloatArray) -> FloatArray:
+        """Drop the star nodes that stand for the mean of the shuffle where this simulator has none."""
+        return states if self._shuffle is None else states[self._start_model.network.kind != "mixing"]
+
+    def step(
+        self, zone_heat: FloatArray, boundary_temperatures: FloatArray, airflow: FloatArray | None = None
+    ) -> FloatArray:
+        """Advance one step.
+
+        Parameters
+        ----------
+        zone_heat : ndarray, shape (n_zone,)
+            Heat given to each zone during the step [W], positive into the zone.
+        boundary_temperatures : ndarray, shape (n_boundary,)
+            Boundary temperatures during the step [K].
+        airflow : ndarray, shape (n_airflow,), optional
+            Directed airflows during the step [kg/s]; zero by default.
+
+        Returns
+        -------
+        ndarray, shape (n_zone,)
+            Zone means over the step [K].
+
+        Raises
+        ------
+        InputShapeError
+            When an input has another shape, or a value that is not finite or not a plausible temperature.
+        """
+        network = self.network
+        heat = self._checked("zone_heat", zone_heat, len(network.zones))
+        boundary = self._checked("boundary_temperatures", boundary_temperatures, network.n_boundary, PLAUSIBLE)
+        flow = self._checked("airflow", np.zeros(len(network.airflows)) if airflow is None else airflow, len(network.airflows))
+        states, mean, _, _ = self._stepper.advance(self._current(), boundary[:, None], heat[:, None], flow[:, None])
+        if self._shuffle is not None:
+            states[self._air, 0] = self._shuffle.apply(states[self._air, 0])
+        self._states = states
+        return mean[:, 0]
+
+    def field(self, floor: int) -> FloatArray:
+        """Temperatures of one floor of a plan on its grid, shape (n_row, n_column) [K]; NaN outside.
+
+        Parameters
+        ----------
+        floor : int
+            Floor number, lowest first.
+        """
+        place = self.network.place
+        mine = place[:, 0] == floor
+        if not mine.any():
+            raise ModelError(f"floor: expected a floor of a plan, came {floor}")
+        rows, columns = place[mine, 1], place[mine, 2]
+        out = np.full((rows.max() + 1, columns.max() + 1), np.nan)
+        out[rows, columns] = self._current()[mine, 0]
+        return out
+
+    def save_state(self) -> dict[str, Any]:
+        """Everything that the next steps depend on, for `restore_state`."""
+        return {"states": self.states, "shuffle": None if self._shuffle is None else self._shuffle.state}
+
+    def restore_state(self, saved: Mapping[str, Any]) -> None:
+        """Return to a saved state; what follows is bit for bit what followed then.
+
+        Parameters
+        ----------
+        saved : mapping
+            From `save_state`.
+        """
+        self._states = np.array(saved["states"], dtype=float)[:, None]
+        if self._shuffle is not None:
+            self._shuffle.restore(saved["shuffle"])
+
+    def _current(self) -> FloatArray:
+        if self._states is None:
+            raise ModelError("simulator: call reset() or reset_from() before the first step")
+        return self._states
+
+    @staticmethod
+    def _checked(name: str, value: FloatArray, n: int, limits: tuple[float, float] | None = None) -> FloatArray:
+        array = np.asarray(value, dtype=float)
+        if array.shape != (n,):
+            raise InputShapeError(f"{name}: expected shape ({n},), came {array.shape}")
+        bad = ~np.isfinite(array)
+        if limits is not None:
+            bad |= (array < limits[0]) | (array > limits[1])
+        if bad.any():
+            where = int(np.flatnonzero(bad)[0])
+            wanted = "finite values" if limits is None else f"kelvin from {limits[0]} to {limits[1]}"
+            raise InputShapeError(f"{name}[{where}]: expected {wanted}, came {array[where]}")
+        return array
+
+
+def _random_shuffle(
+    network: Any, matrices: Any, air: NDArray[np.int64], probability: float, reach: float | None, seed: int
+) -> RandomShuffle:
+    """The shuffle over the air volumes of a network, each zone within one floor."""
+    position = {int(node): i for i, node in enumerate(air)}
+    zones = [
+        np.array([position[int(node)] for node in np.flatnonzero((network.kind == "air") & (network.zone == z))])
+        for z in range(len(network.zones))
+    ]
+    place = network.place[air]
+    spacing = network.spacing
+    positions = place[:, 1:] * spacing if spacing else np.zeros((air.size, 2))
+    capacities = np.asarray(matrices.capacity.diagonal())[air]
+    return RandomShuffle(zones, positions, probability, reach, seed, capacities=capacities)
