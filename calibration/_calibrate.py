@@ -1,4 +1,4 @@
-"""Calibration of a case: from telemetry to parameters, with errors before and after on tuning and held-out intervals."""
+"""Calibration of a case: from telemetry to parameters, with errors before and after, tuned on and held out."""
 
 from __future__ import annotations
 
@@ -14,7 +14,17 @@ from calibration._evaluate import Evaluation, Progress, evaluate_model
 from calibration._intervals import Interval, default_intervals, horizon_steps, merge, select_runs
 from calibration._result import CalibrationResult, GridCheck, ParameterEstimate, SolverReport
 from calibration.errors import CalibrationError, NotEnoughDataError
-from thermal import Case, Inputs, Parameter, SymbolicModel, build_network, free_runs, reduced_model, replay_inputs, spin_up
+from thermal import (
+    Case,
+    Inputs,
+    Parameter,
+    SymbolicModel,
+    build_network,
+    free_runs,
+    reduced_model,
+    replay_inputs,
+    spin_up,
+)
 from thermal.model import SCHEMES, SPIN_UP, Scheme
 from thermal.parameters import Scope
 
@@ -23,7 +33,8 @@ FloatArray = NDArray[np.float64]
 #: Runs of the final check of the reduced model on the grid.
 CHECK_RUNS = 6
 
-#: Largest difference between reduced model and grid that the reported errors may carry [K]; beyond it they come from the grid.
+#: Largest difference between reduced model and grid that the reported errors may carry [K]; beyond it they come from
+#: the grid.
 CHECK_TOLERANCE = 0.01
 
 #: A bound counts as hit within this share of the range, on the estimation scale [-].
@@ -48,8 +59,10 @@ def calibrate(
 ) -> CalibrationResult:
     """Fit the physical parameters of a building to its telemetry by least squares.
 
-    Residuals are the errors of N-step runs that tile the tuning intervals; each zone's errors count as one observation a day
-    (they are strongly correlated in time), and every parameter has a log-normal prior whose 95 % interval is its physical range.
+    Residuals are the errors of N-step runs that tile the tuning intervals; each zone's errors count as one observation
+    a day
+    (they are strongly correlated in time), and every parameter has a log-normal prior whose 95 % interval is its
+    physical range.
     Ipopt solves on a reduced model with exact derivatives; the answer is checked on the grid.
 
     Parameters
@@ -112,17 +125,28 @@ def calibrate(
     given = network.values(fixed or {})
     free = tuple(i for i, p in enumerate(network.parameters) if p.name not in (fixed or {}))
     steps = horizon_steps(horizon, inputs.step)
-    runs = thin([select_runs(inputs, i, steps, spin_up=spin_up_seconds) for i in intervals["tuning"]], steps, inputs.step)
+    runs = thin(
+        [select_runs(inputs, i, steps, spin_up=spin_up_seconds) for i in intervals["tuning"]], steps, inputs.step
+    )
     runs = tuple(r for r in runs if r.starts.size)
     if not runs:
-        raise NotEnoughDataError("tuning: every run misses inputs or zone temperatures; see `buildingmpc check` for the gaps")
+        raise NotEnoughDataError(
+            "tuning: every run misses inputs or zone temperatures; see `buildingmpc check` for the gaps"
+        )
     problem = Problem(grid, inputs, runs, steps, free, given, SCHEMES[scheme])
     best, failures = _solve(problem, starts, seed, progress)
 
     def evaluated(model: SymbolicModel, theta: FloatArray) -> dict[str, Evaluation]:
         return {
             name: evaluate_model(
-                model, theta, inputs, part, horizon, trajectories=True, scheme=SCHEMES[scheme], spin_up_seconds=spin_up_seconds
+                model,
+                theta,
+                inputs,
+                part,
+                horizon,
+                trajectories=True,
+                scheme=SCHEMES[scheme],
+                spin_up_seconds=spin_up_seconds,
             )
             for name, part in intervals.items()
         }
@@ -141,7 +165,13 @@ def calibrate(
         uncalibrated=before,
         calibrated=after,
         solver=SolverReport(
-            "ipopt", best.solve.status, best.solve.success, best.iterations, time.perf_counter() - began, starts, tuple(failures)
+            "ipopt",
+            best.solve.status,
+            best.solve.success,
+            best.iterations,
+            time.perf_counter() - began,
+            starts,
+            tuple(failures),
         ),
         grid_check=check,
         horizon=horizon,
@@ -156,7 +186,8 @@ def _refuse_overlap(tuning: Sequence[Interval], held_out: Sequence[Interval]) ->
         for b in held_out:
             if a.start <= b.end and b.start <= a.end:
                 raise CalibrationError(
-                    f"intervals: tuning {a.start}/{a.end} and held-out {b.start}/{b.end} overlap; a held-out target may not be tuned on"
+                    f"intervals: tuning {a.start}/{a.end} and held-out {b.start}/{b.end} overlap; "
+                    "a held-out target may not be tuned on"
                 )
 
 
@@ -211,7 +242,9 @@ def check_on_grid(
     """
     runs = select_runs(inputs, intervals[0], steps)
     if runs.starts.size == 0:
-        raise NotEnoughDataError(f"held out: all {runs.skipped} runs of {intervals[0].start} to {intervals[0].end} miss telemetry")
+        raise NotEnoughDataError(
+            f"held out: all {runs.skipped} runs of {intervals[0].start} to {intervals[0].end} miss telemetry"
+        )
     starts = np.unique(runs.starts[np.linspace(0, runs.starts.size - 1, CHECK_RUNS).astype(int)])
     means = []
     for model in (grid, reduced):
@@ -227,7 +260,8 @@ def _describe(found: Estimate, nominal: Mapping[str, tuple[float, str]]) -> tupl
     """Parameters with standard errors, bounds and what the data determine."""
     deviations = dict(zip(found.problem.free, np.sqrt(np.diag(found.covariance)), strict=True))
     described = [
-        _estimated(p, float(found.theta[i]), deviations.get(i)) for i, p in enumerate(found.problem.grid.network.parameters)
+        _estimated(p, float(found.theta[i]), deviations.get(i))
+        for i, p in enumerate(found.problem.grid.network.parameters)
     ]
     for name, (value, unit) in nominal.items():
         source = "nominal: enters only as a product with the heat capacity"
@@ -237,7 +271,9 @@ def _describe(found: Estimate, nominal: Mapping[str, tuple[float, str]]) -> tupl
 
 def _estimated(p: Parameter, value: float, deviation: float | None) -> ParameterEstimate:
     if deviation is None:
-        return ParameterEstimate(p.name, p.unit, value, p.lower, p.upper, p.start, False, None, False, "fixed by the user")
+        return ParameterEstimate(
+            p.name, p.unit, value, p.lower, p.upper, p.start, False, None, False, "fixed by the user"
+        )
     low, high, z = p.transform(p.lower), p.transform(p.upper), p.transform(value)
     at_bound = bool(min(z - low, high - z) < BOUND_SHARE * (high - low))
     identifiable = bool(deviation < 0.5 * p.prior_deviation and not at_bound)

@@ -1,4 +1,4 @@
-"""The estimation problem: residuals of six-hour runs and a prior on every parameter, solved on a reduced model that is rebuilt."""
+"""The estimation problem: residuals of N-step runs and a prior on every parameter, solved on a reduced model."""
 
 from __future__ import annotations
 
@@ -104,19 +104,21 @@ class Problem:
         errors = []
         for runs in self.runs:
             states, _ = spin_up(matrices, self.inputs, runs.begin, runs.starts)
-            means, _ = free_runs(matrices, model.network, self.inputs, runs.starts, self.steps, states, None, self.scheme, self.keep)
+            means, _ = free_runs(
+                matrices, model.network, self.inputs, runs.starts, self.steps, states, None, self.scheme, self.keep
+            )
             error = means - self.inputs.zone[runs.starts[:, None] + self.keep[None, :]]
             errors.append(error[np.isfinite(error) & np.isfinite(self.inputs.bridged[runs.starts])[:, None, :]])
         return np.concatenate(errors)
 
     def effective_size(self) -> float:
-        """Independent observations in the tuning runs [-]: days times measured zones, not samples (errors are strongly correlated)."""
+        """Independent observations in the tuning runs [-]: days times measured zones, since errors are correlated."""
         zones = np.isfinite(self.inputs.zone).any(axis=0).sum()
         seconds = sum(r.starts.size for r in self.runs) * self.steps * self.inputs.step
         return float(max(1.0, seconds / 86400.0) * zones)
 
     def weighted(self, model: SymbolicModel, z: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Residuals and Jacobian on the estimation scale: data weighted by deviation and effective size, then the priors."""
+        """Residuals and Jacobian on the estimation scale: weighted data, then the priors."""
         theta = self.theta(z)
         error, slopes = self.residuals(model, theta)
         weight = np.sqrt(self.effective_size() / error.size) / self.deviation
@@ -158,7 +160,8 @@ class Estimate:
 def estimate(problem: Problem, z: FloatArray, progress: Progress | None = None) -> Estimate:
     """Solve the problem from one start.
 
-    Each round reduces the grid model at the current θ, solves by Ipopt, and takes the deviation of the errors it finds for the next;
+    Each round reduces the grid model at the current θ, solves by Ipopt, and takes the deviation of the errors it finds
+    for the next;
     the rounds end when θ no longer moves, so the reduced model was accurate where the answer lies.
 
     Parameters
@@ -178,12 +181,14 @@ def estimate(problem: Problem, z: FloatArray, progress: Progress | None = None) 
     for round_ in range(ROUNDS):
         current, small = problem, model
 
-        def weighted(x: FloatArray, current: Problem = current, small: SymbolicModel = small) -> tuple[FloatArray, FloatArray]:
+        def weighted(
+            x: FloatArray, current: Problem = current, small: SymbolicModel = small
+        ) -> tuple[FloatArray, FloatArray]:
             return current.weighted(small, x)
 
         solve = solve_least_squares(weighted, z, lower, upper, tolerance=1e-2 if round_ == 0 else 1e-3)
         iterations += solve.iterations
-        covariance = np.linalg.inv(solve.jacobian.T @ solve.jacobian)
+        covariance = np.asarray(np.linalg.inv(solve.jacobian.T @ solve.jacobian), dtype=float)
         # distance in units of what the data leave open, so that flat directions do not keep the rounds going
         moved = float(np.sqrt((solve.x - z) @ np.linalg.solve(covariance, solve.x - z)))
         z = solve.x
@@ -201,7 +206,7 @@ def estimate(problem: Problem, z: FloatArray, progress: Progress | None = None) 
 
 
 def random_starts(problem: Problem, count: int, seed: int) -> list[FloatArray]:
-    """Starts on the estimation scale: the given θ first, then draws from the prior at half its spread.
+    """Draw starts on the estimation scale: the given θ first, then draws from the prior at half its spread.
 
     Parameters
     ----------

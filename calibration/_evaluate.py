@@ -126,7 +126,12 @@ class Evaluation:
             "steps": self.steps,
             "step_seconds": self.step_seconds,
             "intervals": [
-                {**p.interval.to_dict(), **spatial_metrics(p.error).to_dict(), "runs": len(p.start), "skipped": p.skipped}
+                {
+                    **p.interval.to_dict(),
+                    **spatial_metrics(p.error).to_dict(),
+                    "runs": len(p.start),
+                    "skipped": p.skipped,
+                }
                 for p in self.predictions
             ],
             **self.metrics.to_dict(),
@@ -196,7 +201,9 @@ def predict(
     measured = np.where(
         np.isfinite(inputs.bridged[runs.starts])[:, None, :], inputs.zone[runs.starts[:, None] + keep[None, :]], np.nan
     )
-    return Predictions(interval, inputs.stamps[runs.starts], simulated, measured, keep, inputs.bridged[runs.starts], runs.skipped)
+    return Predictions(
+        interval, inputs.stamps[runs.starts], simulated, measured, keep, inputs.bridged[runs.starts], runs.skipped
+    )
 
 
 def evaluate_model(
@@ -249,7 +256,9 @@ def evaluate_model(
     def runs_of(n: int, keep: NDArray[np.int64] | None, interval: Interval) -> Predictions:
         runs = select_runs(inputs, interval, n, spin_up=spin_up_seconds)
         if runs.starts.size == 0:
-            raise NotEnoughDataError(f"interval {interval.start} to {interval.end}: all {runs.skipped} runs miss telemetry")
+            raise NotEnoughDataError(
+                f"interval {interval.start} to {interval.end}: all {runs.skipped} runs miss telemetry"
+            )
         return predict(model, matrices, inputs, interval, runs, n, keep, scheme)
 
     main, done = [], 0

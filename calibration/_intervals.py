@@ -51,7 +51,9 @@ def parse_interval(text: str, case: Case) -> Interval:
     """
     parts = text.split("/")
     if len(parts) != 2:
-        raise IntervalError(f"interval: expected START/END in ISO 8601, came {text!r}; for example 2023-10-02/2023-10-09T12:00")
+        raise IntervalError(
+            f"interval: expected START/END in ISO 8601, came {text!r}; for example 2023-10-02/2023-10-09T12:00"
+        )
     try:
         start, end = (pd.Timestamp(local_timestamp(part.strip(), case.building)) for part in parts)
     except CaseError as error:
@@ -78,7 +80,7 @@ def default_intervals(case: Case) -> tuple[Interval, Interval]:
 
 
 def horizon_steps(horizon: str, step: float) -> int:
-    """Number of steps N of a horizon.
+    """Count the steps N of a horizon.
 
     Parameters
     ----------
@@ -121,7 +123,9 @@ class Runs:
     skipped: int
 
 
-def select_runs(inputs: Inputs, interval: Interval, steps: int, every: float = 3600.0, spin_up: float = SPIN_UP) -> Runs:
+def select_runs(
+    inputs: Inputs, interval: Interval, steps: int, every: float = 3600.0, spin_up: float = SPIN_UP
+) -> Runs:
     """Find the runs of an interval.
 
     Parameters
@@ -155,7 +159,8 @@ def select_runs(inputs: Inputs, interval: Interval, steps: int, every: float = 3
     starts = starts[starts >= lowest]
     if starts.size == 0:
         raise NotEnoughDataError(
-            f"interval {interval.start} to {interval.end}: expected room for a run of {steps} steps of {step:g} s after "
+            f"interval {interval.start} to {interval.end}: expected room for a run of {steps} steps "
+            f"of {step:g} s after "
             f"{LEAST_SPIN_UP / 3600:g} h of spin-up, found {last - first + 1} stamps"
         )
     gaps = np.concatenate([[0], np.cumsum(~inputs.complete)])

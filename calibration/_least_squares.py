@@ -1,9 +1,10 @@
-"""Nonlinear least squares with bounds and priors by Ipopt: Gauss-Newton Hessian with a secant term for the residuals' curvature."""
+"""Nonlinear least squares with bounds by Ipopt: Gauss-Newton with a secant term for the residuals' curvature."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -72,8 +73,10 @@ class _Cache:
 class _Hessian:
     """Gauss-Newton ``J'J`` plus the structured secant estimate of ``Σ r_i ∇²r_i``.
 
-    Where residuals stay large Gauss-Newton overshoots and its line search crawls (measured on an office with slabs and furniture: 60
-    iterations and 337 evaluations against 12 and 14). Dennis, Gay & Welsch (1981), doi:10.1145/355958.355965, eqs. 1.2-1.4, with
+    Where residuals stay large Gauss-Newton overshoots and its line search crawls (measured on an office with slabs and
+    furniture: 60
+    iterations and 337 evaluations against 12 and 14). Dennis, Gay & Welsch (1981), doi:10.1145/355958.355965, eqs.
+    1.2-1.4, with
     their sizing.
     """
 
@@ -88,8 +91,8 @@ class _Hessian:
             y = gradient - self.last[2]
             wanted = gradient - self.last[1].T @ residual
             if s @ y > 0.0:
-                size = abs(s @ self.curvature @ s)
-                self.curvature *= min(1.0, abs(s @ wanted) / size) if size > 0.0 else 1.0
+                size = float(abs(s @ self.curvature @ s))
+                self.curvature *= min(1.0, float(abs(s @ wanted)) / size) if size > 0.0 else 1.0
                 miss = wanted - self.curvature @ s
                 self.curvature += (np.outer(miss, y) + np.outer(y, miss)) / (s @ y)
                 self.curvature -= (s @ miss) * np.outer(y, y) / (s @ y) ** 2
@@ -97,41 +100,45 @@ class _Hessian:
         return np.asarray(jacobian.T @ jacobian + self.curvature)
 
 
-class _Objective(ca.Callback):  # type: ignore[misc]
+class _Objective(ca.Callback):
     """``½ r'r`` for Ipopt; its gradient and Hessian come from the same cached residuals."""
 
     def __init__(self, cache: _Cache, p: int, order: int) -> None:
         ca.Callback.__init__(self)
-        self.cache, self.p, self.order = cache, p, order
-        self.hessian = _Hessian(p)
+        self._residuals, self._p, self._order = cache, p, order
+        self._hessian = _Hessian(p)
         self._kept: list[ca.Callback] = []  # CasADi holds no reference to the derivatives it is handed
         self.construct(f"least_squares_{order}", {})
 
     def get_n_in(self) -> int:
-        return 1 if self.order != 1 else 2
+        return 1 if self._order != 1 else 2
 
     def get_n_out(self) -> int:
         return 1
 
     def get_sparsity_in(self, i: int) -> ca.Sparsity:
-        return ca.Sparsity.dense(self.p, 1) if i == 0 else ca.Sparsity(1, 1)
+        return ca.Sparsity.dense(self._p, 1) if i == 0 else ca.Sparsity(1, 1)
 
     def get_sparsity_out(self, i: int) -> ca.Sparsity:
-        return [ca.Sparsity.dense(1, 1), ca.Sparsity.dense(1, self.p), ca.Sparsity.dense(self.p, self.p)][self.order]
+        return [ca.Sparsity.dense(1, 1), ca.Sparsity.dense(1, self._p), ca.Sparsity.dense(self._p, self._p)][
+            self._order
+        ]
 
-    def eval(self, arg: list[ca.DM]) -> list[ca.DM]:
-        residual, jacobian = self.cache(np.array(arg[0], dtype=float).ravel())
-        if self.order == 0:
+    def eval(self, arg: Sequence[ca.DM]) -> list[ca.DM]:
+        residual, jacobian = self._residuals(np.array(arg[0], dtype=float).ravel())
+        if self._order == 0:
             return [ca.DM(0.5 * float(residual @ residual))]
-        if self.order == 1:
+        if self._order == 1:
             return [ca.DM((jacobian.T @ residual)[None, :])]
-        return [ca.DM(self.hessian(np.array(arg[0], dtype=float).ravel(), residual, jacobian))]
+        return [ca.DM(self._hessian(np.array(arg[0], dtype=float).ravel(), residual, jacobian))]
 
     def has_jacobian(self) -> bool:
-        return self.order == 0
+        return self._order == 0
 
-    def get_jacobian(self, name: str, inames: list[str], onames: list[str], opts: dict[str, object]) -> ca.Function:
-        self._kept.append(_Objective(self.cache, self.p, 1))
+    def get_jacobian(
+        self, name: str, inames: Sequence[str], onames: Sequence[str], opts: Mapping[str, object]
+    ) -> ca.Function:
+        self._kept.append(_Objective(self._residuals, self._p, 1))
         return self._kept[-1]
 
 
@@ -179,11 +186,11 @@ def solve_least_squares(
         ["triu_hess_gamma_x_x"],
     )
     first = cache(np.clip(start, lower, upper))
-    options = {
+    options: dict[str, Any] = {
         "print_time": False,
         "hess_lag": lagrangian,
         "ipopt": {
-            "print_level": int(__import__("os").environ.get("IPL","0")),
+            "print_level": 0,
             "sb": "yes",
             "tol": tolerance,
             "compl_inf_tol": tolerance,
@@ -196,7 +203,8 @@ def solve_least_squares(
             "nlp_scaling_method": "none",
         },
     }
-    solver = ca.nlpsol("least_squares", "ipopt", {"x": x, "f": objective(x)}, options)
+    problem: dict[str, Any] = {"x": x, "f": objective(x)}
+    solver = ca.nlpsol("least_squares", "ipopt", problem, options)
     try:
         solver(x0=start, lbx=lower, ubx=upper)
     except Exception:

@@ -214,12 +214,16 @@ def load_parameters(path: str | Path, network: ThermalNetwork) -> FloatArray:
         raise ParameterFileError(f"{path}: expected JSON as `calibrate` writes it, found {error}") from error
     entries = content.get("parameters") if isinstance(content, dict) else None
     if not isinstance(entries, dict) or not entries:
-        raise ParameterFileError(f"{path}: expected a key 'parameters' with an entry a parameter, as in calibration.json")
+        raise ParameterFileError(
+            f"{path}: expected a key 'parameters' with an entry a parameter, as in calibration.json"
+        )
     values: dict[str, float] = {}
     for name, entry in entries.items():
         value = entry.get("value") if isinstance(entry, dict) else entry
         if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value) or value <= 0:
-            raise ParameterFileError(f"{path}: parameters.{name}: expected a positive number under 'value', found {value!r}")
+            raise ParameterFileError(
+                f"{path}: parameters.{name}: expected a positive number under 'value', found {value!r}"
+            )
         values[name] = float(value)
     wanted = {p.name for p in network.parameters}
     unknown = sorted(set(values) - wanted - set(network.nominal))

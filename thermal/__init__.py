@@ -1,6 +1,16 @@
 """A building as a thermal system: cases, control volumes and faces, the symbolic model and what steps it."""
 
-from thermal.case import Building, Case, FloorPlan, FloorPlans, Telemetry, ZoneTable, load_case, local_timestamp, save_case
+from thermal.case import (
+    Building,
+    Case,
+    FloorPlan,
+    FloorPlans,
+    Telemetry,
+    ZoneTable,
+    load_case,
+    local_timestamp,
+    save_case,
+)
 from thermal.data import load_bundled_case
 from thermal.errors import CaseError, ModelError, ThermalError
 from thermal.model import Inputs, Simulator, SymbolicModel, free_runs, reduced_model, replay_inputs, simulate, spin_up

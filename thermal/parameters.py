@@ -46,7 +46,8 @@ class Parameter:
     def __post_init__(self) -> None:
         if not 0.0 < self.lower < self.start < self.upper:
             raise ValueError(
-                f"parameter {self.name}: expected 0 < lower < start < upper, came {self.lower}, {self.start}, {self.upper}"
+                f"parameter {self.name}: expected 0 < lower < start < upper, "
+                f"came {self.lower}, {self.start}, {self.upper}"
             )
 
     @property
@@ -63,7 +64,7 @@ class Parameter:
         return float(1.0 / (1.0 + np.exp(-z))) if self.logit else float(np.exp(z))
 
     def slope(self, value: float) -> float:
-        """Derivative of the value with respect to the estimation scale [unit]."""
+        """Differentiate the value with respect to the estimation scale [unit]."""
         return value * (1.0 - value) if self.logit else value
 
     def rescaled(self, factor: float) -> Parameter:
@@ -82,22 +83,80 @@ PARAMETERS: dict[str, Parameter] = {
         Parameter("exterior_convection_coefficient", "W/m^2/K", 20.0, 5.0, 60.0, f"{_ISO6946}: 4 + 4 v at 0.5-14 m/s"),
         Parameter("exterior_wall_conductivity", "W/m/K", 0.55, 0.12, 4.0, "U-values of 0.12-2.5 W/m2/K: ISO 6946:2017"),
         Parameter("exterior_wall_heat_capacity", "J/kg/K", 1000.0, 100.0, 4000.0, _ISO13786),
-        Parameter("interior_wall_conductivity", "W/m/K", 2.5, 0.4, 20.0, "partition resistances of 0.05-2.5 m2K/W: ISO 6946:2017"),
+        Parameter(
+            "interior_wall_conductivity",
+            "W/m/K",
+            2.5,
+            0.4,
+            20.0,
+            "partition resistances of 0.05-2.5 m2K/W: ISO 6946:2017",
+        ),
         Parameter("interior_wall_heat_capacity", "J/kg/K", 1000.0, 100.0, 8000.0, _ISO13786),
-        Parameter("shuffle_probability", "1", 0.5, 0.02, 0.98, "probability per 300 s step; above 0.98 the mean factor vanishes", logit=True),
+        Parameter(
+            "shuffle_probability",
+            "1",
+            0.5,
+            0.02,
+            0.98,
+            "probability per 300 s step; above 0.98 the mean factor vanishes",
+            logit=True,
+        ),
         Parameter("interior_film_coefficient", "W/m^2/K", 2.5, 1.0, 6.0, _ARCH),
         Parameter("radiant_coefficient", "W/m^2/K", 5.0, 1.5, 8.0, _ARCH),
         Parameter("slab_heat_capacity", "J/m^2/K", 1.5e5, 2.0e4, 6.0e5, _ISO13786),
-        Parameter("slab_coupling", "W/m^2/K", 10.0, 0.8, 60.0, "conductivity over thickness: carpeted 0.2 m slab to bare 0.05 m screed"),
-        Parameter("furniture_heat_capacity", "J/m^2/K", 1.5e4, 5.0e2, 1.0e5, "Johra & Heiselberg (2017), doi:10.1016/j.rser.2016.11.145"),
-        Parameter("furniture_coupling", "W/m^2/K", 5.0, 0.5, 20.0, "Johra & Heiselberg (2017), doi:10.1016/j.rser.2016.11.145"),
+        Parameter(
+            "slab_coupling",
+            "W/m^2/K",
+            10.0,
+            0.8,
+            60.0,
+            "conductivity over thickness: carpeted 0.2 m slab to bare 0.05 m screed",
+        ),
+        Parameter(
+            "furniture_heat_capacity",
+            "J/m^2/K",
+            1.5e4,
+            5.0e2,
+            1.0e5,
+            "Johra & Heiselberg (2017), doi:10.1016/j.rser.2016.11.145",
+        ),
+        Parameter(
+            "furniture_coupling", "W/m^2/K", 5.0, 0.5, 20.0, "Johra & Heiselberg (2017), doi:10.1016/j.rser.2016.11.145"
+        ),
         Parameter("window_u_value", "W/m^2/K", 2.5, 0.6, 6.0, "EN 673: triple to single glazing"),
-        Parameter("opening_exchange_velocity", "m/s", 0.08, 0.01, 0.3, "Allard & Utsumi (1992), doi:10.1016/0378-7788(92)90020-G"),
-        Parameter("exterior_wall_conductivity_multiplier", "1", 1.0, 0.33, 3.0, "tabulated design conductivities: ISO 10456:2007"),
-        Parameter("exterior_wall_heat_capacity_multiplier", "1", 1.0, 0.33, 3.0, "tabulated design values: ISO 10456:2007"),
-        Parameter("interior_wall_conductivity_multiplier", "1", 1.0, 0.33, 3.0, "tabulated design conductivities: ISO 10456:2007"),
-        Parameter("interior_wall_heat_capacity_multiplier", "1", 1.0, 0.33, 3.0, "tabulated design values: ISO 10456:2007"),
-        Parameter("slab_conductivity_multiplier", "1", 1.0, 0.33, 3.0, "tabulated design conductivities: ISO 10456:2007"),
+        Parameter(
+            "opening_exchange_velocity",
+            "m/s",
+            0.08,
+            0.01,
+            0.3,
+            "Allard & Utsumi (1992), doi:10.1016/0378-7788(92)90020-G",
+        ),
+        Parameter(
+            "exterior_wall_conductivity_multiplier",
+            "1",
+            1.0,
+            0.33,
+            3.0,
+            "tabulated design conductivities: ISO 10456:2007",
+        ),
+        Parameter(
+            "exterior_wall_heat_capacity_multiplier", "1", 1.0, 0.33, 3.0, "tabulated design values: ISO 10456:2007"
+        ),
+        Parameter(
+            "interior_wall_conductivity_multiplier",
+            "1",
+            1.0,
+            0.33,
+            3.0,
+            "tabulated design conductivities: ISO 10456:2007",
+        ),
+        Parameter(
+            "interior_wall_heat_capacity_multiplier", "1", 1.0, 0.33, 3.0, "tabulated design values: ISO 10456:2007"
+        ),
+        Parameter(
+            "slab_conductivity_multiplier", "1", 1.0, 0.33, 3.0, "tabulated design conductivities: ISO 10456:2007"
+        ),
         Parameter("slab_heat_capacity_multiplier", "1", 1.0, 0.33, 3.0, "tabulated design values: ISO 10456:2007"),
         Parameter("window_u_value_multiplier", "1", 1.0, 0.5, 2.0, "EN 673 against in-situ values"),
     )

@@ -1,4 +1,4 @@
-"""Galerkin reduction by rational block-Krylov subspaces: the same model in a few hundred states, still affine in the classes."""
+"""Galerkin reduction by rational block-Krylov subspaces: few states, still affine in the classes."""
 
 from __future__ import annotations
 
@@ -18,7 +18,8 @@ SHIFTS = (1.0 / 2.6e6, 1.0 / 86400.0, 1.0 / 28800.0, 1.0 / 3600.0, 1.0 / 600.0, 
 def krylov_basis(matrices: list[Matrices], shifts: tuple[float, ...] = SHIFTS, tolerance: float = 1e-10) -> FloatArray:
     """Orthonormal basis of the responses to every input at several shifts, over one or more θ.
 
-    The responses ``(K + s C)^-1 [H, B, C 1]`` interpolate the transfer function at ``s`` (Grimme 1997; Antoulas 2005, ch. 11); K and
+    The responses ``(K + s C)^-1 [H, B, C 1]`` interpolate the transfer function at ``s`` (Grimme 1997; Antoulas 2005,
+    ch. 11); K and
     C are symmetric, so the Galerkin projection matches twice as many moments for the zone means and stays stable.
 
     Parameters

@@ -26,7 +26,8 @@ LONGEST_BRIDGE = 1800.0
 SPIN_UP = 3 * 86400.0
 LEAST_SPIN_UP = 12 * 3600.0
 
-#: Temperatures are stepped as differences from this one [K]: rows of ``[K, -B]`` sum to zero, so nothing changes but round-off.
+#: Temperatures are stepped as differences from this one [K]: rows of ``[K, -B]`` sum to zero, so nothing changes but
+#: round-off.
 _REFERENCE = 293.15
 
 #: One long implicit step towards the steady state that a spin-up starts from [s].
@@ -97,10 +98,14 @@ def replay_inputs(case: Case, network: ThermalNetwork) -> Inputs:
     zone = case.zone_temperatures()
     boundary = case.boundary_temperatures()
     if zone.isna().all(axis=None):
-        raise SimulationError("telemetry: expected a zone_air_temperature_sensor of at least one zone, found none that is usable")
+        raise SimulationError(
+            "telemetry: expected a zone_air_temperature_sensor of at least one zone, found none that is usable"
+        )
     missing = [str(c) for c in boundary.columns if boundary[c].isna().all()]
     if missing:
-        raise SimulationError(f"telemetry: expected temperatures of the boundaries, found none that is usable for {missing}")
+        raise SimulationError(
+            f"telemetry: expected temperatures of the boundaries, found none that is usable for {missing}"
+        )
     frames = [case.zone_heat(), boundary, case.airflow_rates()]
     limit = int(LONGEST_BRIDGE // step)
     bridged = [_bridge(f, limit) for f in frames]
@@ -142,7 +147,8 @@ def spin_up(
 ) -> tuple[FloatArray, FloatArray | None]:
     """States at several stamps after holding the zones at their measured temperatures since stamp ``begin``.
 
-    The zones are held by whatever heat that takes, so walls, slabs and furniture follow the building as it was measured. It starts
+    The zones are held by whatever heat that takes, so walls, slabs and furniture follow the building as it was
+    measured. It starts
     from the steady state of the first day's mean temperatures.
 
     Parameters
@@ -217,7 +223,8 @@ def free_runs(
     Returns
     -------
     tuple
-        Zone means over the kept steps (m, n_keep, n_zone) [K] and derivatives (m, n_keep, n_zone, n_parameter), or None.
+        Zone means over the kept steps (m, n_keep, n_zone) [K] and derivatives (m, n_keep, n_zone, n_parameter), or
+        None.
     """
     keep = np.arange(1, steps + 1) if keep is None else keep
     stepper = Stepper(matrices, inputs.step, scheme, network.airflows)

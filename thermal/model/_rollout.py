@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from thermal.errors import InputShapeError, ModelError
 from thermal.model._scheme import IMPLICIT_EULER, Scheme, Stage
 from thermal.model._stepper import Stepper
-from thermal.model._symbolic import SymbolicModel
+from thermal.model._symbolic import Matrix, SymbolicModel
 from thermal.network import AIR_HEAT_CAPACITY
 
 FloatArray = NDArray[np.float64]
@@ -81,7 +81,7 @@ def rollout(
     scheme: Scheme = IMPLICIT_EULER,
     executor: Literal["symbolic", "sparse"] = "sparse",
 ) -> ca.Function:
-    """A roll-out as a CasADi function ``zone_temperatures(theta)``, differentiable once.
+    """Make a roll-out, a CasADi function ``zone_temperatures(theta)``, differentiable once.
 
     Parameters
     ----------
@@ -117,12 +117,13 @@ def rollout(
         raise ModelError("symbolic executor: expected a grid model, came a reduced one; use executor='sparse'")
     if model.network.n_node > LARGEST_SYMBOLIC:
         raise ModelError(
-            f"symbolic executor: expected at most {LARGEST_SYMBOLIC} volumes, came {model.network.n_node}; use executor='sparse'"
+            f"symbolic executor: expected at most {LARGEST_SYMBOLIC} volumes, came {model.network.n_node}; "
+            "use executor='sparse'"
         )
     return _symbolic_rollout(model, data, step, scheme)
 
 
-class SparseRollout(ca.Callback):  # type: ignore[misc]
+class SparseRollout(ca.Callback):
     """Zone temperatures of a roll-out as a Callback of θ, with exact forward sensitivities as its Jacobian.
 
     Parameters
@@ -159,7 +160,7 @@ class SparseRollout(ca.Callback):  # type: ignore[misc]
         """Zones by steps."""
         return ca.Sparsity.dense(self._data.heat.shape[1], self._data.heat.shape[0])
 
-    def eval(self, arg: list[ca.DM]) -> list[ca.DM]:
+    def eval(self, arg: Sequence[ca.DM]) -> list[ca.DM]:
         """Zone means over the steps."""
         return [ca.DM(self._run(np.asarray(arg[0]).ravel(), slopes=False)[0])]
 
@@ -167,10 +168,14 @@ class SparseRollout(ca.Callback):  # type: ignore[misc]
         """Exact, by forward sensitivities."""
         return True
 
-    def get_jacobian(self, name: str, inames: list[str], onames: list[str], opts: dict[str, object]) -> ca.Function:
+    def get_jacobian(
+        self, name: str, inames: Sequence[str], onames: Sequence[str], opts: Mapping[str, object]
+    ) -> ca.Function:
         """Jacobian of the stacked output with respect to θ."""
         p, m = len(self._model.network.parameters), self._data.heat.size
-        self._kept.append(_Jacobian(name, lambda theta: self._run(theta, slopes=True)[1], p, self.get_sparsity_out(0), m))
+        self._kept.append(
+            _Jacobian(name, lambda theta: self._run(theta, slopes=True)[1], p, self.get_sparsity_out(0), m)
+        )
         return self._kept[-1]
 
     def _run(self, theta: FloatArray, slopes: bool) -> tuple[FloatArray, FloatArray]:
@@ -190,10 +195,12 @@ class SparseRollout(ca.Callback):  # type: ignore[misc]
         return np.array(means).T, np.concatenate(mean_slopes) if slopes else np.empty((0, p))
 
 
-class _Jacobian(ca.Callback):  # type: ignore[misc]
+class _Jacobian(ca.Callback):
     """Jacobian of a Callback of θ, as CasADi asks for it: inputs θ and the nominal output."""
 
-    def __init__(self, name: str, function: Callable[[FloatArray], FloatArray], p: int, out: ca.Sparsity, m: int) -> None:
+    def __init__(
+        self, name: str, function: Callable[[FloatArray], FloatArray], p: int, out: ca.Sparsity, m: int
+    ) -> None:
         ca.Callback.__init__(self)
         self._function, self._p, self._out, self._m = function, p, out, m
         self.construct(name, {})
@@ -210,7 +217,7 @@ class _Jacobian(ca.Callback):  # type: ignore[misc]
     def get_sparsity_out(self, i: int) -> ca.Sparsity:
         return ca.Sparsity.dense(self._m, self._p)
 
-    def eval(self, arg: list[ca.DM]) -> list[ca.DM]:
+    def eval(self, arg: Sequence[ca.DM]) -> list[ca.DM]:
         return [ca.DM(self._function(np.asarray(arg[0]).ravel()))]
 
 
@@ -248,13 +255,13 @@ def symbolic_step(model: SymbolicModel, step: float, scheme: Scheme = IMPLICIT_E
     x, u = ca.MX.sym("states", n), ca.MX.sym("boundary", network.n_boundary)
     q, v = ca.MX.sym("heat", len(network.zones)), ca.MX.sym("airflow", len(network.airflows))
     kappa, heat = model.classes(theta)
-    flow = _assembled([m for m in model.class_flows], kappa)
-    capacity = _assembled([m for m in model.class_masses], heat)
+    flow = _assembled(model.class_flows, kappa)
+    capacity = _assembled(model.class_masses, heat)
     stiffness, exchange = flow[:, :n], flow[:, n:]
     heating, observation = ca.DM(network.heating.tocsc()), ca.DM(network.observation.tocsc())
     mixing = _symbolic_mixing(network.airflows, len(network.zones), v) if network.airflows else None
     matrix = capacity + scheme.implicit * step * stiffness
-    response = ca.solve(matrix, ca.densify(heating), "ldl") if mixing is not None else None
+    response = ca.solve(matrix, ca.densify(heating), "ldl") if mixing is not None else ca.MX()
 
     def inflow(state: ca.MX) -> ca.MX:
         own = -(stiffness @ state) - exchange @ u + heating @ q
@@ -292,11 +299,11 @@ def _symbolic_mixing(airflows: tuple[tuple[int, int], ...], n_zone: int, flow: c
     return total
 
 
-def _assembled(classes: list[sp.csr_matrix], weights: ca.MX) -> ca.MX:
+def _assembled(classes: list[Matrix], weights: ca.MX) -> ca.MX:
     """Sparse matrix ``Σ_c weights_c classes_c`` as an MX of the union's pattern."""
     union = sp.csc_matrix(sum((abs(c) for c in classes[1:]), abs(classes[0])))
     union.sort_indices()
-    pattern = ca.Sparsity(*union.shape, union.indptr.tolist(), union.indices.tolist())
+    pattern = ca.Sparsity(union.shape[0], union.shape[1], union.indptr.tolist(), union.indices.tolist())
     columns = np.repeat(np.arange(union.shape[1]), np.diff(union.indptr))
     values = sp.csc_matrix(np.column_stack([np.asarray(c.tocsr()[union.indices, columns]).ravel() for c in classes]))
     return ca.MX(pattern, ca.DM(values) @ weights)

@@ -79,21 +79,24 @@ def simulate(
     first, last = int(stamps.searchsorted(start)), int(stamps.searchsorted(end, side="right")) - 1
     if not (start < end and first < last and stamps[0] <= start and end <= stamps[-1]):
         raise SimulationError(
-            f"interval {start} to {end}: expected two times in order within the telemetry, which goes from {stamps[0]} to {stamps[-1]}"
+            f"interval {start} to {end}: expected two times in order within the telemetry, "
+            f"which goes from {stamps[0]} to {stamps[-1]}"
         )
     begin = max(0, first - round(spin_up_seconds / inputs.step))
     if (first - begin) * inputs.step < LEAST_SPIN_UP:
         earliest = stamps[0] + pd.Timedelta(seconds=LEAST_SPIN_UP)
-        raise SimulationError(f"start {start}: expected at least 12 h of telemetry before it for the spin-up; earliest is {earliest}")
+        raise SimulationError(
+            f"start {start}: expected at least 12 h of telemetry before it for the spin-up; earliest is {earliest}"
+        )
     lacking = np.flatnonzero(~inputs.complete[first + 1 : last + 1])
     if lacking.size:
-        raise SimulationError(f"inputs are missing for over 30 minutes from {stamps[first + 1 + lacking[0]]}; choose another interval")
+        raise SimulationError(
+            f"inputs are missing for over 30 minutes from {stamps[first + 1 + lacking[0]]}; choose another interval"
+        )
     matrices = model.matrices(theta)
     at = np.array([first])
     states, _ = spin_up(matrices, inputs, begin, at)
-    means, _ = free_runs(
-        matrices, model.network, inputs, at, last - first, states, scheme=scheme, progress=progress
-    )
+    means, _ = free_runs(matrices, model.network, inputs, at, last - first, states, scheme=scheme, progress=progress)
     rows = slice(first + 1, last + 1)
     zones = list(model.network.zones)
 

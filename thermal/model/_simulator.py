@@ -95,7 +95,11 @@ class Simulator:
         self.matrices = self.model.matrices(self.theta)
         self._stepper = Stepper(self.matrices, self.step_seconds, SCHEMES[scheme], network.airflows)
         self._air = np.flatnonzero(network.kind == "air")
-        self._shuffle = _random_shuffle(network, self.matrices, self._air, probability, reach, seed) if shuffle == "random" else None
+        self._shuffle = (
+            _random_shuffle(network, self.matrices, self._air, probability, reach, seed)
+            if shuffle == "random"
+            else None
+        )
         self._states: FloatArray | None = None
 
     @property
@@ -213,7 +217,9 @@ class Simulator:
         network = self.network
         heat = self._checked("zone_heat", zone_heat, len(network.zones))
         boundary = self._checked("boundary_temperatures", boundary_temperatures, network.n_boundary, PLAUSIBLE)
-        flow = self._checked("airflow", np.zeros(len(network.airflows)) if airflow is None else airflow, len(network.airflows))
+        flow = self._checked(
+            "airflow", np.zeros(len(network.airflows)) if airflow is None else airflow, len(network.airflows)
+        )
         states, mean, _, _ = self._stepper.advance(self._current(), boundary[:, None], heat[:, None], flow[:, None])
         if self._shuffle is not None:
             states[self._air, 0] = self._shuffle.apply(states[self._air, 0])
@@ -276,7 +282,7 @@ class Simulator:
 def _random_shuffle(
     network: Any, matrices: Any, air: NDArray[np.int64], probability: float, reach: float | None, seed: int
 ) -> RandomShuffle:
-    """The shuffle over the air volumes of a network, each zone within one floor."""
+    """Make the shuffle over the air volumes of a network, each zone within one floor."""
     position = {int(node): i for i, node in enumerate(air)}
     zones = [
         np.array([position[int(node)] for node in np.flatnonzero((network.kind == "air") & (network.zone == z))])

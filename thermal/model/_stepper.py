@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from thermal.errors import ModelError, SingularModelError
 from thermal.model._scheme import IMPLICIT_EULER, Scheme, Stage
-from thermal.model._symbolic import Matrices
+from thermal.model._symbolic import Matrices, Matrix
 from thermal.network import AIR_HEAT_CAPACITY
 
 FloatArray = NDArray[np.float64]
@@ -22,7 +22,8 @@ FloatArray = NDArray[np.float64]
 class Stepper:
     """Steps ``C dT/dt = -K T + B u + H (q + M(t) T_zone)`` and its derivatives with respect to θ.
 
-    ``M(t)`` are the directed airflows: not part of the symmetric K, they act between zone means and enter each solve exactly, as a
+    ``M(t)`` are the directed airflows: not part of the symmetric K, they act between zone means and enter each solve
+    exactly, as a
     correction of the rank of the zones (Woodbury), so that a flow that changes every step needs no new factorisation.
 
     Parameters
@@ -43,7 +44,11 @@ class Stepper:
     """
 
     def __init__(
-        self, matrices: Matrices, step: float, scheme: Scheme = IMPLICIT_EULER, airflows: tuple[tuple[int, int], ...] = ()
+        self,
+        matrices: Matrices,
+        step: float,
+        scheme: Scheme = IMPLICIT_EULER,
+        airflows: tuple[tuple[int, int], ...] = (),
     ) -> None:
         self.matrices, self.step, self.scheme, self.airflows = matrices, step, scheme, airflows
         n = matrices.n
@@ -54,7 +59,7 @@ class Stepper:
         self.n_parameter = len(matrices.flow_slopes)
 
     @cached_property
-    def _slope_stacks(self) -> tuple[sp.csr_matrix | FloatArray, sp.csr_matrix | FloatArray]:
+    def _slope_stacks(self) -> tuple[Matrix, Matrix]:
         m = self.matrices
         if sp.issparse(m.capacity):
             return sp.vstack(m.capacity_slopes).tocsr(), sp.vstack(m.flow_slopes).tocsr()
@@ -62,7 +67,7 @@ class Stepper:
 
     @cached_property
     def response(self) -> tuple[FloatArray, FloatArray]:
-        """End of a stage per unit of heat in each zone [K/W x J/s]: states (n, n_zone) and zone means (n_zone, n_zone)."""
+        """End of a stage per joule in each zone [K/J]: states (n, n_zone) and zone means (n_zone, n_zone)."""
         heating = self.matrices.heating
         states = self._solve(heating.toarray() if sp.issparse(heating) else np.asarray(heating))
         return states, np.asarray(self.matrices.observation @ states)
@@ -97,7 +102,8 @@ class Stepper:
         """
         scheme, m = self.scheme, self.matrices
         mixing = self._mixing(airflow)
-        trail, slope_trail = [states], [slopes]
+        trail = [states]
+        slope_trail = [] if slopes is None else [slopes]
         source = m.heating @ heat
         for stage in scheme.stages:
             base = _combine(stage.weights, trail)
@@ -107,7 +113,7 @@ class Stepper:
                 rhs += stage.explicit * self.step * self._flow_in(states, boundary, mixing)
             new = self._solve_mixed(rhs, mixing, stage.implicit)
             if slopes is not None:
-                slope_trail.append(self._stage_slopes(stage, base, new, trail[0], slope_trail, boundary, mixing))
+                slope_trail.append(self._stage_slopes(stage, base, new, states, slope_trail, boundary, mixing))
             trail.append(new)
         mean = np.asarray(m.observation @ _combine(scheme.mean, trail))
         if slopes is None:
@@ -209,7 +215,7 @@ class Stepper:
         keep: NDArray[np.int64],
         slopes: FloatArray | None,
     ) -> tuple[FloatArray, FloatArray | None]:
-        """`hold_many` of a reduced model: the held step is one affine map, and the sources of all slopes come in one product."""
+        """`hold_many` of a reduced model: one affine map, and all sources of slopes in one product."""
         m, n_time = self.matrices, int(keep[-1]) + 1
         held = np.isfinite(zone[0])
         lift = self._lift(held)
@@ -240,7 +246,7 @@ class Stepper:
         return np.asarray(np.linalg.solve(gain[np.ix_(held, held)].T, response[:, held].T).T)
 
     def _slope_source(self, base: FloatArray, new: FloatArray, boundary: FloatArray) -> FloatArray:
-        """Source of the slopes in an implicit Euler step, shape (n, n_parameter m): ``dC (T_0 - T) - Δt d[K, -B] [T; u]``."""
+        """Source of the slopes in an Euler step, (n, n_parameter m): ``dC (T_0 - T) - Δt d[K, -B] [T; u]``."""
         capacity_stack, flow_stack = self._slope_stacks
         full = np.vstack([new, boundary])
         return self._by_parameter(capacity_stack @ (base - new)) - self.step * self._by_parameter(flow_stack @ full)
@@ -283,7 +289,7 @@ class Stepper:
     def _mixed_heat(self, states: FloatArray, mixing: FloatArray) -> FloatArray:
         m, n_zone = mixing.shape[:2]
         zone = np.asarray(self.matrices.observation @ states).reshape(n_zone, -1, m).transpose(2, 0, 1)
-        return (mixing @ zone).transpose(1, 2, 0).reshape(n_zone, -1)
+        return np.asarray((mixing @ zone).transpose(1, 2, 0).reshape(n_zone, -1))
 
     def _stage_slopes(
         self,
@@ -291,19 +297,18 @@ class Stepper:
         base: FloatArray,
         new: FloatArray,
         start: FloatArray,
-        trail: list[FloatArray | None],
+        trail: list[FloatArray],
         boundary: FloatArray,
         mixing: FloatArray | None,
     ) -> FloatArray:
         """Differentiate one stage with respect to θ."""
         m = self.matrices
-        known = [t for t in trail if t is not None]
-        rhs = m.capacity @ _combine(stage.weights, known) + stage.implicit * self._slope_source(base, new, boundary)
+        rhs = m.capacity @ _combine(stage.weights, trail) + stage.implicit * self._slope_source(base, new, boundary)
         capacity_stack, flow_stack = self._slope_stacks
         if stage.implicit != 1.0:
             rhs += (1.0 - stage.implicit) * self._by_parameter(capacity_stack @ (base - new))
         if stage.explicit:
-            first = known[0]
+            first = trail[0]
             rhs -= stage.explicit * self.step * self._by_parameter(flow_stack @ np.vstack([start, boundary]))
             rhs -= stage.explicit * self.step * (self._stiffness @ first)
             if mixing is not None:
@@ -319,8 +324,8 @@ def _combine(weights: tuple[float, ...], trail: list[FloatArray]) -> FloatArray:
     return np.asarray(total)
 
 
-def factorise(system: sp.csr_matrix | FloatArray) -> Callable[[FloatArray], FloatArray]:
-    """Factorise a symmetric positive definite matrix, sparse (SuperLU in symmetric mode) or dense (inverse by Cholesky).
+def factorise(system: Matrix) -> Callable[[FloatArray], FloatArray]:
+    """Factorise a symmetric positive definite matrix, sparse (SuperLU) or dense (inverse by Cholesky).
 
     Parameters
     ----------
@@ -339,15 +344,19 @@ def factorise(system: sp.csr_matrix | FloatArray) -> Callable[[FloatArray], Floa
     """
     try:
         if sp.issparse(system):
-            # minimum degree on A^T + A without pivoting keeps the symmetric structure: four times faster than the default
+            # minimum degree on A^T + A without pivoting keeps the symmetric structure: four times faster than the
+            # default
             options = {"SymmetricMode": True}
             lu = spl.splu(sp.csc_matrix(system), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
-            return lambda rhs: np.asarray(lu.solve(np.ascontiguousarray(rhs) if rhs.ndim == 1 else np.asfortranarray(rhs)))
+            return lambda rhs: np.asarray(
+                lu.solve(np.ascontiguousarray(rhs) if rhs.ndim == 1 else np.asfortranarray(rhs))
+            )
         factor = sl.cho_factor(np.asarray(system))
         inverse = sl.cho_solve(factor, np.eye(system.shape[0]))
         return lambda rhs: np.asarray(inverse @ rhs)
     except (RuntimeError, np.linalg.LinAlgError) as error:
         raise SingularModelError(
-            f"the matrix of the step (n = {system.shape[0]}) cannot be factorised: {error}; a volume without heat capacity and "
+            f"the matrix of the step (n = {system.shape[0]}) cannot be factorised: {error}; "
+            "a volume without heat capacity and "
             "without any face, or a parameter out of range, does this"
         ) from error

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -14,12 +15,16 @@ from thermal.network import ThermalNetwork
 
 FloatArray = NDArray[np.float64]
 
+#: A csr_matrix on the grid, an ndarray when reduced; the stubs of scipy cannot type products with such a union.
+Matrix = Any
+
 
 @dataclass(frozen=True)
 class Matrices:
     """The model at one θ: ``C dT/dt = -K T + B u + H q`` and its derivatives with respect to θ.
 
-    The boundary nodes are the last columns of ``flow = [K, -B]``, so that ``flow @ [T; u]`` is the heat that leaves each volume.
+    The boundary nodes are the last columns of ``flow = [K, -B]``, so that ``flow @ [T; u]`` is the heat that leaves
+    each volume.
 
     Parameters
     ----------
@@ -37,13 +42,13 @@ class Matrices:
         dC/dθ_j and d[K, -B]/dθ_j, one a parameter.
     """
 
-    capacity: sp.csr_matrix | FloatArray
-    flow: sp.csr_matrix | FloatArray
-    heating: sp.csr_matrix | FloatArray
-    observation: sp.csr_matrix | FloatArray
+    capacity: Matrix
+    flow: Matrix
+    heating: Matrix
+    observation: Matrix
     uniform: FloatArray
-    capacity_slopes: list[sp.csr_matrix | FloatArray]
-    flow_slopes: list[sp.csr_matrix | FloatArray]
+    capacity_slopes: list[Matrix]
+    flow_slopes: list[Matrix]
 
     @property
     def n(self) -> int:
@@ -64,7 +69,8 @@ class SymbolicModel:
     network : ThermalNetwork
         Control volumes and faces.
     projection : ndarray, shape (n_node, r), optional
-        Orthonormal basis of a Galerkin reduction: every class matrix is projected, so the model stays affine in κ(θ) and c(θ).
+        Orthonormal basis of a Galerkin reduction: every class matrix is projected, so the model stays affine in κ(θ)
+        and c(θ).
 
     Attributes
     ----------
@@ -91,15 +97,15 @@ class SymbolicModel:
         self._slopes = ca.Function("slopes", [theta], jacobians)
         laplacians = [class_laplacian(network, k) for k in range(len(network.conductances))]
         masses = [class_mass(network, k) for k in range(len(network.capacities))]
-        self._heating: sp.csr_matrix | FloatArray = network.heating
-        self._observation: sp.csr_matrix | FloatArray = network.observation
+        self._heating: Matrix = network.heating
+        self._observation: Matrix = network.observation
         self._uniform = np.ones(network.n_node)
-        self.class_flows: list[sp.csr_matrix] | list[FloatArray] = laplacians
-        self.class_masses: list[sp.csr_matrix] | list[FloatArray] = masses
+        self.class_flows: list[Matrix] = laplacians
+        self.class_masses: list[Matrix] = masses
         if projection is not None:
             self._project(projection, laplacians, masses)
 
-    def _project(self, v: FloatArray, laplacians: list[sp.csr_matrix], masses: list[sp.csr_matrix]) -> None:
+    def _project(self, v: FloatArray, laplacians: list[Matrix], masses: list[Matrix]) -> None:
         n = self.network.n_node
         self.class_flows = [np.hstack([v.T @ (m[:, :n] @ v), v.T @ m[:, n:].toarray()]) for m in laplacians]
         self.class_masses = [v.T @ (m @ v) for m in masses]
@@ -130,8 +136,8 @@ class SymbolicModel:
         if bad:
             raise ModelError(f"theta: expected positive finite values, came {theta[names.index(bad[0])]} for {bad[0]}")
         kappa, heat = (np.asarray(v).ravel() for v in self.classes(theta))
-        flow_slopes: list[sp.csr_matrix | FloatArray] = []
-        capacity_slopes: list[sp.csr_matrix | FloatArray] = []
+        flow_slopes: list[Matrix] = []
+        capacity_slopes: list[Matrix] = []
         if slopes:
             d_kappa, d_heat = (np.asarray(v) for v in self._slopes(theta))
             flow_slopes = [_weighted(self.class_flows, d_kappa[:, j]) for j in range(theta.size)]
@@ -147,9 +153,7 @@ class SymbolicModel:
         )
 
 
-def _weighted(
-    terms: list[sp.csr_matrix] | list[FloatArray], weights: FloatArray
-) -> sp.csr_matrix | FloatArray:
+def _weighted(terms: list[Matrix], weights: FloatArray) -> Matrix:
     """Sum of class matrices with weights; zero weights cost nothing."""
     chosen = [w * m for w, m in zip(weights, terms, strict=True) if w != 0.0]
     total = sum(chosen[1:], chosen[0]) if chosen else 0.0 * terms[0]
@@ -160,7 +164,7 @@ def _weighted(
 
 
 def class_laplacian(network: ThermalNetwork, k: int) -> sp.csr_matrix:
-    """Rows of the graph Laplacian of conductance class ``k`` at κ = 1, shape (n_node, n_node + n_boundary) [m2 or as the class says]."""
+    """Rows of the graph Laplacian of conductance class ``k`` at κ = 1, shape (n_node, n_node + n_boundary)."""
     c = network.conductances[k]
     n, total = network.n_node, network.n_node + network.n_boundary
     rows = np.concatenate([c.first, c.second, c.first, c.second])

@@ -24,8 +24,10 @@ def series(*conductances: Any) -> Any:
 def surface_mesh(film: Any, radiant: Any, solid: Any) -> tuple[Any, Any, Any]:
     """Eliminate the massless surface where film, radiation and solid meet (star-mesh transform).
 
-    A surface at ``T_s`` exchanges ``h_c (T_air - T_s)`` with the air, ``h_r (T_rad - T_s)`` with the zone's radiant node and
-    ``g (T_solid - T_s)`` with the solid behind it. Without its own mass the three become three direct conductances, exactly
+    A surface at ``T_s`` exchanges ``h_c (T_air - T_s)`` with the air, ``h_r (T_rad - T_s)`` with the zone's radiant
+    node and
+    ``g (T_solid - T_s)`` with the solid behind it. Without its own mass the three become three direct conductances,
+    exactly
     (Kirchhoff; e.g. Desoer & Kuh, Basic Circuit Theory, 1969, ch. 2):
     ``g_ij = g_i g_j / (h_c + h_r + g)``.
 

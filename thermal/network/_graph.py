@@ -197,9 +197,11 @@ class GraphBuilder:
         """Code of a boundary in a face: negative until the graph is finished."""
         return -1 - self.boundaries.index(name)
 
-    def face(self, key: str, value: ca.SX, first: Any, second: Any, weight: Any) -> None:
+    def face(self, key: str, value: Any, first: Any, second: Any, weight: Any) -> None:
         """Add faces of class ``key``: nodes (broadcast), geometry weight [κ weight = W/K]."""
-        first, second, weight = np.broadcast_arrays(np.atleast_1d(first), np.atleast_1d(second), np.asarray(weight, float))
+        first, second, weight = np.broadcast_arrays(
+            np.atleast_1d(first), np.atleast_1d(second), np.asarray(weight, float)
+        )
         self._faces.setdefault(key, (ca.SX(value), []))[1].append((first, second, weight))
 
     def capacity(self, key: str, value: ca.SX | float, node: Any, weight: Any) -> None:
@@ -208,7 +210,11 @@ class GraphBuilder:
         self._masses.setdefault(key, (ca.SX(value), []))[1].append((node, weight))
 
     def finish(
-        self, observation: sp.csr_matrix, heating: sp.csr_matrix, airflows: tuple[tuple[int, int], ...], spacing: float | None = None
+        self,
+        observation: sp.csr_matrix,
+        heating: sp.csr_matrix,
+        airflows: tuple[tuple[int, int], ...],
+        spacing: float | None = None,
     ) -> ThermalNetwork:
         """Make the network from what was added."""
 
@@ -217,7 +223,8 @@ class GraphBuilder:
             return np.where(joined < 0, self._count - 1 - joined, joined) if column < 2 else joined
 
         conductances = tuple(
-            ConductanceClass(k, v, join(f, 0), join(f, 1), join(f, 2).astype(float)) for k, (v, f) in self._faces.items()
+            ConductanceClass(k, v, join(f, 0), join(f, 1), join(f, 2).astype(float))
+            for k, (v, f) in self._faces.items()
         )
         capacities = tuple(
             CapacityClass(k, v, np.concatenate([m[0] for m in ms]), np.concatenate([m[1] for m in ms]).astype(float))

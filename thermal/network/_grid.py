@@ -1,4 +1,4 @@
-"""A floor plan at a chosen cell size: refined by splitting cells, coarsened by merging cells of one token in a block."""
+"""A floor plan at a chosen cell size: refined by splitting cells, coarsened by merging like cells."""
 
 from __future__ import annotations
 
@@ -83,7 +83,8 @@ def resolution(cell_size: float, dx: float | None) -> tuple[int, Fraction]:
         if ratio.denominator != 1:
             split = max(2, round(cell_size / dx))
             raise CellSizeError(
-                f"cell size {dx} m does not divide the plan's cells of {cell_size} m; nearest that does: {cell_size / split:g} m"
+                f"cell size {dx} m does not divide the plan's cells of {cell_size} m; "
+                f"nearest that does: {cell_size / split:g} m"
             )
         return int(ratio), Fraction(1)
     return 1, 1 / ratio
@@ -92,7 +93,8 @@ def resolution(cell_size: float, dx: float | None) -> tuple[int, Fraction]:
 def floor_grid(plan: FloorPlan, cell_size: float, dx: float | None = None) -> FloorGrid:
     """Cells and control volumes of one floor at distance ``dx``.
 
-    Merging keeps what the plan says: cells of different tokens in one block become different control volumes, so areas, volumes and
+    Merging keeps what the plan says: cells of different tokens in one block become different control volumes, so
+    areas, volumes and
     one-cell walls stay exact and zones never merge.
 
     Parameters
@@ -115,7 +117,7 @@ def floor_grid(plan: FloorPlan, cell_size: float, dx: float | None = None) -> Fl
     tokens = np.pad(tokens, 1, constant_values=".")
     rows, columns = np.indices(tokens.shape)
     names, code = np.unique(tokens, return_inverse=True)
-    code = code.reshape(tokens.shape)
+    code = np.asarray(code).reshape(tokens.shape)
     block_r = ((rows - 1 + 0.5) / float(merge)).astype(np.int64)
     block_c = ((columns - 1 + 0.5) / float(merge)).astype(np.int64)
     solid = tokens != "."
@@ -128,7 +130,7 @@ def floor_grid(plan: FloorPlan, cell_size: float, dx: float | None = None) -> Fl
 
 
 def _refuse_swallowed_zones(plan: FloorPlan, tokens: NDArray[np.str_], merge: float, cell_size: float) -> None:
-    """Refuse blocks wider than the narrowest zone and its walls: the grid would no longer tell it from its neighbour."""
+    """Refuse blocks wider than the narrowest zone and its walls: it would be lost in its neighbour."""
     if merge <= 1.0:
         return
     for zone in sorted(set(np.unique(tokens)) - {".", "#", "+"}):
@@ -136,6 +138,7 @@ def _refuse_swallowed_zones(plan: FloorPlan, tokens: NDArray[np.str_], merge: fl
         extent = min(np.ptp(rows), np.ptp(columns)) + 1
         if extent + 1 < merge:
             raise CellSizeError(
-                f"cell size {merge * cell_size:g} m on floor {plan.name}: zone {zone} is only {extent * cell_size:g} m wide and would "
+                f"cell size {merge * cell_size:g} m on floor {plan.name}: zone {zone} is only {extent * cell_size:g} m wide "
+                f"and would "
                 f"merge with its neighbour; use at most {(extent + 1) * cell_size:g} m"
             )

@@ -67,7 +67,11 @@ class Zone:
         key = graph.key(kind, self.name, "interior_film_coefficient", "radiant_coefficient", *depends)
         solid_, area_ = np.atleast_1d(solid), np.atleast_1d(np.asarray(area, float))
         if air is None:
-            air_solid, air_area, air_node = np.repeat(solid_, self.air.size), np.outer(area_, self.share).ravel(), np.tile(self.air, solid_.size)
+            air_solid, air_area, air_node = (
+                np.repeat(solid_, self.air.size),
+                np.outer(area_, self.share).ravel(),
+                np.tile(self.air, solid_.size),
+            )
         else:
             air_solid, air_area, air_node = np.broadcast_to(solid_, air.shape), np.broadcast_to(area_, air.shape), air
         graph.face(f"air-{key}", to_air, air_node, air_solid, air_area)
@@ -75,31 +79,39 @@ class Zone:
         graph.face(f"air-radiant past {key}", across, air_node, self.radiant, air_area)
 
     def slabs(self, area: float) -> None:
-        """Floor and ceiling slab, adiabatic at their back: one chain of `SLAB_LAYERS` nodes for both [area: both faces, m2]."""
+        """Floor and ceiling slab, adiabatic at their back: one chain of nodes for both [area: both faces, m2]."""
         graph = self.graph
         coupling = graph.parameter("slab_coupling", self.name)
         heat = graph.parameter("slab_heat_capacity", self.name)
         nodes = graph.volumes("slab", np.full(SLAB_LAYERS, self.number))
         graph.capacity(graph.key("slab", self.name, "slab_heat_capacity"), heat, nodes, area / SLAB_LAYERS)
         self.surface("slab", 2 * SLAB_LAYERS * coupling, nodes[0], area, depends=("slab_coupling",))
-        graph.face(graph.key("slab-slab", self.name, "slab_coupling"), SLAB_LAYERS * coupling, nodes[:-1], nodes[1:], area)
+        graph.face(
+            graph.key("slab-slab", self.name, "slab_coupling"), SLAB_LAYERS * coupling, nodes[:-1], nodes[1:], area
+        )
 
     def furniture(self, floor_area: float) -> None:
-        """Furniture: one node whose coupling to the room is split between air and radiant node as the films are [floor_area: m2]."""
+        """Furniture: one node, coupled to air and radiant node in the ratio of the films [floor_area: m2]."""
         graph = self.graph
         coupling = graph.parameter("furniture_coupling", self.name)
         heat = graph.parameter("furniture_heat_capacity", self.name)
         node = graph.volumes("furniture", self.number)
         graph.capacity(graph.key("furniture", self.name, "furniture_heat_capacity"), heat, node, floor_area)
-        key = graph.key("furniture", self.name, "furniture_coupling", "interior_film_coefficient", "radiant_coefficient")
+        key = graph.key(
+            "furniture", self.name, "furniture_coupling", "interior_film_coefficient", "radiant_coefficient"
+        )
         total = self.film + self.radiation
         graph.face(f"air-{key}", coupling * self.film / total, self.air, node, floor_area * self.share)
         graph.face(f"radiant-{key}", coupling * self.radiation / total, self.radiant, node, floor_area)
 
-    def window(self, u_value: ca.SX, area: float, other: int, air: NDArray[np.int64] | None = None, *, depends: str) -> None:
-        """Glass without mass towards boundary ``other``: rated ``u_value`` [W/m2/K] with its inside film replaced by the zone's own."""
+    def window(
+        self, u_value: ca.SX, area: float, other: int, air: NDArray[np.int64] | None = None, *, depends: str
+    ) -> None:
+        """Glass without mass towards boundary ``other``: ``u_value`` [W/m2/K] with the zone's own inside film."""
         pane = 1.0 / (1.0 / u_value - 1.0 / WINDOW_RATED_FILM)
         if air is None:
             self.surface("window", pane, other, area, depends=(depends,))
         else:
-            self.surface("window", pane, np.full(air.size, other), np.full(air.size, area / air.size), air, depends=(depends,))
+            self.surface(
+                "window", pane, np.full(air.size, other), np.full(air.size, area / air.size), air, depends=(depends,)
+            )

@@ -8,11 +8,13 @@ AIR_HEAT_CAPACITY = 1006.0
 #: Molecular conductivity of air at 20 degC [W/m/K] (Incropera, Fundamentals of Heat and Mass Transfer, Table A.4).
 AIR_CONDUCTIVITY = 0.026
 
-#: Resistance of the structural layer of an exterior wall [m2K/W], which carries its mass inside the insulation: 0.2 m of
+#: Resistance of the structural layer of an exterior wall [m2K/W], which carries its mass inside the insulation: 0.2 m
+#: of
 #: concrete or brick at 1.4 W/m/K (ISO 10456:2007 Table 3).
 STRUCTURE_RESISTANCE = 0.15
 
-#: Nominal areal mass of an exterior wall's structure and of a partition [kg/m2]; only mass times heat capacity is determined.
+#: Nominal areal mass of an exterior wall's structure and of a partition [kg/m2]; only mass times heat capacity is
+#: determined.
 EXTERIOR_WALL_MASS = 150.0
 INTERIOR_WALL_MASS = 60.0
 
@@ -27,4 +29,3 @@ RATED_OUTSIDE_FILM = 25.0
 
 #: Step of the paper's shuffle [s].
 SHUFFLE_STEP = 300.0
-

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -23,8 +24,8 @@ from thermal.network._materials import (
     STRUCTURE_RESISTANCE,
 )
 from thermal.parameters import Scope
-from thermal.units import air_density
 from thermal.shuffle import choose_equivalent, effective_diffusivity, exchange_rate, mean_square_reach
+from thermal.units import air_density
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -58,7 +59,8 @@ def plan_network(
     Returns
     -------
     ThermalNetwork
-        Boundary ``outdoor``; slabs adiabatic at their back; no air exchange between zones (both are effects of the catalogue).
+        Boundary ``outdoor``; slabs adiabatic at their back; no air exchange between zones (both are effects of the
+        catalogue).
     """
     plans = building.geometry
     assert isinstance(plans, FloorPlans)  # noqa: S101 - narrows the type; build_network chose this builder by it
@@ -122,7 +124,7 @@ class _Floor:
         return zone
 
     def _air(self, zone: Zone, area: float, heat: float, reach: float | None, mean_shuffle: bool) -> None:
-        """Conduction between air volumes, and the mean of the shuffle: a massless star node or a diffusivity (`thermal.shuffle`)."""
+        """Conduction between air volumes, and the mean of the shuffle: a star node or a diffusivity (`thermal.shuffle`)."""
         graph, grid = self.graph, self.grid
         conductivity = ca.SX(AIR_CONDUCTIVITY)
         name = "air-air"
@@ -167,10 +169,12 @@ class _Floor:
         solid_of = {"#": ("exterior_wall", structure / half), "+": ("interior_wall", inner / half)}
         for facade, step in FACADES.items():
             for token, (kind, conductance) in solid_of.items():
-                for name, zone in present.items():
+                for zone in present.values():
                     self._room_side(zone, kind, conductance, step, token, opaque[facade] if token == "#" else None)
             face = grid.cell * height
-            self._outside(step, "#", "exterior_wall-outdoor", series(film, insulation, structure / half), opaque[facade])
+            self._outside(
+                step, "#", "exterior_wall-outdoor", series(film, insulation, structure / half), opaque[facade]
+            )
             self._outside(step, "+", "interior_wall-outdoor", series(film, inner / half), None)
             if facade in ("south", "east"):
                 pairs = (("#", "#", structure / grid.spacing), ("+", "+", inner / grid.spacing))
@@ -186,7 +190,10 @@ class _Floor:
         graph, grid = self.graph, self.grid
         cube = grid.cell**2 * self.plan.height
         least = np.minimum.reduce(list(opaque.values()))
-        for token, name, mass in (("#", "exterior_wall", EXTERIOR_WALL_MASS), ("+", "interior_wall", INTERIOR_WALL_MASS)):
+        for token, name, mass in (
+            ("#", "exterior_wall", EXTERIOR_WALL_MASS),
+            ("+", "interior_wall", INTERIOR_WALL_MASS),
+        ):
             mine = grid.token == token
             if not mine.any():
                 continue
@@ -198,7 +205,7 @@ class _Floor:
             graph.capacity(name, density * graph.parameter(f"{name}_heat_capacity"), self.node[mine], volume)
 
     def _pairs(self, step: tuple[int, int], a: str, b: str) -> tuple[IntArray, IntArray, FloatArray]:
-        """Pairs of different volumes of tokens a and b across faces in a direction, and how many cell faces they share."""
+        """Pairs of volumes of tokens a and b across faces in a direction, and how many cell faces they share."""
         here, there = self.grid.neighbours(step)
         tokens, volume = self.grid.tokens.ravel(), self.grid.volume.ravel()
         keep = (tokens[here] == a) & (tokens[there] == b)
@@ -208,7 +215,7 @@ class _Floor:
         return self.node[pairs[:, 0]], self.node[pairs[:, 1]], faces.astype(float)
 
     def _room_side(
-        self, zone: Zone, kind: str, conductance: object, step: tuple[int, int], token: str, share: FloatArray | None
+        self, zone: Zone, kind: str, conductance: Any, step: tuple[int, int], token: str, share: FloatArray | None
     ) -> None:
         here, there = self.grid.neighbours(step)
         tokens, volume = self.grid.tokens.ravel(), self.grid.volume.ravel()
@@ -220,7 +227,7 @@ class _Floor:
             zone.surface(kind, conductance, self.node[volume[there[keep]]], area, self.node[volume[here[keep]]],
                          depends=(f"{kind}_conductivity",))  # fmt: skip
 
-    def _outside(self, step: tuple[int, int], token: str, key: str, value: object, share: FloatArray | None) -> None:
+    def _outside(self, step: tuple[int, int], token: str, key: str, value: Any, share: FloatArray | None) -> None:
         here, there = self.grid.neighbours(step)
         tokens, volume = self.grid.tokens.ravel(), self.grid.volume.ravel()
         keep = (tokens[here] == token) & (tokens[there] == ".")
@@ -230,7 +237,9 @@ class _Floor:
                 area *= share.ravel()[here[keep]]
             self.graph.face(key, value, self.node[volume[here[keep]]], self.graph.boundary("outdoor"), area)
 
-    def _opaque_share(self, zones: Mapping[str, Zone], glazing: Mapping[str, Mapping[str, float]]) -> dict[str, FloatArray]:
+    def _opaque_share(
+        self, zones: Mapping[str, Zone], glazing: Mapping[str, Mapping[str, float]]
+    ) -> dict[str, FloatArray]:
         """Per facade, the share of each exterior wall cell that is not glass; adds the windows themselves."""
         grid, graph = self.grid, self.graph
         shares = {}
@@ -245,7 +254,13 @@ class _Floor:
                 exposed = cells.sum() * grid.cell * self.plan.height
                 rows, columns = np.nonzero(cells)
                 air = self.node[grid.volume[rows, columns]]
-                zone.window(graph.parameter("window_u_value", name), area, graph.boundary("outdoor"), air, depends="window_u_value")
+                zone.window(
+                    graph.parameter("window_u_value", name),
+                    area,
+                    graph.boundary("outdoor"),
+                    air,
+                    depends="window_u_value",
+                )
                 while (wall := tokens[rows + dr, columns + dc] == "#").any():
                     rows, columns = rows[wall] + dr, columns[wall] + dc
                     share[rows, columns] = max(0.0, 1.0 - area / exposed)

@@ -39,7 +39,8 @@ def table_network(building: Building, scopes: Mapping[str, Scope] | None = None)
     Returns
     -------
     ThermalNetwork
-        Boundaries ``outdoor`` and the measured ones. Surfaces to ``ground`` are adiabatic at their back (``ground_exchange`` is an
+        Boundaries ``outdoor`` and the measured ones. Surfaces to ``ground`` are adiabatic at their back
+        (``ground_exchange`` is an
         effect of the catalogue).
     """
     table = building.geometry
@@ -61,7 +62,9 @@ def table_network(building: Building, scopes: Mapping[str, Scope] | None = None)
     return graph.finish(heating.T.tocsr(), heating, flows)
 
 
-def _add_surface(graph: GraphBuilder, zones: Mapping[str, Zone], surface: Surface, table: ZoneTable, density: float) -> None:
+def _add_surface(
+    graph: GraphBuilder, zones: Mapping[str, Zone], surface: Surface, table: ZoneTable, density: float
+) -> None:
     """Add one row of the surface table."""
     zone, other = zones[surface.zone], surface.other
     if surface.kind == "opening":
@@ -114,7 +117,7 @@ def _sublayers(layers: tuple[Layer, ...]) -> tuple[NDArray[np.float64], NDArray[
 
 
 def _add_layers(graph: GraphBuilder, zones: Mapping[str, Zone], surface: Surface, layers: tuple[Layer, ...]) -> None:
-    """A chain of sublayers from the zone to what lies behind; conductivity and heat capacity by the group's multipliers."""
+    """Add a chain of sublayers from the zone to what lies behind, scaled by its group's multipliers."""
     group = _group(surface)
     scale = graph.parameter(f"{group}_conductivity_multiplier")
     heat = graph.parameter(f"{group}_heat_capacity_multiplier")
