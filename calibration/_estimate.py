@@ -72,19 +72,39 @@ class Problem:
         return np.arange(self.steps, 0, -stride)[::-1]
 
     def theta(self, z: FloatArray) -> FloatArray:
-        """θ of a point of the estimation scale."""
+        """θ of a point of the estimation scale.
+
+        Parameters
+        ----------
+        z : ndarray, shape (n_free,)
+            Point of the estimation scale [-].
+        """
         theta = self.start.copy()
         for i, p, v in zip(self.free, self.parameters, z, strict=True):
             theta[i] = p.inverse(float(v))
         return theta
 
     def point(self, theta: FloatArray) -> FloatArray:
-        """Point of the estimation scale of θ, moved inside the range."""
+        """Point of the estimation scale of θ, moved inside the range.
+
+        Parameters
+        ----------
+        theta : ndarray, shape (n_parameter,)
+            Parameter values [parameter units].
+        """
         inside = [float(np.clip(theta[i], p.lower, p.upper)) for i, p in zip(self.free, self.parameters, strict=True)]
         return np.array([p.transform(v) for p, v in zip(self.parameters, inside, strict=True)])
 
     def residuals(self, model: SymbolicModel, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Errors of all runs [K] and their derivatives with respect to θ; unmeasured ones left out."""
+        """Errors of all runs [K] and their derivatives with respect to θ; unmeasured ones left out.
+
+        Parameters
+        ----------
+        model : SymbolicModel
+            On the grid or reduced.
+        theta : ndarray, shape (n_parameter,)
+            Parameter values [parameter units].
+        """
         matrices = model.matrices(theta, slopes=True)
         errors, slopes = [], []
         for runs in self.runs:
@@ -99,7 +119,15 @@ class Problem:
         return np.concatenate(errors), np.concatenate(slopes)[:, list(self.free)]
 
     def residuals_only(self, model: SymbolicModel, theta: FloatArray) -> FloatArray:
-        """Errors of all runs [K]."""
+        """Errors of all runs [K].
+
+        Parameters
+        ----------
+        model : SymbolicModel
+            On the grid or reduced.
+        theta : ndarray, shape (n_parameter,)
+            Parameter values [parameter units].
+        """
         matrices = model.matrices(theta)
         errors = []
         for runs in self.runs:
@@ -118,7 +146,15 @@ class Problem:
         return float(max(1.0, seconds / 86400.0) * zones)
 
     def weighted(self, model: SymbolicModel, z: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Residuals and Jacobian on the estimation scale: weighted data, then the priors."""
+        """Residuals and Jacobian on the estimation scale: weighted data, then the priors.
+
+        Parameters
+        ----------
+        model : SymbolicModel
+            On the grid or reduced.
+        z : ndarray, shape (n_free,)
+            Point of the estimation scale [-].
+        """
         theta = self.theta(z)
         error, slopes = self.residuals(model, theta)
         weight = np.sqrt(self.effective_size() / error.size) / self.deviation

@@ -23,11 +23,11 @@ class LeastSquaresResult:
     Parameters
     ----------
     x : ndarray, shape (p,)
-        Best point found, also when the solver failed.
+        Best point found, also when the solver failed [as the caller's x].
     cost : float
         ``½ Σ r²`` there [-].
     jacobian : ndarray, shape (m, p)
-        Jacobian of the residuals there.
+        Jacobian of the residuals there [per unit of x].
     status : str
         Ipopt's return status, such as ``Solve_Succeeded``.
     success : bool
@@ -157,9 +157,9 @@ def solve_least_squares(
     function : callable
         Residuals (m,) and their Jacobian (m, p) at x.
     start, lower, upper : ndarray, shape (p,)
-        Start and bounds; the start is moved inside.
+        Start and bounds; the start is moved inside [as the caller's x].
     tolerance : float
-        Ipopt's relative convergence tolerance.
+        Largest component of the gradient at convergence [per unit of x].
     iterations : int
         Most iterations.
 

@@ -143,6 +143,8 @@ class CalibrationResult:
         Distance between control volumes of a plan [m].
     seed : int
         Seed of the starts.
+    version : str
+        Of the library.
     """
 
     case: str

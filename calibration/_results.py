@@ -81,6 +81,7 @@ def write_results(
     for name in files:
         if PurePath(name).name != name or name in {"", ".", ".."}:
             raise ResultsExistError(f"{folder}: expected plain file names for results, came {name!r}")
+    folder = folder.resolve()
     folder.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix=f".{folder.name}-", dir=folder.parent) as work:
         new, old = Path(work) / "new", Path(work) / "old"
@@ -88,11 +89,9 @@ def write_results(
         old.mkdir()
         for name, content in files.items():
             _write(new / name, content)
-        if folder.is_dir() and any(folder.iterdir()):
-            _replace(folder, new, old, list(files))
+        if folder.is_dir():
+            _move_into(folder, new, old, list(files))
         else:
-            if folder.is_dir():
-                folder.rmdir()
             os.replace(new, folder)
     return folder
 
@@ -144,7 +143,7 @@ def _write(path: Path, content: bytes | str | dict[str, Any] | pd.DataFrame) -> 
         path.write_text(content if isinstance(content, str) else to_json(content) + "\n", encoding="utf-8")
 
 
-def _replace(folder: Path, new: Path, old: Path, names: list[str]) -> None:
+def _move_into(folder: Path, new: Path, old: Path, names: list[str]) -> None:
     """Move files into a folder; on a failure move back what was there."""
     moved: list[str] = []
     try:

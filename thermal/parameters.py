@@ -56,19 +56,43 @@ class Parameter:
         return float(self.transform(self.upper) - self.transform(self.lower)) / 4.0
 
     def transform(self, value: float) -> float:
-        """Map a value to the estimation scale (log or logit)."""
+        """Map a value to the estimation scale (log or logit).
+
+        Parameters
+        ----------
+        value : float
+            Value of the parameter [parameter unit].
+        """
         return float(np.log(value / (1.0 - value))) if self.logit else float(np.log(value))
 
     def inverse(self, z: float) -> float:
-        """Map a point of the estimation scale back to the value [unit]."""
+        """Map a point of the estimation scale back to the value.
+
+        Parameters
+        ----------
+        z : float
+            Point of the estimation scale [-].
+        """
         return float(1.0 / (1.0 + np.exp(-z))) if self.logit else float(np.exp(z))
 
     def slope(self, value: float) -> float:
-        """Differentiate the value with respect to the estimation scale [unit]."""
+        """Differentiate the value with respect to the estimation scale.
+
+        Parameters
+        ----------
+        value : float
+            Value of the parameter [parameter unit].
+        """
         return value * (1.0 - value) if self.logit else value
 
     def rescaled(self, factor: float) -> Parameter:
-        """Return the parameter with start and range multiplied by ``factor`` [-]."""
+        """Return the parameter with start and range multiplied by ``factor``.
+
+        Parameters
+        ----------
+        factor : float
+            Scale [-], positive.
+        """
         return replace(self, start=self.start * factor, lower=self.lower * factor, upper=self.upper * factor)
 
 
@@ -130,7 +154,7 @@ PARAMETERS: dict[str, Parameter] = {
             0.08,
             0.01,
             0.3,
-            "Allard & Utsumi (1992), doi:10.1016/0378-7788(92)90020-G",
+            "Allard & Utsumi (1992), Energy and Buildings 18, 133-145",
         ),
         Parameter(
             "exterior_wall_conductivity_multiplier",
@@ -158,6 +182,8 @@ PARAMETERS: dict[str, Parameter] = {
             "slab_conductivity_multiplier", "1", 1.0, 0.33, 3.0, "tabulated design conductivities: ISO 10456:2007"
         ),
         Parameter("slab_heat_capacity_multiplier", "1", 1.0, 0.33, 3.0, "tabulated design values: ISO 10456:2007"),
-        Parameter("window_u_value_multiplier", "1", 1.0, 0.5, 2.0, "EN 673 against in-situ values"),
+        Parameter(
+            "window_conductance_multiplier", "1", 1.0, 0.5, 2.0, "panes without films: EN 673 against in-situ values"
+        ),
     )
 }

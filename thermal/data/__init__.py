@@ -6,6 +6,8 @@ from pathlib import Path
 
 from thermal.case import Case, load_case
 
+__all__ = ["bundled_case_path", "load_bundled_case"]
+
 
 def bundled_case_path() -> Path:
     """Folder of the bundled case inside the installed package."""

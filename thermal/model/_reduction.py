@@ -55,7 +55,12 @@ def krylov_basis(matrices: list[Matrices], shifts: tuple[float, ...] = SHIFTS, t
     return np.asarray(np.linalg.qr(np.hstack([np.ones((basis.shape[0], 1)), basis]))[0])
 
 
-def reduced_model(model: SymbolicModel, thetas: list[FloatArray], **options: object) -> SymbolicModel:
+def reduced_model(
+    model: SymbolicModel,
+    thetas: list[FloatArray],
+    shifts: tuple[float, ...] = SHIFTS,
+    tolerance: float = 1e-10,
+) -> SymbolicModel:
     """Reduce a grid model around one or more θ; the result keeps κ(θ) and c(θ) exact.
 
     Parameters
@@ -63,14 +68,16 @@ def reduced_model(model: SymbolicModel, thetas: list[FloatArray], **options: obj
     model : SymbolicModel
         On the grid.
     thetas : list of ndarray, shape (n_parameter,)
-        Where the basis is made.
-    **options : object
-        Passed to `krylov_basis`.
+        Where the basis is made [parameter units].
+    shifts : tuple of float
+        Expansion points [1/s], positive.
+    tolerance : float
+        As in `krylov_basis` [-].
 
     Returns
     -------
     SymbolicModel
         With dense matrices of the order of the basis.
     """
-    basis = krylov_basis([model.matrices(t) for t in thetas], **options)  # type: ignore[arg-type]
+    basis = krylov_basis([model.matrices(t) for t in thetas], shifts, tolerance)
     return SymbolicModel(model.network, basis)

@@ -19,11 +19,13 @@ from thermal.network import ThermalNetwork
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-#: Longest gap of an input that is bridged by a straight line [s] (outputs contract: 30 minutes).
+#: Longest gap of an input that is bridged by a straight line [s] (results contract: 30 minutes).
 LONGEST_BRIDGE = 1800.0
 
-#: Length of the spin-up and the least that is accepted [s] (outputs contract: 3 days, 12 hours).
+#: Length of the spin-up [s] (results contract: 3 days).
 SPIN_UP = 3 * 86400.0
+
+#: The least spin-up that is accepted [s] (results contract: 12 hours).
 LEAST_SPIN_UP = 12 * 3600.0
 
 #: Temperatures are stepped as differences from this one [K]: rows of ``[K, -B]`` sum to zero, so nothing changes but
@@ -212,7 +214,7 @@ def free_runs(
     states : ndarray, shape (n, m)
         States at the starts [K].
     slopes : ndarray, shape (n, n_parameter m), optional
-        Their derivatives.
+        Their derivatives [K per unit of θ].
     scheme : Scheme
         Implicit Euler by default.
     keep : ndarray of int, optional

@@ -57,8 +57,10 @@ class Scheme:
         return self.stages[0].implicit
 
 
+#: First order, as in the paper; with piecewise constant inputs its mean over a step is the trapezoid's.
 IMPLICIT_EULER = Scheme("implicit_euler", (Stage((1.0,), 1.0, 0.0),), (0.5, 0.5))
 
+#: Second order and L-stable.
 TR_BDF2 = Scheme(
     "tr_bdf2",
     (
@@ -68,4 +70,5 @@ TR_BDF2 = Scheme(
     (_GAMMA / 2.0, 0.5, (1.0 - _GAMMA) / 2.0),
 )
 
+#: Schemes by name.
 SCHEMES: dict[str, Scheme] = {s.name: s for s in (IMPLICIT_EULER, TR_BDF2)}

@@ -14,7 +14,7 @@ from thermal.model._replay import SPIN_UP, replay_inputs, spin_up
 from thermal.model._scheme import SCHEMES
 from thermal.model._stepper import Stepper
 from thermal.model._symbolic import Matrices, SymbolicModel
-from thermal.network import build_network
+from thermal.network import SHUFFLE_STEP, build_network
 from thermal.shuffle import RandomShuffle
 
 FloatArray = NDArray[np.float64]
@@ -44,7 +44,7 @@ class Simulator:
     shuffle : {"mean", "random"}
         The mean of the shuffle as a term of the model, or the paper's random one after each step.
     probability : float
-        Shuffle probability of the random shuffle [-], in [0, 1]; with ``mean`` it is a parameter.
+        Probability of the random shuffle per 300 s [-], in [0, 1]; with ``mean`` it is a parameter.
     reach : float, optional
         Reach of the shuffle [m]; None is the whole zone.
     seed : int
@@ -101,6 +101,7 @@ class Simulator:
             else None
         )
         self._states: FloatArray | None = None
+        self._elapsed = 0.0
 
     @property
     def zone_names(self) -> tuple[str, ...]:
@@ -221,13 +222,14 @@ class Simulator:
             "airflow", np.zeros(len(network.airflows)) if airflow is None else airflow, len(network.airflows)
         )
         states, mean, _, _ = self._stepper.advance(self._current(), boundary[:, None], heat[:, None], flow[:, None])
-        if self._shuffle is not None:
-            states[self._air, 0] = self._shuffle.apply(states[self._air, 0])
         self._states = states
+        self._shuffle_when_due()
         return mean[:, 0]
 
     def field(self, floor: int) -> FloatArray:
         """Temperatures of one floor of a plan on its grid, shape (n_row, n_column) [K]; NaN outside.
+
+        On a coarsened grid air and wall can share a place: the air is shown.
 
         Parameters
         ----------
@@ -238,14 +240,27 @@ class Simulator:
         mine = place[:, 0] == floor
         if not mine.any():
             raise ModelError(f"floor: expected a floor of a plan, came {floor}")
-        rows, columns = place[mine, 1], place[mine, 2]
-        out = np.full((rows.max() + 1, columns.max() + 1), np.nan)
-        out[rows, columns] = self._current()[mine, 0]
+        out = np.full((place[mine, 1].max() + 1, place[mine, 2].max() + 1), np.nan)
+        for shown in (mine & (self.network.kind != "air"), mine & (self.network.kind == "air")):
+            out[place[shown, 1], place[shown, 2]] = self._current()[shown, 0]
         return out
+
+    def _shuffle_when_due(self) -> None:
+        """Shuffle once for every 300 s that have passed, the step that the probability belongs to."""
+        if self._shuffle is None or self._states is None:
+            return
+        self._elapsed += self.step_seconds
+        while self._elapsed >= SHUFFLE_STEP:
+            self._elapsed -= SHUFFLE_STEP
+            self._states[self._air, 0] = self._shuffle.apply(self._states[self._air, 0])
 
     def save_state(self) -> dict[str, Any]:
         """Everything that the next steps depend on, for `restore_state`."""
-        return {"states": self.states, "shuffle": None if self._shuffle is None else self._shuffle.state}
+        return {
+            "states": self.states,
+            "shuffle": None if self._shuffle is None else self._shuffle.state,
+            "elapsed": self._elapsed,
+        }
 
     def restore_state(self, saved: Mapping[str, Any]) -> None:
         """Return to a saved state; what follows is bit for bit what followed then.
@@ -256,6 +271,7 @@ class Simulator:
             From `save_state`.
         """
         self._states = np.array(saved["states"], dtype=float)[:, None]
+        self._elapsed = float(saved["elapsed"])
         if self._shuffle is not None:
             self._shuffle.restore(saved["shuffle"])
 

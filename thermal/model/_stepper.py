@@ -93,7 +93,7 @@ class Stepper:
         airflow : ndarray, shape (n_airflow, m), optional
             Directed airflows during the step [kg/s].
         slopes : ndarray, shape (n, n_parameter m), optional
-            Derivatives of ``states`` with respect to θ, parameter by parameter.
+            Derivatives of ``states`` with respect to θ, parameter by parameter [K per unit of θ].
 
         Returns
         -------

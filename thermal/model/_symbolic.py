@@ -37,7 +37,7 @@ class Matrices:
     observation : matrix, shape (n_zone, n)
         Zone means.
     uniform : ndarray, shape (n,)
-        The state in which every volume is at 1 K.
+        The state in which every volume is at 1 K [K].
     capacity_slopes, flow_slopes : list of matrices
         dC/dθ_j and d[K, -B]/dθ_j, one a parameter.
     """
@@ -69,7 +69,7 @@ class SymbolicModel:
     network : ThermalNetwork
         Control volumes and faces.
     projection : ndarray, shape (n_node, r), optional
-        Orthonormal basis of a Galerkin reduction: every class matrix is projected, so the model stays affine in κ(θ)
+        Orthonormal basis [-] of a Galerkin reduction: every class is projected, so the model stays affine in κ(θ)
         and c(θ).
 
     Attributes
@@ -95,8 +95,8 @@ class SymbolicModel:
         jacobians = [ca.densify(ca.jacobian(e, theta)) for e in (kappa, heat)]
         self.classes = ca.Function("classes", [theta], [kappa, heat], ["theta"], ["conductance", "capacity"])
         self._slopes = ca.Function("slopes", [theta], jacobians)
-        laplacians = [class_laplacian(network, k) for k in range(len(network.conductances))]
-        masses = [class_mass(network, k) for k in range(len(network.capacities))]
+        laplacians = [_class_laplacian(network, k) for k in range(len(network.conductances))]
+        masses = [_class_mass(network, k) for k in range(len(network.capacities))]
         self._heating: Matrix = network.heating
         self._observation: Matrix = network.observation
         self._uniform = np.ones(network.n_node)
@@ -119,7 +119,7 @@ class SymbolicModel:
         Parameters
         ----------
         theta : ndarray, shape (n_parameter,)
-            Parameter values in the units of `ThermalNetwork.parameters`.
+            Parameter values, as in `ThermalNetwork.parameters` [parameter units].
         slopes : bool
             Also the derivatives with respect to θ.
 
@@ -163,7 +163,7 @@ def _weighted(terms: list[Matrix], weights: FloatArray) -> Matrix:
     return total
 
 
-def class_laplacian(network: ThermalNetwork, k: int) -> sp.csr_matrix:
+def _class_laplacian(network: ThermalNetwork, k: int) -> sp.csr_matrix:
     """Rows of the graph Laplacian of conductance class ``k`` at κ = 1, shape (n_node, n_node + n_boundary)."""
     c = network.conductances[k]
     n, total = network.n_node, network.n_node + network.n_boundary
@@ -173,7 +173,7 @@ def class_laplacian(network: ThermalNetwork, k: int) -> sp.csr_matrix:
     return sp.csr_matrix((values, (rows, columns)), shape=(total, total))[:n]
 
 
-def class_mass(network: ThermalNetwork, k: int) -> sp.csr_matrix:
+def _class_mass(network: ThermalNetwork, k: int) -> sp.csr_matrix:
     """Diagonal matrix of capacity class ``k`` at unit heat capacity, shape (n_node, n_node)."""
     c = network.capacities[k]
     n = network.n_node

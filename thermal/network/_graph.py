@@ -43,7 +43,19 @@ class ConductanceClass:
 
 @dataclass(frozen=True)
 class CapacityClass:
-    """Control volumes that share one volumetric (or areal) heat capacity: ``C_i = value weight_i`` [J/K]."""
+    """Control volumes that share one volumetric (or areal) heat capacity: ``C_i = value weight_i`` [J/K].
+
+    Parameters
+    ----------
+    name : str
+        For example ``air``.
+    value : casadi.SX
+        Heat capacity as an expression of the parameter symbols.
+    node : ndarray of int, shape (n,)
+        Node numbers.
+    weight : ndarray, shape (n,)
+        Volumes [m3] or areas [m2], so that ``value weight`` is in [J/K].
+    """
 
     name: str
     value: ca.SX
@@ -80,7 +92,7 @@ class ThermalNetwork:
     symbols : casadi.SX, shape (n_parameter,)
         Their symbols in the class expressions.
     nominal : mapping of str to (float, str)
-        Values that enter only as a product with a parameter (densities), with their unit: reported, never estimated.
+        Values that enter only as a product with a parameter, with their unit (densities [kg/m3]): never estimated.
     spacing : float or None
         Distance between the volumes of a plan [m]; None for a zone table.
     """
@@ -116,6 +128,11 @@ class ThermalNetwork:
 
     def values(self, given: Mapping[str, float]) -> FloatArray:
         """Parameter vector θ with ``given`` values by name and the starts for the rest.
+
+        Parameters
+        ----------
+        given : mapping of str to float
+            Values by name [parameter units].
 
         Raises
         ------
@@ -179,12 +196,32 @@ class GraphBuilder:
         return self._count
 
     def key(self, name: str, zone: str | None, *parameters: str) -> str:
-        """Class name: the zone is part of it when one of the parameters is per zone."""
+        """Class name: the zone is part of it when one of the parameters is per zone.
+
+        Parameters
+        ----------
+        name : str
+            What the faces join.
+        zone : str, optional
+            Zone they belong to.
+        *parameters : str
+            Parameters in their conductance.
+        """
         own = zone is not None and any(self.scopes.get(p) == "zone" for p in parameters)
         return f"{name}@{zone}" if own else name
 
     def volumes(self, kind: str, zone: Any, place: IntArray | None = None) -> IntArray:
-        """Add control volumes of one kind; returns their node numbers, shape (n,)."""
+        """Add control volumes of one kind; returns their node numbers, shape (n,).
+
+        Parameters
+        ----------
+        kind : str
+            What they are.
+        zone : int or ndarray of int, shape (n,)
+            Zone numbers, -1 for none; their count is the number of volumes.
+        place : ndarray of int, shape (n, 3), optional
+            Floor, row and column on a plan's grid.
+        """
         zone = np.atleast_1d(np.asarray(zone, dtype=np.int64))
         n = zone.size
         self._kind.append(np.full(n, kind))
@@ -194,18 +231,48 @@ class GraphBuilder:
         return np.arange(self._count - n, self._count)
 
     def boundary(self, name: str) -> int:
-        """Code of a boundary in a face: negative until the graph is finished."""
+        """Code of a boundary in a face: negative until the graph is finished.
+
+        Parameters
+        ----------
+        name : str
+            One of the boundaries.
+        """
         return -1 - self.boundaries.index(name)
 
     def face(self, key: str, value: Any, first: Any, second: Any, weight: Any) -> None:
-        """Add faces of class ``key``: nodes (broadcast), geometry weight [κ weight = W/K]."""
+        """Add faces of one class.
+
+        Parameters
+        ----------
+        key : str
+            Class name; the first faces of a class give it its conductance.
+        value : casadi.SX or float
+            Conductance κ as an expression of the parameter symbols.
+        first, second : int or ndarray of int, shape (n,)
+            Nodes or boundary codes, broadcast.
+        weight : float or ndarray, shape (n,)
+            Geometry, so that κ times weight is in [W/K].
+        """
         first, second, weight = np.broadcast_arrays(
             np.atleast_1d(first), np.atleast_1d(second), np.asarray(weight, float)
         )
         self._faces.setdefault(key, (ca.SX(value), []))[1].append((first, second, weight))
 
     def capacity(self, key: str, value: ca.SX | float, node: Any, weight: Any) -> None:
-        """Give volumes of class ``key`` the heat capacity ``value weight`` [J/K]."""
+        """Give volumes of one class their heat capacity.
+
+        Parameters
+        ----------
+        key : str
+            Class name.
+        value : casadi.SX or float
+            Heat capacity as an expression of the parameter symbols [J/m3/K or J/m2/K].
+        node : int or ndarray of int, shape (n,)
+            Nodes.
+        weight : float or ndarray, shape (n,)
+            Volumes [m3] or areas [m2].
+        """
         node, weight = np.broadcast_arrays(np.atleast_1d(node), np.asarray(weight, float))
         self._masses.setdefault(key, (ca.SX(value), []))[1].append((node, weight))
 
@@ -216,7 +283,19 @@ class GraphBuilder:
         airflows: tuple[tuple[int, int], ...],
         spacing: float | None = None,
     ) -> ThermalNetwork:
-        """Make the network from what was added."""
+        """Make the network from what was added.
+
+        Parameters
+        ----------
+        observation : csr_matrix, shape (n_zone, n_node)
+            Zone means [-].
+        heating : csr_matrix, shape (n_node, n_zone)
+            Distribution of a zone's heat [-].
+        airflows : tuple of (int, int)
+            Source and target zone of each directed airflow.
+        spacing : float, optional
+            Distance between the volumes of a plan [m].
+        """
 
         def join(parts: list[Any], column: int) -> Any:
             joined = np.concatenate([p[column] for p in parts])

@@ -45,7 +45,13 @@ class FloorGrid:
     token: NDArray[np.str_]
 
     def neighbours(self, step: tuple[int, int]) -> tuple[IntArray, IntArray]:
-        """Flat cell numbers of all pairs (cell, neighbour in direction ``step``)."""
+        """Flat cell numbers of all pairs (cell, neighbour in direction ``step``).
+
+        Parameters
+        ----------
+        step : tuple of (int, int)
+            Row and column step, as in `FACADES`.
+        """
         index = np.arange(self.tokens.size).reshape(self.tokens.shape)
         dr, dc = step
         n_r, n_c = self.tokens.shape
@@ -54,7 +60,7 @@ class FloorGrid:
         return here.ravel(), there.ravel()
 
 
-def resolution(cell_size: float, dx: float | None) -> tuple[int, Fraction]:
+def _resolution(cell_size: float, dx: float | None) -> tuple[int, Fraction]:
     """How to reach cells of ``dx`` from plan cells: split factor and merge ratio.
 
     Parameters
@@ -109,22 +115,24 @@ def floor_grid(plan: FloorPlan, cell_size: float, dx: float | None = None) -> Fl
     Raises
     ------
     CellSizeError
-        See `resolution`; also when a block would swallow a whole zone together with a neighbour.
+        When ``dx`` is not positive, or is finer than the plan but does not divide its cells; also when a
+        block would swallow a whole zone together with a neighbour.
     """
-    split, merge = resolution(cell_size, dx)
+    split, merge = _resolution(cell_size, dx)
     tokens = np.repeat(np.repeat(np.asarray(plan.tokens), split, axis=0), split, axis=1)
     _refuse_swallowed_zones(plan, tokens, float(merge), cell_size)
     tokens = np.pad(tokens, 1, constant_values=".")
-    rows, columns = np.indices(tokens.shape)
-    names, code = np.unique(tokens, return_inverse=True)
-    code = np.asarray(code).reshape(tokens.shape)
-    block_r = ((rows - 1 + 0.5) / float(merge)).astype(np.int64)
-    block_c = ((columns - 1 + 0.5) / float(merge)).astype(np.int64)
+    names, inverse = np.unique(tokens, return_inverse=True)
+    code: IntArray = np.reshape(inverse, tokens.shape)
+    rows: IntArray = np.floor((np.arange(tokens.shape[0]) - 0.5) / float(merge)).astype(np.int64)
+    columns: IntArray = np.floor((np.arange(tokens.shape[1]) - 0.5) / float(merge)).astype(np.int64)
     solid = tokens != "."
-    key = np.stack([block_r[solid], block_c[solid], code[solid]], axis=1)
-    unique, inverse = np.unique(key, axis=0, return_inverse=True)
+    key = np.column_stack(
+        [*(axis[solid] for axis in np.broadcast_arrays(rows[:, None], columns[None, :])), code[solid]]
+    )
+    unique, number = np.unique(key, axis=0, return_inverse=True)
     volume = np.full(tokens.shape, -1, dtype=np.int64)
-    volume[solid] = inverse.ravel()
+    volume[solid] = np.ravel(number)
     cell = cell_size / split
     return FloorGrid(tokens, cell, cell * float(merge), volume, unique[:, :2], names[unique[:, 2]])
 
@@ -138,7 +146,8 @@ def _refuse_swallowed_zones(plan: FloorPlan, tokens: NDArray[np.str_], merge: fl
         extent = min(np.ptp(rows), np.ptp(columns)) + 1
         if extent + 1 < merge:
             raise CellSizeError(
-                f"cell size {merge * cell_size:g} m on floor {plan.name}: zone {zone} is only {extent * cell_size:g} m wide "
+                f"cell size {merge * cell_size:g} m on floor {plan.name}: zone {zone} "
+                f"is only {extent * cell_size:g} m wide "
                 f"and would "
                 f"merge with its neighbour; use at most {(extent + 1) * cell_size:g} m"
             )

@@ -27,5 +27,8 @@ WINDOW_RATED_FILM = 7.7
 #: Combined outside film that rated u-values contain [W/m2/K] (EN 673:2011, h_e).
 RATED_OUTSIDE_FILM = 25.0
 
+#: Resistance of a single pane [m2K/W], 4 mm of glass at 1 W/m/K (EN 673:2011): the least that rated u-values may leave.
+LEAST_PANE_RESISTANCE = 0.004
+
 #: Step of the paper's shuffle [s].
 SHUFFLE_STEP = 300.0

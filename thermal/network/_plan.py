@@ -124,7 +124,7 @@ class _Floor:
         return zone
 
     def _air(self, zone: Zone, area: float, heat: float, reach: float | None, mean_shuffle: bool) -> None:
-        """Conduction between air volumes, and the mean of the shuffle: a star node or a diffusivity (`thermal.shuffle`)."""
+        """Conduction between air volumes, and the shuffle's mean: a star node or a diffusivity (`thermal.shuffle`)."""
         graph, grid = self.graph, self.grid
         conductivity = ca.SX(AIR_CONDUCTIVITY)
         name = "air-air"

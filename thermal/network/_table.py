@@ -16,6 +16,7 @@ from thermal.network._interior import Zone
 from thermal.network._materials import (
     AIR_HEAT_CAPACITY,
     BOUNDARY_FILM_RESISTANCE,
+    LEAST_PANE_RESISTANCE,
     RATED_OUTSIDE_FILM,
     WINDOW_RATED_FILM,
 )
@@ -83,12 +84,12 @@ def _add_surface(
 def _add_window(graph: GraphBuilder, zones: Mapping[str, Zone], surface: Surface) -> None:
     """Glass: rated air-to-air u-value with its films replaced by the building's own."""
     zone, rated = zones[surface.zone], float(surface.u_value or 0.0)
-    u_value = rated * graph.parameter("window_u_value_multiplier")
+    multiplier = graph.parameter("window_conductance_multiplier")
     if surface.other in zones:
         far = zones[surface.other]
-        graph.face(f"window u={rated:g} between zones", u_value, zone.air, far.air, surface.area)
+        graph.face(f"window u={rated:g} between zones", rated * multiplier, zone.air, far.air, surface.area)
         return
-    pane = 1.0 / (1.0 / u_value - 1.0 / WINDOW_RATED_FILM - 1.0 / RATED_OUTSIDE_FILM)
+    pane = multiplier / max(1.0 / rated - 1.0 / WINDOW_RATED_FILM - 1.0 / RATED_OUTSIDE_FILM, LEAST_PANE_RESISTANCE)
     if surface.other == "outdoor":
         value = series(pane, graph.parameter("exterior_convection_coefficient"))
     else:

@@ -10,6 +10,7 @@ import pandas as pd
 
 from thermal.case import Building, Case, Location, load_case, save_case
 from thermal.errors import CaseExistsError, describe
+from thermal.model import Simulator
 from thermal.pilot.layout import devices, generate_office
 from thermal.pilot.telemetry import Plant, Progress, generate_telemetry
 from thermal.pilot.weather import MOUNTAIN_VIEW, generate_weather
@@ -23,7 +24,7 @@ _STATION = "weather_station"  # as in the shared cases
 def generate_pilot(
     path: str | PathLike[str],
     *,
-    plant_factory: PlantFactory,
+    plant_factory: PlantFactory | None = None,
     seed: int = 0,
     days: float = 14.0,
     spin_up_days: float = 2.0,
@@ -45,8 +46,9 @@ def generate_pilot(
     ----------
     path : str or path-like
         Folder to make.
-    plant_factory : callable
+    plant_factory : callable, optional
         Called as ``plant_factory(building, step_seconds)``; returns the plant that produces the telemetry.
+        The library's own stepping simulator with its starting parameters by default.
     seed : int
         Same seed, same case; 0 or more.
     days : float
@@ -105,7 +107,7 @@ def generate_pilot(
         station=_STATION,
     )
     telemetry = generate_telemetry(
-        plant_factory(building, step_seconds),
+        (plant_factory or _own_simulator)(building, step_seconds),
         plans,
         weather,
         seed=seed,
@@ -115,3 +117,8 @@ def generate_pilot(
     )
     save_case(Case(building, telemetry), target, overwrite=overwrite)
     return load_case(target)
+
+
+def _own_simulator(building: Building, step_seconds: float) -> Plant:
+    """Make the default plant: the grid model with the mean of the shuffle."""
+    return Simulator(building, step_seconds=step_seconds)

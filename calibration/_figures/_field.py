@@ -1,0 +1,55 @@
+"""The temperature of every control volume at the end of one run."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+
+from calibration._figures._style import FloatArray
+from thermal import Inputs, SymbolicModel, spin_up
+from thermal.model import IMPLICIT_EULER, SPIN_UP, Scheme, Stepper
+
+#: The steppers take temperatures as differences from this one [K], which costs no accuracy.
+_REFERENCE = 293.15
+
+
+def spatial_field(
+    model: SymbolicModel,
+    theta: FloatArray,
+    inputs: Inputs,
+    start: pd.Timestamp,
+    steps: int,
+    scheme: Scheme = IMPLICIT_EULER,
+) -> FloatArray:
+    """Simulate one run on the grid and return its last state.
+
+    Parameters
+    ----------
+    model : SymbolicModel
+        On the grid.
+    theta : ndarray, shape (n_parameter,)
+        Parameter values [parameter units].
+    inputs : Inputs
+        The telemetry.
+    start : Timestamp
+        Start of the run; the spin-up takes three days before it, or what there is.
+    steps : int
+        N.
+    scheme : Scheme
+        Time stepping.
+
+    Returns
+    -------
+    ndarray, shape (n_node,)
+        Temperatures [K].
+    """
+    matrices = model.matrices(theta)
+    first = int(inputs.stamps.searchsorted(start))
+    begin = max(0, first - round(SPIN_UP / inputs.step))
+    states, _ = spin_up(matrices, inputs, begin, np.array([first]))
+    states = states - _REFERENCE
+    stepper = Stepper(matrices, inputs.step, scheme, model.network.airflows)
+    for row in range(first + 1, first + steps + 1):
+        boundary = inputs.boundary[row][:, None] - _REFERENCE
+        states, *_ = stepper.advance(states, boundary, inputs.heat[row][:, None], inputs.airflow[row][:, None])
+    return np.asarray(states[:, 0] + _REFERENCE)

@@ -1,0 +1,155 @@
+"""Floor plans: the building as drawn, and the paper's heat map of the spatial error on it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize, to_rgb
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+from scipy.ndimage import distance_transform_edt
+
+from calibration._figures._style import INK, FloatArray, Picture, picture, styled
+from thermal import FloorPlan, FloorPlans, ThermalNetwork
+
+#: Red is a simulation that is too warm, blue one that is too cold, white none, as in the paper.
+ERROR_COLOURS = colormaps["RdBu_r"]
+
+_WALLS = {"#": to_rgb("#3A3F45"), "+": to_rgb("#8E949B"), ".": to_rgb("white")}
+_UNMEASURED = to_rgb("#E3E5E8")
+_ZONES = [to_rgb(c) for c in ("#D7E8F5", "#FBE3D0", "#DDEFDC", "#F3E6F3", "#FFF3C9", "#DDEFEF", "#F0E4DA", "#E5E6F4")]
+
+
+def error_scale(values: FloatArray) -> float:
+    """Ends of a symmetric colour scale [K]: what 98 % of the values stay within, rounded up."""
+    finite = np.abs(values[np.isfinite(values)])
+    top = float(np.quantile(finite, 0.98)) if finite.size else 0.0
+    return max(0.1, float(np.ceil(top * 10.0) / 10.0))
+
+
+def colour_bar(figure: Figure, axes: Axes, scale: float) -> None:
+    """Horizontal bar of the error's colours, below the axes."""
+    bar = figure.colorbar(ScalarMappable(Normalize(-scale, scale), ERROR_COLOURS), ax=axes, orientation="horizontal", aspect=40,
+                          shrink=0.8, pad=0.02, extend="both")  # fmt: skip
+    bar.set_label("simulated minus measured [K]: red too warm, blue too cold", fontsize=8)
+    bar.ax.tick_params(labelsize=8)
+
+
+def error_colour(value: float, scale: float) -> tuple[float, float, float]:
+    """Colour of an error; grey where nothing is measured."""
+    if not np.isfinite(value):
+        return _UNMEASURED
+    red, green, blue, _ = ERROR_COLOURS(0.5 + 0.5 * value / scale)
+    return red, green, blue
+
+
+def ink_on(colour: tuple[float, float, float]) -> str:
+    """Dark or white text, whichever reads better on a colour."""
+    return "white" if 0.299 * colour[0] + 0.587 * colour[1] + 0.114 * colour[2] < 0.5 else INK
+
+
+@styled
+def plan_drawings(plans: FloorPlans, orientation: float) -> list[Picture]:
+    """Draw each floor with its zones and walls.
+
+    Parameters
+    ----------
+    plans : FloorPlans
+        The floors.
+    orientation : float
+        Clockwise from true north to the plan's up [deg].
+    """
+    drawn = []
+    for floor in plans.floors:
+        colours = {zone: _ZONES[i % len(_ZONES)] for i, zone in enumerate(floor.zone_names)}
+        image = np.array([[_WALLS.get(str(t)) or colours[str(t)] for t in row] for row in floor.tokens])
+        labels = {zone: (zone, colours[zone]) for zone in floor.zone_names}
+        figure, _ = _canvas(floor, plans.cell_size, orientation, image, f"floor {floor.name}", labels)
+        drawn.append(picture(figure, f"Plan of floor {floor.name} with {len(labels)} zones"))
+    return drawn
+
+
+@styled
+def floor_maps(
+    plans: FloorPlans,
+    orientation: float,
+    zones: tuple[str, ...],
+    error: FloatArray,
+    title: str,
+    field: tuple[ThermalNetwork, FloatArray, FloatArray] | None = None,
+) -> list[Picture]:
+    """Draw the error of each zone on the plan of each floor, or of each cell where the field of the grid is given.
+
+    Parameters
+    ----------
+    plans : FloorPlans
+        The floors.
+    orientation : float
+        Clockwise from true north to the plan's up [deg].
+    zones : tuple of str
+        Zone names.
+    error : ndarray, shape (n_zone,)
+        Simulated minus measured [K], NaN where not measured; the numbers on the map.
+    title : str
+        Follows the floor's name.
+    field : tuple of (ThermalNetwork, ndarray, ndarray), optional
+        Network of the grid, temperatures of its control volumes, shape (n_node,) [K], and measured temperatures of the zones, shape
+        (n_zone,) [K].
+    """
+    values = [_cell_errors(floor, number, plans.cell_size, zones, error, field) for number, floor in enumerate(plans.floors)]
+    scale = error_scale(np.concatenate([v.ravel() for v in values]))
+    by_zone = dict(zip(zones, error, strict=True))
+    drawn = []
+    for floor, cells in zip(plans.floors, values, strict=True):
+        image = ERROR_COLOURS(0.5 + 0.5 * cells / scale)[..., :3]
+        image[~np.isfinite(cells)] = _UNMEASURED
+        split = cells.shape[0] // floor.tokens.shape[0]
+        tokens = np.repeat(np.repeat(floor.tokens, split, axis=0), split, axis=1)
+        for token, colour in _WALLS.items():
+            image[tokens == token] = colour
+        labels = {z: (f"{z}\n{_signed(by_zone[z])}", error_colour(by_zone[z], scale)) for z in floor.zone_names}
+        figure, axes = _canvas(floor, plans.cell_size, orientation, image, f"floor {floor.name}, {title}", labels)
+        colour_bar(figure, axes, scale)
+        worst = max(floor.zone_names, key=lambda z: np.nan_to_num(abs(by_zone[z]), nan=-1.0))
+        alt = f"Error on floor {floor.name}, {title}; largest in zone {worst}: {_signed(by_zone[worst])}"
+        drawn.append(picture(figure, alt))
+    return drawn
+
+
+def _signed(value: float) -> str:
+    return f"{value:+.2f} K" if np.isfinite(value) else "not measured"
+
+
+def _cell_errors(
+    floor: FloorPlan,
+    number: int,
+    cell: float,
+    zones: tuple[str, ...],
+    error: FloatArray,
+    field: tuple[ThermalNetwork, FloatArray, FloatArray] | None,
+) -> FloatArray:
+    """Error of each pixel of a floor [K]; NaN in walls, outside, and where nothing is measured."""
+    code = np.full(floor.tokens.shape, -1)
+    for name in floor.zone_names:
+        code[floor.tokens == name] = zones.index(name)
+    if field is None:
+        return np.where(code >= 0, error[code], np.nan)
+    network, temperatures, measured = field
+    mine = (network.kind == "air") & (network.place[:, 0] == number)
+    rows, columns = network.place[mine, 1:].T
+    # the grid's spacing over the plan's cell, from how many volumes span the plan
+    ratio = (max(rows.max(), columns.max()) + 1) / _extent(code)
+    split = max(1, round(ratio))
+    code = np.repeat(np.repeat(code, split, axis=0), split, axis=1)
+    lookup = {key: t for key, t in zip(zip(rows, columns, network.zone[mine], strict=True), temperatures[mine], strict=True)}
+    merge = 1.0 if ratio >= 1.0 else _merge(network, mine, code)
+    out = np.full(code.shape, np.nan)
+    for row, column in np.argwhere(code >= 0):
+        zone = int(code[row, column])
+        key = (int((row + 0.5) / merge), int((column + 0.5) / merge), zone)
+        out[row, column] = lookup[key] - measured[zone]
+    return out

@@ -1,0 +1,108 @@
+"""How every figure looks, and how it becomes a picture of a page."""
+
+from __future__ import annotations
+
+import base64
+import io
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import tzinfo
+from functools import wraps
+from typing import ParamSpec, TypeVar
+
+import matplotlib as mpl
+import numpy as np
+import pandas as pd
+from matplotlib import dates
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+P = ParamSpec("P")
+T = TypeVar("T")
+FloatArray = NDArray[np.float64]
+
+#: Measured is blue and simulated orange, as in the paper; red is hotter, blue colder (Okabe & Ito's palette, safe for the colour-blind).
+MEASURED, SIMULATED, WARNING, MUTED, INK = "#0072B2", "#D55E00", "#C00028", "#8A8F98", "#22262B"
+
+#: Zero of the Celsius scale [K].
+CELSIUS = 273.15
+
+_STYLE = {
+    "axes.edgecolor": "#9AA0A8",
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "axes.labelcolor": INK,
+    "axes.spines.right": False,
+    "axes.spines.top": False,
+    "axes.titlelocation": "left",
+    "axes.titlesize": 10,
+    "figure.constrained_layout.use": True,
+    "font.family": "sans-serif",
+    "font.sans-serif": ["DejaVu Sans", "Verdana", "Arial", "sans-serif"],
+    "font.size": 9,
+    "grid.color": "#E4E7EB",
+    "legend.frameon": False,
+    "svg.fonttype": "none",
+    "svg.hashsalt": "buildingmpc",
+    "text.color": INK,
+    "text.parse_math": False,
+    "xtick.color": INK,
+    "ytick.color": INK,
+}
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A figure as a page shows it.
+
+    Parameters
+    ----------
+    source : str
+        Data URI of an SVG.
+    alt : str
+        What it shows, for those who cannot see it.
+    width : int
+        Natural width [px].
+    """
+
+    source: str
+    alt: str
+    width: int
+
+
+def styled(function: Callable[P, T]) -> Callable[P, T]:
+    """Draw in the house's style, whatever the user's own settings."""
+
+    @wraps(function)
+    def drawn(*args: P.args, **kwargs: P.kwargs) -> T:
+        with mpl.rc_context(), warnings.catch_warnings():
+            mpl.rcdefaults()
+            mpl.rcParams.update(_STYLE)
+            warnings.filterwarnings("ignore", message="Glyph .* missing from")  # names in any script: the page's font shows them
+            warnings.filterwarnings("ignore", message="Mean of empty slice|All-NaN slice")  # a sensor that is silent: a gap in a line
+            return function(*args, **kwargs)
+
+    return drawn
+
+
+def picture(figure: Figure, alt: str) -> Picture:
+    """Turn a figure into an SVG that a page holds itself."""
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
+    encoded = base64.b64encode(buffer.getvalue()).decode("ascii")
+    return Picture(f"data:image/svg+xml;base64,{encoded}", alt, round(figure.get_size_inches()[0] * 96))
+
+
+def day_numbers(stamps: pd.DatetimeIndex) -> FloatArray:
+    """Stamps as Matplotlib's days, shape (n_time,)."""
+    return np.asarray(stamps.tz_convert("UTC").tz_localize(None).as_unit("us").asi8 / 86400e6, dtype=float)
+
+
+def time_axis(axes: Axes, zone: tzinfo | None, ticks: int = 7) -> None:
+    """Local time along x."""
+    locator = dates.AutoDateLocator(tz=zone, minticks=3, maxticks=ticks)
+    axes.xaxis.set_major_locator(locator)
+    axes.xaxis.set_major_formatter(dates.ConciseDateFormatter(locator, tz=zone))
+    axes.tick_params(axis="x", labelsize=8)
