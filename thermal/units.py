@@ -18,7 +18,7 @@ from thermal.errors import IncompatibleUnitError, UnknownUnitError, describe
 
 
 @dataclass(frozen=True)
-class Quantity:
+class _Quantity:
     """What a point measures, and in which unit.
 
     Parameters
@@ -39,16 +39,16 @@ class Quantity:
     examples: str
 
 
-QUANTITIES: dict[str, Quantity] = {
-    "temperature": Quantity("a temperature", "kelvin", "degC", "degC, K, degF"),
-    "air_flow": Quantity("a mass flow or a volume flow", "kilogram / second", "kg/s", "kg/s, m^3/h, L/s, cfm"),
-    "power": Quantity("a power", "watt", "W", "W, kW, BTU/h"),
-    "share": Quantity("a share", "dimensionless", "%", "%, ppm, 1"),
-    "concentration": Quantity("a share", "dimensionless", "ppm", "ppm, %, 1"),
-    "count": Quantity("a number of people", "dimensionless", "-", "-, 1, count"),
-    "speed": Quantity("a speed", "meter / second", "m/s", "m/s, km/h, mph"),
-    "angle": Quantity("an angle", "degree", "deg", "deg, rad"),
-    "irradiance": Quantity("a power per area", "watt / meter ** 2", "W/m^2", "W/m^2, kW/m^2"),
+QUANTITIES: dict[str, _Quantity] = {
+    "temperature": _Quantity("a temperature", "kelvin", "degC", "degC, K, degF"),
+    "air_flow": _Quantity("a mass flow or a volume flow", "kilogram / second", "kg/s", "kg/s, m^3/h, L/s, cfm"),
+    "power": _Quantity("a power", "watt", "W", "W, kW, BTU/h"),
+    "share": _Quantity("a share", "dimensionless", "%", "%, ppm, 1"),
+    "concentration": _Quantity("a share", "dimensionless", "ppm", "ppm, %, 1"),
+    "count": _Quantity("a number of people", "dimensionless", "-", "-, 1, count"),
+    "speed": _Quantity("a speed", "meter / second", "m/s", "m/s, km/h, mph"),
+    "angle": _Quantity("an angle", "degree", "deg", "deg, rad"),
+    "irradiance": _Quantity("a power per area", "watt / meter ** 2", "W/m^2", "W/m^2, kW/m^2"),
 }
 
 STANDARD_PRESSURE = 101_325.0  # Pa, at sea level (ISO 2533)
@@ -192,16 +192,16 @@ def _line(unit: str, quantity: str, elevation: float, where: str) -> tuple[float
             describe(where, f"{target.name} ({target.examples})", repr(unit), "this is a difference")
         )
     if quantity == "air_flow" and parsed.dimensionality == registry.parse_units("m^3/s").dimensionality:
-        return float(registry.Quantity(1.0, parsed).to("m^3/s").magnitude) * air_density(elevation), 0.0
-    is_angle = "radian" in str(registry.Quantity(1.0, parsed).to_root_units().units)
+        return float(registry._Quantity(1.0, parsed).to("m^3/s").magnitude) * air_density(elevation), 0.0
+    is_angle = "radian" in str(registry._Quantity(1.0, parsed).to_root_units().units)
     if parsed.dimensionality != registry.parse_units(target.unit).dimensionality or is_angle != (quantity == "angle"):
         hint = {"C": "write degC", "F": "write degF"}.get(unit, f"use one of {target.examples}")
         raise IncompatibleUnitError(describe(where, f"a unit of {target.name}", repr(unit), hint))
-    zero, one = (float(registry.Quantity(x, parsed).to(target.unit).magnitude) for x in (0.0, 1.0))
+    zero, one = (float(registry._Quantity(x, parsed).to(target.unit).magnitude) for x in (0.0, 1.0))
     return one - zero, zero
 
 
-def _parse(unit: str, target: Quantity, where: str) -> Any:
+def _parse(unit: str, target: _Quantity, where: str) -> Any:
     text = "dimensionless" if unit.strip() in {"-", "1"} else unit.strip()
     try:
         if not text:

@@ -2,7 +2,7 @@
 
 from calibration._figures._drift import drift_boxes, median_run
 from calibration._figures._error import error_growth
-from calibration._figures._field import spatial_field
+from calibration._figures._field import Field, spatial_field
 from calibration._figures._parameters import parameter_ranges
 from calibration._figures._plan import floor_maps, plan_drawings
 from calibration._figures._quality import quality_timeline
@@ -11,6 +11,7 @@ from calibration._figures._style import Picture
 from calibration._figures._tiles import tile_map
 
 __all__ = [
+    "Field",
     "Picture",
     "Series",
     "drift_boxes",

@@ -2,15 +2,39 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import pandas as pd
 
 from calibration._figures._style import FloatArray
-from thermal import Inputs, SymbolicModel, spin_up
+from thermal import Inputs, SymbolicModel, ThermalNetwork, spin_up
 from thermal.model import IMPLICIT_EULER, SPIN_UP, Scheme, Stepper
 
 #: The steppers take temperatures as differences from this one [K], which costs no accuracy.
 _REFERENCE = 293.15
+
+
+@dataclass(frozen=True)
+class Field:
+    """Temperatures at the end of one run.
+
+    Parameters
+    ----------
+    network : ThermalNetwork
+        The grid.
+    temperatures : ndarray, shape (n_node,)
+        Of its control volumes [K].
+    measured : ndarray, shape (n_zone,)
+        Of the zones, at the same stamp [K].
+    dx : float or None
+        Distance between control volumes [m]; None is the plan's cell size.
+    """
+
+    network: ThermalNetwork
+    temperatures: FloatArray
+    measured: FloatArray
+    dx: float | None
 
 
 def spatial_field(
@@ -19,9 +43,10 @@ def spatial_field(
     inputs: Inputs,
     start: pd.Timestamp,
     steps: int,
+    dx: float | None = None,
     scheme: Scheme = IMPLICIT_EULER,
-) -> FloatArray:
-    """Simulate one run on the grid and return its last state.
+) -> Field:
+    """Simulate one run on the grid to its last step.
 
     Parameters
     ----------
@@ -35,13 +60,10 @@ def spatial_field(
         Start of the run; the spin-up takes three days before it, or what there is.
     steps : int
         N.
+    dx : float, optional
+        Distance between control volumes that the grid was built with [m].
     scheme : Scheme
         Time stepping.
-
-    Returns
-    -------
-    ndarray, shape (n_node,)
-        Temperatures [K].
     """
     matrices = model.matrices(theta)
     first = int(inputs.stamps.searchsorted(start))
@@ -52,4 +74,4 @@ def spatial_field(
     for row in range(first + 1, first + steps + 1):
         boundary = inputs.boundary[row][:, None] - _REFERENCE
         states, *_ = stepper.advance(states, boundary, inputs.heat[row][:, None], inputs.airflow[row][:, None])
-    return np.asarray(states[:, 0] + _REFERENCE)
+    return Field(model.network, np.asarray(states[:, 0] + _REFERENCE), inputs.zone[first + steps], dx)

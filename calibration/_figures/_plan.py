@@ -10,11 +10,13 @@ from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize, to_rgb
 from matplotlib.figure import Figure
+from matplotlib.text import OffsetFrom
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
+from calibration._figures._field import Field
 from calibration._figures._style import INK, FloatArray, Picture, picture, styled
-from thermal import FloorPlan, FloorPlans, ThermalNetwork
+from thermal import FloorPlan, FloorPlans
 
 #: Red is a simulation that is too warm, blue one that is too cold, white none, as in the paper.
 ERROR_COLOURS = colormaps["RdBu_r"]
@@ -80,7 +82,7 @@ def floor_maps(
     zones: tuple[str, ...],
     error: FloatArray,
     title: str,
-    field: tuple[ThermalNetwork, FloatArray, FloatArray] | None = None,
+    field: Field | None = None,
 ) -> list[Picture]:
     """Draw the error of each zone on the plan of each floor, or of each cell where the field of the grid is given.
 
@@ -96,9 +98,8 @@ def floor_maps(
         Simulated minus measured [K], NaN where not measured; the numbers on the map.
     title : str
         Follows the floor's name.
-    field : tuple of (ThermalNetwork, ndarray, ndarray), optional
-        Network of the grid, temperatures of its control volumes, shape (n_node,) [K], and measured temperatures of the zones, shape
-        (n_zone,) [K].
+    field : Field, optional
+        Temperatures of the grid's control volumes.
     """
     values = [_cell_errors(floor, number, plans.cell_size, zones, error, field) for number, floor in enumerate(plans.floors)]
     scale = error_scale(np.concatenate([v.ravel() for v in values]))
@@ -125,12 +126,7 @@ def _signed(value: float) -> str:
 
 
 def _cell_errors(
-    floor: FloorPlan,
-    number: int,
-    cell: float,
-    zones: tuple[str, ...],
-    error: FloatArray,
-    field: tuple[ThermalNetwork, FloatArray, FloatArray] | None,
+    floor: FloorPlan, number: int, cell: float, zones: tuple[str, ...], error: FloatArray, field: Field | None
 ) -> FloatArray:
     """Error of each pixel of a floor [K]; NaN in walls, outside, and where nothing is measured."""
     code = np.full(floor.tokens.shape, -1)
@@ -138,18 +134,76 @@ def _cell_errors(
         code[floor.tokens == name] = zones.index(name)
     if field is None:
         return np.where(code >= 0, error[code], np.nan)
-    network, temperatures, measured = field
-    mine = (network.kind == "air") & (network.place[:, 0] == number)
-    rows, columns = network.place[mine, 1:].T
-    # the grid's spacing over the plan's cell, from how many volumes span the plan
-    ratio = (max(rows.max(), columns.max()) + 1) / _extent(code)
-    split = max(1, round(ratio))
+    spacing = cell if field.dx is None else field.dx
+    split, merge = max(1, round(cell / spacing)), max(1.0, spacing / cell)
     code = np.repeat(np.repeat(code, split, axis=0), split, axis=1)
-    lookup = {key: t for key, t in zip(zip(rows, columns, network.zone[mine], strict=True), temperatures[mine], strict=True)}
-    merge = 1.0 if ratio >= 1.0 else _merge(network, mine, code)
+    mine = np.flatnonzero((field.network.kind == "air") & (field.network.place[:, 0] == number))
+    places = zip(*field.network.place[mine, 1:].T, field.network.zone[mine], strict=True)
+    temperature = {(int(r), int(c), int(z)): t for (r, c, z), t in zip(places, field.temperatures[mine], strict=True)}
     out = np.full(code.shape, np.nan)
     for row, column in np.argwhere(code >= 0):
         zone = int(code[row, column])
-        key = (int((row + 0.5) / merge), int((column + 0.5) / merge), zone)
-        out[row, column] = lookup[key] - measured[zone]
+        out[row, column] = temperature[int((row + 0.5) / merge), int((column + 0.5) / merge), zone] - field.measured[zone]
     return out
+
+
+def _canvas(
+    floor: FloorPlan,
+    cell: float,
+    orientation: float,
+    image: FloatArray,
+    title: str,
+    labels: Mapping[str, tuple[str, tuple[float, float, float]]],
+) -> tuple[Figure, Axes]:
+    """Axes in metres with the image of a floor, labels where they fit, and an arrow to the north."""
+    rows, columns = floor.tokens.shape
+    width = 6.4
+    shown = width - 0.8
+    figure = Figure(figsize=(width, min(7.5, shown * rows / columns + 1.35)))
+    axes = figure.subplots()
+    axes.imshow(image, extent=(0, columns * cell, rows * cell, 0), interpolation="nearest")
+    axes.grid(visible=False)
+    axes.spines[["left", "bottom"]].set_visible(False)
+    axes.set_title(title)
+    axes.tick_params(labelsize=8)
+    axes.set_xlabel("[m]", fontsize=8)
+    scale = 72.0 * min(shown / columns, 6.0 / rows)  # points a cell
+    for zone, (text, colour) in labels.items():
+        _label(axes, floor.tokens == zone, cell, scale, text, ink_on(colour))
+    _north(axes, orientation)
+    return figure, axes
+
+
+def _north(axes: Axes, orientation: float) -> None:
+    """Arrow to true north, right of the title."""
+    towards = np.array([-np.sin(np.deg2rad(orientation)), np.cos(np.deg2rad(orientation))])
+    foot = np.array([-14.0, 14.0]) - 9.0 * towards
+    style = {"arrowstyle": "-|>", "color": INK, "shrinkA": 0, "shrinkB": 0, "linewidth": 1.0}
+    tip, letter = foot + 18.0 * towards, foot + 25.0 * towards
+    for text, end, start in (("", tip, foot), ("N", letter, letter)):
+        offset = OffsetFrom(axes, (1.0, 1.0), "points")
+        axes.annotate(text, end, start, xycoords=offset, textcoords=offset, fontsize=7, ha="center", va="center",
+                      annotation_clip=False, arrowprops=style if not text else None)  # fmt: skip
+
+
+def _label(axes: Axes, mine: NDArray[np.bool_], cell: float, scale: float, text: str, ink: str) -> None:
+    """Write into the roomiest place of a zone; the number alone, or nothing, where more does not fit."""
+    depth = distance_transform_edt(np.pad(mine, 1))[1:-1, 1:-1]
+    best = (0.0, 0, 0.0, "")
+    for row in np.flatnonzero(depth.max(axis=1) >= 0.7 * depth.max()):
+        for first, last in _runs(mine[row] & (depth[row] >= 0.5 * depth.max())):
+            height = 2.0 * depth[row, first : last + 1].max()
+            for lines in (text, text.rpartition("\n")[2]):
+                count = lines.count("\n") + 1
+                size = min(8.0, (last - first + 1.5) * scale / (0.64 * max(map(len, lines.split("\n")))), height * scale / (1.3 * count))
+                if size > best[0] + 0.4:
+                    best = (size, int(row), (first + last + 1) / 2.0, lines)
+    size, row, column, lines = best
+    if size >= 4.6:
+        axes.text(column * cell, (row + 0.5) * cell, lines, fontsize=size, color=ink, ha="center", va="center", linespacing=1.15)
+
+
+def _runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """First and last position of each stretch of True."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(np.int8), [0]])))
+    return [(int(a), int(b) - 1) for a, b in zip(edges[::2], edges[1::2], strict=True)]

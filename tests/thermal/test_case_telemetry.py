@@ -15,7 +15,6 @@ from thermal.errors import (
     DuplicateColumnError,
     DuplicateStampError,
     EmptyTelemetryError,
-    IncompatibleUnitError,
     IrregularStepError,
     MalformedColumnError,
     MissingTimeZoneError,
@@ -25,7 +24,6 @@ from thermal.errors import (
     TimestampError,
     UnknownFileTypeError,
     UnknownPointError,
-    UnknownUnitError,
     UnorderedStampError,
     UnreadableFileError,
 )
@@ -386,21 +384,6 @@ def test_unknown_point_type_among_the_units(plan_draft: Any) -> None:
 def test_point_without_a_unit(draft: Any) -> None:
     del draft.content["units"]["heating_power_sensor"]
     refused(draft, MissingUnitError, r"building\.yaml: units: .*; add 'heating_power_sensor: <unit>'")
-
-
-def test_unknown_unit(plan_draft: Any) -> None:
-    plan_draft.content["units"]["heating_power_sensor"] = "Wat"
-    refused(plan_draft, UnknownUnitError, r"units\.heating_power_sensor: expected a unit that pint knows, of a power")
-
-
-def test_unit_of_something_else(plan_draft: Any) -> None:
-    plan_draft.content["units"]["zone_air_temperature_sensor"] = "kg"
-    refused(plan_draft, IncompatibleUnitError, r"zone_air_temperature_sensor: expected a unit of a temperature")
-
-
-def test_units_of_points_that_are_not_there_are_checked_too(plan_draft: Any) -> None:
-    plan_draft.content["units"]["wind_speed_sensor"] = "kg"
-    refused(plan_draft, IncompatibleUnitError, "a unit of a speed")
 
 
 def test_entity_with_a_slash(plan_draft: Any) -> None:

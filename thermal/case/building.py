@@ -89,7 +89,7 @@ class Building:
     location
         Where it stands.
     orientation
-        Degrees clockwise from true north to the plan's "up".
+        Clockwise from true north to the plan's "up" [deg].
     geometry
         Floor plans or a zone table.
     devices

@@ -61,9 +61,9 @@ class ColumnQuality:
     column
         ``ENTITY/POINT``.
     missing_share
-        Share of the stamps without a value, 0 to 1.
+        Share of the stamps without a value, 0 to 1 [-].
     unusable_share
-        Share of the stamps without a usable value, 0 to 1: missing, impossible, flat or spike.
+        Share of the stamps without a usable value, 0 to 1 [-]: missing, impossible, flat or spike.
     findings
         In the order of time.
     """

@@ -15,19 +15,19 @@ FACADES = ("north", "east", "south", "west")
 DEVICE_TYPES = ("vav", "fan_coil", "electric_heater", "radiator", "supply_air_terminal", "ahu", "boiler", "chiller")
 
 
-class Entry(BaseModel):
+class _Entry(BaseModel):
     """Base of the models: what is not named is refused, and nothing changes afterwards."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
 
-class Location(Entry):
+class Location(_Entry):
     """Where the building stands.
 
     Parameters
     ----------
     latitude, longitude
-        Degrees, north and east positive.
+        North and east positive [deg].
     elevation
         Height above the sea [m].
     timezone
@@ -40,7 +40,7 @@ class Location(Entry):
     timezone: Text
 
 
-class Device(Entry):
+class Device(_Entry):
     """A device that serves one zone, or none.
 
     Parameters
@@ -58,7 +58,7 @@ class Device(Entry):
     zone: Text | None = None
 
 
-class Airflow(Entry):
+class Airflow(_Entry):
     """Air of a device that goes on from one zone to another.
 
     Parameters
@@ -70,7 +70,7 @@ class Airflow(Entry):
     device
         Device whose supply air it is.
     fraction
-        Share of that device's flow, above 0, up to 1.
+        Share of that device's flow, above 0, up to 1 [-].
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", populate_by_name=True)
@@ -81,7 +81,7 @@ class Airflow(Entry):
     fraction: Share
 
 
-class Layer(Entry):
+class Layer(_Entry):
     """One layer of a construction.
 
     Parameters
@@ -102,7 +102,7 @@ class Layer(Entry):
     heat_capacity: Positive
 
 
-class Surface(Entry):
+class Surface(_Entry):
     """A surface of a zone table.
 
     Parameters
@@ -118,13 +118,13 @@ class Surface(Entry):
     area
         [m2].
     azimuth
-        Degrees clockwise from north that the outer face looks to.
+        Clockwise from north, where the outer face looks to [deg].
     construction
         Name of its layers, from `zone` to `other`.
     u_value
         Air to air [W/m2/K].
     solar_transmittance
-        Share of the sun that a window lets through, 0 to 1.
+        Share of the sun that a window lets through, 0 to 1 [-].
     """
 
     name: Text
@@ -138,7 +138,7 @@ class Surface(Entry):
     solar_transmittance: Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=1)] | None = None
 
 
-class ZoneEntry(Entry):
+class ZoneEntry(_Entry):
     """A zone of a zone table.
 
     Parameters
@@ -156,7 +156,7 @@ class ZoneEntry(Entry):
     floor_area: Positive
 
 
-class FloorEntry(Entry):
+class FloorEntry(_Entry):
     """A floor of a building with plans.
 
     Parameters
@@ -174,7 +174,7 @@ class FloorEntry(Entry):
     plan: Text
 
 
-class BuildingFile(Entry):
+class BuildingFile(_Entry):
     """All of `building.yaml`.
 
     Parameters

@@ -90,7 +90,7 @@ class PointSummary:
     lowest, mean, highest
         Of the usable values [unit]; None without any.
     usable_share
-        Share of the stamps with a usable value, 0 to 1.
+        Share of the stamps with a usable value, 0 to 1 [-].
     """
 
     column: str

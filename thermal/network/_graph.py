@@ -248,7 +248,7 @@ class GraphBuilder:
         key : str
             Class name; the first faces of a class give it its conductance.
         value : casadi.SX or float
-            Conductance κ as an expression of the parameter symbols.
+            Conductance κ as an expression of the parameter symbols [W/K per weight].
         first, second : int or ndarray of int, shape (n,)
             Nodes or boundary codes, broadcast.
         weight : float or ndarray, shape (n,)
