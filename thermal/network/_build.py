@@ -44,6 +44,7 @@ def build_network(
     ThermalNetwork
         The baseline of the architecture: no sun, sky, leakage, gains, exchange between floors, ground or roof.
     """
-    if isinstance(building.geometry, ZoneTable):
-        return table_network(building, scopes)
-    return plan_network(building, dx, reach, scopes, diffusers, mean_shuffle)
+    geometry = building.geometry
+    if isinstance(geometry, ZoneTable):
+        return table_network(building, geometry, scopes)
+    return plan_network(building, geometry, dx, reach, scopes, diffusers, mean_shuffle)

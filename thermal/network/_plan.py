@@ -33,6 +33,7 @@ IntArray = NDArray[np.int64]
 
 def plan_network(
     building: Building,
+    plans: FloorPlans,
     dx: float | None = None,
     reach: float | None = None,
     scopes: Mapping[str, Scope] | None = None,
@@ -44,7 +45,9 @@ def plan_network(
     Parameters
     ----------
     building : Building
-        With `FloorPlans` geometry.
+        For its location, zones and airflows.
+    plans : FloorPlans
+        Its geometry.
     dx : float, optional
         Distance between control volumes [m]; the plan's cell size by default.
     reach : float, optional
@@ -62,8 +65,6 @@ def plan_network(
         Boundary ``outdoor``; slabs adiabatic at their back; no air exchange between zones (both are effects of the
         catalogue).
     """
-    plans = building.geometry
-    assert isinstance(plans, FloorPlans)  # noqa: S101 - narrows the type; build_network chose this builder by it
     graph = GraphBuilder(building.zone_names, ("outdoor",), scopes or {})
     areas = zone_floor_areas(plans)
     density = air_density(building.location.elevation)

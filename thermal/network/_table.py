@@ -27,13 +27,15 @@ from thermal.units import air_density
 SUBLAYER_TIME = 1800.0
 
 
-def table_network(building: Building, scopes: Mapping[str, Scope] | None = None) -> ThermalNetwork:
+def table_network(building: Building, table: ZoneTable, scopes: Mapping[str, Scope] | None = None) -> ThermalNetwork:
     """Build the network of a building given by a zone table.
 
     Parameters
     ----------
     building : Building
-        With `ZoneTable` geometry.
+        For its location, zones, boundaries and airflows.
+    table : ZoneTable
+        Its geometry.
     scopes : mapping of str to {"global", "zone"}, optional
         Parameters with one value a zone.
 
@@ -44,8 +46,6 @@ def table_network(building: Building, scopes: Mapping[str, Scope] | None = None)
         (``ground_exchange`` is an
         effect of the catalogue).
     """
-    table = building.geometry
-    assert isinstance(table, ZoneTable)  # noqa: S101 - narrows the type; build_network chose this builder by it
     graph = GraphBuilder(building.zone_names, ("outdoor", *building.measured_boundaries), scopes or {})
     density = air_density(building.location.elevation)
     zones: dict[str, Zone] = {}
