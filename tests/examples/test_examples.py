@@ -1,0 +1,46 @@
+"""Every example runs, and gives the number it is about."""
+
+import importlib.util
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+
+
+def load(name: str) -> ModuleType:
+    spec = importlib.util.spec_from_file_location(name, EXAMPLES / f"{name}.py")
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_every_example_is_tested_here() -> None:
+    assert {p.stem for p in EXAMPLES.glob("*.py")} == {"step_a_building", "calibrate_a_case", "make_the_pilot"}
+
+
+def test_step_a_building() -> None:
+    example = load("step_a_building")
+    path = example.night()
+    assert path.shape == (144, 5)
+    core = 2
+    last_set_back, end = np.delete(path[107], core), path[-1]
+    assert (last_set_back < example.COMFORT - 2.0).all()
+    assert path[107, core] > last_set_back.max() + 1.0  # no facade of its own
+    assert (end > path[107]).all()
+    assert np.abs(end - example.COMFORT).max() < 1.5
+
+
+def test_calibrate_a_case() -> None:
+    result = load("calibrate_a_case").run(dx=1.0)
+    assert result.solver.success
+    assert result.calibrated["held_out"].metrics.mae < 0.7 * result.uncalibrated["held_out"].metrics.mae
+
+
+def test_make_the_pilot(tmp_path: Path) -> None:
+    case = load("make_the_pilot").small(str(tmp_path / "office"))
+    assert len(case.building.zone_names) == 12
+    assert case.zone_temperatures().to_numpy().mean() == pytest.approx(294.0, abs=2.0)
