@@ -65,7 +65,7 @@ def drift_boxes(runs: Sequence[tuple[str, Predictions, int]], step: float) -> li
         axes.set_xticks(range(0, len(shown), every), clock[::every])
         axes.set_ylim(low - margin, high + margin)
         axes.grid(axis="x", visible=False)
-        axes.set(title=title, xlabel=f"local time, run of {p.start[k]:%Y-%m-%d}", ylabel="zone temperature [degC]")
+        axes.set(title=title, xlabel=f"local time, run of {p.start[k]:%Y-%m-%d}", ylabel="zone temperature [°C]")
         axes.legend(handles=[Patch(color=MEASURED, label="measured"), Patch(color=SIMULATED, label="simulated")], loc="best",
                     ncols=2, fontsize=8)  # fmt: skip
         alt = f"Box plots over the zones, measured and simulated, {title}; run from {p.start[k]:%Y-%m-%d %H:%M}"

@@ -45,7 +45,9 @@ def parameter_ranges(parameters: Sequence[ParameterEstimate]) -> list[Picture]:
     ]
     marks.append(Line2D([], [], color=INK, marker="|", linewidth=0, markersize=8, label="start"))
     figure.legend(handles=marks, loc="outside lower center", ncols=4, fontsize=8)
-    return [picture(figure, "Estimates with 95 % intervals within the physical ranges; the table below has the numbers")]
+    return [
+        picture(figure, "Estimates with 95 % intervals within the physical ranges; the table below has the numbers")
+    ]
 
 
 def _row(axes: Axes, row: int, p: ParameterEstimate) -> None:

@@ -101,7 +101,9 @@ def floor_maps(
     field : Field, optional
         Temperatures of the grid's control volumes.
     """
-    values = [_cell_errors(floor, number, plans.cell_size, zones, error, field) for number, floor in enumerate(plans.floors)]
+    values = [
+        _cell_errors(floor, number, plans.cell_size, zones, error, field) for number, floor in enumerate(plans.floors)
+    ]
     scale = error_scale(np.concatenate([v.ravel() for v in values]))
     by_zone = dict(zip(zones, error, strict=True))
     drawn = []
@@ -143,7 +145,9 @@ def _cell_errors(
     out = np.full(code.shape, np.nan)
     for row, column in np.argwhere(code >= 0):
         zone = int(code[row, column])
-        out[row, column] = temperature[int((row + 0.5) / merge), int((column + 0.5) / merge), zone] - field.measured[zone]
+        out[row, column] = (
+            temperature[int((row + 0.5) / merge), int((column + 0.5) / merge), zone] - field.measured[zone]
+        )
     return out
 
 
@@ -195,12 +199,25 @@ def _label(axes: Axes, mine: NDArray[np.bool_], cell: float, scale: float, text:
             height = 2.0 * depth[row, first : last + 1].max()
             for lines in (text, text.rpartition("\n")[2]):
                 count = lines.count("\n") + 1
-                size = min(8.0, (last - first + 1.5) * scale / (0.64 * max(map(len, lines.split("\n")))), height * scale / (1.3 * count))
+                size = min(
+                    8.0,
+                    (last - first + 1.5) * scale / (0.64 * max(map(len, lines.split("\n")))),
+                    height * scale / (1.3 * count),
+                )
                 if size > best[0] + 0.4:
                     best = (size, int(row), (first + last + 1) / 2.0, lines)
     size, row, column, lines = best
     if size >= 4.6:
-        axes.text(column * cell, (row + 0.5) * cell, lines, fontsize=size, color=ink, ha="center", va="center", linespacing=1.15)
+        axes.text(
+            column * cell,
+            (row + 0.5) * cell,
+            lines,
+            fontsize=size,
+            color=ink,
+            ha="center",
+            va="center",
+            linespacing=1.15,
+        )
 
 
 def _runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:

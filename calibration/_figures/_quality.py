@@ -6,7 +6,17 @@ import pandas as pd
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from calibration._figures._style import MEASURED, MUTED, SIMULATED, WARNING, Picture, day_numbers, picture, styled, time_axis
+from calibration._figures._style import (
+    MEASURED,
+    MUTED,
+    SIMULATED,
+    WARNING,
+    Picture,
+    day_numbers,
+    picture,
+    styled,
+    time_axis,
+)
 from thermal.case import QualityReport
 
 #: Colour of each kind of finding; what is constant is only reported, not left out.

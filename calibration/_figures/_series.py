@@ -10,7 +10,17 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from calibration._evaluate import Evaluation
-from calibration._figures._style import CELSIUS, MEASURED, SIMULATED, FloatArray, Picture, day_numbers, picture, styled, time_axis
+from calibration._figures._style import (
+    CELSIUS,
+    MEASURED,
+    SIMULATED,
+    FloatArray,
+    Picture,
+    day_numbers,
+    picture,
+    styled,
+    time_axis,
+)
 
 #: Panels of a figure: the zones with the largest error.
 MOST_PANELS = 12
@@ -87,8 +97,12 @@ def zone_panels(series: Series, zones: Sequence[str], errors: dict[str, float]) 
         axes.set_ylim(middle - 0.55 * span, middle + 0.55 * span)
         axes.set_xlim(x[0], x[-1])
         axes.set_title(f"{zone}: {errors[zone]:.2f} K", fontsize=9)
-        axes.set_ylabel("[degC]", fontsize=8)
+        axes.set_ylabel("[°C]", fontsize=8)
         time_axis(axes, series.stamps.tz, ticks=6)
         axes.tick_params(labelsize=7)
-        pictures.append(picture(figure, f"Measured and simulated temperature of zone {zone}, mean absolute error {errors[zone]:.2f} K"))
+        pictures.append(
+            picture(
+                figure, f"Measured and simulated temperature of zone {zone}, mean absolute error {errors[zone]:.2f} K"
+            )
+        )
     return pictures

@@ -80,8 +80,12 @@ def styled(function: Callable[P, T]) -> Callable[P, T]:
         with mpl.rc_context(), warnings.catch_warnings():
             mpl.rcdefaults()
             mpl.rcParams.update(_STYLE)
-            warnings.filterwarnings("ignore", message="Glyph .* missing from")  # names in any script: the page's font shows them
-            warnings.filterwarnings("ignore", message="Mean of empty slice|All-NaN slice")  # a sensor that is silent: a gap in a line
+            warnings.filterwarnings(
+                "ignore", message="Glyph .* missing from"
+            )  # names in any script: the page's font shows them
+            warnings.filterwarnings(
+                "ignore", message="Mean of empty slice|All-NaN slice"
+            )  # a sensor that is silent: a gap in a line
             return function(*args, **kwargs)
 
     return drawn

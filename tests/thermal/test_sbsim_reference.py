@@ -38,12 +38,11 @@ def cells_network(data: dict[str, Any]) -> tuple[ThermalNetwork, NDArray[np.bool
     """Graph of the reference's cells: nodes of the rim lie on the facade, so their cells are halves and quarters."""
     height, film = data["meta"]["fh"] / 100.0, data["meta"]["h"]
     inside = data["floor_plan"] != 2
-    lost = np.array([[2, 1], [1, 0]])  # outside neighbours: none, one (edge), two (corner)
-    outside = np.zeros(inside.shape, dtype=int)
+    outside = np.zeros(inside.shape, dtype=int)  # neighbours outside: one of an edge, two of a corner
     for axis in (0, 1):
         for shift in (1, -1):
             outside += inside & ~np.roll(inside, shift, axis)
-    assert lost.size and (np.where(inside, 4 - outside, 0) == data["n_neighbors"]).all()
+    assert (np.where(inside, 4 - outside, 0) == data["n_neighbors"]).all()
     graph = GraphBuilder(tuple(data["meta"]["zones"]), ("outdoor",), {})
     node = np.full(inside.shape, -1)
     node[inside] = graph.volumes("cell", data["zone_index"][inside])

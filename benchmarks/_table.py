@@ -1,0 +1,39 @@
+"""Tables of the benchmarks: JSON and Markdown beside each other, and the marked sections of the README."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).parents[1]
+
+
+def markdown(columns: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
+    """Lay out a Markdown table; floats are given to three significant digits."""
+
+    def cell(value: Any) -> str:
+        return f"{value:.3g}" if isinstance(value, float) else str(value)
+
+    lines = ["| " + " | ".join(columns) + " |", "|" + "---|" * len(columns)]
+    return "\n".join([*lines, *("| " + " | ".join(cell(v) for v in row) + " |" for row in rows)]) + "\n"
+
+
+def write(out: Path, name: str, table: str, data: Any, readme: bool) -> None:
+    """Write ``name.json`` and ``name.md`` to ``out`` and, if asked, the table between its marks in the README."""
+    out.mkdir(parents=True, exist_ok=True)
+    (out / f"{name}.json").write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
+    (out / f"{name}.md").write_text(table, encoding="utf-8")
+    if readme:
+        replace_section(ROOT / "README.md", name, table)
+
+
+def replace_section(page: Path, name: str, table: str) -> None:
+    """Replace what stands between ``<!-- begin NAME -->`` and ``<!-- end NAME -->``."""
+    text = page.read_text(encoding="utf-8")
+    begin, end = f"<!-- begin {name} -->\n", f"<!-- end {name} -->"
+    if begin not in text or end not in text:
+        raise SystemExit(f"{page}: expected the marks {begin.strip()} and {end}")
+    head, rest = text.split(begin, 1)
+    page.write_text(head + begin + table.rstrip() + "\n" + end + rest.split(end, 1)[1], encoding="utf-8")

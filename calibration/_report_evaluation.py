@@ -1,0 +1,237 @@
+"""What an evaluation leaves behind, and the figures that it shares with a calibration."""
+
+from __future__ import annotations
+
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from calibration import _figures as figures
+from calibration._evaluate import Evaluation, spatial_metrics
+from calibration._page import clock, counted, duration, kelvin, render, signed
+from calibration._results import check_results_folder, write_results
+from thermal import Case, FloorPlans
+
+CELSIUS = 273.15
+
+
+def write_evaluation(
+    evaluation: Evaluation, case: Case, out: str | Path, *, parameters: str = "uncalibrated", force: bool = False
+) -> Path:
+    """Write ``evaluation.json``, ``predictions.parquet`` and ``report.html``.
+
+    Parameters
+    ----------
+    evaluation : Evaluation
+        From `evaluate_model`, with its trajectories.
+    case : Case
+        The case it was made on.
+    out : str or Path
+        Folder, made if need be.
+    parameters : str
+        Where the parameters come from, for the page.
+    force : bool
+        Replace earlier results.
+
+    Returns
+    -------
+    Path
+        The page.
+
+    Raises
+    ------
+    ResultsExistError
+        When the folder holds something and ``force`` is not set.
+    """
+    check_results_folder(out, force)
+    drawn = evaluation_figures(evaluation, case)
+    drawn["growth"] = figures.error_growth({"all runs": {"model": evaluation}})
+    metrics, rest = evaluation.metrics, unchanged_error(evaluation)
+    content = {
+        "case": case.building.name,
+        "subtitle": subtitle(case, evaluation),
+        "verdict": evaluation_verdict(evaluation),
+        "cards": [
+            (f"{kelvin(metrics.mae)} K", "mean absolute error (MAE)"),
+            (f"{kelvin(rest)} K", "assuming that nothing changes"),
+            (f"{signed(metrics.bias)} K", "bias, simulated minus measured"),
+            (str(sum(len(p.start) for p in evaluation.predictions)), "runs"),
+        ],
+        "intervals": [
+            [*r, signed(m.median), signed(m.bias)]
+            for r, m in zip(interval_rows(evaluation), _metrics(evaluation), strict=True)
+        ],
+        "interval_note": "Runs start every hour; one is skipped when its inputs are missing for over 30 minutes, or its target is.",
+        "horizons": [[h, f"{mae:.3f}"] for h, mae in evaluation.by_horizon.items()],
+        "figures": drawn,
+        "zones": zone_rows(evaluation.by_zone()),
+        "reproduce": [("version", f"buildingmpc {version('buildingmpc')}"), ("parameters", parameters)],
+    }
+    files = {
+        "evaluation.json": evaluation.to_dict(),
+        "predictions.parquet": predictions_table(evaluation),
+        "report.html": render("evaluation", content),
+    }
+    return write_results(out, files, force) / "report.html"
+
+
+def evaluation_verdict(evaluation: Evaluation) -> str:
+    """Say in plain words how far a model is off.
+
+    Parameters
+    ----------
+    evaluation : Evaluation
+        From `evaluate_model`.
+    """
+    metrics, rest = evaluation.metrics, unchanged_error(evaluation)
+    ahead = duration(evaluation.steps * evaluation.step_seconds).capitalize()
+    lean = "too warm" if metrics.bias > 0 else "too cold"
+    text = f"{ahead} ahead, the model misses the measured zone temperatures by {kelvin(metrics.mae)} K on average"
+    text += f" and is {lean} by {kelvin(abs(metrics.bias))} K."
+    better = "which is better than the model" if rest < metrics.mae else "so the model is of use"
+    return f"{text} Assuming that nothing changes misses by {kelvin(rest)} K, {better}."
+
+
+def unchanged_error(evaluation: Evaluation) -> float:
+    """Error of assuming that every zone keeps the temperature of its start [K], averaged as the model's is.
+
+    Parameters
+    ----------
+    evaluation : Evaluation
+        Whose runs are compared.
+    """
+    return spatial_metrics(np.concatenate([p.initial - p.measured[:, -1] for p in evaluation.predictions])).mae
+
+
+def predictions_table(evaluation: Evaluation) -> pd.DataFrame:
+    """Predictions in tidy form: one row a run, step and measured zone.
+
+    Parameters
+    ----------
+    evaluation : Evaluation
+        From `evaluate_model`.
+
+    Returns
+    -------
+    DataFrame
+        Index ``timestamp``; columns ``run_start``, ``zone``, ``simulated`` and ``measured`` [degC].
+    """
+    parts = []
+    zones = list(evaluation.zones)
+    for p in evaluation.predictions:
+        lags = pd.to_timedelta(p.steps * evaluation.step_seconds, unit="s")
+        stamps = np.repeat(p.start, len(lags)) + np.tile(lags, len(p.start))
+        shape = (len(p.start), len(lags), len(zones))
+        frame = pd.DataFrame(
+            {
+                "run_start": np.repeat(p.start, shape[1] * shape[2]),
+                "zone": pd.Categorical.from_codes(np.tile(np.arange(shape[2]), shape[0] * shape[1]), categories=zones),
+                "simulated": p.simulated.ravel() - CELSIUS,
+                "measured": p.measured.ravel() - CELSIUS,
+            },
+            index=pd.DatetimeIndex(np.repeat(stamps, shape[2]), name="timestamp"),
+        )
+        parts.append(frame[frame["measured"].notna()])
+    table = pd.concat(parts)
+    table.attrs["units"] = {"simulated": "degC", "measured": "degC"}
+    return table
+
+
+def evaluation_figures(
+    evaluation: Evaluation, case: Case, before: Evaluation | None = None, field: figures.Field | None = None
+) -> dict[str, Any]:
+    """Figures of the runs of an evaluation: drift, maps and zones.
+
+    Parameters
+    ----------
+    evaluation : Evaluation
+        With its trajectories.
+    case : Case
+        For the plans.
+    before : Evaluation, optional
+        The same runs before calibration.
+    field : Field, optional
+        Last state of the median run on the grid.
+    """
+    which, run = figures.median_run(evaluation)
+    p = evaluation.predictions[which]
+    ahead = duration(evaluation.steps * evaluation.step_seconds)
+    shown = [("after calibration" if before else "the model", p, run)]
+    if before is not None:
+        shown.insert(0, ("before calibration", before.predictions[which], run))
+    runs = sum(len(x.start) for x in evaluation.predictions)
+    errors = evaluation.by_zone()
+    mean = np.array([errors[z]["bias"] if z in errors else np.nan for z in evaluation.zones])
+    series = figures.series_of_runs(evaluation)
+    largest = (
+        f"The {min(12, len(errors))} of {len(errors)} zones with the largest error" if len(errors) > 12 else "All zones"
+    )
+    begin = f"The run from {clock(p.start[run])}, the one of {runs} with the median error."
+    return {
+        "drift": figures.drift_boxes(shown, evaluation.step_seconds),
+        "drift_note": begin,
+        "maps": [
+            *error_maps(case, evaluation.zones, p.error[run], f"{ahead} after {clock(p.start[run])}", field),
+            *error_maps(case, evaluation.zones, mean, f"mean over {runs} runs"),
+        ],
+        "map_note": _map_note(case, field is not None),
+        "zones": figures.zone_panels(series, evaluation.zones, {z: e["mae"] for z, e in errors.items()}),
+        "zones_note": f"{largest}, the largest first, with the mean absolute error at the end of the runs; local time. The runs of {ahead} "
+        "follow each other, and each starts from the measured temperatures. All panels span the same number of degrees.",
+    }
+
+
+def error_maps(
+    case: Case, zones: tuple[str, ...], error: Any, title: str, field: figures.Field | None = None
+) -> list[figures.Picture]:
+    """Map the error of the zones on the plans, or on tiles where there is no plan."""
+    geometry = case.building.geometry
+    if isinstance(geometry, FloorPlans):
+        return figures.floor_maps(geometry, case.building.orientation, zones, error, title, field)
+    areas = np.array([zone.floor_area for zone in geometry.zones])
+    return figures.tile_map(zones, areas, error, title)
+
+
+def _map_note(case: Case, cells: bool) -> str:
+    text = "Simulated minus measured at the end of a run: red where the simulation is too warm, blue where it is too cold, white where it "
+    text += "is right, grey where nothing is measured. "
+    if not isinstance(case.building.geometry, FloorPlans):
+        return (
+            text
+            + "This case has no plan: a tile is as large as its zone's floor area, and where it stands means nothing."
+        )
+    if cells:
+        return (
+            text
+            + "The run's map shows every cell of the grid against its zone's sensor, the mean one colour a zone; the arrow points north."
+        )
+    return text + "One colour a zone; the arrow points north."
+
+
+def interval_rows(evaluation: Evaluation) -> list[list[str]]:
+    """Rows of the table of intervals: start, end, runs, skipped, error."""
+    return [
+        [clock(p.interval.start), clock(p.interval.end), str(len(p.start)), str(p.skipped), f"{m.mae:.3f}"]
+        for p, m in zip(evaluation.predictions, _metrics(evaluation), strict=True)
+    ]
+
+
+def zone_rows(errors: dict[str, dict[str, float]]) -> list[list[str]]:
+    """Rows of the table of zones, the largest error first."""
+    return [
+        [z, f"{e['mae']:.3f}", signed(e["bias"])] for z, e in sorted(errors.items(), key=lambda item: -item[1]["mae"])
+    ]
+
+
+def subtitle(case: Case, evaluation: Evaluation) -> str:
+    """Line under a page's title."""
+    zones, measured = len(evaluation.zones), len(evaluation.by_zone())
+    seen = counted(zones, "zone") + ("" if measured == zones else f", {measured} of them measured")
+    return f"{seen}; times are local ({case.building.location.timezone})"
+
+
+def _metrics(evaluation: Evaluation) -> list[Any]:
+    return [spatial_metrics(p.error) for p in evaluation.predictions]
