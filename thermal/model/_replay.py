@@ -94,7 +94,7 @@ def replay_inputs(case: Case, network: ThermalNetwork) -> Inputs:
     Raises
     ------
     SimulationError
-        When no zone temperature or no outdoor temperature is measured.
+        When no zone temperature or no outdoor temperature is measured, or no step has all its inputs.
     """
     step = float(case.telemetry.step)
     zone = case.zone_temperatures()
@@ -112,6 +112,8 @@ def replay_inputs(case: Case, network: ThermalNetwork) -> Inputs:
     limit = int(LONGEST_BRIDGE // step)
     bridged = [_bridge(f, limit) for f in frames]
     complete = np.logical_and.reduce([f.notna().all(axis=1).to_numpy() for f in bridged])
+    if not complete.any():
+        raise SimulationError(f"telemetry: no step has all its inputs; {_most_missing(bridged)}")
     filled = [f.interpolate(limit_direction="both").fillna(0.0).to_numpy(dtype=float) for f in bridged]
     index = pd.DatetimeIndex(zone.index)
     return Inputs(
@@ -125,6 +127,15 @@ def replay_inputs(case: Case, network: ThermalNetwork) -> Inputs:
         held=zone.interpolate(limit_direction="both").to_numpy(dtype=float),
         complete=complete,
     )
+
+
+def _most_missing(frames: list[pd.DataFrame]) -> str:
+    """Name the inputs that are missing most."""
+    kinds = ("heat of zone", "temperature of boundary", "airflow")
+    shares = [(f[c].isna().mean(), f"{kind} {c}") for kind, f in zip(kinds, frames, strict=True) for c in f.columns]
+    worst = sorted((s for s in shares if s[0] > 0), reverse=True)[:5]
+    named = ", ".join(f"{name} ({share:.0%} missing)" for share, name in worst)
+    return f"{named}; a device that gives heat must report its flow and discharge temperature, or its power"
 
 
 def _bridge(frame: pd.DataFrame, limit: int) -> pd.DataFrame:

@@ -59,11 +59,9 @@ class Stepper:
         self.n_parameter = len(matrices.flow_slopes)
 
     @cached_property
-    def _slope_stacks(self) -> tuple[Matrix, Matrix]:
-        m = self.matrices
-        if sp.issparse(m.capacity):
-            return sp.vstack(m.capacity_slopes).tocsr(), sp.vstack(m.flow_slopes).tocsr()
-        return np.vstack(m.capacity_slopes), np.vstack(m.flow_slopes)
+    def _slope_stacks(self) -> tuple[tuple[list[int], Matrix], tuple[list[int], Matrix]]:
+        """dC/dθ and d[K, -B]/dθ, each as the parameters that it depends on and their matrices stacked."""
+        return _stacked(self.matrices.capacity_slopes), _stacked(self.matrices.flow_slopes)
 
     @cached_property
     def response(self) -> tuple[FloatArray, FloatArray]:
@@ -158,7 +156,7 @@ class Stepper:
         watts[held] = heat[:, 0] / self.step
         if slopes is None:
             return new, None, watts
-        moved = self._solve(m.capacity @ slopes + self._slope_source(states, new, boundary))
+        moved = self._solve(m.capacity @ slopes + self._slope_source(new - states, np.vstack([new, boundary])))
         return new, moved - lift @ (m.observation @ moved)[held], watts
 
     def hold_many(
@@ -229,7 +227,7 @@ class Stepper:
             path[:, k + 1] = x = advance @ x + forced[:, k]
         if slopes is None:
             return path[:, keep + 1], None
-        source = self._slope_source(path[:, :-1], path[:, 1:], boundary[:n_time].T)
+        source = self._slope_source(path[:, 1:] - path[:, :-1], np.vstack([path[:, 1:], boundary[:n_time].T]))
         p = self.n_parameter
         source = np.ascontiguousarray((solve @ source).reshape(m.n, p, n_time).transpose(2, 0, 1))
         kept = np.empty((m.n, p, keep.size))
@@ -245,16 +243,15 @@ class Stepper:
         response, gain = self.response
         return np.asarray(np.linalg.solve(gain[np.ix_(held, held)].T, response[:, held].T).T)
 
-    def _slope_source(self, base: FloatArray, new: FloatArray, boundary: FloatArray) -> FloatArray:
-        """Source of the slopes in an Euler step, (n, n_parameter m): ``dC (T_0 - T) - Δt d[K, -B] [T; u]``."""
-        capacity_stack, flow_stack = self._slope_stacks
-        full = np.vstack([new, boundary])
-        return self._by_parameter(capacity_stack @ (base - new)) - self.step * self._by_parameter(flow_stack @ full)
-
-    def _by_parameter(self, stacked: FloatArray) -> FloatArray:
-        """Reorder (n_parameter n, m), one block of rows a parameter, to (n, n_parameter m)."""
-        p, n = self.n_parameter, self.matrices.n
-        return np.asarray(stacked).reshape(p, n, -1).transpose(1, 0, 2).reshape(n, -1)
+    def _slope_source(self, change: FloatArray, full: FloatArray) -> FloatArray:
+        """Source of the slopes in a stage, (n, n_parameter m): ``-dC (T - T_base) - Δt d[K, -B] [T; u]``."""
+        capacity, flow = self._slope_stacks
+        n, m = change.shape
+        out = np.zeros((n, self.n_parameter, m))
+        for (which, matrix), x in ((capacity, -change), (flow, -self.step * full)):
+            if which:
+                out[:, which] += np.asarray(matrix @ x).reshape(len(which), n, m).transpose(1, 0, 2)
+        return out.reshape(n, self.n_parameter * m)
 
     def _mixing(self, airflow: FloatArray | None) -> FloatArray | None:
         """M for each run, shape (m, n_zone, n_zone) [W/K]: air that enters a zone at another zone's temperature."""
@@ -303,17 +300,21 @@ class Stepper:
     ) -> FloatArray:
         """Differentiate one stage with respect to θ."""
         m = self.matrices
-        rhs = m.capacity @ _combine(stage.weights, trail) + stage.implicit * self._slope_source(base, new, boundary)
-        capacity_stack, flow_stack = self._slope_stacks
-        if stage.implicit != 1.0:
-            rhs += (1.0 - stage.implicit) * self._by_parameter(capacity_stack @ (base - new))
+        full = stage.implicit * np.vstack([new, boundary]) + stage.explicit * np.vstack([start, boundary])
+        rhs = m.capacity @ _combine(stage.weights, trail) + self._slope_source(new - base, full)
         if stage.explicit:
-            first = trail[0]
-            rhs -= stage.explicit * self.step * self._by_parameter(flow_stack @ np.vstack([start, boundary]))
-            rhs -= stage.explicit * self.step * (self._stiffness @ first)
+            rhs -= stage.explicit * self.step * (self._stiffness @ trail[0])
             if mixing is not None:
-                rhs += stage.explicit * self.step * (m.heating @ self._mixed_heat(first, mixing))
+                rhs += stage.explicit * self.step * (m.heating @ self._mixed_heat(trail[0], mixing))
         return self._solve_mixed(rhs, mixing, stage.implicit)
+
+
+def _stacked(slopes: list[Matrix]) -> tuple[list[int], Matrix]:
+    """Which slopes are not zero, and these on top of each other."""
+    sparse = bool(slopes) and sp.issparse(slopes[0])
+    which = [j for j, m in enumerate(slopes) if (m.nnz if sparse else np.any(m))]
+    chosen = [slopes[j] for j in which]
+    return which, sp.vstack(chosen).tocsr() if sparse and chosen else np.vstack(chosen) if chosen else np.empty((0, 0))
 
 
 def _combine(weights: tuple[float, ...], trail: list[FloatArray]) -> FloatArray:
