@@ -74,6 +74,18 @@ def significant(value: float | None, digits: int = 3) -> str:
     return f"{rounded:,.{max(0, digits - 1 - power)}f}".replace(",", " ").replace("-", "−")
 
 
+def plain(value: float) -> str:
+    """Spell a number that was given, such as a bound, with no more digits than it needs.
+
+    Examples
+    --------
+    >>> plain(0.02), plain(60.0), plain(600000.0)
+    ('0.02', '60', '600 000')
+    """
+    digits = f"{value:.6g}"
+    return f"{int(value):,}".replace(",", " ") if value == int(value) and "e" not in digits else digits
+
+
 def unit(text: str) -> str:
     """Spell a unit as people write it; a dash for a pure number."""
     return _NO_NUMBER if text in {"1", "", "-"} else text.replace("^2", "²").replace("^3", "³")

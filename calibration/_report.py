@@ -13,7 +13,7 @@ import pandas as pd
 from calibration import _figures as figures
 from calibration._calibrate import CHECK_TOLERANCE
 from calibration._evaluate import HORIZONS, Evaluation, evaluate_model
-from calibration._page import clock, duration, kelvin, render, signed, significant, unit
+from calibration._page import clock, counted, duration, kelvin, plain, render, signed, significant, unit
 from calibration._report_evaluation import (
     evaluation_figures,
     interval_rows,
@@ -87,47 +87,46 @@ def calibration_verdict(result: CalibrationResult) -> str:
     result : CalibrationResult
         From `calibrate`.
     """
-    before, after = (e["held_out"].metrics.mae for e in (result.uncalibrated, result.calibrated))
-    rest = unchanged_error(result.calibrated["held_out"])
-    ahead = duration(result.calibrated["held_out"].steps * result.calibrated["held_out"].step_seconds)
-    sentences = []
+    evaluation = result.calibrated["held_out"]
+    before, after = result.uncalibrated["held_out"].metrics.mae, evaluation.metrics.mae
+    rest = unchanged_error(evaluation)
+    ahead = duration(evaluation.steps * evaluation.step_seconds).capitalize()
+    sentences = [
+        f"{ahead} ahead, on data it was not fitted to, the calibrated model misses the measured zone temperatures by",
+        f"{kelvin(after)} K on average. Before calibration it was {kelvin(before)} K" + _change(before, after),
+        f"Assuming that nothing changes misses by {kelvin(rest)} K"
+        + ("." if rest > after else ", less than the model."),
+        _parameter_sentence(result.parameters),
+    ]
     if not result.solver.success:
-        sentences.append(
-            f"The solver stopped before it converged ({result.solver.status}): do not rely on these numbers."
-        )
-    sentences.append(
-        f"{ahead.capitalize()} ahead, on data it was not fitted to, the calibrated model misses the measured zone temperatures by "
-        f"{kelvin(after)} K on average."
-    )
+        status = result.solver.status
+        sentences.insert(0, f"The solver stopped before it converged ({status}): do not rely on these numbers.")
+    return " ".join(sentences)
+
+
+def _change(before: float, after: float) -> str:
     if after < before:
-        sentences.append(
-            f"Before calibration it was {kelvin(before)} K, so the error fell by {100 * (1 - after / before):.0f} %."
-        )
-    else:
-        sentences.append(f"Before calibration it was {kelvin(before)} K: on these data calibration did not help.")
-    compared = "better than" if rest < after else "where"
-    if rest < after:
-        sentences.append(f"Assuming that nothing changes misses by {kelvin(rest)} K, {compared} the model.")
-    else:
-        sentences.append(f"Assuming that nothing changes would miss by {kelvin(rest)} K.")
-    return " ".join([*sentences, _parameter_sentence(result.parameters)])
+        return f", so the error fell by {100 * (1 - after / before):.0f} %."
+    return ": on these data calibration did not help."
 
 
 def _parameter_sentence(parameters: Sequence[ParameterEstimate]) -> str:
     estimated = [p for p in parameters if p.standard_error is not None]
     told = sum(p.identifiable for p in estimated)
-    bound = [p.name for p in estimated if p.at_bound]
+    bound = [p.name.replace("_", " ") for p in estimated if p.at_bound]
     free = len(estimated) - told - len(bound)
-    text = f"Of {len(estimated)} estimated parameters the data determine {told}"
-    text += f", {free} stay open within their physical range" if free else ""
+    parts = [f"Of {counted(len(estimated), 'estimated parameter')} the data determine {told or 'none'}"]
+    if free:
+        parts.append(f"{free} stay{'s' if free == 1 else ''} open within the physical range")
     if not bound:
-        return f"{text}, and none lies on a bound."
-    names = " and ".join(n.replace("_", " ") for n in bound) if len(bound) < 3 else str(len(bound))
-    return f"{text}, and {names} lie{'s' if len(bound) == 1 else ''} on a bound of that range, which hints at physics the model lacks."
+        return "; ".join([*parts, "none lies on a bound."])
+    names = f" ({', '.join(bound)})" if len(bound) < 4 else ""
+    lie = "lies" if len(bound) == 1 else "lie"
+    return "; ".join([*parts, f"{len(bound)} {lie} on a bound{names}, which hints at physics that the model lacks."])
 
 
 def _with_horizons(result: CalibrationResult, grid: SymbolicModel, inputs: Inputs, scheme: str) -> Evaluation:
-    """The held-out evaluation of the calibrated model, with the error at every horizon."""
+    """Complete the held-out evaluation of the calibrated model with the error at every horizon."""
     evaluation = result.calibrated["held_out"]
     if evaluation.by_horizon:
         return evaluation
@@ -160,22 +159,20 @@ def _content(result: CalibrationResult, case: Case, grid: SymbolicModel, inputs:
         "verdict": calibration_verdict(result),
         "fine": result.solver.success and after.metrics.mae < before.metrics.mae,
         "cards": [
-            (f"{kelvin(after.metrics.mae)} K", f"held-out error {result.horizon} ahead, calibrated"),
+            (f"{kelvin(after.metrics.mae)} K", "held-out error of the calibrated model"),
             (f"{kelvin(before.metrics.mae)} K", "before calibration"),
             (f"{kelvin(unchanged_error(after))} K", "assuming that nothing changes"),
             (f"{told} of {len(estimated)}", "parameters determined by the data"),
             (f"{sum(p.at_bound for p in estimated)}", "parameters on a bound"),
         ],
         "errors": _error_rows(result),
-        "error_note": f"At the last of {after.steps} steps of {after.step_seconds:g} s: the mean over zones of the absolute error (MAE), "
-        "their median error and mean error (bias), simulated minus measured, averaged over the runs.",
+        "steps": after.steps,
+        "step": duration(after.step_seconds),
         "figures": drawn,
         "parameters": [_parameter_row(p) for p in result.parameters],
         "parameter_figure": figures.parameter_ranges(result.parameters),
         "intervals": [["tuning", *r] for r in interval_rows(result.calibrated["tuning"])]
         + [["held out", *r] for r in interval_rows(after)],
-        "interval_note": "Runs start every hour; one is skipped when its inputs are missing for over 30 minutes, or its target is. "
-        "A run belongs to the interval that holds its target. Errors are of the calibrated model.",
         **_solver_content(result),
         "reproduce": _reproduce(result, case, scheme),
     }
@@ -203,7 +200,7 @@ def _parameter_row(p: ParameterEstimate) -> dict[str, str]:
         "value": significant(p.value),
         "unit": unit(p.unit),
         "error": significant(p.standard_error, 2),
-        "range": f"{significant(p.lower)} to {significant(p.upper)}" if p.lower is not None else "–",
+        "range": f"{plain(p.lower)} to {plain(p.upper)}" if p.lower is not None and p.upper is not None else "–",
         "told": told,
         "kind": kind,
         "source": p.source,
@@ -211,19 +208,15 @@ def _parameter_row(p: ParameterEstimate) -> dict[str, str]:
 
 
 def _solver_content(result: CalibrationResult) -> dict[str, Any]:
-    s, g = result.solver, result.grid_check
-    starts = f"{s.starts} starts" if s.starts > 1 else "one start"
-    end = "converged" if s.success else "did not converge"
-    compared = (
-        f"A reduced model of {g.order} states was fitted in place of the grid's {g.volumes:,} control volumes. Over {g.runs} held-out "
-        f"runs their zone temperatures differ by {g.max_difference:.4f} K at most and {g.mean_difference:.4f} K on average"
-    ).replace(",", " ", 1)
-    source = "the reduced model" if g.max_difference <= CHECK_TOLERANCE else "the grid itself"
+    solver, check = result.solver, result.grid_check
+    end = "converged" if solver.success else "did not converge"
+    starts = f"{solver.starts} starts" if solver.starts > 1 else "one start"
     return {
-        "solver": f"{s.name.capitalize()} {end} ({s.status}) after {s.iterations} iterations from {starts}, "
-        f"{s.seconds:.1f} s in all.",
-        "failures": s.failures,
-        "grid_check": f"{compared}; the errors on this page come from {source}.",
+        "solver": f"{solver.name.capitalize()} {end} ({solver.status}): {solver.iterations} iterations from {starts}, "
+        f"{solver.seconds:.1f} s in all.",
+        "failures": solver.failures,
+        "check": check,
+        "trusted": check.max_difference <= CHECK_TOLERANCE,
     }
 
 
@@ -236,7 +229,7 @@ def _reproduce(result: CalibrationResult, case: Case, scheme: str) -> list[tuple
     return [
         (
             "case",
-            f"{result.case}, telemetry from {clock(case.stamps[0])} to {clock(case.stamps[-1])} every {duration(case.step)}",
+            f"{result.case}, {clock(case.stamps[0])} to {clock(case.stamps[-1])} every {duration(case.step)}",
         ),
         ("version", f"buildingmpc {result.version}, Python {platform.python_version()}, pandas {pd.__version__}"),
         ("seed", str(result.seed)),

@@ -11,7 +11,7 @@ import pandas as pd
 
 from calibration import _figures as figures
 from calibration._page import clock, counted, duration, kelvin, render, signed, significant, unit
-from calibration._report_evaluation import CELSIUS, error_maps
+from calibration._report_evaluation import CELSIUS, error_maps, tidy
 from calibration._results import check_results_folder, write_results
 from thermal import Case, FloorPlans
 from thermal.case import CaseCheck
@@ -57,12 +57,12 @@ def check_verdict(check: CaseCheck) -> str:
     usable = 1.0 - float(np.mean([c.unusable_share for c in check.quality.columns]))
     flawed = sum(c.unusable_share > 0 for c in check.quality.columns)
     length = (check.end - check.start).total_seconds() + check.step
-    text = (
-        f"The case is valid: {counted(len(check.zones), 'zone')} on {significant(check.floor_area)} m², {measured} of them measured, "
-        f"{counted(len(check.devices), 'device')}, {length / 86400:.3g} days of telemetry every {duration(check.step)}. "
-        f"{100 * usable:.1f} % of its values can be used"
-    )
-    text += f"; {counted(flawed, 'column')} of {len(check.quality.columns)} lack some." if flawed else "."
+    parts = [
+        f"The case is valid: {counted(len(check.zones), 'zone')} on {significant(check.floor_area)} m², {measured}",
+        f"of them measured, {counted(len(check.devices), 'device')}, {length / 86400:.3g} days of telemetry every",
+        f"{duration(check.step)}. {100 * usable:.1f} % of its values can be used",
+    ]
+    text = " ".join(parts) + (f"; {flawed} of {len(check.quality.columns)} columns lack some." if flawed else ".")
     return text + (f" {counted(len(check.remarks), 'remark').capitalize()}." if check.remarks else "")
 
 
@@ -97,7 +97,8 @@ def _check_content(check: CaseCheck) -> dict[str, Any]:
             ]
             for z in check.zones
         ],
-        "quality_note": _quality_note(check),
+        "missing_rows": sum(finding.steps for finding in check.quality.missing_rows),
+        "stamps": check.n_time,
         "timeline": figures.quality_timeline(check.quality),
         "flaws": quality_rows(check),
         "points": [
@@ -110,20 +111,12 @@ def _check_content(check: CaseCheck) -> dict[str, Any]:
                 f"{100 * p.usable_share:.1f}",
             ]
             for p in check.points
-        ],  # fmt: skip
+        ],
         "reproduce": [
             ("version", f"buildingmpc {version('buildingmpc')}"),
             ("command", "buildingmpc check CASE --out RESULTS"),
         ],
     }
-
-
-def _quality_note(check: CaseCheck) -> str:
-    rows = sum(finding.steps for finding in check.quality.missing_rows)
-    text = "Gaps, impossible values, flat lines and spikes are left out of every fit; a value that never changes is only reported."
-    if rows:
-        text += f" {counted(rows, 'row')} of {check.n_time} missing altogether."
-    return text if quality_rows(check) else f"{text} Nothing was found."
 
 
 def quality_rows(check: CaseCheck) -> list[list[str]]:
@@ -227,8 +220,8 @@ def simulation_verdict(summary: dict[str, Any]) -> str:
     length = duration(summary["steps"] * summary["step_seconds"])
     lean = "too warm" if summary["bias"] > 0 else "too cold"
     return (
-        f"Over {length} without looking at the sensors again, the simulated zone temperatures are off by {kelvin(summary['mae'])} K on "
-        f"average and {lean} by {kelvin(abs(summary['bias']))} K."
+        f"Over {length} without another look at the sensors, the simulated zone temperatures are off by "
+        f"{kelvin(summary['mae'])} K on average, and {lean} by {kelvin(abs(summary['bias']))} K."
     )
 
 
@@ -244,7 +237,7 @@ def _simulation_content(simulation: Simulation, case: Case, summary: dict[str, A
     ordered = sorted(by_zone.items(), key=lambda item: -item[1]["mae"])
     return {
         "case": case.building.name,
-        "subtitle": f"{clock(simulation.start)} to {clock(series.stamps[-1])}; times are local ({case.building.location.timezone})",
+        "subtitle": f"{clock(simulation.start)} to {clock(series.stamps[-1])}, local time",
         "verdict": simulation_verdict(summary),
         "cards": [
             (f"{kelvin(summary['mae'])} K", "mean absolute error over zones and time"),
@@ -257,10 +250,12 @@ def _simulation_content(simulation: Simulation, case: Case, summary: dict[str, A
         "figures": {
             "growth": [],
             "drift": [],
+            "runs": 0,
+            "plan": isinstance(case.building.geometry, FloorPlans),
+            "cells": False,
+            "zone_count": len(by_zone),
             "maps": error_maps(case, zones, bias, "mean over the time"),
-            "map_note": "Simulated minus measured, mean over the time: red where the simulation is too warm, blue where it is too cold.",
             "zones": figures.zone_panels(series, zones, {z: e["mae"] for z, e in by_zone.items()}),
-            "zones_note": f"The {min(12, len(by_zone))} of {counted(len(by_zone), 'zone')} with the largest error, and that error; local time.",
         },
         "zones": [[z, f"{e['mae']:.3f}", signed(e["bias"]), significant(e["mean_heat"])] for z, e in ordered],
         "reproduce": [("version", f"buildingmpc {version('buildingmpc')}"), ("parameters", summary["parameters"])],
@@ -269,15 +264,11 @@ def _simulation_content(simulation: Simulation, case: Case, summary: dict[str, A
 
 def _simulation_table(simulation: Simulation) -> pd.DataFrame:
     """Replay in tidy form: index ``timestamp``; ``zone``, ``simulated`` and ``measured`` [degC], ``heat`` [W]."""
-    stamps, zones = simulation.simulated.index, list(simulation.simulated.columns)
-    table = pd.DataFrame(
-        {
-            "zone": pd.Categorical.from_codes(np.tile(np.arange(len(zones)), len(stamps)), categories=zones),
-            "simulated": simulation.simulated.to_numpy(dtype=float).ravel() - CELSIUS,
-            "measured": simulation.measured.to_numpy(dtype=float).ravel() - CELSIUS,
-            "heat": simulation.heat.to_numpy(dtype=float).ravel(),
-        },
-        index=pd.DatetimeIndex(np.repeat(stamps, len(zones)), name="timestamp"),
-    )
+    values = {
+        "simulated": simulation.simulated.to_numpy(dtype=float) - CELSIUS,
+        "measured": simulation.measured.to_numpy(dtype=float) - CELSIUS,
+        "heat": simulation.heat.to_numpy(dtype=float),
+    }
+    table = tidy(pd.DatetimeIndex(simulation.simulated.index), tuple(map(str, simulation.simulated.columns)), values)
     table.attrs["units"] = {"simulated": "degC", "measured": "degC", "heat": "W"}
     return table

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from calibration import _figures as figures
 from calibration._evaluate import Evaluation, spatial_metrics
@@ -15,6 +16,9 @@ from calibration._page import clock, counted, duration, kelvin, render, signed
 from calibration._results import check_results_folder, write_results
 from thermal import Case, FloorPlans
 
+FloatArray = NDArray[np.float64]
+
+#: Zero of the Celsius scale [K].
 CELSIUS = 273.15
 
 
@@ -64,13 +68,12 @@ def write_evaluation(
             [*r, signed(m.median), signed(m.bias)]
             for r, m in zip(interval_rows(evaluation), _metrics(evaluation), strict=True)
         ],
-        "interval_note": "Runs start every hour; one is skipped when its inputs are missing for over 30 minutes, or its target is.",
         "horizons": [[h, f"{mae:.3f}"] for h, mae in evaluation.by_horizon.items()],
         "figures": drawn,
         "zones": zone_rows(evaluation.by_zone()),
         "reproduce": [("version", f"buildingmpc {version('buildingmpc')}"), ("parameters", parameters)],
     }
-    files = {
+    files: dict[str, Any] = {
         "evaluation.json": evaluation.to_dict(),
         "predictions.parquet": predictions_table(evaluation),
         "report.html": render("evaluation", content),
@@ -120,24 +123,39 @@ def predictions_table(evaluation: Evaluation) -> pd.DataFrame:
         Index ``timestamp``; columns ``run_start``, ``zone``, ``simulated`` and ``measured`` [degC].
     """
     parts = []
-    zones = list(evaluation.zones)
     for p in evaluation.predictions:
         lags = pd.to_timedelta(p.steps * evaluation.step_seconds, unit="s")
-        stamps = np.repeat(p.start, len(lags)) + np.tile(lags, len(p.start))
-        shape = (len(p.start), len(lags), len(zones))
-        frame = pd.DataFrame(
-            {
-                "run_start": np.repeat(p.start, shape[1] * shape[2]),
-                "zone": pd.Categorical.from_codes(np.tile(np.arange(shape[2]), shape[0] * shape[1]), categories=zones),
-                "simulated": p.simulated.ravel() - CELSIUS,
-                "measured": p.measured.ravel() - CELSIUS,
-            },
-            index=pd.DatetimeIndex(np.repeat(stamps, shape[2]), name="timestamp"),
-        )
+        stamps = pd.DatetimeIndex(np.repeat(p.start, len(lags)) + np.tile(lags, len(p.start)))
+        shape = (len(stamps), len(evaluation.zones))
+        values = {"simulated": p.simulated.reshape(shape) - CELSIUS, "measured": p.measured.reshape(shape) - CELSIUS}
+        frame = tidy(stamps, evaluation.zones, values)
+        frame.insert(0, "run_start", np.repeat(p.start, len(lags) * shape[1]))
         parts.append(frame[frame["measured"].notna()])
     table = pd.concat(parts)
     table.attrs["units"] = {"simulated": "degC", "measured": "degC"}
     return table
+
+
+def tidy(stamps: pd.DatetimeIndex, zones: tuple[str, ...], values: dict[str, FloatArray]) -> pd.DataFrame:
+    """Tabulate values by time and zone with one row a stamp and zone.
+
+    Parameters
+    ----------
+    stamps : DatetimeIndex, length n_time
+        May repeat.
+    zones : tuple of str
+        Zone names.
+    values : dict of str to ndarray, shape (n_time, n_zone)
+        By column, in the columns' units.
+
+    Returns
+    -------
+    DataFrame
+        Index ``timestamp``; ``zone`` and the columns.
+    """
+    names = pd.Categorical(np.tile(np.array(zones, dtype=object), len(stamps)), categories=list(zones))
+    columns = {"zone": names, **{name: value.ravel() for name, value in values.items()}}
+    return pd.DataFrame(columns, index=pd.DatetimeIndex(np.repeat(stamps, len(zones)), name="timestamp"))
 
 
 def evaluation_figures(
@@ -166,26 +184,24 @@ def evaluation_figures(
     errors = evaluation.by_zone()
     mean = np.array([errors[z]["bias"] if z in errors else np.nan for z in evaluation.zones])
     series = figures.series_of_runs(evaluation)
-    largest = (
-        f"The {min(12, len(errors))} of {len(errors)} zones with the largest error" if len(errors) > 12 else "All zones"
-    )
-    begin = f"The run from {clock(p.start[run])}, the one of {runs} with the median error."
     return {
         "drift": figures.drift_boxes(shown, evaluation.step_seconds),
-        "drift_note": begin,
+        "run_start": clock(p.start[run]),
+        "runs": runs,
         "maps": [
             *error_maps(case, evaluation.zones, p.error[run], f"{ahead} after {clock(p.start[run])}", field),
             *error_maps(case, evaluation.zones, mean, f"mean over {runs} runs"),
         ],
-        "map_note": _map_note(case, field is not None),
+        "plan": isinstance(case.building.geometry, FloorPlans),
+        "cells": field is not None,
         "zones": figures.zone_panels(series, evaluation.zones, {z: e["mae"] for z, e in errors.items()}),
-        "zones_note": f"{largest}, the largest first, with the mean absolute error at the end of the runs; local time. The runs of {ahead} "
-        "follow each other, and each starts from the measured temperatures. All panels span the same number of degrees.",
+        "zone_count": len(errors),
+        "ahead": ahead,
     }
 
 
 def error_maps(
-    case: Case, zones: tuple[str, ...], error: Any, title: str, field: figures.Field | None = None
+    case: Case, zones: tuple[str, ...], error: FloatArray, title: str, field: figures.Field | None = None
 ) -> list[figures.Picture]:
     """Map the error of the zones on the plans, or on tiles where there is no plan."""
     geometry = case.building.geometry
@@ -193,22 +209,6 @@ def error_maps(
         return figures.floor_maps(geometry, case.building.orientation, zones, error, title, field)
     areas = np.array([zone.floor_area for zone in geometry.zones])
     return figures.tile_map(zones, areas, error, title)
-
-
-def _map_note(case: Case, cells: bool) -> str:
-    text = "Simulated minus measured at the end of a run: red where the simulation is too warm, blue where it is too cold, white where it "
-    text += "is right, grey where nothing is measured. "
-    if not isinstance(case.building.geometry, FloorPlans):
-        return (
-            text
-            + "This case has no plan: a tile is as large as its zone's floor area, and where it stands means nothing."
-        )
-    if cells:
-        return (
-            text
-            + "The run's map shows every cell of the grid against its zone's sensor, the mean one colour a zone; the arrow points north."
-        )
-    return text + "One colour a zone; the arrow points north."
 
 
 def interval_rows(evaluation: Evaluation) -> list[list[str]]:

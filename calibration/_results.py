@@ -46,7 +46,7 @@ def check_results_folder(out: str | Path, force: bool = False) -> Path:
         if held:
             shown = ", ".join(held[:4]) + (f" and {len(held) - 4} more" if len(held) > 4 else "")
             raise ResultsExistError(
-                f"{folder}: expected an empty or new folder, found {shown}; choose another folder, or replace results with --force"
+                f"{folder}: expected an empty or new folder, found {shown}; choose another, or replace them with force"
             )
     return folder
 
@@ -56,14 +56,14 @@ def write_results(
 ) -> Path:
     """Write the files of one result, whole or not at all.
 
-    Everything is written beside the folder first and moved there at the end, so that a failure leaves what was there before.
+    Everything is written beside the folder first and moved there at the end, so a failure leaves what was there before.
 
     Parameters
     ----------
     out : str or Path
         Folder of the results, made with its parents.
     files : mapping of str to bytes, str, dict or DataFrame
-        Contents by file name. A dict becomes JSON (NaN as null), a table Parquet, and its time index must have a time zone.
+        Contents by file name. A dict becomes JSON (NaN as null), a table Parquet; its time index must have a time zone.
     force : bool
         Replace files of the same name; what else the folder holds stays.
 
@@ -97,7 +97,7 @@ def write_results(
 
 
 def to_json(content: Mapping[str, Any]) -> str:
-    """Spell results as JSON that every reader takes: NaN and infinities become null, times ISO 8601.
+    r"""Spell results as JSON that every reader takes: NaN and infinities become null, times ISO 8601.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ def to_json(content: Mapping[str, Any]) -> str:
     Examples
     --------
     >>> to_json({"mae": float("nan")})
-    '{\\n  "mae": null\\n}'
+    '{\n  "mae": null\n}'
     """
     return json.dumps(_plain(content), indent=2, ensure_ascii=False, allow_nan=False)
 

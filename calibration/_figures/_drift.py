@@ -16,6 +16,8 @@ from calibration._figures._style import CELSIUS, MEASURED, SIMULATED, FloatArray
 #: Time between two pairs of boxes [s].
 SPACING = 1800.0
 
+_KEYS = [Patch(color=MEASURED, label="measured"), Patch(color=SIMULATED, label="simulated")]
+
 #: Up to this many zones each zone is a dot on its box.
 MOST_DOTS = 16
 
@@ -66,15 +68,14 @@ def drift_boxes(runs: Sequence[tuple[str, Predictions, int]], step: float) -> li
         axes.set_ylim(low - margin, high + margin)
         axes.grid(axis="x", visible=False)
         axes.set(title=title, xlabel=f"local time, run of {p.start[k]:%Y-%m-%d}", ylabel="zone temperature [°C]")
-        axes.legend(handles=[Patch(color=MEASURED, label="measured"), Patch(color=SIMULATED, label="simulated")], loc="best",
-                    ncols=2, fontsize=8)  # fmt: skip
+        axes.legend(handles=_KEYS, loc="best", ncols=2, fontsize=8)
         alt = f"Box plots over the zones, measured and simulated, {title}; run from {p.start[k]:%Y-%m-%d %H:%M}"
         pictures.append(picture(figure, alt))
     return pictures
 
 
 def _run_table(p: Predictions, k: int) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Steps (from 0), measured and simulated [degC] of one run, shape (n_kept + 1, n_zone)."""
+    """Tabulate steps from 0, measured and simulated temperatures [degC] of one run, shape (n_kept + 1, n_zone)."""
     steps = np.concatenate([[0], p.steps]).astype(float)
     measured = np.vstack([p.initial[k], p.measured[k]]) - CELSIUS
     simulated = np.vstack([p.initial[k], p.simulated[k]]) - CELSIUS
@@ -102,5 +103,5 @@ def _boxes(axes: Axes, values: FloatArray, offset: float, colour: str) -> None:
     if max((row.size for row in data), default=0) <= MOST_DOTS:
         x = np.concatenate([np.full(data[i].size, i + offset) for i in keep])
         y = np.concatenate([data[i] for i in keep])
-        axes.add_line(Line2D(x, y, linestyle="none", marker="o", markersize=2.2, color="white", markeredgecolor=colour,
+        axes.add_line(Line2D(x, y, linestyle="none", marker="o", markersize=2.8, color="white", markeredgecolor=colour,
                              markeredgewidth=0.6, zorder=4))  # fmt: skip

@@ -19,8 +19,8 @@ LINES = {"before": (MUTED, "--"), "after": (SIMULATED, "-"), "model": (SIMULATED
 def error_growth(groups: Mapping[str, Mapping[str, Evaluation]]) -> list[Picture]:
     """Draw the mean absolute error over time since the start of a run; the pictures share their axis of error.
 
-    The line is the mean over runs, the band the middle half of the runs; a dotted line is what one gets by assuming that nothing
-    changes at all.
+    The line is the mean over runs, the band the middle half of the runs; a dotted line is what one gets
+    by assuming that nothing changes at all.
 
     Parameters
     ----------

@@ -21,23 +21,28 @@ from thermal import FloorPlan, FloorPlans
 #: Red is a simulation that is too warm, blue one that is too cold, white none, as in the paper.
 ERROR_COLOURS = colormaps["RdBu_r"]
 
+#: Labels below this size are left out [pt].
+SMALLEST_LABEL = 4.6
+
 _WALLS = {"#": to_rgb("#3A3F45"), "+": to_rgb("#8E949B"), ".": to_rgb("white")}
 _UNMEASURED = to_rgb("#E3E5E8")
 _ZONES = [to_rgb(c) for c in ("#D7E8F5", "#FBE3D0", "#DDEFDC", "#F3E6F3", "#FFF3C9", "#DDEFEF", "#F0E4DA", "#E5E6F4")]
 
 
 def error_scale(values: FloatArray) -> float:
-    """Ends of a symmetric colour scale [K]: what 98 % of the values stay within, rounded up."""
+    """Choose the ends of a symmetric colour scale [K]: what 98 % of the values stay within, rounded up."""
     finite = np.abs(values[np.isfinite(values)])
     top = float(np.quantile(finite, 0.98)) if finite.size else 0.0
-    return max(0.1, float(np.ceil(top * 10.0) / 10.0))
+    step = next((step for limit, step in ((0.2, 0.1), (1.0, 0.2), (4.0, 0.4)) if top <= limit), 1.0)
+    return float(max(1.0, np.ceil(round(top / step, 6))) * step)
 
 
 def colour_bar(figure: Figure, axes: Axes, scale: float) -> None:
-    """Horizontal bar of the error's colours, below the axes."""
-    bar = figure.colorbar(ScalarMappable(Normalize(-scale, scale), ERROR_COLOURS), ax=axes, orientation="horizontal", aspect=40,
-                          shrink=0.8, pad=0.02, extend="both")  # fmt: skip
+    """Add a horizontal bar of the error's colours below the axes."""
+    colours = ScalarMappable(Normalize(-scale, scale), ERROR_COLOURS)
+    bar = figure.colorbar(colours, ax=axes, orientation="horizontal", aspect=40, shrink=0.8, pad=0.02, extend="both")
     bar.set_label("simulated minus measured [K]: red too warm, blue too cold", fontsize=8)
+    bar.set_ticks([-scale, -0.5 * scale, 0.0, 0.5 * scale, scale])
     bar.ax.tick_params(labelsize=8)
 
 
@@ -114,17 +119,23 @@ def floor_maps(
         tokens = np.repeat(np.repeat(floor.tokens, split, axis=0), split, axis=1)
         for token, colour in _WALLS.items():
             image[tokens == token] = colour
-        labels = {z: (f"{z}\n{_signed(by_zone[z])}", error_colour(by_zone[z], scale)) for z in floor.zone_names}
+        labels = {
+            z: (f"{z}\n{signed_kelvin(by_zone[z])}", error_colour(float(np.median(cells[tokens == z])), scale))
+            for z in floor.zone_names
+        }
         figure, axes = _canvas(floor, plans.cell_size, orientation, image, f"floor {floor.name}, {title}", labels)
         colour_bar(figure, axes, scale)
         worst = max(floor.zone_names, key=lambda z: np.nan_to_num(abs(by_zone[z]), nan=-1.0))
-        alt = f"Error on floor {floor.name}, {title}; largest in zone {worst}: {_signed(by_zone[worst])}"
+        alt = f"Error on floor {floor.name}, {title}; largest in zone {worst}: {signed_kelvin(by_zone[worst])}"
         drawn.append(picture(figure, alt))
     return drawn
 
 
-def _signed(value: float) -> str:
-    return f"{value:+.2f} K" if np.isfinite(value) else "not measured"
+def signed_kelvin(value: float) -> str:
+    """Spell an error of a zone."""
+    if not np.isfinite(value):
+        return "not measured"
+    return f"{value:+.2f} K".replace("-", "−") if abs(value) >= 0.005 else "0.00 K"
 
 
 def _cell_errors(
@@ -179,45 +190,39 @@ def _canvas(
 
 
 def _north(axes: Axes, orientation: float) -> None:
-    """Arrow to true north, right of the title."""
-    towards = np.array([-np.sin(np.deg2rad(orientation)), np.cos(np.deg2rad(orientation))])
-    foot = np.array([-14.0, 14.0]) - 9.0 * towards
+    """Draw an arrow to true north, above the right corner."""
+    x, y = -np.sin(np.deg2rad(orientation)), np.cos(np.deg2rad(orientation))
+    corner = OffsetFrom(axes, (1.0, 1.0), "points")
+
+    def along(points: float) -> tuple[float, float]:
+        return float(-14.0 + points * x), float(14.0 + points * y)
+
     style = {"arrowstyle": "-|>", "color": INK, "shrinkA": 0, "shrinkB": 0, "linewidth": 1.0}
-    tip, letter = foot + 18.0 * towards, foot + 25.0 * towards
-    for text, end, start in (("", tip, foot), ("N", letter, letter)):
-        offset = OffsetFrom(axes, (1.0, 1.0), "points")
-        axes.annotate(text, end, start, xycoords=offset, textcoords=offset, fontsize=7, ha="center", va="center",
-                      annotation_clip=False, arrowprops=style if not text else None)  # fmt: skip
+    tip, foot = along(9.0), along(-9.0)
+    axes.annotate("", tip, foot, xycoords=corner, textcoords=corner, annotation_clip=False, arrowprops=style)
+    axes.annotate("N", along(16.0), xycoords=corner, fontsize=7, ha="center", va="center", annotation_clip=False)
 
 
 def _label(axes: Axes, mine: NDArray[np.bool_], cell: float, scale: float, text: str, ink: str) -> None:
     """Write into the roomiest place of a zone; the number alone, or nothing, where more does not fit."""
     depth = distance_transform_edt(np.pad(mine, 1))[1:-1, 1:-1]
-    best = (0.0, 0, 0.0, "")
-    for row in np.flatnonzero(depth.max(axis=1) >= 0.7 * depth.max()):
-        for first, last in _runs(mine[row] & (depth[row] >= 0.5 * depth.max())):
-            height = 2.0 * depth[row, first : last + 1].max()
+    deepest = depth.max()
+    centre = np.argwhere(mine).mean(axis=0)
+    best = (0.0, 0.0, 0.0, 0.0, "")
+    for row in np.flatnonzero(depth.max(axis=1) >= 0.6 * deepest):
+        for first, last in _runs(mine[row] & (depth[row] >= 0.5 * deepest)):
+            column = 0.5 * (first + last)
+            far = abs(row - centre[0]) + abs(column - centre[1])
+            height = 2.0 * float(depth[row, first : last + 1].max()) * scale
             for lines in (text, text.rpartition("\n")[2]):
-                count = lines.count("\n") + 1
-                size = min(
-                    8.0,
-                    (last - first + 1.5) * scale / (0.64 * max(map(len, lines.split("\n")))),
-                    height * scale / (1.3 * count),
-                )
-                if size > best[0] + 0.4:
-                    best = (size, int(row), (first + last + 1) / 2.0, lines)
-    size, row, column, lines = best
-    if size >= 4.6:
-        axes.text(
-            column * cell,
-            (row + 0.5) * cell,
-            lines,
-            fontsize=size,
-            color=ink,
-            ha="center",
-            va="center",
-            linespacing=1.15,
-        )
+                width = 0.64 * max(map(len, lines.split("\n")))
+                size = min(8.0, (last - first + 1.5) * scale / width, height / (1.3 * (lines.count("\n") + 1)))
+                better = size - 0.05 * far + (1.0 if lines == text else 0.0)
+                if size >= SMALLEST_LABEL and better > best[0]:
+                    best = (better, size, column, float(row), lines)
+    _, size, column, at, lines = best
+    if lines:
+        axes.text((column + 0.5) * cell, (at + 0.5) * cell, lines, fontsize=size, color=ink, ha="center", va="center")
 
 
 def _runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:

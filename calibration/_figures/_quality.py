@@ -7,7 +7,6 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from calibration._figures._style import (
-    MEASURED,
     MUTED,
     SIMULATED,
     WARNING,
@@ -54,6 +53,6 @@ def quality_timeline(report: QualityReport) -> list[Picture]:
     axes.set(xlim=(left, right), ylim=(len(flawed) - 0.4, -0.6))
     axes.grid(axis="y", visible=False)
     time_axis(axes, report.start.tzinfo)
-    figure.legend(handles=[Patch(color=COLOURS[k], label=k) for k in COLOURS if k in kinds], loc="outside lower center", ncols=5,
-                  fontsize=8)  # fmt: skip
+    keys = [Patch(color=colour, label=kind) for kind, colour in COLOURS.items() if kind in kinds]
+    figure.legend(handles=keys, loc="outside lower center", ncols=5, fontsize=8)
     return [picture(figure, "Time line of what is missing or not usable, one row a telemetry column")]

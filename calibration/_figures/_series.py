@@ -65,7 +65,7 @@ def series_of_runs(evaluation: Evaluation) -> Series:
             measured.append(np.vstack([p.initial[k], p.measured[k], blank]))
             simulated.append(np.vstack([p.initial[k], p.simulated[k], blank]))
     joined = stamps[0].append(stamps[1:])
-    return Series(joined, np.concatenate(measured), np.concatenate(simulated))
+    return Series(pd.DatetimeIndex(joined), np.concatenate(measured), np.concatenate(simulated))
 
 
 @styled

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import tzinfo
 from functools import wraps
-from typing import ParamSpec, TypeVar
+from typing import Any, ParamSpec, TypeVar
 
 import matplotlib as mpl
 import numpy as np
@@ -23,13 +23,13 @@ P = ParamSpec("P")
 T = TypeVar("T")
 FloatArray = NDArray[np.float64]
 
-#: Measured is blue and simulated orange, as in the paper; red is hotter, blue colder (Okabe & Ito's palette, safe for the colour-blind).
+#: Measured is blue and simulated orange, as in the paper, from a palette that the colour-blind can tell apart.
 MEASURED, SIMULATED, WARNING, MUTED, INK = "#0072B2", "#D55E00", "#C00028", "#8A8F98", "#22262B"
 
 #: Zero of the Celsius scale [K].
 CELSIUS = 273.15
 
-_STYLE = {
+_STYLE: dict[Any, Any] = {  # Matplotlib types its keys one by one
     "axes.edgecolor": "#9AA0A8",
     "axes.grid": True,
     "axes.axisbelow": True,
@@ -106,7 +106,9 @@ def day_numbers(stamps: pd.DatetimeIndex) -> FloatArray:
 
 def time_axis(axes: Axes, zone: tzinfo | None, ticks: int = 7) -> None:
     """Local time along x."""
-    locator = dates.AutoDateLocator(tz=zone, minticks=3, maxticks=ticks)
+    locator = dates.AutoDateLocator(tz=zone, minticks=3, maxticks=ticks)  # type: ignore[no-untyped-call]
     axes.xaxis.set_major_locator(locator)
-    axes.xaxis.set_major_formatter(dates.ConciseDateFormatter(locator, tz=zone))
+    formatter = dates.ConciseDateFormatter(locator, tz=zone)  # type: ignore[no-untyped-call]
+    axes.xaxis.set_major_formatter(formatter)
+    axes.xaxis.get_offset_text().set_fontsize(8)
     axes.tick_params(axis="x", labelsize=8)

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from calibration._figures._plan import colour_bar, error_colour, error_scale, ink_on
+from calibration._figures._plan import colour_bar, error_colour, error_scale, ink_on, signed_kelvin
 from calibration._figures._style import FloatArray, Picture, picture, styled
 
 Box = tuple[float, float, float, float]
@@ -36,8 +36,8 @@ def tile_map(zones: tuple[str, ...], areas: FloatArray, error: FloatArray, title
     for i, (x, y, w, h) in zip(order, boxes, strict=True):
         colour = error_colour(float(error[i]), scale)
         axes.add_patch(Rectangle((x, y), w, h, facecolor=colour, edgecolor="#3A3F45", linewidth=1.2))
-        number = f"{error[i]:+.2f} K" if np.isfinite(error[i]) else "not measured"
-        for text in (f"{zones[i]}\n{number}\n{areas[i]:.0f} m2", f"{zones[i]}\n{number}", number):
+        number = signed_kelvin(float(error[i]))
+        for text in (f"{zones[i]}\n{number}\n{areas[i]:.0f} m²", f"{zones[i]}\n{number}", number):
             lines = text.split("\n")
             size = min(9.0, 72 * w / (0.66 * max(map(len, lines))), 72 * h / (1.5 * len(lines)))
             if size >= 6.0 or text == number:
@@ -46,12 +46,14 @@ def tile_map(zones: tuple[str, ...], areas: FloatArray, error: FloatArray, title
     axes.set(xlim=(0, width), ylim=(0, height), title=title)
     axes.set_axis_off()
     colour_bar(figure, axes, scale)
-    listed = "; ".join(f"{z} {e:+.2f} K" for z, e in zip(zones, error, strict=True) if np.isfinite(e))
+    listed = "; ".join(f"{z} {signed_kelvin(e)}" for z, e in zip(zones, error, strict=True) if np.isfinite(e))
     return [picture(figure, f"Error of each zone, {title}: {listed}")]
 
 
 def squarify(sizes: FloatArray, box: Box) -> list[Box]:
-    """Cut a rectangle into tiles of given areas that are as square as can be (Bruls et al. 2000, doi:10.1007/978-3-7091-6783-0_4).
+    """Cut a rectangle into tiles of given areas that are as square as can be.
+
+    Bruls, Huizing & van Wijk (2000), doi:10.1007/978-3-7091-6783-0_4.
 
     Parameters
     ----------

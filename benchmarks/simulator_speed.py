@@ -1,0 +1,221 @@
+"""Speed of the grid model at the size of the paper's pilot building, beside what the memory allows.
+
+The building is the generated pilot (two floors, 6,317 m2, 123 zones, seed 0) at 1, 0.5 and 0.25 m between volumes:
+factorisation, one step of implicit Euler and of TR-BDF2, six hours (72 steps of 5 minutes) with the forward
+sensitivities of the paper's eight parameters, and one random shuffle.
+
+A step must read the factors L and U once. Its bound is their size - 8 byte a value and 4 byte an index for each
+nonzero of the complete factors - over the bandwidth of one core, measured in the same run as the best of several sums
+over an array far larger than the caches. TR-BDF2 reads the factors twice; so does a step with sensitivities, once for
+the state and once for all slopes together.
+
+Times are CPU times of the process on one thread, so that other processes count less, but they share cache and memory:
+medians and, in brackets, minima. The wall time of a step is its median.
+
+Run: ``python benchmarks/simulator_speed.py --out results/speed [--page README.md]``; two minutes on one core. Writes
+``simulator_speed.json`` and ``.md``; with ``--page`` also the table between that page's ``simulator_speed`` markers.
+"""
+
+from __future__ import annotations
+
+import os
+
+for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ[_name] = "1"  # one core; must be set before NumPy is loaded
+
+import argparse
+import platform
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import scipy.sparse as sp
+from _table import markdown, write_table
+from scipy.sparse.linalg import splu
+
+from thermal import Building, SymbolicModel, build_network
+from thermal.model import IMPLICIT_EULER, TR_BDF2, Matrices, Scheme, Stepper, factorise
+from thermal.network import ThermalNetwork
+from thermal.pilot import MOUNTAIN_VIEW, devices, generate_office
+from thermal.shuffle import RandomShuffle
+
+FloatArray = npt.NDArray[np.float64]
+
+SEED = 0
+SPACINGS = (1.0, 0.5, 0.25)  # m
+STEP = 300.0  # s, the paper's
+N_STEP = 72  # six hours, the paper's horizon
+BANDWIDTH_BYTES = 800_000_000  # far more than any cache
+VALUE_BYTES, INDEX_BYTES = 8, 4  # of a stored nonzero
+PARAMETERS = (
+    "exterior_convection_coefficient",
+    "exterior_wall_conductivity",
+    "exterior_wall_heat_capacity",
+    "interior_wall_conductivity",
+    "interior_wall_heat_capacity",
+    "shuffle_probability",
+    "interior_film_coefficient",
+    "radiant_coefficient",
+)
+
+
+def timed(function: Callable[[], object], repeats: int) -> dict[str, float]:
+    """Median and minimum CPU time and median wall time of a call [s], after one call that is not counted."""
+    function()
+    cpu, wall = np.empty(repeats), np.empty(repeats)
+    for i in range(repeats):
+        cpu_0, wall_0 = time.process_time(), time.perf_counter()
+        function()
+        cpu[i], wall[i] = time.process_time() - cpu_0, time.perf_counter() - wall_0
+    return {"cpu_median": float(np.median(cpu)), "cpu_min": float(cpu.min()), "wall_median": float(np.median(wall))}
+
+
+def read_bandwidth(repeats: int = 15) -> float:
+    """Best rate at which one core reads an array from memory [byte/s]."""
+    array = np.ones(BANDWIDTH_BYTES // 8)
+    best = min(timed(function, repeats)["cpu_min"] for function in (array.sum, array.max, lambda: array.dot(array)))
+    return array.nbytes / best
+
+
+def pilot() -> Building:
+    """Make the generated pilot building, without telemetry."""
+    plans = generate_office(SEED)
+    return Building("pilot", MOUNTAIN_VIEW, 0.0, plans, devices(plans), (), "weather_station")
+
+
+def eight_parameters(model: SymbolicModel) -> Matrices:
+    """Assemble the model at its start, with the slopes of the paper's parameters only."""
+    names = [p.name for p in model.network.parameters]
+    matrices = model.matrices(model.network.start(), slopes=True)
+    chosen = [names.index(name) for name in PARAMETERS]
+    return replace(
+        matrices,
+        capacity_slopes=[matrices.capacity_slopes[i] for i in chosen],
+        flow_slopes=[matrices.flow_slopes[i] for i in chosen],
+    )
+
+
+def factor_bytes(system: sp.csr_matrix) -> int:
+    """Bytes of the complete factors L and U: minimum degree on A + A^T, no pivoting."""
+    factors = splu(
+        sp.csc_matrix(system), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
+    )
+    return int(factors.L.nnz + factors.U.nnz) * (VALUE_BYTES + INDEX_BYTES)
+
+
+class Replay:
+    """Steps a model over seeded inputs, forwards in time from call to call.
+
+    Parameters
+    ----------
+    matrices : Matrices
+        The model.
+    network : ThermalNetwork
+        What it was made from.
+    scheme : Scheme
+        Time stepping.
+    """
+
+    def __init__(self, matrices: Matrices, network: ThermalNetwork, scheme: Scheme = IMPLICIT_EULER) -> None:
+        self.stepper = Stepper(matrices, STEP, scheme, network.airflows)
+        rng = np.random.default_rng(SEED)
+        self.heat = rng.uniform(-1000.0, 1000.0, (N_STEP, len(network.zones), 1))
+        self.boundary = 283.15 + 5.0 * rng.standard_normal((N_STEP, network.n_boundary, 1))
+        self.states = np.full((matrices.n, 1), 293.15)
+        self.row = 0
+
+    def step(self) -> None:
+        """One step."""
+        row = self.row = (self.row + 1) % N_STEP
+        self.states = self.stepper.advance(self.states, self.boundary[row], self.heat[row])[0]
+
+    def sensitivities(self, n_parameter: int) -> FloatArray:
+        """Six hours with forward sensitivities; zone means' slopes at the end, shape (n_zone, n_parameter)."""
+        states, slopes = self.states, np.zeros((self.states.shape[0], n_parameter))
+        for row in range(N_STEP):
+            states, _, slopes, mean = self.stepper.advance(states, self.boundary[row], self.heat[row], slopes=slopes)
+        return mean
+
+
+def random_shuffle(network: ThermalNetwork) -> tuple[RandomShuffle, FloatArray]:
+    """The paper's shuffle over whole zones with p = 0.5, and temperatures for it."""
+    air = np.flatnonzero(network.kind == "air")
+    cells = [np.flatnonzero(network.zone[air] == zone) for zone in range(len(network.zones))]
+    positions = network.place[air][:, 1:] * float(network.spacing or 0.0)
+    temperatures = np.random.default_rng(SEED).normal(293.15, 1.0, air.size)
+    return RandomShuffle(cells, positions, 0.5, None, SEED), temperatures
+
+
+def measure(building: Building, dx: float, bandwidth: float) -> dict[str, Any]:
+    """All times at one spacing [s], with the bounds of what reads the factors."""
+    network = build_network(building, dx=dx)
+    matrices = eight_parameters(SymbolicModel(network))
+    system = sp.csr_matrix(matrices.capacity + STEP * matrices.flow[:, : matrices.n])
+    size = factor_bytes(system)
+    repeats = int(np.clip(4e6 / matrices.n, 41, 401))
+    euler, bdf2 = Replay(matrices, network), Replay(matrices, network, TR_BDF2)
+    shuffle, temperatures = random_shuffle(network)
+    times = {
+        "factorisation": timed(lambda: factorise(system), 5),
+        "step": timed(euler.step, repeats),
+        "tr_bdf2_step": timed(bdf2.step, repeats),
+        "sensitivities": timed(lambda: euler.sensitivities(len(PARAMETERS)), 3),
+        "shuffle": timed(lambda: shuffle.apply(temperatures), repeats),
+    }
+    reads = {"step": 1, "tr_bdf2_step": 2, "sensitivities": 2 * N_STEP}
+    for name, count in reads.items():
+        bound = count * size / bandwidth
+        times[name] |= {"bound": bound, "ratio": times[name]["cpu_median"] / bound}
+    cells = int((network.place[:, 0] >= 0).sum())
+    return {"dx": dx, "volumes": matrices.n, "cells": cells, "factor_bytes": size, "repeats": repeats, "times": times}
+
+
+def report(rows: list[dict[str, Any]], bandwidth: float) -> str:
+    """Lay out the table and what it was measured on."""
+    header = (
+        "dx [m]", "volumes", "L and U [MB]", "factorise [ms]", "step [ms]", "wall [ms]", "bound [ms]", "step / bound",
+        "TR-BDF2 [ms]", "/ bound", "72 steps, 8 sensitivities [s]", "/ bound", "shuffle [ms]",
+    )  # fmt: skip
+
+    def cpu(time_: dict[str, float], scale: float, digits: int) -> str:
+        return f"{scale * time_['cpu_median']:.{digits}f} ({scale * time_['cpu_min']:.{digits}f})"
+
+    lines = []
+    for row in rows:
+        t = row["times"]
+        step, bdf2, slopes = t["step"], t["tr_bdf2_step"], t["sensitivities"]
+        lines.append([
+            f"{row['dx']:g}", f"{row['volumes']:,}", f"{row['factor_bytes'] / 1e6:.1f}", cpu(t["factorisation"], 1e3, 0),
+            cpu(step, 1e3, 2), f"{1e3 * step['wall_median']:.2f}", f"{1e3 * step['bound']:.2f}", f"{step['ratio']:.1f}",
+            cpu(bdf2, 1e3, 2), f"{bdf2['ratio']:.1f}", cpu(slopes, 1.0, 2), f"{slopes['ratio']:.1f}",
+            cpu(t["shuffle"], 1e3, 2),
+        ])  # fmt: skip
+    load = os.getloadavg()[0] if hasattr(os, "getloadavg") else float("nan")
+    note = (
+        f"CPU time on one core, median (minimum); bounds from a measured read bandwidth of {bandwidth / 1e9:.1f} GB/s. "
+        f"{platform.machine()}, {os.cpu_count()} cores, load average {load:.1f} at the end of the run.\n"
+    )
+    return markdown(header, lines) + "\n" + note
+
+
+def main() -> None:
+    """Measure and write the table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--out", type=Path, required=True, help="folder of the results")
+    parser.add_argument("--page", type=Path, help="page whose simulator_speed section is replaced as well")
+    options = parser.parse_args()
+    bandwidth = read_bandwidth()
+    building = pilot()
+    rows = [measure(building, dx, bandwidth) for dx in SPACINGS]
+    text = report(rows, bandwidth)
+    data = {"bandwidth": bandwidth, "seed": SEED, "step": STEP, "steps": N_STEP, "parameters": PARAMETERS, "rows": rows}
+    write_table(options.out, "simulator_speed", data, text, options.page)
+    print(text)
+
+
+if __name__ == "__main__":
+    main()

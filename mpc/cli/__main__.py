@@ -1,0 +1,5 @@
+"""Run the console command as ``python -m mpc.cli``."""
+
+from mpc.cli import main
+
+main()

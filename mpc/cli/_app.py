@@ -1,0 +1,120 @@
+"""The subcommands of ``buildingmpc``, their help, and how an error becomes an exit code."""
+
+from __future__ import annotations
+
+import errno
+import sys
+import traceback
+from collections.abc import Callable
+from functools import wraps
+from typing import Annotated, ParamSpec
+
+import typer
+
+from mpc.cli._calibrate import calibrate
+from mpc.cli._check import check
+from mpc.cli._demo import demo
+from mpc.cli._doctor import doctor
+from mpc.cli._evaluate import evaluate
+from mpc.cli._simulate import simulate
+
+P = ParamSpec("P")
+
+#: Exit codes of the contract: success is 0.
+FAILURE, BAD_INPUT = 1, 2
+
+_FAMILIES = {"ThermalError", "CalibrationError", "MpcError"}
+
+app = typer.Typer(
+    name="buildingmpc",
+    help="Model a real building, calibrate it on telemetry, and say how far its predictions are off.",
+    epilog="Start with: buildingmpc demo",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+def _version(asked: bool) -> None:
+    if asked:
+        from importlib.metadata import version
+
+        typer.echo(f"buildingmpc {version('buildingmpc')}")
+        raise typer.Exit
+
+
+@app.callback()
+def options(
+    context: typer.Context,
+    debug: Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")] = False,
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version and exit.")
+    ] = False,
+) -> None:
+    """Take the options that stand before the subcommand."""
+    context.obj = {"debug": debug}
+
+
+def _guarded(command: Callable[P, int]) -> Callable[P, None]:
+    """Turn what a command returns or raises into an exit code, and an error into one line on stderr."""
+
+    @wraps(command)
+    def run(*args: P.args, **kwargs: P.kwargs) -> None:
+        try:
+            code = command(*args, **kwargs)
+        except (typer.Exit, typer.Abort):
+            raise
+        except OSError as error:
+            if error.errno == errno.EPIPE:  # the reader of a pipe has gone: nothing to say to anyone
+                raise
+            code = _report(error)
+        except Exception as error:
+            code = _report(error)
+        raise typer.Exit(code)
+
+    return run
+
+
+def _report(error: Exception) -> int:
+    """Say what went wrong on stderr and choose the exit code."""
+    import click
+
+    if isinstance(error, click.ClickException):
+        raise error
+    context = click.get_current_context(silent=True)
+    if context is not None and context.find_root().obj and context.find_root().obj["debug"]:
+        traceback.print_exception(error, file=sys.stderr)
+    typer.echo(f"error: {type(error).__name__}: {error}", err=True)
+    if any(base.__name__ in _FAMILIES for base in type(error).__mro__):
+        return BAD_INPUT
+    if context is not None:
+        typer.echo(f"For the traceback: buildingmpc --debug {context.info_name} ...", err=True)
+    return FAILURE
+
+
+for _command, _help, _example in (
+    (demo, "Calibrate the bundled case and evaluate it on held-out days, in under two minutes.", "demo --out demo"),
+    (doctor, "Say what is installed and what is missing, and test the solvers.", "doctor"),
+    (check, "Validate a case folder: geometry, quality of the telemetry, what each point is.", "check cases/office"),
+    (
+        simulate,
+        "Replay the inputs of a building through its model.",
+        "simulate cases/office --start 2023-10-16 --end 2023-10-18 --parameters results/calibration.json --out replay",
+    ),
+    (
+        evaluate,
+        "N-step prediction error of a model on the telemetry of a case.",
+        "evaluate cases/office --parameters results/calibration.json --interval 2023-10-16/2023-10-23 --out errors",
+    ),
+    (
+        calibrate,
+        "Fit the physical parameters of a building to its telemetry; of each case in a folder of cases.",
+        "calibrate cases/office --tune 2023-10-02/2023-10-16 --hold-out 2023-10-16T00:05/2023-10-23 --out results",
+    ),
+):
+    app.command(help=_help, epilog=f"Example: buildingmpc {_example}")(_guarded(_command))
+
+
+def main() -> None:
+    """Run the console command and leave with its exit code."""
+    app()

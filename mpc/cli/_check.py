@@ -1,0 +1,99 @@
+"""``buildingmpc check``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from mpc.cli._console import Force, Json, say, show_table, write_json
+
+if TYPE_CHECKING:
+    from thermal.case import CaseCheck
+
+
+def check(
+    case: Annotated[Path, typer.Argument(metavar="CASE", help="Case folder.")],
+    out: Annotated[Path | None, typer.Option(metavar="DIR", help="Folder for check.json and report.html.")] = None,
+    force: Force = False,
+    json: Json = False,
+) -> int:
+    """Validate a case and say what is in it."""
+    from calibration import check_results_folder, write_check
+    from thermal.case import check_case
+
+    if out is not None:
+        check_results_folder(out, force)
+    found = check_case(case)
+    report = write_check(found, out, force=force) if out is not None else None
+    if json:
+        write_json(found.to_dict())
+        return 0
+    show_check(found)
+    _show_points(found)
+    if report is not None:
+        say(f"Report: {report}")
+    return 0
+
+
+def show_check(found: CaseCheck) -> None:
+    """Write the geometry and the quality of a case to stdout.
+
+    Parameters
+    ----------
+    found : CaseCheck
+        From `thermal.case.check_case`.
+    """
+    from calibration import check_verdict, quality_rows
+
+    say(f"{found.name} ({found.geometry}), {found.start:%Y-%m-%d %H:%M} to {found.end:%Y-%m-%d %H:%M} "
+        f"{found.location.timezone}")  # fmt: skip
+    say(check_verdict(found))
+    for remark in found.remarks:
+        say(f"- {remark}")
+    show_table(
+        "Zones",
+        ("zone", "floor", "area [m²]", "volume [m³]", "sensors", "devices"),
+        [
+            (
+                z.name,
+                z.floor or "–",
+                f"{z.floor_area:.1f}",
+                f"{z.volume:.1f}",
+                str(len(z.measured_by)),
+                ", ".join(z.devices),
+            )
+            for z in found.zones
+        ],
+    )
+    rows = quality_rows(found)
+    if rows:
+        show_table(
+            "Findings in the telemetry, by column",
+            ("column", "missing [%]", "unusable [%]", "gaps", "impossible", "flat", "spikes", "constant"),
+            rows,
+        )
+
+
+def _show_points(found: CaseCheck) -> None:
+    def number(value: float | None) -> str:
+        return "–" if value is None else f"{value:.4g}"
+
+    show_table(
+        "Measured points",
+        ("column", "of", "meaning", "unit", "lowest", "mean", "highest", "usable [%]"),
+        [
+            (
+                p.column,
+                p.zone or p.entity_kind,
+                p.meaning,
+                p.unit,
+                number(p.lowest),
+                number(p.mean),
+                number(p.highest),
+                f"{100 * p.usable_share:.1f}",
+            )
+            for p in found.points
+        ],  # fmt: skip
+    )

@@ -1,0 +1,163 @@
+"""What a command writes: tables and sentences or JSON on stdout, a progress bar on stderr."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable, Mapping, Sequence
+from threading import Lock, Timer
+from types import TracebackType
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.progress import Progress, TaskID
+
+#: Options that every command with results has.
+Json = Annotated[bool, typer.Option("--json", help="Write JSON on stdout, and nothing else.")]
+Force = Annotated[bool, typer.Option("--force", help="Replace earlier results in the folder.")]
+
+#: Width of tables where the output is no terminal [characters].
+PLAIN_WIDTH = 120
+
+#: A bar appears after this time [s].
+PATIENCE = 2.0
+
+#: A table on the terminal ends after this many rows.
+MOST_ROWS = 40
+
+
+def console() -> Console:
+    """Console on stdout that takes text as it stands: names may hold brackets."""
+    from rich.console import Console
+
+    width = None if sys.stdout.isatty() else PLAIN_WIDTH
+    return Console(file=sys.stdout, width=width, markup=False, highlight=False, emoji=False)
+
+
+def say(text: str) -> None:
+    """Write a sentence or two to stdout.
+
+    Parameters
+    ----------
+    text : str
+        Wrapped at the width of the terminal.
+    """
+    console().print(text, soft_wrap=not sys.stdout.isatty())
+
+
+def complain(text: str) -> None:
+    """Write a line to stderr.
+
+    Parameters
+    ----------
+    text : str
+        As it stands.
+    """
+    typer.echo(text, err=True)
+
+
+def show_table(
+    title: str, columns: Sequence[str], rows: Iterable[Sequence[str]], more: str = "--json lists them all"
+) -> None:
+    """Write a table to stdout; the first column is text, the others are numbers.
+
+    Parameters
+    ----------
+    title : str
+        Above the table.
+    columns : sequence of str
+        Headers.
+    rows : iterable of sequence of str
+        Cells.
+    more : str
+        Where to find the rows that are left out of a long table.
+    """
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+    from rich.text import Text
+
+    listed = list(rows)
+    table = Table(title=Text(title, style="bold"), title_justify="left", box=SIMPLE_HEAD, pad_edge=False)
+    for number, name in enumerate(columns):
+        table.add_column(name, justify="right" if number else "left", overflow="fold")
+    for row in listed[:MOST_ROWS]:
+        table.add_row(*row)
+    out = console()
+    out.print(table)
+    if len(listed) > MOST_ROWS:
+        out.print(f"and {len(listed) - MOST_ROWS} more; {more}")
+
+
+def write_json(content: Mapping[str, Any]) -> None:
+    """Write JSON to stdout.
+
+    Parameters
+    ----------
+    content : mapping
+        Plain types.
+    """
+    from calibration import to_json
+
+    typer.echo(to_json(content))
+
+
+class Waiting:
+    """A progress bar on stderr that appears when a command takes long and someone is watching.
+
+    Parameters
+    ----------
+    label : str
+        What is being done.
+    """
+
+    def __init__(self, label: str) -> None:
+        self.label = label
+        self._lock = Lock()
+        self._timer: Timer | None = None
+        self._bar: Progress | None = None
+        self._task: TaskID | None = None
+        self._state: tuple[str, int, int | None] = (label, 0, None)
+
+    def __enter__(self) -> Waiting:
+        if sys.stderr.isatty():
+            self._timer = Timer(PATIENCE, self._appear)
+            self._timer.daemon = True
+            self._timer.start()
+        return self
+
+    def __call__(self, stage: str, done: int, total: int) -> None:
+        with self._lock:
+            self._state = (f"{self.label}: {stage}" if stage not in self.label else self.label, done, total)
+            if self._bar is not None and self._task is not None:
+                name, done, full = self._state
+                self._bar.update(self._task, description=name, completed=done, total=full)
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+        with self._lock:
+            if self._bar is not None:
+                self._bar.stop()
+            self._timer = None
+
+    def _appear(self) -> None:
+        from rich.console import Console
+        from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+        with self._lock:
+            if self._timer is None:
+                return
+            columns = (
+                SpinnerColumn(),
+                TextColumn("{task.description}", markup=False),
+                BarColumn(),
+                TimeElapsedColumn(),
+            )
+            self._bar = Progress(*columns, console=Console(stderr=True), transient=True)
+            name, done, total = self._state
+            self._task = self._bar.add_task(name, completed=done, total=total)
+            self._bar.start()

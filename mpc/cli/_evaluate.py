@@ -1,0 +1,90 @@
+"""``buildingmpc evaluate``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from mpc.cli._console import Force, Json, Waiting, say, show_table, write_json
+
+if TYPE_CHECKING:
+    from calibration import Evaluation
+
+Dx = Annotated[
+    float | None, typer.Option(metavar="M", help="Distance between control volumes of a plan; default its cell size.")
+]
+Parameters = Annotated[
+    Path | None, typer.Option(metavar="FILE", help="calibration.json of this case; default: before calibration.")
+]
+SchemeName = Annotated[str, typer.Option(metavar="NAME", help="Time stepping: implicit_euler or tr_bdf2.")]
+
+
+def evaluate(
+    case: Annotated[Path, typer.Argument(metavar="CASE", help="Case folder.")],
+    parameters: Parameters = None,
+    horizon: Annotated[str, typer.Option(metavar="TIME", help="Prediction horizon, such as 6h or 90min.")] = "6h",
+    interval: Annotated[
+        list[str] | None,
+        typer.Option(metavar="START/END", help="Interval to evaluate, repeatable; default: all the telemetry."),
+    ] = None,
+    dx: Dx = None,
+    scheme: SchemeName = "implicit_euler",
+    out: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Folder for evaluation.json, predictions.parquet, report.html.")
+    ] = None,
+    force: Force = False,
+    json: Json = False,
+) -> int:
+    """Evaluate a model over N steps."""
+    from calibration import HORIZONS, Interval, check_results_folder, evaluate_model, parse_interval, write_evaluation
+    from mpc.cli._model import chosen_scheme, quick_model, ready_model
+    from thermal import load_case, replay_inputs
+
+    if out is not None:
+        check_results_folder(out, force)
+    loaded = load_case(case)
+    intervals = [parse_interval(text, loaded) for text in interval or ()]
+    intervals = sorted(intervals, key=lambda i: i.start) or [Interval(loaded.stamps[0], loaded.stamps[-1])]
+    stepping = chosen_scheme(scheme)
+    with Waiting("evaluate") as progress:
+        ready = ready_model(loaded, parameters, dx)
+        inputs = replay_inputs(loaded, ready.grid.network)
+        model = quick_model(ready, inputs, intervals[0], horizon, stepping)
+        found = evaluate_model(
+            model, ready.theta, inputs, intervals, horizon, trajectories=out is not None, horizons=HORIZONS,
+            scheme=stepping, progress=progress,
+        )  # fmt: skip
+        report = write_evaluation(found, loaded, out, parameters=ready.source, force=force) if out is not None else None
+    if json:
+        write_json(found.to_dict())
+        return 0
+    _show(found, ready.source)
+    if report is not None:
+        say(f"Report: {report}")
+    return 0
+
+
+def _show(found: Evaluation, source: str) -> None:
+    from calibration import evaluation_verdict
+
+    say(f"{evaluation_verdict(found)} Parameters: {source}.")
+    show_table(
+        "Intervals",
+        ("from", "to", "runs", "skipped", "MAE [K]", "median [K]", "bias [K]"),
+        [
+            (
+                i["start"],
+                i["end"],
+                str(i["runs"]),
+                str(i["skipped"]),
+                *(f"{i[k]:.3f}" for k in ("mae", "median", "bias")),
+            )
+            for i in found.to_dict()["intervals"]
+        ],
+    )
+    if found.by_horizon:
+        show_table("Horizons", ("horizon", "MAE [K]"), [(h, f"{mae:.3f}") for h, mae in found.by_horizon.items()])
+    zones = sorted(found.by_zone().items(), key=lambda item: -item[1]["mae"])
+    show_table("Zones", ("zone", "MAE [K]", "bias [K]"), [(z, f"{e['mae']:.3f}", f"{e['bias']:.3f}") for z, e in zones])
