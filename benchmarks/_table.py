@@ -1,56 +1,39 @@
-"""Writes one table as JSON and Markdown, and into a page between ``<!-- name -->`` and ``<!-- end name -->``."""
+"""Tables of the benchmarks: JSON and Markdown beside each other, and the marked sections of the README."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-
-def markdown(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """Lay out a Markdown table.
-
-    Parameters
-    ----------
-    header : sequence of str, shape (n_column,)
-        Column titles, units in brackets.
-    rows : iterable of sequences of str, each of shape (n_column,)
-        Cells.
-
-    Returns
-    -------
-    str
-        The table, ending in a line break.
-    """
-    lines = [list(header), ["---"] * len(header), *(list(row) for row in rows)]
-    return "".join(f"| {' | '.join(line)} |\n" for line in lines)
+ROOT = Path(__file__).parents[1]
 
 
-def write_table(out: Path, name: str, data: dict[str, Any], text: str, page: Path | None = None) -> None:
-    """Write ``name.json`` and ``name.md`` to a folder and, when given, the text into a page.
+def markdown(columns: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
+    """Lay out a Markdown table; floats are given to three significant digits."""
 
-    Parameters
-    ----------
-    out : Path
-        Folder, made if there is none.
-    name : str
-        Of the two files and of the page's markers.
-    data : dict
-        Everything that was measured.
-    text : str
-        The same as Markdown.
-    page : Path, optional
-        Page that holds ``<!-- name -->`` and ``<!-- end name -->``; what stands between them is replaced.
-    """
+    def cell(value: Any) -> str:
+        return f"{value:.3g}" if isinstance(value, float) else str(value)
+
+    lines = ["| " + " | ".join(columns) + " |", "|" + "---|" * len(columns)]
+    return "\n".join([*lines, *("| " + " | ".join(cell(v) for v in row) + " |" for row in rows)]) + "\n"
+
+
+def write(out: Path, name: str, table: str, data: Any, readme: bool) -> None:
+    """Write ``name.json`` and ``name.md`` to ``out`` and, if asked, the table between its marks in the README."""
     out.mkdir(parents=True, exist_ok=True)
     (out / f"{name}.json").write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
-    (out / f"{name}.md").write_text(text, encoding="utf-8")
-    if page is None:
-        return
-    start, end = f"<!-- {name} -->\n", f"<!-- end {name} -->"
-    old = page.read_text(encoding="utf-8")
-    if start not in old or end not in old.split(start, 1)[1]:
-        raise SystemExit(f"{page}: expected the lines '{start.strip()}' and '{end}' around the table, found none")
-    before, rest = old.split(start, 1)
-    page.write_text(before + start + text + end + rest.split(end, 1)[1], encoding="utf-8")
+    (out / f"{name}.md").write_text(table, encoding="utf-8")
+    if readme:
+        replace_section(ROOT / "README.md", name, table)
+
+
+def replace_section(page: Path, name: str, table: str) -> None:
+    """Replace what stands between ``<!-- begin NAME -->`` and ``<!-- end NAME -->``."""
+    text = page.read_text(encoding="utf-8")
+    begin, end = f"<!-- begin {name} -->\n", f"<!-- end {name} -->"
+    if begin not in text or end not in text:
+        raise SystemExit(f"{page}: expected the marks {begin.strip()} and {end}")
+    head, rest = text.split(begin, 1)
+    page.write_text(head + begin + table.rstrip() + "\n" + end + rest.split(end, 1)[1], encoding="utf-8")

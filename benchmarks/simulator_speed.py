@@ -12,8 +12,8 @@ the state and once for all slopes together.
 Times are CPU times of the process on one thread, so that other processes count less, but they share cache and memory:
 medians and, in brackets, minima. The wall time of a step is its median.
 
-Run: ``python benchmarks/simulator_speed.py --out results/speed [--page README.md]``; two minutes on one core. Writes
-``simulator_speed.json`` and ``.md``; with ``--page`` also the table between that page's ``simulator_speed`` markers.
+Run: ``python benchmarks/simulator_speed.py --out results/speed [--readme]``; a minute on one core. Writes
+``simulator_speed.json`` and ``.md``; with ``--readme`` also the table in the README.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import scipy.sparse as sp
-from _table import markdown, write_table
+from _table import markdown, write
 from scipy.sparse.linalg import splu
 
 from thermal import Building, SymbolicModel, build_network
@@ -206,14 +206,14 @@ def main() -> None:
     """Measure and write the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=Path, required=True, help="folder of the results")
-    parser.add_argument("--page", type=Path, help="page whose simulator_speed section is replaced as well")
+    parser.add_argument("--readme", action="store_true", help="replace the table in the README")
     options = parser.parse_args()
     bandwidth = read_bandwidth()
     building = pilot()
     rows = [measure(building, dx, bandwidth) for dx in SPACINGS]
     text = report(rows, bandwidth)
     data = {"bandwidth": bandwidth, "seed": SEED, "step": STEP, "steps": N_STEP, "parameters": PARAMETERS, "rows": rows}
-    write_table(options.out, "simulator_speed", data, text, options.page)
+    write(options.out, "simulator_speed", text, data, options.readme)
     print(text)
 
 

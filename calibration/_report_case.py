@@ -56,14 +56,18 @@ def check_verdict(check: CaseCheck) -> str:
     measured = sum(bool(z.measured_by) for z in check.zones)
     usable = 1.0 - float(np.mean([c.unusable_share for c in check.quality.columns]))
     flawed = sum(c.unusable_share > 0 for c in check.quality.columns)
-    length = (check.end - check.start).total_seconds() + check.step
     parts = [
         f"The case is valid: {counted(len(check.zones), 'zone')} on {significant(check.floor_area)} m², {measured}",
-        f"of them measured, {counted(len(check.devices), 'device')}, {length / 86400:.3g} days of telemetry every",
+        f"of them measured, {counted(len(check.devices), 'device')}, {_days(check):.3g} days of telemetry every",
         f"{duration(check.step)}. {100 * usable:.1f} % of its values can be used",
     ]
     text = " ".join(parts) + (f"; {flawed} of {len(check.quality.columns)} columns lack some." if flawed else ".")
     return text + (f" {counted(len(check.remarks), 'remark').capitalize()}." if check.remarks else "")
+
+
+def _days(check: CaseCheck) -> float:
+    """Length of the telemetry [days]."""
+    return float((check.end - check.start).total_seconds() + check.step) / 86400.0
 
 
 def _check_content(check: CaseCheck) -> dict[str, Any]:
@@ -136,13 +140,17 @@ def quality_rows(check: CaseCheck) -> list[list[str]]:
     ]  # fmt: skip
 
 
-def simulation_summary(simulation: Simulation) -> dict[str, Any]:
+def simulation_summary(simulation: Simulation, case: Case, parameters: str = "uncalibrated") -> dict[str, Any]:
     """Contents of ``simulation.json``: errors of a replay, and the heat that drove it.
 
     Parameters
     ----------
     simulation : Simulation
         From `thermal.model.simulate`.
+    case : Case
+        The case that was replayed.
+    parameters : str
+        Where the parameters come from.
     """
     error = simulation.simulated - simulation.measured
     seen = error.columns[error.notna().any()]
@@ -156,6 +164,7 @@ def simulation_summary(simulation: Simulation) -> dict[str, Any]:
     }
     stamps = pd.DatetimeIndex(error.index)
     return {
+        "case": case.building.name,
         "start": simulation.start.isoformat(),
         "end": stamps[-1].isoformat(),
         "step_seconds": (stamps[0] - simulation.start).total_seconds(),
@@ -163,6 +172,8 @@ def simulation_summary(simulation: Simulation) -> dict[str, Any]:
         "mae": float(error.abs().mean(axis=1).mean()) if len(seen) else float("nan"),
         "bias": float(error.mean(axis=1).mean()) if len(seen) else float("nan"),
         "by_zone": by_zone,
+        "parameters": parameters,
+        "version": version("buildingmpc"),
     }
 
 
@@ -195,12 +206,7 @@ def write_simulation(
         When the folder holds something and ``force`` is not set.
     """
     check_results_folder(out, force)
-    summary = {
-        "case": case.building.name,
-        **simulation_summary(simulation),
-        "parameters": parameters,
-        "version": version("buildingmpc"),
-    }
+    summary = simulation_summary(simulation, case, parameters)
     files: dict[str, Any] = {
         "simulation.json": summary,
         "simulation.parquet": _simulation_table(simulation),

@@ -184,7 +184,7 @@ def _canvas(
     axes.set_xlabel("[m]", fontsize=8)
     scale = 72.0 * min(shown / columns, 6.0 / rows)  # points a cell
     for zone, (text, colour) in labels.items():
-        _label(axes, floor.tokens == zone, cell, scale, text, ink_on(colour))
+        _label(axes, floor.tokens == zone, cell, scale, text, ink_on(colour), 8.0 if len(labels) < 30 else 6.5)
     _north(axes, orientation)
     return figure, axes
 
@@ -203,26 +203,28 @@ def _north(axes: Axes, orientation: float) -> None:
     axes.annotate("N", along(16.0), xycoords=corner, fontsize=7, ha="center", va="center", annotation_clip=False)
 
 
-def _label(axes: Axes, mine: NDArray[np.bool_], cell: float, scale: float, text: str, ink: str) -> None:
+def _label(axes: Axes, mine: NDArray[np.bool_], cell: float, scale: float, text: str, ink: str, largest: float) -> None:
     """Write into the roomiest place of a zone; the number alone, or nothing, where more does not fit."""
     depth = distance_transform_edt(np.pad(mine, 1))[1:-1, 1:-1]
     deepest = depth.max()
     centre = np.argwhere(mine).mean(axis=0)
-    best = (0.0, 0.0, 0.0, 0.0, "")
+    best = (-np.inf, 0.0, 0.0, 0, "")
     for row in np.flatnonzero(depth.max(axis=1) >= 0.6 * deepest):
         for first, last in _runs(mine[row] & (depth[row] >= 0.5 * deepest)):
             column = 0.5 * (first + last)
             far = abs(row - centre[0]) + abs(column - centre[1])
             height = 2.0 * float(depth[row, first : last + 1].max()) * scale
             for lines in (text, text.rpartition("\n")[2]):
-                width = 0.64 * max(map(len, lines.split("\n")))
-                size = min(8.0, (last - first + 1.5) * scale / width, height / (1.3 * (lines.count("\n") + 1)))
+                width = 0.66 * max(map(len, lines.split("\n")))
+                size = min(largest, (last - first + 1.3) * scale / width, height / (1.3 * (lines.count("\n") + 1)))
                 better = size - 0.05 * far + (1.0 if lines == text else 0.0)
                 if size >= SMALLEST_LABEL and better > best[0]:
-                    best = (better, size, column, float(row), lines)
+                    best = (better, size, column, int(row), lines)
     _, size, column, at, lines = best
     if lines:
-        axes.text((column + 0.5) * cell, (at + 0.5) * cell, lines, fontsize=size, color=ink, ha="center", va="center")
+        above, below = next(r for r in _runs(depth[:, int(column)] >= depth[at, int(column)]) if r[0] <= at <= r[1])
+        x, y = (column + 0.5) * cell, 0.5 * (above + below + 1) * cell
+        axes.text(x, y, lines, fontsize=size, color=ink, ha="center", va="center", linespacing=1.15)
 
 
 def _runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:

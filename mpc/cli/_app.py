@@ -23,6 +23,8 @@ P = ParamSpec("P")
 #: Exit codes of the contract: success is 0.
 FAILURE, BAD_INPUT = 1, 2
 
+_settings = {"debug": False}
+
 _FAMILIES = {"ThermalError", "CalibrationError", "MpcError"}
 
 app = typer.Typer(
@@ -45,14 +47,13 @@ def _version(asked: bool) -> None:
 
 @app.callback()
 def options(
-    context: typer.Context,
     debug: Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")] = False,
     version: Annotated[
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version and exit.")
     ] = False,
 ) -> None:
     """Take the options that stand before the subcommand."""
-    context.obj = {"debug": debug}
+    _settings["debug"] = debug
 
 
 def _guarded(command: Callable[P, int]) -> Callable[P, None]:
@@ -67,28 +68,23 @@ def _guarded(command: Callable[P, int]) -> Callable[P, None]:
         except OSError as error:
             if error.errno == errno.EPIPE:  # the reader of a pipe has gone: nothing to say to anyone
                 raise
-            code = _report(error)
+            code = _report(error, command.__name__)
         except Exception as error:
-            code = _report(error)
+            code = _report(error, command.__name__)
         raise typer.Exit(code)
 
     return run
 
 
-def _report(error: Exception) -> int:
+def _report(error: Exception, command: str) -> int:
     """Say what went wrong on stderr and choose the exit code."""
-    import click
-
-    if isinstance(error, click.ClickException):
-        raise error
-    context = click.get_current_context(silent=True)
-    if context is not None and context.find_root().obj and context.find_root().obj["debug"]:
+    if _settings["debug"]:
         traceback.print_exception(error, file=sys.stderr)
     typer.echo(f"error: {type(error).__name__}: {error}", err=True)
     if any(base.__name__ in _FAMILIES for base in type(error).__mro__):
         return BAD_INPUT
-    if context is not None:
-        typer.echo(f"For the traceback: buildingmpc --debug {context.info_name} ...", err=True)
+    if not _settings["debug"]:
+        typer.echo(f"For the traceback: buildingmpc --debug {command} ...", err=True)
     return FAILURE
 
 

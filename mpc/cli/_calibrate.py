@@ -143,6 +143,7 @@ def show_calibration(result: CalibrationResult, report: Path) -> None:
             for p in result.parameters
             if p.standard_error is not None
         ],
+        left=(0, 3, 6),
         more="calibration.json lists them all",
     )  # fmt: skip
     solver = result.solver
@@ -182,6 +183,8 @@ def _calibrate_all(folders: list[Path], out: Path, options: _Options, json: bool
     if json:
         write_json({"cases": found})
     else:
-        show_table(f"Held-out error {options.horizon} ahead", ("case", "before [K]", "after [K]", "status"), rows)
+        show_table(
+            f"Held-out error {options.horizon} ahead", ("case", "before [K]", "after [K]", "status"), rows, left=(0, 3)
+        )
         say(f"Results: {out}")
     return 0 if not any(codes) else 2 if all(code == 2 for code in codes) else 1

@@ -47,15 +47,18 @@ def show_check(found: CaseCheck) -> None:
     """
     from calibration import check_verdict, quality_rows
 
-    say(f"{found.name} ({found.geometry}), {found.start:%Y-%m-%d %H:%M} to {found.end:%Y-%m-%d %H:%M} "
-        f"{found.location.timezone}")  # fmt: skip
+    say(
+        f"{found.name} ({found.geometry}), {found.start:%Y-%m-%d %H:%M} to {found.end:%Y-%m-%d %H:%M} "
+        f"{found.location.timezone}"
+    )
     say(check_verdict(found))
     for remark in found.remarks:
         say(f"- {remark}")
     show_table(
         "Zones",
         ("zone", "floor", "area [m²]", "volume [m³]", "sensors", "devices"),
-        [
+        left=(0, 1, 5),
+        rows=[
             (
                 z.name,
                 z.floor or "–",
@@ -83,7 +86,8 @@ def _show_points(found: CaseCheck) -> None:
     show_table(
         "Measured points",
         ("column", "of", "meaning", "unit", "lowest", "mean", "highest", "usable [%]"),
-        [
+        left=(0, 1, 2, 3),
+        rows=[
             (
                 p.column,
                 p.zone or p.entity_kind,
@@ -95,5 +99,5 @@ def _show_points(found: CaseCheck) -> None:
                 f"{100 * p.usable_share:.1f}",
             )
             for p in found.points
-        ],  # fmt: skip
+        ],
     )

@@ -19,7 +19,7 @@ Json = Annotated[bool, typer.Option("--json", help="Write JSON on stdout, and no
 Force = Annotated[bool, typer.Option("--force", help="Replace earlier results in the folder.")]
 
 #: Width of tables where the output is no terminal [characters].
-PLAIN_WIDTH = 120
+PLAIN_WIDTH = 240
 
 #: A bar appears after this time [s].
 PATIENCE = 2.0
@@ -59,9 +59,13 @@ def complain(text: str) -> None:
 
 
 def show_table(
-    title: str, columns: Sequence[str], rows: Iterable[Sequence[str]], more: str = "--json lists them all"
+    title: str,
+    columns: Sequence[str],
+    rows: Iterable[Sequence[str]],
+    left: Sequence[int] = (0,),
+    more: str = "--json lists them all",
 ) -> None:
-    """Write a table to stdout; the first column is text, the others are numbers.
+    """Write a table to stdout.
 
     Parameters
     ----------
@@ -71,6 +75,8 @@ def show_table(
         Headers.
     rows : iterable of sequence of str
         Cells.
+    left : sequence of int
+        Columns of text; the others are numbers.
     more : str
         Where to find the rows that are left out of a long table.
     """
@@ -79,12 +85,13 @@ def show_table(
     from rich.text import Text
 
     listed = list(rows)
-    table = Table(title=Text(title, style="bold"), title_justify="left", box=SIMPLE_HEAD, pad_edge=False)
+    table = Table(box=SIMPLE_HEAD, pad_edge=False)
     for number, name in enumerate(columns):
-        table.add_column(name, justify="right" if number else "left", overflow="fold")
+        table.add_column(name, justify="left" if number in left else "right", overflow="fold")
     for row in listed[:MOST_ROWS]:
         table.add_row(*row)
     out = console()
+    out.print(Text(f"\n{title}", style="bold"))
     out.print(table)
     if len(listed) > MOST_ROWS:
         out.print(f"and {len(listed) - MOST_ROWS} more; {more}")

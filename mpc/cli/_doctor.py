@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from importlib import metadata
+from typing import Any
 
 from mpc.cli._console import Json, say, show_table
 
@@ -48,11 +49,12 @@ def doctor(json: Json = False) -> int:
         return 0 if fine else 1
     core = [p for p in packages if not p.extra]
     say(f"{DISTRIBUTION} {metadata.version(DISTRIBUTION)}, Python {platform.python_version()}, {platform.platform()}")
-    show_table("Core", ("package", "wanted", "installed", ""), [_row(p) for p in core])
-    show_table("Solvers", ("test", "", ""), [(n, "fine" if ok else "FAILED", text) for n, (ok, text) in tests.items()])
-    lines = [(e, "installed" if ok else "missing", "" if ok else install_line(e)) for e, ok in extras.items()]
+    show_table("Core", ("package", "wanted", "installed", ""), [_row(p) for p in core], left=(0, 3))
+    checks = [(n, "fine" if ok else "FAILED", text) for n, (ok, text) in tests.items()]
+    show_table("Solvers", ("test", "", ""), checks, left=(0, 1, 2))
+    lines = [(e, _lacking(packages, e), "" if ok else install_line(e)) for e, ok in extras.items()]
     if lines:
-        show_table("Extras", ("extra", "", "to add it"), lines)
+        show_table("Extras", ("extra", "lacks", "to add it"), lines, left=(0, 1, 2))
     say("All is well." if fine else f"Something in the core is missing or broken: pip install --upgrade {DISTRIBUTION}")
     return 0 if fine else 1
 
@@ -94,6 +96,10 @@ def _belongs(need: object, extra: str) -> bool:
     return marker is not None and not marker.evaluate({"extra": ""}) and marker.evaluate({"extra": extra})
 
 
+def _lacking(packages: list[Package], extra: str) -> str:
+    return ", ".join(p.name for p in packages if p.extra == extra and not p.fine) or "nothing"
+
+
 def _row(p: Package) -> tuple[str, str, str, str]:
     state = "" if p.fine else "MISSING" if p.found is None else "TOO OLD OR TOO NEW"
     return p.name, p.wanted or "any", p.found or "–", state
@@ -115,7 +121,7 @@ def _ipopt() -> str:
 
     x = ca.SX.sym("x", 2)
     problem = {"x": x, "f": (1 - x[0]) ** 2 + 100 * (x[1] - x[0] ** 2) ** 2, "g": ca.sumsqr(x)}
-    options = {"print_time": False, "ipopt": {"print_level": 0, "sb": "yes"}}
+    options: dict[str, Any] = {"print_time": False, "ipopt": {"print_level": 0, "sb": "yes"}}
     solver = ca.nlpsol("doctor", "ipopt", problem, options)
     found = solver(x0=[0.0, 0.0], lbg=-ca.inf, ubg=1.0)
     if not solver.stats()["success"]:

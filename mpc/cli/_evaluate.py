@@ -73,7 +73,8 @@ def _show(found: Evaluation, source: str) -> None:
     show_table(
         "Intervals",
         ("from", "to", "runs", "skipped", "MAE [K]", "median [K]", "bias [K]"),
-        [
+        left=(0, 1),
+        rows=[
             (
                 i["start"],
                 i["end"],

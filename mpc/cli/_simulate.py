@@ -48,7 +48,7 @@ def simulate(
             progress=lambda done: progress("simulate", done, steps),
         )
         report = write_simulation(found, loaded, out, parameters=ready.source, force=force) if out is not None else None
-    summary = {"case": loaded.building.name, **simulation_summary(found), "parameters": ready.source}
+    summary = simulation_summary(found, loaded, ready.source)
     if json:
         write_json(summary)
         return 0
