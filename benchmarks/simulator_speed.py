@@ -18,13 +18,10 @@ Run: ``python benchmarks/simulator_speed.py --out results/speed [--readme]``; a 
 
 from __future__ import annotations
 
-import os
-
-for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-    os.environ[_name] = "1"  # one core; must be set before NumPy is loaded
-
 import argparse
+import os
 import platform
+import sys
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -142,7 +139,7 @@ class Replay:
 
 
 def random_shuffle(network: ThermalNetwork) -> tuple[RandomShuffle, FloatArray]:
-    """The paper's shuffle over whole zones with p = 0.5, and temperatures for it."""
+    """Make the paper's shuffle over whole zones with p = 0.5, and temperatures for it."""
     air = np.flatnonzero(network.kind == "air")
     cells = [np.flatnonzero(network.zone[air] == zone) for zone in range(len(network.zones))]
     positions = network.place[air][:, 1:] * float(network.spacing or 0.0)
@@ -202,8 +199,16 @@ def report(rows: list[dict[str, Any]], bandwidth: float) -> str:
     return markdown(header, lines) + "\n" + note
 
 
+def use_one_thread() -> None:
+    """Start again with one thread for linear algebra, which must be known before NumPy is loaded."""
+    if os.environ.get("OMP_NUM_THREADS") != "1":
+        os.environ["OMP_NUM_THREADS"] = "1"
+        os.execv(sys.executable, sys.orig_argv)
+
+
 def main() -> None:
     """Measure and write the table."""
+    use_one_thread()
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=Path, required=True, help="folder of the results")
     parser.add_argument("--readme", action="store_true", help="replace the table in the README")

@@ -54,6 +54,8 @@ class _Cache:
         self.error: Exception | None = None
 
     def __call__(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        if self.error is not None:  # Ipopt would go on trying shorter steps: a stationary point ends it
+            return np.zeros(1), np.zeros((1, x.size))
         key = x.tobytes()
         if key not in self.values:
             if len(self.values) > 3:

@@ -130,11 +130,14 @@ def _with_horizons(result: CalibrationResult, grid: SymbolicModel, inputs: Input
     evaluation = result.calibrated["held_out"]
     if evaluation.by_horizon:
         return evaluation
+    main = pd.Timedelta(result.horizon)
+    others = [h for h in HORIZONS if pd.Timedelta(h) != main]
     model = reduced_model(grid, [result.theta]) if result.grid_check.max_difference <= CHECK_TOLERANCE else grid
-    further = evaluate_model(
-        model, result.theta, inputs, result.held_out, result.horizon, horizons=HORIZONS, scheme=SCHEMES[scheme]
-    )
-    return replace(evaluation, by_horizon=further.by_horizon)
+    found = evaluate_model(
+        model, result.theta, inputs, result.held_out, result.horizon, horizons=others, scheme=SCHEMES[scheme]
+    ).by_horizon
+    errors = {h: evaluation.metrics.mae if pd.Timedelta(h) == main else found.get(h) for h in HORIZONS}
+    return replace(evaluation, by_horizon={h: mae for h, mae in errors.items() if mae is not None})
 
 
 def _content(result: CalibrationResult, case: Case, grid: SymbolicModel, inputs: Inputs, scheme: str) -> dict[str, Any]:

@@ -70,7 +70,7 @@ def write_evaluation(
         ],
         "horizons": [[h, f"{mae:.3f}"] for h, mae in evaluation.by_horizon.items()],
         "figures": drawn,
-        "zones": zone_rows(evaluation.by_zone()),
+        "zones": _zone_rows(evaluation.by_zone()),
         "reproduce": [("version", f"buildingmpc {version('buildingmpc')}"), ("parameters", parameters)],
     }
     files: dict[str, Any] = {
@@ -219,7 +219,7 @@ def interval_rows(evaluation: Evaluation) -> list[list[str]]:
     ]
 
 
-def zone_rows(errors: dict[str, dict[str, float]]) -> list[list[str]]:
+def _zone_rows(errors: dict[str, dict[str, float]]) -> list[list[str]]:
     """Rows of the table of zones, the largest error first."""
     return [
         [z, f"{e['mae']:.3f}", signed(e["bias"])] for z, e in sorted(errors.items(), key=lambda item: -item[1]["mae"])

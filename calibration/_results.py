@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from calibration.errors import ResultsExistError
+from calibration.errors import CalibrationError, ResultsExistError
 
 
 def check_results_folder(out: str | Path, force: bool = False) -> Path:
@@ -37,16 +37,23 @@ def check_results_folder(out: str | Path, force: bool = False) -> Path:
     ------
     ResultsExistError
         When it holds something and ``force`` is not set, or is a file.
+    CalibrationError
+        When it cannot be written to.
     """
     folder = Path(out)
     if (folder.exists() or folder.is_symlink()) and not folder.is_dir():
         raise ResultsExistError(f"{folder}: expected a folder for results, found a file; choose another name")
+    nearest = next((p for p in (folder, *folder.absolute().parents) if p.exists()), Path("/"))
+    if not nearest.is_dir() or not os.access(nearest, os.W_OK | os.X_OK):
+        raise CalibrationError(
+            f"{folder}: expected a place that can be written to, and {nearest} cannot; choose another"
+        )
     if folder.is_dir() and not force:
         held = sorted(path.name for path in folder.iterdir())
         if held:
             shown = ", ".join(held[:4]) + (f" and {len(held) - 4} more" if len(held) > 4 else "")
             raise ResultsExistError(
-                f"{folder}: expected an empty or new folder, found {shown}; choose another, or replace them with force"
+                f"{folder}: expected an empty or new folder, found {shown}; choose another, or --force (force=True)"
             )
     return folder
 

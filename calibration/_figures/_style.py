@@ -95,7 +95,8 @@ def picture(figure: Figure, alt: str) -> Picture:
     """Turn a figure into an SVG that a page holds itself."""
     buffer = io.BytesIO()
     figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
-    encoded = base64.b64encode(buffer.getvalue()).decode("ascii")
+    drawn = buffer.getvalue()
+    encoded = base64.b64encode(drawn[drawn.index(b"<svg") :]).decode("ascii")  # without the address of a DTD
     return Picture(f"data:image/svg+xml;base64,{encoded}", alt, round(figure.get_size_inches()[0] * 96))
 
 

@@ -30,7 +30,7 @@ def tile_map(zones: tuple[str, ...], areas: FloatArray, error: FloatArray, title
     width, height = 6.0, 3.4
     scale = error_scale(error)
     order = np.argsort(-areas, kind="stable")
-    boxes = squarify(areas[order] / areas.sum() * width * height, (0.0, 0.0, width, height))
+    boxes = _squarify(areas[order] / areas.sum() * width * height, (0.0, 0.0, width, height))
     figure = Figure(figsize=(6.4, 4.3))
     axes = figure.subplots()
     for i, (x, y, w, h) in zip(order, boxes, strict=True):
@@ -50,7 +50,7 @@ def tile_map(zones: tuple[str, ...], areas: FloatArray, error: FloatArray, title
     return [picture(figure, f"Error of each zone, {title}: {listed}")]
 
 
-def squarify(sizes: FloatArray, box: Box) -> list[Box]:
+def _squarify(sizes: FloatArray, box: Box) -> list[Box]:
     """Cut a rectangle into tiles of given areas that are as square as can be.
 
     Bruls, Huizing & van Wijk (2000), doi:10.1007/978-3-7091-6783-0_4.

@@ -7,6 +7,7 @@ import sys
 import traceback
 from collections.abc import Callable
 from functools import wraps
+from io import TextIOWrapper
 from typing import Annotated, ParamSpec
 
 import typer
@@ -113,4 +114,7 @@ for _command, _help, _example in (
 
 def main() -> None:
     """Run the console command and leave with its exit code."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):
+            stream.reconfigure(errors="replace")  # a terminal without the letter must not turn a result into an error
     app()

@@ -28,7 +28,7 @@ PATIENCE = 2.0
 MOST_ROWS = 40
 
 
-def console() -> Console:
+def _console() -> Console:
     """Console on stdout that takes text as it stands: names may hold brackets."""
     from rich.console import Console
 
@@ -44,7 +44,7 @@ def say(text: str) -> None:
     text : str
         Wrapped at the width of the terminal.
     """
-    console().print(text, soft_wrap=not sys.stdout.isatty())
+    _console().print(text, soft_wrap=not sys.stdout.isatty())
 
 
 def complain(text: str) -> None:
@@ -90,7 +90,7 @@ def show_table(
         table.add_column(name, justify="left" if number in left else "right", overflow="fold")
     for row in listed[:MOST_ROWS]:
         table.add_row(*row)
-    out = console()
+    out = _console()
     out.print(Text(f"\n{title}", style="bold"))
     out.print(table)
     if len(listed) > MOST_ROWS:

@@ -15,7 +15,7 @@ DISTRIBUTION = "buildingmpc"
 
 
 @dataclass(frozen=True)
-class Package:
+class _Package:
     """A package that the project asks for.
 
     Parameters
@@ -39,7 +39,7 @@ class Package:
 
 def doctor(json: Json = False) -> int:
     """Look at the installation."""
-    packages = installed_packages()
+    packages = _installed_packages()
     tests = {name: _run(test) for name, test in (("ipopt", _ipopt), ("splu", _splu))}
     missing = {p.extra for p in packages if p.extra and not p.fine}
     extras = {p.extra: p.extra not in missing for p in packages if p.extra}
@@ -52,14 +52,14 @@ def doctor(json: Json = False) -> int:
     show_table("Core", ("package", "wanted", "installed", ""), [_row(p) for p in core], left=(0, 3))
     checks = [(n, "fine" if ok else "FAILED", text) for n, (ok, text) in tests.items()]
     show_table("Solvers", ("test", "", ""), checks, left=(0, 1, 2))
-    lines = [(e, _lacking(packages, e), "" if ok else install_line(e)) for e, ok in extras.items()]
+    lines = [(e, _lacking(packages, e), "" if ok else _install_line(e)) for e, ok in extras.items()]
     if lines:
         show_table("Extras", ("extra", "lacks", "to add it"), lines, left=(0, 1, 2))
     say("All is well." if fine else f"Something in the core is missing or broken: pip install --upgrade {DISTRIBUTION}")
     return 0 if fine else 1
 
 
-def installed_packages() -> list[Package]:
+def _installed_packages() -> list[_Package]:
     """Compare what the project asks for with what is installed."""
     from packaging.requirements import Requirement
 
@@ -76,11 +76,11 @@ def installed_packages() -> list[Package]:
         except metadata.PackageNotFoundError:
             version = None
         fine = version is not None and need.specifier.contains(version, prereleases=True)
-        found.append(Package(need.name, str(need.specifier), extra, version, fine))
+        found.append(_Package(need.name, str(need.specifier), extra, version, fine))
     return found
 
 
-def install_line(extra: str) -> str:
+def _install_line(extra: str) -> str:
     """Spell the command that adds an extra.
 
     Parameters
@@ -96,11 +96,11 @@ def _belongs(need: object, extra: str) -> bool:
     return marker is not None and not marker.evaluate({"extra": ""}) and marker.evaluate({"extra": extra})
 
 
-def _lacking(packages: list[Package], extra: str) -> str:
+def _lacking(packages: list[_Package], extra: str) -> str:
     return ", ".join(p.name for p in packages if p.extra == extra and not p.fine) or "nothing"
 
 
-def _row(p: Package) -> tuple[str, str, str, str]:
+def _row(p: _Package) -> tuple[str, str, str, str]:
     state = "" if p.fine else "MISSING" if p.found is None else "TOO OLD OR TOO NEW"
     return p.name, p.wanted or "any", p.found or "–", state
 
@@ -142,7 +142,7 @@ def _splu() -> str:
     return "" if error < 1e-9 else f"expected an error below 1e-9, found {error:.2g}"
 
 
-def _write(packages: list[Package], extras: dict[str, bool], tests: dict[str, tuple[bool, str]], fine: bool) -> None:
+def _write(packages: list[_Package], extras: dict[str, bool], tests: dict[str, tuple[bool, str]], fine: bool) -> None:
     from json import dumps
 
     import typer
@@ -152,7 +152,7 @@ def _write(packages: list[Package], extras: dict[str, bool], tests: dict[str, tu
         "python": platform.python_version(),
         "platform": platform.platform(),
         "packages": [asdict(p) for p in packages],
-        "extras": {e: {"installed": ok, "install": install_line(e)} for e, ok in extras.items()},
+        "extras": {e: {"installed": ok, "install": _install_line(e)} for e, ok in extras.items()},
         "tests": {name: {"fine": ok, "detail": text} for name, (ok, text) in tests.items()},
         "fine": fine,
     }

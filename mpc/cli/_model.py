@@ -27,7 +27,7 @@ COMPARED_DAYS = 2.0
 
 
 @dataclass(frozen=True)
-class ReadyModel:
+class _ReadyModel:
     """A model on the grid at one θ.
 
     Parameters
@@ -45,7 +45,7 @@ class ReadyModel:
     source: str
 
 
-def ready_model(case: Case, parameters: Path | None, dx: float | None) -> ReadyModel:
+def ready_model(case: Case, parameters: Path | None, dx: float | None) -> _ReadyModel:
     """Build a case's model with the parameters of a file, or those before calibration.
 
     Parameters
@@ -66,16 +66,16 @@ def ready_model(case: Case, parameters: Path | None, dx: float | None) -> ReadyM
     scopes = {n.partition("@")[0]: "zone" for n in names if "@" in n} if isinstance(names, dict) else {}
     network = build_network(case.building, dx=dx, scopes=scopes)  # type: ignore[arg-type]
     if parameters is None:
-        return ReadyModel(SymbolicModel(network), network.start(), "uncalibrated start values")
-    return ReadyModel(SymbolicModel(network), load_parameters(parameters, network), parameters.name)
+        return _ReadyModel(SymbolicModel(network), network.start(), "uncalibrated start values")
+    return _ReadyModel(SymbolicModel(network), load_parameters(parameters, network), parameters.name)
 
 
-def quick_model(ready: ReadyModel, inputs: Inputs, interval: Interval, horizon: str, scheme: Scheme) -> SymbolicModel:
+def quick_model(ready: _ReadyModel, inputs: Inputs, interval: Interval, horizon: str, scheme: Scheme) -> SymbolicModel:
     """Reduce a model, as `calibrate` does, and keep the grid where the reduced model is not accurate enough.
 
     Parameters
     ----------
-    ready : ReadyModel
+    ready : _ReadyModel
         Model on the grid.
     inputs : Inputs
         The telemetry.

@@ -1,0 +1,240 @@
+"""The subcommands: what they print, what they write, and with which code they leave."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner
+
+from mpc.cli._app import app
+from thermal.data import bundled_case_path
+
+CASE = str(bundled_case_path())
+EPILOGS = ("check", "simulate", "evaluate", "calibrate", "demo", "doctor")
+
+
+def run(*arguments: str | Path) -> Any:
+    """Run the command in this process."""
+    return CliRunner().invoke(app, [str(a) for a in arguments])
+
+
+@pytest.fixture(scope="module")
+def calibrated(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("cli") / "results"
+    answer = run("calibrate", CASE, "--out", out, "--dx", "1.0", "--json")
+    assert answer.exit_code == 0, answer.stderr
+    assert json.loads(answer.stdout) == json.loads((out / "calibration.json").read_text(encoding="utf-8"))
+    return out
+
+
+@pytest.fixture
+def spoilt(tmp_path: Path) -> Path:
+    folder = tmp_path / "spoilt"
+    shutil.copytree(CASE, folder)
+    text = (folder / "building.yaml").read_text(encoding="utf-8")
+    (folder / "building.yaml").write_text(text.replace("zone: F1_N", "zone: F1_X"), encoding="utf-8")
+    return folder
+
+
+@pytest.mark.parametrize("command", EPILOGS)
+def test_help_has_an_example(command: str) -> None:
+    answer = run(command, "--help")
+    assert answer.exit_code == 0
+    assert f"Example: buildingmpc {command}" in " ".join(answer.stdout.split())
+
+
+def test_only_what_exists_is_offered() -> None:
+    answer = run("--help")
+    assert answer.exit_code == 0
+    assert sorted(c.name or c.callback.__name__ for c in app.registered_commands) == sorted(EPILOGS)
+
+
+def test_version() -> None:
+    assert run("--version").stdout.startswith("buildingmpc ")
+
+
+def test_check_prints_what_is_there() -> None:
+    answer = run("check", CASE)
+    assert (answer.exit_code, answer.stderr) == (0, "")
+    for text in ("The case is valid", "F1_N", "102.2", "VAV_F1_N/zone_air_temperature_sensor", "degC"):
+        assert text in answer.stdout
+
+
+def test_check_writes_and_answers_in_json(tmp_path: Path) -> None:
+    answer = run("check", CASE, "--out", tmp_path / "check", "--json")
+    assert (answer.exit_code, answer.stderr) == (0, "")
+    assert json.loads(answer.stdout) == json.loads((tmp_path / "check" / "check.json").read_text(encoding="utf-8"))
+    assert (tmp_path / "check" / "report.html").is_file()
+
+
+def test_bad_input_is_named_on_stderr(spoilt: Path) -> None:
+    answer = run("check", spoilt, "--json")
+    assert (answer.exit_code, answer.stdout) == (2, "")
+    assert answer.stderr.startswith("error: UnknownZoneError: ")
+    assert "nearest valid one is 'F1_W'" in answer.stderr and "Traceback" not in answer.stderr
+
+
+def test_debug_shows_the_traceback(spoilt: Path) -> None:
+    answer = run("--debug", "check", spoilt)
+    assert answer.exit_code == 2
+    assert "Traceback" in answer.stderr and "error: UnknownZoneError" in answer.stderr
+    assert "Traceback" not in run("check", spoilt).stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("check", "nowhere"), "MissingFileError"),
+        (("check",), "Missing argument"),
+        (("check", CASE, "--jsn"), "No such option"),
+        (("evaluate", CASE, "--horizon", "7min"), "HorizonError"),
+        (("evaluate", CASE, "--interval", "2023-03-05"), "IntervalError"),
+        (("evaluate", CASE, "--scheme", "euler"), "MpcError: scheme: expected one of implicit_euler, tr_bdf2"),
+        (("evaluate", CASE, "--parameters", f"{CASE}/building.yaml"), "ParameterFileError"),
+        (("evaluate", CASE, "--dx", "0.3"), "CellSizeError"),
+        (("simulate", CASE, "--start", "soon", "--end", "2023-03-05"), "InvalidTimeError"),
+        (("simulate", CASE, "--start", "2023-03-01T01:00", "--end", "2023-03-02"), "SimulationError"),
+        (("calibrate", CASE), "Missing option"),
+        (("calibrate", CASE, "--out", "unused", "--starts", "0"), "CalibrationError: starts"),
+        (("calibrate", CASE, "--out", "unused", "--tune", "2023-03-02/2023-03-05"), "CalibrationError: intervals"),
+        (("calibrate", "nowhere", "--out", "unused"), "MissingFileError"),
+    ],
+)
+def test_bad_requests(
+    arguments: tuple[str, ...], message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    answer = run(*arguments)
+    assert (answer.exit_code, answer.stdout) == (2, "")
+    assert message in answer.stderr and "Traceback" not in answer.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_unexpected_error_is_a_failure(monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(path: object) -> None:
+        raise ZeroDivisionError("of no one's making")
+
+    monkeypatch.setattr("thermal.case.check_case", broken)
+    answer = run("check", CASE)
+    assert (answer.exit_code, answer.stdout) == (1, "")
+    assert answer.stderr == (
+        "error: ZeroDivisionError: of no one's making\nFor the traceback: buildingmpc --debug check ...\n"
+    )
+
+
+def test_results_are_kept_unless_forced(calibrated: Path) -> None:
+    answer = run("calibrate", CASE, "--out", calibrated, "--dx", "1.0")
+    assert answer.exit_code == 2
+    assert "ResultsExistError" in answer.stderr and "--force" in answer.stderr
+    answer = run("check", CASE, "--out", calibrated / "calibration.json")
+    assert answer.exit_code == 2 and "found a file" in answer.stderr
+
+
+def test_evaluate_takes_the_grid_of_the_parameters(calibrated: Path, tmp_path: Path) -> None:
+    interval = "2023-03-07T16:05/2023-03-11"
+    out = tmp_path / "errors"
+    answer = run(
+        "evaluate",
+        CASE,
+        "--parameters",
+        calibrated / "calibration.json",
+        "--interval",
+        interval,
+        "--json",
+        "--out",
+        out,
+    )
+    assert (answer.exit_code, answer.stderr) == (0, "")
+    found = json.loads(answer.stdout)
+    assert found == json.loads((out / "evaluation.json").read_text(encoding="utf-8"))
+    wanted = json.loads((calibrated / "evaluation.json").read_text(encoding="utf-8"))
+    assert found["mae"] == pytest.approx(wanted["mae"], abs=1e-3)
+    assert list(found["by_horizon"]) == ["5min", "1h", "3h", "6h", "24h"]
+    assert sorted(p.name for p in out.iterdir()) == ["evaluation.json", "predictions.parquet", "report.html"]
+
+
+def test_evaluate_without_parameters_is_uncalibrated(calibrated: Path) -> None:
+    answer = run("evaluate", CASE, "--dx", "1.0", "--interval", "2023-03-07T16:05/2023-03-11")
+    assert answer.exit_code == 0
+    assert "uncalibrated start values" in answer.stdout and "F1_S" in answer.stdout
+    before = json.loads((calibrated / "calibration.json").read_text(encoding="utf-8"))["uncalibrated"]["held_out"]
+    assert f"{before['mae']:.3f}" in answer.stdout
+
+
+def test_simulate(calibrated: Path, tmp_path: Path) -> None:
+    arguments = ("simulate", CASE, "--start", "2023-03-05", "--end", "2023-03-06T12:00", "--out", tmp_path / "replay")
+    answer = run(*arguments, "--parameters", calibrated / "calibration.json")
+    assert (answer.exit_code, answer.stderr) == (0, "")
+    assert "F1_W" in answer.stdout and "report.html" in answer.stdout
+    content = json.loads((tmp_path / "replay" / "simulation.json").read_text(encoding="utf-8"))
+    assert (content["steps"], content["step_seconds"]) == (432, 300.0)
+    assert content["start"] == "2023-03-05T00:00:00-05:00" and 0.0 < content["mae"] < 2.0
+    assert set(content["by_zone"]) == {"F1_N", "F1_W", "F1_C", "F1_E", "F1_S"}
+
+
+def test_a_folder_of_cases_reports_each(spoilt: Path, tmp_path: Path) -> None:
+    shutil.copytree(CASE, spoilt.parent / "whole")
+    out = tmp_path / "out"
+    answer = run("calibrate", spoilt.parent, "--out", out, "--dx", "2.0", "--json")
+    assert answer.exit_code == 1
+    cases = json.loads(answer.stdout)["cases"]
+    assert cases["spoilt"]["error"] == "UnknownZoneError"
+    assert cases["whole"]["solver"]["success"] is True
+    assert "error: spoilt: UnknownZoneError" in answer.stderr
+    assert [p.name for p in out.iterdir()] == ["whole"] and (out / "whole" / "report.html").is_file()
+    shutil.rmtree(spoilt.parent / "whole")
+    answer = run("calibrate", spoilt.parent, "--out", tmp_path / "none")
+    assert answer.exit_code == 2 and "UnknownZoneError" in answer.stdout
+
+
+def test_a_solver_that_does_not_converge_is_a_failure_with_results(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from dataclasses import replace
+
+    import calibration
+
+    fit = calibration.calibrate
+
+    def stopped(*args: Any, **settings: Any) -> Any:
+        result = fit(*args, **settings)
+        return replace(result, solver=replace(result.solver, success=False, status="Maximum_Iterations_Exceeded"))
+
+    monkeypatch.setattr(calibration, "calibrate", stopped)
+    answer = run("calibrate", CASE, "--out", tmp_path / "results", "--dx", "2.0")
+    assert answer.exit_code == 1
+    assert "did not converge: Maximum_Iterations_Exceeded" in answer.stderr
+    assert "do not rely on these numbers" in answer.stdout
+    assert (tmp_path / "results" / "calibration.json").is_file()
+
+
+def test_doctor() -> None:
+    answer = run("doctor", "--json")
+    content = json.loads(answer.stdout)
+    assert content["fine"] is True and answer.exit_code == 0
+    assert content["tests"]["ipopt"]["fine"] and content["tests"]["splu"]["fine"]
+    assert content["extras"]["energyplus"]["install"] == 'pip install "buildingmpc[energyplus]"'
+    assert {"casadi", "scipy", "typer"} <= {p["name"] for p in content["packages"] if not p["extra"]}
+    assert "All is well" in run("doctor").stdout
+
+
+def test_doctor_reports_what_is_broken(monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken() -> str:
+        raise ImportError("no module named casadi")
+
+    monkeypatch.setattr("mpc.cli._doctor._ipopt", broken)
+    answer = run("doctor")
+    assert answer.exit_code == 1
+    assert "ImportError: no module named casadi" in answer.stdout and "FAILED" in answer.stdout
+
+
+def test_demo(tmp_path: Path) -> None:
+    answer = run("demo", "--out", tmp_path / "demo")
+    assert (answer.exit_code, answer.stderr) == (0, "")
+    for text in ("The bundled case", "The case is valid", "on data it was not fitted to", "Solve_Succeeded"):
+        assert text in answer.stdout
+    assert f"Report: {tmp_path / 'demo' / 'report.html'}" in answer.stdout

@@ -1,0 +1,94 @@
+"""Sparse factors of the symmetric matrix of a step, without the entries that lie far below round-off."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import scipy.sparse as sp
+import scipy.sparse.linalg as spl
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+#: Entries of the factors below this share of their column are left out [-]. What one volume passes on decays with every
+#: volume between, so up to two fifths of the complete factors lie below it; double precision ends at 1e-16.
+NEGLIGIBLE = 1e-20
+
+#: Largest componentwise backward error [-] with which such factors are kept; complete factors have 1e-16 to 2e-14.
+BACKWARD_ERROR = 1e-12
+
+#: Right-hand sides that are solved for together; more of them no longer fit the cache (twice as slow at 100).
+_COLUMNS = 8
+
+#: First guess of the factors' size over that of the matrix [-]; SuperLU enlarges it when it has to.
+_FILL = 10
+
+
+def sparse_solver(system: sp.csr_matrix) -> Callable[[FloatArray], FloatArray]:
+    """Factorise a sparse symmetric positive definite matrix with SuperLU.
+
+    Minimum degree on A + A^T without pivoting keeps the structure symmetric, which is four times faster than SuperLU's
+    default. Factors that lack what is negligible solve as exactly as complete ones; one solve confirms it by its
+    componentwise backward error (Oettli and Prager 1964, doi:10.1007/BF01386090), and complete factors replace them if
+    it does not.
+
+    Parameters
+    ----------
+    system : csr_matrix, shape (n, n)
+        Matrix of the step [J/K].
+
+    Returns
+    -------
+    callable
+        Solves for right-hand sides of shape (n,) or (n, m).
+
+    Raises
+    ------
+    RuntimeError
+        When the matrix is singular.
+    """
+    matrix = sp.csc_matrix(system)
+    return _solver(_negligible_left_out(matrix) or _complete(matrix))
+
+
+def _complete(matrix: sp.csc_matrix) -> spl.SuperLU:
+    """Complete factors."""
+    return spl.splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+
+
+def _negligible_left_out(matrix: sp.csc_matrix) -> spl.SuperLU | None:
+    """Factors without what is negligible; None where they would not be as exact as complete ones."""
+    try:
+        factors = spl.spilu(
+            matrix,
+            drop_tol=NEGLIGIBLE,
+            fill_factor=_FILL,
+            drop_rule="basic",
+            permc_spec="MMD_AT_PLUS_A",
+            diag_pivot_thresh=0.0,
+            panel_size=1,  # the fastest for columns as short as these
+            options={"SymmetricMode": True},
+        )
+    except RuntimeError:  # a pivot of zero: complete factors tell whether the matrix is singular
+        return None
+    rhs = np.random.default_rng(0).standard_normal(matrix.shape[0])
+    solution = factors.solve(rhs)
+    with np.errstate(all="ignore"):  # a solution that is not finite fails the comparison
+        scale = abs(matrix) @ np.abs(solution) + np.abs(rhs)
+        exact = np.abs(matrix @ solution - rhs) <= BACKWARD_ERROR * scale
+    return factors if exact.all() else None
+
+
+def _solver(factors: spl.SuperLU) -> Callable[[FloatArray], FloatArray]:
+    def solve(rhs: FloatArray) -> FloatArray:
+        if rhs.size == rhs.shape[0]:
+            # the matrix is its own transpose, and sums over rows of the factors are faster than updates by columns
+            return np.asarray(factors.solve(np.ravel(rhs), "T")).reshape(rhs.shape)
+        solution = np.empty(rhs.shape, order="F")
+        for first in range(0, rhs.shape[1], _COLUMNS):
+            block = slice(first, first + _COLUMNS)
+            solution[:, block] = factors.solve(np.asfortranarray(rhs[:, block]))
+        return solution
+
+    return solve
