@@ -5,12 +5,13 @@ factorisation, one step of implicit Euler and of TR-BDF2, six hours (72 steps of
 sensitivities of the paper's eight parameters, and one random shuffle.
 
 A step must read the factors L and U once. Its bound is their size - 8 byte a value and 4 byte an index for each
-nonzero of the complete factors - over the bandwidth of one core, measured in the same run as the best of several sums
-over an array far larger than the caches. TR-BDF2 reads the factors twice; so does a step with sensitivities, once for
-the state and once for all slopes together.
+nonzero - over the bandwidth of one core, measured in the same run as the best of several reductions of an array far
+larger than the caches. It is given for the complete factors and for those that `thermal` keeps, which lack what lies
+below 1e-20 of its column. TR-BDF2 reads the factors twice; so does a step with sensitivities, once for the state and
+once for all slopes together.
 
-Times are CPU times of the process on one thread, so that other processes count less, but they share cache and memory:
-medians and, in brackets, minima. The wall time of a step is its median.
+Times are CPU times of the process on one thread, so that other processes count less; but they share cache and memory,
+so each is a median, with the minimum in brackets.
 
 Run: ``python benchmarks/simulator_speed.py --out results/speed [--readme]``; a minute on one core. Writes
 ``simulator_speed.json`` and ``.md``; with ``--readme`` also the table in the README.
@@ -36,6 +37,7 @@ from scipy.sparse.linalg import splu
 
 from thermal import Building, SymbolicModel, build_network
 from thermal.model import IMPLICIT_EULER, TR_BDF2, Matrices, Scheme, Stepper, factorise
+from thermal.model._factor import SparseSolver
 from thermal.network import ThermalNetwork
 from thermal.pilot import MOUNTAIN_VIEW, devices, generate_office
 from thermal.shuffle import RandomShuffle
@@ -96,12 +98,14 @@ def eight_parameters(model: SymbolicModel) -> Matrices:
     )
 
 
-def factor_bytes(system: sp.csr_matrix) -> int:
-    """Bytes of the complete factors L and U: minimum degree on A + A^T, no pivoting."""
-    factors = splu(
+def factor_bytes(system: sp.csr_matrix) -> tuple[int, int]:
+    """Bytes of the complete factors L and U (minimum degree on A + A^T, no pivoting), and of those that are kept."""
+    complete = splu(
         sp.csc_matrix(system), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
     )
-    return int(factors.L.nnz + factors.U.nnz) * (VALUE_BYTES + INDEX_BYTES)
+    kept = SparseSolver(system)
+    each = VALUE_BYTES + INDEX_BYTES
+    return (complete.L.nnz + complete.U.nnz) * each, kept.nonzeros * each
 
 
 class Replay:
@@ -152,7 +156,7 @@ def measure(building: Building, dx: float, bandwidth: float) -> dict[str, Any]:
     network = build_network(building, dx=dx)
     matrices = eight_parameters(SymbolicModel(network))
     system = sp.csr_matrix(matrices.capacity + STEP * matrices.flow[:, : matrices.n])
-    size = factor_bytes(system)
+    size, kept = factor_bytes(system)
     repeats = int(np.clip(4e6 / matrices.n, 41, 401))
     euler, bdf2 = Replay(matrices, network), Replay(matrices, network, TR_BDF2)
     shuffle, temperatures = random_shuffle(network)
@@ -165,38 +169,44 @@ def measure(building: Building, dx: float, bandwidth: float) -> dict[str, Any]:
     }
     reads = {"step": 1, "tr_bdf2_step": 2, "sensitivities": 2 * N_STEP}
     for name, count in reads.items():
-        bound = count * size / bandwidth
-        times[name] |= {"bound": bound, "ratio": times[name]["cpu_median"] / bound}
-    cells = int((network.place[:, 0] >= 0).sum())
-    return {"dx": dx, "volumes": matrices.n, "cells": cells, "factor_bytes": size, "repeats": repeats, "times": times}
+        times[name] |= {"bound": count * size / bandwidth, "kept_bound": count * kept / bandwidth}
+    sizes = {"volumes": matrices.n, "cells": int((network.place[:, 0] >= 0).sum()), "bytes": size, "kept_bytes": kept}
+    return {"dx": dx, "repeats": repeats, **sizes, "times": times}
 
 
 def report(rows: list[dict[str, Any]], bandwidth: float) -> str:
-    """Lay out the table and what it was measured on."""
-    header = (
-        "dx [m]", "volumes", "L and U [MB]", "factorise [ms]", "step [ms]", "wall [ms]", "bound [ms]", "step / bound",
-        "TR-BDF2 [ms]", "/ bound", "72 steps, 8 sensitivities [s]", "/ bound", "shuffle [ms]",
-    )  # fmt: skip
+    """Lay out the table, one column a spacing, and what it was measured on."""
 
-    def cpu(time_: dict[str, float], scale: float, digits: int) -> str:
-        return f"{scale * time_['cpu_median']:.{digits}f} ({scale * time_['cpu_min']:.{digits}f})"
+    def times(name: str, unit: float, digits: int) -> list[str]:
+        measured = [row["times"][name] for row in rows]
+        return [f"{t['cpu_median'] / unit:.{digits}f} ({t['cpu_min'] / unit:.{digits}f})" for t in measured]
 
-    lines = []
-    for row in rows:
-        t = row["times"]
-        step, bdf2, slopes = t["step"], t["tr_bdf2_step"], t["sensitivities"]
-        lines.append([
-            f"{row['dx']:g}", f"{row['volumes']:,}", f"{row['factor_bytes'] / 1e6:.1f}", cpu(t["factorisation"], 1e3, 0),
-            cpu(step, 1e3, 2), f"{1e3 * step['wall_median']:.2f}", f"{1e3 * step['bound']:.2f}", f"{step['ratio']:.1f}",
-            cpu(bdf2, 1e3, 2), f"{bdf2['ratio']:.1f}", cpu(slopes, 1.0, 2), f"{slopes['ratio']:.1f}",
-            cpu(t["shuffle"], 1e3, 2),
-        ])  # fmt: skip
-    load = os.getloadavg()[0] if hasattr(os, "getloadavg") else float("nan")
+    def ratios(name: str) -> list[str]:
+        measured = [row["times"][name] for row in rows]
+        return [f"{t['cpu_median'] / t['bound']:.1f} ({t['cpu_median'] / t['kept_bound']:.1f})" for t in measured]
+
+    step = [row["times"]["step"] for row in rows]
+    lines = [
+        ["control volumes", *(f"{row['volumes']:,}" for row in rows)],
+        ["of these on the plans' grid", *(f"{row['cells']:,}" for row in rows)],
+        ["complete L and U (kept) [MB]", *(f"{r['bytes'] / 1e6:.1f} ({r['kept_bytes'] / 1e6:.1f})" for r in rows)],
+        ["factorisation [ms]", *times("factorisation", 1e-3, 0)],
+        ["their bound of a step [ms]", *(f"{1e3 * t['bound']:.2f} ({1e3 * t['kept_bound']:.2f})" for t in step)],
+        ["**implicit Euler step** [ms]", *times("step", 1e-3, 2)],
+        ["wall time [ms]", *(f"{1e3 * t['wall_median']:.2f}" for t in step)],
+        ["times the bound", *ratios("step")],
+        ["TR-BDF2 step [ms]", *times("tr_bdf2_step", 1e-3, 2)],
+        ["times the bound", *ratios("tr_bdf2_step")],
+        ["**72 steps, 8 sensitivities** [s]", *times("sensitivities", 1.0, 2)],
+        ["times the bound", *ratios("sensitivities")],
+        ["random shuffle [ms]", *times("shuffle", 1e-3, 2)],
+    ]
     note = (
-        f"CPU time on one core, median (minimum); bounds from a measured read bandwidth of {bandwidth / 1e9:.1f} GB/s. "
-        f"{platform.machine()}, {os.cpu_count()} cores, load average {load:.1f} at the end of the run.\n"
+        f"CPU time of one thread, median (minimum). Bounds: bytes of L and U over {bandwidth / 1e9:.1f} GB/s, the read "
+        f"bandwidth of one core in the same run; complete factors, and (in brackets) those kept without entries below "
+        f"1e-20 of their column. {platform.machine()}, {os.cpu_count()} cores, load average {os.getloadavg()[0]:.1f}.\n"
     )
-    return markdown(header, lines) + "\n" + note
+    return markdown(["distance between volumes", *(f"{row['dx']:g} m" for row in rows)], lines) + "\n" + note
 
 
 def use_one_thread() -> None:

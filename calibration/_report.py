@@ -20,6 +20,7 @@ from calibration._report_evaluation import (
     predictions_table,
     subtitle,
     unchanged_error,
+    zone_rows,
 )
 from calibration._result import CalibrationResult, ParameterEstimate
 from calibration._results import check_results_folder, write_results
@@ -174,6 +175,7 @@ def _content(result: CalibrationResult, case: Case, grid: SymbolicModel, inputs:
         "figures": drawn,
         "parameters": [_parameter_row(p) for p in result.parameters],
         "parameter_figure": figures.parameter_ranges(result.parameters),
+        "zones": zone_rows(after.by_zone()),
         "intervals": [["tuning", *r] for r in interval_rows(result.calibrated["tuning"])]
         + [["held out", *r] for r in interval_rows(after)],
         **_solver_content(result),

@@ -70,7 +70,7 @@ def write_evaluation(
         ],
         "horizons": [[h, f"{mae:.3f}"] for h, mae in evaluation.by_horizon.items()],
         "figures": drawn,
-        "zones": _zone_rows(evaluation.by_zone()),
+        "zones": zone_rows(evaluation.by_zone()),
         "reproduce": [("version", f"buildingmpc {version('buildingmpc')}"), ("parameters", parameters)],
     }
     files: dict[str, Any] = {
@@ -94,8 +94,8 @@ def evaluation_verdict(evaluation: Evaluation) -> str:
     lean = "too warm" if metrics.bias > 0 else "too cold"
     text = f"{ahead} ahead, the model misses the measured zone temperatures by {kelvin(metrics.mae)} K on average"
     text += f" and is {lean} by {kelvin(abs(metrics.bias))} K."
-    better = "which is better than the model" if rest < metrics.mae else "so the model is of use"
-    return f"{text} Assuming that nothing changes misses by {kelvin(rest)} K, {better}."
+    compared = "less" if rest < metrics.mae else "more"
+    return f"{text} Assuming that nothing changes misses by {kelvin(rest)} K, {compared} than the model."
 
 
 def unchanged_error(evaluation: Evaluation) -> float:
@@ -219,7 +219,7 @@ def interval_rows(evaluation: Evaluation) -> list[list[str]]:
     ]
 
 
-def _zone_rows(errors: dict[str, dict[str, float]]) -> list[list[str]]:
+def zone_rows(errors: dict[str, dict[str, float]]) -> list[list[str]]:
     """Rows of the table of zones, the largest error first."""
     return [
         [z, f"{e['mae']:.3f}", signed(e["bias"])] for z, e in sorted(errors.items(), key=lambda item: -item[1]["mae"])

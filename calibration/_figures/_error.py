@@ -33,7 +33,7 @@ def error_growth(groups: Mapping[str, Mapping[str, Evaluation]]) -> list[Picture
     top = 1.08 * max([top, *(float(np.max(r[1])) for r in rest.values() if np.max(r[1]) < 1.6 * top)])
     pictures = []
     for title, models in curves.items():
-        figure = Figure(figsize=(5.6, 3.1))
+        figure = Figure(figsize=(5.6, 3.3))
         axes = figure.subplots()
         axes.plot(*rest[title], color=INK, linestyle=":", linewidth=1.2, label="nothing changes")
         for name, curve in models.items():
@@ -41,7 +41,7 @@ def error_growth(groups: Mapping[str, Mapping[str, Evaluation]]) -> list[Picture
         axes.set_xlim(0, max(c[0][-1] for c in models.values()))
         axes.set_ylim(0, top)
         axes.set(title=title, xlabel="time since the start of the run [h]", ylabel="mean absolute error [K]")
-        axes.legend(fontsize=8, loc="upper left")
+        figure.legend(fontsize=8, loc="outside lower center", ncols=3)
         ends = "; ".join(f"{name} {curve[1][-1]:.2f} K" for name, curve in models.items())
         pictures.append(picture(figure, f"Mean absolute error over the horizon, {title}: at its end {ends}"))
     return pictures

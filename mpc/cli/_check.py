@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mpc.cli._console import Force, Json, say, show_table, write_json
+from mpc.cli._console import Force, Json, is_narrow, say, show_table, write_json
 
 if TYPE_CHECKING:
-    from thermal.case import CaseCheck
+    from thermal.case import CaseCheck, PointSummary
 
 
 def check(
@@ -80,24 +80,21 @@ def show_check(found: CaseCheck) -> None:
 
 
 def _show_points(found: CaseCheck) -> None:
-    def number(value: float | None) -> str:
-        return "–" if value is None else f"{value:.4g}"
-
-    show_table(
-        "Measured points",
-        ("column", "of", "meaning", "unit", "lowest", "mean", "highest", "usable [%]"),
-        left=(0, 1, 2, 3),
-        rows=[
-            (
-                p.column,
-                p.zone or p.entity_kind,
-                p.meaning,
-                p.unit,
-                number(p.lowest),
-                number(p.mean),
-                number(p.highest),
-                f"{100 * p.usable_share:.1f}",
-            )
-            for p in found.points
-        ],
-    )
+    """Write one row a point type; `--json` and the page have one a column."""
+    by_type: dict[str, list[PointSummary]] = {}
+    for point in found.points:
+        by_type.setdefault(point.point, []).append(point)
+    rows = []
+    for name, points in by_type.items():
+        means = [p.mean for p in points if p.mean is not None]
+        lowest = [p.lowest for p in points if p.lowest is not None]
+        highest = [p.highest for p in points if p.highest is not None]
+        numbers = (min(lowest), sum(means) / len(means), max(highest)) if means else ()
+        usable = 100 * sum(p.usable_share for p in points) / len(points)
+        spelled = [f"{number:.4g}" for number in numbers] or ["–"] * 3
+        rows.append((name, points[0].meaning, points[0].unit, str(len(points)), *spelled, f"{usable:.1f}"))
+    columns: tuple[str, ...] = ("point", "meaning", "unit", "sensors", "lowest", "mean", "highest", "usable [%]")
+    if is_narrow():
+        show_table("Measured points", columns[1:], [row[1:] for row in rows], left=(0, 1))
+    else:
+        show_table("Measured points", columns, rows, left=(0, 1, 2))

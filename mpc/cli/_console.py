@@ -21,6 +21,9 @@ Force = Annotated[bool, typer.Option("--force", help="Replace earlier results in
 #: Width of tables where the output is no terminal [characters].
 PLAIN_WIDTH = 240
 
+#: Tables drop a column of words below this width [characters].
+WIDE = 130
+
 #: A bar appears after this time [s].
 PATIENCE = 2.0
 
@@ -34,6 +37,11 @@ def _console() -> Console:
 
     width = None if sys.stdout.isatty() else PLAIN_WIDTH
     return Console(file=sys.stdout, width=width, markup=False, highlight=False, emoji=False)
+
+
+def is_narrow() -> bool:
+    """Whether the terminal has less room than a wide table needs."""
+    return _console().width < WIDE
 
 
 def say(text: str) -> None:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.linalg as spl
@@ -15,7 +13,7 @@ FloatArray = NDArray[np.float64]
 #: volume between, so up to two fifths of the complete factors lie below it; double precision ends at 1e-16.
 NEGLIGIBLE = 1e-20
 
-#: Largest componentwise backward error [-] with which such factors are kept; complete factors have 1e-16 to 2e-14.
+#: Largest componentwise backward error [-] with which such factors are kept; complete ones have 1e-16 to 2e-14.
 BACKWARD_ERROR = 1e-12
 
 #: Right-hand sides that are solved for together; more of them no longer fit the cache (twice as slow at 100).
@@ -25,8 +23,8 @@ _COLUMNS = 8
 _FILL = 10
 
 
-def sparse_solver(system: sp.csr_matrix) -> Callable[[FloatArray], FloatArray]:
-    """Factorise a sparse symmetric positive definite matrix with SuperLU.
+class SparseSolver:
+    """Solves with a sparse symmetric positive definite matrix, which SuperLU factorises once.
 
     Minimum degree on A + A^T without pivoting keeps the structure symmetric, which is four times faster than SuperLU's
     default. Factors that lack what is negligible solve as exactly as complete ones; one solve confirms it by its
@@ -38,18 +36,38 @@ def sparse_solver(system: sp.csr_matrix) -> Callable[[FloatArray], FloatArray]:
     system : csr_matrix, shape (n, n)
         Matrix of the step [J/K].
 
-    Returns
-    -------
-    callable
-        Solves for right-hand sides of shape (n,) or (n, m).
-
     Raises
     ------
     RuntimeError
         When the matrix is singular.
+
+    Examples
+    --------
+    >>> SparseSolver(sp.csr_matrix([[2.0, -1.0], [-1.0, 2.0]]))(np.array([1.0, 1.0])).tolist()
+    [1.0, 1.0]
     """
-    matrix = sp.csc_matrix(system)
-    return _solver(_negligible_left_out(matrix) or _complete(matrix))
+
+    def __init__(self, system: sp.csr_matrix) -> None:
+        matrix = sp.csc_matrix(system)
+        self._factors = _without_negligible(matrix) or _complete(matrix)
+
+    def __call__(self, rhs: FloatArray) -> FloatArray:
+        """Solve for right-hand sides of shape (n,) or (n, m)."""
+        if rhs.size == rhs.shape[0]:
+            # the matrix is its own transpose, and sums over rows of the factors are faster than updates by columns
+            return np.asarray(self._factors.solve(np.ravel(rhs), "T")).reshape(rhs.shape)
+        if rhs.shape[1] <= _COLUMNS:
+            return np.asarray(self._factors.solve(np.asfortranarray(rhs)))
+        solution = np.empty(rhs.shape, order="F")
+        for first in range(0, rhs.shape[1], _COLUMNS):
+            block = slice(first, first + _COLUMNS)
+            solution[:, block] = self._factors.solve(np.asfortranarray(rhs[:, block]))
+        return solution
+
+    @property
+    def nonzeros(self) -> int:
+        """Entries of L and U that are kept."""
+        return int(self._factors.nnz)
 
 
 def _complete(matrix: sp.csc_matrix) -> spl.SuperLU:
@@ -57,7 +75,7 @@ def _complete(matrix: sp.csc_matrix) -> spl.SuperLU:
     return spl.splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
 
 
-def _negligible_left_out(matrix: sp.csc_matrix) -> spl.SuperLU | None:
+def _without_negligible(matrix: sp.csc_matrix) -> spl.SuperLU | None:
     """Factors without what is negligible; None where they would not be as exact as complete ones."""
     try:
         factors = spl.spilu(
@@ -78,17 +96,3 @@ def _negligible_left_out(matrix: sp.csc_matrix) -> spl.SuperLU | None:
         scale = abs(matrix) @ np.abs(solution) + np.abs(rhs)
         exact = np.abs(matrix @ solution - rhs) <= BACKWARD_ERROR * scale
     return factors if exact.all() else None
-
-
-def _solver(factors: spl.SuperLU) -> Callable[[FloatArray], FloatArray]:
-    def solve(rhs: FloatArray) -> FloatArray:
-        if rhs.size == rhs.shape[0]:
-            # the matrix is its own transpose, and sums over rows of the factors are faster than updates by columns
-            return np.asarray(factors.solve(np.ravel(rhs), "T")).reshape(rhs.shape)
-        solution = np.empty(rhs.shape, order="F")
-        for first in range(0, rhs.shape[1], _COLUMNS):
-            block = slice(first, first + _COLUMNS)
-            solution[:, block] = factors.solve(np.asfortranarray(rhs[:, block]))
-        return solution
-
-    return solve

@@ -162,7 +162,7 @@ def spin_up(
 
     The zones are held by whatever heat that takes, so walls, slabs and furniture follow the building as it was
     measured. It starts
-    from the steady state of the first day's mean temperatures.
+    from the steady state of the first 12 hours' mean temperatures.
 
     Parameters
     ----------
@@ -183,13 +183,13 @@ def spin_up(
         States (n, m) [K] and their derivatives (n, n_parameter m) parameter by parameter, or None.
     """
     p = len(matrices.flow_slopes)
-    day = slice(begin, begin + max(1, int(86400.0 / inputs.step)))
+    first = slice(begin, begin + max(1, int(LEAST_SPIN_UP / inputs.step)))  # before any start: nothing of what comes after it
     held, boundary = inputs.held - _REFERENCE, inputs.boundary - _REFERENCE
-    zone = held[day].mean(axis=0)[:, None]
+    zone = held[first].mean(axis=0)[:, None]
     states = float(np.nanmean(zone)) * matrices.uniform[:, None]
     slopes = np.zeros((matrices.n, p)) if p else None
     steady = Stepper(matrices, _STEADY_STEP, IMPLICIT_EULER)
-    states, slopes, _ = steady.hold(states, boundary[day].mean(axis=0)[:, None], zone, slopes)
+    states, slopes, _ = steady.hold(states, boundary[first].mean(axis=0)[:, None], zone, slopes)
     stepper = Stepper(matrices, inputs.step, IMPLICIT_EULER)
     rows = np.arange(begin, int(at[-1]) + 1)
     kept, kept_slopes = stepper.hold_many(states, boundary[rows], held[rows], at - begin, slopes, progress)

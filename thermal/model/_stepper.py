@@ -11,7 +11,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from thermal.errors import ModelError, SingularModelError
-from thermal.model._factor import sparse_solver
+from thermal.model._factor import SparseSolver
 from thermal.model._scheme import IMPLICIT_EULER, Scheme, Stage
 from thermal.model._symbolic import Matrices, Matrix
 from thermal.network import AIR_HEAT_CAPACITY
@@ -247,11 +247,11 @@ class Stepper:
         """Source of the slopes in a stage, (n, n_parameter m): ``-dC (T - T_base) - Δt d[K, -B] [T; u]``."""
         capacity, flow = self._slope_stacks
         n, m = change.shape
-        out = np.zeros((n, self.n_parameter, m))
+        out = np.zeros((self.n_parameter, m, n))  # one slope after the other, as the solver wants its columns
         for (which, matrix), x in ((capacity, -change), (flow, -self.step * full)):
             if which:
-                out[:, which] += np.asarray(matrix @ x).reshape(len(which), n, m).transpose(1, 0, 2)
-        return out.reshape(n, self.n_parameter * m)
+                out[which] += np.asarray(matrix @ x).reshape(len(which), n, m).transpose(0, 2, 1)
+        return out.reshape(self.n_parameter * m, n).T
 
     def _mixing(self, airflow: FloatArray | None) -> FloatArray | None:
         """M for each run, shape (m, n_zone, n_zone) [W/K]: air that enters a zone at another zone's temperature."""
@@ -345,7 +345,7 @@ def factorise(system: Matrix) -> Callable[[FloatArray], FloatArray]:
     """
     try:
         if sp.issparse(system):
-            return sparse_solver(system)
+            return SparseSolver(system)
         factor = sl.cho_factor(np.asarray(system))
         inverse = sl.cho_solve(factor, np.eye(system.shape[0]))
         return lambda rhs: np.asarray(inverse @ rhs)
