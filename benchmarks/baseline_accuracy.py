@@ -1,6 +1,6 @@
 """Held-out error of the baseline before and after calibration, on every case of a folder.
 
-Run: ``python benchmarks/baseline_accuracy.py --cases CASES --out DIR [--readme]``; without ``--cases`` the bundled case.
+Run: ``python benchmarks/baseline_accuracy.py [--cases CASES] --out DIR [--readme]``; always with the bundled case.
 A case that holds an effect which the baseline leaves out keeps an error: finding that effect is what diagnosis is for.
 """
 

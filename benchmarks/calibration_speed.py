@@ -45,7 +45,7 @@ def measure(path: Path) -> list[dict[str, Any]]:
 
 
 def summary(result: CalibrationResult) -> dict[str, Any]:
-    """What the calibration reached."""
+    """Collect what the calibration reached."""
     return {
         "case": result.case,
         "zones": len(result.zones),
@@ -78,8 +78,8 @@ def main() -> None:
     rows = [row for path in paths for row in measure(path)]
     table = markdown(COLUMNS, [cells(row) for row in rows])
     note = (
-        f"{os.cpu_count()} cores, load average {os.getloadavg()[0]:.1f} at the end of the run; MAE of six-hour "
-        f"predictions on the last third of the telemetry.\n"
+        f"{os.cpu_count()} cores, {os.environ.get('OMP_NUM_THREADS', 'as many')} threads of linear algebra, load "
+        f"average {os.getloadavg()[0]:.1f}; MAE of six-hour predictions on the last third of the telemetry.\n"
     )
     write(options.out, "calibration_speed", f"{table}\n{note}", rows, options.readme)
     print(table, note, sep="\n")

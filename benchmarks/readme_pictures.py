@@ -1,6 +1,6 @@
 """The pictures of the README, from a calibration of the bundled case.
 
-Run: ``python benchmarks/readme_pictures.py``. Writes ``docs/images/readme_growth.svg`` and ``docs/images/readme_map.svg``.
+Run: ``python benchmarks/readme_pictures.py``. Writes ``readme_growth.svg`` and ``readme_map.svg`` into ``docs/images``.
 """
 
 from __future__ import annotations

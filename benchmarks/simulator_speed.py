@@ -189,16 +189,19 @@ def report(rows: list[dict[str, Any]], bandwidth: float) -> str:
     lines = [
         ["control volumes", *(f"{row['volumes']:,}" for row in rows)],
         ["of these on the plans' grid", *(f"{row['cells']:,}" for row in rows)],
-        ["complete L and U (kept) [MB]", *(f"{r['bytes'] / 1e6:.1f} ({r['kept_bytes'] / 1e6:.1f})" for r in rows)],
+        ["L and U: complete (kept) [MB]", *(f"{r['bytes'] / 1e6:.1f} ({r['kept_bytes'] / 1e6:.1f})" for r in rows)],
         ["factorisation [ms]", *times("factorisation", 1e-3, 0)],
-        ["their bound of a step [ms]", *(f"{1e3 * t['bound']:.2f} ({1e3 * t['kept_bound']:.2f})" for t in step)],
+        [
+            "bound of a step: complete (kept) [ms]",
+            *(f"{1e3 * t['bound']:.2f} ({1e3 * t['kept_bound']:.2f})" for t in step),
+        ],
         ["**implicit Euler step** [ms]", *times("step", 1e-3, 2)],
         ["wall time [ms]", *(f"{1e3 * t['wall_median']:.2f}" for t in step)],
-        ["times the bound", *ratios("step")],
+        ["over the bound: complete (kept)", *ratios("step")],
         ["TR-BDF2 step [ms]", *times("tr_bdf2_step", 1e-3, 2)],
-        ["times the bound", *ratios("tr_bdf2_step")],
+        ["over the bound: complete (kept)", *ratios("tr_bdf2_step")],
         ["**72 steps, 8 sensitivities** [s]", *times("sensitivities", 1.0, 2)],
-        ["times the bound", *ratios("sensitivities")],
+        ["over the bound: complete (kept)", *ratios("sensitivities")],
         ["random shuffle [ms]", *times("shuffle", 1e-3, 2)],
     ]
     note = (

@@ -124,7 +124,12 @@ class Runs:
 
 
 def select_runs(
-    inputs: Inputs, interval: Interval, steps: int, every: float = 3600.0, spin_up: float = SPIN_UP
+    inputs: Inputs,
+    interval: Interval,
+    steps: int,
+    every: float = 3600.0,
+    spin_up: float = SPIN_UP,
+    least: float = LEAST_SPIN_UP,
 ) -> Runs:
     """Find the runs of an interval.
 
@@ -140,6 +145,8 @@ def select_runs(
         Time between starts [s]; an hour in the contract of results.
     spin_up : float
         Telemetry before the interval that the spin-up may use [s].
+    least : float
+        Least spin-up of a run [s].
 
     Raises
     ------
@@ -153,15 +160,14 @@ def select_runs(
     stride = max(1, round(every / step))
     on_hour = np.flatnonzero((stamps.minute == 0) & (stamps.second == 0))
     anchor = int(on_hour[0]) if on_hour.size else 0
-    least = begin + int(np.ceil(LEAST_SPIN_UP / step))
-    lowest = max(least, first - steps)
+    lowest = max(begin + int(np.ceil(least / step)), first - steps)
     starts = np.arange(anchor, last - steps + 1, stride)
     starts = starts[starts >= lowest]
     if starts.size == 0:
         raise NotEnoughDataError(
             f"interval {interval.start} to {interval.end}: expected room for a run of {steps} steps "
             f"of {step:g} s after "
-            f"{LEAST_SPIN_UP / 3600:g} h of spin-up, found {last - first + 1} stamps"
+            f"{least / 3600:g} h of spin-up, found {last - first + 1} stamps"
         )
     gaps = np.concatenate([[0], np.cumsum(~inputs.complete)])
     whole = gaps[starts + steps + 1] == gaps[starts + 1]

@@ -51,7 +51,7 @@ class _Cache:
         self.function = function
         self.values: dict[bytes, tuple[FloatArray, FloatArray]] = {}
         self.best: tuple[float, FloatArray] | None = None
-        self.error: Exception | None = None
+        self.error: BaseException | None = None
 
     def __call__(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
         if self.error is not None:  # Ipopt would go on trying shorter steps: a stationary point ends it
@@ -62,7 +62,7 @@ class _Cache:
                 self.values.pop(next(iter(self.values)))
             try:
                 self.values[key] = self.function(x)
-            except Exception as error:  # kept: CasADi reports only that a callback failed
+            except BaseException as error:  # kept: CasADi reports only that a callback failed
                 self.error = error
                 raise
             r = self.values[key][0]
@@ -172,8 +172,8 @@ def solve_least_squares(
 
     Raises
     ------
-    Exception
-        Whatever ``function`` raises, unchanged.
+    BaseException
+        Whatever ``function`` raises, unchanged; ``KeyboardInterrupt`` on Ctrl-C during the solve.
     """
     p = start.size
     cache = _Cache(function)
@@ -216,6 +216,8 @@ def solve_least_squares(
     if cache.error is not None:
         raise cache.error
     stats = solver.stats()
+    if stats["return_status"] == "User_Requested_Stop":  # how CasADi ends a solve on Ctrl-C
+        raise KeyboardInterrupt
     best = cache.best if cache.best is not None else (0.5 * float(first[0] @ first[0]), start)
     jacobian = cache(best[1])[1]
     return LeastSquaresResult(

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import platform
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 
 from calibration import _figures as figures
-from calibration._calibrate import CHECK_TOLERANCE
-from calibration._evaluate import HORIZONS, Evaluation, evaluate_model
+from calibration._case_model import CHECK_TOLERANCE
 from calibration._page import clock, counted, duration, kelvin, plain, render, signed, significant, unit
 from calibration._report_evaluation import (
     evaluation_figures,
@@ -24,16 +22,13 @@ from calibration._report_evaluation import (
 )
 from calibration._result import CalibrationResult, ParameterEstimate
 from calibration._results import check_results_folder, write_results
-from thermal import Case, Inputs, SymbolicModel, build_network, reduced_model, replay_inputs
-from thermal.model import SCHEMES
+from thermal import Case, Inputs, SymbolicModel, replay_inputs
 
 #: The heat map shows every cell of the grid up to this many control volumes; beyond, one colour a zone.
 MOST_VOLUMES = 40_000
 
 
-def write_calibration(
-    result: CalibrationResult, case: Case, out: str | Path, *, scheme: str = "implicit_euler", force: bool = False
-) -> Path:
+def write_calibration(result: CalibrationResult, case: Case, out: str | Path, *, force: bool = False) -> Path:
     """Write ``calibration.json``, ``evaluation.json``, ``predictions.parquet`` and ``report.html``.
 
     The last three are of the calibrated model on the held-out intervals.
@@ -46,8 +41,6 @@ def write_calibration(
         The case it was calibrated on.
     out : str or Path
         Folder, made if need be.
-    scheme : str
-        Time stepping of the calibration.
     force : bool
         Replace earlier results.
 
@@ -62,11 +55,10 @@ def write_calibration(
         When the folder holds something and ``force`` is not set.
     """
     check_results_folder(out, force)
-    scopes = {p.name.partition("@")[0]: "zone" for p in result.parameters if "@" in p.name}
-    grid = SymbolicModel(build_network(case.building, dx=result.dx, scopes=scopes))  # type: ignore[arg-type]
+    grid = SymbolicModel(result.settings.network(case.building))
     inputs = replay_inputs(case, grid.network)
-    held_out = _with_horizons(result, grid, inputs, scheme)
-    page = render("calibration", _content(result, case, grid, inputs, scheme))
+    held_out = result.calibrated["held_out"]
+    page = render("calibration", _content(result, case, grid, inputs))
     folder = write_results(
         out,
         {
@@ -126,28 +118,15 @@ def _parameter_sentence(parameters: Sequence[ParameterEstimate]) -> str:
     return "; ".join([*parts, f"{len(bound)} {lie} on a bound{names}, which hints at physics that the model lacks."])
 
 
-def _with_horizons(result: CalibrationResult, grid: SymbolicModel, inputs: Inputs, scheme: str) -> Evaluation:
-    """Complete the held-out evaluation of the calibrated model with the error at every horizon."""
-    evaluation = result.calibrated["held_out"]
-    if evaluation.by_horizon:
-        return evaluation
-    main = pd.Timedelta(result.horizon)
-    others = [h for h in HORIZONS if pd.Timedelta(h) != main]
-    model = reduced_model(grid, [result.theta]) if result.grid_check.max_difference <= CHECK_TOLERANCE else grid
-    found = evaluate_model(
-        model, result.theta, inputs, result.held_out, result.horizon, horizons=others, scheme=SCHEMES[scheme]
-    ).by_horizon
-    errors = {h: evaluation.metrics.mae if pd.Timedelta(h) == main else found.get(h) for h in HORIZONS}
-    return replace(evaluation, by_horizon={h: mae for h, mae in errors.items() if mae is not None})
-
-
-def _content(result: CalibrationResult, case: Case, grid: SymbolicModel, inputs: Inputs, scheme: str) -> dict[str, Any]:
+def _content(result: CalibrationResult, case: Case, grid: SymbolicModel, inputs: Inputs) -> dict[str, Any]:
     before, after = result.uncalibrated["held_out"], result.calibrated["held_out"]
     field = None
     if grid.network.n_node <= MOST_VOLUMES and (grid.network.place >= 0).any():
         which, run = figures.median_run(after)
         start = after.predictions[which].start[run]
-        field = figures.spatial_field(grid, result.theta, inputs, start, after.steps, result.dx, SCHEMES[scheme])
+        field = figures.spatial_field(
+            grid, result.theta, inputs, start, after.steps, result.settings.dx, result.settings.stepping
+        )
     drawn = evaluation_figures(after, case, before=before, field=field)
     drawn["growth"] = figures.error_growth(
         {
@@ -179,7 +158,7 @@ def _content(result: CalibrationResult, case: Case, grid: SymbolicModel, inputs:
         "intervals": [["tuning", *r] for r in interval_rows(result.calibrated["tuning"])]
         + [["held out", *r] for r in interval_rows(after)],
         **_solver_content(result),
-        "reproduce": _reproduce(result, case, scheme),
+        "reproduce": _reproduce(result, case),
     }
 
 
@@ -225,12 +204,13 @@ def _solver_content(result: CalibrationResult) -> dict[str, Any]:
     }
 
 
-def _reproduce(result: CalibrationResult, case: Case, scheme: str) -> list[tuple[str, str]]:
+def _reproduce(result: CalibrationResult, case: Case) -> list[tuple[str, str]]:
     parts = ["buildingmpc calibrate CASE --out RESULTS"]
     parts += [f"--tune {i.start.isoformat()}/{i.end.isoformat()}" for i in result.tuning]
     parts += [f"--hold-out {i.start.isoformat()}/{i.end.isoformat()}" for i in result.held_out]
-    parts += [f"--horizon {result.horizon} --scheme {scheme} --starts {result.solver.starts} --seed {result.seed}"]
-    parts += [f"--dx {result.dx:g}"] if result.dx is not None else []
+    parts += [f"--horizon {result.horizon} --scheme {result.settings.scheme}"]
+    parts += [f"--starts {result.solver.starts} --seed {result.seed}"]
+    parts += [f"--dx {result.settings.dx:g}"] if result.settings.dx is not None else []
     return [
         (
             "case",

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from calibration._evaluate import Evaluation
 from calibration._intervals import Interval
+from calibration._settings import ModelSettings
 from calibration.errors import ParameterFileError
 from thermal import ThermalNetwork
 
@@ -139,8 +140,8 @@ class CalibrationResult:
         Certificate of the reduced model that the numbers were made with.
     horizon : str
         Prediction horizon.
-    dx : float or None
-        Distance between control volumes of a plan [m].
+    settings : ModelSettings
+        How the model was built and run.
     seed : int
         Seed of the starts.
     version : str
@@ -158,7 +159,7 @@ class CalibrationResult:
     solver: SolverReport
     grid_check: GridCheck
     horizon: str
-    dx: float | None
+    settings: ModelSettings
     seed: int
     version: str = field(default="")
 
@@ -180,7 +181,7 @@ class CalibrationResult:
                 "held_out": [i.to_dict() for i in self.held_out],
             },
             "horizon": self.horizon,
-            "dx": self.dx,
+            "settings": self.settings.to_dict(),
             "case": self.case,
             "version": self.version,
             "seed": self.seed,

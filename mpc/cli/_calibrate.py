@@ -50,7 +50,7 @@ def calibrate(
     ] = None,
     dx: Dx = None,
     horizon: Annotated[str, typer.Option(metavar="TIME", help="Prediction horizon, such as 6h or 90min.")] = "6h",
-    scheme: SchemeName = "implicit_euler",
+    scheme: SchemeName = None,
     starts: Annotated[int, typer.Option(metavar="N", help="Number of starts of the solver.")] = 1,
     seed: Annotated[int, typer.Option(metavar="N", help="Seed of the further starts.")] = 0,
     force: Force = False,
@@ -59,7 +59,9 @@ def calibrate(
     """Calibrate a case, or each case of a folder."""
     from calibration import check_results_folder
 
-    options = _Options(tuple(tune or ()), tuple(hold_out or ()), dx, horizon, scheme, starts, seed, force)
+    options = _Options(
+        tuple(tune or ()), tuple(hold_out or ()), dx, horizon, scheme or "implicit_euler", starts, seed, force
+    )
     check_results_folder(out, force)
     inside = sorted(path.parent for path in case.glob(f"*/{_BUILDING}")) if not (case / _BUILDING).exists() else []
     if inside:
@@ -106,8 +108,7 @@ def calibrate_and_write(
 
     with Waiting(label) as progress:
         result = calibration.calibrate(case, progress=progress, **settings)
-        scheme = settings.get("scheme", "implicit_euler")
-        report = calibration.write_calibration(result, case, out, scheme=scheme, force=force)
+        report = calibration.write_calibration(result, case, out, force=force)
     return result, report
 
 

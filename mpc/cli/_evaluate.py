@@ -18,7 +18,10 @@ Dx = Annotated[
 Parameters = Annotated[
     Path | None, typer.Option(metavar="FILE", help="calibration.json of this case; default: before calibration.")
 ]
-SchemeName = Annotated[str, typer.Option(metavar="NAME", help="Time stepping: implicit_euler or tr_bdf2.")]
+SchemeName = Annotated[
+    str | None,
+    typer.Option(metavar="NAME", help="implicit_euler or tr_bdf2; default: as calibrated, else implicit_euler."),
+]
 
 
 def evaluate(
@@ -30,7 +33,7 @@ def evaluate(
         typer.Option(metavar="START/END", help="Interval to evaluate, repeatable; default: all the telemetry."),
     ] = None,
     dx: Dx = None,
-    scheme: SchemeName = "implicit_euler",
+    scheme: SchemeName = None,
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Folder for evaluation.json, predictions.parquet, report.html.")
     ] = None,
@@ -38,29 +41,24 @@ def evaluate(
     json: Json = False,
 ) -> int:
     """Evaluate a model over N steps."""
-    from calibration import HORIZONS, Interval, check_results_folder, evaluate_model, parse_interval, write_evaluation
-    from mpc.cli._model import chosen_scheme, quick_model, ready_model
-    from thermal import load_case, replay_inputs
+    from calibration import check_results_folder, evaluate_case, parse_interval, write_evaluation
+    from thermal import load_case
 
     if out is not None:
         check_results_folder(out, force)
     loaded = load_case(case)
     intervals = [parse_interval(text, loaded) for text in interval or ()]
-    intervals = sorted(intervals, key=lambda i: i.start) or [Interval(loaded.stamps[0], loaded.stamps[-1])]
-    stepping = chosen_scheme(scheme)
+    source = parameters.name if parameters is not None else "uncalibrated start values"
     with Waiting("evaluate") as progress:
-        ready = ready_model(loaded, parameters, dx)
-        inputs = replay_inputs(loaded, ready.grid.network)
-        model = quick_model(ready, inputs, intervals[0], horizon, stepping)
-        found = evaluate_model(
-            model, ready.theta, inputs, intervals, horizon, trajectories=out is not None, horizons=HORIZONS,
-            scheme=stepping, progress=progress,
+        found = evaluate_case(
+            loaded, intervals, parameters=parameters, horizon=horizon, dx=dx, scheme=scheme,
+            trajectories=out is not None, progress=progress,
         )  # fmt: skip
-        report = write_evaluation(found, loaded, out, parameters=ready.source, force=force) if out is not None else None
+        report = write_evaluation(found, loaded, out, parameters=source, force=force) if out is not None else None
     if json:
         write_json(found.to_dict())
         return 0
-    _show(found, ready.source)
+    _show(found, source)
     if report is not None:
         say(f"Report: {report}")
     return 0

@@ -17,7 +17,7 @@ def simulate(
     end: Annotated[str, typer.Option(metavar="T", help="End.")],
     parameters: Parameters = None,
     dx: Dx = None,
-    scheme: SchemeName = "implicit_euler",
+    scheme: SchemeName = None,
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Folder for simulation.json, simulation.parquet, report.html.")
     ] = None,
@@ -25,8 +25,7 @@ def simulate(
     json: Json = False,
 ) -> int:
     """Replay an interval on the grid, from the measured temperatures at its start."""
-    from calibration import check_results_folder, simulation_summary, simulation_verdict, write_simulation
-    from mpc.cli._model import chosen_scheme, ready_model
+    from calibration import case_model, check_results_folder, simulation_summary, simulation_verdict, write_simulation
     from thermal import load_case, local_timestamp
     from thermal.model import simulate as replay
 
@@ -34,17 +33,16 @@ def simulate(
         check_results_folder(out, force)
     loaded = load_case(case)
     first, last = (local_timestamp(time, loaded.building) for time in (start, end))
-    stepping = chosen_scheme(scheme)
     steps = max(1, int((last - first).total_seconds() // loaded.step))
     with Waiting("simulate") as progress:
-        ready = ready_model(loaded, parameters, dx)
+        ready = case_model(loaded, parameters, dx=dx, scheme=scheme)
         found = replay(
             loaded,
             ready.grid,
             ready.theta,
             first,
             last,
-            stepping,
+            ready.settings.stepping,
             progress=lambda done: progress("simulate", done, steps),
         )
         report = write_simulation(found, loaded, out, parameters=ready.source, force=force) if out is not None else None

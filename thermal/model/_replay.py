@@ -183,7 +183,8 @@ def spin_up(
         States (n, m) [K] and their derivatives (n, n_parameter m) parameter by parameter, or None.
     """
     p = len(matrices.flow_slopes)
-    first = slice(begin, begin + max(1, int(LEAST_SPIN_UP / inputs.step)))  # before any start: nothing of what comes after it
+    # these hours lie before any start: a state may know nothing of what comes after it
+    first = slice(begin, begin + max(1, int(LEAST_SPIN_UP / inputs.step)))
     held, boundary = inputs.held - _REFERENCE, inputs.boundary - _REFERENCE
     zone = held[first].mean(axis=0)[:, None]
     states = float(np.nanmean(zone)) * matrices.uniform[:, None]

@@ -1,0 +1,96 @@
+"""How a case's model is built and run: what belongs to a set of parameters beside their values."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from calibration.errors import CalibrationError, ParameterFileError
+from thermal import Building, ThermalNetwork, build_network
+from thermal.model import SCHEMES, SPIN_UP, Scheme
+from thermal.parameters import Scope
+
+
+@dataclass(frozen=True)
+class ModelSettings:
+    """How a case's model is built and run, beside its parameters.
+
+    Parameters
+    ----------
+    dx : float, optional
+        Distance between control volumes of a plan [m]; the plan's cell size by default.
+    reach : float, optional
+        Reach of the shuffle [m]; None is the whole zone.
+    scheme : str
+        ``implicit_euler`` or ``tr_bdf2``.
+    scopes : mapping of str to {"global", "zone"}
+        Parameters with one value a zone.
+    spin_up_seconds : float
+        Length of the spin-up before an interval [s].
+
+    Raises
+    ------
+    CalibrationError
+        When the scheme is unknown.
+    """
+
+    dx: float | None = None
+    reach: float | None = None
+    scheme: str = "implicit_euler"
+    scopes: Mapping[str, Scope] = field(default_factory=dict)
+    spin_up_seconds: float = SPIN_UP
+
+    def __post_init__(self) -> None:
+        if self.scheme not in SCHEMES:
+            raise CalibrationError(f"scheme: expected one of {', '.join(sorted(SCHEMES))}, came {self.scheme!r}")
+
+    @property
+    def stepping(self) -> Scheme:
+        """Time stepping of the free runs."""
+        return SCHEMES[self.scheme]
+
+    def network(self, building: Building) -> ThermalNetwork:
+        """Build the control volumes and faces of a building.
+
+        Parameters
+        ----------
+        building : Building
+            What the case folder describes.
+        """
+        return build_network(building, dx=self.dx, reach=self.reach, scopes=self.scopes)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Entry of ``calibration.json``."""
+        return {**{k: getattr(self, k) for k in self.__dataclass_fields__}, "scopes": dict(self.scopes)}
+
+
+def read_settings(path: str | Path) -> dict[str, Any]:
+    """Read the settings in a file of parameters; `load_parameters` says what else is wrong with it.
+
+    Parameters
+    ----------
+    path : str or Path
+        A ``calibration.json``.
+
+    Raises
+    ------
+    ParameterFileError
+        When the settings are not as `ModelSettings` writes them.
+    """
+    path = Path(path)
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    settings = content.get("settings", {}) if isinstance(content, dict) else {}
+    known = set(ModelSettings.__dataclass_fields__)
+    if not isinstance(settings, dict) or set(settings) - known:
+        raise ParameterFileError(f"{path}: settings: expected a mapping with keys {sorted(known)}, found {settings!r}")
+    for name in ("dx", "reach", "spin_up_seconds"):
+        value = settings.get(name)
+        if value is not None and (isinstance(value, bool) or not isinstance(value, int | float) or value <= 0):
+            raise ParameterFileError(f"{path}: settings.{name}: expected a positive number or null, found {value!r}")
+    return settings
