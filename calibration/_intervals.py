@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -95,7 +96,8 @@ def horizon_steps(horizon: str, step: float) -> int:
         When it is not a positive whole number of steps.
     """
     try:
-        seconds = pd.Timedelta(horizon).total_seconds()
+        day = re.sub(r"d$", "D", horizon.strip())  # pandas is giving up its lower-case day
+        seconds = pd.Timedelta(day).total_seconds()
     except ValueError as error:
         raise HorizonError(f"horizon: expected a duration such as 6h or 90min, came {horizon!r}") from error
     steps = seconds / step

@@ -93,7 +93,7 @@ def test_debug_shows_the_traceback(spoilt: Path) -> None:
         (("check", CASE, "--jsn"), "No such option"),
         (("evaluate", CASE, "--horizon", "7min"), "HorizonError"),
         (("evaluate", CASE, "--interval", "2023-03-05"), "IntervalError"),
-        (("evaluate", CASE, "--scheme", "euler"), "MpcError: scheme: expected one of implicit_euler, tr_bdf2"),
+        (("evaluate", CASE, "--scheme", "euler"), "CalibrationError: scheme: expected one of implicit_euler, tr_bdf2"),
         (("evaluate", CASE, "--parameters", f"{CASE}/building.yaml"), "ParameterFileError"),
         (("evaluate", CASE, "--dx", "0.3"), "CellSizeError"),
         (("simulate", CASE, "--start", "soon", "--end", "2023-03-05"), "InvalidTimeError"),

@@ -102,10 +102,10 @@ def test_zones_are_matched_at_every_start(name: str) -> None:
 
 @pytest.mark.parametrize("name", ["plan", "table"])
 def test_spin_up_is_holding_the_zones_step_by_step(name: str) -> None:
-    """From the steady state of the first 12 hours' means; the same temperatures in kelvin, without a reference."""
+    """From the steady state of the first day's means; the same temperatures in kelvin, without a reference."""
     model, inputs, theta = model_of(name), inputs_of(name), theta_of(name)
     matrices = model.matrices(theta)
-    day = slice(0, 144)
+    day = slice(0, 288)
     zone, boundary = inputs.zone[day].mean(axis=0), inputs.boundary[day].mean(axis=0)
     states = np.full((matrices.n, 1), zone.mean())
     states = Stepper(matrices, 10 * 86400.0).hold(states, boundary[:, None], zone[:, None])[0]

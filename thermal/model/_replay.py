@@ -162,7 +162,7 @@ def spin_up(
 
     The zones are held by whatever heat that takes, so walls, slabs and furniture follow the building as it was
     measured. It starts
-    from the steady state of the first 12 hours' mean temperatures.
+    from the steady state of the mean temperatures of the first day (or of what there is before the first start).
 
     Parameters
     ----------
@@ -183,8 +183,8 @@ def spin_up(
         States (n, m) [K] and their derivatives (n, n_parameter m) parameter by parameter, or None.
     """
     p = len(matrices.flow_slopes)
-    # these hours lie before any start: a state may know nothing of what comes after it
-    first = slice(begin, begin + max(1, int(LEAST_SPIN_UP / inputs.step)))
+    # a day, or what lies before the first start: a state may know nothing of what comes after it
+    first = slice(begin, min(begin + max(1, int(86400.0 / inputs.step)), int(at[0]) + 1))
     held, boundary = inputs.held - _REFERENCE, inputs.boundary - _REFERENCE
     zone = held[first].mean(axis=0)[:, None]
     states = float(np.nanmean(zone)) * matrices.uniform[:, None]
