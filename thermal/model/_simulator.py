@@ -19,8 +19,8 @@ from thermal.shuffle import RandomShuffle
 
 FloatArray = NDArray[np.float64]
 
-#: One long implicit step towards the steady state of a reset [s].
-_STEADY_STEP = 10 * 86400.0
+#: One long implicit step to the steady state of a reset [s], three years.
+_STEADY_STEP = 1e8
 
 #: Temperatures outside of this range are refused as inputs [K].
 PLAUSIBLE = (173.15, 373.15)
@@ -43,8 +43,8 @@ class Simulator:
         ``implicit_euler`` or ``tr_bdf2``.
     shuffle : {"mean", "random"}
         The mean of the shuffle as a term of the model, or the paper's random one after each step.
-    probability : float
-        Probability of the random shuffle per 300 s [-], in [0, 1]; with ``mean`` it is a parameter.
+    probability : float, optional
+        Probability of the shuffle per 300 s [-], in [0, 1]; ``shuffle_probability`` of the parameters by default.
     reach : float, optional
         Reach of the shuffle [m]; None is the whole zone.
     seed : int
@@ -72,12 +72,14 @@ class Simulator:
         dx: float | None = None,
         scheme: str = "implicit_euler",
         shuffle: Literal["mean", "random"] = "mean",
-        probability: float = 0.5,
+        probability: float | None = None,
         reach: float | None = None,
         seed: int = 0,
     ) -> None:
         if scheme not in SCHEMES:
             raise ModelError(f"scheme: expected one of {sorted(SCHEMES)}, came {scheme!r}")
+        if probability is not None and not 0.0 <= probability <= 1.0:
+            raise ModelError(f"probability: expected a number from 0 to 1, came {probability}")
         if shuffle not in ("mean", "random"):
             raise ModelError(f"shuffle: expected 'mean' or 'random', came {shuffle!r}")
         if not (np.isfinite(step_seconds) and step_seconds > 0):
@@ -88,15 +90,21 @@ class Simulator:
         self._start_model = SymbolicModel(
             network if shuffle == "mean" else build_network(building, dx=dx, reach=reach, mean_shuffle=True)
         )
-        self.probability = min(max(probability, 1e-3), 1.0)
+        given = dict(parameters or {})
+        names = [p.name for p in self._start_model.network.parameters]
+        if probability is not None and "shuffle_probability" in names:
+            given["shuffle_probability"] = probability
+        start = dict(zip(names, self._start_model.network.values(given), strict=True))
+        self.probability = float(start.get("shuffle_probability", 0.0))
+        self._start_theta = np.array([max(v, 1e-3) if n == "shuffle_probability" else v for n, v in start.items()])
         self.step_seconds = float(step_seconds)
         self.model = SymbolicModel(network)
-        self.theta = network.values(parameters or {})
+        self.theta = np.array([start[p.name] for p in network.parameters])
         self.matrices = self.model.matrices(self.theta)
         self._stepper = Stepper(self.matrices, self.step_seconds, SCHEMES[scheme], network.airflows)
         self._air = np.flatnonzero(network.kind == "air")
         self._shuffle = (
-            _random_shuffle(network, self.matrices, self._air, probability, reach, seed)
+            _random_shuffle(network, self.matrices, self._air, self.probability, reach, seed)
             if shuffle == "random"
             else None
         )
@@ -145,7 +153,7 @@ class Simulator:
         matrices = self._start_matrices()
         start = zone.mean() * matrices.uniform[:, None]
         states, _, _ = Stepper(matrices, _STEADY_STEP).hold(start, boundary[:, None], zone[:, None])
-        self._states = self._without_stars(states)
+        self._states, self._elapsed = self._without_stars(states), 0.0
         return self.zone_temperatures
 
     def reset_from(self, case: Case, stamp: int, spin_up_seconds: float = SPIN_UP) -> FloatArray:
@@ -177,15 +185,11 @@ class Simulator:
             raise ModelError(f"stamp: expected a row from 1 to {len(inputs) - 1}, came {stamp}")
         begin = max(0, stamp - round(spin_up_seconds / inputs.step))
         states, _ = spin_up(self._start_matrices(), inputs, begin, np.array([stamp]))
-        self._states = self._without_stars(states)
+        self._states, self._elapsed = self._without_stars(states), 0.0
         return self.zone_temperatures
 
     def _start_matrices(self) -> Matrices:
-        given = dict(zip((p.name for p in self.network.parameters), self.theta, strict=True))
-        network = self._start_model.network
-        if self._shuffle is not None:
-            given |= {p.name: self.probability for p in network.parameters if p.name.startswith("shuffle_probability")}
-        return self._start_model.matrices(network.values(given))
+        return self._start_model.matrices(self._start_theta)
 
     def _without_stars(self, states: FloatArray) -> FloatArray:
         """Drop the star nodes that stand for the mean of the shuffle where this simulator has none."""
@@ -218,9 +222,8 @@ class Simulator:
         network = self.network
         heat = self._checked("zone_heat", zone_heat, len(network.zones))
         boundary = self._checked("boundary_temperatures", boundary_temperatures, network.n_boundary, PLAUSIBLE)
-        flow = self._checked(
-            "airflow", np.zeros(len(network.airflows)) if airflow is None else airflow, len(network.airflows)
-        )
+        n_flow = len(network.airflows)
+        flow = self._checked("airflow", np.zeros(n_flow) if airflow is None else airflow, n_flow, (0.0, np.inf))
         states, mean, _, _ = self._stepper.advance(self._current(), boundary[:, None], heat[:, None], flow[:, None])
         self._states = states
         self._shuffle_when_due()
@@ -240,7 +243,7 @@ class Simulator:
         mine = place[:, 0] == floor
         if not mine.any():
             raise ModelError(f"floor: expected a floor of a plan, came {floor}")
-        out = np.full((place[mine, 1].max() + 1, place[mine, 2].max() + 1), np.nan)
+        out = np.full(self.network.floor_shapes[floor], np.nan)
         for shown in (mine & (self.network.kind != "air"), mine & (self.network.kind == "air")):
             out[place[shown, 1], place[shown, 2]] = self._current()[shown, 0]
         return out
@@ -269,8 +272,18 @@ class Simulator:
         ----------
         saved : mapping
             From `save_state`.
+
+        Raises
+        ------
+        ModelError
+            When it is the state of another building.
         """
-        self._states = np.array(saved["states"], dtype=float)[:, None]
+        states = np.array(saved["states"], dtype=float)
+        if states.shape != (self.network.n_node,):
+            raise ModelError(
+                f"state: expected {self.network.n_node} temperatures of this building, came {states.shape}"
+            )
+        self._states = states[:, None]
         self._elapsed = float(saved["elapsed"])
         if self._shuffle is not None:
             self._shuffle.restore(saved["shuffle"])
@@ -290,7 +303,9 @@ class Simulator:
             bad |= (array < limits[0]) | (array > limits[1])
         if bad.any():
             where = int(np.flatnonzero(bad)[0])
-            wanted = "finite values" if limits is None else f"kelvin from {limits[0]} to {limits[1]}"
+            wanted = "finite values"
+            if limits is not None:
+                wanted = f"kelvin from {limits[0]} to {limits[1]}" if limits == PLAUSIBLE else "a flow of zero or more"
             raise InputShapeError(f"{name}[{where}]: expected {wanted}, came {array[where]}")
         return array
 

@@ -135,6 +135,9 @@ class SymbolicModel:
         bad = [n for n, t in zip(names, theta, strict=True) if not (np.isfinite(t) and t > 0)]
         if bad:
             raise ModelError(f"theta: expected positive finite values, came {theta[names.index(bad[0])]} for {bad[0]}")
+        for p, t in zip(self.network.parameters, theta, strict=True):
+            if p.logit and t > 1:
+                raise ModelError(f"theta: expected a probability of at most 1, came {t} for {p.name}")
         kappa, heat = (np.asarray(v).ravel() for v in self.classes(theta))
         flow_slopes: list[Matrix] = []
         capacity_slopes: list[Matrix] = []

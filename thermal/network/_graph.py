@@ -95,6 +95,8 @@ class ThermalNetwork:
         Values that enter only as a product with a parameter, with their unit (densities [kg/m3]): never estimated.
     spacing : float or None
         Distance between the volumes of a plan [m]; None for a zone table.
+    floor_shapes : tuple of (int, int)
+        Rows and columns of each floor's grid, outside included; empty for a zone table.
     """
 
     zones: tuple[str, ...]
@@ -111,6 +113,7 @@ class ThermalNetwork:
     symbols: ca.SX
     nominal: Mapping[str, tuple[float, str]] = field(default_factory=dict)
     spacing: float | None = None
+    floor_shapes: tuple[tuple[int, int], ...] = ()
 
     @property
     def n_node(self) -> int:
@@ -282,6 +285,7 @@ class GraphBuilder:
         heating: sp.csr_matrix,
         airflows: tuple[tuple[int, int], ...],
         spacing: float | None = None,
+        floor_shapes: tuple[tuple[int, int], ...] = (),
     ) -> ThermalNetwork:
         """Make the network from what was added.
 
@@ -295,6 +299,8 @@ class GraphBuilder:
             Source and target zone of each directed airflow.
         spacing : float, optional
             Distance between the volumes of a plan [m].
+        floor_shapes : tuple of (int, int)
+            Rows and columns of each floor's grid.
         """
 
         def join(parts: list[Any], column: int) -> Any:
@@ -324,4 +330,5 @@ class GraphBuilder:
             symbols=ca.vertcat(*[s for _, s in self._parameters.values()]) if self._parameters else ca.SX(0, 1),
             nominal=dict(self.nominal),
             spacing=spacing,
+            floor_shapes=floor_shapes,
         )

@@ -44,6 +44,12 @@ class FloorGrid:
     place: IntArray
     token: NDArray[np.str_]
 
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns of the control volumes' grid, the rim left out."""
+        rows, columns = self.tokens.shape
+        return tuple(int(np.ceil(round((n - 2) * self.cell / self.spacing, 9))) for n in (rows, columns))  # type: ignore[return-value]
+
     def neighbours(self, step: tuple[int, int]) -> tuple[IntArray, IntArray]:
         """Flat cell numbers of all pairs (cell, neighbour in direction ``step``).
 

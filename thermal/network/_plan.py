@@ -70,8 +70,10 @@ def plan_network(
     density = air_density(building.location.elevation)
     diffuser_weight: dict[int, FloatArray] = {}
     zones: dict[str, Zone] = {}
+    shapes = []
     for number, plan in enumerate(plans.floors):
         grid = floor_grid(plan, plans.cell_size, dx)
+        shapes.append(grid.shape)
         floor = _Floor(graph, plan, grid, number, plans.cell_size)
         for name in (z for z in building.zone_names if (grid.token == z).any()):
             zones[name] = floor.zone(name, areas[name], density, reach, mean_shuffle)
@@ -88,7 +90,7 @@ def plan_network(
     heating = sp.csr_matrix((share, (node, column)), shape=shape)
     observation = sp.csr_matrix((mean, (column, node)), shape=shape[::-1])
     flows = tuple((graph.zones.index(a.source), graph.zones.index(a.target)) for a in building.airflows)
-    return graph.finish(observation, heating, flows, grid.spacing)
+    return graph.finish(observation, heating, flows, grid.spacing, tuple(shapes))
 
 
 class _Floor:

@@ -1,0 +1,161 @@
+"""The estimation problem: residuals, their derivatives, the weight of data and priors, starts and runs."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from calibration import Interval, Problem, estimate, select_runs
+from calibration._estimate import random_starts, thin
+from thermal import SymbolicModel, build_network, free_runs, load_bundled_case, reduced_model, replay_inputs, spin_up
+from thermal.model import TR_BDF2
+
+FloatArray = NDArray[np.float64]
+
+
+@cache
+def problem() -> Problem:
+    """Two tuning intervals of the bundled case on a coarse grid; two parameters fixed."""
+    case = load_bundled_case()
+    grid = SymbolicModel(build_network(case.building, dx=1.5))
+    inputs = replay_inputs(case, grid.network)
+    stamps = inputs.stamps
+    parts = [Interval(stamps[300], stamps[500]), Interval(stamps[1000], stamps[1100])]
+    runs = thin([select_runs(inputs, part, 72) for part in parts], 72, inputs.step)
+    fixed = ("exterior_convection_coefficient", "radiant_coefficient")
+    free = tuple(i for i, p in enumerate(grid.network.parameters) if p.name not in fixed)
+    return Problem(grid, inputs, runs, 72, free, grid.network.start())
+
+
+@cache
+def reduced() -> SymbolicModel:
+    return reduced_model(problem().grid, [problem().start])
+
+
+def point() -> FloatArray:
+    rng = np.random.default_rng(2)
+    return np.array(
+        [p.transform(p.start) + 0.3 * p.prior_deviation * rng.standard_normal() for p in problem().parameters]
+    )
+
+
+def test_runs_tile_the_intervals() -> None:
+    for runs in problem().runs:
+        assert runs.starts.size > 0
+        assert (np.diff(runs.starts) >= 72).all()
+
+
+def test_residuals_are_half_hourly_errors_of_the_runs() -> None:
+    p, model = problem(), reduced()
+    np.testing.assert_array_equal(p.keep, np.arange(6, 73, 6))
+    theta = p.theta(point())
+    found, _ = p.residuals(model, theta)
+    matrices = model.matrices(theta)
+    wanted = []
+    for runs in p.runs:
+        states, _ = spin_up(matrices, p.inputs, runs.begin, runs.starts)
+        means, _ = free_runs(matrices, model.network, p.inputs, runs.starts, 72, states)
+        for run, start in enumerate(runs.starts):
+            wanted.append(means[run, p.keep - 1] - p.inputs.zone[start + p.keep])
+    np.testing.assert_allclose(np.sort(found), np.sort(np.concatenate(wanted).ravel()), rtol=0, atol=1e-9)
+    np.testing.assert_allclose(p.residuals_only(model, theta), found, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("scheme", ["implicit_euler", "tr_bdf2"])
+def test_weighted_jacobian_is_that_of_finite_differences(scheme: str) -> None:
+    """On the estimation scale, data and priors together, to 1e-6."""
+    p, model, z = problem(), reduced(), point()
+    if scheme == "tr_bdf2":
+        p = replace(p, scheme=TR_BDF2)
+    _, jacobian = p.weighted(model, z)
+    h = 2e-3
+    for j in range(z.size):
+        step = h * np.eye(z.size)[j]
+        near = p.weighted(model, z + step)[0] - p.weighted(model, z - step)[0]
+        far = p.weighted(model, z + 2 * step)[0] - p.weighted(model, z - 2 * step)[0]
+        wanted = (8.0 * near - far) / (12.0 * h)
+        assert np.abs(jacobian[:, j] - wanted).max() < 1e-6 * np.abs(wanted).max()
+
+
+def test_cost_is_the_negative_log_posterior() -> None:
+    """Data count as days times zones of independent observations; a prior's range is four deviations."""
+    p, model, z = problem(), reduced(), point()
+    residual, _ = p.weighted(model, z)
+    error = p.residuals_only(model, p.theta(z))
+    days = sum(r.starts.size for r in p.runs) * 6.0 / 24.0
+    observations = max(1.0, days) * 5
+    data = observations * np.mean(error**2) / p.deviation**2
+    prior = sum(
+        ((v - q.transform(q.start)) / q.prior_deviation) ** 2 for v, q in zip(z, p.parameters, strict=True)
+    )
+    assert residual @ residual == pytest.approx(data + prior, rel=1e-10)
+    assert p.effective_size() == pytest.approx(observations)
+
+
+def test_theta_keeps_what_is_not_free() -> None:
+    p = problem()
+    theta = p.theta(point())
+    for i, parameter in enumerate(p.grid.network.parameters):
+        if i not in p.free:
+            assert theta[i] == parameter.start
+    np.testing.assert_allclose(p.point(theta), point(), rtol=1e-12)
+
+
+def test_point_outside_of_the_range_is_moved_inside() -> None:
+    p = problem()
+    theta = p.start.copy()
+    theta[p.free[0]] = 1e6
+    first = p.parameters[0]
+    assert p.point(theta)[0] == pytest.approx(first.transform(first.upper))
+
+
+def test_unmeasured_zones_and_stamps_have_no_residual() -> None:
+    p, model = problem(), reduced()
+    whole = p.residuals_only(model, p.start).size
+    zone = p.inputs.zone.copy()
+    zone[p.runs[0].starts[0] + p.keep[3], 1] = np.nan
+    spoilt = replace(p, inputs=replace(p.inputs, zone=zone))
+    error, slopes = spoilt.residuals(model, p.start)
+    assert error.size == whole - 1
+    assert slopes.shape == (error.size, len(p.free))
+    assert np.isfinite(error).all()
+
+
+def test_starts_are_the_given_one_and_seeded_draws() -> None:
+    p = problem()
+    first, *further = random_starts(p, 4, seed=5)
+    np.testing.assert_allclose(first, p.point(p.start))
+    again = random_starts(p, 4, seed=5)
+    other = random_starts(p, 4, seed=6)
+    for a, b, c in zip(further, again[1:], other[1:], strict=True):
+        np.testing.assert_array_equal(a, b)
+        assert (a != c).all()
+    assert not np.array_equal(further[0], further[1])
+
+
+def test_estimate_is_a_minimum_of_the_grid_s_own_cost() -> None:
+    """Found on a reduced model: a step along any parameter does not lower the cost on the grid by more than round-off."""
+    p = problem()
+    found = estimate(p, p.point(p.start))
+    assert found.solve.success
+    fixed_deviation = found.problem
+    z = p.point(found.theta)
+
+    def cost(x: FloatArray) -> float:
+        r, _ = fixed_deviation.weighted(p.grid, x)
+        return 0.5 * float(r @ r)
+
+    least = cost(z)
+    spread = np.sqrt(np.diag(found.covariance))
+    for j in range(z.size):
+        for sign in (-0.5, 0.5):
+            assert cost(z + sign * spread[j] * np.eye(z.size)[j]) > least - 0.02
+    start = 0.5 * float(np.sum(fixed_deviation.weighted(p.grid, p.point(p.start))[0] ** 2))
+    assert least < start
+    # the covariance is that of the posterior: inverse of the Gauss-Newton Hessian there
+    _, jacobian = fixed_deviation.weighted(p.grid, z)
+    np.testing.assert_allclose(np.sqrt(np.diag(np.linalg.inv(jacobian.T @ jacobian))), spread, rtol=0.1)
