@@ -167,13 +167,14 @@ def _tuning_runs(inputs: Inputs, intervals: Sequence[Interval], steps: int, spin
     """
     chosen = []
     for interval in intervals:
-        first = max(inputs.stamps[0], interval.start - pd.Timedelta(seconds=spin_up))
-        half = 0.5 * (interval.end - first).total_seconds()
-        least = max(LEAST_SPIN_UP, min(spin_up, half))
+        begin = max(inputs.stamps[0], interval.start - pd.Timedelta(seconds=spin_up))
+        half = 0.5 * (interval.end - begin).total_seconds()
         try:
-            chosen.append(select_runs(inputs, interval, steps, spin_up=spin_up, least=least))
+            found = select_runs(inputs, interval, steps, spin_up=spin_up, least=max(LEAST_SPIN_UP, min(spin_up, half)))
         except NotEnoughDataError:
-            chosen.append(select_runs(inputs, interval, steps, spin_up=spin_up))
+            found = select_runs(inputs, interval, steps, spin_up=spin_up)
+        inside = found.starts >= inputs.stamps.searchsorted(interval.start)  # every residual lies in the interval
+        chosen.append(Runs(found.begin, found.starts[inside], found.skipped))
     runs = tuple(r for r in thin(chosen, steps, inputs.step) if r.starts.size)
     if not runs:
         raise NotEnoughDataError(

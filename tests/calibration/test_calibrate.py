@@ -54,7 +54,9 @@ def truth(building: Building, seed: int) -> dict[str, float]:
     }
 
 
-def telemetry(building: Building, parameters: dict[str, float], seed: int = 0, days: int = 12, step: float = 300.0) -> Case:
+def telemetry(
+    building: Building, parameters: dict[str, float], seed: int = 0, days: int = 12, step: float = 300.0
+) -> Case:
     """What sensors would say of the building: our own simulator under random pulses of heat, with noise."""
     rng = np.random.default_rng(seed)
     zones = building.zone_names
@@ -81,7 +83,9 @@ def telemetry(building: Building, parameters: dict[str, float], seed: int = 0, d
     if building.airflows:
         columns["fan/supply_air_flowrate_sensor"] = flow
         columns["fan/discharge_air_temperature_sensor"] = supplied
-    index = pd.date_range("2023-01-01", periods=n + 1, freq=pd.Timedelta(step, unit="s"), tz="Etc/GMT-1", name="timestamp")[1:]
+    index = pd.date_range(
+        "2023-01-01", periods=n + 1, freq=pd.Timedelta(step, unit="s"), tz="Etc/GMT-1", name="timestamp"
+    )[1:]
     return Case(building, Telemetry.from_frame(pd.DataFrame(columns, index=index)))
 
 

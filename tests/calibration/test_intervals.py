@@ -87,7 +87,9 @@ def test_runs_start_on_the_hour_and_their_targets_lie_in_the_interval() -> None:
 @pytest.mark.parametrize(("step", "every"), [(300.0, 12), (600.0, 6), (1800.0, 2), (3600.0, 1)])
 def test_runs_start_every_hour_at_any_step(step: float, every: int) -> None:
     inputs = inputs_of(step=step, start=f"2023-03-01T00:{int(step // 60) % 60:02d}:00-05:00")
-    runs = select_runs(inputs, interval(inputs, inputs.stamps.size // 2, inputs.stamps.size - 1), horizon_steps("6h", step))
+    runs = select_runs(
+        inputs, interval(inputs, inputs.stamps.size // 2, inputs.stamps.size - 1), horizon_steps("6h", step)
+    )
     assert (np.diff(runs.starts) == every).all()
     assert (inputs.stamps[runs.starts].minute == 0).all()
 
@@ -209,7 +211,12 @@ def test_texts_that_are_no_interval_are_refused(text: str, message: str) -> None
 def test_overlapping_tuning_and_held_out_intervals_are_refused() -> None:
     case = bundled()
     tune = [parse_interval("2023-03-01/2023-03-06", case), parse_interval("2023-03-08/2023-03-09", case)]
-    for text in ("2023-03-05/2023-03-07", "2023-03-06/2023-03-07", "2023-03-08T12:00/2023-03-08T18:00", "2023-03-01/2023-03-11"):
+    for text in (
+        "2023-03-05/2023-03-07",
+        "2023-03-06/2023-03-07",
+        "2023-03-08T12:00/2023-03-08T18:00",
+        "2023-03-01/2023-03-11",
+    ):
         with pytest.raises(CalibrationError, match="overlap"):
             calibrate(case, tune, [parse_interval(text, case)], dx=1.5)
 

@@ -114,7 +114,9 @@ def test_answer_is_inside_the_bounds(name: str) -> None:
 def test_linear_problem_is_solved_exactly_and_its_jacobian_returned() -> None:
     rng = np.random.default_rng(0)
     matrix, rhs = rng.standard_normal((12, 4)), rng.standard_normal(12)
-    found = solve_least_squares(lambda x: (matrix @ x - rhs, matrix), np.zeros(4), np.full(4, -9.0), np.full(4, 9.0), 1e-9)
+    found = solve_least_squares(
+        lambda x: (matrix @ x - rhs, matrix), np.zeros(4), np.full(4, -9.0), np.full(4, 9.0), 1e-9
+    )
     np.testing.assert_allclose(found.x, np.linalg.lstsq(matrix, rhs, rcond=None)[0], atol=1e-7)
     assert found.success
 
@@ -154,7 +156,9 @@ def test_exceptions_of_the_residuals_come_back_unchanged(after: int) -> None:
 
 
 def test_solver_that_stops_early_says_so_and_returns_its_best() -> None:
-    found = solve_least_squares(rosenbrock, np.array([-1.2, 1.0]), np.full(2, -5.0), np.full(2, 5.0), 1e-9, iterations=3)
+    found = solve_least_squares(
+        rosenbrock, np.array([-1.2, 1.0]), np.full(2, -5.0), np.full(2, 5.0), 1e-9, iterations=3
+    )
     assert not found.success
     assert found.status == "Maximum_Iterations_Exceeded"
     start = 0.5 * float(np.sum(rosenbrock(np.array([-1.2, 1.0]))[0] ** 2))

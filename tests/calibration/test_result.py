@@ -63,7 +63,9 @@ def check_calibration(content: Mapping[str, Any]) -> None:
     """Keys and kinds of ``calibration.json``."""
     assert content["parameters"]
     for name, entry in content["parameters"].items():
-        assert {"value", "unit", "lower", "upper", "start", "at_bound", "standard_error", "identifiable"} <= set(entry), name
+        assert {"value", "unit", "lower", "upper", "start", "at_bound", "standard_error", "identifiable"} <= set(
+            entry
+        ), name
         assert number(entry["value"])
         assert isinstance(entry["unit"], str)
         assert isinstance(entry["at_bound"], bool)
@@ -114,7 +116,12 @@ def test_calibrated_parameters_are_physical_and_theirs_is_the_model_s_order() ->
     for i, parameter in enumerate(network().parameters):
         p = values[parameter.name]
         assert p.value == found.theta[i]
-        assert (p.lower, p.upper, p.start, p.unit) == (parameter.lower, parameter.upper, parameter.start, parameter.unit)
+        assert (p.lower, p.upper, p.start, p.unit) == (
+            parameter.lower,
+            parameter.upper,
+            parameter.start,
+            parameter.unit,
+        )
         assert p.lower is not None
         assert p.upper is not None
         assert p.lower <= p.value <= p.upper
@@ -191,7 +198,9 @@ def test_parameters_come_back_as_they_were_found(tmp_path: Path) -> None:
 
 def test_plain_numbers_do_as_well(tmp_path: Path) -> None:
     values = {p.name: p.start for p in network().parameters}
-    np.testing.assert_array_equal(load_parameters(written(tmp_path, {"parameters": values}), network()), network().start())
+    np.testing.assert_array_equal(
+        load_parameters(written(tmp_path, {"parameters": values}), network()), network().start()
+    )
 
 
 def entries() -> dict[str, Any]:

@@ -59,7 +59,9 @@ def dense(network: ThermalNetwork) -> tuple[Matrices, FloatArray, FloatArray]:
     return matrices, matrices.capacity.toarray(), matrices.flow[:, :n].toarray()
 
 
-def marched(network: ThermalNetwork, start: FloatArray, time: float, steps: int, scheme: Scheme, **inputs: float) -> FloatArray:
+def marched(
+    network: ThermalNetwork, start: FloatArray, time: float, steps: int, scheme: Scheme, **inputs: float
+) -> FloatArray:
     """States after a number of steps with constant inputs."""
     matrices, _, _ = dense(network)
     stepper = Stepper(matrices, time / steps, scheme)
@@ -112,7 +114,8 @@ def test_steps_are_of_their_order_in_time(scheme: str, low: float, high: float) 
     exact = (sl.expm(time * generator) @ np.append(start, 1.0))[:16]
     counts = (512, 1024, 2048, 4096) if scheme == "tr_bdf2" else (256, 512, 1024, 2048)
     errors = [
-        np.abs(marched(network, start, time, m, SCHEMES[scheme], outdoor=boundary, heat=heat) - exact).max() for m in counts
+        np.abs(marched(network, start, time, m, SCHEMES[scheme], outdoor=boundary, heat=heat) - exact).max()
+        for m in counts
     ]
     assert ((orders(errors) > low) & (orders(errors) < high)).all(), orders(errors)
 
@@ -204,7 +207,9 @@ def test_both_schemes_keep_a_steady_state_and_damp_what_is_stiff() -> None:
     for scheme in (IMPLICIT_EULER, TR_BDF2):
         ended = marched(network, rough, 1e3 * slowest, 1, scheme, outdoor=20.0)
         assert np.abs(ended - 20.0).max() < 0.02 * np.abs(rough - 20.0).max()
-        np.testing.assert_allclose(marched(network, np.full(12, 20.0), 1e3 * slowest, 1, scheme, outdoor=20.0), 20.0, rtol=1e-13)
+        np.testing.assert_allclose(
+            marched(network, np.full(12, 20.0), 1e3 * slowest, 1, scheme, outdoor=20.0), 20.0, rtol=1e-13
+        )
 
 
 @pytest.mark.parametrize(("scheme", "order"), [("implicit_euler", 1.0), ("tr_bdf2", 2.0)])

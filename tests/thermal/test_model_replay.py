@@ -40,7 +40,9 @@ def model_of(name: str) -> SymbolicModel:
     if name == "plan":
         rows = ("######", "#A+BB#", "#A+BB#", "######")
         floor = FloorPlan("F1", 3.0, np.array([list(row) for row in rows]))
-        return SymbolicModel(build_network(Building("plan", SITE, 0.0, FloorPlans(1.0, (floor,), {"A": {"south": 1.0}}))))
+        return SymbolicModel(
+            build_network(Building("plan", SITE, 0.0, FloorPlans(1.0, (floor,), {"A": {"south": 1.0}})))
+        )
     layers = (Layer(thickness=0.2, conductivity=0.5, density=1200.0, heat_capacity=1000.0),)
     surfaces = (
         Surface(name="W", kind="wall", zone="room", other="outdoor", area=12.0, azimuth=180.0, construction="wall"),
@@ -60,7 +62,9 @@ def inputs_of(name: str, n_time: int = 400, step: float = 300.0) -> Inputs:
     network = model_of(name).network
     rng = np.random.default_rng(3)
     hours = np.arange(n_time) * step / 3600.0
-    zone = 293.15 + np.column_stack([np.sin(0.4 * hours + z) + 0.3 * np.cos(1.7 * hours) for z in range(len(network.zones))])
+    zone = 293.15 + np.column_stack(
+        [np.sin(0.4 * hours + z) + 0.3 * np.cos(1.7 * hours) for z in range(len(network.zones))]
+    )
     boundary = 280.0 + 4.0 * np.sin(0.26 * hours)[:, None] + np.arange(network.n_boundary)
     return Inputs(
         stamps=pd.date_range("2023-03-01T00:05:00+01:00", periods=n_time, freq=pd.Timedelta(step, unit="s")),
@@ -78,7 +82,9 @@ def inputs_of(name: str, n_time: int = 400, step: float = 300.0) -> Inputs:
 def theta_of(name: str) -> FloatArray:
     rng = np.random.default_rng(17)
     parameters = model_of(name).network.parameters
-    return np.array([p.inverse(p.transform(p.start) + 0.4 * p.prior_deviation * rng.standard_normal()) for p in parameters])
+    return np.array(
+        [p.inverse(p.transform(p.start) + 0.4 * p.prior_deviation * rng.standard_normal()) for p in parameters]
+    )
 
 
 def central(function: Callable[[FloatArray], FloatArray], theta: FloatArray, j: int) -> FloatArray:
@@ -269,7 +275,9 @@ def test_gaps_of_inputs_are_bridged_by_straight_lines_up_to_30_minutes(count: in
     np.testing.assert_array_equal(found.complete, ~missing)
     line = np.interp(np.arange(100, 100 + count), [99, 100 + count], whole.boundary[[99, 100 + count], 0])
     np.testing.assert_allclose(found.boundary[100 : 100 + count, 0], line, rtol=1e-12)
-    np.testing.assert_array_equal(np.delete(found.boundary, np.s_[100 : 100 + count]), np.delete(whole.boundary, np.s_[100 : 100 + count]))
+    np.testing.assert_array_equal(
+        np.delete(found.boundary, np.s_[100 : 100 + count]), np.delete(whole.boundary, np.s_[100 : 100 + count])
+    )
 
 
 def test_missing_flow_makes_the_heat_of_its_zone_missing() -> None:

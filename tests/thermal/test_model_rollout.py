@@ -37,7 +37,9 @@ def table_building() -> Building:
         Surface(name="O", kind="opening", zone="room", other="hall", area=1.9),
     )  # fmt: skip
     zones = (ZoneEntry(name="room", volume=50.0, floor_area=20.0), ZoneEntry(name="hall", volume=26.0, floor_area=10.0))
-    flows = tuple(Airflow(source=s, target=t, device="fan", fraction=0.5) for s, t in (("room", "hall"), ("hall", "room")))
+    flows = tuple(
+        Airflow(source=s, target=t, device="fan", fraction=0.5) for s, t in (("room", "hall"), ("hall", "room"))
+    )
     return Building("table", SITE, 0.0, ZoneTable(zones, surfaces, {"wall": layers}), airflows=flows)
 
 
@@ -116,7 +118,9 @@ def test_roll_out_is_step_after_step() -> None:
 def test_symbolic_step_is_the_step() -> None:
     model, data, theta = model_of("table"), data_of("table"), theta_of("table")
     for scheme in SCHEMES.values():
-        end, mean = symbolic_step(model, 300.0, scheme)(data.initial, data.boundary[0], data.heat[0], data.airflow[0], theta)
+        end, mean = symbolic_step(model, 300.0, scheme)(
+            data.initial, data.boundary[0], data.heat[0], data.airflow[0], theta
+        )
         wanted = Stepper(model.matrices(theta), 300.0, scheme, model.network.airflows).advance(
             data.initial[:, None], data.boundary[[0]].T, data.heat[[0]].T, data.airflow[[0]].T
         )

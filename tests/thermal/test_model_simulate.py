@@ -8,7 +8,17 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from thermal import Case, SymbolicModel, Telemetry, build_network, free_runs, load_bundled_case, replay_inputs, simulate, spin_up
+from thermal import (
+    Case,
+    SymbolicModel,
+    Telemetry,
+    build_network,
+    free_runs,
+    load_bundled_case,
+    replay_inputs,
+    simulate,
+    spin_up,
+)
 from thermal.errors import SimulationError
 from thermal.model import TR_BDF2
 

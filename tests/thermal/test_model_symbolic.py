@@ -22,7 +22,9 @@ SITE = Location(latitude=48.0, longitude=12.0, elevation=690.0, timezone="Etc/GM
 def plan_building() -> Building:
     rows = ("#######", "#AA+BB#", "#AA+BB#", "#######")
     floor = FloorPlan("F1", 3.0, np.array([list(row) for row in rows]))
-    return Building("plan", SITE, 0.0, FloorPlans(1.0, (floor,), {"A": {"south": 2.0, "west": 1.5}, "B": {"east": 2.0}}))
+    return Building(
+        "plan", SITE, 0.0, FloorPlans(1.0, (floor,), {"A": {"south": 2.0, "west": 1.5}, "B": {"east": 2.0}})
+    )
 
 
 def table_building() -> Building:
@@ -113,7 +115,9 @@ def test_heat_and_mean_of_a_zone_are_whole(name: str) -> None:
         np.testing.assert_allclose(network.observation.toarray()[z, air], share, rtol=1e-12)
 
 
-def central(function: Callable[[FloatArray], FloatArray], theta: FloatArray, j: int, relative: float = 2e-3) -> FloatArray:
+def central(
+    function: Callable[[FloatArray], FloatArray], theta: FloatArray, j: int, relative: float = 2e-3
+) -> FloatArray:
     """Derivative by the five-point rule; its error is of fourth order."""
     h = relative * theta[j]
     step = h * np.eye(theta.size)[j]
@@ -130,7 +134,9 @@ def test_derivatives_of_classes_are_those_of_finite_differences(name: str) -> No
         m = model.matrices(theta, slopes=True)
         value = [np.asarray(v).ravel() for v in model.classes(theta)]
         for j in range(theta.size):
-            for k, (slopes, terms) in enumerate(((m.flow_slopes, model.class_flows), (m.capacity_slopes, model.class_masses))):
+            for k, (slopes, terms) in enumerate(
+                ((m.flow_slopes, model.class_flows), (m.capacity_slopes, model.class_masses))
+            ):
                 wanted = central(lambda t, k=k: np.asarray(model.classes(t)[k]).ravel(), theta, j)
                 difference = slopes[j] - sum(w * term for w, term in zip(wanted, terms, strict=True))
                 scale = sum(abs(v) / theta[j] * abs(term) for v, term in zip(value[k], terms, strict=True))

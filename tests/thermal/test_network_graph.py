@@ -50,7 +50,10 @@ def test_zone_scope_gives_each_zone_its_own_parameter() -> None:
     flow = SymbolicModel(network).matrices(np.array([3.0, 1.5])).flow.toarray()
     np.testing.assert_allclose(flow[:2, 2], [-6.0, -3.0], rtol=1e-14)
     base = PARAMETERS["interior_film_coefficient"]
-    assert all((p.start, p.lower, p.upper, p.unit) == (base.start, base.lower, base.upper, base.unit) for p in network.parameters)
+    assert all(
+        (p.start, p.lower, p.upper, p.unit) == (base.start, base.lower, base.upper, base.unit)
+        for p in network.parameters
+    )
 
 
 def test_values_by_name_and_starts_for_the_rest() -> None:
@@ -64,4 +67,3 @@ def test_unknown_names_are_refused() -> None:
         three_nodes().values({"interior_film_coeficient": 4.0})
     with pytest.raises(ModelError, match="radiant_coeff"):
         GraphBuilder(("one",), ("outdoor",), {"radiant_coeff": "zone"})
-

@@ -125,9 +125,13 @@ class ExplicitTable:
         group = "slab" if s.kind != "wall" else "exterior_wall" if s.other == "outdoor" else "interior_wall"
         conduct, store = (self.v[f"{group}_{k}_multiplier"] for k in ("conductivity", "heat_capacity"))
         cuts: list[tuple[float, float]] = []
-        for part, count in zip(self.table.constructions[str(s.construction)], self.chains[str(s.construction)], strict=True):
+        for part, count in zip(
+            self.table.constructions[str(s.construction)], self.chains[str(s.construction)], strict=True
+        ):
             thickness = part.thickness / count
-            cuts += [(thickness / part.conductivity / conduct, thickness * part.density * part.heat_capacity * store)] * count
+            cuts += [
+                (thickness / part.conductivity / conduct, thickness * part.density * part.heat_capacity * store)
+            ] * count
         for k, (_, heat) in enumerate(cuts):
             self.store((s.name, k), heat * s.area)
         for k in range(len(cuts) - 1):

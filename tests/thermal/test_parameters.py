@@ -53,7 +53,9 @@ def test_rescaled_range_keeps_the_prior() -> None:
     assert half.name == p.name
 
 
-@pytest.mark.parametrize(("start", "lower", "upper"), [(1.0, 0.0, 2.0), (3.0, 1.0, 2.0), (1.0, 1.0, 2.0), (0.5, -1.0, 2.0)])
+@pytest.mark.parametrize(
+    ("start", "lower", "upper"), [(1.0, 0.0, 2.0), (3.0, 1.0, 2.0), (1.0, 1.0, 2.0), (0.5, -1.0, 2.0)]
+)
 def test_start_outside_of_the_range_is_refused(start: float, lower: float, upper: float) -> None:
     with pytest.raises(ValueError, match="film"):
         Parameter("film", "W/m^2/K", start, lower, upper, "made up")
@@ -61,6 +63,8 @@ def test_start_outside_of_the_range_is_refused(start: float, lower: float, upper
 
 def test_nomenclature_lists_every_parameter_with_its_unit() -> None:
     page = (Path(__file__).parents[2] / "docs" / "nomenclature.md").read_text(encoding="utf-8")
-    rows = {cells[1].strip("` "): cells[3].strip("` ") for line in page.splitlines() if len(cells := line.split("|")) > 4}
+    rows = {
+        cells[1].strip("` "): cells[3].strip("` ") for line in page.splitlines() if len(cells := line.split("|")) > 4
+    }
     for name, p in PARAMETERS.items():
         assert rows.get(name) == p.unit, name

@@ -365,7 +365,11 @@ def test_bad_starts_are_refused() -> None:
 
 def test_step_before_reset_says_what_to_do() -> None:
     plant = Simulator(table_building())
-    for call in (lambda: plant.step(np.zeros(2), np.full(2, 280.0)), lambda: plant.states, lambda: plant.zone_temperatures):
+    for call in (
+        lambda: plant.step(np.zeros(2), np.full(2, 280.0)),
+        lambda: plant.states,
+        lambda: plant.zone_temperatures,
+    ):
         with pytest.raises(ModelError, match=r"reset\(\)"):
             call()
 
