@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, get_args
 
 import casadi as ca
 import numpy as np
@@ -164,6 +164,9 @@ class GraphBuilder:
         unknown = sorted(set(scopes) - set(PARAMETERS))
         if unknown:
             raise ModelError(f"scopes name unknown parameters {unknown}; known are {sorted(PARAMETERS)}")
+        odd = {name: scope for name, scope in scopes.items() if scope not in get_args(Scope)}
+        if odd:
+            raise ModelError(f"scopes: expected one of {get_args(Scope)} for each parameter, came {odd}")
         self.zones, self.boundaries, self.scopes = zones, boundaries, dict(scopes)
         self.nominal: dict[str, tuple[float, str]] = {}
         self._parameters: dict[str, tuple[Parameter, ca.SX]] = {}
@@ -302,6 +305,15 @@ class GraphBuilder:
         floor_shapes : tuple of (int, int)
             Rows and columns of each floor's grid.
         """
+        shared = [
+            n
+            for n, s in self.scopes.items()
+            if s == "zone" and not any(p.startswith(f"{n}@") for p in self._parameters)
+        ]
+        if shared:
+            raise ModelError(
+                f"scopes: {shared} belong to no single zone of this building; only the global scope fits them"
+            )
 
         def join(parts: list[Any], column: int) -> Any:
             joined = np.concatenate([p[column] for p in parts])

@@ -11,6 +11,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from thermal.case import Building, FloorPlan, FloorPlans, zone_floor_areas
+from thermal.errors import ModelError
 from thermal.network._films import series
 from thermal.network._graph import GraphBuilder, ThermalNetwork
 from thermal.network._grid import FACADES, FloorGrid, floor_grid
@@ -66,6 +67,9 @@ def plan_network(
         catalogue).
     """
     graph = GraphBuilder(building.zone_names, ("outdoor",), scopes or {})
+    unknown = sorted(set(diffusers or {}) - set(building.zone_names))
+    if unknown:
+        raise ModelError(f"diffusers: zones {unknown} are not of this building; it has {list(building.zone_names)}")
     areas = zone_floor_areas(plans)
     density = air_density(building.location.elevation)
     diffuser_weight: dict[int, FloatArray] = {}
@@ -154,6 +158,13 @@ class _Floor:
         split = (grid.tokens.shape[0] - 2) // self.plan.tokens.shape[0]
         cells = grid.tokens == name
         if mask is not None:
+            if np.shape(mask) != self.plan.tokens.shape:
+                raise ModelError(
+                    f"diffusers of {name}: expected a mask of the plan's shape {self.plan.tokens.shape}, "
+                    f"came {np.shape(mask)}"
+                )
+            if not (mask & (np.asarray(self.plan.tokens) == name)).any():
+                raise ModelError(f"diffusers of {name}: expected at least one cell of the zone, came none")
             cells &= np.pad(np.repeat(np.repeat(mask, split, axis=0), split, axis=1), 1)
         count = np.bincount(grid.volume[cells], minlength=grid.token.size)[grid.token == name]
         return np.asarray(count / count.sum(), dtype=float)
@@ -183,7 +194,8 @@ class _Floor:
                 pairs = (("#", "#", structure / grid.spacing), ("+", "+", inner / grid.spacing))
                 mixed = series(structure / half, inner / half)
                 for a, b, value in (*pairs, ("#", "+", mixed), ("+", "#", mixed)):
-                    first, second, faces = self._pairs(step, a, b)
+                    along = np.minimum(opaque[facade], opaque["north" if facade == "south" else "west"])
+                    first, second, faces = self._pairs(step, a, b, along if a == b == "#" else None)
                     if first.size:
                         kinds = sorted({solid_of[a][0], solid_of[b][0]})
                         graph.face("-".join(kinds if len(kinds) > 1 else kinds * 2), value, first, second, faces * face)
@@ -207,14 +219,19 @@ class _Floor:
             volume = np.bincount(grid.volume[cells], weight * cube, minlength=grid.token.size)[mine]
             graph.capacity(name, density * graph.parameter(f"{name}_heat_capacity"), self.node[mine], volume)
 
-    def _pairs(self, step: tuple[int, int], a: str, b: str) -> tuple[IntArray, IntArray, FloatArray]:
+    def _pairs(
+        self, step: tuple[int, int], a: str, b: str, share: FloatArray | None = None
+    ) -> tuple[IntArray, IntArray, FloatArray]:
         """Pairs of volumes of tokens a and b across faces in a direction, and how many cell faces they share."""
         here, there = self.grid.neighbours(step)
         tokens, volume = self.grid.tokens.ravel(), self.grid.volume.ravel()
         keep = (tokens[here] == a) & (tokens[there] == b)
         first, second = volume[here[keep]], volume[there[keep]]
         apart = first != second
-        pairs, faces = np.unique(np.column_stack([first[apart], second[apart]]), axis=0, return_counts=True)
+        pairs, which = np.unique(np.column_stack([first[apart], second[apart]]), axis=0, return_inverse=True)
+        # glass that stands in a wall of several cells leaves less of the faces between them
+        part = None if share is None else np.maximum(share.ravel()[here[keep]], share.ravel()[there[keep]])[apart]
+        faces = np.bincount(which.ravel(), part, minlength=len(pairs))
         return self.node[pairs[:, 0]], self.node[pairs[:, 1]], faces.astype(float)
 
     def _room_side(

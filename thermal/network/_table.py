@@ -68,6 +68,8 @@ def _add_surface(
 ) -> None:
     """Add one row of the surface table."""
     zone, other = zones[surface.zone], surface.other
+    if other == "ground" and surface.kind in ("bridge", "window"):
+        return  # adiabatic in the baseline, and without mass nothing is left of them
     if surface.kind == "opening":
         velocity = graph.parameter("opening_exchange_velocity")
         graph.face("opening", velocity * density * AIR_HEAT_CAPACITY, zone.air, zones[other].air, surface.area)
