@@ -107,6 +107,11 @@ def calibrate(
     network = settings.network(case.building)
     grid = SymbolicModel(network)
     inputs = replay_inputs(case, network)
+    nominal = sorted(set(fixed or {}) & set(network.nominal))
+    if nominal:
+        raise CalibrationError(
+            f"fixed: {nominal} are nominal values, known only as a product; fix the heat capacity instead"
+        )
     given = network.values(fixed or {})
     free = tuple(i for i, p in enumerate(network.parameters) if p.name not in (fixed or {}))
     steps = horizon_steps(horizon, inputs.step)

@@ -51,11 +51,12 @@ class _Cache:
         self.function = function
         self.values: dict[bytes, tuple[FloatArray, FloatArray]] = {}
         self.best: tuple[float, FloatArray] | None = None
+        self.size = 0
         self.error: BaseException | None = None
 
     def __call__(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
         if self.error is not None:  # Ipopt would go on trying shorter steps: a stationary point ends it
-            return np.zeros(1), np.zeros((1, x.size))
+            return np.zeros(self.size), np.zeros((self.size, x.size))
         key = x.tobytes()
         if key not in self.values:
             if len(self.values) > 3:
@@ -66,6 +67,7 @@ class _Cache:
                 self.error = error
                 raise
             r = self.values[key][0]
+            self.size = r.size
             cost = 0.5 * float(r @ r)
             if np.isfinite(cost) and (self.best is None or cost < self.best[0]):
                 self.best = (cost, x.copy())

@@ -15,12 +15,16 @@ from thermal.model._scheme import SCHEMES
 from thermal.model._stepper import Stepper
 from thermal.model._symbolic import Matrices, SymbolicModel
 from thermal.network import SHUFFLE_STEP, build_network
+from thermal.parameters import Scope
 from thermal.shuffle import RandomShuffle
 
 FloatArray = NDArray[np.float64]
 
 #: One long implicit step to the steady state of a reset [s], three years.
 _STEADY_STEP = 1e8
+
+#: The mean of the shuffle needs a rate above zero [-].
+_LEAST_PROBABILITY = 1e-3
 
 #: Temperatures outside of this range are refused as inputs [K].
 PLAUSIBLE = (173.15, 373.15)
@@ -49,6 +53,8 @@ class Simulator:
         Reach of the shuffle [m]; None is the whole zone.
     seed : int
         Seed of the random shuffle.
+    scopes : mapping of str to {"global", "zone"}, optional
+        Parameters with one value a zone, as they were calibrated.
 
     Raises
     ------
@@ -75,6 +81,7 @@ class Simulator:
         probability: float | None = None,
         reach: float | None = None,
         seed: int = 0,
+        scopes: Mapping[str, Scope] | None = None,
     ) -> None:
         if scheme not in SCHEMES:
             raise ModelError(f"scheme: expected one of {sorted(SCHEMES)}, came {scheme!r}")
@@ -84,19 +91,21 @@ class Simulator:
             raise ModelError(f"shuffle: expected 'mean' or 'random', came {shuffle!r}")
         if not (np.isfinite(step_seconds) and step_seconds > 0):
             raise ModelError(f"step_seconds: expected a positive number of seconds, came {step_seconds}")
-        network = build_network(building, dx=dx, reach=reach, mean_shuffle=shuffle == "mean")
+        network = build_network(building, dx=dx, reach=reach, scopes=scopes, mean_shuffle=shuffle == "mean")
         self.network = network
         # a steady state or a spin-up needs the mean of the shuffle, also where the steps shuffle at random
         self._start_model = SymbolicModel(
-            network if shuffle == "mean" else build_network(building, dx=dx, reach=reach, mean_shuffle=True)
+            network if shuffle == "mean" else build_network(building, dx=dx, reach=reach, scopes=scopes)
         )
         given = dict(parameters or {})
         names = [p.name for p in self._start_model.network.parameters]
         if probability is not None and "shuffle_probability" in names:
-            given["shuffle_probability"] = probability
+            given["shuffle_probability"] = probability if shuffle == "random" else max(probability, _LEAST_PROBABILITY)
         start = dict(zip(names, self._start_model.network.values(given), strict=True))
         self.probability = float(start.get("shuffle_probability", 0.0))
-        self._start_theta = np.array([max(v, 1e-3) if n == "shuffle_probability" else v for n, v in start.items()])
+        self._start_theta = np.array(
+            [max(v, _LEAST_PROBABILITY) if n == "shuffle_probability" else v for n, v in start.items()]
+        )
         self.step_seconds = float(step_seconds)
         self.model = SymbolicModel(network)
         self.theta = np.array([start[p.name] for p in network.parameters])
