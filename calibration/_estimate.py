@@ -105,18 +105,8 @@ class Problem:
         theta : ndarray, shape (n_parameter,)
             Parameter values [parameter units].
         """
-        matrices = model.matrices(theta, slopes=True)
-        errors, slopes = [], []
-        for runs in self.runs:
-            states, moved = spin_up(matrices, self.inputs, runs.begin, runs.starts)
-            means, mean_slopes = free_runs(
-                matrices, model.network, self.inputs, runs.starts, self.steps, states, moved, self.scheme, self.keep
-            )
-            error = means - self.inputs.zone[runs.starts[:, None] + self.keep[None, :]]
-            seen = np.isfinite(error) & np.isfinite(self.inputs.bridged[runs.starts])[:, None, :]
-            errors.append(error[seen])
-            slopes.append(np.asarray(mean_slopes)[seen])
-        return np.concatenate(errors), np.concatenate(slopes)[:, list(self.free)]
+        errors, slopes = self._errors(model, theta, slopes=True)
+        return errors, slopes[:, list(self.free)]
 
     def residuals_only(self, model: SymbolicModel, theta: FloatArray) -> FloatArray:
         """Errors of all runs [K].
@@ -128,16 +118,24 @@ class Problem:
         theta : ndarray, shape (n_parameter,)
             Parameter values [parameter units].
         """
-        matrices = model.matrices(theta)
-        errors = []
+        return self._errors(model, theta, slopes=False)[0]
+
+    def _errors(self, model: SymbolicModel, theta: FloatArray, slopes: bool) -> tuple[FloatArray, FloatArray]:
+        """Errors of all measured zones at the kept steps of all runs (n,) [K], and their derivatives (n, n_parameter)."""
+        matrices = model.matrices(theta, slopes)
+        inputs, keep = self.inputs, self.keep
+        errors, derivatives = [], [np.empty((0, theta.size))]
         for runs in self.runs:
-            states, _ = spin_up(matrices, self.inputs, runs.begin, runs.starts)
-            means, _ = free_runs(
-                matrices, model.network, self.inputs, runs.starts, self.steps, states, None, self.scheme, self.keep
+            states, moved = spin_up(matrices, inputs, runs.begin, runs.starts)
+            means, mean_slopes = free_runs(
+                matrices, model.network, inputs, runs.starts, self.steps, states, moved, self.scheme, keep
             )
-            error = means - self.inputs.zone[runs.starts[:, None] + self.keep[None, :]]
-            errors.append(error[np.isfinite(error) & np.isfinite(self.inputs.bridged[runs.starts])[:, None, :]])
-        return np.concatenate(errors)
+            error = means - inputs.zone[runs.starts[:, None] + keep[None, :]]
+            seen = np.isfinite(error) & np.isfinite(inputs.bridged[runs.starts])[:, None, :]
+            errors.append(error[seen])
+            if mean_slopes is not None:
+                derivatives.append(mean_slopes[seen])
+        return np.concatenate(errors), np.concatenate(derivatives)
 
     def effective_size(self) -> float:
         """Independent observations in the tuning runs [-]: days times measured zones, since errors are correlated."""
