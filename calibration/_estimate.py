@@ -121,7 +121,7 @@ class Problem:
         return self._errors(model, theta, slopes=False)[0]
 
     def _errors(self, model: SymbolicModel, theta: FloatArray, slopes: bool) -> tuple[FloatArray, FloatArray]:
-        """Errors of all measured zones at the kept steps of all runs (n,) [K], and their derivatives (n, n_parameter)."""
+        """Errors of the measured zones at the kept steps of all runs, (n,) [K], and derivatives (n, n_parameter)."""
         matrices = model.matrices(theta, slopes)
         inputs, keep = self.inputs, self.keep
         errors, derivatives = [], [np.empty((0, theta.size))]
