@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 from calibration._case_model import CaseModel
 from calibration._estimate import Estimate, Problem, estimate, random_starts, thin
 from calibration._evaluate import HORIZONS, Evaluation, Progress, evaluate_model
-from calibration._intervals import Interval, Runs, default_intervals, horizon_steps, merge, select_runs
+from calibration._intervals import Interval, Runs, default_intervals, horizon_steps, select_runs
 from calibration._result import CalibrationResult, GridCheck, ParameterEstimate, SolverReport
 from calibration._settings import ModelSettings
 from calibration.errors import CalibrationError, NotEnoughDataError
-from thermal import Case, Inputs, Parameter, SymbolicModel, replay_inputs
+from thermal import Case, Inputs, ModelError, Parameter, SymbolicModel, replay_inputs
 from thermal.model import LEAST_SPIN_UP, SPIN_UP
 from thermal.parameters import Scope
 
@@ -56,7 +56,7 @@ def calibrate(
     case : Case
         Building and telemetry.
     tune, hold_out : sequence of Interval
-        First two thirds and last third of the telemetry when both are empty.
+        First two thirds and last third of the telemetry when both are empty; what the other leaves when one is.
     dx : float, optional
         Distance between control volumes of a plan [m]; the plan's cell size by default.
     fixed : mapping of str to float, optional
@@ -97,25 +97,22 @@ def calibrate(
     """
     began = time.perf_counter()
     settings = ModelSettings(dx, reach, scheme, dict(scopes or {}), spin_up_seconds)
-    if bool(tune) != bool(hold_out):
-        raise CalibrationError("intervals: give both tuning and held-out intervals, or neither")
     if starts < 1:
         raise CalibrationError(f"starts: expected at least 1, came {starts}")
-    first, second = default_intervals(case)
-    intervals = {"tuning": merge(tune or [first]), "held_out": merge(hold_out or [second])}
+    if seed < 0:
+        raise CalibrationError(f"seed: expected 0 or more, came {seed}")
+    tuned, judged = default_intervals(case, tune, hold_out)
+    intervals = {"tuning": tuned, "held_out": judged}
     _refuse_overlap(intervals["tuning"], intervals["held_out"])
     network = settings.network(case.building)
     grid = SymbolicModel(network)
     inputs = replay_inputs(case, network)
-    nominal = sorted(set(fixed or {}) & set(network.nominal))
-    if nominal:
-        raise CalibrationError(
-            f"fixed: {nominal} are nominal values, known only as a product; fix the heat capacity instead"
-        )
     given = network.values(fixed or {})
     free = tuple(i for i, p in enumerate(network.parameters) if p.name not in (fixed or {}))
     steps = horizon_steps(horizon, inputs.step)
     runs = _tuning_runs(inputs, intervals["tuning"], steps, spin_up_seconds)
+    for interval in intervals["held_out"]:
+        select_runs(inputs, interval, steps, spin_up=spin_up_seconds)  # refused now rather than after the solve
     problem = Problem(grid, inputs, runs, steps, free, given, settings.stepping)
     best, failures = _solve(problem, starts, seed, progress)
 
@@ -205,7 +202,7 @@ def _solve(problem: Problem, starts: int, seed: int, progress: Progress | None) 
     for number, z in enumerate(random_starts(problem, starts, seed)):
         try:
             found = estimate(problem, z, progress)
-        except ArithmeticError as error:
+        except (ArithmeticError, np.linalg.LinAlgError, ModelError) as error:
             failures.append(f"start {number}: {error}")
             continue
         if best is None or _objective(found) < _objective(best):

@@ -24,7 +24,7 @@ from thermal import (
     replay_inputs,
     spin_up,
 )
-from thermal.model import Scheme
+from thermal.model import SPIN_UP, Scheme
 
 FloatArray = NDArray[np.float64]
 
@@ -73,7 +73,10 @@ class CaseModel:
             N of the runs that are compared.
         """
         reduced = reduced_model(self.grid, [self.theta])
-        check = check_on_grid(self.grid, reduced, self.theta, self.inputs, interval, steps, self.settings.stepping)
+        s = self.settings
+        check = check_on_grid(
+            self.grid, reduced, self.theta, self.inputs, interval, steps, s.stepping, s.spin_up_seconds
+        )
         return (reduced if check.max_difference <= CHECK_TOLERANCE else self.grid), check
 
 
@@ -170,6 +173,7 @@ def check_on_grid(
     interval: Interval,
     steps: int,
     scheme: Scheme,
+    spin_up_seconds: float = SPIN_UP,
 ) -> GridCheck:
     """Replay a few runs on the reduced model and on the grid and compare zone means.
 
@@ -187,13 +191,15 @@ def check_on_grid(
         N.
     scheme : Scheme
         Time stepping of the runs.
+    spin_up_seconds : float
+        Length of the spin-up [s].
 
     Raises
     ------
     NotEnoughDataError
         When the interval has no usable run.
     """
-    runs = _check_runs(inputs, interval, steps)
+    runs = _check_runs(inputs, interval, steps, spin_up_seconds)
     starts = np.unique(runs.starts[np.linspace(0, runs.starts.size - 1, CHECK_RUNS).astype(int)])
     means = []
     for model in (grid, reduced):
@@ -205,13 +211,13 @@ def check_on_grid(
     return GridCheck(grid.network.n_node, order, starts.size, float(difference.max()), float(difference.mean()))
 
 
-def _check_runs(inputs: Inputs, interval: Interval, steps: int) -> Runs:
+def _check_runs(inputs: Inputs, interval: Interval, steps: int, spin_up_seconds: float) -> Runs:
     """Choose the runs of a check: at the beginning of the interval where there are any."""
     begin = max(interval.start, inputs.stamps[0])
     length = pd.Timedelta(days=CHECK_DAYS) + steps * pd.Timedelta(seconds=inputs.step)
     for part in (Interval(begin, min(interval.end, begin + length)), interval):
         try:
-            runs = select_runs(inputs, part, steps)
+            runs = select_runs(inputs, part, steps, spin_up=spin_up_seconds)
         except NotEnoughDataError:
             if part is interval:
                 raise

@@ -23,7 +23,7 @@ RESIDUAL_SPACING = 1800.0
 FIRST_DEVIATION = 0.3
 
 #: Rounds of reduction and re-weighting, and the change of the estimation scale that ends them [-].
-ROUNDS = 4
+ROUNDS = 8
 ROUND_TOLERANCE = 0.05
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -29,6 +30,10 @@ class Interval:
 
     start: pd.Timestamp
     end: pd.Timestamp
+
+    def __post_init__(self) -> None:
+        if not self.start < self.end:
+            raise IntervalError(f"interval {self.start}/{self.end}: expected the start before the end")
 
     def to_dict(self) -> dict[str, str]:
         """ISO 8601 texts of both ends."""
@@ -60,24 +65,52 @@ def parse_interval(text: str, case: Case) -> Interval:
     except CaseError as error:
         raise IntervalError(f"interval {text!r}: {error}") from error
     stamps = case.stamps
-    if not start < end:
-        raise IntervalError(f"interval {text!r}: expected the start before the end")
+    interval = Interval(start, end)
     if end < stamps[0] or start > stamps[-1]:
         raise IntervalError(f"interval {text!r}: outside of the telemetry, which goes from {stamps[0]} to {stamps[-1]}")
-    return Interval(start, end)
+    return interval
 
 
-def default_intervals(case: Case) -> tuple[Interval, Interval]:
-    """First two thirds of the telemetry to tune on, the last third held out.
+def default_intervals(
+    case: Case, tune: Sequence[Interval] = (), hold_out: Sequence[Interval] = ()
+) -> tuple[list[Interval], list[Interval]]:
+    """Complete tuning and held-out intervals.
 
     Parameters
     ----------
     case : Case
         With telemetry.
+    tune, hold_out : sequence of Interval
+        First two thirds and last third of the telemetry when both are empty. When only one is given, the other is what
+        follows it, or what precedes it where that is longer.
+
+    Returns
+    -------
+    tuple of lists
+        Tuning and held-out intervals, each in order.
+
+    Raises
+    ------
+    IntervalError
+        When the given intervals leave nothing, or overlap.
     """
     stamps = case.stamps
-    split = (2 * len(stamps)) // 3
-    return Interval(stamps[0], stamps[split - 1]), Interval(stamps[split], stamps[-1])
+    if not tune and not hold_out:
+        split = (2 * len(stamps)) // 3
+        return [Interval(stamps[0], stamps[split - 1])], [Interval(stamps[split], stamps[-1])]
+    tune, hold_out = merge(tune), merge(hold_out)
+    return tune or [_rest(stamps, hold_out)], hold_out or [_rest(stamps, tune)]
+
+
+def _rest(stamps: pd.DatetimeIndex, given: Sequence[Interval]) -> Interval:
+    """Find the longer stretch of telemetry before or after the given intervals."""
+    before, after = stamps[stamps < given[0].start], stamps[stamps > max(i.end for i in given)]
+    longer = max((after, before), key=len)
+    if len(longer) < 2:
+        raise IntervalError(
+            "intervals: what is given leaves no telemetry for the other; give both --tune and --hold-out"
+        )
+    return Interval(longer[0], longer[-1])
 
 
 def horizon_steps(horizon: str, step: float) -> int:
@@ -185,5 +218,16 @@ def merge(intervals: Sequence[Interval]) -> list[Interval]:
     ----------
     intervals : sequence of Interval
         In any order.
+
+    Raises
+    ------
+    IntervalError
+        When two of them overlap: their telemetry would count twice.
     """
-    return sorted(intervals, key=lambda i: (i.start, i.end))
+    ordered = sorted(intervals, key=lambda i: (i.start, i.end))
+    for a, b in itertools.pairwise(ordered):
+        if b.start <= a.end:
+            raise IntervalError(
+                f"intervals {a.start}/{a.end} and {b.start}/{b.end} overlap: their telemetry would count twice"
+            )
+    return ordered

@@ -239,4 +239,4 @@ def load_parameters(path: str | Path, network: ThermalNetwork) -> FloatArray:
             f"{path}: parameters of another building: unknown {unknown or 'none'}, missing {missing or 'none'}; "
             "calibrate this case, or give the file that belongs to it"
         )
-    return network.values(values)
+    return network.values({name: value for name, value in values.items() if name in wanted})

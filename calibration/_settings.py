@@ -10,7 +10,7 @@ from typing import Any
 
 from calibration.errors import CalibrationError, ParameterFileError
 from thermal import Building, ThermalNetwork, build_network
-from thermal.model import SCHEMES, SPIN_UP, Scheme
+from thermal.model import LEAST_SPIN_UP, SCHEMES, SPIN_UP, Scheme
 from thermal.parameters import Scope
 
 
@@ -34,7 +34,7 @@ class ModelSettings:
     Raises
     ------
     CalibrationError
-        When the scheme is unknown.
+        When the scheme is unknown, or the spin-up shorter than 12 hours.
     """
 
     dx: float | None = None
@@ -46,6 +46,10 @@ class ModelSettings:
     def __post_init__(self) -> None:
         if self.scheme not in SCHEMES:
             raise CalibrationError(f"scheme: expected one of {', '.join(sorted(SCHEMES))}, came {self.scheme!r}")
+        if not LEAST_SPIN_UP <= self.spin_up_seconds < float("inf"):
+            raise CalibrationError(
+                f"spin_up_seconds: expected at least {LEAST_SPIN_UP:g} s, came {self.spin_up_seconds}"
+            )
 
     @property
     def stepping(self) -> Scheme:

@@ -86,6 +86,7 @@ def styled(function: Callable[P, T]) -> Callable[P, T]:
             warnings.filterwarnings(
                 "ignore", message="Mean of empty slice|All-NaN slice"
             )  # a sensor that is silent: a gap in a line
+            warnings.filterwarnings("ignore", message="AutoDateLocator")  # chooses its ticks all the same
             return function(*args, **kwargs)
 
     return drawn

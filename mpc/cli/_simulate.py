@@ -43,6 +43,7 @@ def simulate(
             first,
             last,
             ready.settings.stepping,
+            ready.settings.spin_up_seconds,
             progress=lambda done: progress("simulate", done, steps),
         )
         report = write_simulation(found, loaded, out, parameters=ready.source, force=force) if out is not None else None

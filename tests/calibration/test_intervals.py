@@ -176,10 +176,22 @@ def test_gap_of_20_minutes_is_bridged_and_one_over_30_skips_its_runs(rows: int, 
 
 
 def test_default_split_tunes_on_two_thirds_and_holds_out_one() -> None:
-    tuning, held_out = default_intervals(bundled())
+    (tuning,), (held_out,) = default_intervals(bundled())
     stamps = bundled().stamps
     assert (tuning.start, tuning.end) == (stamps[0], stamps[1919])
     assert (held_out.start, held_out.end) == (stamps[1920], stamps[2879])
+
+
+def test_what_one_kind_of_interval_leaves_serves_the_other() -> None:
+    stamps = bundled().stamps
+    early, late = Interval(stamps[0], stamps[999]), Interval(stamps[2000], stamps[-1])
+    assert default_intervals(bundled(), [early])[1] == [Interval(stamps[1000], stamps[-1])]
+    assert default_intervals(bundled(), [late])[1] == [Interval(stamps[0], stamps[1999])]
+    assert default_intervals(bundled(), (), [late])[0] == [Interval(stamps[0], stamps[1999])]
+    with pytest.raises(IntervalError, match="leaves no telemetry"):
+        default_intervals(bundled(), [Interval(stamps[0], stamps[-1])])
+    with pytest.raises(IntervalError, match="overlap"):
+        default_intervals(bundled(), [early, early])
 
 
 def test_interval_as_text() -> None:

@@ -23,6 +23,7 @@ from thermal import (
     build_network,
     free_runs,
     load_bundled_case,
+    reduced_model,
     replay_inputs,
     spin_up,
 )
@@ -175,11 +176,22 @@ def test_unmeasured_zone_is_free_in_the_spin_up() -> None:
     model, inputs = model_of("plan"), inputs_of("plan")
     held = inputs.held.copy()
     held[:, 1] = np.nan
-    states, _ = spin_up(model.matrices(theta_of("plan")), replace(inputs, held=held), 0, np.array([300]))
+    heat = inputs.heat.copy()
+    heat[:, 1] = 0.0
+    matrices = model.matrices(theta_of("plan"))
+    states, _ = spin_up(matrices, replace(inputs, held=held, heat=heat), 0, np.array([300]))
     zone = model.network.observation @ states
     assert zone[0, 0] == pytest.approx(inputs.zone[300, 0], abs=1e-9)
     # between what it is coupled to: outdoor and the held zone
     assert inputs.boundary[:301].min() < zone[1, 0] < inputs.zone[:301, 0].max()
+    # its metered heat is not lost on it, on the grid or reduced
+    heat[:, 1] = 200.0
+    warmer = [
+        m.observation @ spin_up(m, replace(inputs, held=held, heat=heat), 0, np.array([300]))[0]
+        for m in (matrices, reduced_model(model, [theta_of("plan")]).matrices(theta_of("plan")))
+    ]
+    assert warmer[0][1, 0] > zone[1, 0] + 1.0
+    np.testing.assert_allclose(warmer[0], warmer[1], atol=0.01)
 
 
 # Free runs

@@ -55,9 +55,9 @@ class Inputs:
     zone : ndarray, shape (n_time, n_zone)
         Measured zone temperatures [K], NaN where missing; an unmeasured zone is NaN throughout.
     bridged : ndarray, shape (n_time, n_zone)
-        ``zone`` with gaps of at most 30 minutes bridged [K].
+        ``zone`` with the last value kept for at most 30 minutes: a start may know nothing of what comes after it [K].
     held : ndarray, shape (n_time, n_zone)
-        The same with every gap bridged by a straight line, to hold the zones at in a spin-up [K].
+        ``zone`` with the last value kept through every gap, to hold the zones at in a spin-up [K].
     complete : ndarray of bool, shape (n_time,)
         Whether heat, boundaries and airflows of this step are measured or bridged over at most 30 minutes.
     """
@@ -123,8 +123,8 @@ def replay_inputs(case: Case, network: ThermalNetwork) -> Inputs:
         boundary=filled[1],
         airflow=filled[2],
         zone=zone.to_numpy(dtype=float),
-        bridged=_bridge(zone, limit).to_numpy(dtype=float),
-        held=zone.interpolate(limit_direction="both").to_numpy(dtype=float),
+        bridged=(zone.ffill(limit=limit) if limit else zone).to_numpy(dtype=float),
+        held=zone.ffill().bfill().to_numpy(dtype=float),
         complete=complete,
     )
 
@@ -190,10 +190,13 @@ def spin_up(
     states = float(np.nanmean(zone)) * matrices.uniform[:, None]
     slopes = np.zeros((matrices.n, p)) if p else None
     steady = Stepper(matrices, _STEADY_STEP, IMPLICIT_EULER)
-    states, slopes, _ = steady.hold(states, boundary[first].mean(axis=0)[:, None], zone, slopes)
+    mean_heat = inputs.heat[first].mean(axis=0)[:, None]
+    states, slopes, _ = steady.hold(states, boundary[first].mean(axis=0)[:, None], zone, slopes, mean_heat)
     stepper = Stepper(matrices, inputs.step, IMPLICIT_EULER)
     rows = np.arange(begin, int(at[-1]) + 1)
-    kept, kept_slopes = stepper.hold_many(states, boundary[rows], held[rows], at - begin, slopes, progress)
+    kept, kept_slopes = stepper.hold_many(
+        states, boundary[rows], held[rows], at - begin, slopes, inputs.heat[rows], progress
+    )
     return kept + _REFERENCE * matrices.uniform[:, None], kept_slopes
 
 

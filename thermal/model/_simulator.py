@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from thermal.case import Building, Case
 from thermal.errors import InputShapeError, ModelError
-from thermal.model._replay import SPIN_UP, replay_inputs, spin_up
+from thermal.model._replay import LEAST_SPIN_UP, SPIN_UP, replay_inputs, spin_up
 from thermal.model._scheme import SCHEMES
 from thermal.model._stepper import Stepper
 from thermal.model._symbolic import Matrices, SymbolicModel
@@ -192,6 +192,10 @@ class Simulator:
             raise ModelError(f"telemetry: expected a step of {self.step_seconds:g} s, came {inputs.step:g} s")
         if not 0 < stamp < len(inputs):
             raise ModelError(f"stamp: expected a row from 1 to {len(inputs) - 1}, came {stamp}")
+        if not LEAST_SPIN_UP <= spin_up_seconds < np.inf or stamp * inputs.step < LEAST_SPIN_UP:
+            raise ModelError(
+                f"spin-up: expected at least 12 h before the stamp, came {spin_up_seconds} s before row {stamp}"
+            )
         begin = max(0, stamp - round(spin_up_seconds / inputs.step))
         states, _ = spin_up(self._start_matrices(), inputs, begin, np.array([stamp]))
         self._states, self._elapsed = self._without_stars(states), 0.0
@@ -250,7 +254,7 @@ class Simulator:
         """
         place = self.network.place
         mine = place[:, 0] == floor
-        if not mine.any():
+        if floor < 0 or not mine.any():
             raise ModelError(f"floor: expected a floor of a plan, came {floor}")
         out = np.full(self.network.floor_shapes[floor], np.nan)
         for shown in (mine & (self.network.kind != "air"), mine & (self.network.kind == "air")):

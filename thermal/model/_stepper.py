@@ -119,7 +119,12 @@ class Stepper:
         return trail[-1], mean, slope_trail[-1], np.asarray(m.observation @ _combine(scheme.mean, slope_trail))
 
     def hold(
-        self, states: FloatArray, boundary: FloatArray, zone: FloatArray, slopes: FloatArray | None = None
+        self,
+        states: FloatArray,
+        boundary: FloatArray,
+        zone: FloatArray,
+        slopes: FloatArray | None = None,
+        heat: FloatArray | None = None,
     ) -> tuple[FloatArray, FloatArray | None, FloatArray]:
         """One implicit Euler step with zone means held at given temperatures by whatever heat that takes.
 
@@ -133,6 +138,8 @@ class Stepper:
             Zone means at the end of the step [K]; NaN leaves a zone free.
         slopes : ndarray, shape (n, n_parameter), optional
             Derivatives of ``states`` [K per unit of θ].
+        heat : ndarray, shape (n_zone, 1), optional
+            Metered heat, for the zones that are left free [W]; zero by default.
 
         Returns
         -------
@@ -148,7 +155,10 @@ class Stepper:
         if self.scheme.implicit != 1.0:
             raise ModelError(f"hold: expected a stepper with scheme implicit_euler, came {self.scheme.name}")
         held = np.isfinite(zone[:, 0])
-        free = self._solve(m.capacity @ states - self.step * (self._exchange @ boundary))
+        rhs = m.capacity @ states - self.step * (self._exchange @ boundary)
+        if heat is not None and not held.all():
+            rhs += self.step * (m.heating @ np.where(held[:, None], 0.0, heat))
+        free = self._solve(rhs)
         lift = self._lift(held)
         heat = np.linalg.solve(self.response[1][np.ix_(held, held)], (zone - m.observation @ free)[held])
         new = free + self.response[0][:, held] @ heat
@@ -166,6 +176,7 @@ class Stepper:
         zone: FloatArray,
         keep: NDArray[np.int64],
         slopes: FloatArray | None = None,
+        heat: FloatArray | None = None,
         progress: Callable[[int], None] | None = None,
     ) -> tuple[FloatArray, FloatArray | None]:
         """Hold the zones over many steps and keep the states at some of them.
@@ -182,6 +193,8 @@ class Stepper:
             Steps (counted from 0) after which states are kept, increasing.
         slopes : ndarray, shape (n, n_parameter), optional
             Derivatives of ``states`` [K per unit of θ].
+        heat : ndarray, shape (n_time, n_zone), optional
+            Metered heat of each step, for the zones that are left free [W]; zero by default.
         progress : callable, optional
             Called with the number of steps done.
 
@@ -191,12 +204,13 @@ class Stepper:
             Kept states (n, m) and derivatives (n, n_parameter m) parameter by parameter, or None.
         """
         if isinstance(self.matrices.capacity, np.ndarray):
-            return self._hold_dense(states, boundary, zone, keep, slopes)
+            return self._hold_dense(states, boundary, zone, keep, slopes, heat)
         n, p = self.matrices.n, self.n_parameter
         kept, kept_slopes = np.empty((n, keep.size)), np.empty((n, p, keep.size))
         wanted = {int(k): i for i, k in enumerate(keep)}
         for k in range(int(keep[-1]) + 1):
-            states, slopes, _ = self.hold(states, boundary[k][:, None], zone[k][:, None], slopes)
+            given = heat[k][:, None] if heat is not None else None
+            states, slopes, _ = self.hold(states, boundary[k][:, None], zone[k][:, None], slopes, given)
             if k in wanted:
                 kept[:, wanted[k]] = states[:, 0]
                 if slopes is not None:
@@ -212,6 +226,7 @@ class Stepper:
         zone: FloatArray,
         keep: NDArray[np.int64],
         slopes: FloatArray | None,
+        heat: FloatArray | None,
     ) -> tuple[FloatArray, FloatArray | None]:
         """`hold_many` of a reduced model: one affine map, and all sources of slopes in one product."""
         m, n_time = self.matrices, int(keep[-1]) + 1
@@ -221,6 +236,8 @@ class Stepper:
         solve = solve - lift @ (m.observation[held] @ solve)
         advance = solve @ m.capacity
         forced = -self.step * (solve @ self._exchange) @ boundary[:n_time].T + lift @ zone[:n_time, held].T
+        if heat is not None and not held.all():
+            forced += self.step * (solve @ m.heating[:, ~held]) @ heat[:n_time, ~held].T
         path = np.empty((m.n, n_time + 1))
         path[:, 0] = x = states[:, 0]
         for k in range(n_time):

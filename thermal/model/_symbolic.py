@@ -139,6 +139,13 @@ class SymbolicModel:
             if p.logit and t > 1:
                 raise ModelError(f"theta: expected a probability of at most 1, came {t} for {p.name}")
         kappa, heat = (np.asarray(v).ravel() for v in self.classes(theta))
+        negative = [
+            c.name for c, k in zip(self.network.conductances, kappa, strict=True) if not (np.isfinite(k) and k >= 0)
+        ]
+        if negative:
+            raise ModelError(
+                f"theta: makes the conductance of {negative} negative; a parameter lies outside of its physical range"
+            )
         flow_slopes: list[Matrix] = []
         capacity_slopes: list[Matrix] = []
         if slopes:

@@ -143,10 +143,18 @@ class ThermalNetwork:
             When a name is not a parameter of this building.
         """
         names = [p.name for p in self.parameters]
-        unknown = sorted(set(given) - set(names) - set(self.nominal))
+        fixed = sorted(set(given) & set(self.nominal))
+        if fixed:
+            raise ModelError(
+                f"{fixed} are nominal: only their product with the heat capacity counts, so give that instead"
+            )
+        unknown = sorted(set(given) - set(names))
         if unknown:
             raise ModelError(f"parameters {unknown} are not of this building; it has {names}")
-        return np.array([given.get(p.name, p.start) for p in self.parameters])
+        for name, value in given.items():
+            if isinstance(value, bool) or not isinstance(value, int | float | np.number) or not 0 < value < np.inf:
+                raise ModelError(f"{name}: expected a positive finite number, came {value!r}")
+        return np.array([float(given.get(p.name, p.start)) for p in self.parameters])
 
 
 class GraphBuilder:

@@ -6,7 +6,9 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy as np
+import scipy.sparse as sp
 from numpy.typing import NDArray
+from scipy.sparse.csgraph import connected_components
 
 from thermal.case import FloorPlan
 from thermal.errors import CellSizeError
@@ -133,14 +135,31 @@ def floor_grid(plan: FloorPlan, cell_size: float, dx: float | None = None) -> Fl
     rows: IntArray = np.floor((np.arange(tokens.shape[0]) - 0.5) / float(merge)).astype(np.int64)
     columns: IntArray = np.floor((np.arange(tokens.shape[1]) - 0.5) / float(merge)).astype(np.int64)
     solid = tokens != "."
-    key = np.column_stack(
-        [*(axis[solid] for axis in np.broadcast_arrays(rows[:, None], columns[None, :])), code[solid]]
+    key = np.ravel_multi_index(
+        (*np.broadcast_arrays(rows[:, None] + 1, columns[None, :] + 1), code),
+        (rows[-1] + 2, columns[-1] + 2, len(names)),
     )
-    unique, number = np.unique(key, axis=0, return_inverse=True)
-    volume = np.full(tokens.shape, -1, dtype=np.int64)
-    volume[solid] = np.ravel(number)
+    volume = _connected(key, solid)
+    first = np.unique(volume[solid], return_index=True)[1]
+    at_row, at_column = (axis[first] for axis in np.nonzero(solid))
     cell = cell_size / split
-    return FloorGrid(tokens, cell, cell * float(merge), volume, unique[:, :2], names[unique[:, 2]])
+    place = np.column_stack([rows[at_row], columns[at_column]])
+    return FloorGrid(tokens, cell, cell * float(merge), volume, place, tokens[at_row, at_column])
+
+
+def _connected(key: IntArray, solid: NDArray[np.bool_]) -> IntArray:
+    """Give connected cells of equal keys one number, -1 outside: two walls in one block stay two volumes."""
+    index = np.arange(key.size).reshape(key.shape)
+    pairs = []
+    for here, there in ((np.s_[:, :-1], np.s_[:, 1:]), (np.s_[:-1], np.s_[1:])):
+        same = (key[here] == key[there]) & solid[here] & solid[there]
+        pairs.append(np.column_stack([index[here][same], index[there][same]]))
+    first, second = np.concatenate(pairs).T
+    graph = sp.coo_matrix((np.ones(first.size), (first, second)), shape=(key.size, key.size))
+    label = connected_components(graph, directed=False)[1].reshape(key.shape)
+    volume = np.full(key.shape, -1, dtype=np.int64)
+    volume[solid] = np.unique(label[solid], return_inverse=True)[1].ravel()
+    return volume
 
 
 def _refuse_swallowed_zones(plan: FloorPlan, tokens: NDArray[np.str_], merge: float, cell_size: float) -> None:

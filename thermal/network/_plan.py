@@ -268,21 +268,37 @@ class _Floor:
             share = np.ones(tokens.shape)
             for name, zone in zones.items():
                 area = float(glazing.get(name, {}).get(facade, 0.0))
-                cells = (tokens == name) & (np.roll(tokens, (-dr, -dc), (0, 1)) == "#")
-                if area <= 0.0 or not cells.any():
+                if area <= 0.0:
                     continue
-                exposed = cells.sum() * grid.cell * self.plan.height
-                rows, columns = np.nonzero(cells)
+                rows, columns, depth = _facade_cells(tokens, name, (dr, dc))
+                if rows.size == 0:
+                    continue
+                exposed = rows.size * grid.cell * self.plan.height
                 air = self.node[grid.volume[rows, columns]]
-                zone.window(
-                    graph.parameter("window_u_value", name),
-                    area,
-                    graph.boundary("outdoor"),
-                    air,
-                    depends="window_u_value",
-                )
-                while (wall := tokens[rows + dr, columns + dc] == "#").any():
-                    rows, columns = rows[wall] + dr, columns[wall] + dc
-                    share[rows, columns] = max(0.0, 1.0 - area / exposed)
+                u_value = graph.parameter("window_u_value", name)
+                zone.window(u_value, area, graph.boundary("outdoor"), air, depends="window_u_value")
+                for k in range(1, depth + 1):
+                    share[rows + k * dr, columns + k * dc] = max(0.0, 1.0 - area / exposed)
             shares[facade] = share
         return shares
+
+
+def _facade_cells(tokens: NDArray[np.str_], zone: str, step: tuple[int, int]) -> tuple[IntArray, IntArray, int]:
+    """Air cells of a zone behind a wall to the outside in one direction, and the thickness of that wall in cells.
+
+    A wall that runs on in that direction before it ends outside is another facade's, seen from its end.
+    """
+    rows, columns = np.nonzero(tokens == zone)
+    depth = np.zeros(rows.size, dtype=np.int64)
+    wall = np.ones(rows.size, dtype=bool)
+    while wall.any():
+        r, c = rows + (depth + 1) * step[0], columns + (depth + 1) * step[1]
+        wall &= tokens[np.clip(r, 0, tokens.shape[0] - 1), np.clip(c, 0, tokens.shape[1] - 1)] == "#"
+        depth[wall] += 1
+    beyond = tokens[rows + (depth + 1) * step[0], columns + (depth + 1) * step[1]]
+    outside = (depth > 0) & (beyond == ".")
+    if not outside.any():
+        return rows[:0], columns[:0], 0
+    thickness = int(depth[outside].min())
+    mine = outside & (depth == thickness)
+    return rows[mine], columns[mine], thickness
