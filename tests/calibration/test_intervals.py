@@ -231,10 +231,3 @@ def test_overlapping_tuning_and_held_out_intervals_are_refused() -> None:
     ):
         with pytest.raises(CalibrationError, match="overlap"):
             calibrate(case, tune, [parse_interval(text, case)], dx=1.5)
-
-
-def test_one_kind_of_interval_alone_is_refused() -> None:
-    part = parse_interval("2023-03-01/2023-03-06", bundled())
-    for tune, hold_out in (([part], []), ([], [part])):
-        with pytest.raises(CalibrationError, match="both"):
-            calibrate(bundled(), tune, hold_out, dx=1.5)
