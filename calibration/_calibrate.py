@@ -97,10 +97,9 @@ def calibrate(
     """
     began = time.perf_counter()
     settings = ModelSettings(dx, reach, scheme, dict(scopes or {}), spin_up_seconds)
-    if starts < 1:
-        raise CalibrationError(f"starts: expected at least 1, came {starts}")
-    if seed < 0:
-        raise CalibrationError(f"seed: expected 0 or more, came {seed}")
+    for name, value, least in (("starts", starts, 1), ("seed", seed, 0)):
+        if value < least:
+            raise CalibrationError(f"{name}: expected at least {least}, came {value}")
     tuned, judged = default_intervals(case, tune, hold_out)
     intervals = {"tuning": tuned, "held_out": judged}
     _refuse_overlap(intervals["tuning"], intervals["held_out"])
@@ -116,25 +115,9 @@ def calibrate(
     problem = Problem(grid, inputs, runs, steps, free, given, settings.stepping)
     best, failures = _solve(problem, starts, seed, progress)
 
-    def evaluated(theta: FloatArray) -> tuple[dict[str, Evaluation], GridCheck]:
-        model, check = CaseModel(case, settings, grid, inputs, theta, "").certified(intervals["held_out"][0], steps)
-        errors = {}
-        for name, part in intervals.items():
-            errors[name] = evaluate_model(
-                model,
-                theta,
-                inputs,
-                part,
-                horizon,
-                trajectories=True,
-                horizons=HORIZONS if name == "held_out" else (),
-                scheme=settings.stepping,
-                spin_up_seconds=spin_up_seconds,
-            )
-        return errors, check
-
-    before, _ = evaluated(given)
-    after, check = evaluated(best.theta)
+    before, _ = _evaluated(CaseModel(case, settings, grid, inputs, given, "start"), intervals, horizon)
+    after, check = _evaluated(CaseModel(case, settings, grid, inputs, best.theta, "estimate"), intervals, horizon)
+    seconds = time.perf_counter() - began
     return CalibrationResult(
         case=case.building.name,
         zones=network.zones,
@@ -145,13 +128,7 @@ def calibrate(
         uncalibrated=before,
         calibrated=after,
         solver=SolverReport(
-            "ipopt",
-            best.solve.status,
-            best.solve.success,
-            best.iterations,
-            time.perf_counter() - began,
-            starts,
-            tuple(failures),
+            "ipopt", best.solve.status, best.solve.success, best.iterations, seconds, starts, tuple(failures)
         ),
         grid_check=check,
         horizon=horizon,
@@ -159,6 +136,29 @@ def calibrate(
         seed=seed,
         version=version("buildingmpc"),
     )
+
+
+def _evaluated(
+    model: CaseModel, intervals: Mapping[str, Sequence[Interval]], horizon: str
+) -> tuple[dict[str, Evaluation], GridCheck]:
+    """Errors on both kinds of interval, at other horizons too where held out, and the check of the reduced model."""
+    settings = model.settings
+    quick, check = model.certified(intervals["held_out"][0], horizon_steps(horizon, model.inputs.step))
+    errors = {
+        name: evaluate_model(
+            quick,
+            model.theta,
+            model.inputs,
+            part,
+            horizon,
+            trajectories=True,
+            horizons=HORIZONS if name == "held_out" else (),
+            scheme=settings.stepping,
+            spin_up_seconds=settings.spin_up_seconds,
+        )
+        for name, part in intervals.items()
+    }
+    return errors, check
 
 
 def _tuning_runs(inputs: Inputs, intervals: Sequence[Interval], steps: int, spin_up: float) -> tuple[Runs, ...]:

@@ -44,6 +44,19 @@ class LeastSquaresResult:
     iterations: int
 
 
+#: Ipopt's options beside its tolerances: quiet, and with a small barrier from close to the bounds, since the start is
+#: usually good.
+_IPOPT = {
+    "print_level": 0,
+    "sb": "yes",
+    "acceptable_iter": 4,
+    "mu_init": 1e-4,
+    "bound_push": 1e-4,
+    "bound_frac": 1e-4,
+    "nlp_scaling_method": "none",
+}
+
+
 class _Cache:
     """The residual function with its last few values kept, and the best point seen."""
 
@@ -179,35 +192,22 @@ def solve_least_squares(
     """
     p = start.size
     cache = _Cache(function)
+    inside = np.clip(start, lower, upper)
+    cache(inside)
     objective, hessian = _Objective(cache, p, 0), _Objective(cache, p, 2)
     x, scale, empty = ca.MX.sym("x", p), ca.MX.sym("lam_f"), ca.MX.sym("p", 0)
-    multipliers = ca.MX.sym("lam_g", 0)
     lagrangian = ca.Function(
         "nlp_hess_l",
-        [x, empty, scale, multipliers],
+        [x, empty, scale, ca.MX.sym("lam_g", 0)],
         [ca.triu(scale * hessian(x))],
         ["x", "p", "lam_f", "lam_g"],
         ["triu_hess_gamma_x_x"],
     )
-    first = cache(np.clip(start, lower, upper))
-    options: dict[str, Any] = {
-        "print_time": False,
-        "hess_lag": lagrangian,
-        "ipopt": {
-            "print_level": 0,
-            "sb": "yes",
-            "tol": tolerance,
-            "compl_inf_tol": tolerance,
-            "acceptable_tol": 10 * tolerance,
-            "acceptable_iter": 4,
-            "max_iter": iterations,
-            "mu_init": 1e-4,
-            "bound_push": 1e-4,
-            "bound_frac": 1e-4,
-            "nlp_scaling_method": "none",
-        },
-    }
     problem: dict[str, Any] = {"x": x, "f": objective(x)}
+    ipopt = {**_IPOPT, "tol": tolerance, "compl_inf_tol": tolerance, "acceptable_tol": 10 * tolerance}
+    options: dict[str, Any] = {
+        "print_time": False, "hess_lag": lagrangian, "ipopt": {**ipopt, "max_iter": iterations}
+    }  # fmt: skip
     solver = ca.nlpsol("least_squares", "ipopt", problem, options)
     try:
         solver(x0=start, lbx=lower, ubx=upper)
@@ -220,12 +220,11 @@ def solve_least_squares(
     stats = solver.stats()
     if stats["return_status"] == "User_Requested_Stop":  # how CasADi ends a solve on Ctrl-C
         raise KeyboardInterrupt
-    best = cache.best if cache.best is not None else (0.5 * float(first[0] @ first[0]), start)
-    jacobian = cache(best[1])[1]
+    cost, best = cache.best if cache.best is not None else (np.nan, inside)
     return LeastSquaresResult(
-        x=best[1],
-        cost=best[0],
-        jacobian=jacobian,
+        x=best,
+        cost=cost,
+        jacobian=cache(best)[1],
         status=str(stats["return_status"]),
         success=bool(stats["success"]),
         iterations=int(stats["iter_count"]),
