@@ -46,10 +46,8 @@ def calibrate(
     """Fit the physical parameters of a building to its telemetry by least squares.
 
     Residuals are the errors of N-step runs that tile the tuning intervals; each zone's errors count as one observation
-    a day
-    (they are strongly correlated in time), and every parameter has a log-normal prior whose 95 % interval is its
-    physical range.
-    Ipopt solves on a reduced model with exact derivatives; the answer is checked on the grid.
+    a day (they are strongly correlated in time), and every parameter has a log-normal prior whose 95 % interval is its
+    physical range. Ipopt solves on a reduced model with exact derivatives; the answer is checked on the grid.
 
     Parameters
     ----------
@@ -102,19 +100,18 @@ def calibrate(
             raise CalibrationError(f"{name}: expected at least {least}, came {value}")
     tuned, judged = default_intervals(case, tune, hold_out)
     intervals = {"tuning": tuned, "held_out": judged}
-    _refuse_overlap(intervals["tuning"], intervals["held_out"])
+    _refuse_overlap(tuned, judged)
     network = settings.network(case.building)
     grid = SymbolicModel(network)
     inputs = replay_inputs(case, network)
     given = network.values(fixed or {})
     free = tuple(i for i, p in enumerate(network.parameters) if p.name not in (fixed or {}))
     steps = horizon_steps(horizon, inputs.step)
-    runs = _tuning_runs(inputs, intervals["tuning"], steps, spin_up_seconds)
-    for interval in intervals["held_out"]:
+    runs = _tuning_runs(inputs, tuned, steps, spin_up_seconds)
+    for interval in judged:
         select_runs(inputs, interval, steps, spin_up=spin_up_seconds)  # refused now rather than after the solve
     problem = Problem(grid, inputs, runs, steps, free, given, settings.stepping)
     best, failures = _solve(problem, starts, seed, progress)
-
     before, _ = _evaluated(CaseModel(case, settings, grid, inputs, given, "start"), intervals, horizon)
     after, check = _evaluated(CaseModel(case, settings, grid, inputs, best.theta, "estimate"), intervals, horizon)
     seconds = time.perf_counter() - began
@@ -123,8 +120,8 @@ def calibrate(
         zones=network.zones,
         parameters=_describe(best, network.nominal),
         theta=best.theta,
-        tuning=tuple(intervals["tuning"]),
-        held_out=tuple(intervals["held_out"]),
+        tuning=tuple(tuned),
+        held_out=tuple(judged),
         uncalibrated=before,
         calibrated=after,
         solver=SolverReport(

@@ -195,8 +195,7 @@ def estimate(problem: Problem, z: FloatArray, progress: Progress | None = None) 
     """Solve the problem from one start.
 
     Each round reduces the grid model at the current θ, solves by Ipopt, and takes the deviation of the errors it finds
-    for the next;
-    the rounds end when θ no longer moves, so the reduced model was accurate where the answer lies.
+    for the next; the rounds end when θ no longer moves, so the reduced model was accurate where the answer lies.
 
     Parameters
     ----------

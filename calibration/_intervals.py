@@ -201,8 +201,7 @@ def select_runs(
     if starts.size == 0:
         raise NotEnoughDataError(
             f"interval {interval.start} to {interval.end}: expected room for a run of {steps} steps "
-            f"of {step:g} s after "
-            f"{least / 3600:g} h of spin-up, found {last - first + 1} stamps"
+            f"of {step:g} s after {least / 3600:g} h of spin-up, found {last - first + 1} stamps"
         )
     gaps = np.concatenate([[0], np.cumsum(~inputs.complete)])
     whole = gaps[starts + steps + 1] == gaps[starts + 1]

@@ -93,8 +93,7 @@ class _Hessian:
     Where residuals stay large Gauss-Newton overshoots and its line search crawls (measured on an office with slabs and
     furniture: 60
     iterations and 337 evaluations against 12 and 14). Dennis, Gay & Welsch (1981), doi:10.1145/355958.355965, eqs.
-    1.2-1.4, with
-    their sizing.
+    1.2-1.4, with their sizing.
     """
 
     def __init__(self, p: int) -> None:

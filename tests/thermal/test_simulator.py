@@ -13,7 +13,7 @@ from thermal import Building, FloorPlan, FloorPlans, Simulator, SymbolicModel, Z
 from thermal.case import Airflow, Layer, Location, Surface, ZoneEntry
 from thermal.errors import InputShapeError, ModelError, ThermalError
 from thermal.model import TR_BDF2, free_runs, replay_inputs, spin_up
-from thermal.network import AIR_HEAT_CAPACITY
+from thermal.units import AIR_HEAT_CAPACITY
 
 FloatArray = NDArray[np.float64]
 

@@ -24,8 +24,7 @@ from thermal.case.schema import Device
 from thermal.case.telemetry import Telemetry
 from thermal.case.times import local_timestamp
 from thermal.errors import EmptyIntervalError, describe
-
-AIR_HEAT_CAPACITY = 1006.0  # J/kg/K, dry air at room temperature (case format)
+from thermal.units import AIR_HEAT_CAPACITY
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,7 +15,7 @@ from thermal.errors import InputShapeError, ModelError
 from thermal.model._scheme import IMPLICIT_EULER, Scheme, Stage
 from thermal.model._stepper import Stepper
 from thermal.model._symbolic import Matrix, SymbolicModel
-from thermal.network import AIR_HEAT_CAPACITY
+from thermal.units import AIR_HEAT_CAPACITY
 
 FloatArray = NDArray[np.float64]
 

@@ -94,9 +94,9 @@ class Simulator:
         network = build_network(building, dx=dx, reach=reach, scopes=scopes, mean_shuffle=shuffle == "mean")
         self.network = network
         # a steady state or a spin-up needs the mean of the shuffle, also where the steps shuffle at random
-        self._start_model = SymbolicModel(
-            network if shuffle == "mean" else build_network(building, dx=dx, reach=reach, scopes=scopes)
-        )
+        self.model = self._start_model = SymbolicModel(network)
+        if shuffle == "random":
+            self._start_model = SymbolicModel(build_network(building, dx=dx, reach=reach, scopes=scopes))
         given = dict(parameters or {})
         names = [p.name for p in self._start_model.network.parameters]
         if probability is not None and "shuffle_probability" in names:
@@ -107,7 +107,6 @@ class Simulator:
             [max(v, _LEAST_PROBABILITY) if n == "shuffle_probability" else v for n, v in start.items()]
         )
         self.step_seconds = float(step_seconds)
-        self.model = SymbolicModel(network)
         self.theta = np.array([start[p.name] for p in network.parameters])
         self.matrices = self.model.matrices(self.theta)
         self._stepper = Stepper(self.matrices, self.step_seconds, SCHEMES[scheme], network.airflows)

@@ -14,7 +14,7 @@ from thermal.errors import ModelError, SingularModelError
 from thermal.model._factor import SparseSolver
 from thermal.model._scheme import IMPLICIT_EULER, Scheme, Stage
 from thermal.model._symbolic import Matrices, Matrix
-from thermal.network import AIR_HEAT_CAPACITY
+from thermal.units import AIR_HEAT_CAPACITY
 
 FloatArray = NDArray[np.float64]
 
@@ -160,10 +160,10 @@ class Stepper:
             rhs += self.step * (m.heating @ np.where(held[:, None], 0.0, heat))
         free = self._solve(rhs)
         lift = self._lift(held)
-        heat = np.linalg.solve(self.response[1][np.ix_(held, held)], (zone - m.observation @ free)[held])
-        new = free + self.response[0][:, held] @ heat
+        holding = np.linalg.solve(self.response[1][np.ix_(held, held)], (zone - m.observation @ free)[held])
+        new = free + self.response[0][:, held] @ holding
         watts = np.zeros(held.size)
-        watts[held] = heat[:, 0] / self.step
+        watts[held] = holding[:, 0] / self.step
         if slopes is None:
             return new, None, watts
         moved = self._solve(m.capacity @ slopes + self._slope_source(new - states, np.vstack([new, boundary])))
@@ -369,6 +369,5 @@ def factorise(system: Matrix) -> Callable[[FloatArray], FloatArray]:
     except (RuntimeError, np.linalg.LinAlgError) as error:
         raise SingularModelError(
             f"the matrix of the step (n = {system.shape[0]}) cannot be factorised: {error}; "
-            "a volume without heat capacity and "
-            "without any face, or a parameter out of range, does this"
+            "a volume without heat capacity and without any face, or a parameter out of range, does this"
         ) from error

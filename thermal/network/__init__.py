@@ -4,10 +4,9 @@ from thermal.network._build import build_network
 from thermal.network._films import series, surface_mesh
 from thermal.network._graph import CapacityClass, ConductanceClass, GraphBuilder, ThermalNetwork
 from thermal.network._grid import FloorGrid, floor_grid
-from thermal.network._materials import AIR_HEAT_CAPACITY, SHUFFLE_STEP
+from thermal.network._materials import SHUFFLE_STEP
 
 __all__ = [
-    "AIR_HEAT_CAPACITY",
     "SHUFFLE_STEP",
     "CapacityClass",
     "ConductanceClass",

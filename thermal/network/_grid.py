@@ -108,8 +108,7 @@ def floor_grid(plan: FloorPlan, cell_size: float, dx: float | None = None) -> Fl
     """Cells and control volumes of one floor at distance ``dx``.
 
     Merging keeps what the plan says: cells of different tokens in one block become different control volumes, so
-    areas, volumes and
-    one-cell walls stay exact and zones never merge.
+    areas, volumes and one-cell walls stay exact and zones never merge.
 
     Parameters
     ----------
@@ -171,8 +170,7 @@ def _refuse_swallowed_zones(plan: FloorPlan, tokens: NDArray[np.str_], merge: fl
         extent = min(np.ptp(rows), np.ptp(columns)) + 1
         if extent + 1 < merge:
             raise CellSizeError(
-                f"cell size {merge * cell_size:g} m on floor {plan.name}: zone {zone} "
-                f"is only {extent * cell_size:g} m wide "
-                f"and would "
-                f"merge with its neighbour; use at most {(extent + 1) * cell_size:g} m"
+                f"cell size {merge * cell_size:g} m on floor {plan.name}: zone {zone} is only "
+                f"{extent * cell_size:g} m wide and would merge with its neighbour; "
+                f"use at most {(extent + 1) * cell_size:g} m"
             )

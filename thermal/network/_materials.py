@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-#: Specific heat of air [J/kg/K]; the value of the metered heat (Digital Buildings flow meters, case-format contract).
-AIR_HEAT_CAPACITY = 1006.0
-
 #: Molecular conductivity of air at 20 degC [W/m/K] (Incropera, Fundamentals of Heat and Mass Transfer, Table A.4).
 AIR_CONDUCTIVITY = 0.026
 
 #: Resistance of the structural layer of an exterior wall [m2K/W], which carries its mass inside the insulation: 0.2 m
-#: of
-#: concrete or brick at 1.4 W/m/K (ISO 10456:2007 Table 3).
+#: of concrete or brick at 1.4 W/m/K (ISO 10456:2007 Table 3).
 STRUCTURE_RESISTANCE = 0.15
 
 #: Nominal areal mass of an exterior wall's structure and of a partition [kg/m2]; only mass times heat capacity is

@@ -18,7 +18,6 @@ from thermal.network._grid import FACADES, FloorGrid, floor_grid
 from thermal.network._interior import Zone
 from thermal.network._materials import (
     AIR_CONDUCTIVITY,
-    AIR_HEAT_CAPACITY,
     EXTERIOR_WALL_MASS,
     INTERIOR_WALL_MASS,
     SHUFFLE_STEP,
@@ -26,7 +25,7 @@ from thermal.network._materials import (
 )
 from thermal.parameters import Scope
 from thermal.shuffle import choose_equivalent, effective_diffusivity, exchange_rate, mean_square_reach
-from thermal.units import air_density
+from thermal.units import AIR_HEAT_CAPACITY, air_density
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]

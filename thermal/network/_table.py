@@ -14,14 +14,13 @@ from thermal.network._films import series
 from thermal.network._graph import GraphBuilder, ThermalNetwork
 from thermal.network._interior import Zone
 from thermal.network._materials import (
-    AIR_HEAT_CAPACITY,
     BOUNDARY_FILM_RESISTANCE,
     LEAST_PANE_RESISTANCE,
     RATED_OUTSIDE_FILM,
     WINDOW_RATED_FILM,
 )
 from thermal.parameters import Scope
-from thermal.units import air_density
+from thermal.units import AIR_HEAT_CAPACITY, air_density
 
 #: Time that a sublayer must resolve [s]: its thickness is at most sqrt(diffusivity x this), a Fourier number of one.
 SUBLAYER_TIME = 1800.0
@@ -43,8 +42,7 @@ def table_network(building: Building, table: ZoneTable, scopes: Mapping[str, Sco
     -------
     ThermalNetwork
         Boundaries ``outdoor`` and the measured ones. Surfaces to ``ground`` are adiabatic at their back
-        (``ground_exchange`` is an
-        effect of the catalogue).
+        (``ground_exchange`` is an effect of the catalogue).
     """
     graph = GraphBuilder(building.zone_names, ("outdoor", *building.measured_boundaries), scopes or {})
     density = air_density(building.location.elevation)

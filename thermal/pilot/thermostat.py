@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 import pandas as pd
 
-from thermal.case.case import AIR_HEAT_CAPACITY
 from thermal.pilot._errors import ClosedLoopError
+from thermal.units import AIR_HEAT_CAPACITY
 
 Series = npt.NDArray[np.float64]
 
