@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from thermal import SymbolicModel, build_network, load_bundled_case, reduced_model
+from thermal import ModelError, SymbolicModel, build_network, load_bundled_case, reduced_model
 from thermal.model import IMPLICIT_EULER, TR_BDF2, Scheme, Stepper, krylov_basis
+from thermal.model._certificate import closed_loop
 
 FloatArray = NDArray[np.float64]
 
@@ -68,23 +69,68 @@ def test_error_falls_with_every_shift() -> None:
     assert errors[0] > 20 * errors[-1]
 
 
-def test_error_falls_with_the_tolerance() -> None:
+def test_order_falls_and_error_rises_with_the_tolerance() -> None:
     theta = draw()
     wanted = replayed(grid(), theta)
-    found = []
-    for tolerance in (1e-3, 1e-6, 1e-10):
+    orders, errors = [], []
+    for tolerance in (0.3, 0.03, 0.003):
         small = reduced_model(grid(), [theta], tolerance=tolerance)
-        assert small.projection is not None
-        found.append((small.projection.shape[1], np.abs(replayed(small, theta) - wanted).max()))
-    orders, errors = zip(*found, strict=True)
+        assert small.certificate.max_difference <= tolerance
+        assert small.certificate.order == small.order
+        orders.append(small.order)
+        errors.append(np.abs(replayed(small, theta) - wanted).max())
     assert orders[0] < orders[1] < orders[2]
     assert errors[0] > errors[1] > errors[2]
+
+
+def test_error_falls_with_the_order() -> None:
+    theta = draw()
+    errors = [reduced_model(grid(), [theta], order=n).certificate.max_difference for n in (8, 16, 24, 36)]
+    assert (np.diff(errors) < 0).all(), errors
+    assert errors[-1] < 2e-3
+
+
+def test_the_certificate_is_a_replay_on_the_grid() -> None:
+    """The same thermostats' heat through the generic stepper of both models gives the certificate's numbers."""
+    theta = draw()
+    small = reduced_model(grid(), [theta], order=20)
+    replay = closed_loop(grid().matrices(theta))
+    assert np.ptp(replay.zone) > 4.0
+    assert replay.heat.max() > 100.0
+    matrices = small.matrices(theta)
+    stepper = Stepper(matrices, replay.step)
+    states = 17.0 * matrices.uniform[:, None]
+    means = []
+    for q, u in zip(replay.heat, replay.boundary, strict=True):
+        states, mean, _, _ = stepper.advance(states, u[:, None], q[:, None])
+        means.append(mean[:, 0])
+    error = np.abs(np.array(means) - replay.zone)
+    assert small.certificate.max_difference == pytest.approx(error.max(), rel=1e-6)
+    assert small.certificate.mean_difference == pytest.approx(error.mean(), rel=1e-6)
+    assert small.certificate.volumes == grid().network.n_node
+
+
+def test_drift_grows_as_theta_moves_away() -> None:
+    small = reduced_model(grid(), [draw()])
+    drifts = [small.drift(draw(1, spread)) for spread in (0.3, 0.5, 1.0)]
+    assert drifts[0] < 2e-3 < drifts[-1]
+    assert drifts[0] < drifts[1] < drifts[2]
+
+
+def test_impossible_wishes_are_refused() -> None:
+    theta = draw()
+    with pytest.raises(ModelError, match="order or a tolerance, came both"):
+        reduced_model(grid(), [theta], order=10, tolerance=0.1)
+    with pytest.raises(ModelError, match="at least 2 states, came 1"):
+        reduced_model(grid(), [theta], order=1)
+    with pytest.raises(ModelError, match="add shifts"):
+        reduced_model(grid(), [theta], tolerance=1e-9)
 
 
 def test_transfer_function_is_matched_at_the_shifts() -> None:
     """Galerkin with a symmetric model: value and slope at each expansion point."""
     theta, shifts = draw(), (DAY, HOUR)
-    small = reduced_model(grid(), [theta], shifts=shifts, tolerance=1e-14)
+    small = reduced_model(grid(), [theta], shifts=shifts)
 
     def transfer(model: SymbolicModel, s: float) -> FloatArray:
         m = model.matrices(theta)

@@ -185,19 +185,22 @@ def spin_up(
     p = len(matrices.flow_slopes)
     # a day, or what lies before the first start: a state may know nothing of what comes after it
     first = slice(begin, min(begin + max(1, int(86400.0 / inputs.step)), int(at[0]) + 1))
-    held, boundary = inputs.held - _REFERENCE, inputs.boundary - _REFERENCE
-    zone = held[first].mean(axis=0)[:, None]
-    states = float(np.nanmean(zone)) * matrices.uniform[:, None]
-    slopes = np.zeros((matrices.n, p)) if p else None
-    steady = Stepper(matrices, _STEADY_STEP, IMPLICIT_EULER)
-    mean_heat = inputs.heat[first].mean(axis=0)[:, None]
-    states, slopes, _ = steady.hold(states, boundary[first].mean(axis=0)[:, None], zone, slopes, mean_heat)
-    stepper = Stepper(matrices, inputs.step, IMPLICIT_EULER)
     rows = np.arange(begin, int(at[-1]) + 1)
-    kept, kept_slopes = stepper.hold_many(
-        states, boundary[rows], held[rows], at - begin, slopes, inputs.heat[rows], progress
+    held, boundary = inputs.held - _REFERENCE, inputs.boundary - _REFERENCE
+    states = float(np.nanmean(held[first].mean(axis=0))) * matrices.uniform[:, None]
+    slopes = np.zeros((matrices.n, p)) if p else None
+    driven = (boundary, held, inputs.heat)
+    stages = (
+        (_STEADY_STEP, [v[first].mean(axis=0)[None] for v in driven], np.array([0]), None),
+        (inputs.step, [v[rows] for v in driven], at - begin, progress),
     )
-    return kept + _REFERENCE * matrices.uniform[:, None], kept_slopes
+    for step, (outside, zone, heat), keep, told in stages:
+        if matrices.reduced and matrices.modal.heated_as_observed:
+            states, slopes = matrices.modal.hold(states, outside, zone, heat, keep, step, slopes)
+        else:
+            stepper = Stepper(matrices, step, IMPLICIT_EULER)
+            states, slopes = stepper.hold_many(states, outside, zone, keep, slopes, heat, told)
+    return states + _REFERENCE * matrices.uniform[:, None], slopes
 
 
 def free_runs(
@@ -244,6 +247,12 @@ def free_runs(
         None.
     """
     keep = np.arange(1, steps + 1) if keep is None else keep
+    if matrices.reduced and not network.airflows:
+        row = starts + np.arange(1, int(keep[-1]) + 1)[:, None]
+        boundary, heat = ((v[row]).transpose(0, 2, 1) for v in (inputs.boundary - _REFERENCE, inputs.heat))
+        start = states - _REFERENCE * matrices.uniform[:, None]
+        means, moved = matrices.modal.run(start, boundary, heat, keep, inputs.step, scheme, slopes)
+        return means + _REFERENCE, moved
     stepper = Stepper(matrices, inputs.step, scheme, network.airflows)
     m, n_zone, p = starts.size, len(network.zones), len(matrices.flow_slopes)
     means = np.empty((m, keep.size, n_zone))

@@ -10,7 +10,7 @@ from typing import Literal
 
 import numpy as np
 
-SchemeName = Literal["implicit_euler", "tr_bdf2"]
+SchemeName = Literal["implicit_euler", "tr_bdf2", "exact"]
 
 _GAMMA = 2.0 - np.sqrt(2.0)
 
@@ -39,12 +39,12 @@ class Scheme:
     Parameters
     ----------
     name : str
-        ``implicit_euler`` (first order) or ``tr_bdf2`` (second order, L-stable; Bank et al. 1985,
-        doi:10.1109/T-ED.1985.22232).
+        ``implicit_euler`` (first order), ``tr_bdf2`` (second order, L-stable; Bank et al. 1985,
+        doi:10.1109/T-ED.1985.22232) or ``exact`` (zero-order hold of a reduced model's modes).
     stages : tuple of Stage
-        In order; the last gives the state at the end of the step.
+        In order; the last gives the state at the end of the step. None for ``exact``.
     mean : tuple of float
-        Quadrature weights of the step's mean over start and stages [-]; they sum to 1.
+        Quadrature weights of the step's mean over start and stages [-]; they sum to 1. None for ``exact``.
     """
 
     name: SchemeName
@@ -70,5 +70,8 @@ TR_BDF2 = Scheme(
     (_GAMMA / 2.0, 0.5, (1.0 - _GAMMA) / 2.0),
 )
 
-#: Schemes by name.
+#: Zero-order hold without any error of time stepping: for the modes of a reduced model, not on the grid.
+EXACT = Scheme("exact", (), ())
+
+#: Schemes of the grid by name.
 SCHEMES: dict[str, Scheme] = {s.name: s for s in (IMPLICIT_EULER, TR_BDF2)}

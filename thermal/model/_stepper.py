@@ -203,8 +203,6 @@ class Stepper:
         tuple
             Kept states (n, m) and derivatives (n, n_parameter m) parameter by parameter, or None.
         """
-        if isinstance(self.matrices.capacity, np.ndarray):
-            return self._hold_dense(states, boundary, zone, keep, slopes, heat)
         n, p = self.matrices.n, self.n_parameter
         kept, kept_slopes = np.empty((n, keep.size)), np.empty((n, p, keep.size))
         wanted = {int(k): i for i, k in enumerate(keep)}
@@ -218,42 +216,6 @@ class Stepper:
             if progress is not None:
                 progress(k + 1)
         return kept, kept_slopes.reshape(n, p * keep.size) if slopes is not None else None
-
-    def _hold_dense(
-        self,
-        states: FloatArray,
-        boundary: FloatArray,
-        zone: FloatArray,
-        keep: NDArray[np.int64],
-        slopes: FloatArray | None,
-        heat: FloatArray | None,
-    ) -> tuple[FloatArray, FloatArray | None]:
-        """`hold_many` of a reduced model: one affine map, and all sources of slopes in one product."""
-        m, n_time = self.matrices, int(keep[-1]) + 1
-        held = np.isfinite(zone[0])
-        lift = self._lift(held)
-        solve = self._solve(np.eye(m.n))
-        solve = solve - lift @ (m.observation[held] @ solve)
-        advance = solve @ m.capacity
-        forced = -self.step * (solve @ self._exchange) @ boundary[:n_time].T + lift @ zone[:n_time, held].T
-        if heat is not None and not held.all():
-            forced += self.step * (solve @ m.heating[:, ~held]) @ heat[:n_time, ~held].T
-        path = np.empty((m.n, n_time + 1))
-        path[:, 0] = x = states[:, 0]
-        for k in range(n_time):
-            path[:, k + 1] = x = advance @ x + forced[:, k]
-        if slopes is None:
-            return path[:, keep + 1], None
-        source = self._slope_source(path[:, 1:] - path[:, :-1], np.vstack([path[:, 1:], boundary[:n_time].T]))
-        p = self.n_parameter
-        source = np.ascontiguousarray((solve @ source).reshape(m.n, p, n_time).transpose(2, 0, 1))
-        kept = np.empty((m.n, p, keep.size))
-        wanted = {int(k): i for i, k in enumerate(keep)}
-        for k in range(n_time):
-            slopes = advance @ slopes + source[k]
-            if k in wanted:
-                kept[:, :, wanted[k]] = slopes
-        return path[:, keep + 1], kept.reshape(m.n, p * keep.size)
 
     def _lift(self, held: NDArray[np.bool_]) -> FloatArray:
         """States per kelvin of each held zone mean, shape (n, n_held) [K/K]."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import casadi as ca
@@ -11,7 +12,8 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from thermal.errors import ModelError
-from thermal.network import ThermalNetwork
+from thermal.model._modal_runs import ModalRuns
+from thermal.network import ConductanceClass, ThermalNetwork
 
 FloatArray = NDArray[np.float64]
 
@@ -60,6 +62,16 @@ class Matrices:
         """Number of boundary temperatures."""
         return int(self.flow.shape[1] - self.flow.shape[0])
 
+    @property
+    def reduced(self) -> bool:
+        """Whether the matrices are dense, those of a reduced model."""
+        return isinstance(self.capacity, np.ndarray)
+
+    @cached_property
+    def modal(self) -> ModalRuns:
+        """What steps a reduced model in its modes."""
+        return ModalRuns(self)
+
 
 class SymbolicModel:
     """A network's conductances and capacities as CasADi functions of θ, differentiated by CasADi.
@@ -95,21 +107,21 @@ class SymbolicModel:
         jacobians = [ca.densify(ca.jacobian(e, theta)) for e in (kappa, heat)]
         self.classes = ca.Function("classes", [theta], [kappa, heat], ["theta"], ["conductance", "capacity"])
         self._slopes = ca.Function("slopes", [theta], jacobians)
-        laplacians = [_class_laplacian(network, k) for k in range(len(network.conductances))]
-        masses = [_class_mass(network, k) for k in range(len(network.capacities))]
         self._heating: Matrix = network.heating
         self._observation: Matrix = network.observation
         self._uniform = np.ones(network.n_node)
-        self.class_flows: list[Matrix] = laplacians
-        self.class_masses: list[Matrix] = masses
-        if projection is not None:
-            self._project(projection, laplacians, masses)
+        self.class_flows: list[Matrix]
+        self.class_masses: list[Matrix]
+        if projection is None:
+            self.class_flows = [_class_laplacian(network, k) for k in range(len(network.conductances))]
+            self.class_masses = [_class_mass(network, k) for k in range(len(network.capacities))]
+        else:
+            self._project(projection)
 
-    def _project(self, v: FloatArray, laplacians: list[Matrix], masses: list[Matrix]) -> None:
-        n = self.network.n_node
-        self.class_flows = [np.hstack([v.T @ (m[:, :n] @ v), v.T @ m[:, n:].toarray()]) for m in laplacians]
-        self.class_masses = [v.T @ (m @ v) for m in masses]
-        self._uniform = v.T @ np.ones(n)
+    def _project(self, v: FloatArray) -> None:
+        self.class_flows = [_projected_class(c, v, self.network.n_boundary) for c in self.network.conductances]
+        self.class_masses = [_congruent(v[c.node], c.weight) for c in self.network.capacities]
+        self._uniform = v.T @ np.ones(self.network.n_node)
         self._heating = v.T @ self.network.heating.toarray()
         self._observation = self.network.observation @ v
 
@@ -171,6 +183,33 @@ def _weighted(terms: list[Matrix], weights: FloatArray) -> Matrix:
         total = sp.csr_matrix(total)
         total.eliminate_zeros()
     return total
+
+
+#: Faces that are projected together, so that a class of all of a large grid fits the memory.
+_FACES = 8192
+
+
+def _projected_class(c: ConductanceClass, v: FloatArray, n_boundary: int) -> FloatArray:
+    """Rows of a class's graph Laplacian at κ = 1 on a basis, from its faces, shape (r, r + n_boundary)."""
+    n, r = v.shape
+    total = np.zeros((r, r + n_boundary))
+    for begin in range(0, c.weight.size, _FACES):
+        part = slice(begin, begin + _FACES)
+        ends = (c.first[part], c.second[part])
+        inside, weight = [e < n for e in ends], c.weight[part]
+        drop = np.where(inside[0][:, None], v[np.where(inside[0], ends[0], 0)], 0.0)
+        drop -= np.where(inside[1][:, None], v[np.where(inside[1], ends[1], 0)], 0.0)
+        total[:, :r] += _congruent(drop, weight)
+        for sign, end, within in zip((1.0, -1.0), ends, inside, strict=True):
+            out = ~within
+            np.add.at(total.T, r + end[out] - n, sign * weight[out, None] * drop[out])
+    return total
+
+
+def _congruent(rows: FloatArray, weight: FloatArray) -> FloatArray:
+    """``V' diag(w) V`` of positive weights, by a symmetric product."""
+    scaled = np.sqrt(weight)[:, None] * rows
+    return np.asarray(scaled.T @ scaled)
 
 
 def _class_laplacian(network: ThermalNetwork, k: int) -> sp.csr_matrix:

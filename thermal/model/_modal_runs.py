@@ -1,0 +1,287 @@
+"""Runs of a reduced model in its modes: free, or with the zones held, with forward sensitivities.
+
+Modes are decoupled, so that a run costs vector operations and each sensitivity one matrix product over all its steps.
+With ``S = (K + s C)^-1 C`` a step is ``x' = f(S) x + g(S) (K + s C)^-1 b``, and ``d f(S)`` in modal coordinates is
+``(dC - d(K + s C) c) ∘ f[c_i, c_j]`` (`divided_differences`).
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+import scipy.linalg as sl
+from numpy.typing import NDArray
+
+from thermal.model._modal import SHIFT, ModalModel, divided_differences, modal_model, propagator_functions
+from thermal.model._scheme import Scheme
+
+if TYPE_CHECKING:
+    from thermal.model._symbolic import Matrices
+
+FloatArray = NDArray[np.float64]
+
+
+class _ModalSlopes:
+    """Derivatives of a reduced model's matrices with respect to θ, in its modes.
+
+    Parameters
+    ----------
+    matrices : Matrices
+        Of the reduced model, with slopes.
+    modes : ModalModel
+        Its modes.
+
+    Attributes
+    ----------
+    capacity, stiffness : list of ndarray or None, shape (r, r)
+        dC and dK of every parameter; None where they do not depend on it.
+    boundary : list of ndarray or None, shape (r, n_boundary)
+        dB.
+    """
+
+    def __init__(self, matrices: Matrices, modes: ModalModel) -> None:
+        t, n = modes.states, matrices.n
+        self._capacities = modes.capacity
+        self.capacity: list[FloatArray | None] = []
+        self.stiffness: list[FloatArray | None] = []
+        self.boundary: list[FloatArray | None] = []
+        for capacity, flow in zip(matrices.capacity_slopes, matrices.flow_slopes, strict=True):
+            moves = bool(np.any(flow))
+            self.capacity.append(t.T @ (capacity @ t) if np.any(capacity) else None)
+            self.stiffness.append(t.T @ (flow[:, :n] @ t) if moves else None)
+            self.boundary.append(-t.T @ flow[:, n:] if moves else None)
+
+    def __len__(self) -> int:
+        return len(self.capacity)
+
+    def turn(self, j: int) -> tuple[FloatArray, FloatArray]:
+        """``dC - d(K + s C) c`` and ``d(K + s C)`` of one parameter.
+
+        Parameters
+        ----------
+        j : int
+            Number of the parameter.
+        """
+        c, capacity, stiffness = self._capacities, self.capacity[j], self.stiffness[j]
+        stiffer = np.zeros((c.size, c.size)) if stiffness is None else stiffness
+        if capacity is None:
+            return -stiffer * c, stiffer
+        stiffer = stiffer + SHIFT * capacity
+        return capacity - stiffer * c, stiffer
+
+
+class ModalRuns:
+    """Steps a reduced model in its modes.
+
+    Parameters
+    ----------
+    matrices : Matrices
+        Of the reduced model at one θ; with slopes when sensitivities are wanted.
+    """
+
+    def __init__(self, matrices: Matrices) -> None:
+        self.matrices = matrices
+        self.modes = modal_model(matrices)
+
+    @cached_property
+    def slopes(self) -> _ModalSlopes:
+        """Derivatives of the matrices in the modes."""
+        return _ModalSlopes(self.matrices, self.modes)
+
+    @property
+    def heated_as_observed(self) -> bool:
+        """Whether a zone's heat is spread over its air as its mean is taken; `hold` needs that."""
+        m = self.matrices
+        scale = float(np.abs(m.observation).max())
+        return bool(np.allclose(m.heating.T, m.observation, rtol=1e-9, atol=1e-12 * scale))
+
+    def run(
+        self,
+        states: FloatArray,
+        boundary: FloatArray,
+        heat: FloatArray,
+        keep: NDArray[np.int64],
+        step: float,
+        scheme: Scheme,
+        slopes: FloatArray | None = None,
+    ) -> tuple[FloatArray, FloatArray | None]:
+        """Zone means of m free runs over N steps.
+
+        Parameters
+        ----------
+        states : ndarray, shape (n, m)
+            States of the reduced model at the starts [K].
+        boundary : ndarray, shape (N, n_boundary, m)
+            Boundary temperatures [K].
+        heat : ndarray, shape (N, n_zone, m)
+            Heat given to the zones [W].
+        keep : ndarray of int
+            Steps whose means are returned, 1 to N, increasing.
+        step : float
+            Time step [s].
+        scheme : Scheme
+            Time stepping; ``EXACT`` too.
+        slopes : ndarray, shape (n, n_parameter m), optional
+            Derivatives of ``states``, parameter by parameter [K per unit of θ].
+
+        Returns
+        -------
+        tuple
+            Zone means (m, n_keep, n_zone) [K] and derivatives (m, n_keep, n_zone, n_parameter), or None.
+        """
+        modes, propagator = self.modes, self.modes.propagator(step, scheme)
+        count, m = int(keep[-1]), states.shape[1]
+        inputs = np.concatenate([boundary[:count], heat[:count]], axis=1).transpose(1, 0, 2).reshape(-1, count * m)
+        drive = np.hstack([modes.boundary, modes.heating])
+        pushed = (drive @ inputs).reshape(-1, count, m)
+        path = np.empty((drive.shape[0], count + 1, m))
+        path[:, 0] = modes.coordinates @ states
+        forced = propagator.end_gain[:, None, None] * pushed
+        for k in range(count):
+            path[:, k + 1] = propagator.end[:, None] * path[:, k] + forced[:, k]
+        last = keep - 1
+        mean = propagator.mean[:, None, None] * path[:, last] + propagator.mean_gain[:, None, None] * pushed[:, last]
+        means = np.tensordot(modes.observation, mean, axes=1).transpose(2, 1, 0)
+        if slopes is None:
+            return means, None
+        moved = self._run_slopes(path[:, :count], inputs, keep, step, scheme, slopes)
+        return means, moved
+
+    def _run_slopes(
+        self,
+        path: FloatArray,
+        inputs: FloatArray,
+        keep: NDArray[np.int64],
+        step: float,
+        scheme: Scheme,
+        slopes: FloatArray,
+    ) -> FloatArray:
+        """Differentiate the means of `run`, (m, n_keep, n_zone, n_parameter)."""
+        modes, propagator = self.modes, self.modes.propagator(step, scheme)
+        r, count, m = path.shape
+        functions = propagator_functions(step, scheme)
+        end, end_gain, mean, mean_gain = (divided_differences(f, modes.capacity) for f in functions)
+        observe, drive, last = modes.observation, np.hstack([modes.boundary, modes.heating]), keep - 1
+        seen_path = path[:, last].reshape(r, -1)
+        seen_inputs = inputs.reshape(-1, count, m)[:, last].reshape(-1, keep.size * m)
+        starts = (modes.coordinates @ slopes).reshape(r, -1, m)
+        out = np.empty((m, keep.size, observe.shape[0], len(self.slopes)))
+        flat = path.reshape(r, -1)
+        for j in range(len(self.slopes)):
+            turn, stiffer = self.slopes.turn(j)
+            pushed = self._pushed(j, stiffer)
+            source = (turn * end) @ flat
+            source += (propagator.end_gain[:, None] * pushed + (turn * end_gain) @ drive) @ inputs
+            source = source.reshape(r, count, m)
+            moved = np.empty((r, count, m))
+            moved[:, 0] = starts[:, j]
+            for k in range(count - 1):
+                moved[:, k + 1] = propagator.end[:, None] * moved[:, k] + source[:, k]
+            seen = np.tensordot(observe * propagator.mean, moved[:, last], axes=1).reshape(observe.shape[0], -1)
+            seen += (observe @ (turn * mean)) @ seen_path
+            seen += (observe @ (propagator.mean_gain[:, None] * pushed + (turn * mean_gain) @ drive)) @ seen_inputs
+            out[..., j] = seen.reshape(-1, keep.size, m).transpose(2, 1, 0)
+        return out
+
+    def _pushed(self, j: int, stiffer: FloatArray) -> FloatArray:
+        """Differentiate ``(K + s C)^-1 [B, H]`` with respect to one parameter, (r, n_boundary + n_zone)."""
+        modes = self.modes
+        pushed = -stiffer @ np.hstack([modes.boundary, modes.heating])
+        moved = self.slopes.boundary[j]
+        if moved is not None:
+            pushed[:, : moved.shape[1]] += moved
+        return np.asarray(pushed)
+
+    def hold(
+        self,
+        states: FloatArray,
+        boundary: FloatArray,
+        zone: FloatArray,
+        heat: FloatArray,
+        keep: NDArray[np.int64],
+        step: float,
+        slopes: FloatArray | None = None,
+    ) -> tuple[FloatArray, FloatArray | None]:
+        """Hold the zones over many implicit Euler steps and keep the states at some of them.
+
+        Held zones are a constraint ``O ξ = y``; the modes of its null space decouple in turn.
+
+        Parameters
+        ----------
+        states : ndarray, shape (n, 1)
+            State of the reduced model at the start [K].
+        boundary : ndarray, shape (n_time, n_boundary)
+            Boundary temperatures of each step [K].
+        zone : ndarray, shape (n_time, n_zone)
+            Zone means at the end of each step [K]; a zone that is NaN throughout stays free.
+        heat : ndarray, shape (n_time, n_zone)
+            Metered heat of each step, for the zones that are left free [W].
+        keep : ndarray of int, shape (m,)
+            Steps (counted from 0) after which states are kept, increasing.
+        step : float
+            Time step [s].
+        slopes : ndarray, shape (n, n_parameter), optional
+            Derivatives of ``states`` [K per unit of θ].
+
+        Returns
+        -------
+        tuple
+            Kept states (n, m) and derivatives (n, n_parameter m) parameter by parameter, or None.
+        """
+        modes, count = self.modes, int(keep[-1]) + 1
+        held = np.isfinite(zone[0])
+        frame = _HeldFrame(modes, held)
+        inputs = np.hstack([boundary[:count], heat[:count] * ~held]).T
+        start = modes.coordinates @ states[:, 0]
+        wanted = np.vstack([modes.observation[held] @ start, zone[:count, held]]).T
+        push = step * ((frame.basis.T @ np.hstack([modes.boundary, modes.heating])) @ inputs)
+        push -= frame.coupling @ (np.diff(wanted) - step * SHIFT * wanted[:, 1:])
+        inner = _scan(frame.capacity, step, frame.basis.T @ (start - frame.lift @ wanted[:, 0]), push)
+        path = frame.lift @ wanted + frame.basis @ inner
+        kept = modes.states @ path[:, keep + 1]
+        if slopes is None:
+            return kept, None
+        change, after = np.diff(path), path[:, 1:]
+        out = np.empty((states.shape[0], len(self.slopes), keep.size))
+        begin = modes.coordinates @ slopes
+        lifted = modes.observation[held] @ begin  # of the held means at the start, nothing from there on
+        for j in range(len(self.slopes)):
+            tables = (self.slopes.capacity, self.slopes.stiffness, self.slopes.boundary)
+            capacity, stiffness, moved = (table[j] for table in tables)
+            source = np.zeros((frame.capacity.size, count))
+            if capacity is not None:
+                source -= (frame.basis.T @ capacity) @ change
+            if stiffness is not None and moved is not None:
+                source -= step * ((frame.basis.T @ stiffness) @ after - (frame.basis.T @ moved) @ boundary[:count].T)
+            source[:, 0] += frame.coupling @ lifted[:, j]
+            first = frame.basis.T @ (begin[:, j] - frame.lift @ lifted[:, j])
+            turned = _scan(frame.capacity, step, first, source)[:, keep + 1]
+            out[:, j] = modes.states @ (frame.basis @ turned)
+        return kept, out.reshape(states.shape[0], -1)
+
+
+class _HeldFrame:
+    """States with given means of the held zones, ``ξ = lift y + basis ζ``, where C is diagonal in ζ."""
+
+    def __init__(self, modes: ModalModel, held: NDArray[np.bool_]) -> None:
+        observe = modes.observation[held]
+        count = observe.shape[0]
+        q, upper = sl.qr(observe.T)
+        self.lift = sl.solve_triangular(upper[:count], q[:, :count].T).T if count else observe.T
+        null = q[:, count:]
+        self.capacity, turn = np.linalg.eigh(null.T @ (modes.capacity[:, None] * null))
+        self.basis = null @ turn
+        self.coupling = self.basis.T @ (modes.capacity[:, None] * self.lift)
+
+
+def _scan(capacity: FloatArray, step: float, start: FloatArray, push: FloatArray) -> FloatArray:
+    """``c (ζ' - ζ) + Δt k ζ' = push`` over all steps, (r, n_time + 1)."""
+    system = capacity + step * (1.0 - SHIFT * capacity)
+    stay, gain = capacity / system, push.T / system
+    path = np.empty((push.shape[1] + 1, start.size))
+    path[0] = start
+    for k in range(push.shape[1]):
+        path[k + 1] = stay * path[k] + gain[k]
+    return path.T
