@@ -159,7 +159,6 @@ class Stepper:
         if heat is not None and not held.all():
             rhs += self.step * (m.heating @ np.where(held[:, None], 0.0, heat))
         free = self._solve(rhs)
-        lift = self._lift(held)
         holding = np.linalg.solve(self.response[1][np.ix_(held, held)], (zone - m.observation @ free)[held])
         new = free + self.response[0][:, held] @ holding
         watts = np.zeros(held.size)
@@ -167,7 +166,7 @@ class Stepper:
         if slopes is None:
             return new, None, watts
         moved = self._solve(m.capacity @ slopes + self._slope_source(new - states, np.vstack([new, boundary])))
-        return new, moved - lift @ (m.observation @ moved)[held], watts
+        return new, moved - self._lift(held) @ (m.observation @ moved)[held], watts
 
     def hold_many(
         self,
