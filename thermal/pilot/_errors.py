@@ -11,3 +11,7 @@ class LayoutError(ThermalError):
 
 class ClosedLoopError(ThermalError):
     """Plant, plan and weather of a closed loop do not fit each other."""
+
+
+class TwinError(ThermalError):
+    """No twin can be drawn from what was asked for."""

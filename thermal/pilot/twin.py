@@ -1,0 +1,254 @@
+"""Twins: telemetry of a building whose parameters, unmeasured heat and sensor noise are known, all from a seed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+import pandas as pd
+from scipy.special import ndtr, ndtri
+
+from thermal.case import Building, Case, FloorPlans, Telemetry, zone_floor_areas
+from thermal.case.points import DISCHARGE_TEMPERATURE, OUTDOOR_TEMPERATURE, SUPPLY_FLOW, ZONE_TEMPERATURE
+from thermal.errors import nearest
+from thermal.model import Simulator
+from thermal.network import build_network
+from thermal.parameters import Parameter, Scope
+from thermal.pilot._errors import TwinError
+from thermal.pilot._truth import TwinRanges, TwinTruth
+from thermal.pilot.disturbance import draw_disturbance
+from thermal.pilot.layout import devices
+from thermal.pilot.prbs import draw_prbs_thermostats
+from thermal.pilot.telemetry import Progress, generate_telemetry
+from thermal.pilot.thermostat import draw_thermostats
+from thermal.pilot.weather import generate_weather
+from thermal.units import AIR_HEAT_CAPACITY
+
+Series = npt.NDArray[np.float64]
+
+#: How set-points move: by schedule with night set-back, or in a pseudo-random binary sequence [-].
+Excitation = Literal["schedule", "prbs"]
+
+#: What the discharge sensor of a twin reports: its own noise, or what makes the metered heat exact [-].
+Meter = Literal["sensors", "exact"]
+
+_DAY = 86400.0  # s
+_THETA, _CONDITIONS = 2, 3  # streams of random numbers of a seed; the sensors have 1
+
+
+class _DisturbedPlant:
+    """A simulator that receives the unmeasured heat as well, and remembers what it did and received."""
+
+    def __init__(self, simulator: Simulator, disturbance: Series, outdoor_at_start: float, skipped: int) -> None:
+        self._simulator, self._disturbance, self._outdoor = simulator, disturbance, outdoor_at_start
+        self._skipped = skipped
+        self.heat: list[Series] = []
+        self.temperatures: list[Series] = []
+        self.states: Series = np.empty(0)
+
+    @property
+    def step_seconds(self) -> float:
+        return self._simulator.step_seconds
+
+    @property
+    def zone_names(self) -> tuple[str, ...]:
+        return self._simulator.zone_names
+
+    def reset(self, zone_temperatures: Series, /) -> Series:
+        # walls between the zones and the season's outdoor air, not as warm as the zones all through
+        return self._simulator.reset(zone_temperatures, np.array([self._outdoor]))
+
+    def step(self, zone_heat: Series, boundary_temperatures: Series, /) -> Series:
+        number = len(self.heat)
+        zone = self._simulator.step(zone_heat + self._disturbance[number], boundary_temperatures)
+        self.heat.append(zone_heat)
+        self.temperatures.append(zone)
+        if number == self._skipped:
+            self.states = self._simulator.states
+        return zone
+
+
+def generate_twin(
+    building: Building,
+    seed: int = 0,
+    *,
+    days: float = 21.0,
+    step_seconds: float = 300.0,
+    start: str = "2023-01-09",
+    spin_up_days: float = 7.0,
+    dx: float | None = None,
+    excitation: Excitation = "schedule",
+    fixed: Mapping[str, float] | None = None,
+    scopes: Mapping[str, Scope] | None = None,
+    ranges: TwinRanges | None = None,
+    meter: Meter = "sensors",
+    resolution: float = 0.0,
+    progress: Progress | None = None,
+) -> tuple[Case, TwinTruth]:
+    """Make telemetry of a building under thermostats, with parameters drawn from their priors, and keep the truth.
+
+    The plant is the grid model that calibration fits, by implicit Euler at the telemetry's step. θ is drawn normally on
+    the estimation scale, with each parameter's `prior_deviation` about its start, within its physical range. Beside the
+    heat of its terminal unit each zone receives an autocorrelated heat (`draw_disturbance`) that no sensor sees: only
+    the temperatures show it, and through them the thermostats.
+
+    Parameters
+    ----------
+    building : Building
+        With floor plans. A VAV terminal a zone takes the place of its devices; its `airflows` are left out.
+    seed : int
+        Same seed, same twin; 0 or more. Weather, set-points, θ, disturbance and sensors all come from it.
+    days : float
+        Length of the telemetry [d], positive.
+    step_seconds : float
+        Length of an interval [s], positive, up to 3600.
+    start : str
+        Local time at which the first interval begins, ISO 8601 without offset. The default is a Monday in winter.
+    spin_up_days : float
+        Length that is simulated before it, from the steady state of the first day's outdoor air [d], 0 or more.
+    dx : float, optional
+        Distance between control volumes [m]; the plan's cell size by default. Calibrate with the same.
+    excitation : {"schedule", "prbs"}
+        Set-points with night set-back (`draw_thermostats`), or in a pseudo-random sequence (`draw_prbs_thermostats`).
+    fixed : mapping of str to float, optional
+        Parameters that are not drawn, with their values [parameter units].
+    scopes : mapping of str to {"global", "zone"}, optional
+        Parameters with one value a zone.
+    ranges : TwinRanges, optional
+        Of the unmeasured heat and of the sensor noise.
+    meter : {"sensors", "exact"}
+        What the discharge sensor reports, see the notes.
+    resolution : float
+        Steps of the temperature sensors [K], 0 or more; 0 reports every digit.
+    progress : callable, optional
+        Called as ``progress(steps_done, steps)`` after every step.
+
+    Returns
+    -------
+    tuple of Case and TwinTruth
+        What a user would have, and what is true.
+
+    Raises
+    ------
+    TwinError
+        When an option is unknown or the building has no floor plans.
+    ModelError
+        When a fixed parameter is not of this building.
+    ClosedLoopError
+        When a length is out of range.
+
+    Notes
+    -----
+    Heat is metered as ``flow * 1006 * (discharge - zone)`` of the temperatures that are *reported* (`Case.zone_heat`).
+    With ``meter="sensors"`` both sensors have noise of their own, as in a real building: the heat that entered the air
+    is `TwinTruth.heat`, and the metered heat is off by ``flow * 1006 * (e_discharge - e_zone)``, white and without
+    bias. With ``meter="exact"`` the discharge sensor is off by as much as the zone's, so that the metered heat of a
+    stamp is exactly the heat that entered the air, whatever the noise. The flow is reported as it was, but for its
+    single precision.
+
+    Examples
+    --------
+    >>> from thermal import load_bundled_case
+    >>> case, truth = generate_twin(load_bundled_case().building, 3, days=1.0, spin_up_days=1.0, dx=1.0)
+    >>> case.zone_heat().shape == truth.heat.shape
+    True
+    """
+    plans = _check(building, excitation, meter)
+    station = building.weather_station
+    twin = replace(building, name=f"{building.name}_twin_{seed}", devices=devices(plans), airflows=())
+    weather = generate_weather(
+        seed,
+        start=str(pd.Timestamp(start) - pd.Timedelta(days=spin_up_days)),
+        days=days + spin_up_days,
+        step_seconds=step_seconds,
+        location=building.location,
+        station=station,
+    )
+    parameters = build_network(twin, dx=dx, scopes=scopes).parameters
+    values = _draw_values(seed, parameters) | dict(fixed or {})
+    deviation, time_constant, noise = _draw_conditions(seed, ranges or TwinRanges())
+    floor_areas = zone_floor_areas(plans)
+    areas = np.array([floor_areas[zone] for zone in twin.zone_names])
+    disturbance = draw_disturbance(seed, len(weather), deviation * areas, time_constant, step_seconds)
+    outdoor = weather[f"{station}/{OUTDOOR_TEMPERATURE}"].iloc[: round(_DAY / step_seconds)].mean()
+    skipped = round(spin_up_days * _DAY / step_seconds)
+    simulator = Simulator(twin, values, step_seconds, dx=dx, scopes=scopes)
+    plant = _DisturbedPlant(simulator, disturbance, float(outdoor), skipped)
+    draw = draw_prbs_thermostats if excitation == "prbs" else draw_thermostats
+    telemetry = generate_telemetry(
+        plant,
+        plans,
+        weather,
+        seed=seed,
+        spin_up_days=spin_up_days,
+        thermostats=draw(seed, len(areas)),
+        station=station,
+        noise=noise,
+        resolution=resolution,
+        progress=progress,
+    )
+    heat = np.array(plant.heat[skipped:])
+    truth = TwinTruth(
+        seed=seed,
+        parameters=parameters,
+        theta=simulator.theta,
+        disturbance_deviation=deviation,
+        disturbance_time=time_constant,
+        noise=noise,
+        resolution=resolution,
+        zone_temperatures=np.array(plant.temperatures[skipped:]),
+        heat=heat,
+        disturbance=disturbance[skipped:],
+        states=plant.states,
+    )
+    return Case(twin, telemetry if meter == "sensors" else _metered_exactly(telemetry, plant.zone_names, heat)), truth
+
+
+def _check(building: Building, excitation: str, meter: str) -> FloorPlans:
+    """Refuse what no twin can be made of."""
+    for name, word, options in (
+        ("excitation", excitation, ("schedule", "prbs")),
+        ("meter", meter, ("sensors", "exact")),
+    ):
+        if word not in options:
+            raise TwinError(f"{name}: expected one of {', '.join(options)}, found {word!r}; {nearest(word, options)}")
+    if not isinstance(building.geometry, FloorPlans):
+        raise TwinError(
+            f"building {building.name!r}: expected floor plans, found a zone table; "
+            "its terminal units are sized by floor plans"
+        )
+    return building.geometry
+
+
+def _draw_values(seed: int, parameters: tuple[Parameter, ...]) -> dict[str, float]:
+    """Draw each parameter from its prior, cut at its physical range [parameter units]."""
+    shares = np.random.default_rng([seed, _THETA]).uniform(size=len(parameters))
+    values = {}
+    for p, share in zip(parameters, shares, strict=True):
+        centre, spread = p.transform(p.start), p.prior_deviation
+        low, high = (ndtr((p.transform(bound) - centre) / spread) for bound in (p.lower, p.upper))
+        drawn = p.inverse(centre + spread * float(ndtri(low + share * (high - low))))
+        values[p.name] = float(np.clip(drawn, p.lower, p.upper))
+    return values
+
+
+def _draw_conditions(seed: int, ranges: TwinRanges) -> tuple[float, float, float]:
+    """Draw deviation [W/m2] and correlation time [s] of the unmeasured heat, and the sensors' noise [K]."""
+    limits = (ranges.disturbance_deviation, ranges.disturbance_time, ranges.noise)
+    shares = np.random.default_rng([seed, _CONDITIONS]).uniform(size=len(limits))
+    drawn = [
+        low if low == high else low * (high / low) ** share for (low, high), share in zip(limits, shares, strict=True)
+    ]
+    return float(drawn[0]), float(drawn[1]), float(drawn[2])
+
+
+def _metered_exactly(telemetry: Telemetry, zones: tuple[str, ...], heat: Series) -> Telemetry:
+    """Report the discharge temperatures [K] that belong to the heat and to what the other sensors report."""
+    frame = telemetry.frame.copy()
+    for number, zone in enumerate(zones):
+        flow, air = frame[f"VAV_{zone}/{SUPPLY_FLOW}"], frame[f"VAV_{zone}/{ZONE_TEMPERATURE}"]
+        frame[f"VAV_{zone}/{DISCHARGE_TEMPERATURE}"] = air + heat[:, number] / (AIR_HEAT_CAPACITY * flow)
+    return replace(telemetry, frame=frame)
