@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 from calibration.errors import CalibrationError, ParameterFileError
-from thermal import Building, ThermalNetwork, build_network
+from thermal import Building, ModelError, Structure, ThermalNetwork, build_network
 from thermal.model import LEAST_SPIN_UP, SCHEMES, SPIN_UP, Scheme
+from thermal.network import BASELINE
 from thermal.parameters import Scope
 
 
@@ -26,15 +27,17 @@ class ModelSettings:
         Reach of the shuffle [m]; None is the whole zone.
     scheme : str
         ``implicit_euler`` or ``tr_bdf2``.
-    scopes : mapping of str to {"global", "zone"}
-        Parameters with one value a zone.
+    scopes : mapping of str to {"global", "facade", "zone"}
+        Parameters with one value a facade or a zone.
     spin_up_seconds : float
         Length of the spin-up before an interval [s].
+    structure : Structure
+        What the model is made of: furniture, slabs, nodes of a wall, radiant node.
 
     Raises
     ------
     CalibrationError
-        When the scheme is unknown, or the spin-up shorter than 12 hours.
+        When the scheme is unknown, the spin-up shorter than 12 hours, or the structure no `Structure`.
     """
 
     dx: float | None = None
@@ -42,6 +45,7 @@ class ModelSettings:
     scheme: str = "implicit_euler"
     scopes: Mapping[str, Scope] = field(default_factory=dict)
     spin_up_seconds: float = SPIN_UP
+    structure: Structure = BASELINE
 
     def __post_init__(self) -> None:
         if self.scheme not in SCHEMES:
@@ -50,6 +54,8 @@ class ModelSettings:
             raise CalibrationError(
                 f"spin_up_seconds: expected at least {LEAST_SPIN_UP:g} s, came {self.spin_up_seconds}"
             )
+        if not isinstance(self.structure, Structure):
+            raise CalibrationError(f"structure: expected a Structure, came {self.structure!r}")
 
     @property
     def stepping(self) -> Scheme:
@@ -64,11 +70,12 @@ class ModelSettings:
         building : Building
             What the case folder describes.
         """
-        return build_network(building, dx=self.dx, reach=self.reach, scopes=self.scopes)
+        return build_network(building, dx=self.dx, reach=self.reach, scopes=self.scopes, structure=self.structure)
 
     def to_dict(self) -> dict[str, Any]:
         """Entry of ``calibration.json``."""
-        return {**{k: getattr(self, k) for k in self.__dataclass_fields__}, "scopes": dict(self.scopes)}
+        plain = {"scopes": dict(self.scopes), "structure": asdict(self.structure)}
+        return {**{k: getattr(self, k) for k in self.__dataclass_fields__}, **plain}
 
 
 def read_settings(path: str | Path) -> dict[str, Any]:
@@ -78,6 +85,11 @@ def read_settings(path: str | Path) -> dict[str, Any]:
     ----------
     path : str or Path
         A ``calibration.json``.
+
+    Returns
+    -------
+    dict
+        Arguments of `ModelSettings`, as far as the file has them.
 
     Raises
     ------
@@ -97,4 +109,29 @@ def read_settings(path: str | Path) -> dict[str, Any]:
         value = settings.get(name)
         if value is not None and (isinstance(value, bool) or not isinstance(value, int | float) or value <= 0):
             raise ParameterFileError(f"{path}: settings.{name}: expected a positive number or null, found {value!r}")
+    if "scopes" in settings:
+        _check_scopes(path, settings["scopes"])
+    if "structure" in settings:
+        settings["structure"] = _structure(path, settings["structure"])
     return settings
+
+
+def _check_scopes(path: Path, scopes: Any) -> None:
+    """Refuse scopes that are not as `ModelSettings` writes them; the network says whether they fit the building."""
+    if not isinstance(scopes, dict) or not all(scope in get_args(Scope) for scope in scopes.values()):
+        raise ParameterFileError(
+            f"{path}: settings.scopes: expected a mapping to {', '.join(get_args(Scope))}, found {scopes!r}"
+        )
+
+
+def _structure(path: Path, entry: Any) -> Structure:
+    """Make the structure that a file names."""
+    known = sorted(Structure.__dataclass_fields__)
+    if not isinstance(entry, dict) or set(entry) - set(known):
+        raise ParameterFileError(
+            f"{path}: settings.structure: expected a mapping with keys among {known}, found {entry!r}"
+        )
+    try:
+        return Structure(**entry)
+    except ModelError as error:
+        raise ParameterFileError(f"{path}: settings.{error}") from error

@@ -14,7 +14,7 @@ from thermal.case import (
 from thermal.data import load_bundled_case
 from thermal.errors import CaseError, ModelError, ThermalError
 from thermal.model import Inputs, Simulator, SymbolicModel, free_runs, reduced_model, replay_inputs, simulate, spin_up
-from thermal.network import ThermalNetwork, build_network
+from thermal.network import Structure, ThermalNetwork, build_network
 from thermal.parameters import PARAMETERS, Parameter
 
 __all__ = [
@@ -28,6 +28,7 @@ __all__ = [
     "ModelError",
     "Parameter",
     "Simulator",
+    "Structure",
     "SymbolicModel",
     "Telemetry",
     "ThermalError",

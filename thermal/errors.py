@@ -218,6 +218,14 @@ class CellSizeError(ModelError):
     """A distance between control volumes that a plan cannot have."""
 
 
+class ScopeError(ModelError):
+    """A scope that is unknown, or that a parameter cannot have in this building."""
+
+
+class StructureError(ModelError):
+    """A structure of the baseline that cannot be built."""
+
+
 class SingularModelError(ModelError):
     """A system matrix that cannot be factorised."""
 

@@ -7,7 +7,11 @@ from typing import Literal
 
 import numpy as np
 
-Scope = Literal["global", "zone"]
+#: How many values a parameter has: one for the building, one a facade, or one a zone.
+Scope = Literal["global", "facade", "zone"]
+
+#: What stands before the facade in the full name of its parameter, so that a zone called "south" cannot be meant.
+FACADE_PREFIX = "facade:"
 
 
 @dataclass(frozen=True)
@@ -17,7 +21,7 @@ class Parameter:
     Parameters
     ----------
     name : str
-        Field term in full; a per-zone parameter is ``name@zone``.
+        Field term in full; that of a zone is ``name@zone``, that of a facade ``name@facade:south``.
     unit : str
         Unit as pint reads it.
     start : float
@@ -28,11 +32,15 @@ class Parameter:
         Where start and range come from.
     logit : bool
         True for a probability, estimated on the logit scale; every other parameter is estimated on the log scale.
+    scope : {"global", "facade", "zone"}
+        Whether the value is the building's, or a facade's or a zone's own.
+    member : str or None
+        The facade or the zone it is of; None for a global one.
 
     Raises
     ------
     ValueError
-        When the range does not hold the start.
+        When the range does not hold the start, or scope and member contradict each other.
     """
 
     name: str
@@ -42,6 +50,8 @@ class Parameter:
     upper: float
     source: str
     logit: bool = False
+    scope: Scope = "global"
+    member: str | None = None
 
     def __post_init__(self) -> None:
         if not 0.0 < self.lower < self.start < self.upper:
@@ -49,6 +59,16 @@ class Parameter:
                 f"parameter {self.name}: expected 0 < lower < start < upper, "
                 f"came {self.lower}, {self.start}, {self.upper}"
             )
+        if (self.scope == "global") != (self.member is None):
+            raise ValueError(
+                f"parameter {self.name}: expected a member with the scopes facade and zone only, "
+                f"came scope {self.scope!r} with member {self.member!r}"
+            )
+
+    @property
+    def base(self) -> str:
+        """Name that the members of one group share, a key of `PARAMETERS`: calibration may draw them together."""
+        return self.name.partition("@")[0]
 
     @property
     def prior_deviation(self) -> float:
@@ -95,6 +115,24 @@ class Parameter:
         """
         return replace(self, start=self.start * factor, lower=self.lower * factor, upper=self.upper * factor)
 
+    def of(self, scope: Literal["facade", "zone"], member: str) -> Parameter:
+        """Return the parameter of one facade or one zone, with the same start and range.
+
+        Parameters
+        ----------
+        scope : {"facade", "zone"}
+            Which of the two.
+        member : str
+            Its name.
+
+        Examples
+        --------
+        >>> PARAMETERS["window_u_value"].of("facade", "south").name
+        'window_u_value@facade:south'
+        """
+        prefix = FACADE_PREFIX if scope == "facade" else ""
+        return replace(self, name=f"{self.base}@{prefix}{member}", scope=scope, member=member)
+
 
 _ISO6946 = "ISO 6946:2017 Annex C (surface resistances)"
 _ISO13786 = "ISO 13786:2017 and ISO 52016-1:2017 Table B.14 (areal heat capacity classes)"
@@ -127,6 +165,14 @@ PARAMETERS: dict[str, Parameter] = {
         ),
         Parameter("interior_film_coefficient", "W/m^2/K", 2.5, 1.0, 6.0, _ARCH),
         Parameter("radiant_coefficient", "W/m^2/K", 5.0, 1.5, 8.0, _ARCH),
+        Parameter(
+            "combined_film_coefficient",
+            "W/m^2/K",
+            7.7,
+            2.5,
+            14.0,
+            "1 / 0.13 m2K/W: ISO 6946:2017 Table 7; range: the sum of the convective and radiative ones",
+        ),
         Parameter("slab_heat_capacity", "J/m^2/K", 1.5e5, 2.0e4, 6.0e5, _ISO13786),
         Parameter(
             "slab_coupling",
@@ -187,3 +233,14 @@ PARAMETERS: dict[str, Parameter] = {
         ),
     )
 }
+
+#: Parameters of the envelope: those that may have one value a facade.
+ENVELOPE_PARAMETERS = (
+    "exterior_convection_coefficient",
+    "exterior_wall_conductivity",
+    "exterior_wall_heat_capacity",
+    "window_u_value",
+    "exterior_wall_conductivity_multiplier",
+    "exterior_wall_heat_capacity_multiplier",
+    "window_conductance_multiplier",
+)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
 import pint
 import pytest
 
-from thermal.parameters import PARAMETERS, Parameter
+from thermal.parameters import ENVELOPE_PARAMETERS, PARAMETERS, Parameter, Scope
 
 UNITS = pint.UnitRegistry()
 
@@ -51,6 +52,33 @@ def test_rescaled_range_keeps_the_prior() -> None:
     assert (half.start, half.lower, half.upper) == (0.5 * p.start, 0.5 * p.lower, 0.5 * p.upper)
     assert half.prior_deviation == pytest.approx(p.prior_deviation, rel=1e-13)
     assert half.name == p.name
+
+
+def test_parameters_of_a_facade_and_of_a_zone_keep_base_and_prior() -> None:
+    p = PARAMETERS["window_u_value"]
+    south, zone = p.of("facade", "south"), p.of("zone", "room@2")
+    assert (south.name, south.base, south.scope, south.member) == (
+        "window_u_value@facade:south", "window_u_value", "facade", "south"
+    )  # fmt: skip
+    assert (zone.name, zone.base, zone.scope, zone.member) == (
+        "window_u_value@room@2", "window_u_value", "zone", "room@2"
+    )  # fmt: skip
+    assert (p.base, p.scope, p.member) == (p.name, "global", None)
+    for own in (south, zone):
+        assert (own.start, own.lower, own.upper, own.unit, own.source) == (p.start, p.lower, p.upper, p.unit, p.source)
+
+
+@pytest.mark.parametrize(("scope", "member"), [("global", "south"), ("facade", None), ("zone", None)])
+def test_scope_and_member_that_contradict_each_other_are_refused(scope: Scope, member: str | None) -> None:
+    with pytest.raises(ValueError, match=f"film: expected a member .* came scope '{scope}' with member {member!r}"):
+        Parameter("film", "W/m^2/K", 2.0, 1.0, 4.0, "made up", scope=scope, member=member)
+
+
+def test_envelope_parameters_are_parameters() -> None:
+    assert set(ENVELOPE_PARAMETERS) < set(PARAMETERS)
+    page = (Path(__file__).parents[2] / "docs" / "nomenclature.md").read_text(encoding="utf-8")
+    (row,) = [line for line in page.splitlines() if line.startswith("| `facade` |")]
+    assert re.findall(r"`(\w+)`", row.split("|")[4]) == list(ENVELOPE_PARAMETERS)
 
 
 @pytest.mark.parametrize(

@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal.case import Building, ZoneTable
-from thermal.network._graph import ThermalNetwork
+from thermal.network._network import ThermalNetwork
 from thermal.network._plan import plan_network
+from thermal.network._structure import BASELINE, Structure
 from thermal.network._table import table_network
 from thermal.parameters import Scope
 
@@ -21,6 +22,7 @@ def build_network(
     scopes: Mapping[str, Scope] | None = None,
     diffusers: Mapping[str, NDArray[np.bool_]] | None = None,
     mean_shuffle: bool = True,
+    structure: Structure = BASELINE,
 ) -> ThermalNetwork:
     """Build the control volumes and faces of a building, from floor plans or from a zone table.
 
@@ -32,19 +34,36 @@ def build_network(
         Distance between control volumes of a plan [m]; its cell size by default. A zone table has none and ignores it.
     reach : float, optional
         Reach of the shuffle [m]; None is the whole zone.
-    scopes : mapping of str to {"global", "zone"}, optional
-        Parameters with one value a zone; the others are global.
+    scopes : mapping of str to {"global", "facade", "zone"}, optional
+        Parameters with one value a facade or a zone; the others are global. Facades are the plan's sides, in a zone
+        table the direction nearest to a surface's azimuth, and ``roof`` and ``floor`` where those look outdoors.
     diffusers : mapping of str to ndarray of bool, optional
         Cells with a diffuser, per zone, at the plan's resolution; all air cells by default.
     mean_shuffle : bool
         Whether the mean of the shuffle is a term of K; off for a simulator that shuffles at random.
 
+    structure : Structure
+        What the model is made of beside its geometry: furniture, slabs, nodes of a wall, radiant node.
+
     Returns
     -------
     ThermalNetwork
         The baseline of the architecture: no sun, sky, leakage, gains, exchange between floors, ground or roof.
+
+    Raises
+    ------
+    ModelError
+        When a cell size, a scope, a mask of diffusers or the structure does not fit the building.
+
+    Examples
+    --------
+    >>> from thermal import Structure, load_bundled_case
+    >>> building = load_bundled_case().building
+    >>> network = build_network(building, dx=1.0, scopes={"window_u_value": "facade"}, structure=Structure.paper())
+    >>> [p.member for p in network.parameters if p.base == "window_u_value"]
+    ['north', 'south', 'west', 'east']
     """
     geometry = building.geometry
     if isinstance(geometry, ZoneTable):
-        return table_network(building, geometry, scopes)
-    return plan_network(building, geometry, dx, reach, scopes, diffusers, mean_shuffle)
+        return table_network(building, geometry, scopes, structure)
+    return plan_network(building, geometry, dx, reach, scopes, diffusers, mean_shuffle, structure)

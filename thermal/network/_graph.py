@@ -1,9 +1,8 @@
-"""Control volumes and faces: the graph that plans and zone tables both become."""
+"""The builder of a network: volumes, faces and the parameters in them, collected one by one."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from typing import Any, get_args
 
 import casadi as ca
@@ -11,150 +10,13 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from thermal.errors import ModelError
-from thermal.parameters import PARAMETERS, Parameter, Scope
+from thermal.errors import ScopeError
+from thermal.network._network import CapacityClass, ConductanceClass, ThermalNetwork
+from thermal.network._structure import BASELINE, Structure
+from thermal.parameters import ENVELOPE_PARAMETERS, FACADE_PREFIX, PARAMETERS, Parameter, Scope
 
-FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
-
-
-@dataclass(frozen=True)
-class ConductanceClass:
-    """Faces that share one conductance κ(θ): the flow over face f is ``κ weight_f (T_first - T_second)``.
-
-    Parameters
-    ----------
-    name : str
-        For example ``air-interior_wall``.
-    value : casadi.SX
-        κ as an expression of the parameter symbols.
-    first, second : ndarray, shape (n_face,)
-        Node numbers; numbers from ``n_node`` on are boundaries.
-    weight : ndarray, shape (n_face,)
-        Geometry of the face, so that ``κ weight`` is in [W/K].
-    """
-
-    name: str
-    value: ca.SX
-    first: IntArray
-    second: IntArray
-    weight: FloatArray
-
-
-@dataclass(frozen=True)
-class CapacityClass:
-    """Control volumes that share one volumetric (or areal) heat capacity: ``C_i = value weight_i`` [J/K].
-
-    Parameters
-    ----------
-    name : str
-        For example ``air``.
-    value : casadi.SX
-        Heat capacity as an expression of the parameter symbols.
-    node : ndarray of int, shape (n,)
-        Node numbers.
-    weight : ndarray, shape (n,)
-        Volumes [m3] or areas [m2], so that ``value weight`` is in [J/K].
-    """
-
-    name: str
-    value: ca.SX
-    node: IntArray
-    weight: FloatArray
-
-
-@dataclass(frozen=True)
-class ThermalNetwork:
-    """A building as control volumes and faces, ``C(θ) dT/dt = -K(θ) T + B(θ) u + H q``.
-
-    Parameters
-    ----------
-    zones : tuple of str
-        Zone names, the order of every zone axis.
-    boundaries : tuple of str
-        Names of the boundary temperatures, ``outdoor`` first.
-    kind : ndarray of str, shape (n_node,)
-        What each control volume is (``air``, ``radiant``, ``exterior_wall``, ``slab``, ...).
-    zone : ndarray, shape (n_node,)
-        Zone number, -1 where a volume belongs to none.
-    place : ndarray, shape (n_node, 3)
-        Floor, row and column of a plan's volume on its grid, -1 elsewhere.
-    conductances, capacities : tuple
-        The classes; K and C are their sums.
-    observation : csr_matrix, shape (n_zone, n_node)
-        Zone mean over the air volumes (the paper's T_sim).
-    heating : csr_matrix, shape (n_node, n_zone)
-        Distribution of a zone's heat over its volumes; columns sum to 1.
-    airflows : tuple of (int, int)
-        Directed airflows (source zone, target zone).
-    parameters : tuple of Parameter
-        The θ of this building, in order.
-    symbols : casadi.SX, shape (n_parameter,)
-        Their symbols in the class expressions.
-    nominal : mapping of str to (float, str)
-        Values that enter only as a product with a parameter, with their unit (densities [kg/m3]): never estimated.
-    spacing : float or None
-        Distance between the volumes of a plan [m]; None for a zone table.
-    floor_shapes : tuple of (int, int)
-        Rows and columns of each floor's grid, outside included; empty for a zone table.
-    """
-
-    zones: tuple[str, ...]
-    boundaries: tuple[str, ...]
-    kind: NDArray[np.str_]
-    zone: IntArray
-    place: IntArray
-    conductances: tuple[ConductanceClass, ...]
-    capacities: tuple[CapacityClass, ...]
-    observation: sp.csr_matrix
-    heating: sp.csr_matrix
-    airflows: tuple[tuple[int, int], ...]
-    parameters: tuple[Parameter, ...]
-    symbols: ca.SX
-    nominal: Mapping[str, tuple[float, str]] = field(default_factory=dict)
-    spacing: float | None = None
-    floor_shapes: tuple[tuple[int, int], ...] = ()
-
-    @property
-    def n_node(self) -> int:
-        """Number of control volumes, boundaries not counted."""
-        return len(self.kind)
-
-    @property
-    def n_boundary(self) -> int:
-        """Number of boundary temperatures."""
-        return len(self.boundaries)
-
-    def start(self) -> FloatArray:
-        """Parameter vector θ before calibration, shape (n_parameter,)."""
-        return np.array([p.start for p in self.parameters])
-
-    def values(self, given: Mapping[str, float]) -> FloatArray:
-        """Parameter vector θ with ``given`` values by name and the starts for the rest.
-
-        Parameters
-        ----------
-        given : mapping of str to float
-            Values by name [parameter units].
-
-        Raises
-        ------
-        ModelError
-            When a name is not a parameter of this building.
-        """
-        names = [p.name for p in self.parameters]
-        fixed = sorted(set(given) & set(self.nominal))
-        if fixed:
-            raise ModelError(
-                f"{fixed} are nominal: only their product with the heat capacity counts, so give that instead"
-            )
-        unknown = sorted(set(given) - set(names))
-        if unknown:
-            raise ModelError(f"parameters {unknown} are not of this building; it has {names}")
-        for name, value in given.items():
-            if isinstance(value, bool) or not isinstance(value, int | float | np.number) or not 0 < value < np.inf:
-                raise ModelError(f"{name}: expected a positive finite number, came {value!r}")
-        return np.array([float(given.get(p.name, p.start)) for p in self.parameters])
+FloatArray = NDArray[np.float64]
 
 
 class GraphBuilder:
@@ -164,18 +26,26 @@ class GraphBuilder:
     ----------
     zones, boundaries : tuple of str
         Names, in order; ``outdoor`` is the first boundary.
-    scopes : mapping of str to {"global", "zone"}
-        Parameters that get one value a zone; the others are global.
+    scopes : mapping of str to {"global", "facade", "zone"}
+        Parameters that get one value a facade or a zone; the others are global.
+    structure : Structure
+        What the model is made of.
+
+    Raises
+    ------
+    ScopeError
+        When a scope is unknown, or a facade's value asked for what is no part of the envelope.
     """
 
-    def __init__(self, zones: tuple[str, ...], boundaries: tuple[str, ...], scopes: Mapping[str, Scope]) -> None:
-        unknown = sorted(set(scopes) - set(PARAMETERS))
-        if unknown:
-            raise ModelError(f"scopes name unknown parameters {unknown}; known are {sorted(PARAMETERS)}")
-        odd = {name: scope for name, scope in scopes.items() if scope not in get_args(Scope)}
-        if odd:
-            raise ModelError(f"scopes: expected one of {get_args(Scope)} for each parameter, came {odd}")
-        self.zones, self.boundaries, self.scopes = zones, boundaries, dict(scopes)
+    def __init__(
+        self,
+        zones: tuple[str, ...],
+        boundaries: tuple[str, ...],
+        scopes: Mapping[str, Scope],
+        structure: Structure = BASELINE,
+    ) -> None:
+        _check_scopes(scopes, zones)
+        self.zones, self.boundaries, self.scopes, self.structure = zones, boundaries, dict(scopes), structure
         self.nominal: dict[str, tuple[float, str]] = {}
         self._parameters: dict[str, tuple[Parameter, ca.SX]] = {}
         self._kind: list[NDArray[np.str_]] = []
@@ -185,8 +55,8 @@ class GraphBuilder:
         self._faces: dict[str, tuple[ca.SX, list[tuple[Any, Any, Any]]]] = {}
         self._masses: dict[str, tuple[ca.SX, list[tuple[IntArray, FloatArray]]]] = {}
 
-    def parameter(self, name: str, zone: str | None = None, factor: float = 1.0) -> ca.SX:
-        """Symbol of a parameter; a zone's own when its scope is ``zone``.
+    def parameter(self, name: str, zone: str | None = None, factor: float = 1.0, *, facade: str | None = None) -> ca.SX:
+        """Symbol of a parameter; that of a zone or a facade when its scope says so.
 
         Parameters
         ----------
@@ -196,21 +66,30 @@ class GraphBuilder:
             Zone it acts in; None for what belongs to no single zone.
         factor : float
             Scale of start and range [-], for wall thickness.
+        facade : str, optional
+            Facade it acts on; None for what belongs to none.
         """
-        full = f"{name}@{zone}" if zone is not None and self.scopes.get(name) == "zone" else name
-        if full not in self._parameters:
-            base = PARAMETERS[name].rescaled(factor) if factor != 1.0 else PARAMETERS[name]
-            own = Parameter(full, base.unit, base.start, base.lower, base.upper, base.source, base.logit)
-            self._parameters[full] = (own, ca.SX.sym(full))
-        return self._parameters[full][1]
+        own = PARAMETERS[name].rescaled(factor) if factor != 1.0 else PARAMETERS[name]
+        if zone is not None and self.scopes.get(name) == "zone":
+            own = own.of("zone", zone)
+        elif facade is not None and self.scopes.get(name) == "facade":
+            own = own.of("facade", facade)
+        if own.name not in self._parameters:
+            self._parameters[own.name] = (own, ca.SX.sym(own.name))
+        return self._parameters[own.name][1]
 
     @property
     def size(self) -> int:
         """Number of control volumes so far."""
         return self._count
 
-    def key(self, name: str, zone: str | None, *parameters: str) -> str:
-        """Class name: the zone is part of it when one of the parameters is per zone.
+    @property
+    def has_facades(self) -> bool:
+        """Whether a parameter has one value a facade."""
+        return "facade" in self.scopes.values()
+
+    def key(self, name: str, zone: str | None, *parameters: str, facade: str | None = None) -> str:
+        """Class name: zone and facade are part of it when one of the parameters is a zone's or a facade's own.
 
         Parameters
         ----------
@@ -220,9 +99,13 @@ class GraphBuilder:
             Zone they belong to.
         *parameters : str
             Parameters in their conductance.
+        facade : str, optional
+            Facade they belong to.
         """
-        own = zone is not None and any(self.scopes.get(p) == "zone" for p in parameters)
-        return f"{name}@{zone}" if own else name
+        scopes = {self.scopes.get(p) for p in parameters}
+        members = [zone] if zone is not None and "zone" in scopes else []
+        members += [FACADE_PREFIX + facade] if facade is not None and "facade" in scopes else []
+        return "@".join([name, *members])
 
     def volumes(self, kind: str, zone: Any, place: IntArray | None = None) -> IntArray:
         """Add control volumes of one kind; returns their node numbers, shape (n,).
@@ -313,15 +196,7 @@ class GraphBuilder:
         floor_shapes : tuple of (int, int)
             Rows and columns of each floor's grid.
         """
-        shared = [
-            n
-            for n, s in self.scopes.items()
-            if s == "zone" and not any(p.startswith(f"{n}@") for p in self._parameters)
-        ]
-        if shared:
-            raise ModelError(
-                f"scopes: {shared} belong to no single zone of this building; only the global scope fits them"
-            )
+        self._refuse_unused_scopes()
 
         def join(parts: list[Any], column: int) -> Any:
             joined = np.concatenate([p[column] for p in parts])
@@ -352,3 +227,39 @@ class GraphBuilder:
             spacing=spacing,
             floor_shapes=floor_shapes,
         )
+
+    def _refuse_unused_scopes(self) -> None:
+        """Refuse scopes that gave nobody a value of its own, rather than leave the parameter global in silence."""
+        made = [p for p, _ in self._parameters.values()]
+        for name, scope in self.scopes.items():
+            if scope == "global" or any(p.base == name and p.scope == scope for p in made):
+                continue
+            if not any(p.base == name for p in made):
+                raise ScopeError(
+                    f"scopes: {name} is no parameter of this building with {self.structure}; "
+                    f"it has {sorted({p.base for p in made})}"
+                )
+            raise ScopeError(f"scopes: {name} belongs to no single {scope} of this building; {_fitting(name)}")
+
+
+def _fitting(name: str) -> str:
+    """Say which other scopes fit a parameter."""
+    return "the scopes global and facade fit it" if name in ENVELOPE_PARAMETERS else "only the global scope fits it"
+
+
+def _check_scopes(scopes: Mapping[str, Scope], zones: tuple[str, ...]) -> None:
+    """Refuse unknown parameters and scopes, facades of what is no envelope, and zones named as facades are."""
+    unknown = sorted(set(scopes) - set(PARAMETERS))
+    if unknown:
+        raise ScopeError(f"scopes name unknown parameters {unknown}; known are {sorted(PARAMETERS)}")
+    odd = {name: scope for name, scope in scopes.items() if scope not in get_args(Scope)}
+    if odd:
+        raise ScopeError(f"scopes: expected one of {get_args(Scope)} for each parameter, came {odd}")
+    inner = sorted(name for name, scope in scopes.items() if scope == "facade" and name not in ENVELOPE_PARAMETERS)
+    if inner:
+        raise ScopeError(
+            f"scopes: {inner} belong to no facade; these may have one value a facade: {list(ENVELOPE_PARAMETERS)}"
+        )
+    confused = sorted(zone for zone in zones if zone.startswith(FACADE_PREFIX))
+    if confused and any(scope != "global" for scope in scopes.values()):
+        raise ScopeError(f"scopes: zones {confused} are named as the facades of parameters are; rename them")

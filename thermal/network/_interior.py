@@ -6,16 +6,16 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal.network._films import surface_mesh
+from thermal.network._films import series, surface_mesh
 from thermal.network._graph import GraphBuilder
 from thermal.network._materials import WINDOW_RATED_FILM
 
-#: Layers of a slab: two resolve the hours-to-days response of floors and ceilings (chain of two nodes).
-SLAB_LAYERS = 2
+#: Parameters of the inside films with a radiant node, and of the one film without.
+_FILMS = {True: ("interior_film_coefficient", "radiant_coefficient"), False: ("combined_film_coefficient",)}
 
 
 class Zone:
-    """A zone while its network is built: its air volumes with their shares, and its radiant node.
+    """A zone while its network is built: its air volumes with their shares, its radiant node and its films.
 
     Parameters
     ----------
@@ -32,9 +32,20 @@ class Zone:
     def __init__(self, graph: GraphBuilder, name: str, air: NDArray[np.int64], share: NDArray[np.float64]) -> None:
         self.graph, self.name, self.air, self.share = graph, name, air, share
         self.number = graph.zones.index(name)
-        self.radiant = int(graph.volumes("radiant", self.number)[0])
-        self.film = graph.parameter("interior_film_coefficient", name)
-        self.radiation = graph.parameter("radiant_coefficient", name)
+        self.film_names = _FILMS[graph.structure.radiant]
+        self._inside: tuple[tuple[ca.SX, ...], int] | None = None
+        if graph.structure.furniture:
+            self.inside()
+
+    def inside(self) -> tuple[tuple[ca.SX, ...], int]:
+        """Films of the zone's surfaces and its radiant node (-1 without), made where the first surface needs them.
+
+        A zone that has none, with no wall and nothing in it, has no radiant node: it would make the system singular.
+        """
+        if self._inside is None:
+            node = int(self.graph.volumes("radiant", self.number)[0]) if self.graph.structure.radiant else -1
+            self._inside = (tuple(self.graph.parameter(n, self.name) for n in self.film_names), node)
+        return self._inside
 
     def surface(
         self,
@@ -44,6 +55,7 @@ class Zone:
         area: NDArray[np.float64] | float,
         air: NDArray[np.int64] | None = None,
         depends: tuple[str, ...] = (),
+        facade: str | None = None,
     ) -> None:
         """Add surfaces between this zone and a solid (or a boundary, for a window).
 
@@ -61,10 +73,12 @@ class Zone:
             The air volume that each surface faces; None spreads one surface over all air of the zone.
         depends : tuple of str
             Parameters inside ``solid_value``.
+        facade : str, optional
+            Facade that these belong to.
         """
-        to_air, to_radiant, across = surface_mesh(self.film, self.radiation, solid_value)
         graph = self.graph
-        key = graph.key(kind, self.name, "interior_film_coefficient", "radiant_coefficient", *depends)
+        films, radiant = self.inside()
+        key = graph.key(kind, self.name, *self.film_names, *depends, facade=facade)
         solid_, area_ = np.atleast_1d(solid), np.atleast_1d(np.asarray(area, float))
         if air is None:
             air_solid, air_area, air_node = (
@@ -74,44 +88,50 @@ class Zone:
             )
         else:
             air_solid, air_area, air_node = np.broadcast_to(solid_, air.shape), np.broadcast_to(area_, air.shape), air
+        if radiant < 0:
+            graph.face(f"air-{key}", series(*films, solid_value), air_node, air_solid, air_area)
+            return
+        film, radiation = films
+        to_air, to_radiant, across = surface_mesh(film, radiation, solid_value)
         graph.face(f"air-{key}", to_air, air_node, air_solid, air_area)
-        graph.face(f"radiant-{key}", to_radiant, self.radiant, solid_, area_)
-        graph.face(f"air-radiant past {key}", across, air_node, self.radiant, air_area)
+        graph.face(f"radiant-{key}", to_radiant, radiant, solid_, area_)
+        graph.face(f"air-radiant past {key}", across, air_node, radiant, air_area)
 
     def slabs(self, area: float) -> None:
         """Floor and ceiling slab, adiabatic at their back: one chain of nodes for both [area: both faces, m2]."""
         graph = self.graph
+        layers = graph.structure.slab_nodes
+        if layers == 0:
+            return
         coupling = graph.parameter("slab_coupling", self.name)
         heat = graph.parameter("slab_heat_capacity", self.name)
-        nodes = graph.volumes("slab", np.full(SLAB_LAYERS, self.number))
-        graph.capacity(graph.key("slab", self.name, "slab_heat_capacity"), heat, nodes, area / SLAB_LAYERS)
-        self.surface("slab", 2 * SLAB_LAYERS * coupling, nodes[0], area, depends=("slab_coupling",))
-        graph.face(
-            graph.key("slab-slab", self.name, "slab_coupling"), SLAB_LAYERS * coupling, nodes[:-1], nodes[1:], area
-        )
+        nodes = graph.volumes("slab", np.full(layers, self.number))
+        graph.capacity(graph.key("slab", self.name, "slab_heat_capacity"), heat, nodes, area / layers)
+        self.surface("slab", 2 * layers * coupling, nodes[0], area, depends=("slab_coupling",))
+        graph.face(graph.key("slab-slab", self.name, "slab_coupling"), layers * coupling, nodes[:-1], nodes[1:], area)
 
     def furniture(self, floor_area: float) -> None:
         """Furniture: one node, coupled to air and radiant node in the ratio of the films [floor_area: m2]."""
         graph = self.graph
+        if not graph.structure.furniture:
+            return
         coupling = graph.parameter("furniture_coupling", self.name)
         heat = graph.parameter("furniture_heat_capacity", self.name)
         node = graph.volumes("furniture", self.number)
         graph.capacity(graph.key("furniture", self.name, "furniture_heat_capacity"), heat, node, floor_area)
-        key = graph.key(
-            "furniture", self.name, "furniture_coupling", "interior_film_coefficient", "radiant_coefficient"
-        )
-        total = self.film + self.radiation
-        graph.face(f"air-{key}", coupling * self.film / total, self.air, node, floor_area * self.share)
-        graph.face(f"radiant-{key}", coupling * self.radiation / total, self.radiant, node, floor_area)
+        films, radiant = self.inside()
+        if radiant < 0:
+            key = graph.key("air-furniture", self.name, "furniture_coupling")
+            graph.face(key, coupling, self.air, node, floor_area * self.share)
+            return
+        film, radiation = films
+        key = graph.key("furniture", self.name, "furniture_coupling", *self.film_names)
+        total = film + radiation
+        graph.face(f"air-{key}", coupling * film / total, self.air, node, floor_area * self.share)
+        graph.face(f"radiant-{key}", coupling * radiation / total, radiant, node, floor_area)
 
-    def window(
-        self, u_value: ca.SX, area: float, other: int, air: NDArray[np.int64] | None = None, *, depends: str
-    ) -> None:
+    def window(self, u_value: ca.SX, area: float, other: int, air: NDArray[np.int64], facade: str) -> None:
         """Glass without mass towards boundary ``other``: ``u_value`` [W/m2/K] with the zone's own inside film."""
         pane = 1.0 / (1.0 / u_value - 1.0 / WINDOW_RATED_FILM)
-        if air is None:
-            self.surface("window", pane, other, area, depends=(depends,))
-        else:
-            self.surface(
-                "window", pane, np.full(air.size, other), np.full(air.size, area / air.size), air, depends=(depends,)
-            )
+        far, each = np.full(air.size, other), np.full(air.size, area / air.size)
+        self.surface("window", pane, far, each, air, depends=("window_u_value",), facade=facade)

@@ -7,11 +7,12 @@ from collections.abc import Mapping
 import casadi as ca
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 
 from thermal.case import Building, Layer, Surface, ZoneTable
+from thermal.network._chains import Chain
+from thermal.network._facades import facade_of
 from thermal.network._films import series
-from thermal.network._graph import GraphBuilder, ThermalNetwork
+from thermal.network._graph import GraphBuilder
 from thermal.network._interior import Zone
 from thermal.network._materials import (
     BOUNDARY_FILM_RESISTANCE,
@@ -19,14 +20,18 @@ from thermal.network._materials import (
     RATED_OUTSIDE_FILM,
     WINDOW_RATED_FILM,
 )
+from thermal.network._network import ThermalNetwork
+from thermal.network._structure import BASELINE, Structure
 from thermal.parameters import Scope
 from thermal.units import AIR_HEAT_CAPACITY, air_density
 
-#: Time that a sublayer must resolve [s]: its thickness is at most sqrt(diffusivity x this), a Fourier number of one.
-SUBLAYER_TIME = 1800.0
 
-
-def table_network(building: Building, table: ZoneTable, scopes: Mapping[str, Scope] | None = None) -> ThermalNetwork:
+def table_network(
+    building: Building,
+    table: ZoneTable,
+    scopes: Mapping[str, Scope] | None = None,
+    structure: Structure = BASELINE,
+) -> ThermalNetwork:
     """Build the network of a building given by a zone table.
 
     Parameters
@@ -35,8 +40,10 @@ def table_network(building: Building, table: ZoneTable, scopes: Mapping[str, Sco
         For its location, zones, boundaries and airflows.
     table : ZoneTable
         Its geometry.
-    scopes : mapping of str to {"global", "zone"}, optional
-        Parameters with one value a zone.
+    scopes : mapping of str to {"global", "facade", "zone"}, optional
+        Parameters with one value a facade (`thermal.network._facades.facade_of`) or a zone.
+    structure : Structure
+        What the model is made of.
 
     Returns
     -------
@@ -44,7 +51,7 @@ def table_network(building: Building, table: ZoneTable, scopes: Mapping[str, Sco
         Boundaries ``outdoor`` and the measured ones. Surfaces to ``ground`` are adiabatic at their back
         (``ground_exchange`` is an effect of the catalogue).
     """
-    graph = GraphBuilder(building.zone_names, ("outdoor", *building.measured_boundaries), scopes or {})
+    graph = GraphBuilder(building.zone_names, ("outdoor", *building.measured_boundaries), scopes or {}, structure)
     density = air_density(building.location.elevation)
     zones: dict[str, Zone] = {}
     for entry in table.zones:
@@ -81,21 +88,27 @@ def _add_surface(
         _add_layers(graph, zones, surface, layers)
 
 
+def _facade(graph: GraphBuilder, surface: Surface) -> str | None:
+    """Facade of a surface where that matters."""
+    return facade_of(surface) if graph.has_facades else None
+
+
 def _add_window(graph: GraphBuilder, zones: Mapping[str, Zone], surface: Surface) -> None:
     """Glass: rated air-to-air u-value with its films replaced by the building's own."""
-    zone, rated = zones[surface.zone], float(surface.u_value or 0.0)
-    multiplier = graph.parameter("window_conductance_multiplier")
+    zone, rated, facade = zones[surface.zone], float(surface.u_value or 0.0), _facade(graph, surface)
+    multiplier = graph.parameter("window_conductance_multiplier", facade=facade)
     if surface.other in zones:
         far = zones[surface.other]
         graph.face(f"window u={rated:g} between zones", rated * multiplier, zone.air, far.air, surface.area)
         return
     pane = multiplier / max(1.0 / rated - 1.0 / WINDOW_RATED_FILM - 1.0 / RATED_OUTSIDE_FILM, LEAST_PANE_RESISTANCE)
     if surface.other == "outdoor":
-        value = series(pane, graph.parameter("exterior_convection_coefficient"))
+        value = series(pane, graph.parameter("exterior_convection_coefficient", facade=facade))
     else:
         value = series(pane, 1.0 / BOUNDARY_FILM_RESISTANCE)
     kind = f"window u={rated:g} {'outdoor' if surface.other == 'outdoor' else 'boundary'}"
-    zone.surface(kind, value, graph.boundary(surface.other), surface.area)
+    depends = ("window_conductance_multiplier", "exterior_convection_coefficient")
+    zone.surface(kind, value, graph.boundary(surface.other), surface.area, depends=depends, facade=facade)
 
 
 def _group(surface: Surface) -> str:
@@ -105,41 +118,29 @@ def _group(surface: Surface) -> str:
     return "exterior_wall" if surface.other == "outdoor" else "interior_wall"
 
 
-def _sublayers(layers: tuple[Layer, ...]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Resistances [m2K/W] and areal capacities [J/m2/K] of sublayers thin enough for `SUBLAYER_TIME`."""
-    resistance, capacity = [], []
-    for layer in layers:
-        heat = layer.density * layer.heat_capacity
-        depth = np.sqrt(layer.conductivity / heat * SUBLAYER_TIME)
-        n = int(np.clip(np.ceil(layer.thickness / depth), 1, 12))
-        resistance += [layer.thickness / n / layer.conductivity] * n
-        capacity += [layer.thickness / n * heat] * n
-    return np.array(resistance), np.array(capacity)
-
-
 def _add_layers(graph: GraphBuilder, zones: Mapping[str, Zone], surface: Surface, layers: tuple[Layer, ...]) -> None:
-    """Add a chain of sublayers from the zone to what lies behind, scaled by its group's multipliers."""
-    group = _group(surface)
-    scale = graph.parameter(f"{group}_conductivity_multiplier")
-    heat = graph.parameter(f"{group}_heat_capacity_multiplier")
-    resistance, capacity = _sublayers(layers)
-    zone = zones[surface.zone]
-    nodes = graph.volumes(group, np.full(resistance.size, zone.number))
-    graph.capacity(group, heat, nodes, capacity * surface.area)
-    between = 1.0 / (0.5 * (resistance[:-1] + resistance[1:]))
-    graph.face(f"{group}-{group}", scale, nodes[:-1], nodes[1:], surface.area * between)
-    _room_side(zone, group, scale, resistance[0], int(nodes[0]), surface.area)
-    last, r = int(nodes[-1]), float(resistance[-1])
+    """Add a chain of nodes from the zone to what lies behind, scaled by its group's multipliers."""
+    group, facade = _group(surface), _facade(graph, surface)
+    conductivity, heat_capacity = f"{group}_conductivity_multiplier", f"{group}_heat_capacity_multiplier"
+    scale = graph.parameter(conductivity, facade=facade)
+    heat = graph.parameter(heat_capacity, facade=facade)
+    wall = Chain.of(layers, graph.structure.wall_nodes)
+    nodes = graph.volumes(group, np.full(wall.capacity.size, graph.zones.index(surface.zone)))
+    graph.capacity(graph.key(group, None, heat_capacity, facade=facade), heat, nodes, wall.capacity * surface.area)
+    between = graph.key(f"{group}-{group}", None, conductivity, facade=facade)
+    graph.face(between, scale, nodes[:-1], nodes[1:], surface.area * (1.0 / wall.between))
+
+    def room_side(zone: Zone, resistance: float, node: int) -> None:  # equal resistances share a class
+        kind = f"{group} r={2.0 * resistance:.6g}"
+        zone.surface(kind, scale / resistance, node, surface.area, depends=(conductivity,), facade=facade)
+
+    room_side(zones[surface.zone], wall.near, int(nodes[0]))
     if surface.other in zones:
-        _room_side(zones[surface.other], group, scale, r, last, surface.area)
-    elif surface.other == "outdoor":
-        value = series(graph.parameter("exterior_convection_coefficient"), 2.0 * scale / r)
-        graph.face(f"{group}-outdoor r={r:.6g}", value, last, graph.boundary("outdoor"), surface.area)
+        room_side(zones[surface.other], wall.far, int(nodes[-1]))
     elif surface.other != "ground":
-        value = series(1.0 / BOUNDARY_FILM_RESISTANCE, 2.0 * scale / r)
-        graph.face(f"{group}-boundary r={r:.6g}", value, last, graph.boundary(surface.other), surface.area)
-
-
-def _room_side(zone: Zone, group: str, scale: ca.SX, resistance: float, node: int, area: float) -> None:
-    """Surface of a chain's first or last sublayer towards a zone; faces of equal half resistance share a class."""
-    zone.surface(f"{group} r={resistance:.6g}", 2.0 * scale / resistance, node, area)
+        place, film = "boundary", ca.SX(1.0 / BOUNDARY_FILM_RESISTANCE)
+        if surface.other == "outdoor":
+            place, film = "outdoor", graph.parameter("exterior_convection_coefficient", facade=facade)
+        depends = (conductivity, "exterior_convection_coefficient")
+        key = graph.key(f"{group}-{place} r={2.0 * wall.far:.6g}", None, *depends, facade=facade)
+        graph.face(key, series(film, scale / wall.far), int(nodes[-1]), graph.boundary(surface.other), surface.area)
