@@ -2,10 +2,19 @@
 
 from calibration._calibrate import calibrate
 from calibration._case_model import CaseModel, case_model, check_on_grid, evaluate_case
-from calibration._estimate import Problem, estimate
+from calibration._corrected import evaluate_filter, filter_interval
+from calibration._disturbance import DisturbanceModel, DisturbedSpace
+from calibration._estimate import Estimate, estimate
 from calibration._evaluate import HORIZONS, Evaluation, Metrics, Predictions, evaluate_model, spatial_metrics
+from calibration._gain import Gain
+from calibration._innovations import DISTURBANCE_PRIORS, DisturbancePrior, TunedDisturbance, tune_disturbance
 from calibration._intervals import Interval, Runs, default_intervals, horizon_steps, parse_interval, select_runs
+from calibration._kalman import Filtered, KalmanFilter
 from calibration._least_squares import LeastSquaresResult, solve_least_squares
+from calibration._many import calibrate_many, case_folders
+from calibration._many_cluster import ClusterExecutor
+from calibration._many_record import CaseOutcome
+from calibration._problem import Problem
 from calibration._report import calibration_verdict, write_calibration
 from calibration._report_case import (
     check_verdict,
@@ -19,16 +28,29 @@ from calibration._report_evaluation import evaluation_verdict, predictions_table
 from calibration._result import CalibrationResult, GridCheck, ParameterEstimate, SolverReport, load_parameters
 from calibration._results import check_results_folder, to_json, write_results
 from calibration._settings import ModelSettings
+from calibration._smoother import Smoothed, smooth
+from calibration._state_space import StateSpace, state_space
+from calibration._whiteness import Whiteness, ZoneWhiteness, whiteness
 from calibration.errors import CalibrationError
 
 __all__ = [
+    "DISTURBANCE_PRIORS",
     "HORIZONS",
     "CalibrationError",
     "CalibrationResult",
     "CaseModel",
+    "CaseOutcome",
+    "ClusterExecutor",
+    "DisturbanceModel",
+    "DisturbancePrior",
+    "DisturbedSpace",
+    "Estimate",
     "Evaluation",
+    "Filtered",
+    "Gain",
     "GridCheck",
     "Interval",
+    "KalmanFilter",
     "LeastSquaresResult",
     "Metrics",
     "ModelSettings",
@@ -36,9 +58,16 @@ __all__ = [
     "Predictions",
     "Problem",
     "Runs",
+    "Smoothed",
     "SolverReport",
+    "StateSpace",
+    "TunedDisturbance",
+    "Whiteness",
+    "ZoneWhiteness",
     "calibrate",
+    "calibrate_many",
     "calibration_verdict",
+    "case_folders",
     "case_model",
     "check_on_grid",
     "check_results_folder",
@@ -46,8 +75,10 @@ __all__ = [
     "default_intervals",
     "estimate",
     "evaluate_case",
+    "evaluate_filter",
     "evaluate_model",
     "evaluation_verdict",
+    "filter_interval",
     "horizon_steps",
     "load_parameters",
     "parse_interval",
@@ -56,9 +87,13 @@ __all__ = [
     "select_runs",
     "simulation_summary",
     "simulation_verdict",
+    "smooth",
     "solve_least_squares",
     "spatial_metrics",
+    "state_space",
     "to_json",
+    "tune_disturbance",
+    "whiteness",
     "write_calibration",
     "write_check",
     "write_evaluation",

@@ -5,26 +5,34 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping, Sequence
 from importlib.metadata import version
+from typing import get_args
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
 from calibration._case_model import CaseModel
-from calibration._estimate import Estimate, Problem, estimate, random_starts, thin
+from calibration._describe import describe
+from calibration._estimate import Estimate, Tuner, compensated_start, draw_starts, estimate
 from calibration._evaluate import HORIZONS, Evaluation, Progress, evaluate_model
 from calibration._intervals import Interval, Runs, default_intervals, horizon_steps, select_runs
-from calibration._result import CalibrationResult, GridCheck, ParameterEstimate, SolverReport
+from calibration._problem import Loss, Problem, thin
+from calibration._result import CalibrationResult, GridCheck, SolverReport
 from calibration._settings import ModelSettings
+from calibration._tuner import tune
 from calibration.errors import CalibrationError, NotEnoughDataError
-from thermal import Case, Inputs, ModelError, Parameter, SymbolicModel, replay_inputs
-from thermal.model import LEAST_SPIN_UP, SPIN_UP
+from thermal import Case, Inputs, ModelError, Structure, SymbolicModel, reduced_model, replay_inputs
+from thermal.model import LEAST_SPIN_UP, SPIN_UP, ReducedModel
+from thermal.network import BASELINE
 from thermal.parameters import Scope
 
 FloatArray = NDArray[np.float64]
 
-#: A bound counts as hit within this share of the range, on the estimation scale [-].
-BOUND_SHARE = 0.01
+#: Starts that are tried unless told otherwise: the given one, where compensation would lead, and a draw.
+STARTS = 3
+
+#: Objectives closer than this are one optimum [-].
+_SAME = 1.0
 
 
 def calibrate(
@@ -39,15 +47,19 @@ def calibrate(
     scheme: str = "implicit_euler",
     reach: float | None = None,
     spin_up_seconds: float = SPIN_UP,
-    starts: int = 1,
+    structure: Structure = BASELINE,
+    loss: Loss = "linear",
+    starts: int = STARTS,
     seed: int = 0,
     progress: Progress | None = None,
 ) -> CalibrationResult:
     """Fit the physical parameters of a building to its telemetry by least squares.
 
-    Residuals are the errors of N-step runs that tile the tuning intervals; each zone's errors count as one observation
-    a day (they are strongly correlated in time), and every parameter has a log-normal prior whose 95 % interval is its
-    physical range. Ipopt solves on a reduced model with exact derivatives; the answer is checked on the grid.
+    Residuals are the errors of N-step runs that tile the tuning intervals, and every parameter has a log-normal prior
+    whose 95 % interval is its physical range. The errors are strongly correlated: an autocorrelated heat disturbance in
+    each zone and the sensors' noise, tuned by the likelihood of a Kalman filter's innovations, say how many independent
+    observations they are worth, and what the standard errors are. Ipopt solves on a reduced model with exact
+    derivatives; the answer is checked on the grid.
 
     Parameters
     ----------
@@ -59,8 +71,8 @@ def calibrate(
         Distance between control volumes of a plan [m]; the plan's cell size by default.
     fixed : mapping of str to float, optional
         Parameters that keep a given value [parameter units].
-    scopes : mapping of str to {"global", "zone"}, optional
-        Parameters with one value a zone.
+    scopes : mapping of str to {"global", "facade", "zone"}, optional
+        Parameters with one value a facade or a zone, shrunk towards a common one as far as the data let them.
     horizon : str
         Prediction horizon, such as ``6h``.
     scheme : str
@@ -69,8 +81,13 @@ def calibrate(
         Reach of the shuffle [m]; None is the whole zone.
     spin_up_seconds : float
         Length of the spin-up before an interval [s].
+    structure : Structure
+        What the model is made of: furniture, slabs, nodes of a wall, radiant node.
+    loss : {"linear", "pseudo_huber"}
+        Least squares, or a loss that outlying errors do not pull.
     starts : int
-        Number of starts: the given one, then draws from the prior.
+        Number of starts: the given one, where a fit would go that may compensate freely, then draws from the prior.
+        The best is kept, and a start that fails costs that start only.
     seed : int
         Seed of the draws.
     progress : callable, optional
@@ -79,7 +96,7 @@ def calibrate(
     Returns
     -------
     CalibrationResult
-        With the solver's status, which says whether it converged.
+        With the solver's status, which says whether it converged; after Ctrl-C during the solves, of the best so far.
 
     Raises
     ------
@@ -94,7 +111,9 @@ def calibrate(
     True
     """
     began = time.perf_counter()
-    settings = ModelSettings(dx, reach, scheme, dict(scopes or {}), spin_up_seconds)
+    settings = ModelSettings(dx, reach, scheme, dict(scopes or {}), spin_up_seconds, structure)
+    if loss not in get_args(Loss):
+        raise CalibrationError(f"loss: expected one of {', '.join(get_args(Loss))}, came {loss!r}")
     for name, value, least in (("starts", starts, 1), ("seed", seed, 0)):
         if value < least:
             raise CalibrationError(f"{name}: expected at least {least}, came {value}")
@@ -106,27 +125,43 @@ def calibrate(
     inputs = replay_inputs(case, network)
     given = network.values(fixed or {})
     free = tuple(i for i, p in enumerate(network.parameters) if p.name not in (fixed or {}))
+    if not free:
+        raise CalibrationError(
+            f"fixed: expected a parameter that is left to estimate, came all {len(given)}; evaluate instead"
+        )
     steps = horizon_steps(horizon, inputs.step)
     runs = _tuning_runs(inputs, tuned, steps, spin_up_seconds)
     for interval in judged:
         select_runs(inputs, interval, steps, spin_up=spin_up_seconds)  # refused now rather than after the solve
-    problem = Problem(grid, inputs, runs, steps, free, given, settings.stepping)
-    best, failures = _solve(problem, starts, seed, progress)
-    before, _ = _evaluated(CaseModel(case, settings, grid, inputs, given, "start"), intervals, horizon)
-    after, check = _evaluated(CaseModel(case, settings, grid, inputs, best.theta, "estimate"), intervals, horizon)
+    problem = Problem(grid, inputs, runs, steps, free, given, settings.stepping, loss=loss)
+    first = reduced_model(grid, [given])
+    best, failures = _solve(problem, first, starts, seed, progress)
+    before, _ = _evaluated(CaseModel(case, settings, grid, inputs, given, "start"), first, intervals, horizon, progress)
+    found = CaseModel(case, settings, grid, inputs, best.theta, "estimate")
+    after, check = _evaluated(found, best.model, intervals, horizon, progress)
     seconds = time.perf_counter() - began
     return CalibrationResult(
         case=case.building.name,
         zones=network.zones,
-        parameters=_describe(best, network.nominal),
+        parameters=describe(best, network.nominal),
         theta=best.theta,
         tuning=tuple(tuned),
         held_out=tuple(judged),
         uncalibrated=before,
         calibrated=after,
         solver=SolverReport(
-            "ipopt", best.solve.status, best.solve.success, best.iterations, seconds, starts, tuple(failures)
+            "ipopt",
+            best.solve.status,
+            best.solve.success,
+            best.iterations,
+            seconds,
+            starts,
+            tuple(failures),
+            best.evaluations,
+            best.settled,
         ),
+        disturbance=best.disturbance,
+        excess=best.excess,
         grid_check=check,
         horizon=horizon,
         settings=settings,
@@ -136,13 +171,19 @@ def calibrate(
 
 
 def _evaluated(
-    model: CaseModel, intervals: Mapping[str, Sequence[Interval]], horizon: str
+    model: CaseModel,
+    reduced: ReducedModel,
+    intervals: Mapping[str, Sequence[Interval]],
+    horizon: str,
+    progress: Progress | None,
 ) -> tuple[dict[str, Evaluation], GridCheck]:
     """Errors on both kinds of interval, at other horizons too where held out, and the check of the reduced model."""
     settings = model.settings
-    quick, check = model.certified(intervals["held_out"][0], horizon_steps(horizon, model.inputs.step))
-    errors = {
-        name: evaluate_model(
+    steps = horizon_steps(horizon, model.inputs.step)
+    quick, check = model.certified(intervals["held_out"][0], steps, reduced)
+    errors = {}
+    for name, part in intervals.items():
+        errors[name] = evaluate_model(
             quick,
             model.theta,
             model.inputs,
@@ -152,9 +193,8 @@ def _evaluated(
             horizons=HORIZONS if name == "held_out" else (),
             scheme=settings.stepping,
             spin_up_seconds=settings.spin_up_seconds,
+            progress=progress,
         )
-        for name, part in intervals.items()
-    }
     return errors, check
 
 
@@ -174,7 +214,7 @@ def _tuning_runs(inputs: Inputs, intervals: Sequence[Interval], steps: int, spin
             found = select_runs(inputs, interval, steps, spin_up=spin_up)
         inside = found.starts >= inputs.stamps.searchsorted(interval.start)  # every residual lies in the interval
         chosen.append(Runs(found.begin, found.starts[inside], found.skipped))
-    runs = tuple(r for r in thin(chosen, steps, inputs.step) if r.starts.size)
+    runs = tuple(r for r in thin(chosen, steps) if r.starts.size)
     if not runs:
         raise NotEnoughDataError(
             "tuning: every run misses inputs or zone temperatures; `buildingmpc check` shows the gaps"
@@ -192,49 +232,41 @@ def _refuse_overlap(tuning: Sequence[Interval], held_out: Sequence[Interval]) ->
                 )
 
 
-def _solve(problem: Problem, starts: int, seed: int, progress: Progress | None) -> tuple[Estimate, list[str]]:
-    """Best estimate over the starts; a start that fails costs that start only."""
+def _solve(
+    problem: Problem, first: ReducedModel, starts: int, seed: int, progress: Progress | None
+) -> tuple[Estimate, list[str]]:
+    """Best estimate over the starts; a start that fails costs that start only, Ctrl-C those that are left."""
     best: Estimate | None = None
     failures = []
-    for number, z in enumerate(random_starts(problem, starts, seed)):
+    draws = draw_starts(problem, max(1, starts - 1), seed)
+    for number in range(starts):
         try:
-            found = estimate(problem, z, progress)
-        except (ArithmeticError, np.linalg.LinAlgError, ModelError) as error:
-            failures.append(f"start {number}: {error}")
+            if number == 1:
+                begun = best.problem if best is not None else problem
+                z = compensated_start(begun, problem.point(problem.start), first)
+            else:
+                z = draws[max(0, number - 1)]
+            model = first if number == 0 else None
+            found = estimate(problem, z, progress, model, tune if best is None else _as(best))
+        except (ArithmeticError, np.linalg.LinAlgError, CalibrationError, ModelError) as error:
+            failures.append(f"start {number + 1}: {error}")
             continue
-        if best is None or _objective(found) < _objective(best):
+        except KeyboardInterrupt:
+            if best is None:
+                raise
+            failures.append(f"start {number + 1}: stopped by Ctrl-C")
+            break
+        if best is None or found.better_than(best):
             best = found
+        if found.solve.interrupted:
+            failures.append(f"start {number + 1}: stopped by Ctrl-C")
+            break
     if best is None:
         raise CalibrationError(f"every start failed: {'; '.join(failures)}")
     return best, failures
 
 
-def _objective(found: Estimate) -> float:
-    """Negative log posterior up to a constant, the deviation profiled out, so that starts compare."""
-    size, deviation = found.problem.effective_size(), found.problem.deviation
-    return found.solve.cost + size * float(np.log(deviation))
-
-
-def _describe(found: Estimate, nominal: Mapping[str, tuple[float, str]]) -> tuple[ParameterEstimate, ...]:
-    """Parameters with standard errors, bounds and what the data determine."""
-    deviations = dict(zip(found.problem.free, np.sqrt(np.diag(found.covariance)), strict=True))
-    described = [
-        _estimated(p, float(found.theta[i]), deviations.get(i))
-        for i, p in enumerate(found.problem.grid.network.parameters)
-    ]
-    for name, (value, unit) in nominal.items():
-        source = "nominal: enters only as a product with the heat capacity"
-        described.append(ParameterEstimate(name, unit, value, None, None, value, False, None, False, source))
-    return tuple(described)
-
-
-def _estimated(p: Parameter, value: float, deviation: float | None) -> ParameterEstimate:
-    if deviation is None:
-        return ParameterEstimate(
-            p.name, p.unit, value, p.lower, p.upper, p.start, False, None, False, "fixed by the user"
-        )
-    low, high, z = p.transform(p.lower), p.transform(p.upper), p.transform(value)
-    at_bound = bool(min(z - low, high - z) < BOUND_SHARE * (high - low))
-    identifiable = bool(deviation < 0.5 * p.prior_deviation and not at_bound)
-    error = float(deviation * p.slope(value))
-    return ParameterEstimate(p.name, p.unit, value, p.lower, p.upper, p.start, at_bound, error, identifiable, p.source)
+def _as(found: Estimate) -> Tuner | None:
+    """Disturbance of an earlier start, so that starts are weighed alike."""
+    disturbance = found.disturbance
+    return None if disturbance is None else lambda *_: disturbance

@@ -24,7 +24,7 @@ from thermal import (
     replay_inputs,
     spin_up,
 )
-from thermal.model import SPIN_UP, Scheme
+from thermal.model import SPIN_UP, ReducedModel, Scheme
 
 FloatArray = NDArray[np.float64]
 
@@ -62,7 +62,9 @@ class CaseModel:
     theta: FloatArray
     source: str
 
-    def certified(self, interval: Interval, steps: int) -> tuple[SymbolicModel, GridCheck]:
+    def certified(
+        self, interval: Interval, steps: int, reduced: ReducedModel | None = None
+    ) -> tuple[SymbolicModel, GridCheck]:
         """Reduce the model where that is accurate enough, and return the grid where it is not.
 
         Parameters
@@ -71,8 +73,10 @@ class CaseModel:
             Reduced model and grid are compared at its beginning.
         steps : int
             N of the runs that are compared.
+        reduced : ReducedModel, optional
+            That serves θ; made here by default.
         """
-        reduced = reduced_model(self.grid, [self.theta])
+        reduced = reduced or reduced_model(self.grid, [self.theta])
         s = self.settings
         check = check_on_grid(
             self.grid, reduced, self.theta, self.inputs, interval, steps, s.stepping, s.spin_up_seconds

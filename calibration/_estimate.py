@@ -1,166 +1,46 @@
-"""The estimation problem: residuals of N-step runs and a prior on every parameter, solved on a reduced model."""
+"""Estimation from one start: rounds of solving on a reduced model, re-weighing the data, and reducing anew."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from calibration._disturbance import DisturbanceModel
 from calibration._evaluate import Progress
-from calibration._intervals import Runs
 from calibration._least_squares import LeastSquaresResult, solve_least_squares
-from thermal import Inputs, Parameter, SymbolicModel, free_runs, reduced_model, spin_up
-from thermal.model import IMPLICIT_EULER, Scheme
+from calibration._precision import Precision, precision, unexplained
+from calibration._problem import Problem
+from calibration._samples import randomised
+from thermal import SymbolicModel, reduced_model
+from thermal.model import ReducedModel
 
 FloatArray = NDArray[np.float64]
 
-#: Residuals of a run are taken every half hour: what lies between is almost the same number again.
-RESIDUAL_SPACING = 1800.0
-
-#: Standard deviation of a zone's prediction error before the data have told it [K].
-FIRST_DEVIATION = 0.3
-
-#: Rounds of reduction and re-weighting, and the change of the estimation scale that ends them [-].
+#: Most rounds, and the change of the estimate in standard errors that ends them [-].
 ROUNDS = 8
 ROUND_TOLERANCE = 0.05
 
+#: Drift of a reduced model beyond which it is made anew at the new θ [K].
+DRIFT_TOLERANCE = 0.005
 
-@dataclass(frozen=True)
-class Problem:
-    """Least squares over N-step runs of several tuning intervals.
+#: Change of the data's worth beyond which a round with the new one follows [-].
+_WORTH_TOLERANCE = 0.1
 
-    Parameters
-    ----------
-    grid : SymbolicModel
-        The model on the grid.
-    inputs : Inputs
-        The telemetry.
-    runs : tuple of Runs
-        Tuning runs, one entry an interval.
-    steps : int
-        N.
-    free : tuple of int
-        Positions of the estimated parameters in θ; the others keep their start.
-    start : ndarray, shape (n_parameter,)
-        θ at the start, each in the unit of its parameter [parameter units].
-    scheme : Scheme
-        Time stepping.
-    deviation : float
-        Standard deviation of a zone's prediction error [K].
-    """
+#: How often the disturbance is tuned: when the estimate has come to rest, and (a large building not) when it has again.
+_TUNINGS = 2
 
-    grid: SymbolicModel
-    inputs: Inputs
-    runs: tuple[Runs, ...]
-    steps: int
-    free: tuple[int, ...]
-    start: FloatArray
-    scheme: Scheme = IMPLICIT_EULER
-    deviation: float = FIRST_DEVIATION
+#: Least standard deviation of an error [K]: sensors do not resolve less.
+_LEAST_DEVIATION = 0.02
 
-    @property
-    def parameters(self) -> list[Parameter]:
-        """Estimated parameters, in order."""
-        return [self.grid.network.parameters[i] for i in self.free]
+#: Zones up to which parameters are sampled. A building of more is large: seventy evaluations take minutes there, so the
+#: curvature has to do, and a basis is made at one θ.
+MOST_SAMPLED = 40
 
-    @property
-    def keep(self) -> NDArray[np.int64]:
-        """Steps whose residuals count: every half hour, the last included."""
-        stride = max(1, round(RESIDUAL_SPACING / self.inputs.step))
-        return np.arange(self.steps, 0, -stride)[::-1]
-
-    def theta(self, z: FloatArray) -> FloatArray:
-        """θ of a point of the estimation scale.
-
-        Parameters
-        ----------
-        z : ndarray, shape (n_free,)
-            Point of the estimation scale [-].
-        """
-        theta = self.start.copy()
-        for i, p, v in zip(self.free, self.parameters, z, strict=True):
-            theta[i] = p.inverse(float(v))
-        return theta
-
-    def point(self, theta: FloatArray) -> FloatArray:
-        """Point of the estimation scale of θ, moved inside the range.
-
-        Parameters
-        ----------
-        theta : ndarray, shape (n_parameter,)
-            Parameter values [parameter units].
-        """
-        inside = [float(np.clip(theta[i], p.lower, p.upper)) for i, p in zip(self.free, self.parameters, strict=True)]
-        return np.array([p.transform(v) for p, v in zip(self.parameters, inside, strict=True)])
-
-    def residuals(self, model: SymbolicModel, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Errors of all runs [K] and their derivatives with respect to θ; unmeasured ones left out.
-
-        Parameters
-        ----------
-        model : SymbolicModel
-            On the grid or reduced.
-        theta : ndarray, shape (n_parameter,)
-            Parameter values [parameter units].
-        """
-        errors, slopes = self._errors(model, theta, slopes=True)
-        return errors, slopes[:, list(self.free)]
-
-    def residuals_only(self, model: SymbolicModel, theta: FloatArray) -> FloatArray:
-        """Errors of all runs [K].
-
-        Parameters
-        ----------
-        model : SymbolicModel
-            On the grid or reduced.
-        theta : ndarray, shape (n_parameter,)
-            Parameter values [parameter units].
-        """
-        return self._errors(model, theta, slopes=False)[0]
-
-    def _errors(self, model: SymbolicModel, theta: FloatArray, slopes: bool) -> tuple[FloatArray, FloatArray]:
-        """Errors of the measured zones at the kept steps of all runs, (n,) [K], and derivatives (n, n_parameter)."""
-        matrices = model.matrices(theta, slopes)
-        inputs, keep = self.inputs, self.keep
-        errors, derivatives = [], [np.empty((0, theta.size))]
-        for runs in self.runs:
-            states, moved = spin_up(matrices, inputs, runs.begin, runs.starts)
-            means, mean_slopes = free_runs(
-                matrices, model.network, inputs, runs.starts, self.steps, states, moved, self.scheme, keep
-            )
-            error = means - inputs.zone[runs.starts[:, None] + keep[None, :]]
-            seen = np.isfinite(error) & np.isfinite(inputs.bridged[runs.starts])[:, None, :]
-            errors.append(error[seen])
-            if mean_slopes is not None:
-                derivatives.append(mean_slopes[seen])
-        return np.concatenate(errors), np.concatenate(derivatives)
-
-    def effective_size(self) -> float:
-        """Independent observations in the tuning runs [-]: days times measured zones, since errors are correlated."""
-        zones = np.isfinite(self.inputs.zone).any(axis=0).sum()
-        seconds = sum(r.starts.size for r in self.runs) * self.steps * self.inputs.step
-        return float(max(1.0, seconds / 86400.0) * zones)
-
-    def weighted(self, model: SymbolicModel, z: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Residuals and Jacobian on the estimation scale: weighted data, then the priors.
-
-        Parameters
-        ----------
-        model : SymbolicModel
-            On the grid or reduced.
-        z : ndarray, shape (n_free,)
-            Point of the estimation scale [-].
-        """
-        theta = self.theta(z)
-        error, slopes = self.residuals(model, theta)
-        weight = np.sqrt(self.effective_size() / error.size) / self.deviation
-        scale = np.array([p.slope(theta[i]) for i, p in zip(self.free, self.parameters, strict=True)])
-        spread = np.array([p.prior_deviation for p in self.parameters])
-        centre = np.array([p.transform(p.start) for p in self.parameters])
-        residual = np.concatenate([weight * error, (z - centre) / spread])
-        return residual, np.vstack([weight * slopes * scale, np.diag(1.0 / spread)])
+#: Finds the unmeasured heat and the sensors' noise at θ.
+Tuner = Callable[[Problem, ReducedModel, FloatArray], DisturbanceModel]
 
 
 @dataclass(frozen=True)
@@ -174,28 +54,75 @@ class Estimate:
     solve : LeastSquaresResult
         Last solve, on the estimation scale.
     problem : Problem
-        With the deviation that was found.
-    model : SymbolicModel
-        Reduced model at θ.
+        With the deviation and the worth of the errors that were found.
+    model : ReducedModel
+        Reduced model that serves θ.
     iterations : int
         Ipopt iterations over all rounds.
+    evaluations : int
+        Evaluations of the errors with their derivatives, over all rounds.
     covariance : ndarray, shape (n_free, n_free)
-        Posterior covariance on the estimation scale [-].
+        Of the estimate, on the estimation scale [-].
+    disturbance : DisturbanceModel or None
+        Unmeasured heat and sensor noise, where they were tuned.
+    excess : float
+        Mean square of the errors over that which the disturbance makes [-]; 1 where it was not tuned.
+    settled : bool
+        Whether the rounds ended because nothing moved any more.
     """
 
     theta: FloatArray
     solve: LeastSquaresResult
     problem: Problem
-    model: SymbolicModel
+    model: ReducedModel
     iterations: int
+    evaluations: int
     covariance: FloatArray
+    disturbance: DisturbanceModel | None
+    excess: float
+    settled: bool
+
+    @property
+    def point(self) -> FloatArray:
+        """The estimate on the estimation scale, (n_free,) [-]."""
+        return self.problem.point(self.theta)
+
+    def better_than(self, other: Estimate) -> bool:
+        """Whether its cost is less, errors weighed as the other has them.
+
+        Parameters
+        ----------
+        other : Estimate
+            From another start.
+        """
+        own, _ = other.problem.weighted(self.model, self.point)
+        return 0.5 * float(own @ own) < other.solve.cost
+
+    def sampled(self) -> FloatArray | None:
+        """Where the parameters may be, (n_sample, n_free) on the estimation scale [-].
+
+        None where the disturbance was not tuned, and in large buildings, where the curvature has to do.
+        """
+        if self.disturbance is None or self.problem.inputs.zone.shape[1] > MOST_SAMPLED or self.solve.interrupted:
+            return None
+        return randomised(self.problem, self.model, self.point, *self._known(self.disturbance))
+
+    def _known(self, disturbance: DisturbanceModel) -> tuple[Precision, float]:
+        return _known(self.problem, self.model, self.theta, disturbance, self.excess)
 
 
-def estimate(problem: Problem, z: FloatArray, progress: Progress | None = None) -> Estimate:
+def estimate(
+    problem: Problem,
+    z: FloatArray,
+    progress: Progress | None = None,
+    model: ReducedModel | None = None,
+    tuner: Tuner | None = None,
+) -> Estimate:
     """Solve the problem from one start.
 
-    Each round reduces the grid model at the current θ, solves by Ipopt, and takes the deviation of the errors it finds
-    for the next; the rounds end when θ no longer moves, so the reduced model was accurate where the answer lies.
+    Each round solves by Ipopt on a reduced model, then takes the deviation of the errors (and, with a tuner, how many
+    independent observations they are worth) for the next, and reduces anew where θ has moved too far from the
+    basis; the rounds end when nothing moves.
 
     Parameters
     ----------
@@ -205,41 +132,130 @@ def estimate(problem: Problem, z: FloatArray, progress: Progress | None = None) 
         Start on the estimation scale [-].
     progress : callable, optional
         Called with stage, done, total.
+    model : ReducedModel, optional
+        Made at the start; saves reducing there.
+    tuner : callable, optional
+        Finds the disturbance model that standard errors follow, and weights where it finds the errors worth less than
+        one a day and zone. It never makes them worth more: disturbances of zones are independent, while what a model
+        lacks is common to them, and priors must hold against it.
+
+    Returns
+    -------
+    Estimate
+        The best so far, with the solver's status, also after Ctrl-C.
     """
-    lower = np.array([p.transform(p.lower) for p in problem.parameters])
-    upper = np.array([p.transform(p.upper) for p in problem.parameters])
-    iterations = 0
-    solve: LeastSquaresResult | None = None
-    model = reduced_model(problem.grid, [problem.theta(z)])
-    for round_ in range(ROUNDS):
-        current, small = problem, model
-
-        def weighted(
-            x: FloatArray, current: Problem = current, small: SymbolicModel = small
-        ) -> tuple[FloatArray, FloatArray]:
-            return current.weighted(small, x)
-
-        solve = solve_least_squares(weighted, z, lower, upper, tolerance=1e-2 if round_ == 0 else 1e-3)
-        iterations += solve.iterations
-        covariance = np.asarray(np.linalg.inv(solve.jacobian.T @ solve.jacobian), dtype=float)
-        # distance in units of what the data leave open, so that flat directions do not keep the rounds going
-        moved = float(np.sqrt((solve.x - z) @ np.linalg.solve(covariance, solve.x - z)))
-        z = solve.x
+    rounds = _Rounds(problem, model or reduced_model(problem.grid, [problem.theta(z)]), tuner)
+    for number in range(ROUNDS):
+        z = rounds.solve(z, 1e-2 if number == 0 else 1e-3)
         if progress is not None:
-            progress("calibrate", round_ + 1, ROUNDS)
-        theta = problem.theta(z)
-        if round_ and solve.success and moved < ROUND_TOLERANCE * np.sqrt(z.size):
+            progress("calibrate", number + 1, ROUNDS)
+        if rounds.interrupted or (rounds.next_round(z, number) and number):
             break
-        model = reduced_model(problem.grid, [theta])
-        error = problem.residuals_only(model, theta)
-        problem = replace(problem, deviation=float(max(0.02, np.sqrt(np.mean(error**2)))))
-    if solve is None:  # pragma: no cover - ROUNDS is at least one
-        raise RuntimeError
-    return Estimate(problem.theta(z), solve, problem, model, iterations, covariance)
+    return rounds.result(z)
 
 
-def random_starts(problem: Problem, count: int, seed: int) -> list[FloatArray]:
-    """Draw starts on the estimation scale: the given θ first, then draws from the prior at half its spread.
+class _Rounds:
+    """State of the rounds: how errors are weighed, the reduced model in use, and what was counted."""
+
+    def __init__(self, problem: Problem, model: ReducedModel, tuner: Tuner | None) -> None:
+        self.problem, self.model, self.tuner = problem, model, tuner
+        self.iterations = self.evaluations = self.tunings = 0
+        self.moved, self.settled, self.interrupted = np.inf, False, False
+        self.disturbance: DisturbanceModel | None = None
+        self.excess = 1.0
+        self.last: LeastSquaresResult | None = None
+        self.large = problem.inputs.zone.shape[1] > MOST_SAMPLED
+
+    def solve(self, z: FloatArray, tolerance: float) -> FloatArray:
+        """One solve; returns the point found."""
+        problem, model = self.problem, self.model
+
+        def weighted(x: FloatArray) -> tuple[FloatArray, FloatArray]:
+            self.evaluations += 1
+            return problem.weighted(model, x)
+
+        found = solve_least_squares(weighted, z, *problem.bounds, tolerance=tolerance)
+        self.iterations += found.iterations
+        self.interrupted = found.interrupted
+        # in units of what the data leave open, so that flat directions do not keep the rounds going
+        self.moved = float(np.linalg.norm(found.jacobian @ (found.x - z)))
+        self.last = found
+        return found.x
+
+    def next_round(self, z: FloatArray, number: int) -> bool:
+        """Weigh and reduce anew; True when another round would change nothing."""
+        theta = self.problem.theta(z)
+        still = self.moved < ROUND_TOLERANCE * np.sqrt(z.size) and self.last is not None and self.last.success
+        if self.model.drift(theta) > DRIFT_TOLERANCE:
+            # both ends of a move where it does not come to rest: the optimum can jump to and fro between two bases
+            both = number > 2 and not self.large
+            self.model = reduced_model(self.problem.grid, [theta, self.model.theta] if both else [theta])
+            still = False
+        error = self.problem.residuals_only(self.model, theta)
+        before = self.problem.effective_size()
+        deviation = max(_LEAST_DEVIATION, self.problem.spread(error))
+        self.problem = replace(self.problem, deviation=deviation, shrinkage=_shrinkage(self.problem, z, self.last))
+        if self.tuner is not None and (still or self.disturbance is not None):
+            if self.tunings < (1 if self.large else _TUNINGS):
+                self.disturbance = self.tuner(self.problem, self.model, theta)
+                self.tunings += 1
+            if self.disturbance is None:  # pragma: no cover - there is at least one tuning
+                raise RuntimeError
+            self.excess = max(1.0, unexplained(self.problem, self.model, theta, self.disturbance))
+            known = precision(self.problem, self.model, theta, self.disturbance)
+            most = replace(self.problem, effective=None).effective_size()
+            worth = min(most, known.effective(deviation) / self.excess)
+            self.problem = replace(self.problem, effective=worth)
+            still = still and abs(self.problem.effective_size() - before) < _WORTH_TOLERANCE * before
+        self.settled = bool(still)
+        return self.settled
+
+    def result(self, z: FloatArray) -> Estimate:
+        """Collect what was found, with its covariance."""
+        if self.last is None:  # pragma: no cover - there is at least one round
+            raise RuntimeError
+        jacobian = self.last.jacobian
+        covariance = np.asarray(np.linalg.inv(jacobian.T @ jacobian), dtype=float)
+        theta = self.problem.theta(z)
+        if self.disturbance is not None:
+            known, weight = _known(self.problem, self.model, theta, self.disturbance, self.excess)
+            covariance = known.covariance(weight)
+        return Estimate(
+            theta, self.last, self.problem, self.model, self.iterations, self.evaluations, covariance,
+            self.disturbance, self.excess, self.settled,
+        )  # fmt: skip
+
+
+def _known(
+    problem: Problem, model: ReducedModel, theta: FloatArray, disturbance: DisturbanceModel, excess: float
+) -> tuple[Precision, float]:
+    """Work out what the errors tell, and the weight w² that they were given [1/K²]."""
+    known = precision(problem, model, theta, disturbance)
+    weight = problem.effective_size() / (known.errors * problem.deviation**2)
+    return replace(known, score=excess * known.score), weight
+
+
+def _shrinkage(problem: Problem, z: FloatArray, solve: LeastSquaresResult | None) -> dict[str, float]:
+    """Spread of every group's members about their mean: what is seen and what is still open (empirical Bayes)."""
+    groups: dict[str, list[int]] = {}
+    for i, p in enumerate(problem.parameters):
+        if p.member is not None:
+            groups.setdefault(p.base, []).append(i)
+    if not groups or solve is None:
+        return dict(problem.shrinkage)
+    covariance = np.linalg.inv(solve.jacobian.T @ solve.jacobian)
+    found = {}
+    for base, members in groups.items():
+        own = z[members] - z[members].mean()
+        n = len(members)
+        centre = np.eye(n) - 1.0 / n
+        still_open = np.trace(centre @ covariance[np.ix_(members, members)] @ centre)
+        found[base] = float(np.sqrt(np.clip((own @ own + still_open) / max(1, n - 1), 0.02**2, 1.0)))
+    return found
+
+
+def draw_starts(problem: Problem, count: int, seed: int) -> list[FloatArray]:
+    """Draw starts on the estimation scale: the given θ, then draws from the prior at half its spread.
 
     Parameters
     ----------
@@ -257,23 +273,20 @@ def random_starts(problem: Problem, count: int, seed: int) -> list[FloatArray]:
     return [problem.point(problem.start), *further]
 
 
-def thin(runs: Sequence[Runs], steps: int, step: float) -> tuple[Runs, ...]:
-    """Keep runs that tile the data: each stamp lies in one run.
+def compensated_start(problem: Problem, z: FloatArray, model: SymbolicModel) -> FloatArray:
+    """Where the data alone would go: a fit with priors a tenth as strong, from which a compensated optimum is seen.
+
+    Where physics is missing, parameters compensate for it, often as far as a bound (six of eight in the paper); a
+    second optimum with the priors may lie on the way back.
 
     Parameters
     ----------
-    runs : sequence of Runs
-        Hourly runs, one entry an interval.
-    steps : int
-        N.
-    step : float
-        Step [s].
+    problem : Problem
+        What to fit.
+    z : ndarray, shape (n_free,)
+        Start on the estimation scale [-].
+    model : SymbolicModel
+        Reduced there.
     """
-    thinned = []
-    for r in runs:
-        kept: list[int] = []
-        for start in r.starts:
-            if not kept or start >= kept[-1] + steps:
-                kept.append(int(start))
-        thinned.append(Runs(r.begin, np.array(kept, dtype=np.int64), r.skipped))
-    return tuple(thinned)
+    bold = replace(problem, effective=10.0 * problem.effective_size())
+    return solve_least_squares(lambda x: bold.weighted(model, x), z, *problem.bounds, tolerance=1e-1, iterations=15).x

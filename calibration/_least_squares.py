@@ -34,6 +34,8 @@ class LeastSquaresResult:
         Whether Ipopt converged.
     iterations : int
         Number of Ipopt iterations.
+    interrupted : bool
+        Whether Ctrl-C ended it.
     """
 
     x: FloatArray
@@ -42,6 +44,7 @@ class LeastSquaresResult:
     status: str
     success: bool
     iterations: int
+    interrupted: bool = False
 
 
 #: Ipopt's options beside its tolerances: quiet, and with a small barrier from close to the bounds, since the start is
@@ -182,12 +185,12 @@ def solve_least_squares(
     Returns
     -------
     LeastSquaresResult
-        With Ipopt's status; the best point seen when it stops early.
+        With Ipopt's status; the best point seen when it stops early, also by Ctrl-C.
 
     Raises
     ------
     BaseException
-        Whatever ``function`` raises, unchanged; ``KeyboardInterrupt`` on Ctrl-C during the solve.
+        Whatever ``function`` raises, unchanged.
     """
     p = start.size
     cache = _Cache(function)
@@ -211,20 +214,21 @@ def solve_least_squares(
     try:
         solver(x0=start, lbx=lower, ubx=upper)
     except Exception:
-        if cache.error is not None:
-            raise cache.error from None
-        raise
-    if cache.error is not None:
+        if cache.error is None:
+            raise
+    interrupted = isinstance(cache.error, KeyboardInterrupt)
+    if cache.error is not None and not (interrupted and cache.best is not None):
         raise cache.error
     stats = solver.stats()
-    if stats["return_status"] == "User_Requested_Stop":  # how CasADi ends a solve on Ctrl-C
-        raise KeyboardInterrupt
+    interrupted |= stats["return_status"] == "User_Requested_Stop"  # how CasADi ends a solve on Ctrl-C
     cost, best = cache.best if cache.best is not None else (np.nan, inside)
+    cache.error = None
     return LeastSquaresResult(
         x=best,
         cost=cost,
         jacobian=cache(best)[1],
-        status=str(stats["return_status"]),
-        success=bool(stats["success"]),
+        status="User_Requested_Stop" if interrupted else str(stats["return_status"]),
+        success=bool(stats["success"]) and not interrupted,
         iterations=int(stats["iter_count"]),
+        interrupted=interrupted,
     )

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from calibration._disturbance import DisturbanceModel
 from calibration._evaluate import Evaluation
 from calibration._intervals import Interval
 from calibration._settings import ModelSettings
@@ -40,6 +41,8 @@ class ParameterEstimate:
         Whether the data at least halve the prior's spread, and no bound is hit.
     source : str
         Where the range comes from, or why the value was not estimated.
+    interval90 : tuple of float or None
+        Ends of the 90 % interval within the physical range [parameter units].
     """
 
     name: str
@@ -52,6 +55,7 @@ class ParameterEstimate:
     standard_error: float | None
     identifiable: bool
     source: str
+    interval90: tuple[float, float] | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """Entry of ``calibration.json``."""
@@ -76,6 +80,10 @@ class SolverReport:
         Number of starts.
     failures : tuple of str
         What went wrong in starts that failed.
+    evaluations : int
+        Evaluations of the errors with their derivatives, of the best start.
+    settled : bool
+        Whether its rounds of weighing and reducing ended because nothing moved any more.
     """
 
     name: str
@@ -85,6 +93,8 @@ class SolverReport:
     seconds: float
     starts: int
     failures: tuple[str, ...] = ()
+    evaluations: int = 0
+    settled: bool = True
 
     def to_dict(self) -> dict[str, Any]:
         """Entry of ``calibration.json``."""
@@ -138,6 +148,10 @@ class CalibrationResult:
         Status of the solve.
     grid_check : GridCheck
         Certificate of the reduced model that the numbers were made with.
+    disturbance : DisturbanceModel or None
+        Unmeasured heat and sensor noise that the standard errors follow.
+    excess : float
+        Mean square of the tuning errors over that which the disturbance makes [-]; far above 1, physics is missing.
     horizon : str
         Prediction horizon.
     settings : ModelSettings
@@ -158,6 +172,8 @@ class CalibrationResult:
     calibrated: Mapping[str, Evaluation]
     solver: SolverReport
     grid_check: GridCheck
+    disturbance: DisturbanceModel | None
+    excess: float
     horizon: str
     settings: ModelSettings
     seed: int
@@ -176,6 +192,8 @@ class CalibrationResult:
             "effects": [],
             "solver": self.solver.to_dict(),
             "grid_check": self.grid_check.to_dict(),
+            "disturbance": None if self.disturbance is None else self.disturbance.to_dict(),
+            "excess": self.excess,
             "intervals": {
                 "tuning": [i.to_dict() for i in self.tuning],
                 "held_out": [i.to_dict() for i in self.held_out],

@@ -25,3 +25,31 @@ class ParameterFileError(CalibrationError):
 
 class ResultsExistError(CalibrationError):
     """Results would be written over a folder that holds something."""
+
+
+class OtherResultsError(ResultsExistError):
+    """Earlier results of other settings, or of a case that has changed since."""
+
+
+class CaseFoldersError(CalibrationError):
+    """Case folders that cannot be calibrated together."""
+
+
+class AnotherRunError(CalibrationError):
+    """Another run is writing to the same folder of results."""
+
+
+class WorkerLostError(CalibrationError):
+    """A case whose workers died more often than it may be tried again."""
+
+
+class ClusterError(CalibrationError):
+    """No scheduler, no workers, or workers that cannot do the job."""
+
+
+class MissingExtraError(CalibrationError):
+    """A package that only an extra of the installation brings."""
+
+
+class FilterError(CalibrationError):
+    """A filter, disturbance or innovations that do not fit each other or the data."""

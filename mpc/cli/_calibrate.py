@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -12,24 +13,10 @@ from mpc.cli._console import Force, Json, Waiting, complain, say, show_table, wr
 from mpc.cli._evaluate import Dx, SchemeName
 
 if TYPE_CHECKING:
-    from calibration import CalibrationResult
+    from calibration import CalibrationResult, CaseOutcome
     from thermal import Case
 
 _BUILDING = "building.yaml"
-
-
-@dataclass(frozen=True)
-class _Options:
-    """What the user asked for, the same for each case."""
-
-    tune: tuple[str, ...]
-    hold_out: tuple[str, ...]
-    dx: float | None
-    horizon: str
-    scheme: str
-    starts: int
-    seed: int
-    force: bool
 
 
 def calibrate(
@@ -37,7 +24,9 @@ def calibrate(
     out: Annotated[
         Path,
         typer.Option(
-            metavar="DIR", help="Folder for calibration.json, evaluation.json, predictions.parquet, report.html."
+            metavar="DIR",
+            help="Folder for calibration.json, evaluation.json, predictions.parquet, report.html; of a folder of cases "
+            "one such folder a case, and summary.json.",
         ),
     ],
     tune: Annotated[
@@ -53,20 +42,35 @@ def calibrate(
     scheme: SchemeName = None,
     starts: Annotated[int, typer.Option(metavar="N", help="Number of starts of the solver.")] = 1,
     seed: Annotated[int, typer.Option(metavar="N", help="Seed of the further starts.")] = 0,
+    workers: Annotated[
+        int | None,
+        typer.Option(metavar="N", help="Processes that share a folder of cases; default: one a core."),
+    ] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(metavar="ADDRESS", help="Of a dask cluster for a folder of cases, such as tcp://10.0.0.1:8786."),
+    ] = None,
     force: Force = False,
     json: Json = False,
 ) -> int:
-    """Calibrate a case, or each case of a folder."""
-    from calibration import check_results_folder
+    """Calibrate a case, or each case of a folder; a folder that was interrupted goes on where it stopped."""
+    from calibration import CalibrationError, case_folders, check_results_folder
 
-    options = _Options(
-        tuple(tune or ()), tuple(hold_out or ()), dx, horizon, scheme or "implicit_euler", starts, seed, force
-    )
+    settings = {
+        "tune": tune or [], "hold_out": hold_out or [], "dx": dx, "horizon": horizon,
+        "scheme": scheme or "implicit_euler", "starts": starts, "seed": seed,
+    }  # fmt: skip
+    if workers is not None and scheduler is not None:
+        raise CalibrationError("--workers and --scheduler: expected one of them; a cluster has workers of its own")
+    if not (case / _BUILDING).exists() and case_folders(case):
+        return _calibrate_many(case, out, settings, workers, scheduler, force, json)
+    if workers is not None or scheduler is not None:
+        raise CalibrationError(
+            f"{case}: --workers and --scheduler are for a folder of cases, one folder each; expected {_BUILDING} in "
+            "some of its folders, and not beside them"
+        )
     check_results_folder(out, force)
-    inside = sorted(path.parent for path in case.glob(f"*/{_BUILDING}")) if not (case / _BUILDING).exists() else []
-    if inside:
-        return _calibrate_all(inside, out, options, json)
-    result, report = _calibrate_one(case, out, options, f"calibrate {case.name}")
+    result, report = _calibrate_one(case, out, settings, force)
     if json:
         write_json(result.to_dict())
     else:
@@ -74,16 +78,13 @@ def calibrate(
     return _exit_code(result)
 
 
-def _calibrate_one(folder: Path, out: Path, options: _Options, label: str) -> tuple[CalibrationResult, Path]:
+def _calibrate_one(folder: Path, out: Path, settings: dict[str, Any], force: bool) -> tuple[CalibrationResult, Path]:
     from calibration import parse_interval
     from thermal import load_case
 
     case = load_case(folder)
-    tune, hold_out = ([parse_interval(text, case) for text in texts] for texts in (options.tune, options.hold_out))
-    return calibrate_and_write(
-        case, out, label, options.force, tune=tune, hold_out=hold_out, dx=options.dx, horizon=options.horizon,
-        scheme=options.scheme, starts=options.starts, seed=options.seed,
-    )  # fmt: skip
+    intervals = {name: [parse_interval(text, case) for text in settings[name]] for name in ("tune", "hold_out")}
+    return calibrate_and_write(case, out, f"calibrate {folder.name}", force, **settings | intervals)
 
 
 def calibrate_and_write(
@@ -159,33 +160,64 @@ def _exit_code(result: CalibrationResult) -> int:
     return 1
 
 
-def _calibrate_all(folders: list[Path], out: Path, options: _Options, json: bool) -> int:
+def _calibrate_many(
+    folder: Path,
+    out: Path,
+    settings: dict[str, Any],
+    workers: int | None,
+    scheduler: str | None,
+    force: bool,
+    json: bool,
+) -> int:
     """Calibrate each case into a folder of its name; one that fails is reported beside the others."""
-    from calibration import CalibrationError
-    from thermal import ThermalError
+    from calibration import ClusterExecutor, calibrate_many, case_folders
 
-    found: dict[str, dict[str, Any]] = {}
-    rows, codes = [], []
-    for number, folder in enumerate(folders, start=1):
-        try:
-            result, _ = _calibrate_one(
-                folder, out / folder.name, options, f"calibrate {folder.name} ({number} of {len(folders)})"
-            )
-        except Exception as error:  # one case must not take the others down
-            codes.append(2 if isinstance(error, ThermalError | CalibrationError) else 1)
-            found[folder.name] = {"error": type(error).__name__, "message": str(error)}
-            complain(f"error: {folder.name}: {type(error).__name__}: {error}")
-            rows.append((folder.name, "–", "–", type(error).__name__))
-            continue
-        codes.append(_exit_code(result))
-        found[folder.name] = result.to_dict()
-        before, after = (e["held_out"].metrics.mae for e in (result.uncalibrated, result.calibrated))
-        rows.append((folder.name, f"{before:.3f}", f"{after:.3f}", result.solver.status))
+    cases = case_folders(folder)
+    inside = [p for p in sorted(folder.iterdir()) if p.is_dir() and p.name[0] != "."]
+    others = [p.name for p in inside if p not in cases and p != out]
+    if others:
+        complain(f"left out, for want of {_BUILDING}: {', '.join(others)}")
+    try:
+        with (
+            Waiting("calibrate cases") as waiting,
+            ClusterExecutor(scheduler, folders=[folder]) if scheduler is not None else nullcontext() as executor,
+        ):
+            outcomes = calibrate_many(
+                cases, out, settings, executor=executor, workers=workers, force=force,
+                progress=lambda _, done, total: waiting(f"{done} of {total}", done, total),
+            )  # fmt: skip
+    except KeyboardInterrupt:
+        complain(f"interrupted: what is finished is in {out}, and the same command goes on from there")
+        raise
+    for outcome in outcomes:
+        _complain_of(outcome)
     if json:
-        write_json({"cases": found})
+        write_json({"cases": {outcome.case: outcome.to_dict() for outcome in outcomes}})
     else:
-        show_table(
-            f"Held-out error {options.horizon} ahead", ("case", "before [K]", "after [K]", "status"), rows, left=(0, 3)
-        )
+        _show_outcomes(outcomes, str(settings["horizon"]))
         say(f"Results: {out}")
-    return 0 if not any(codes) else 2 if all(code == 2 for code in codes) else 1
+    if all(outcome.status == "calibrated" for outcome in outcomes):
+        return 0
+    return 2 if all(outcome.bad_input for outcome in outcomes) else 1
+
+
+def _complain_of(outcome: CaseOutcome) -> None:
+    if outcome.error is not None:
+        complain(f"error: {outcome.case}: {outcome.error}: {outcome.message}")
+    elif outcome.solver is not None and outcome.status == "not_converged":
+        solver = outcome.solver
+        complain(
+            f"error: {outcome.case}: {solver['name']} did not converge: {solver['status']}; the results say so too"
+        )
+
+
+def _show_outcomes(outcomes: Sequence[CaseOutcome], horizon: str) -> None:
+    rows = []
+    for o in outcomes:
+        errors = ("–" if mae is None else f"{mae:.3f}" for mae in (o.held_out_mae_before, o.held_out_mae_after))
+        status = o.error or o.status.replace("_", " ") + (", done before" if o.resumed else "")
+        rows.append((o.case, *errors, f"{o.seconds:.1f}", status))
+    show_table(
+        f"Held-out error {horizon} ahead", ("case", "before [K]", "after [K]", "time [s]", "status"), rows, left=(0, 4),
+        more="summary.json lists them all",
+    )  # fmt: skip

@@ -10,7 +10,8 @@ import pytest
 from numpy.typing import NDArray
 
 from calibration import Interval, Problem, estimate, select_runs
-from calibration._estimate import random_starts, thin
+from calibration._estimate import compensated_start, draw_starts
+from calibration._problem import thin
 from thermal import SymbolicModel, build_network, free_runs, load_bundled_case, reduced_model, replay_inputs, spin_up
 from thermal.model import TR_BDF2
 
@@ -25,7 +26,7 @@ def problem() -> Problem:
     inputs = replay_inputs(case, grid.network)
     stamps = inputs.stamps
     parts = [Interval(stamps[300], stamps[500]), Interval(stamps[1000], stamps[1100])]
-    runs = thin([select_runs(inputs, part, 72) for part in parts], 72, inputs.step)
+    runs = thin([select_runs(inputs, part, 72) for part in parts], 72)
     fixed = ("exterior_convection_coefficient", "radiant_coefficient")
     free = tuple(i for i, p in enumerate(grid.network.parameters) if p.name not in fixed)
     return Problem(grid, inputs, runs, 72, free, grid.network.start())
@@ -125,10 +126,10 @@ def test_unmeasured_zones_and_stamps_have_no_residual() -> None:
 
 def test_starts_are_the_given_one_and_seeded_draws() -> None:
     p = problem()
-    first, *further = random_starts(p, 4, seed=5)
+    first, *further = draw_starts(p, 4, seed=5)
     np.testing.assert_allclose(first, p.point(p.start))
-    again = random_starts(p, 4, seed=5)
-    other = random_starts(p, 4, seed=6)
+    again = draw_starts(p, 4, seed=5)
+    other = draw_starts(p, 4, seed=6)
     for a, b, c in zip(further, again[1:], other[1:], strict=True):
         np.testing.assert_array_equal(a, b)
         assert (a != c).all()
@@ -164,3 +165,60 @@ def test_covariance_is_that_of_the_posterior() -> None:
     _, jacobian = found.problem.weighted(found.model, p.point(found.theta))
     wanted = np.sqrt(np.diag(np.linalg.inv(jacobian.T @ jacobian)))
     np.testing.assert_allclose(np.sqrt(np.diag(found.covariance)), wanted, rtol=0.1)
+
+
+def test_compensated_start_fits_better_than_the_estimate_and_cares_less_for_the_priors() -> None:
+    p = problem()
+    found = estimate(p, p.point(p.start))
+    bold = compensated_start(found.problem, p.point(p.start), found.model)
+    errors = [np.mean(p.residuals_only(found.model, p.theta(z)) ** 2) for z in (bold, found.point)]
+    spread = np.array([q.prior_deviation for q in p.parameters])
+    centre = np.array([q.transform(q.start) for q in p.parameters])
+    moves = [np.linalg.norm((z - centre) / spread) for z in (bold, found.point)]
+    assert errors[0] < errors[1]
+    assert moves[0] > moves[1]
+
+
+def test_outliers_pull_least_squares_but_not_the_robust_loss() -> None:
+    """A sensor that reads 8 K too high for a few hours: the robust estimate stays closer to that without it."""
+    p = problem()
+    zone = p.inputs.zone.copy()
+    zone[p.runs[0].starts[1] + 30 : p.runs[0].starts[1] + 66, 2] += 8.0
+    spoilt = replace(p, inputs=replace(p.inputs, zone=zone))
+    spread = np.array([q.prior_deviation for q in p.parameters])
+    wanted = estimate(p, p.point(p.start)).point
+    away = {}
+    for loss in ("linear", "pseudo_huber"):
+        found = estimate(replace(spoilt, loss=loss), p.point(p.start))
+        away[loss] = float(np.linalg.norm((found.point - wanted) / spread))
+    assert away["pseudo_huber"] < 0.7 * away["linear"]
+
+
+def test_robust_loss_is_least_squares_for_small_errors_and_linear_for_large_ones() -> None:
+    p = replace(problem(), loss="pseudo_huber", deviation=1.0)
+    small, large = np.array([1e-3, -1e-3]), np.array([100.0, -100.0])
+    np.testing.assert_allclose(p._cost(small)[0], small, rtol=1e-6)
+    np.testing.assert_allclose(0.5 * p._cost(large)[0] ** 2, 1.345 * 100.0, rtol=0.02)
+    for e in (0.01, 0.7, -3.0, 20.0):
+        h = 1e-6
+        slope = (p._cost(np.array([e + h]))[0] - p._cost(np.array([e - h]))[0]) / (2 * h)
+        np.testing.assert_allclose(p._cost(np.array([e]))[1], slope, rtol=1e-6)
+
+
+def test_members_of_a_group_share_their_spread_and_shrink_towards_each_other() -> None:
+    """Correlation of the members before any data, and a spread that is learnt from how far they are apart."""
+    case = load_bundled_case()
+    scopes = {"slab_heat_capacity": "zone"}
+    network = build_network(case.building, dx=1.5, scopes=scopes)
+    grid = SymbolicModel(network)
+    p = replace(problem(), grid=grid, free=tuple(range(len(network.parameters))), start=network.start())
+    members = [i for i, q in enumerate(p.parameters) if q.base == "slab_heat_capacity"]
+    assert len(members) == 5
+    block = p.prior_covariance()[np.ix_(members, members)]
+    spread = p.parameters[members[0]].prior_deviation
+    np.testing.assert_allclose(block, spread**2 + 0.3**2 * np.eye(5))
+    found = estimate(p, p.point(p.start))
+    learnt = found.problem.shrinkage["slab_heat_capacity"]
+    own = found.point[members] - found.point[members].mean()
+    assert 0.02 <= learnt <= 1.0
+    assert np.sqrt(own @ own / 4) <= learnt + 1e-9  # what is seen, and what is still open

@@ -17,7 +17,7 @@ CASES = Path(__file__).parents[2].parent / "shared" / "cases"
 def calibrated(name: str) -> CalibrationResult:
     if not (CASES / name).is_dir():
         pytest.skip(f"the shared case is not here: {CASES / name}")
-    return calibrate(load_case(CASES / name))
+    return calibrate(load_case(CASES / name), starts=1)
 
 
 LIMITS = {"practice_none_schedule": 0.10, "practice_none_prbs": 0.16, "twinhouse_N2_exp1": 0.8}

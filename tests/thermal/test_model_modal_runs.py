@@ -94,6 +94,22 @@ def test_sensitivities_are_differences(scheme: Scheme) -> None:
         np.testing.assert_allclose(moved[..., j] * value, numeric, atol=2e-6 * np.abs(numeric).max() + 1e-7)
 
 
+@pytest.mark.parametrize("scheme", [EXACT, IMPLICIT_EULER], ids=["exact", "implicit_euler"])
+def test_the_adjoint_is_the_transpose_of_the_run(scheme: Scheme) -> None:
+    """<w, G q + F x> of a run is <G'w, q> + <F'w, x> of the adjoint: both are linear, so exactly."""
+    m = model().matrices(model().theta)
+    rng = np.random.default_rng(6)
+    heat, states = rng.standard_normal((STEPS, 5, RUNS)), rng.standard_normal((m.n, RUNS))
+    weights = rng.standard_normal((2, STEPS, 5, RUNS))
+    keep = np.arange(1, STEPS + 1)
+    means, _ = m.modal.run(states, np.zeros((STEPS, 1, RUNS)), heat, keep, 300.0, scheme)
+    by_heat, by_start = m.modal.backward(weights, 300.0, scheme)
+    for j in range(2):
+        forward = np.einsum("kzm,mkz->", weights[j], means)
+        adjoint = np.sum(by_heat[j] * heat) + np.sum(by_start[j] * states)
+        assert adjoint == pytest.approx(forward, rel=1e-9)
+
+
 def test_heat_that_is_spread_otherwise_is_noticed() -> None:
     m = model().matrices(model().theta)
     assert m.modal.heated_as_observed

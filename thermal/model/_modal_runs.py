@@ -22,6 +22,9 @@ if TYPE_CHECKING:
 
 FloatArray = NDArray[np.float64]
 
+#: Most numbers of an array that the slopes of a spin-up are made in.
+_LARGEST = 10_000_000
+
 
 class _ModalSlopes:
     """Derivatives of a reduced model's matrices with respect to θ, in its modes.
@@ -194,6 +197,36 @@ class ModalRuns:
             pushed[:, : moved.shape[1]] += moved
         return np.asarray(pushed)
 
+    def backward(self, weights: FloatArray, step: float, scheme: Scheme) -> tuple[FloatArray, FloatArray]:
+        """Differentiate weighted sums of the zone means of free runs with respect to heat and start: the adjoint.
+
+        Parameters
+        ----------
+        weights : ndarray, shape (p, N, n_zone, m)
+            Weights of p sums over steps, zones and m runs [-].
+        step : float
+            Time step [s].
+        scheme : Scheme
+            Time stepping; ``EXACT`` too.
+
+        Returns
+        -------
+        tuple
+            Derivatives with respect to the heat of every step (p, N, n_zone, m) [1/W], and to the states of the
+            reduced model at the start (p, n, m) [1/K].
+        """
+        modes, propagator = self.modes, self.modes.propagator(step, scheme)
+        p, count, n_zone, m = weights.shape
+        costate = np.zeros((propagator.end.size, p * m))
+        heat = np.empty((count, n_zone, p * m))
+        for k in range(count - 1, -1, -1):
+            seen = modes.observation.T @ weights[:, k].transpose(1, 0, 2).reshape(n_zone, -1)
+            heat[k] = modes.heating.T @ (propagator.end_gain[:, None] * costate + propagator.mean_gain[:, None] * seen)
+            costate = propagator.end[:, None] * costate + propagator.mean[:, None] * seen
+        start = modes.coordinates.T @ costate
+        heats = heat.reshape(count, n_zone, p, m).transpose(2, 0, 1, 3)
+        return heats, start.reshape(-1, p, m).transpose(1, 0, 2)
+
     def hold(
         self,
         states: FloatArray,
@@ -244,22 +277,75 @@ class ModalRuns:
         if slopes is None:
             return kept, None
         change, after = np.diff(path), path[:, 1:]
-        out = np.empty((states.shape[0], len(self.slopes), keep.size))
         begin = modes.coordinates @ slopes
         lifted = modes.observation[held] @ begin  # of the held means at the start, nothing from there on
-        for j in range(len(self.slopes)):
-            tables = (self.slopes.capacity, self.slopes.stiffness, self.slopes.boundary)
-            capacity, stiffness, moved = (table[j] for table in tables)
-            source = np.zeros((frame.capacity.size, count))
-            if capacity is not None:
-                source -= (frame.basis.T @ capacity) @ change
-            if stiffness is not None and moved is not None:
-                source -= step * ((frame.basis.T @ stiffness) @ after - (frame.basis.T @ moved) @ boundary[:count].T)
-            source[:, 0] += frame.coupling @ lifted[:, j]
-            first = frame.basis.T @ (begin[:, j] - frame.lift @ lifted[:, j])
-            turned = _scan(frame.capacity, step, first, source)[:, keep + 1]
-            out[:, j] = modes.states @ (frame.basis @ turned)
+        first = frame.basis.T @ (begin - frame.lift @ lifted)
+        out = np.empty((states.shape[0], len(self.slopes), keep.size))
+        together = max(1, _LARGEST // (count * first.shape[0]))
+        for low in range(0, len(self.slopes), together):
+            part = range(low, min(low + together, len(self.slopes)))
+            sources = [self._held_source(frame, j, change, after, boundary[:count], step) for j in part]
+            source = np.stack(sources, axis=1)
+            source[0] += (frame.coupling @ lifted[:, part]).T
+            turned = _scan_at(frame.capacity, step, first[:, part].T, source, keep)
+            out[:, part] = np.tensordot(modes.states @ frame.basis, turned, axes=(1, 2)).transpose(0, 2, 1)
         return kept, out.reshape(states.shape[0], -1)
+
+    def _held_source(
+        self, frame: _HeldFrame, j: int, change: FloatArray, after: FloatArray, boundary: FloatArray, step: float
+    ) -> FloatArray:
+        """Source of one parameter's slopes in every held step, (n_time, r)."""
+        tables = (self.slopes.capacity, self.slopes.stiffness, self.slopes.boundary)
+        capacity, stiffness, moved = (table[j] for table in tables)
+        source = np.zeros((change.shape[1], frame.capacity.size))
+        if capacity is not None:
+            source -= change.T @ (frame.basis.T @ capacity).T
+        if stiffness is not None and moved is not None:
+            source -= step * (after.T @ (frame.basis.T @ stiffness).T - boundary @ (frame.basis.T @ moved).T)
+        return source
+
+    def held_response(self, held: NDArray[np.bool_], step: float) -> FloatArray:
+        """States at the end of a held step per kelvin of each held zone mean, shape (n, n_held) [K/K].
+
+        Parameters
+        ----------
+        held : ndarray of bool, shape (n_zone,)
+            Zones that are held.
+        step : float
+            Time step [s].
+        """
+        frame = _HeldFrame(self.modes, held)
+        system = frame.capacity + step * (1.0 - SHIFT * frame.capacity)
+        inner = -(frame.coupling * (1.0 - step * SHIFT)) / system[:, None]
+        return np.asarray(self.modes.states @ (frame.lift + frame.basis @ inner))
+
+    def history_response(self, held: NDArray[np.bool_], step: float, elapsed: NDArray[np.int64]) -> FloatArray:
+        """States after a spin-up per kelvin by which boundaries and zones were warmer before it began.
+
+        A spin-up starts from a steady state, while walls and slabs remember days of which there is no telemetry.
+
+        Parameters
+        ----------
+        held : ndarray of bool, shape (n_zone,)
+            Zones that are held.
+        step : float
+            Time step [s].
+        elapsed : ndarray of int, shape (m,)
+            Steps since the spin-up began.
+
+        Returns
+        -------
+        ndarray, shape (n, m, 1 + n_held)
+            All boundaries together, then every held zone [K/K].
+        """
+        frame = _HeldFrame(self.modes, held)
+        conductance = 1.0 - SHIFT * frame.capacity
+        outside = frame.basis.T @ self.modes.boundary.sum(axis=1)
+        begin = np.column_stack([outside / conductance, frame.coupling / frame.capacity[:, None]])
+        left = (frame.capacity / (frame.capacity + step * conductance))[:, None] ** elapsed
+        turn = self.modes.states @ frame.basis
+        return np.asarray((turn @ (left[:, :, None] * begin[:, None, :]).reshape(begin.shape[0], -1)).reshape(
+            turn.shape[0], elapsed.size, -1))  # fmt: skip
 
 
 class _HeldFrame:
@@ -274,6 +360,22 @@ class _HeldFrame:
         self.capacity, turn = np.linalg.eigh(null.T @ (modes.capacity[:, None] * null))
         self.basis = null @ turn
         self.coupling = self.basis.T @ (modes.capacity[:, None] * self.lift)
+
+
+def _scan_at(
+    capacity: FloatArray, step: float, start: FloatArray, push: FloatArray, keep: NDArray[np.int64]
+) -> FloatArray:
+    """`_scan` of several columns at once, kept after some steps only, (n_keep, p, r)."""
+    system = capacity + step * (1.0 - SHIFT * capacity)
+    stay, current, position = capacity / system, start, 0
+    kept = np.empty((keep.size, *start.shape))
+    push /= system
+    for k in range(len(push)):
+        current = stay * current + push[k]
+        if k == keep[position]:
+            kept[position] = current
+            position += 1
+    return kept
 
 
 def _scan(capacity: FloatArray, step: float, start: FloatArray, push: FloatArray) -> FloatArray:

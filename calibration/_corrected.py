@@ -1,0 +1,265 @@
+"""A model at θ with its predictor-corrector on telemetry: filtering an interval, and N-step errors from there."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibration._disturbance import DisturbanceModel
+from calibration._evaluate import Evaluation, Predictions, Progress, spatial_metrics
+from calibration._gain import Covariance
+from calibration._intervals import Interval, Runs, horizon_steps, select_runs
+from calibration._kalman import Filtered, KalmanFilter
+from calibration._start import start_spread
+from calibration._state_space import StateSpace, mean_flow, state_space
+from calibration.errors import FilterError, HorizonError, NotEnoughDataError
+from thermal import Inputs, SymbolicModel, spin_up
+from thermal.model import IMPLICIT_EULER, LEAST_SPIN_UP, SPIN_UP, Matrices, Scheme
+
+FloatArray = NDArray[np.float64]
+
+
+def filter_interval(
+    model: SymbolicModel,
+    theta: FloatArray,
+    inputs: Inputs,
+    interval: Interval,
+    disturbance: DisturbanceModel,
+    *,
+    scheme: Scheme = IMPLICIT_EULER,
+    covariance: Covariance = "exact",
+    spin_up_seconds: float = SPIN_UP,
+) -> Filtered:
+    """Filter one interval of telemetry; the states at its beginning come from a spin-up.
+
+    Parameters
+    ----------
+    model : SymbolicModel
+        Reduced.
+    theta : ndarray, shape (n_parameter,)
+        Parameter values [parameter units].
+    inputs : Inputs
+        The telemetry.
+    interval : Interval
+        Filtered, less the 12 hours of the least spin-up where the telemetry does not begin before.
+    disturbance : DisturbanceModel
+        Unmeasured heat and sensors, from `tune_disturbance` or assumed.
+    scheme : Scheme
+        Time stepping.
+    covariance : {"exact", "steady"}
+        See `KalmanFilter`.
+    spin_up_seconds : float
+        Telemetry before the interval that the spin-up may use [s].
+
+    Raises
+    ------
+    FilterError
+        When the model is not reduced, or the interval too short.
+    """
+    ready = prepare(model, theta, inputs, scheme)
+    kalman = KalmanFilter(ready.space, disturbance, covariance=covariance)
+    begin, at, stop = rows_of(inputs, interval, spin_up_seconds, covariance)
+    return kalman.filter(inputs, at, stop, *ready.start(begin, at))
+
+
+@dataclass(frozen=True)
+class _Prepared:
+    """A model at θ, ready to be filtered.
+
+    Parameters
+    ----------
+    matrices : Matrices
+        The reduced model at θ.
+    space : StateSpace
+        Its state space, with the telemetry's mean airflows.
+    inputs : Inputs
+        The telemetry.
+    """
+
+    matrices: Matrices
+    space: StateSpace
+    inputs: Inputs
+
+    def start(self, begin: int, at: int) -> tuple[FloatArray, FloatArray]:
+        """States of the reduced model after a spin-up (n, 1) [K], and what is unknown of x, see `start_spread`.
+
+        Parameters
+        ----------
+        begin, at : int
+            First row of the spin-up, and the one at whose stamp the state is wanted.
+        """
+        states, _ = spin_up(self.matrices, self.inputs, begin, np.array([at]))
+        held = np.isfinite(self.inputs.held[begin])
+        return states, start_spread(self.matrices.modal.modes, self.inputs.step, at - begin, held)
+
+
+def prepare(model: SymbolicModel, theta: FloatArray, inputs: Inputs, scheme: Scheme) -> _Prepared:
+    """Make the state space of a model at θ.
+
+    Parameters
+    ----------
+    model : SymbolicModel
+        Reduced.
+    theta : ndarray, shape (n_parameter,)
+        Parameter values [parameter units].
+    inputs : Inputs
+        The telemetry.
+    scheme : Scheme
+        Time stepping.
+
+    Raises
+    ------
+    FilterError
+        When the model is not reduced.
+    """
+    matrices, airflows = model.matrices(theta), model.network.airflows
+    if not matrices.reduced:
+        raise FilterError("filter: expected a reduced model, came the grid; see `thermal.reduced_model`")
+    flow = mean_flow(inputs) if airflows else None
+    return _Prepared(
+        matrices, state_space(matrices.modal.modes, inputs.step, scheme, airflows=airflows, flow=flow), inputs
+    )
+
+
+def rows_of(inputs: Inputs, interval: Interval, spin_up_seconds: float, covariance: Covariance) -> tuple[int, int, int]:
+    """Rows at which an interval's spin-up begins, its filter starts, and it ends.
+
+    The spin-up has at least 12 hours, of the interval if there is no telemetry before it. With steady gains, which know
+    nothing of what a spin-up leaves unknown, it has its full length or a third of what there is.
+
+    Parameters
+    ----------
+    inputs : Inputs
+        The telemetry.
+    interval : Interval
+        What is filtered.
+    spin_up_seconds : float
+        Longest spin-up [s].
+    covariance : {"exact", "steady"}
+        See `KalmanFilter`.
+
+    Raises
+    ------
+    FilterError
+        When nothing is left to filter after the least spin-up.
+    """
+    first = int(inputs.stamps.searchsorted(interval.start))
+    stop = int(inputs.stamps.searchsorted(interval.end, side="right")) - 1
+    begin = max(0, first - 1 - round(spin_up_seconds / inputs.step))
+    least = int(np.ceil(LEAST_SPIN_UP / inputs.step))
+    if covariance == "steady":
+        least = max(least, min(round(spin_up_seconds / inputs.step), (stop - begin) // 3))
+    at = max(first - 1, begin + least)
+    if at >= stop:
+        raise FilterError(
+            f"interval {interval.start} to {interval.end}: expected room for a step after {LEAST_SPIN_UP / 3600:g} h "
+            f"of spin-up, found {stop - begin + 1} stamps"
+        )
+    return begin, at, stop
+
+
+def evaluate_filter(
+    model: SymbolicModel,
+    theta: FloatArray,
+    inputs: Inputs,
+    intervals: Sequence[Interval],
+    disturbance: DisturbanceModel,
+    horizon: str = "6h",
+    *,
+    trajectories: bool = False,
+    horizons: Sequence[str] = (),
+    scheme: Scheme = IMPLICIT_EULER,
+    covariance: Covariance = "exact",
+    spin_up_seconds: float = SPIN_UP,
+    progress: Progress | None = None,
+) -> Evaluation:
+    """N-step prediction error from the filtered state, on the runs and in the terms of `evaluate_model`.
+
+    The filter starts 12 hours into an interval's spin-up and knows, at the start of a run, what was measured until then
+    and nothing of what comes after.
+
+    Parameters
+    ----------
+    model : SymbolicModel
+        Reduced.
+    theta : ndarray, shape (n_parameter,)
+        Parameter values [parameter units].
+    inputs : Inputs
+        The telemetry.
+    intervals : sequence of Interval
+        Runs start every hour such that their targets lie inside.
+    disturbance : DisturbanceModel
+        Unmeasured heat and sensors, tuned on other intervals.
+    horizon : str
+        The prediction horizon; six hours in the paper.
+    trajectories : bool
+        Keep every step of the runs instead of the last only.
+    horizons : sequence of str
+        Further horizons; those that are no multiple of the step, or leave no run, are left out.
+    scheme : Scheme
+        Time stepping.
+    covariance : {"exact", "steady"}
+        See `KalmanFilter`.
+    spin_up_seconds : float
+        Telemetry before an interval that spin-up and filter may use [s].
+    progress : callable, optional
+        Called with stage, done, total.
+
+    Raises
+    ------
+    NotEnoughDataError
+        When an interval has no run.
+    FilterError
+        When the model is not reduced.
+    """
+    ready = prepare(model, theta, inputs, scheme)
+    kalman = KalmanFilter(ready.space, disturbance, covariance=covariance)
+    steps = horizon_steps(horizon, inputs.step)
+    main: list[Predictions] = []
+    errors: dict[str, list[FloatArray]] = {name: [] for name in horizons}
+    for done, interval in enumerate(intervals):
+        runs = select_runs(inputs, interval, steps, spin_up=spin_up_seconds)
+        if runs.starts.size == 0:
+            raise NotEnoughDataError(
+                f"interval {interval.start} to {interval.end}: all {runs.skipped} runs miss telemetry"
+            )
+        further = {name: _runs(inputs, interval, name, spin_up_seconds) for name in horizons}
+        last = max(int(r.starts[-1]) for r in (runs, *(f for f in further.values() if f is not None)))
+        at = runs.begin + int(np.ceil(LEAST_SPIN_UP / inputs.step))
+        filtered = kalman.filter(inputs, at, max(last, at + 1), *ready.start(runs.begin, at))
+        keep = np.arange(1, steps + 1) if trajectories else np.array([steps])
+        main.append(_predictions(filtered, inputs, interval, runs, keep))
+        for name, others in further.items():
+            if others is not None:
+                ahead = np.array([horizon_steps(name, inputs.step)])
+                errors[name].append(_predictions(filtered, inputs, interval, others, ahead).error)
+        if progress is not None:
+            progress("predict", done + 1, len(intervals))
+    by_horizon = {n: spatial_metrics(np.concatenate(e)).mae for n, e in errors.items() if len(e) == len(intervals)}
+    return Evaluation(steps, inputs.step, tuple(main), model.network.zones, by_horizon)
+
+
+def _runs(inputs: Inputs, interval: Interval, horizon: str, spin_up_seconds: float) -> Runs | None:
+    """Find the runs of a further horizon, None where there are none."""
+    try:
+        runs = select_runs(inputs, interval, horizon_steps(horizon, inputs.step), spin_up=spin_up_seconds)
+    except (HorizonError, NotEnoughDataError):
+        return None
+    return runs if runs.starts.size else None
+
+
+def _predictions(
+    filtered: Filtered, inputs: Inputs, interval: Interval, runs: Runs, keep: NDArray[np.int64]
+) -> Predictions:
+    """Predict the runs of an interval from the filtered states at their starts."""
+    starts, steps = runs.starts, int(keep[-1])
+    rows = starts + np.arange(1, steps + 1)[:, None]
+    boundary, heat, airflow = (v[rows].transpose(0, 2, 1) for v in (inputs.boundary, inputs.heat, inputs.airflow))
+    states = filtered.states[starts - filtered.begin].T
+    simulated = filtered.kalman.predict(states, boundary, heat, keep, airflow)
+    known = inputs.bridged[starts]
+    measured = np.where(np.isfinite(known)[:, None, :], inputs.zone[starts[:, None] + keep[None, :]], np.nan)
+    return Predictions(interval, inputs.stamps[starts], simulated, measured, keep, known, runs.skipped)

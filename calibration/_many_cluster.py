@@ -1,0 +1,192 @@
+"""Workers of a `dask.distributed` cluster (extra ``[cluster]``)."""
+
+from __future__ import annotations
+
+import pickle
+import sys
+import time
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Executor, Future
+from importlib import import_module
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, ParamSpec, TypeVar
+
+from calibration.errors import ClusterError, MissingExtraError
+
+P = ParamSpec("P")
+T = TypeVar("T")
+
+#: How long a cluster may be without any worker before its cases are given up [s].
+PATIENCE = 60.0
+
+#: Time between looks at the workers that are there [s].
+LOOK = 2.0
+
+
+class ClusterExecutor(Executor):
+    """Runs calls on the workers of a `dask.distributed` scheduler.
+
+    Start the workers with one thread each, ``dask worker ADDRESS --nworkers N --nthreads 1``: calls in threads of one
+    process hinder each other, and die together.
+
+    Parameters
+    ----------
+    scheduler : str
+        Its address, such as ``tcp://10.0.0.1:8786``.
+    timeout : float
+        How long to wait for it, and then for a first worker [s].
+    patience : float
+        How long it may be without any worker later on [s].
+    folders : sequence of str or Path
+        What each worker must see under the same path.
+
+    Raises
+    ------
+    MissingExtraError
+        When `distributed` is not installed.
+    ClusterError
+        When no scheduler answers, it has no workers, or a worker has not this version of the package or does not see a
+        folder.
+
+    Examples
+    --------
+    >>> with ClusterExecutor("tcp://10.0.0.1:8786") as executor:  # doctest: +SKIP
+    ...     outcomes = calibrate_many(case_folders("cases"), "results", executor=executor)
+    """
+
+    def __init__(
+        self,
+        scheduler: str,
+        *,
+        timeout: float = 10.0,
+        patience: float = PATIENCE,
+        folders: Sequence[str | Path] = (),
+    ) -> None:
+        try:
+            distributed: Any = import_module("distributed")
+        except ImportError as error:
+            raise MissingExtraError(
+                f'a scheduler needs {error.name}, which the extra brings: pip install "buildingmpc[cluster]"'
+            ) from error
+        try:
+            self._client = distributed.Client(scheduler, timeout=timeout, set_as_default=False)
+        except (OSError, ValueError, TypeError) as error:
+            raise ClusterError(
+                f"scheduler {scheduler!r}: expected an answer within {timeout:g} s, as from tcp://HOST:8786: {error}"
+            ) from error
+        self._address, self._patience = scheduler, patience
+        try:
+            self._check_workers(timeout, [str(Path(folder).resolve()) for folder in folders])
+        except BaseException:
+            self._client.close()
+            raise
+        self._executor: Executor = self._client.get_executor(pure=False)
+        self._seen = self._looked = time.monotonic()
+
+    def submit(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> Future[T]:
+        """Run a call on one of the workers.
+
+        Parameters
+        ----------
+        fn : callable
+            Importable by name on the workers.
+        *args, **kwargs
+            What it takes; must be possible to pickle.
+        """
+        message = pickle.dumps((fn, args, kwargs))
+        future: Future[T] = self._executor.submit(_unpacking(), message)
+        return future
+
+    def trouble(self) -> str | None:
+        """Say why no more answers will come, if that is so."""
+        if self._client.status == "closed":
+            return f"scheduler {self._address}: the connection was lost"
+        now = time.monotonic()
+        if now - self._looked > LOOK or now - self._seen > self._patience:
+            self._looked = now
+            if self._client.status == "running" and self._client.scheduler_info()["workers"]:
+                self._seen = now
+        if now - self._seen > self._patience:
+            what = "had no worker" if self._client.status == "running" else "did not answer"
+            return f"scheduler {self._address}: {what} for {self._patience:g} s"
+        return None
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        """Close the connection; the cluster itself stays.
+
+        Parameters
+        ----------
+        wait : bool
+            Finish what is submitted first.
+        cancel_futures : bool
+            Give up what is not finished.
+        """
+        self._executor.shutdown(wait=wait and not cancel_futures)
+        self._client.close()
+
+    def _check_workers(self, timeout: float, folders: list[str]) -> None:
+        try:
+            self._client.wait_for_workers(1, timeout=timeout)
+        except TimeoutError as error:
+            raise ClusterError(
+                f"scheduler {self._address}: expected at least one worker, found none within {timeout:g} s; start some "
+                f"with: dask worker {self._address} --nworkers N --nthreads 1"
+            ) from error
+        answers: Mapping[str, Any] = self._client.run(_probe(), folders, on_error="return")
+        for worker, answer in sorted(answers.items()):
+            if isinstance(answer, OSError):  # gone again: the scheduler knows by now, or soon will
+                continue
+            if isinstance(answer, BaseException) or answer[0] != version("buildingmpc"):
+                found = f"{type(answer).__name__}: {answer}" if isinstance(answer, BaseException) else answer[0]
+                raise ClusterError(
+                    f"worker {worker}: expected buildingmpc {version('buildingmpc')}, found {found}; install the same "
+                    "version in the environment of every worker"
+                )
+            if answer[1]:
+                raise ClusterError(
+                    f"worker {worker}: does not see {', '.join(answer[1])}; cases and results must lie on a file "
+                    "system that every worker sees under the same path"
+                )
+
+
+def _unpacking() -> Callable[[bytes], Any]:
+    """Make what runs a pickled call on a worker, so that the scheduler can do without the package."""
+
+    def run(message: bytes) -> Any:
+        import pickle
+
+        fn, args, kwargs = pickle.loads(message)
+        return fn(*args, **kwargs)
+
+    return run
+
+
+def _probe() -> Callable[[list[str]], tuple[str, list[str]]]:
+    """Make what asks a worker for its version, and the folders that it does not see.
+
+    A function inside of a function travels with its code, so it also runs where the package is missing (as does the
+    one above).
+    """
+
+    def ask(folders: list[str]) -> tuple[str, list[str]]:
+        import importlib
+        import os
+        from importlib import metadata
+
+        importlib.import_module("calibration")
+        return metadata.version("buildingmpc"), [folder for folder in folders if not os.path.isdir(folder)]
+
+    return ask
+
+
+def killed_worker(error: Exception) -> bool:
+    """Whether a cluster says with this error that workers died under a call.
+
+    Parameters
+    ----------
+    error : Exception
+        What a future raised.
+    """
+    distributed = sys.modules.get("distributed")
+    return distributed is not None and isinstance(error, distributed.KilledWorker)

@@ -1,0 +1,265 @@
+"""Smoother: the unmeasured heat of every zone over time with its band, from measurements before and after."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+from scipy.special import ndtri
+
+from calibration._disturbance import DisturbedSpace
+from calibration._gain import Gain
+from calibration._kalman import Filtered
+from calibration.errors import FilterError
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Smoothed:
+    """Missing watts of every zone, and its temperature, from all of a stretch of telemetry.
+
+    Parameters
+    ----------
+    stamps : DatetimeIndex, length n_time
+        Ends of the steps.
+    disturbance, disturbance_deviation : ndarray, shape (n_time, n_zone)
+        Unmeasured heat during each step and its standard deviation [W].
+    zone, zone_deviation : ndarray, shape (n_time, n_zone)
+        Zone temperatures without the sensors' noise, also where not measured, and their standard deviation [K].
+    """
+
+    stamps: pd.DatetimeIndex
+    disturbance: FloatArray
+    disturbance_deviation: FloatArray
+    zone: FloatArray
+    zone_deviation: FloatArray
+
+    def band(self, level: float = 0.9) -> tuple[FloatArray, FloatArray]:
+        """Lower and upper edge of the unmeasured heat, each of shape (n_time, n_zone) [W].
+
+        Parameters
+        ----------
+        level : float
+            Probability that the heat lies within [-], between 0 and 1; it holds stamp by stamp.
+
+        Raises
+        ------
+        FilterError
+            When the level is not between 0 and 1.
+        """
+        if not 0.0 < level < 1.0:
+            raise FilterError(f"level: expected a probability between 0 and 1, came {level}")
+        half = float(ndtri(0.5 * (1.0 + level))) * self.disturbance_deviation
+        return self.disturbance - half, self.disturbance + half
+
+
+@dataclass(frozen=True)
+class _Spread:
+    """What a step's smoothing owes to covariances alone, not to the data: vectors over the zones.
+
+    Parameters
+    ----------
+    heat, zone : ndarray, shape (n_zone,)
+        Variances of the smoothed disturbance [W²] and zone temperature [K²].
+    drive : ndarray, shape (n_zone,)
+        Diagonal of N at the disturbances [1/W²].
+    carried : ndarray, shape (n_zone,)
+        Diagonal of ``N' L P`` at the disturbances, N' that of the next step [-].
+    noise : ndarray, shape (n_zone,)
+        Variance of the smoothed noise over that of the noise squared [1/K²].
+    """
+
+    heat: FloatArray
+    zone: FloatArray
+    drive: FloatArray
+    carried: FloatArray
+    noise: FloatArray
+
+    def near(self, other: _Spread, limit: float) -> bool:
+        """Whether all variances are within a share of another's."""
+        variances = [np.concatenate([s.heat, s.zone, s.drive]) for s in (self, other)]
+        return bool((np.abs(variances[0] - variances[1]) <= limit * variances[1]).all())
+
+
+@dataclass(frozen=True)
+class _Backward:
+    """A pass backwards over what was filtered (de Jong 1989, doi:10.1080/01621459.1989.10478875).
+
+    Parameters
+    ----------
+    costates : ndarray, shape (n_time + 1, n)
+        Derivatives of the log-likelihood with respect to the predicted states [1 per unit of the state].
+    noise : ndarray, shape (n_time, n_zone)
+        Its derivatives with respect to the measurements, negative [1/K]; zero where not measured.
+    first : ndarray, shape (n, n)
+        N, variance of the first costate [1 per products of states].
+    spreads : tuple of _Spread
+        Covariances of the steps.
+    spread_of : ndarray of int, shape (n_time,)
+        Which of them a step has.
+    """
+
+    costates: FloatArray
+    noise: FloatArray
+    first: FloatArray
+    spreads: tuple[_Spread, ...]
+    spread_of: NDArray[np.int64]
+
+
+def smooth(filtered: Filtered) -> Smoothed:
+    """Estimate unmeasured heat and zone temperatures of every step from all measurements.
+
+    Fixed-interval smoothing without inverses of covariances (de Jong 1989; Durbin and Koopman 2012, Time Series
+    Analysis by State Space Methods, ch. 4.4): ``ẑ = z + P ρ``, ``Var = P - P N P``, with ρ and N run backwards.
+
+    Parameters
+    ----------
+    filtered : Filtered
+        From `KalmanFilter.filter`.
+
+    Returns
+    -------
+    Smoothed
+        Missing watts per zone over time, with their band.
+
+    Examples
+    --------
+    >>> from calibration import DisturbanceModel, Interval, filter_interval
+    >>> from thermal import build_network, load_bundled_case, reduced_model, replay_inputs, SymbolicModel
+    >>> grid = SymbolicModel(build_network(load_bundled_case().building, dx=1.0))
+    >>> inputs, theta = replay_inputs(load_bundled_case(), grid.network), grid.network.start()
+    >>> small = reduced_model(grid, [theta])
+    >>> week = Interval(inputs.stamps[600], inputs.stamps[900])
+    >>> found = smooth(filter_interval(small, theta, inputs, week, DisturbanceModel(100.0, 3600.0, 0.05)))
+    >>> low, high = found.band(0.9)
+    >>> bool((low < high).all())
+    True
+    """
+    back = backward(filtered)
+    heat, zone = smoothed_zones(filtered, back.costates)
+    variances = [np.array([getattr(s, name) for s in back.spreads])[back.spread_of] for name in ("heat", "zone")]
+    deviations = [np.sqrt(np.maximum(v, 0.0)) for v in variances]
+    return Smoothed(filtered.stamps, heat, deviations[0], zone, deviations[1])
+
+
+def smoothed_zones(filtered: Filtered, costates: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Smoothed disturbances [W] and zone temperatures [K], each of shape (n_time, n_zone).
+
+    Parameters
+    ----------
+    filtered : Filtered
+        From `KalmanFilter.filter`.
+    costates : ndarray, shape (n_time + 1, n)
+        From `backward` [1 per unit of the state].
+    """
+    r, count = filtered.kalman.space.order, len(filtered.stamps)
+    heat, zone = filtered.states[:count, r:].copy(), filtered.predicted.copy()
+    order = np.argsort(filtered.gain_of, kind="stable")
+    for rows in np.split(order, np.flatnonzero(np.diff(filtered.gain_of[order])) + 1):
+        gain = filtered.gains[filtered.gain_of[rows[0]]]
+        heat[rows] += costates[rows] @ gain.heat.T
+        zone[rows] += costates[rows] @ gain.reach
+    return heat, zone
+
+
+def backward(filtered: Filtered) -> _Backward:
+    """Run costates and their variances backwards.
+
+    Parameters
+    ----------
+    filtered : Filtered
+        From `KalmanFilter.filter`.
+    """
+    whole, count = filtered.kalman.whole, len(filtered.stamps)
+    observe, gains, gain_of = whole.observation, filtered.gains, filtered.gain_of
+    costates, noise = np.zeros((count + 1, whole.n)), np.empty((count, whole.space.n_zone))
+    for k in range(count - 1, -1, -1):
+        gain = gains[gain_of[k]]
+        carried = whole.retreat(costates[k + 1])
+        noise[k] = gain.weight @ (filtered.errors[k] - carried @ gain.reach)
+        costates[k] = carried + noise[k] @ observe
+    spreads, spread_of, first = _spreads(filtered)
+    return _Backward(costates, noise, first, tuple(spreads), spread_of)
+
+
+def _spreads(filtered: Filtered) -> tuple[list[_Spread], NDArray[np.int64], FloatArray]:
+    """Run N backwards, a new one only until it is steady under the gain of its steps."""
+    kalman, gain_of = filtered.kalman, filtered.gain_of
+    if kalman.covariance == "steady":
+        precision = _steady_precision(filtered)
+        return _steady_spreads(filtered, precision), gain_of, precision
+    spreads: list[_Spread] = []
+    spread_of = np.empty(len(gain_of), dtype=np.int64)
+    precision, settled, last = np.zeros((kalman.whole.n, kalman.whole.n)), False, -1
+    for k in range(len(gain_of) - 1, -1, -1):
+        if not (settled and gain_of[k] == last):
+            spread, precision = _step(kalman.whole, filtered.gains[gain_of[k]], precision)
+            settled = gain_of[k] == last and spread.near(spreads[-1], kalman.tolerance)
+            spreads.append(spread)
+            last = gain_of[k]
+        spread_of[k] = len(spreads) - 1
+    return spreads, spread_of, precision
+
+
+def _steady_spreads(filtered: Filtered, precision: FloatArray) -> list[_Spread]:
+    """Spread of every gain where N is steady after its step; gains of one covariance share all large products."""
+    whole, first, r = filtered.kalman.whole, filtered.gains[0], filtered.kalman.space.order
+    heat, observed, fed = np.ascontiguousarray(first.heat.T), first.reach[r:], whole.observation[:, r:].T
+    behind = whole.retreat(np.ascontiguousarray(whole.retreat(precision).T))
+    products = [behind @ x for x in (heat, first.reach)]
+    across, inner = first.heat @ products[1], first.reach.T @ products[1]
+    carried, crossed = _rows(precision[r:], whole.advance(heat).T), precision[r:] @ whole.advance(first.reach)
+    plain, known = np.diag(first.heat[:, r:]) - _rows(first.heat, products[0].T), np.diag(behind)[r:]
+    spreads = []
+    for gain in filtered.gains:
+        if gain.reach is not first.reach:
+            spreads.append(_step(whole, gain, precision)[0])
+            continue
+        weight, seen = gain.weight, gain.seen
+        middle = weight + weight @ inner @ weight
+        informed = inner - 2.0 * inner @ weight @ seen + seen @ middle @ seen
+        spread = _Spread(
+            heat=plain + 2.0 * _rows(across @ weight, observed) - _rows(observed @ middle, observed),
+            zone=np.diag(seen) - np.diag(informed),
+            drive=known - 2.0 * _rows(products[1][r:] @ weight, fed) + _rows(fed @ middle, fed),
+            carried=carried - _rows(crossed @ weight, observed),
+            noise=np.diag(middle).copy(),
+        )
+        spreads.append(spread)
+    return spreads
+
+
+def _rows(first: FloatArray, second: FloatArray) -> FloatArray:
+    """Products of the rows of two matrices, the diagonal of ``first second'``."""
+    return np.asarray(np.einsum("ij,ij->i", first, second))
+
+
+def _step(whole: DisturbedSpace, gain: Gain, after: FloatArray) -> tuple[_Spread, FloatArray]:
+    """Spread of a step, and its N from that of the next step."""
+    r, observe = whole.space.order, whole.observation
+    carried = whole.retreat(np.ascontiguousarray(whole.retreat(after).T))
+    gained = gain.reach @ gain.weight
+    across = carried @ gained
+    # a congruence, one side after the other, so that round-off dies out as N itself does
+    before = carried - across @ observe
+    before += observe.T @ (gain.weight @ observe - gained.T @ before)
+    before = 0.5 * (before + before.T)
+    filtered = gain.heat.T - gained @ gain.reach[r:].T
+    spread = _Spread(
+        heat=np.diag(gain.heat[:, r:]) - _rows(gain.heat @ before, gain.heat),
+        zone=np.diag(gain.seen) - _rows((before @ gain.reach).T, gain.reach.T),
+        drive=np.diag(before)[r:].copy(),
+        carried=_rows(after[r:], whole.advance(filtered).T),
+        noise=np.diag(gain.weight) + _rows(gained.T, across.T),
+    )
+    return spread, before
+
+
+def _steady_precision(filtered: Filtered) -> FloatArray:
+    """N far from both ends, ``(I + Y P)^-1 Y``."""
+    covariance, dual = filtered.kalman.steady(filtered.measured)
+    precision = np.linalg.solve(np.eye(len(dual)) + dual @ covariance, dual)
+    return np.asarray(0.5 * (precision + precision.T))

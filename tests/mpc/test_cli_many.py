@@ -1,0 +1,177 @@
+"""``buildingmpc calibrate`` over a folder of cases: interrupted, killed, repeated, and on a cluster."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner
+
+import calibration
+from calibration import calibrate
+from mpc.cli._app import app
+from thermal.pilot import generate_pilot
+
+OPTIONS = ("--horizon", "1h")
+NAMES = ["office 0", "office 1", "office 2"]
+
+
+def run(*arguments: str | Path) -> Any:
+    """Run the command in this process."""
+    return CliRunner().invoke(app, [str(a) for a in arguments])
+
+
+def wait_for(what: Callable[[], Any]) -> Any:
+    """Wait until something is true; return it."""
+    end = time.monotonic() + 60.0
+    while not (found := what()):
+        assert time.monotonic() < end, "waited too long"
+        time.sleep(0.02)
+    return found
+
+
+def processes(out: Path) -> set[int]:
+    """Workers that have begun a case."""
+    files = out.glob(".running/*/*.starts")
+    return {int(line.rpartition(" ")[2]) for file in files for line in file.read_text(encoding="utf-8").splitlines()}
+
+
+def is_alive(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    return True
+
+
+@pytest.fixture(scope="module")
+def cases(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Three offices of one zone, and a folder that is no case."""
+    folder = tmp_path_factory.mktemp("many") / "all cases"
+    for seed, name in enumerate(NAMES):
+        generate_pilot(folder / name, seed=seed, days=2.0, spin_up_days=0.5, step_seconds=1800.0, floor_area=40.0,
+                       zones=1, floors=1, cell_size=1.0)  # fmt: skip
+    (folder / "photographs").mkdir()
+    return folder
+
+
+@pytest.fixture
+def on_threads(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
+    """A cluster that is a thread of this process; what it was called with."""
+    called: list[Any] = []
+
+    def executor(scheduler: str, folders: list[Path]) -> ThreadPoolExecutor:
+        called.append((scheduler, folders))
+        return ThreadPoolExecutor(1)
+
+    monkeypatch.setattr(calibration, "ClusterExecutor", executor)
+    return called
+
+
+def start(cases: Path, out: Path) -> subprocess.Popen[str]:
+    command = [sys.executable, "-m", "mpc.cli", "calibrate", str(cases), "--out", str(out), "--workers", "2", *OPTIONS]
+    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="sends signals")
+def test_a_run_that_is_killed_or_interrupted_goes_on(cases: Path, tmp_path: Path, on_threads: list[Any]) -> None:
+    """Killed: no worker outlives it. Interrupted: what is finished stays. Repeated: the rest is done."""
+    out = tmp_path / "results"
+    with start(cases, out) as command:
+        killed = wait_for(lambda: processes(out))
+        command.kill()
+    wait_for(lambda: not any(map(is_alive, killed)))
+    assert [p.name for p in out.iterdir()] == [".running"]
+
+    with start(cases, out) as command:
+        workers = wait_for(lambda: processes(out))
+        wait_for(lambda: list(out.glob("*/case.json")))
+        workers |= processes(out)
+        os.killpg(command.pid, signal.SIGINT)
+        stdout, stderr = command.communicate(timeout=60.0)
+    assert (command.returncode, stdout) == (130, "")
+    assert f"interrupted: what is finished is in {out}" in stderr and "Traceback" not in stderr
+    assert not any(map(is_alive, workers))
+    kept = sorted(p.name for p in out.iterdir())
+    assert kept[-1] == "summary.json" and 2 <= len(kept) <= 3
+    summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))["cases"]
+    assert [name for name, entry in summary.items() if entry["status"] == "calibrated"] == kept[:-1]
+    assert {entry["status"] for name, entry in summary.items() if name not in kept} == {"interrupted"}
+
+    answer = run("calibrate", cases, "--out", out, "--scheduler", "tcp://somewhere:8786", "--json", *OPTIONS)
+    assert (answer.exit_code, answer.stderr) == (0, "left out, for want of building.yaml: photographs\n")
+    assert on_threads == [("tcp://somewhere:8786", [cases])]
+    entries = json.loads(answer.stdout)["cases"]
+    assert entries == json.loads((out / "summary.json").read_text(encoding="utf-8"))["cases"]
+    assert [name for name, entry in entries.items() if entry["resumed"]] == kept[:-1]
+    assert {entry["status"] for entry in entries.values()} == {"calibrated"}
+    assert sorted(p.name for p in out.iterdir()) == [*NAMES, "summary.json"]
+
+    answer = run("calibrate", cases, "--out", out, *OPTIONS)
+    assert answer.exit_code == 0
+    for text in ("Held-out error 1h ahead", "office 1", "calibrated, done before", f"Results: {out}"):
+        assert text in answer.stdout
+    answer = run("calibrate", cases, "--out", out, "--horizon", "2h")
+    assert (answer.exit_code, answer.stdout) == (2, "")
+    assert "error: OtherResultsError: " in answer.stderr and "horizon is '1h' there and '2h' here" in answer.stderr
+
+
+def test_a_solver_that_does_not_converge_fails_the_run_and_keeps_the_results(
+    cases: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, on_threads: list[Any]
+) -> None:
+    def stopped(*args: Any, **settings: Any) -> Any:
+        result = calibrate(*args, **settings)
+        return replace(result, solver=replace(result.solver, success=False, status="Maximum_Iterations_Exceeded"))
+
+    monkeypatch.setattr("calibration._many_case.calibrate", stopped)
+    shutil.copytree(cases / NAMES[0], tmp_path / "cases" / NAMES[0])
+    answer = run("calibrate", tmp_path / "cases", "--out", tmp_path / "out", "--scheduler", "x", *OPTIONS)
+    assert answer.exit_code == 1
+    assert "error: office 0: ipopt did not converge: Maximum_Iterations_Exceeded" in answer.stderr
+    assert "not converged" in answer.stdout
+    assert (tmp_path / "out" / NAMES[0] / "report.html").is_file()
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("--workers", "2", "--scheduler", "tcp://127.0.0.1:9"), "CalibrationError: --workers and --scheduler"),
+        (("--workers", "0"), "CalibrationError: workers: expected at least 1, came 0"),
+        (("--scheduler", "nonsense://x"), "ClusterError: scheduler 'nonsense://x': expected an answer within 10 s"),
+    ],
+)
+def test_bad_requests(cases: Path, tmp_path: Path, options: tuple[str, ...], message: str) -> None:
+    answer = run("calibrate", cases, "--out", tmp_path / "out", *options)
+    assert (answer.exit_code, answer.stdout) == (2, "")
+    assert f"error: {message}" in answer.stderr and "Traceback" not in answer.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("folder", ["office 0", "photographs"])
+def test_workers_are_for_folders_of_cases(cases: Path, tmp_path: Path, folder: str) -> None:
+    answer = run("calibrate", cases / folder, "--out", tmp_path / "out", "--workers", "2")
+    assert (answer.exit_code, answer.stdout) == (2, "")
+    assert "--workers and --scheduler are for a folder of cases" in answer.stderr
+
+
+def test_the_missing_extra_is_named(cases: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    answer = run("calibrate", cases, "--out", tmp_path / "out", "--scheduler", "tcp://127.0.0.1:9")
+    assert answer.exit_code == 2
+    assert "MissingExtraError: " in answer.stderr and 'pip install "buildingmpc[cluster]"' in answer.stderr
+
+
+def test_doctor_knows_the_extra() -> None:
+    answer = run("doctor", "--json")
+    assert json.loads(answer.stdout)["extras"]["cluster"]["install"] == 'pip install "buildingmpc[cluster]"'
