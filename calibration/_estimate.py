@@ -29,9 +29,6 @@ DRIFT_TOLERANCE = 0.005
 #: Change of the data's worth beyond which a round with the new one follows [-].
 _WORTH_TOLERANCE = 0.1
 
-#: How often the disturbance is tuned: when the estimate has come to rest, and (a large building not) when it has again.
-_TUNINGS = 2
-
 #: Least standard deviation of an error [K]: sensors do not resolve less.
 _LEAST_DEVIATION = 0.02
 
@@ -159,7 +156,7 @@ class _Rounds:
 
     def __init__(self, problem: Problem, model: ReducedModel, tuner: Tuner | None) -> None:
         self.problem, self.model, self.tuner = problem, model, tuner
-        self.iterations = self.evaluations = self.tunings = 0
+        self.iterations = self.evaluations = 0
         self.moved, self.settled, self.interrupted = np.inf, False, False
         self.disturbance: DisturbanceModel | None = None
         self.excess = 1.0
@@ -196,11 +193,8 @@ class _Rounds:
         deviation = max(_LEAST_DEVIATION, self.problem.spread(error))
         self.problem = replace(self.problem, deviation=deviation, shrinkage=_shrinkage(self.problem, z, self.last))
         if self.tuner is not None and (still or self.disturbance is not None):
-            if self.tunings < (1 if self.large else _TUNINGS):
+            if self.disturbance is None:
                 self.disturbance = self.tuner(self.problem, self.model, theta)
-                self.tunings += 1
-            if self.disturbance is None:  # pragma: no cover - there is at least one tuning
-                raise RuntimeError
             self.excess = max(1.0, unexplained(self.problem, self.model, theta, self.disturbance))
             known = precision(self.problem, self.model, theta, self.disturbance)
             most = replace(self.problem, effective=None).effective_size()
@@ -214,6 +208,8 @@ class _Rounds:
         """Collect what was found, with its covariance."""
         if self.last is None:  # pragma: no cover - there is at least one round
             raise RuntimeError
+        if self.interrupted and self.model.drift(self.problem.theta(z)) > DRIFT_TOLERANCE:
+            self.model = reduced_model(self.problem.grid, [self.problem.theta(z)])
         jacobian = self.last.jacobian
         covariance = np.asarray(np.linalg.inv(jacobian.T @ jacobian), dtype=float)
         theta = self.problem.theta(z)

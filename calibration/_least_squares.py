@@ -47,6 +47,9 @@ class LeastSquaresResult:
     interrupted: bool = False
 
 
+#: Status of a solve that Ctrl-C ended, as Ipopt has it.
+INTERRUPTED = "User_Requested_Stop"
+
 #: Ipopt's options beside its tolerances: quiet, and with a small barrier from close to the bounds, since the start is
 #: usually good.
 _IPOPT = {
@@ -220,14 +223,14 @@ def solve_least_squares(
     if cache.error is not None and not (interrupted and cache.best is not None):
         raise cache.error
     stats = solver.stats()
-    interrupted |= stats["return_status"] == "User_Requested_Stop"  # how CasADi ends a solve on Ctrl-C
+    interrupted |= stats["return_status"] == INTERRUPTED  # how CasADi ends a solve on Ctrl-C
     cost, best = cache.best if cache.best is not None else (np.nan, inside)
     cache.error = None
     return LeastSquaresResult(
         x=best,
         cost=cost,
         jacobian=cache(best)[1],
-        status="User_Requested_Stop" if interrupted else str(stats["return_status"]),
+        status=INTERRUPTED if interrupted else str(stats["return_status"]),
         success=bool(stats["success"]) and not interrupted,
         iterations=int(stats["iter_count"]),
         interrupted=interrupted,

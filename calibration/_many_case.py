@@ -13,6 +13,7 @@ from typing import Any
 
 from calibration._calibrate import calibrate
 from calibration._intervals import parse_interval
+from calibration._least_squares import INTERRUPTED
 from calibration._many_record import (
     INTERVALS,
     RECORD,
@@ -133,6 +134,8 @@ def _calibrate_one(task: CaseTask) -> CaseOutcome:
     files = digest(task.case)  # before it is loaded: what changes from here on counts as another case
     case = load_case(task.case)
     result = calibrate(case, **_settings_of(case, task.settings))
+    if result.solver.status == INTERRUPTED:  # the best so far is not what a later run should take over
+        return task.unfinished("interrupted")
     with tempfile.TemporaryDirectory(prefix="buildingmpc-") as work:
         staged = Path(work) / task.name
         write_calibration(result, case, staged)

@@ -12,6 +12,7 @@ import pandas as pd
 from calibration import _figures as figures
 from calibration._case_model import CHECK_TOLERANCE
 from calibration._page import clock, counted, duration, kelvin, plain, render, signed, significant, unit
+from calibration._report_diagnostics import diagnostics_content
 from calibration._report_evaluation import (
     evaluation_figures,
     interval_rows,
@@ -127,7 +128,8 @@ def _content(result: CalibrationResult, case: Case, grid: SymbolicModel, inputs:
         field = figures.spatial_field(
             grid, result.theta, inputs, start, after.steps, result.settings.dx, result.settings.stepping
         )
-    drawn = evaluation_figures(after, case, before=before, field=field)
+    band = figures.error_band(result.calibrated["tuning"])
+    drawn = evaluation_figures(after, case, before=before, field=field, band=band)
     drawn["growth"] = figures.error_growth(
         {
             "held out": {"before": before, "after": after},
@@ -152,11 +154,12 @@ def _content(result: CalibrationResult, case: Case, grid: SymbolicModel, inputs:
         "steps": after.steps,
         "step": duration(after.step_seconds),
         "figures": drawn,
-        "parameters": [_parameter_row(p) for p in result.parameters],
+        "parameters": _parameter_rows(result.parameters),
         "parameter_figure": figures.parameter_ranges(result.parameters),
         "zones": zone_rows(after.by_zone()),
         "intervals": [["tuning", *r] for r in interval_rows(result.calibrated["tuning"])]
         + [["held out", *r] for r in interval_rows(after)],
+        **diagnostics_content(result, grid, inputs),
         **_solver_content(result),
         "reproduce": _reproduce(result, case),
     }
@@ -172,7 +175,12 @@ def _error_rows(result: CalibrationResult) -> list[list[str]]:
     return rows
 
 
-def _parameter_row(p: ParameterEstimate) -> dict[str, str]:
+def _parameter_rows(parameters: Sequence[ParameterEstimate]) -> list[dict[str, str]]:
+    paper = figures.paper_values(parameters)
+    return [_parameter_row(p, paper.get(p.name)) for p in parameters]
+
+
+def _parameter_row(p: ParameterEstimate, paper: float | None) -> dict[str, str]:
     if p.standard_error is None:
         told, kind = "not estimated", "soft"
     elif p.at_bound:
@@ -184,6 +192,8 @@ def _parameter_row(p: ParameterEstimate) -> dict[str, str]:
         "value": significant(p.value),
         "unit": unit(p.unit),
         "error": significant(p.standard_error, 2),
+        "interval": " to ".join(significant(end) for end in p.interval90) if p.interval90 else "–",
+        "paper": significant(paper),
         "range": f"{plain(p.lower)} to {plain(p.upper)}" if p.lower is not None and p.upper is not None else "–",
         "told": told,
         "kind": kind,
@@ -194,10 +204,16 @@ def _parameter_row(p: ParameterEstimate) -> dict[str, str]:
 def _solver_content(result: CalibrationResult) -> dict[str, Any]:
     solver, check = result.solver, result.grid_check
     end = "converged" if solver.success else "did not converge"
-    starts = f"{solver.starts} starts" if solver.starts > 1 else "one start"
+    starts = f"the best of {solver.starts} starts" if solver.starts > 1 else "from one start"
+    settled = (
+        "Its rounds of weighing the data and reducing the model ended because nothing moved any more."
+        if solver.settled
+        else "Its rounds of weighing the data and reducing the model were still moving the estimate when they ended."
+    )
     return {
-        "solver": f"{solver.name.capitalize()} {end} ({solver.status}): {solver.iterations} iterations from {starts}, "
-        f"{solver.seconds:.1f} s in all.",
+        "solver": f"{solver.name.capitalize()} {end} ({solver.status}): {solver.iterations} iterations with "
+        f"{solver.evaluations} evaluations of the errors and their derivatives, {starts}; "
+        f"{solver.seconds:.1f} s in all. {settled}",
         "failures": solver.failures,
         "check": check,
         "trusted": check.max_difference <= CHECK_TOLERANCE,

@@ -159,7 +159,11 @@ def tidy(stamps: pd.DatetimeIndex, zones: tuple[str, ...], values: dict[str, Flo
 
 
 def evaluation_figures(
-    evaluation: Evaluation, case: Case, before: Evaluation | None = None, field: figures.Field | None = None
+    evaluation: Evaluation,
+    case: Case,
+    before: Evaluation | None = None,
+    field: figures.Field | None = None,
+    band: figures.Band | None = None,
 ) -> dict[str, Any]:
     """Figures of the runs of an evaluation: drift, maps and zones.
 
@@ -173,6 +177,8 @@ def evaluation_figures(
         The same runs before calibration.
     field : Field, optional
         Last state of the median run on the grid.
+    band : Band, optional
+        About the predictions, from other runs.
     """
     which, run = figures.median_run(evaluation)
     p = evaluation.predictions[which]
@@ -183,7 +189,8 @@ def evaluation_figures(
     runs = sum(len(x.start) for x in evaluation.predictions)
     errors = evaluation.by_zone()
     mean = np.array([errors[z]["bias"] if z in errors else np.nan for z in evaluation.zones])
-    series = figures.series_of_runs(evaluation)
+    series = figures.series_of_runs(evaluation, band)
+    inside = band.coverage(evaluation) if band is not None else np.nan
     return {
         "drift": figures.drift_boxes(shown, evaluation.step_seconds),
         "run_start": clock(p.start[run]),
@@ -195,6 +202,7 @@ def evaluation_figures(
         "plan": isinstance(case.building.geometry, FloorPlans),
         "cells": field is not None,
         "zones": figures.zone_panels(series, evaluation.zones, {z: e["mae"] for z, e in errors.items()}),
+        "inside": f"{100 * inside:.0f} %" if np.isfinite(inside) else "",
         "zone_count": len(errors),
         "ahead": ahead,
     }

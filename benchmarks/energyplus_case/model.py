@@ -139,9 +139,7 @@ def _constructions() -> Objects:
     }
     solid["render"]["solar_absorptance"] = materials.EXTERIOR_SOLAR_ABSORPTANCE
     fields = ("outside_layer", "layer_2", "layer_3", "layer_4")
-    constructions = {
-        name: dict(zip(fields, layers, strict=False)) for name, layers in materials.CONSTRUCTIONS.items()
-    }
+    constructions = {name: dict(zip(fields, layers, strict=False)) for name, layers in materials.CONSTRUCTIONS.items()}
     return {
         "Material": solid,
         "WindowMaterial:SimpleGlazingSystem": {

@@ -16,6 +16,38 @@ from thermal import PARAMETERS, Parameter
 #: More rows than this are not drawn; the table has them all.
 MOST_ROWS = 40
 
+#: Values that the paper found for parameters that ours correspond to [parameter units]: Goldfeder and Sipple (2023),
+#: Table 1. Of walls it has the density beside the heat capacity, of which only the product counts, so ours is theirs at
+#: our nominal density. A plan's walls are as thick as drawn in both; those of a table of zones are 1 m thick and
+#: have no such density, so that nothing corresponds.
+PAPER = {"exterior_convection_coefficient": 800.0, "shuffle_probability": 1.0}
+PAPER_WALLS = {  # conductivity [W/m/K], density [kg/m^3], heat capacity [J/kg/K]
+    "exterior_wall": (0.01, 2748.0, 2500.0),
+    "interior_wall": (780.0, 0.5, 500.0),
+}
+
+
+def paper_values(parameters: Sequence[ParameterEstimate]) -> dict[str, float]:
+    """Find what the paper's calibration of its own building gave for each parameter that it has.
+
+    Parameters
+    ----------
+    parameters : sequence of ParameterEstimate
+        With the nominal densities of the walls.
+
+    Returns
+    -------
+    dict of str to float
+        By name [parameter units].
+    """
+    known = dict(PAPER)
+    density = {p.name: p.value for p in parameters if p.name.endswith("_density")}
+    for wall, (conductivity, dense, heat) in PAPER_WALLS.items():
+        if f"{wall}_density" in density:
+            known[f"{wall}_conductivity"] = conductivity
+            known[f"{wall}_heat_capacity"] = dense * heat / density[f"{wall}_density"]
+    return {p.name: known[base] for p in parameters if (base := p.name.partition("@")[0]) in known}
+
 
 @styled
 def parameter_ranges(parameters: Sequence[ParameterEstimate]) -> list[Picture]:
@@ -31,11 +63,12 @@ def parameter_ranges(parameters: Sequence[ParameterEstimate]) -> list[Picture]:
         return []
     figure = Figure(figsize=(7.4, 0.9 + 0.3 * len(shown)))
     axes = figure.subplots()
+    paper = paper_values(parameters)
     for row, p in enumerate(shown):
-        _row(axes, row, p)
+        _row(axes, row, p, paper.get(p.name))
     axes.set_yticks(range(len(shown)), [p.name.replace("_", " ") for p in shown], fontsize=8)
     axes.set_xticks([0, 0.25, 0.5, 0.75, 1.0], ["lower bound", "", "middle (log scale)", "", "upper bound"])
-    axes.set(xlim=(-0.03, 1.03), ylim=(len(shown) - 0.4, -0.6))
+    axes.set(xlim=(-0.05, 1.05), ylim=(len(shown) - 0.4, -0.6))
     axes.grid(axis="y", visible=False)
     axes.spines["left"].set_visible(False)
     axes.tick_params(axis="y", length=0)
@@ -44,13 +77,17 @@ def parameter_ranges(parameters: Sequence[ParameterEstimate]) -> list[Picture]:
         for colour, label in ((MEASURED, "determined by the data"), (MUTED, "not determined"), (WARNING, "on a bound"))
     ]
     marks.append(Line2D([], [], color=INK, marker="|", linewidth=0, markersize=8, label="start"))
-    figure.legend(handles=marks, loc="outside lower center", ncols=4, fontsize=8)
+    if any(p.name in paper for p in shown):
+        label = "the paper's value (arrow: beyond the range)"
+        marks.append(Line2D([], [], color=INK, marker="D", markerfacecolor="white", linewidth=0, markersize=5,
+                            label=label))  # fmt: skip
+    figure.legend(handles=marks, loc="outside lower center", ncols=3, fontsize=8)
     return [
-        picture(figure, "Estimates with 95 % intervals within the physical ranges; the table below has the numbers")
+        picture(figure, "Estimates with 90 % intervals within the physical ranges; the table below has the numbers")
     ]
 
 
-def _row(axes: Axes, row: int, p: ParameterEstimate) -> None:
+def _row(axes: Axes, row: int, p: ParameterEstimate, paper: float | None) -> None:
     scale = _scale(p)
     low, high = scale.transform(scale.lower), scale.transform(scale.upper)
 
@@ -58,12 +95,22 @@ def _row(axes: Axes, row: int, p: ParameterEstimate) -> None:
         return (scale.transform(value) - low) / (high - low)
 
     centre = place(p.value)
-    half = 1.96 * (p.standard_error or 0.0) / scale.slope(p.value) / (high - low)
+    ends = [place(end) for end in p.interval90 or ()]
     colour = WARNING if p.at_bound else MEASURED if p.identifiable else MUTED
     axes.plot([0, 1], [row, row], color="#DDE1E6", linewidth=7, solid_capstyle="butt", zorder=1)
-    axes.plot([max(0.0, centre - half), min(1.0, centre + half)], [row, row], color=colour, linewidth=2.2, zorder=3)
+    axes.plot(ends, [row] * len(ends), color=colour, linewidth=2.2, solid_capstyle="butt", zorder=3)
     axes.plot([place(p.start)], [row], color=INK, marker="|", markersize=9, markeredgewidth=1.2, zorder=2)
     axes.plot([centre], [row], color=colour, marker="o", markersize=6, zorder=4)
+    if paper is not None:
+        _paper_mark(axes, row, 1.0 if scale.logit and paper >= 1.0 else place(paper), paper >= scale.upper)
+
+
+def _paper_mark(axes: Axes, row: int, at: float, above: bool) -> None:
+    """Mark the paper's value, with an arrow at the end that it lies beyond."""
+    beyond = above or at < 0.0
+    marker = ">" if above else "<" if beyond else "D"
+    x = 1.025 if above else -0.025 if beyond else at
+    axes.plot([x], [row], color=INK, marker=marker, markerfacecolor="white", markersize=5.5, zorder=5, clip_on=False)
 
 
 def _scale(p: ParameterEstimate) -> Parameter:

@@ -25,6 +25,52 @@ from calibration._figures._style import (
 #: Panels of a figure: the zones with the largest error.
 MOST_PANELS = 12
 
+#: Ends of the band of a prediction [-], and fewest errors that they are taken from.
+TAILS = (0.05, 0.95)
+FEWEST = 20
+
+
+@dataclass(frozen=True)
+class Band:
+    """Where measurements lie about a prediction, 90 % of them on the runs it was made from.
+
+    Parameters
+    ----------
+    low, high : ndarray, shape (n_kept, n_zone)
+        Ends, measured minus simulated, by step of the run and zone [K]; NaN where too little was measured.
+    """
+
+    low: FloatArray
+    high: FloatArray
+
+    def coverage(self, evaluation: Evaluation) -> float:
+        """Share of the measurements of other runs inside the band [-]; NaN where none can be.
+
+        Parameters
+        ----------
+        evaluation : Evaluation
+            Runs of the same length, with their trajectories.
+        """
+        errors = np.concatenate([p.measured - p.simulated for p in evaluation.predictions])
+        known = np.isfinite(errors) & np.isfinite(self.low)
+        inside = (errors >= self.low) & (errors <= self.high)
+        return float(inside[known].mean()) if known.any() else float("nan")
+
+
+@styled
+def error_band(evaluation: Evaluation) -> Band:
+    """Take the band of a prediction from the errors of earlier runs, zone by zone and step by step.
+
+    Parameters
+    ----------
+    evaluation : Evaluation
+        Of the tuning runs, with their trajectories.
+    """
+    errors = np.concatenate([p.measured - p.simulated for p in evaluation.predictions])
+    low, high = np.nanquantile(errors, TAILS, axis=0)
+    enough = np.isfinite(errors).sum(axis=0) >= FEWEST
+    return Band(np.where(enough, low, np.nan), np.where(enough, high, np.nan))
+
 
 @dataclass(frozen=True)
 class Series:
@@ -36,22 +82,28 @@ class Series:
         Local stamps.
     measured, simulated : ndarray, shape (n_time, n_zone)
         Temperatures [K].
+    low, high : ndarray, shape (n_time, n_zone), or None
+        Ends of the band of the prediction [K].
     """
 
     stamps: pd.DatetimeIndex
     measured: FloatArray
     simulated: FloatArray
+    low: FloatArray | None = None
+    high: FloatArray | None = None
 
 
-def series_of_runs(evaluation: Evaluation) -> Series:
+def series_of_runs(evaluation: Evaluation, band: Band | None = None) -> Series:
     """Concatenate runs that follow each other without overlap; each starts at the measured temperatures again.
 
     Parameters
     ----------
     evaluation : Evaluation
         With its trajectories.
+    band : Band, optional
+        About the predictions, of the same steps.
     """
-    stamps, measured, simulated = [], [], []
+    stamps, measured, simulated, low, high = [], [], [], [], []
     length = pd.Timedelta(seconds=evaluation.steps * evaluation.step_seconds)
     blank = np.full((1, len(evaluation.zones)), np.nan)
     for p in evaluation.predictions:
@@ -64,8 +116,12 @@ def series_of_runs(evaluation: Evaluation) -> Series:
             stamps.append((start + lags).append(pd.DatetimeIndex([after])))
             measured.append(np.vstack([p.initial[k], p.measured[k], blank]))
             simulated.append(np.vstack([p.initial[k], p.simulated[k], blank]))
-    joined = stamps[0].append(stamps[1:])
-    return Series(pd.DatetimeIndex(joined), np.concatenate(measured), np.concatenate(simulated))
+            if band is not None:
+                low.append(np.vstack([p.initial[k], p.simulated[k] + band.low, blank]))
+                high.append(np.vstack([p.initial[k], p.simulated[k] + band.high, blank]))
+    joined = pd.DatetimeIndex(stamps[0].append(stamps[1:]))
+    ends = (np.concatenate(low), np.concatenate(high)) if band is not None else (None, None)
+    return Series(joined, np.concatenate(measured), np.concatenate(simulated), *ends)
 
 
 @styled
@@ -85,15 +141,21 @@ def zone_panels(series: Series, zones: Sequence[str], errors: dict[str, float]) 
     columns = [list(zones).index(zone) for zone in chosen]
     x = day_numbers(series.stamps)
     both = np.stack([series.measured[:, columns], series.simulated[:, columns]]) - CELSIUS
-    span = float(np.nanmax(np.nanmax(both, axis=(0, 1)) - np.nanmin(both, axis=(0, 1))))
+    drawn = both
+    if series.low is not None and series.high is not None:
+        drawn = np.concatenate([both, np.stack([series.low[:, columns], series.high[:, columns]]) - CELSIUS])
+    highest, lowest = np.nanmax(drawn, axis=(0, 1)), np.nanmin(drawn, axis=(0, 1))
+    span = float(np.nanmax(highest - lowest))
     pictures = []
     for i, zone in enumerate(chosen):
         measured, simulated = both[:, :, i]
         figure = Figure(figsize=(4.1, 2.0))
         axes = figure.subplots()
+        if len(drawn) > len(both):
+            axes.fill_between(x, drawn[2, :, i], drawn[3, :, i], color=SIMULATED, alpha=0.2, linewidth=0)
         axes.plot(x, measured, color=MEASURED, linewidth=1.1)
         axes.plot(x, simulated, color=SIMULATED, linewidth=1.1)
-        middle = 0.5 * (np.nanmax(both[:, :, i]) + np.nanmin(both[:, :, i]))
+        middle = 0.5 * (highest[i] + lowest[i])
         axes.set_ylim(middle - 0.55 * span, middle + 0.55 * span)
         axes.set_xlim(x[0], x[-1])
         axes.set_title(f"{zone}: {errors[zone]:.2f} K", fontsize=9)

@@ -40,7 +40,8 @@ def calibrate(
     dx: Dx = None,
     horizon: Annotated[str, typer.Option(metavar="TIME", help="Prediction horizon, such as 6h or 90min.")] = "6h",
     scheme: SchemeName = None,
-    starts: Annotated[int, typer.Option(metavar="N", help="Number of starts of the solver.")] = 1,
+    loss: Annotated[str, typer.Option(metavar="LOSS", help="linear, or pseudo_huber against outliers.")] = "linear",
+    starts: Annotated[int, typer.Option(metavar="N", help="Starts of the solver; the best is kept.")] = 3,
     seed: Annotated[int, typer.Option(metavar="N", help="Seed of the further starts.")] = 0,
     workers: Annotated[
         int | None,
@@ -58,7 +59,7 @@ def calibrate(
 
     settings = {
         "tune": tune or [], "hold_out": hold_out or [], "dx": dx, "horizon": horizon,
-        "scheme": scheme or "implicit_euler", "starts": starts, "seed": seed,
+        "scheme": scheme or "implicit_euler", "loss": loss, "starts": starts, "seed": seed,
     }  # fmt: skip
     if workers is not None and scheduler is not None:
         raise CalibrationError("--workers and --scheduler: expected one of them; a cluster has workers of its own")
@@ -154,8 +155,13 @@ def show_calibration(result: CalibrationResult, report: Path) -> None:
 
 
 def _exit_code(result: CalibrationResult) -> int:
+    from calibration import INTERRUPTED
+
     if result.solver.success:
         return 0
+    if result.solver.status == INTERRUPTED:
+        complain("interrupted: these are the results of the best so far")
+        return 130
     complain(f"error: {result.solver.name} did not converge: {result.solver.status}; the results say so too")
     return 1
 

@@ -6,6 +6,7 @@ import json
 import os
 import shutil
 from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
+from dataclasses import replace
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
@@ -13,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from calibration import CaseOutcome, Interval, calibrate, calibrate_many, case_folders
+from calibration import INTERRUPTED, CaseOutcome, Interval, calibrate, calibrate_many, case_folders
 from calibration._many_case import CaseTask, calibrate_one
 from calibration._many_record import RECORD, check_settings
 from calibration.errors import (
@@ -25,7 +26,7 @@ from calibration.errors import (
 )
 from thermal import load_case
 
-SETTINGS = {"horizon": "1h"}
+SETTINGS = {"horizon": "1h", "starts": 1}
 Finished = tuple[Path, tuple[CaseOutcome, ...], int]  # results, what came back, the process that was killed
 
 
@@ -45,7 +46,7 @@ def test_a_killed_process_loses_nothing(finished: Finished, check_nothing_is_los
 
 
 def test_a_worker_finds_what_calibrate_finds(cases: Path, finished: Finished) -> None:
-    result = calibrate(load_case(cases / "office 1"), horizon="1h")
+    result = calibrate(load_case(cases / "office 1"), horizon="1h", starts=1)
     content = json.loads((finished[0] / "office 1" / "calibration.json").read_text(encoding="utf-8"))
     for p in result.parameters:
         assert content["parameters"][p.name]["value"] == pytest.approx(p.value, rel=1e-6), p.name
@@ -88,7 +89,7 @@ def test_results_of_other_settings_are_refused(one: tuple[Path, Path], monkeypat
     case, out = one
     assert calibrate_many([case], out, SETTINGS, executor=Idle())[0].resumed
     with pytest.raises(OtherResultsError, match=r"settings: horizon is '1h' there and '2h' here; .* --force"):
-        calibrate_many([case], out, {"horizon": "2h"}, executor=Idle())
+        calibrate_many([case], out, SETTINGS | {"horizon": "2h"}, executor=Idle())
     (case / "notes.txt").write_text("not a part of the case", encoding="utf-8")
     assert calibrate_many([case], out, SETTINGS, executor=Idle())[0].resumed
     with (case / "building.yaml").open("a", encoding="utf-8") as stream:
@@ -116,11 +117,11 @@ def test_force_calibrates_anew_and_keeps_what_it_did_not_make(one: tuple[Path, P
     (out / "office 0" / "notes.txt").write_text("mine", encoding="utf-8")
     tune = [Interval(*load_case(case).stamps[[0, 60]])]
     with ThreadPoolExecutor(1) as pool:
-        done = calibrate_many([case], out, {"horizon": "2h", "tune": tune}, executor=pool, force=True)
+        done = calibrate_many([case], out, {"starts": 1, "horizon": "2h", "tune": tune}, executor=pool, force=True)
     assert [(o.status, o.resumed) for o in done] == [("calibrated", False)]
     assert {p.name for p in (out / "office 0").iterdir()} > {"calibration.json", "report.html", RECORD, "notes.txt"}
     text = f"{tune[0].start.isoformat()}/{tune[0].end.isoformat()}"
-    again = calibrate_many([case], out, {"horizon": "2h", "tune": [text]}, executor=Idle())
+    again = calibrate_many([case], out, {"starts": 1, "horizon": "2h", "tune": [text]}, executor=Idle())
     assert again[0].resumed
 
 
@@ -173,6 +174,21 @@ def test_results_whose_worker_died_before_it_could_answer_are_found(one: tuple[P
     given = CaseTask(case, out / "office 0", out, SETTINGS, record["run"], 1, 2, True)
     assert calibrate_one(given).status == "calibrated"
     assert given.starts() == []
+
+
+def test_the_best_so_far_of_an_interrupted_solve_is_not_kept(
+    cases: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As where Ctrl-C reaches a worker of an executor that was passed in."""
+
+    def stopped(*args: Any, **settings: Any) -> Any:
+        result = calibrate(*args, **settings)
+        return replace(result, solver=replace(result.solver, success=False, status=INTERRUPTED))
+
+    monkeypatch.setattr("calibration._many_case.calibrate", stopped)
+    given = task(cases, tmp_path)
+    assert calibrate_one(given).status == "interrupted"
+    assert not given.out.exists()
 
 
 @pytest.mark.parametrize(

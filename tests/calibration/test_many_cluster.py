@@ -16,7 +16,7 @@ from calibration import ClusterExecutor, calibrate_many, case_folders
 from calibration._many_local import ONE_THREAD
 from calibration.errors import ClusterError, MissingExtraError
 
-SETTINGS = {"horizon": "1h"}
+SETTINGS = {"horizon": "1h", "starts": 1}
 WITHOUT = "import sys; sys.modules['calibration'] = None"  # as where the package is not installed
 LONG = 60.0  # s, for what a busy machine is slow to do
 

@@ -23,7 +23,7 @@ from calibration import calibrate
 from mpc.cli._app import app
 from thermal.pilot import generate_pilot
 
-OPTIONS = ("--horizon", "1h")
+OPTIONS = ("--horizon", "1h", "--starts", "1")
 NAMES = ["office 0", "office 1", "office 2"]
 
 
@@ -122,7 +122,7 @@ def test_a_run_that_is_killed_or_interrupted_goes_on(cases: Path, tmp_path: Path
     assert answer.exit_code == 0
     for text in ("Held-out error 1h ahead", "office 1", "calibrated, done before", f"Results: {out}"):
         assert text in answer.stdout
-    answer = run("calibrate", cases, "--out", out, "--horizon", "2h")
+    answer = run("calibrate", cases, "--out", out, *OPTIONS, "--horizon", "2h")
     assert (answer.exit_code, answer.stdout) == (2, "")
     assert "error: OtherResultsError: " in answer.stderr and "horizon is '1h' there and '2h' here" in answer.stderr
 
