@@ -15,6 +15,7 @@ from calibration._case_model import CaseModel
 from calibration._describe import describe
 from calibration._estimate import Estimate, Tuner, compensated_start, draw_starts, estimate
 from calibration._evaluate import HORIZONS, Evaluation, Progress, evaluate_model
+from calibration._information import information_of
 from calibration._intervals import Interval, Runs, default_intervals, horizon_steps, select_runs
 from calibration._problem import Loss, Problem, thin
 from calibration._result import CalibrationResult, GridCheck, SolverReport
@@ -162,6 +163,7 @@ def calibrate(
         ),
         disturbance=best.disturbance,
         excess=best.excess,
+        information=information_of(best),
         grid_check=check,
         horizon=horizon,
         settings=settings,

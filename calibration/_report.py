@@ -156,6 +156,7 @@ def _content(result: CalibrationResult, case: Case, grid: SymbolicModel, inputs:
         "figures": drawn,
         "parameters": _parameter_rows(result.parameters),
         "parameter_figure": figures.parameter_ranges(result.parameters),
+        "told": result.information.sentences,
         "zones": zone_rows(after.by_zone()),
         "intervals": [["tuning", *r] for r in interval_rows(result.calibrated["tuning"])]
         + [["held out", *r] for r in interval_rows(after)],

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from calibration._disturbance import DisturbanceModel
 from calibration._evaluate import Evaluation
+from calibration._information import Information
 from calibration._intervals import Interval
 from calibration._settings import ModelSettings
 from calibration.errors import ParameterFileError
@@ -152,6 +153,8 @@ class CalibrationResult:
         Unmeasured heat and sensor noise that the standard errors follow.
     excess : float
         Mean square of the tuning errors over that which the disturbance makes [-]; far above 1, physics is missing.
+    information : Information
+        What the data determine, in numbers and in words.
     horizon : str
         Prediction horizon.
     settings : ModelSettings
@@ -174,6 +177,7 @@ class CalibrationResult:
     grid_check: GridCheck
     disturbance: DisturbanceModel | None
     excess: float
+    information: Information
     horizon: str
     settings: ModelSettings
     seed: int
@@ -194,6 +198,7 @@ class CalibrationResult:
             "grid_check": self.grid_check.to_dict(),
             "disturbance": None if self.disturbance is None else self.disturbance.to_dict(),
             "excess": self.excess,
+            "information": self.information.to_dict(),
             "intervals": {
                 "tuning": [i.to_dict() for i in self.tuning],
                 "held_out": [i.to_dict() for i in self.held_out],
