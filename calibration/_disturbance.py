@@ -126,6 +126,14 @@ class DisturbedSpace:
         return self.space.order + self.space.n_zone
 
     @cached_property
+    def _order(self) -> int:
+        return self.space.order
+
+    @cached_property
+    def _coupling(self) -> FloatArray:
+        return np.ascontiguousarray(self.space.heat_drive)
+
+    @cached_property
     def keep(self) -> float:
         """φ, share of the disturbance that a step leaves [-]."""
         return self.disturbance.discrete(self.space.step)[0]
@@ -150,11 +158,12 @@ class DisturbedSpace:
 
         Parameters
         ----------
-        states : ndarray, shape (n, ...)
+        states : ndarray, shape (n,) or (n, m)
             States [(W K)^0.5 and W].
         """
-        r, out = self.space.order, np.empty(states.shape)
-        out[:r] = self.space.advance(states[:r]) + self.space.heat_drive @ states[r:]
+        r, out = self._order, np.empty(states.shape)
+        out[:r] = self.space.advance(states[:r])
+        out[:r] += self._coupling @ states[r:]
         out[r:] = self.keep * states[r:]
         return out
 
@@ -163,12 +172,13 @@ class DisturbedSpace:
 
         Parameters
         ----------
-        costates : ndarray, shape (n, ...)
+        costates : ndarray, shape (n,) or (n, m)
             Vectors of the dual space [(W K)^-0.5 and 1/W].
         """
-        r, out = self.space.order, np.empty(costates.shape)
+        r, out = self._order, np.empty(costates.shape)
         out[:r] = self.space.retreat(costates[:r])
-        out[r:] = self.keep * costates[r:] + self.space.heat_drive.T @ costates[:r]
+        out[r:] = self.keep * costates[r:]
+        out[r:] += self._coupling.T @ costates[:r]
         return out
 
     def propagate(self, covariance: FloatArray) -> FloatArray:

@@ -70,12 +70,14 @@ def _make_gain(whole: DisturbedSpace, covariance: FloatArray, measured: BoolArra
 
 def _weighed(gain: Gain, measured: BoolArray, noise: FloatArray) -> Gain:
     """Weigh other sensors with the same covariance."""
-    chosen = np.ix_(measured, measured)
-    spread = gain.seen[chosen] + np.diag(noise[measured])
-    inverse = np.linalg.inv(spread)
+    chosen = np.flatnonzero(measured)
+    rows, columns = chosen[:, None], chosen[None, :]
+    spread = gain.seen[rows, columns]
+    spread[np.diag_indices(chosen.size)] += noise[chosen]
     weight = np.zeros(gain.seen.shape)
-    weight[chosen] = 0.5 * (inverse + inverse.T)
-    return replace(gain, weight=weight, log_determinant=float(np.linalg.slogdet(spread)[1]))
+    weight[rows, columns] = np.linalg.inv(spread)
+    root = np.linalg.cholesky(spread)
+    return replace(gain, weight=0.5 * (weight + weight.T), log_determinant=2.0 * float(np.log(root.diagonal()).sum()))
 
 
 def exact_gains(

@@ -69,6 +69,9 @@ DISTURBANCE_PRIORS: dict[str, DisturbancePrior] = {
 }  # fmt: skip
 
 
+#: Numbers that each zone may have of its own.
+_ZONAL = ("deviation", "sensor_deviation")
+
 #: Most evaluations of the likelihood.
 EVALUATIONS = 200
 
@@ -98,8 +101,8 @@ class TunedDisturbance:
     disturbance : DisturbanceModel
         What was found.
     spread : mapping of str to float
-        Standard deviation of the logarithm of each common number [-], from the curvature at the optimum; 0.1 is about
-        10 %.
+        Standard deviation of the logarithm of each number [-], from the curvature at the optimum; 0.1 is about 10 %.
+        Empty when there are more than 30.
     log_likelihood : float
         Of all measurements of the intervals, the priors left out [-].
     count : int
@@ -135,7 +138,7 @@ def tune_disturbance(
     inputs: Inputs,
     intervals: Sequence[Interval],
     *,
-    per_zone: bool = False,
+    per_zone: Sequence[str] = (),
     weights: FloatArray | None = None,
     time_constant: float | None = None,
     priors: Mapping[str, DisturbancePrior] = DISTURBANCE_PRIORS,
@@ -159,8 +162,8 @@ def tune_disturbance(
         The telemetry.
     intervals : sequence of Interval
         Tuning intervals.
-    per_zone : bool
-        A deviation for each zone instead of a common one.
+    per_zone : sequence of str
+        What each zone has a number of its own of: ``deviation``, ``sensor_deviation``; both are common by default.
     weights : ndarray, shape (n_zone,), optional
         Deviations of the zones in proportion to each other, such as floor areas [any unit]; equal by default.
     time_constant : float, optional
@@ -244,14 +247,14 @@ class _Tuning:
         self.count = int(seen.sum())
         walks = time_constant is not None and np.isinf(time_constant)
         self.weights = np.where(seen.any(axis=0), weights, 0.0) if walks else weights  # nothing holds a walk unseen
-        self.zonal = len(numbers) - 1 - (time_constant is None)  # deviations among the numbers
+        self.heats, self.sensors = (sum(n.startswith(name) for n in numbers) for name in _ZONAL)
         self.evaluations = 0
 
     def disturbance(self, x: FloatArray) -> DisturbanceModel:
         """Disturbance of a point."""
         values = np.exp(x)
-        time = float(values[self.zonal]) if self.time_constant is None else self.time_constant
-        return DisturbanceModel(self.weights * values[: self.zonal], time, float(values[-1]))
+        time = float(values[self.heats]) if self.time_constant is None else self.time_constant
+        return DisturbanceModel(self.weights * values[: self.heats], time, values[-self.sensors :])
 
     def filtered(self, disturbance: DisturbanceModel) -> list[Filtered]:
         """Filter every stretch."""
@@ -279,28 +282,29 @@ class _Tuning:
         """Differentiate one stretch's log-likelihood with respect to the logarithms."""
         by_drive, by_keep, by_noise = log_likelihood_slopes(filtered)
         whole, step = filtered.kalman.whole, self.space.step
-        heat = 2.0 * whole.heat_variance * by_drive
-        slopes = [heat if self.zonal > 1 else heat.sum(keepdims=True)]
+        heat, noise = 2.0 * whole.heat_variance * by_drive, 2.0 * whole.noise_variance * by_noise
+        slopes = [heat if self.heats > 1 else heat.sum(keepdims=True)]
         if self.time_constant is None:
             keep, rate = whole.keep, step / disturbance.time_constant
             variance = np.asarray(disturbance.deviation) ** 2
             slopes.append(np.array([keep * rate * (by_keep - 2.0 * keep * variance @ by_drive)]))
-        slopes.append(np.array([2.0 * whole.noise_variance @ by_noise]))
+        slopes.append(noise if self.sensors > 1 else noise.sum(keepdims=True))
         return np.concatenate(slopes)
 
 
 def _numbers(
-    zones: Sequence[str], per_zone: bool, time_constant: float | None, priors: Mapping[str, DisturbancePrior]
+    zones: Sequence[str], per_zone: Sequence[str], time_constant: float | None, priors: Mapping[str, DisturbancePrior]
 ) -> dict[str, DisturbancePrior]:
     """Numbers that are tuned, with their priors: deviations first, the sensors last."""
     missing = sorted(set(DISTURBANCE_PRIORS) - set(priors))
     if missing:
         raise FilterError(f"priors: expected {sorted(DISTURBANCE_PRIORS)}, came none for {missing}")
-    names = [f"deviation@{zone}" for zone in zones] if per_zone else ["deviation"]
-    numbers = dict.fromkeys(names, priors["deviation"])
-    if time_constant is None:
-        numbers["time_constant"] = priors["time_constant"]
-    return {**numbers, "sensor_deviation": priors["sensor_deviation"]}
+    own = {per_zone} if isinstance(per_zone, str) else set(per_zone)
+    if not own <= set(_ZONAL):
+        raise FilterError(f"per_zone: expected some of {', '.join(_ZONAL)}, came {sorted(own)}")
+    names = {name: [f"{name}@{zone}" for zone in zones] if name in own else [name] for name in _ZONAL}
+    names["time_constant"] = ["time_constant"] if time_constant is None else []
+    return {full: priors[name] for name in ("deviation", "time_constant", "sensor_deviation") for full in names[name]}
 
 
 def _shares(weights: FloatArray | None, n_zone: int) -> FloatArray:

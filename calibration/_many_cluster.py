@@ -63,6 +63,8 @@ class ClusterExecutor(Executor):
         patience: float = PATIENCE,
         folders: Sequence[str | Path] = (),
     ) -> None:
+        if not scheduler.strip():  # dask would start a cluster of its own
+            raise ClusterError("scheduler: expected an address such as tcp://HOST:8786, came none")
         try:
             distributed: Any = import_module("distributed")
         except ImportError as error:

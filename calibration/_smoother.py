@@ -84,31 +84,6 @@ class _Spread:
         return bool((np.abs(variances[0] - variances[1]) <= limit * variances[1]).all())
 
 
-@dataclass(frozen=True)
-class _Backward:
-    """A pass backwards over what was filtered (de Jong 1989, doi:10.1080/01621459.1989.10478875).
-
-    Parameters
-    ----------
-    costates : ndarray, shape (n_time + 1, n)
-        Derivatives of the log-likelihood with respect to the predicted states [1 per unit of the state].
-    noise : ndarray, shape (n_time, n_zone)
-        Its derivatives with respect to the measurements, negative [1/K]; zero where not measured.
-    first : ndarray, shape (n, n)
-        N, variance of the first costate [1 per products of states].
-    spreads : tuple of _Spread
-        Covariances of the steps.
-    spread_of : ndarray of int, shape (n_time,)
-        Which of them a step has.
-    """
-
-    costates: FloatArray
-    noise: FloatArray
-    first: FloatArray
-    spreads: tuple[_Spread, ...]
-    spread_of: NDArray[np.int64]
-
-
 def smooth(filtered: Filtered) -> Smoothed:
     """Estimate unmeasured heat and zone temperatures of every step from all measurements.
 
@@ -138,98 +113,114 @@ def smooth(filtered: Filtered) -> Smoothed:
     >>> bool((low < high).all())
     True
     """
-    back = backward(filtered)
-    heat, zone = smoothed_zones(filtered, back.costates)
-    variances = [np.array([getattr(s, name) for s in back.spreads])[back.spread_of] for name in ("heat", "zone")]
-    deviations = [np.sqrt(np.maximum(v, 0.0)) for v in variances]
-    return Smoothed(filtered.stamps, heat, deviations[0], zone, deviations[1])
+    heat, zone = smoothed_zones(filtered, costates(filtered)[0])
+    if filtered.kalman.covariance == "steady":
+        variances = _steady_variances(filtered)
+    else:
+        found, index, _ = spreads(filtered)
+        variances = np.array([[s.heat, s.zone] for s in found])[index]
+    deviations = np.sqrt(np.maximum(variances, 0.0))
+    return Smoothed(filtered.stamps, heat, deviations[:, 0], zone, deviations[:, 1])
 
 
-def smoothed_zones(filtered: Filtered, costates: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Smoothed disturbances [W] and zone temperatures [K], each of shape (n_time, n_zone).
+def smoothed_zones(filtered: Filtered, slopes: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Correct disturbances [W] and zone temperatures [K], each of shape (n_time, n_zone).
 
     Parameters
     ----------
     filtered : Filtered
         From `KalmanFilter.filter`.
-    costates : ndarray, shape (n_time + 1, n)
-        From `backward` [1 per unit of the state].
+    slopes : ndarray, shape (n_time + 1, n)
+        From `costates` [1 per unit of the state].
     """
     r, count = filtered.kalman.space.order, len(filtered.stamps)
     heat, zone = filtered.states[:count, r:].copy(), filtered.predicted.copy()
     order = np.argsort(filtered.gain_of, kind="stable")
     for rows in np.split(order, np.flatnonzero(np.diff(filtered.gain_of[order])) + 1):
         gain = filtered.gains[filtered.gain_of[rows[0]]]
-        heat[rows] += costates[rows] @ gain.heat.T
-        zone[rows] += costates[rows] @ gain.reach
+        heat[rows] += slopes[rows] @ gain.heat.T
+        zone[rows] += slopes[rows] @ gain.reach
     return heat, zone
 
 
-def backward(filtered: Filtered) -> _Backward:
-    """Run costates and their variances backwards.
+def costates(filtered: Filtered) -> tuple[FloatArray, FloatArray]:
+    """Run derivatives of the log-likelihood backwards.
 
     Parameters
     ----------
     filtered : Filtered
         From `KalmanFilter.filter`.
+
+    Returns
+    -------
+    tuple
+        Derivatives with respect to the predicted states (n_time + 1, n) [1 per unit of the state], the last zero, and
+        to the predicted zone temperatures of each step (n_time, n_zone) [1/K], zero where not measured.
     """
     whole, count = filtered.kalman.whole, len(filtered.stamps)
     observe, gains, gain_of = whole.observation, filtered.gains, filtered.gain_of
-    costates, noise = np.zeros((count + 1, whole.n)), np.empty((count, whole.space.n_zone))
+    slopes, noise = np.zeros((count + 1, whole.n)), np.empty((count, whole.space.n_zone))
     for k in range(count - 1, -1, -1):
         gain = gains[gain_of[k]]
-        carried = whole.retreat(costates[k + 1])
+        carried = whole.retreat(slopes[k + 1])
         noise[k] = gain.weight @ (filtered.errors[k] - carried @ gain.reach)
-        costates[k] = carried + noise[k] @ observe
-    spreads, spread_of, first = _spreads(filtered)
-    return _Backward(costates, noise, first, tuple(spreads), spread_of)
+        slopes[k] = carried + noise[k] @ observe
+    return slopes, noise
 
 
-def _spreads(filtered: Filtered) -> tuple[list[_Spread], NDArray[np.int64], FloatArray]:
-    """Run N backwards, a new one only until it is steady under the gain of its steps."""
+def spreads(filtered: Filtered) -> tuple[list[_Spread], NDArray[np.int64], FloatArray]:
+    """Run N, the variance of the costates, backwards; a new one only until it is steady under the gain of its steps.
+
+    Parameters
+    ----------
+    filtered : Filtered
+        From `KalmanFilter.filter`, with ``covariance="exact"``.
+
+    Returns
+    -------
+    tuple
+        What the steps need of it, which of these each step has (n_time,), and N of the first state (n, n).
+    """
     kalman, gain_of = filtered.kalman, filtered.gain_of
-    if kalman.covariance == "steady":
-        precision = _steady_precision(filtered)
-        return _steady_spreads(filtered, precision), gain_of, precision
-    spreads: list[_Spread] = []
-    spread_of = np.empty(len(gain_of), dtype=np.int64)
+    found: list[_Spread] = []
+    index = np.empty(len(gain_of), dtype=np.int64)
     precision, settled, last = np.zeros((kalman.whole.n, kalman.whole.n)), False, -1
     for k in range(len(gain_of) - 1, -1, -1):
         if not (settled and gain_of[k] == last):
             spread, precision = _step(kalman.whole, filtered.gains[gain_of[k]], precision)
-            settled = gain_of[k] == last and spread.near(spreads[-1], kalman.tolerance)
-            spreads.append(spread)
+            settled = gain_of[k] == last and spread.near(found[-1], kalman.tolerance)
+            found.append(spread)
             last = gain_of[k]
-        spread_of[k] = len(spreads) - 1
-    return spreads, spread_of, precision
+        index[k] = len(found) - 1
+    return found, index, precision
 
 
-def _steady_spreads(filtered: Filtered, precision: FloatArray) -> list[_Spread]:
-    """Spread of every gain where N is steady after its step; gains of one covariance share all large products."""
+def _steady_variances(filtered: Filtered) -> FloatArray:
+    """Variances of smoothed disturbances and zones where N is steady after every step, (n_time, 2, n_zone).
+
+    Gains of one covariance share all large products.
+    """
     whole, first, r = filtered.kalman.whole, filtered.gains[0], filtered.kalman.space.order
-    heat, observed, fed = np.ascontiguousarray(first.heat.T), first.reach[r:], whole.observation[:, r:].T
+    covariance, dual = filtered.kalman.steady(filtered.measured)
+    precision = np.linalg.solve(np.eye(len(dual)) + dual @ covariance, dual)
+    precision = 0.5 * (precision + precision.T)
+    heat, observed = np.ascontiguousarray(first.heat.T), first.reach[r:]
     behind = whole.retreat(np.ascontiguousarray(whole.retreat(precision).T))
-    products = [behind @ x for x in (heat, first.reach)]
-    across, inner = first.heat @ products[1], first.reach.T @ products[1]
-    carried, crossed = _rows(precision[r:], whole.advance(heat).T), precision[r:] @ whole.advance(first.reach)
-    plain, known = np.diag(first.heat[:, r:]) - _rows(first.heat, products[0].T), np.diag(behind)[r:]
-    spreads = []
+    from_heat, from_zone = behind @ heat, behind @ first.reach
+    across, inner = first.heat @ from_zone, first.reach.T @ from_zone
+    plain = np.diag(first.heat[:, r:]) - _rows(first.heat, from_heat.T)
+    variances = []
     for gain in filtered.gains:
         if gain.reach is not first.reach:
-            spreads.append(_step(whole, gain, precision)[0])
+            spread = _step(whole, gain, precision)[0]
+            variances.append([spread.heat, spread.zone])
             continue
         weight, seen = gain.weight, gain.seen
         middle = weight + weight @ inner @ weight
         informed = inner - 2.0 * inner @ weight @ seen + seen @ middle @ seen
-        spread = _Spread(
-            heat=plain + 2.0 * _rows(across @ weight, observed) - _rows(observed @ middle, observed),
-            zone=np.diag(seen) - np.diag(informed),
-            drive=known - 2.0 * _rows(products[1][r:] @ weight, fed) + _rows(fed @ middle, fed),
-            carried=carried - _rows(crossed @ weight, observed),
-            noise=np.diag(middle).copy(),
-        )
-        spreads.append(spread)
-    return spreads
+        known = plain + 2.0 * _rows(across @ weight, observed) - _rows(observed @ middle, observed)
+        variances.append([known, np.diag(seen) - np.diag(informed)])
+    return np.array(variances)[filtered.gain_of]
 
 
 def _rows(first: FloatArray, second: FloatArray) -> FloatArray:
@@ -256,10 +247,3 @@ def _step(whole: DisturbedSpace, gain: Gain, after: FloatArray) -> tuple[_Spread
         noise=np.diag(gain.weight) + _rows(gained.T, across.T),
     )
     return spread, before
-
-
-def _steady_precision(filtered: Filtered) -> FloatArray:
-    """N far from both ends, ``(I + Y P)^-1 Y``."""
-    covariance, dual = filtered.kalman.steady(filtered.measured)
-    precision = np.linalg.solve(np.eye(len(dual)) + dual @ covariance, dual)
-    return np.asarray(0.5 * (precision + precision.T))

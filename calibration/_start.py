@@ -11,8 +11,8 @@ FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
 #: How far the mean temperatures of the weeks before the telemetry may be from those of its first day [K], standard
-#: deviation: zones are kept within a few kelvins; daily means outdoors vary by some 4 to 6 K within a month of the
-#: temperate climates (ISO 15927-6, cold spells; the practice cases' own weather).
+#: deviation. Daily means of the shared cases vary by 1.5 to 8 K outdoors and by 0.4 to 0.6 K in occupied zones (4 K in
+#: a house that is heated for a test): rather wide than narrow, since measurements make it smaller and nothing larger.
 ZONE_SPREAD, BOUNDARY_SPREAD = 1.5, 5.0
 
 

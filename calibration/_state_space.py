@@ -113,7 +113,7 @@ class StateSpace:
 
         Parameters
         ----------
-        states : ndarray, shape (r, ...)
+        states : ndarray, shape (r,) or (r, m)
             States [(W K)^0.5].
         """
         return _times(self.transition, states)
@@ -123,7 +123,7 @@ class StateSpace:
 
         Parameters
         ----------
-        costates : ndarray, shape (r, ...)
+        costates : ndarray, shape (r,) or (r, m)
             Vectors of the dual space [(W K)^-0.5].
         """
         return _times(self.transition.T, costates)
@@ -230,7 +230,7 @@ def _times(transition: FloatArray, x: FloatArray) -> FloatArray:
     """Product of a diagonal or a matrix with columns."""
     if transition.ndim == 2:
         return np.asarray(transition @ x)
-    return np.asarray(transition[(slice(None),) + (None,) * (x.ndim - 1)] * x)
+    return np.asarray(transition * x if x.ndim == 1 else transition[:, None] * x)
 
 
 def _mixing(airflows: tuple[tuple[int, int], ...], flow: FloatArray, n_zone: int) -> FloatArray:
