@@ -8,6 +8,7 @@ import shutil
 import signal
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from threading import Event, Thread
 from typing import Any
@@ -33,8 +34,12 @@ def wait_for(what: Callable[[], Any]) -> Any:
 
 def begun(out: Path, case: str = "*") -> list[int]:
     """Processes that have begun a case without results, the latest last."""
-    files = [p for p in out.glob(f".running/*/{case}.starts") if not (out / p.stem / RECORD).exists()]
-    return [int(line.rpartition(" ")[2]) for file in files for line in file.read_text(encoding="utf-8").splitlines()]
+    try:
+        files = [p for p in out.glob(f".running/*/{case}.starts") if not (out / p.stem / RECORD).exists()]
+        lines = [line for file in files for line in file.read_text(encoding="utf-8").splitlines()]
+    except FileNotFoundError:  # the run ended while they were looked for, and took its folder along
+        return []
+    return [int(line.rpartition(" ")[2]) for line in lines]
 
 
 class KillAtFirst:
@@ -61,7 +66,8 @@ class KillAlways(Thread):
         while not self.stop.wait(0.01):
             for pid in set(begun(self.out, self.case)) - killed:
                 killed.add(pid)
-                os.kill(pid, signal.SIGKILL)
+                with suppress(ProcessLookupError):  # the scheduler's own end of it came first
+                    os.kill(pid, signal.SIGKILL)
 
     def __enter__(self) -> KillAlways:
         self.start()
