@@ -5,14 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import stats
 
 from calibration._estimate import Estimate
 from calibration._result import ParameterEstimate
 from thermal import Parameter
-
-FloatArray = NDArray[np.float64]
 
 #: A bound counts as hit within this share of the range, on the estimation scale [-].
 BOUND_SHARE = 0.01
@@ -35,10 +32,8 @@ def describe(found: Estimate, nominal: Mapping[str, tuple[float, str]]) -> tuple
         Values that were never estimated, with their units.
     """
     deviations = dict(zip(found.problem.free, np.sqrt(np.diag(found.covariance)), strict=True))
-    drawn = found.sampled()
-    samples = {} if drawn is None else dict(zip(found.problem.free, drawn.T, strict=True))
     described = [
-        _estimated(p, float(found.theta[i]), deviations.get(i), samples.get(i))
+        _estimated(p, float(found.theta[i]), deviations.get(i))
         for i, p in enumerate(found.problem.grid.network.parameters)
     ]
     for name, (value, unit) in nominal.items():
@@ -47,17 +42,14 @@ def describe(found: Estimate, nominal: Mapping[str, tuple[float, str]]) -> tuple
     return tuple(described)
 
 
-def _estimated(p: Parameter, value: float, deviation: float | None, samples: FloatArray | None) -> ParameterEstimate:
+def _estimated(p: Parameter, value: float, deviation: float | None) -> ParameterEstimate:
     if deviation is None:
         source = "fixed by the user"
         return ParameterEstimate(p.name, p.unit, value, p.lower, p.upper, p.start, False, None, False, source)
     low, high, z = p.transform(p.lower), p.transform(p.upper), p.transform(value)
     at_bound = bool(min(z - low, high - z) < BOUND_SHARE * (high - low))
-    if samples is None:  # a normal on the estimation scale, cut at the physical range
-        ends = stats.truncnorm((low - z) / deviation, (high - z) / deviation, loc=z, scale=deviation).ppf(_TAILS)
-    else:
-        ends = np.percentile(samples, 100.0 * np.array(_TAILS))
-        deviation = float(np.sqrt(np.mean((samples - z) ** 2)))
+    # a normal on the estimation scale, cut at the physical range: the truth does not leave it either
+    ends = stats.truncnorm((low - z) / deviation, (high - z) / deviation, loc=z, scale=deviation).ppf(_TAILS)
     deviation = min(deviation, p.prior_deviation)  # the data never make a parameter less certain than its range does
     identifiable = bool(deviation < _DETERMINED * p.prior_deviation and not at_bound)
     first, last = (float(np.clip(p.inverse(float(end)), p.lower, p.upper)) for end in ends)

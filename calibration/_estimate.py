@@ -13,7 +13,6 @@ from calibration._evaluate import Progress
 from calibration._least_squares import LeastSquaresResult, solve_least_squares
 from calibration._precision import Precision, precision, unexplained
 from calibration._problem import Problem
-from calibration._samples import randomised
 from thermal import SymbolicModel, reduced_model
 from thermal.model import ReducedModel
 
@@ -32,9 +31,8 @@ _WORTH_TOLERANCE = 0.1
 #: Least standard deviation of an error [K]: sensors do not resolve less.
 _LEAST_DEVIATION = 0.02
 
-#: Zones up to which parameters are sampled. A building of more is large: seventy evaluations take minutes there, so the
-#: curvature has to do, and a basis is made at one θ.
-MOST_SAMPLED = 40
+#: Zones beyond which a basis is made at one θ: a building of more is large, and a basis of two twice as slow.
+_MOST_ZONES = 40
 
 #: Finds the unmeasured heat and the sensors' noise at θ.
 Tuner = Callable[[Problem, ReducedModel, FloatArray], DisturbanceModel]
@@ -95,18 +93,6 @@ class Estimate:
         own, _ = other.problem.weighted(self.model, self.point)
         return 0.5 * float(own @ own) < other.solve.cost
 
-    def sampled(self) -> FloatArray | None:
-        """Where the parameters may be, (n_sample, n_free) on the estimation scale [-].
-
-        None where the disturbance was not tuned, and in large buildings, where the curvature has to do.
-        """
-        if self.disturbance is None or self.problem.inputs.zone.shape[1] > MOST_SAMPLED or self.solve.interrupted:
-            return None
-        return randomised(self.problem, self.model, self.point, *self._known(self.disturbance))
-
-    def _known(self, disturbance: DisturbanceModel) -> tuple[Precision, float]:
-        return _known(self.problem, self.model, self.theta, disturbance, self.excess)
-
 
 def estimate(
     problem: Problem,
@@ -161,7 +147,7 @@ class _Rounds:
         self.disturbance: DisturbanceModel | None = None
         self.excess = 1.0
         self.last: LeastSquaresResult | None = None
-        self.large = problem.inputs.zone.shape[1] > MOST_SAMPLED
+        self.large = problem.inputs.zone.shape[1] > _MOST_ZONES
 
     def solve(self, z: FloatArray, tolerance: float) -> FloatArray:
         """One solve; returns the point found."""

@@ -1,10 +1,9 @@
-"""Precision of an estimate: the gradient's covariance against simulated heat and noise, weights, and randomised refits."""
+"""Precision of an estimate: the gradient's covariance against simulated heat and noise, and weights."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
-from typing import Any
 
 import numpy as np
 import pytest
@@ -14,7 +13,6 @@ from calibration import Interval, Problem, select_runs
 from calibration._disturbance import DisturbanceModel
 from calibration._precision import Precision, precision, unexplained
 from calibration._problem import thin
-from calibration._samples import randomised
 from thermal import SymbolicModel, build_network, load_bundled_case, reduced_model, replay_inputs
 from thermal.model import IMPLICIT_EULER, ReducedModel
 
@@ -120,37 +118,3 @@ def test_errors_as_large_as_the_disturbance_makes_leave_nothing_unexplained() ->
     p = problem()
     small, large = (unexplained(p, reduced(), p.start, DisturbanceModel(d, 4 * 3600.0, 1e-6)) for d in (50.0, 100.0))
     assert small / large == pytest.approx(4.0, rel=1e-3)
-
-
-class Linear:
-    """What `randomised` asks of a problem, for errors ``A z - b`` of weight w² and a standard normal prior."""
-
-    def __init__(self, matrix: FloatArray, weight: float, bound: float) -> None:
-        self.matrix, self.root = matrix, np.sqrt(weight)
-        self.bounds = -bound * np.ones(matrix.shape[1]), bound * np.ones(matrix.shape[1])
-
-    def weighted(self, model: object, z: FloatArray) -> tuple[FloatArray, FloatArray]:
-        jacobian = np.vstack([self.root * self.matrix, np.eye(z.size)])
-        return jacobian @ z, jacobian
-
-
-def test_randomised_refits_of_a_linear_problem_have_the_covariance() -> None:
-    """Chi-square of all samples over many seeds; opposite moves; the same seed gives the same."""
-    rng = np.random.default_rng(2)
-    matrix = rng.standard_normal((50, 3))
-    curvature = matrix.T @ matrix
-    known = Precision(curvature, 5.0 * curvature, np.eye(3), 50)
-    stub: Any = Linear(matrix, 0.1, 100.0)
-    samples = np.concatenate([randomised(stub, stub, np.zeros(3), known, 0.1, seed) for seed in range(60)])
-    np.testing.assert_allclose(samples[::2], -samples[1::2], atol=1e-12)
-    found = samples.T @ samples / len(samples)
-    root = np.linalg.inv(np.linalg.cholesky(known.covariance(0.1)))
-    np.testing.assert_allclose(np.linalg.eigvalsh(root @ found @ root.T), 1.0, atol=0.2)
-    np.testing.assert_array_equal(samples[:24], randomised(stub, stub, np.zeros(3), known, 0.1, 0))
-
-
-def test_randomised_refits_stay_inside_the_range() -> None:
-    known = Precision(np.eye(2), np.eye(2), np.eye(2), 2)
-    stub: Any = Linear(np.eye(2), 1.0, 0.3)
-    samples = randomised(stub, stub, np.zeros(2), known, 1.0)
-    assert np.abs(samples).max() == pytest.approx(0.3)
