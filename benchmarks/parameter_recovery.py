@@ -3,10 +3,10 @@
 A twin a seed (`thermal.pilot.generate_twin`): an office of its own, θ drawn from the priors within their ranges, the
 grid model under thermostats, unmeasured heat and sensor noise of strengths drawn anew. `calibration.calibrate` sees the
 telemetry only. Its intervals are normal on the estimation scale (log or logit), value ± quantile times standard error;
-the 90 % interval that the result itself gives, cut at the range, takes their place. As θ comes from the prior that calibration assumes,
-intervals of every level must hold the truth as often as they say, on average over all parameters, what the data
-determine and what they do not alike (Talts et al. 2018, arXiv:1804.06788). Parameters of one twin share its telemetry:
-the band about 90 % and how it is corrected for clusters are in `_coverage.py`.
+the 90 % interval that the result itself gives, cut at the range, takes their place. As θ comes from the prior that
+calibration assumes, intervals of every level must hold the truth as often as they say, on average over all parameters,
+what the data determine and what they do not alike (Talts et al. 2018, arXiv:1804.06788). Parameters of one twin share
+its telemetry: the band about 90 % and how it is corrected for clusters are in `_coverage.py`.
 
 The truth never leaves a parameter's physical range, while a normal interval may: where the data say little, a 90 %
 interval that reaches beyond the range holds the truth more often than 90 %, up to some 95 %. The rows "cut to range"

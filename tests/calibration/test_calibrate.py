@@ -141,7 +141,7 @@ def test_errors_shrink_with_more_days() -> None:
         assert b.standard_error / b.value < 1.05 * a.standard_error / a.value
     name = "exterior_wall_heat_capacity_multiplier"
     errors = [{p.name: p.standard_error for p in r.parameters}[name] for r in (short, long)]
-    assert errors[1] < 0.75 * errors[0]  # type: ignore[operator]
+    assert errors[1] < 0.8 * errors[0]  # type: ignore[operator]
 
 
 def test_two_zones_with_directed_air_are_recovered() -> None:
