@@ -7,6 +7,7 @@ import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor, Future
+from contextlib import suppress
 from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
@@ -20,7 +21,7 @@ T = TypeVar("T")
 #: How long a cluster may be without any worker before its cases are given up [s].
 PATIENCE = 60.0
 
-#: Time between looks at the workers that are there [s].
+#: Time between looks at the workers that are there, and for an answer to each [s].
 LOOK = 2.0
 
 
@@ -65,18 +66,7 @@ class ClusterExecutor(Executor):
     ) -> None:
         if not scheduler.strip():  # dask would start a cluster of its own
             raise ClusterError("scheduler: expected an address such as tcp://HOST:8786, came none")
-        try:
-            distributed: Any = import_module("distributed")
-        except ImportError as error:
-            raise MissingExtraError(
-                f'a scheduler needs {error.name}, which the extra brings: pip install "buildingmpc[cluster]"'
-            ) from error
-        try:
-            self._client = distributed.Client(scheduler, timeout=timeout, set_as_default=False)
-        except (OSError, ValueError, TypeError) as error:
-            raise ClusterError(
-                f"scheduler {scheduler!r}: expected an answer within {timeout:g} s, as from tcp://HOST:8786: {error}"
-            ) from error
+        self._client = _connected(scheduler, timeout)
         self._address, self._patience = scheduler, patience
         try:
             self._check_workers(timeout, [str(Path(folder).resolve()) for folder in folders])
@@ -106,12 +96,12 @@ class ClusterExecutor(Executor):
             return f"scheduler {self._address}: the connection was lost"
         now = time.monotonic()
         if now - self._looked > LOOK or now - self._seen > self._patience:
-            self._looked = now
-            if self._client.status == "running" and self._client.scheduler_info()["workers"]:
+            self._looked, workers = now, self._workers()
+            if workers:
                 self._seen = now
-        if now - self._seen > self._patience:
-            what = "had no worker" if self._client.status == "running" else "did not answer"
-            return f"scheduler {self._address}: {what} for {self._patience:g} s"
+            elif now - self._seen > self._patience:
+                what = "did not answer" if workers is None else "had no worker"
+                return f"scheduler {self._address}: {what} for {self._patience:g} s"
         return None
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
@@ -126,6 +116,16 @@ class ClusterExecutor(Executor):
         """
         self._executor.shutdown(wait=wait and not cancel_futures)
         self._client.close()
+
+    def _workers(self) -> int | None:
+        """Count the workers; None when the scheduler does not answer, be it that it hangs."""
+        if self._client.status != "running":
+            return None
+        try:
+            known: Mapping[str, Any] = self._client.sync(self._client.scheduler.identity, callback_timeout=LOOK)
+        except OSError:  # so are a lost connection and a timeout
+            return None
+        return len(known["workers"])
 
     def _check_workers(self, timeout: float, folders: list[str]) -> None:
         try:
@@ -150,6 +150,31 @@ class ClusterExecutor(Executor):
                     f"worker {worker}: does not see {', '.join(answer[1])}; cases and results must lie on a file "
                     "system that every worker sees under the same path"
                 )
+
+
+def _connected(scheduler: str, timeout: float) -> Any:
+    """Make a client of a scheduler; leave nothing behind when that fails."""
+    try:
+        distributed: Any = import_module("distributed")
+    except ImportError as error:
+        raise MissingExtraError(
+            f'a scheduler needs {error.name}, which the extra brings: pip install "buildingmpc[cluster]"'
+        ) from error
+    client = distributed.Client.__new__(distributed.Client)
+    try:
+        try:
+            client.__init__(scheduler, timeout=timeout, set_as_default=False)
+        except BaseException:
+            # A client that failed half-way would close itself when the garbage collector comes upon it; if that is
+            # while the next one starts, it waits for ever for a lock of dask that the start holds.
+            with suppress(AttributeError):  # there was nothing to close yet
+                client.close()
+            raise
+    except (OSError, ValueError, TypeError) as error:
+        raise ClusterError(
+            f"scheduler {scheduler!r}: expected an answer within {timeout:g} s, as from tcp://HOST:8786: {error}"
+        ) from error
+    return client
 
 
 def _unpacking() -> Callable[[bytes], Any]:

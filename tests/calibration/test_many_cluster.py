@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import gc
 import json
 import os
+import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import distributed
 import pytest
 
 from calibration import ClusterExecutor, calibrate_many, case_folders
@@ -91,6 +94,8 @@ def test_a_cluster_that_cannot_do_it_is_refused(scheduler: str, start_worker: Ca
 def test_no_scheduler(address: str) -> None:
     with pytest.raises(ClusterError, match=r"expected an answer within 0\.3 s"):
         ClusterExecutor(address, timeout=0.3)
+    # what is left to the garbage collector may close itself while the next client starts, and then both hang
+    assert {x.status for x in gc.get_objects() if type(x) is distributed.Client} <= {"closed"}
 
 
 def test_no_address() -> None:
@@ -112,3 +117,19 @@ def test_a_cluster_that_dies_is_given_up(
         (lost,) = calibrate_many([cases / "office 0"], tmp_path / "out", SETTINGS, executor=executor)
     assert (lost.status, lost.attempts) == ("lost", 1)
     assert "had no worker for 1 s; the same command goes on from here" in str(lost.message)
+
+
+def test_a_scheduler_that_hangs_is_given_up(
+    scheduler: str, start_worker: Callable[..., None], wait_until: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("calibration._many_cluster.LOOK", 0.2)
+    start_worker()
+    with distributed.Client(scheduler, timeout=LONG, set_as_default=False) as client:
+        process = client.run_on_scheduler(os.getpid)
+    with ClusterExecutor(scheduler, timeout=LONG, patience=1.0) as executor:
+        assert executor.trouble() is None
+        os.kill(process, signal.SIGSTOP)
+        try:
+            assert str(wait_until(executor.trouble)).endswith("did not answer for 1 s")
+        finally:
+            os.kill(process, signal.SIGCONT)
