@@ -17,7 +17,8 @@ from calibration._estimate import Estimate, Tuner, compensated_start, draw_start
 from calibration._evaluate import HORIZONS, Evaluation, Progress, evaluate_model
 from calibration._information import information_of
 from calibration._intervals import Interval, Runs, default_intervals, horizon_steps, select_runs
-from calibration._problem import Loss, Problem, thin
+from calibration._likelihood import InnovationsProblem
+from calibration._problem import Loss, Objective, Problem, thin
 from calibration._result import CalibrationResult, GridCheck, SolverReport
 from calibration._settings import ModelSettings
 from calibration._tuner import tune
@@ -49,6 +50,7 @@ def calibrate(
     reach: float | None = None,
     spin_up_seconds: float = SPIN_UP,
     structure: Structure = BASELINE,
+    objective: Objective = "multi_step",
     loss: Loss = "linear",
     starts: int = STARTS,
     seed: int = 0,
@@ -84,6 +86,9 @@ def calibrate(
         Length of the spin-up before an interval [s].
     structure : Structure
         What the model is made of: furniture, slabs, nodes of a wall, radiant node.
+    objective : {"multi_step", "innovations"}
+        Errors of N-step runs, or the likelihood of a Kalman filter's innovations, whose disturbance is tuned with the
+        parameters in turn.
     loss : {"linear", "pseudo_huber"}
         Least squares, or a loss that outlying errors do not pull.
     starts : int
@@ -113,8 +118,9 @@ def calibrate(
     """
     began = time.perf_counter()
     settings = ModelSettings(dx, reach, scheme, dict(scopes or {}), spin_up_seconds, structure)
-    if loss not in get_args(Loss):
-        raise CalibrationError(f"loss: expected one of {', '.join(get_args(Loss))}, came {loss!r}")
+    for name, text, known in (("loss", loss, get_args(Loss)), ("objective", objective, get_args(Objective))):
+        if text not in known:
+            raise CalibrationError(f"{name}: expected one of {', '.join(known)}, came {text!r}")
     for name, value, least in (("starts", starts, 1), ("seed", seed, 0)):
         if value < least:
             raise CalibrationError(f"{name}: expected at least {least}, came {value}")
@@ -136,6 +142,11 @@ def calibrate(
         select_runs(inputs, interval, steps, spin_up=spin_up_seconds)  # refused now rather than after the solve
     problem = Problem(grid, inputs, runs, steps, free, given, settings.stepping, loss=loss)
     first = reduced_model(grid, [given])
+    if objective == "innovations":
+        problem = InnovationsProblem(
+            grid, inputs, runs, steps, free, given, settings.stepping, loss=loss, intervals=tuple(tuned),
+            spin_up_seconds=spin_up_seconds,
+        ).at(first, given)  # fmt: skip
     best, failures = _solve(problem, first, starts, seed, progress)
     before, _ = _evaluated(CaseModel(case, settings, grid, inputs, given, "start"), first, intervals, horizon, progress)
     found = CaseModel(case, settings, grid, inputs, best.theta, "estimate")
@@ -165,6 +176,7 @@ def calibrate(
         excess=best.excess,
         information=information_of(best),
         grid_check=check,
+        objective=objective,
         horizon=horizon,
         settings=settings,
         seed=seed,

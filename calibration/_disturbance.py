@@ -82,6 +82,19 @@ class DisturbanceModel:
         # 1 - φ² by expm1: the step may be a millionth of the time constant
         return float(np.exp(-step / self.time_constant)), heat * np.sqrt(-np.expm1(-2.0 * step / self.time_constant))
 
+    def near(self, other: DisturbanceModel, limit: float) -> bool:
+        """Whether every number is within a share of another disturbance's.
+
+        Parameters
+        ----------
+        other : DisturbanceModel
+            Of the same zones.
+        limit : float
+            Largest relative difference [-].
+        """
+        pairs = [(getattr(self, name), getattr(other, name)) for name in self.__dataclass_fields__]
+        return all(np.allclose(own, theirs, rtol=limit, atol=0.0) for own, theirs in pairs)
+
     def to_dict(self) -> dict[str, Any]:
         """Values for a file; one that is common to the zones as a single number."""
         heat, noise = (np.unique(np.asarray(v)) for v in (self.deviation, self.sensor_deviation))

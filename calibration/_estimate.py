@@ -28,6 +28,13 @@ DRIFT_TOLERANCE = 0.005
 #: Change of the data's worth beyond which a round with the new one follows [-].
 _WORTH_TOLERANCE = 0.1
 
+#: Share by which numbers of the disturbance change in a round below which they are kept from there on [-].
+_SAME_DISTURBANCE = 0.05
+
+#: Times by which gradients of whitened residuals may be larger at convergence [-]: data that are worth a hundred times
+#: as much make them so at the same distance in standard errors.
+_WHITENED_SLACK = 10.0
+
 #: Least standard deviation of an error [K]: sensors do not resolve less.
 _LEAST_DEVIATION = 0.02
 
@@ -128,6 +135,7 @@ def estimate(
         The best so far, with the solver's status, also after Ctrl-C.
     """
     rounds = _Rounds(problem, model or reduced_model(problem.grid, [problem.theta(z)]), tuner)
+    rounds.whiten(problem.theta(z))
     for number in range(ROUNDS):
         z = rounds.solve(z, 1e-2 if number == 0 else 1e-3)
         if progress is not None:
@@ -145,9 +153,19 @@ class _Rounds:
         self.iterations = self.evaluations = 0
         self.moved, self.settled, self.interrupted = np.inf, False, False
         self.disturbance: DisturbanceModel | None = None
-        self.excess = 1.0
+        self.excess, self.retune = 1.0, True
         self.last: LeastSquaresResult | None = None
         self.large = problem.inputs.zone.shape[1] > _MOST_ZONES
+
+    def whiten(self, theta: FloatArray) -> None:
+        """Tune the disturbance at θ and whiten by it, where residuals are whitened."""
+        if not self.problem.whitened or self.tuner is None:
+            return
+        if self.disturbance is None or self.retune:
+            tuned = self.tuner(self.problem, self.model, theta)
+            self.retune = self.disturbance is None or not tuned.near(self.disturbance, _SAME_DISTURBANCE)
+            self.disturbance = tuned
+        self.problem = self.problem.at(self.model, theta, self.disturbance)
 
     def solve(self, z: FloatArray, tolerance: float) -> FloatArray:
         """One solve; returns the point found."""
@@ -157,7 +175,8 @@ class _Rounds:
             self.evaluations += 1
             return problem.weighted(model, x)
 
-        found = solve_least_squares(weighted, z, *problem.bounds, tolerance=tolerance)
+        slack = _WHITENED_SLACK if problem.whitened else 1.0
+        found = solve_least_squares(weighted, z, *problem.bounds, tolerance=slack * tolerance)
         self.iterations += found.iterations
         self.interrupted = found.interrupted
         # in units of what the data leave open, so that flat directions do not keep the rounds going
@@ -174,6 +193,8 @@ class _Rounds:
             both = number > 2 and not self.large
             self.model = reduced_model(self.problem.grid, [theta, self.model.theta] if both else [theta])
             still = False
+        if not still:
+            self.whiten(theta)
         error = self.problem.residuals_only(self.model, theta)
         before = self.problem.effective_size()
         deviation = max(_LEAST_DEVIATION, self.problem.spread(error))

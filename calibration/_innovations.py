@@ -142,6 +142,7 @@ def tune_disturbance(
     weights: FloatArray | None = None,
     time_constant: float | None = None,
     priors: Mapping[str, DisturbancePrior] = DISTURBANCE_PRIORS,
+    start: DisturbanceModel | None = None,
     scheme: Scheme = IMPLICIT_EULER,
     covariance: Covariance = "exact",
     spin_up_seconds: float = SPIN_UP,
@@ -170,6 +171,8 @@ def tune_disturbance(
         Keep the time constant at this value [s]; infinite for a random walk.
     priors : mapping of str to DisturbancePrior
         Of ``deviation`` (that of a zone of mean weight), ``time_constant`` and ``sensor_deviation``.
+    start : DisturbanceModel, optional
+        Where to start, such as what was found at a θ close by; the medians of the priors by default.
     scheme : Scheme
         Time stepping.
     covariance : {"exact", "steady"}
@@ -197,7 +200,7 @@ def tune_disturbance(
     bounds = [(np.log(p.lower), np.log(p.upper)) for p in tuning.numbers.values()]
     solved = so.minimize(
         tuning.cost,
-        [np.log(p.median) for p in tuning.numbers.values()],
+        [np.log(p.median) for p in tuning.numbers.values()] if start is None else tuning.point(start, bounds),
         jac=True,
         method="L-BFGS-B",
         bounds=bounds,
@@ -255,6 +258,17 @@ class _Tuning:
         values = np.exp(x)
         time = float(values[self.heats]) if self.time_constant is None else self.time_constant
         return DisturbanceModel(self.weights * values[: self.heats], time, values[-self.sensors :])
+
+    def point(self, disturbance: DisturbanceModel, bounds: Sequence[tuple[float, float]]) -> FloatArray:
+        """Point of a disturbance, within bounds; the mean over the zones of what is common to them."""
+        whole = np.broadcast_to(np.asarray(disturbance.deviation), self.weights.shape)
+        noise = np.broadcast_to(np.asarray(disturbance.sensor_deviation), self.weights.shape)
+        share = np.where(self.weights > 0.0, self.weights, 1.0)
+        values = [whole / share if self.heats > 1 else [whole.sum() / self.weights.sum()]]
+        values += [[disturbance.time_constant]] if self.time_constant is None else []
+        values += [noise if self.sensors > 1 else [noise.mean()]]
+        low, high = np.array(bounds).T
+        return np.asarray(np.clip(np.log(np.maximum(np.concatenate(values), 1e-12)), low, high))
 
     def filtered(self, disturbance: DisturbanceModel) -> list[Filtered]:
         """Filter every stretch."""

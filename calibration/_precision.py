@@ -11,6 +11,7 @@ covariance with prior precision Λ is ``H^-1 (w⁴M + Λ) H^-1``, H = w²B + Λ 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import singledispatch
 
 import numpy as np
 from numpy.typing import NDArray
@@ -79,6 +80,7 @@ class Precision:
         return np.asarray(inverse @ (weight**2 * self.score + self.prior) @ inverse)
 
 
+@singledispatch
 def precision(problem: Problem, model: SymbolicModel, theta: FloatArray, disturbance: DisturbanceModel) -> Precision:
     """Curvature of the squared errors and covariance of their gradient under a disturbance model.
 
@@ -151,6 +153,7 @@ def _autocorrelated(reach: FloatArray, stay: float) -> FloatArray:
     return np.asarray(total + cross + cross.T)
 
 
+@singledispatch
 def unexplained(
     problem: Problem, model: SymbolicModel, theta: FloatArray, disturbance: DisturbanceModel, seed: int = 0
 ) -> float:

@@ -9,7 +9,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from calibration._intervals import Runs
+from calibration._disturbance import DisturbanceModel
+from calibration._intervals import Interval, Runs
 from thermal import Inputs, Parameter, SymbolicModel, free_runs, spin_up
 from thermal.model import IMPLICIT_EULER, Scheme
 
@@ -17,6 +18,9 @@ FloatArray = NDArray[np.float64]
 
 #: ``linear`` is plain least squares; ``pseudo_huber`` takes errors far beyond the others for outliers.
 Loss = Literal["linear", "pseudo_huber"]
+
+#: Errors of N-step runs, or whitened innovations of a Kalman filter.
+Objective = Literal["multi_step", "innovations"]
 
 #: Residuals of a run are taken every half hour: what lies between is almost the same number again.
 RESIDUAL_SPACING = 1800.0
@@ -88,6 +92,36 @@ class Problem:
         """Steps whose residuals count: every half hour, the last included."""
         stride = max(1, round(RESIDUAL_SPACING / self.inputs.step))
         return np.arange(self.steps, 0, -stride)[::-1]
+
+    @property
+    def whitened(self) -> bool:
+        """Whether residuals are whitened, which takes a disturbance from the beginning: these are not."""
+        return False
+
+    def at(self, model: SymbolicModel, theta: FloatArray, disturbance: DisturbanceModel | None = None) -> Problem:
+        """Return the problem whose residuals are weighed by a disturbance at θ: itself, as they are not whitened.
+
+        Parameters
+        ----------
+        model : SymbolicModel
+            Reduced.
+        theta : ndarray, shape (n_parameter,)
+            Parameter values [parameter units].
+        disturbance : DisturbanceModel, optional
+            Unmeasured heat and sensors.
+        """
+        return self
+
+    @property
+    def stretches(self) -> tuple[Interval, ...]:
+        """Telemetry that is fitted: from the first to the last run of each interval."""
+        stamps = self.inputs.stamps
+        return tuple(Interval(stamps[r.starts[0]], stamps[r.starts[-1] + self.steps]) for r in self.runs)
+
+    @property
+    def disturbance(self) -> DisturbanceModel | None:
+        """What residuals are whitened by: nothing."""
+        return None
 
     @property
     def bounds(self) -> tuple[FloatArray, FloatArray]:
@@ -237,13 +271,26 @@ class Problem:
             Point of the estimation scale [-].
         """
         theta = self.theta(z)
-        error, slopes = self.residuals(model, theta)
-        weight = np.sqrt(self.effective_size() / error.size) / self.deviation
-        cost, turn = self._cost(error)
+        cost, slopes = self.turned(model, theta)
+        weight = np.sqrt(self.effective_size() / cost.size) / self.deviation
         centre = np.array([p.transform(p.start) for p in self.parameters])
         whiten = np.linalg.inv(np.linalg.cholesky(self.prior_covariance()))
         residual = np.concatenate([weight * cost, whiten @ (z - centre)])
-        return residual, np.vstack([weight * (turn[:, None] * slopes) * self.slopes(theta), whiten])
+        return residual, np.vstack([weight * slopes, whiten])
+
+    def turned(self, model: SymbolicModel, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Unweighted data: roots of twice what the errors cost [K], and their Jacobian on the estimation scale.
+
+        Parameters
+        ----------
+        model : SymbolicModel
+            On the grid or reduced.
+        theta : ndarray, shape (n_parameter,)
+            Parameter values [parameter units].
+        """
+        error, slopes = self.residuals(model, theta)
+        cost, turn = self._cost(error)
+        return cost, (turn[:, None] * slopes) * self.slopes(theta)
 
     def _cost(self, error: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Root of twice the loss, with the sign of the error [K], and its derivative [-]."""

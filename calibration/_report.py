@@ -226,6 +226,7 @@ def _reproduce(result: CalibrationResult, case: Case) -> list[tuple[str, str]]:
     parts += [f"--tune {i.start.isoformat()}/{i.end.isoformat()}" for i in result.tuning]
     parts += [f"--hold-out {i.start.isoformat()}/{i.end.isoformat()}" for i in result.held_out]
     parts += [f"--horizon {result.horizon} --scheme {result.settings.scheme}"]
+    parts += [f"--objective {result.objective}"] if result.objective != "multi_step" else []
     parts += [f"--starts {result.solver.starts} --seed {result.seed}"]
     parts += [f"--dx {result.settings.dx:g}"] if result.settings.dx is not None else []
     return [

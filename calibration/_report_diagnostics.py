@@ -15,6 +15,7 @@ from calibration._evaluate import HORIZONS, Evaluation
 from calibration._heat_balance import CV_RMSE_LIMIT, NMBE_LIMIT, HeatBalance, HeatFit, heat_balance
 from calibration._kalman import Filtered
 from calibration._page import clock, counted, duration, significant
+from calibration._problem import Objective
 from calibration._result import CalibrationResult
 from calibration._whiteness import Whiteness, whiteness
 from calibration.errors import FilterError, NotEnoughDataError
@@ -56,13 +57,13 @@ def diagnostics_content(result: CalibrationResult, grid: SymbolicModel, inputs: 
     large = len(result.zones) > MOST_FILTERED
     model = reduced_model(grid, [result.theta], order=LARGE_ORDER if large else None)
     return {
-        "leftover": _leftover_sentence(result.disturbance, result.excess),
+        "leftover": _leftover_sentence(result.disturbance, result.excess, result.objective),
         "innovations": _innovations(result, model, inputs),
         "heat": _heat(result, model, inputs),
     }
 
 
-def _leftover_sentence(disturbance: DisturbanceModel | None, excess: float) -> str:
+def _leftover_sentence(disturbance: DisturbanceModel | None, excess: float, objective: Objective = "multi_step") -> str:
     """Say in plain words what heat nobody measured, and whether it makes the errors that there are.
 
     Parameters
@@ -70,7 +71,9 @@ def _leftover_sentence(disturbance: DisturbanceModel | None, excess: float) -> s
     disturbance : DisturbanceModel or None
         Unmeasured heat and sensor noise, tuned on the tuning intervals.
     excess : float
-        Mean square of the tuning errors over that which the disturbance makes [-].
+        Mean square of the tuning errors, or of what innovations pull at, over that which the disturbance makes [-].
+    objective : {"multi_step", "innovations"}
+        What was minimised.
 
     Examples
     --------
@@ -84,9 +87,11 @@ def _leftover_sentence(disturbance: DisturbanceModel | None, excess: float) -> s
     text = f"Unmeasured heat of about {significant(heat, 2)} W a zone, {memory}, and sensor noise of {noise:.2g} K "
     text += "make the one-step errors of the tuning intervals as likely as can be."
     # never below 1: the search for what is missing does not reward errors that happen to be small
+    multi_step = objective == "multi_step"
+    what = "errors of the runs are" if multi_step else "pulls of a day's innovations at the parameters are"
     if excess <= 1.0:
-        return f"{text} The errors of the runs are no larger than these make."
-    text += f" The errors of the runs are, in the mean square, {excess:.2g} times what these make"
+        return f"{text} The {what} no larger than these make."
+    text += f" The {what}, in the mean square, {excess:.2g} times what these make"
     return text + (": physics is missing." if excess > EXCESS_LIMIT else ", which is close to what they should be.")
 
 

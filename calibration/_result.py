@@ -15,6 +15,7 @@ from calibration._disturbance import DisturbanceModel
 from calibration._evaluate import Evaluation
 from calibration._information import Information
 from calibration._intervals import Interval
+from calibration._problem import Objective
 from calibration._settings import ModelSettings
 from calibration.errors import ParameterFileError
 from thermal import ThermalNetwork
@@ -152,7 +153,8 @@ class CalibrationResult:
     disturbance : DisturbanceModel or None
         Unmeasured heat and sensor noise that the standard errors follow.
     excess : float
-        Mean square of the tuning errors over that which the disturbance makes [-]; far above 1, physics is missing.
+        Mean square of the tuning errors, or of what a day's innovations pull at, over that which the disturbance makes
+        [-]; far above 1, physics is missing.
     information : Information
         What the data determine, in numbers and in words.
     horizon : str
@@ -163,6 +165,8 @@ class CalibrationResult:
         Seed of the starts.
     version : str
         Of the library.
+    objective : {"multi_step", "innovations"}
+        What was minimised.
     """
 
     case: str
@@ -182,6 +186,7 @@ class CalibrationResult:
     settings: ModelSettings
     seed: int
     version: str = field(default="")
+    objective: Objective = "multi_step"
 
     def to_dict(self) -> dict[str, Any]:
         """Contents of ``calibration.json``."""
@@ -203,6 +208,7 @@ class CalibrationResult:
                 "tuning": [i.to_dict() for i in self.tuning],
                 "held_out": [i.to_dict() for i in self.held_out],
             },
+            "objective": self.objective,
             "horizon": self.horizon,
             "settings": self.settings.to_dict(),
             "case": self.case,

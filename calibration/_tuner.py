@@ -7,7 +7,6 @@ from numpy.typing import NDArray
 
 from calibration._disturbance import DisturbanceModel
 from calibration._innovations import tune_disturbance
-from calibration._intervals import Interval
 from calibration._problem import Problem
 from thermal import ThermalNetwork, reduced_model
 from thermal.model import ReducedModel
@@ -31,15 +30,14 @@ def tune(problem: Problem, model: ReducedModel, theta: FloatArray) -> Disturbanc
     theta : ndarray, shape (n_parameter,)
         Parameter values [parameter units].
     """
-    stamps = problem.inputs.stamps
-    intervals = [Interval(stamps[r.starts[0]], stamps[r.starts[-1] + problem.steps]) for r in problem.runs]
     large = len(model.network.zones) > _MANY_ZONES
     tuned = tune_disturbance(
         reduced_model(problem.grid, [theta], order=_ORDER) if large else model,
         theta,
         problem.inputs,
-        intervals,
+        problem.stretches,
         weights=_air_volumes(model.network),
+        start=problem.disturbance,
         scheme=problem.scheme,
         covariance="steady",  # where sensors come and go exact gains take ten times as long
     )

@@ -40,6 +40,10 @@ def calibrate(
     dx: Dx = None,
     horizon: Annotated[str, typer.Option(metavar="TIME", help="Prediction horizon, such as 6h or 90min.")] = "6h",
     scheme: SchemeName = None,
+    objective: Annotated[
+        str,
+        typer.Option(metavar="OBJECTIVE", help="multi_step: errors of runs; innovations: a filter's likelihood."),
+    ] = "multi_step",
     loss: Annotated[str, typer.Option(metavar="LOSS", help="linear, or pseudo_huber against outliers.")] = "linear",
     starts: Annotated[int, typer.Option(metavar="N", help="Starts of the solver; the best is kept.")] = 3,
     seed: Annotated[int, typer.Option(metavar="N", help="Seed of the further starts.")] = 0,
@@ -59,7 +63,7 @@ def calibrate(
 
     settings = {
         "tune": tune or [], "hold_out": hold_out or [], "dx": dx, "horizon": horizon,
-        "scheme": scheme or "implicit_euler", "loss": loss, "starts": starts, "seed": seed,
+        "scheme": scheme or "implicit_euler", "objective": objective, "loss": loss, "starts": starts, "seed": seed,
     }  # fmt: skip
     if workers is not None and scheduler is not None:
         raise CalibrationError("--workers and --scheduler: expected one of them; a cluster has workers of its own")

@@ -183,3 +183,14 @@ def test_random_walk_without_a_sensor_is_refused() -> None:
         disturbed(DisturbanceModel(100.0, np.inf, 0.05)).steady(measured)
     deviation = np.array([100.0, 100.0, 0.0, 100.0, 100.0])
     assert np.isfinite(disturbed(DisturbanceModel(deviation, np.inf, 0.05)).steady(measured)[0]).all()
+
+
+def test_near_compares_every_number() -> None:
+    one = DisturbanceModel(np.array([100.0, 50.0]), 3600.0, 0.05)
+    assert one.near(DisturbanceModel(np.array([103.0, 49.0]), 3700.0, 0.051), 0.05)
+    for other in (
+        DisturbanceModel(np.array([100.0, 60.0]), 3600.0, 0.05),
+        DisturbanceModel(np.array([100.0, 50.0]), 4600.0, 0.05),
+        DisturbanceModel(np.array([100.0, 50.0]), 3600.0, 0.06),
+    ):
+        assert not one.near(other, 0.05)

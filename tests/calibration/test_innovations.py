@@ -106,6 +106,17 @@ def test_result_is_the_likeliest_and_says_so() -> None:
             assert lower < found.log_likelihood
 
 
+def test_a_start_near_the_optimum_finds_the_same_sooner() -> None:
+    inputs, wanted = telemetry(0), tuned(0)
+    for per_zone in ((), ("deviation", "sensor_deviation")):
+        cold = wanted if not per_zone else tune_disturbance(model(), theta(), inputs, whole(inputs), per_zone=per_zone)
+        found = tune_disturbance(
+            model(), theta(), inputs, whole(inputs), per_zone=per_zone, start=cold.disturbance
+        )  # fmt: skip
+        assert found.evaluations < 0.5 * cold.evaluations
+        assert found.disturbance.near(cold.disturbance, 0.02)
+
+
 def holed(seed: int, days: float) -> Inputs:
     """Single readings, an hour of a sensor, and an hour of an input are missing."""
     inputs = telemetry(seed, days=days)

@@ -100,6 +100,7 @@ def test_debug_shows_the_traceback(spoilt: Path) -> None:
         (("simulate", CASE, "--start", "2023-03-01T01:00", "--end", "2023-03-02"), "SimulationError"),
         (("calibrate", CASE), "Missing option"),
         (("calibrate", CASE, "--out", "unused", "--starts", "0"), "CalibrationError: starts"),
+        (("calibrate", CASE, "--out", "unused", "--objective", "kalman"), "CalibrationError: objective"),
         (("calibrate", CASE, "--out", "unused", "--tune", "2023-03-01/2023-03-11"), "IntervalError: intervals"),
         (("calibrate", "nowhere", "--out", "unused"), "MissingFileError"),
     ],

@@ -167,6 +167,7 @@ class ModalRuns:
         functions = propagator_functions(step, scheme)
         end, end_gain, mean, mean_gain = (divided_differences(f, modes.capacity) for f in functions)
         observe, drive, last = modes.observation, np.hstack([modes.boundary, modes.heating]), keep - 1
+        stay = propagator.end[:, None]
         seen_path = path[:, last].reshape(r, -1)
         seen_inputs = inputs.reshape(-1, count, m)[:, last].reshape(-1, keep.size * m)
         starts = (modes.coordinates @ slopes).reshape(r, -1, m)
@@ -177,12 +178,13 @@ class ModalRuns:
             pushed = self._pushed(j, stiffer)
             source = (turn * end) @ flat
             source += (propagator.end_gain[:, None] * pushed + (turn * end_gain) @ drive) @ inputs
-            source = source.reshape(r, count, m)
-            moved = np.empty((r, count, m))
-            moved[:, 0] = starts[:, j]
+            source = np.ascontiguousarray(source.reshape(r, count, m).transpose(1, 0, 2))
+            moved = np.empty((count, r, m))  # time first: a step then lies together in memory
+            moved[0] = starts[:, j]
             for k in range(count - 1):
-                moved[:, k + 1] = propagator.end[:, None] * moved[:, k] + source[:, k]
-            seen = np.tensordot(observe * propagator.mean, moved[:, last], axes=1).reshape(observe.shape[0], -1)
+                np.multiply(stay, moved[k], out=moved[k + 1])
+                moved[k + 1] += source[k]
+            seen = np.tensordot(observe * propagator.mean, moved[last], axes=(1, 1)).reshape(observe.shape[0], -1)
             seen += (observe @ (turn * mean)) @ seen_path
             seen += (observe @ (propagator.mean_gain[:, None] * pushed + (turn * mean_gain) @ drive)) @ seen_inputs
             out[..., j] = seen.reshape(-1, keep.size, m).transpose(2, 1, 0)
