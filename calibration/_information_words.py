@@ -46,7 +46,7 @@ def _precision_words(parameter: Parameter | None, deviation: float) -> str:
         On the estimation scale [-].
     """
     size = f"{100 * deviation:.2g} %" if deviation < MOST_PER_CENT else f"a factor of {np.exp(deviation):.2g}"
-    return f"its odds to {size}" if parameter is not None and parameter.logit else f"to {size}"
+    return f"its odds to {size}" if parameter is not None and parameter.scale == "logit" else f"to {size}"
 
 
 def combination_words(parameters: Mapping[str, Parameter], exponents: Mapping[str, float]) -> str:
@@ -66,7 +66,7 @@ def combination_words(parameters: Mapping[str, Parameter], exponents: Mapping[st
     'ratio slab heat capacity / slab coupling'
     """
     names = {
-        name: f"odds of the {spoken(parameters[name])}" if parameters[name].logit else spoken(parameters[name])
+        name: f"odds of the {spoken(parameters[name])}" if parameters[name].scale == "logit" else spoken(parameters[name])
         for name in exponents
     }
     if any(abs(abs(e) - 1.0) > 1e-9 for e in exponents.values()):

@@ -258,7 +258,7 @@ def load_parameters(path: str | Path, network: ThermalNetwork) -> FloatArray:
             )
         values[name] = float(value)
     for p in network.parameters:
-        if p.logit and values.get(p.name, 0.0) > 1.0:
+        if p.scale == "logit" and values.get(p.name, 0.0) > 1.0:
             raise ParameterFileError(f"{path}: parameters.{p.name}: expected at most 1, found {values[p.name]!r}")
     wanted = {p.name for p in network.parameters}
     unknown = sorted(set(values) - wanted - set(network.nominal))

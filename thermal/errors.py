@@ -284,3 +284,7 @@ def nearest(word: object, options: Iterable[object]) -> str:
         return "there is none to choose from"
     shown = ", ".join(names[:8])
     return f"valid: {shown}" + (f" and {len(names) - 8} more" if len(names) > 8 else "")
+
+
+class EffectError(ModelError):
+    """An effect is unknown, or asked for where it cannot be."""

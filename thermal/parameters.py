@@ -10,6 +10,9 @@ import numpy as np
 #: How many values a parameter has: one for the building, one a facade, or one a zone.
 Scope = Literal["global", "facade", "zone"]
 
+#: Scale that a parameter is estimated on.
+Scale = Literal["log", "logit", "linear"]
+
 #: What stands before the facade in the full name of its parameter, so that a zone called "south" cannot be meant.
 FACADE_PREFIX = "facade:"
 
@@ -27,11 +30,15 @@ class Parameter:
     start : float
         Value before calibration [unit]; the centre of the prior.
     lower, upper : float
-        Physical range [unit], ``0 < lower < start < upper``.
+        Physical range [unit], ``0 < lower < start < upper``; on the linear scale ``lower <= start <= upper``, where 0
+        and negative values are possible.
     source : str
         Where start and range come from.
-    logit : bool
-        True for a probability, estimated on the logit scale; every other parameter is estimated on the log scale.
+    scale : {"log", "logit", "linear"}
+        What it is estimated on: log for what is positive, logit for a share, linear for the strength of an effect,
+        which may be absent or of either sign.
+    effect : str or None
+        Effect of the catalogue that it belongs to; None for the baseline.
     scope : {"global", "facade", "zone"}
         Whether the value is the building's, or a facade's or a zone's own.
     member : str or None
@@ -49,15 +56,20 @@ class Parameter:
     lower: float
     upper: float
     source: str
-    logit: bool = False
+    scale: Scale = "log"
+    effect: str | None = None
     scope: Scope = "global"
     member: str | None = None
 
     def __post_init__(self) -> None:
-        if not 0.0 < self.lower < self.start < self.upper:
+        if self.scale == "linear":
+            expected, ordered = "lower <= start <= upper, not equal", self.lower <= self.start <= self.upper
+            ordered = ordered and self.lower < self.upper
+        else:
+            expected, ordered = "0 < lower < start < upper", 0.0 < self.lower < self.start < self.upper
+        if not ordered:
             raise ValueError(
-                f"parameter {self.name}: expected 0 < lower < start < upper, "
-                f"came {self.lower}, {self.start}, {self.upper}"
+                f"parameter {self.name}: expected {expected}, came {self.lower}, {self.start}, {self.upper}"
             )
         if (self.scope == "global") != (self.member is None):
             raise ValueError(
@@ -72,18 +84,28 @@ class Parameter:
 
     @property
     def prior_deviation(self) -> float:
-        """Standard deviation of the prior on the estimation scale [-]: the physical range is its 95 % interval."""
-        return float(self.transform(self.upper) - self.transform(self.lower)) / 4.0
+        """Standard deviation of the prior on the estimation scale [-]: the physical range is its 95 % interval.
+
+        Where the range begins at the start, as that of a strength that is absent at first, the prior is the half of a
+        normal distribution.
+        """
+        ends = (self.transform(self.lower), self.transform(self.upper))
+        if self.scale == "linear":
+            centre = self.transform(self.start)
+            return max(centre - ends[0], ends[1] - centre) / 2.0
+        return float(ends[1] - ends[0]) / 4.0
 
     def transform(self, value: float) -> float:
-        """Map a value to the estimation scale (log or logit).
+        """Map a value to the estimation scale.
 
         Parameters
         ----------
         value : float
             Value of the parameter [parameter unit].
         """
-        return float(np.log(value / (1.0 - value))) if self.logit else float(np.log(value))
+        if self.scale == "linear":
+            return float(value)
+        return float(np.log(value / (1.0 - value))) if self.scale == "logit" else float(np.log(value))
 
     def inverse(self, z: float) -> float:
         """Map a point of the estimation scale back to the value.
@@ -93,7 +115,9 @@ class Parameter:
         z : float
             Point of the estimation scale [-].
         """
-        return float(1.0 / (1.0 + np.exp(-z))) if self.logit else float(np.exp(z))
+        if self.scale == "linear":
+            return float(z)
+        return float(1.0 / (1.0 + np.exp(-z))) if self.scale == "logit" else float(np.exp(z))
 
     def slope(self, value: float) -> float:
         """Differentiate the value with respect to the estimation scale.
@@ -103,7 +127,9 @@ class Parameter:
         value : float
             Value of the parameter [parameter unit].
         """
-        return value * (1.0 - value) if self.logit else value
+        if self.scale == "linear":
+            return 1.0
+        return value * (1.0 - value) if self.scale == "logit" else value
 
     def rescaled(self, factor: float) -> Parameter:
         """Return the parameter with start and range multiplied by ``factor``.
@@ -161,7 +187,7 @@ PARAMETERS: dict[str, Parameter] = {
             0.02,
             0.98,
             "probability per 300 s step; above 0.98 the mean factor vanishes",
-            logit=True,
+            scale="logit",
         ),
         Parameter("interior_film_coefficient", "W/m^2/K", 2.5, 1.0, 6.0, _ARCH),
         Parameter("radiant_coefficient", "W/m^2/K", 5.0, 1.5, 8.0, _ARCH),

@@ -102,7 +102,7 @@ def _row(axes: Axes, row: int, p: ParameterEstimate, paper: float | None) -> Non
     axes.plot([place(p.start)], [row], color=INK, marker="|", markersize=9, markeredgewidth=1.2, zorder=2)
     axes.plot([centre], [row], color=colour, marker="o", markersize=6, zorder=4)
     if paper is not None:
-        _paper_mark(axes, row, 1.0 if scale.logit and paper >= 1.0 else place(paper), paper >= scale.upper)
+        _paper_mark(axes, row, 1.0 if scale.scale == "logit" and paper >= 1.0 else place(paper), paper >= scale.upper)
 
 
 def _paper_mark(axes: Axes, row: int, at: float, above: bool) -> None:

@@ -28,8 +28,8 @@ MASS, SLAB, SHUFFLE = "slab_heat_capacity", "slab_coupling", "shuffle_probabilit
 def alike(*names: str) -> list[Parameter]:
     """Parameters whose priors have a deviation of one on the estimation scale."""
     return [
-        Parameter(n, "1", 0.5, p.inverse(-2.0), p.inverse(2.0), "", logit=True)
-        if (p := PARAMETERS[n]).logit
+        Parameter(n, "1", 0.5, p.inverse(-2.0), p.inverse(2.0), "", scale="logit")
+        if (p := PARAMETERS[n]).scale == "logit"
         else Parameter(n, p.unit, 1.0, np.exp(-2.0), np.exp(2.0), "")
         for n in names
     ]

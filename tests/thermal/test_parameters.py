@@ -31,7 +31,7 @@ def test_parameter_has_a_unit_a_range_and_a_source(name: str) -> None:
     assert p.name == name
     UNITS.parse_units(p.unit)
     assert 0 < p.lower < p.start < p.upper
-    assert not p.logit or p.upper < 1
+    assert p.scale != "logit" or p.upper < 1
     assert len(p.source) > 5
     # the range is the 95 % interval of the prior: four deviations on the estimation scale
     assert p.transform(p.upper) - p.transform(p.lower) == pytest.approx(4 * p.prior_deviation, rel=1e-13)
@@ -41,7 +41,7 @@ def test_prior_of_a_known_range() -> None:
     p = Parameter("film", "W/m^2/K", 2.0, 1.0, np.e**4, "made up")
     assert p.prior_deviation == pytest.approx(1.0)
     assert p.transform(1.0) == pytest.approx(0.0)
-    q = Parameter("share", "1", 0.4, 0.25, 0.5, "made up", logit=True)
+    q = Parameter("share", "1", 0.4, 0.25, 0.5, "made up", scale="logit")
     assert q.transform(0.25) == pytest.approx(-np.log(3.0))
     assert q.slope(0.25) == pytest.approx(0.1875)
 

@@ -70,6 +70,10 @@ class ModalModel:
         Modes as columns in the states of the reduced model [(K/W)^0.5].
     coordinates : ndarray, shape (r, n)
         Its inverse [(W/K)^0.5].
+    reading : ndarray, shape (n_zone, r), optional
+        What the zones' sensors read where these lag behind [(K/W)^0.5]; see `output`.
+    n_signal : int
+        How many of the columns of B, the last ones, are signals of effects.
 
     Examples
     --------
@@ -87,6 +91,13 @@ class ModalModel:
     uniform: FloatArray
     states: FloatArray
     coordinates: FloatArray
+    reading: FloatArray | None = None
+    n_signal: int = 0
+
+    @property
+    def output(self) -> FloatArray:
+        """What is compared with telemetry, shape (n_zone, r): the sensors' readings, or the zone means."""
+        return self.observation if self.reading is None else self.reading
 
     @property
     def conductance(self) -> FloatArray:
@@ -160,6 +171,8 @@ def modal_model(matrices: Matrices) -> ModalModel:
         uniform=(states.T @ stiffness) @ matrices.uniform,
         states=states,
         coordinates=states.T @ stiffness,
+        reading=None if matrices.reading is None else matrices.reading @ states,
+        n_signal=matrices.n_signal,
     )
 
 

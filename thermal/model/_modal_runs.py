@@ -51,13 +51,22 @@ class _ModalSlopes:
         self.stiffness: list[FloatArray | None] = []
         self.boundary: list[FloatArray | None] = []
         for capacity, flow in zip(matrices.capacity_slopes, matrices.flow_slopes, strict=True):
-            moves = bool(np.any(flow))
             self.capacity.append(t.T @ (capacity @ t) if np.any(capacity) else None)
-            self.stiffness.append(t.T @ (flow[:, :n] @ t) if moves else None)
-            self.boundary.append(-t.T @ flow[:, n:] if moves else None)
+            self.stiffness.append(t.T @ (flow[:, :n] @ t) if np.any(flow[:, :n]) else None)
+            self.boundary.append(-t.T @ flow[:, n:] if np.any(flow[:, n:]) else None)
 
     def __len__(self) -> int:
         return len(self.capacity)
+
+    def brings_heat_only(self, j: int) -> bool:
+        """Whether a parameter moves B alone, as the strength of a source does.
+
+        Parameters
+        ----------
+        j : int
+            Number of the parameter.
+        """
+        return self.capacity[j] is None and self.stiffness[j] is None
 
     def turn(self, j: int) -> tuple[FloatArray, FloatArray]:
         """``dC - d(K + s C) c`` and ``d(K + s C)`` of one parameter.
@@ -146,7 +155,7 @@ class ModalRuns:
             path[:, k + 1] = propagator.end[:, None] * path[:, k] + forced[:, k]
         last = keep - 1
         mean = propagator.mean[:, None, None] * path[:, last] + propagator.mean_gain[:, None, None] * pushed[:, last]
-        means = np.tensordot(modes.observation, mean, axes=1).transpose(2, 1, 0)
+        means = np.tensordot(modes.output, mean, axes=1).transpose(2, 1, 0)
         if slopes is None:
             return means, None
         moved = self._run_slopes(path[:, :count], inputs, keep, step, scheme, slopes)
@@ -166,7 +175,7 @@ class ModalRuns:
         r, count, m = path.shape
         functions = propagator_functions(step, scheme)
         end, end_gain, mean, mean_gain = (divided_differences(f, modes.capacity) for f in functions)
-        observe, drive, last = modes.observation, np.hstack([modes.boundary, modes.heating]), keep - 1
+        observe, drive, last = modes.output, np.hstack([modes.boundary, modes.heating]), keep - 1
         stay = propagator.end[:, None]
         seen_path = path[:, last].reshape(r, -1)
         seen_inputs = inputs.reshape(-1, count, m)[:, last].reshape(-1, keep.size * m)
@@ -174,21 +183,34 @@ class ModalRuns:
         out = np.empty((m, keep.size, observe.shape[0], len(self.slopes)))
         flat = path.reshape(r, -1)
         for j in range(len(self.slopes)):
-            turn, stiffer = self.slopes.turn(j)
-            pushed = self._pushed(j, stiffer)
-            source = (turn * end) @ flat
-            source += (propagator.end_gain[:, None] * pushed + (turn * end_gain) @ drive) @ inputs
+            if self.slopes.brings_heat_only(j):
+                heat = self._heat_of(j, inputs)
+                source, direct = propagator.end_gain[:, None] * heat, heat.reshape(r, count, m)[:, last].reshape(r, -1)
+                seen = (observe * propagator.mean_gain) @ direct
+            else:
+                turn, stiffer = self.slopes.turn(j)
+                pushed = self._pushed(j, stiffer)
+                source = (turn * end) @ flat
+                source += (propagator.end_gain[:, None] * pushed + (turn * end_gain) @ drive) @ inputs
+                seen = (observe @ (turn * mean)) @ seen_path
+                seen += (observe @ (propagator.mean_gain[:, None] * pushed + (turn * mean_gain) @ drive)) @ seen_inputs
             source = np.ascontiguousarray(source.reshape(r, count, m).transpose(1, 0, 2))
             moved = np.empty((count, r, m))  # time first: a step then lies together in memory
             moved[0] = starts[:, j]
             for k in range(count - 1):
                 np.multiply(stay, moved[k], out=moved[k + 1])
                 moved[k + 1] += source[k]
-            seen = np.tensordot(observe * propagator.mean, moved[last], axes=(1, 1)).reshape(observe.shape[0], -1)
-            seen += (observe @ (turn * mean)) @ seen_path
-            seen += (observe @ (propagator.mean_gain[:, None] * pushed + (turn * mean_gain) @ drive)) @ seen_inputs
+            seen += np.tensordot(observe * propagator.mean, moved[last], axes=(1, 1)).reshape(observe.shape[0], -1)
             out[..., j] = seen.reshape(-1, keep.size, m).transpose(2, 1, 0)
         return out
+
+    def _heat_of(self, j: int, inputs: FloatArray) -> FloatArray:
+        """Modal heat that a unit of a source's strength brings at every input, (r, n)."""
+        moved = self.slopes.boundary[j]
+        if moved is None:
+            return np.zeros((self.modes.capacity.size, inputs.shape[1]))
+        used = np.flatnonzero(np.any(moved, axis=0))
+        return np.asarray(moved[:, used] @ inputs[used])
 
     def _pushed(self, j: int, stiffer: FloatArray) -> FloatArray:
         """Differentiate ``(K + s C)^-1 [B, H]`` with respect to one parameter, (r, n_boundary + n_zone)."""
@@ -222,7 +244,7 @@ class ModalRuns:
         costate = np.zeros((propagator.end.size, p * m))
         heat = np.empty((count, n_zone, p * m))
         for k in range(count - 1, -1, -1):
-            seen = modes.observation.T @ weights[:, k].transpose(1, 0, 2).reshape(n_zone, -1)
+            seen = modes.output.T @ weights[:, k].transpose(1, 0, 2).reshape(n_zone, -1)
             heat[k] = modes.heating.T @ (propagator.end_gain[:, None] * costate + propagator.mean_gain[:, None] * seen)
             costate = propagator.end[:, None] * costate + propagator.mean[:, None] * seen
         start = modes.coordinates.T @ costate
@@ -302,8 +324,11 @@ class ModalRuns:
         source = np.zeros((change.shape[1], frame.capacity.size))
         if capacity is not None:
             source -= change.T @ (frame.basis.T @ capacity).T
-        if stiffness is not None and moved is not None:
-            source -= step * (after.T @ (frame.basis.T @ stiffness).T - boundary @ (frame.basis.T @ moved).T)
+        if stiffness is not None:
+            source -= step * (after.T @ (frame.basis.T @ stiffness).T)
+        if moved is not None:
+            used = np.flatnonzero(np.any(moved, axis=0))
+            source += step * (boundary[:, used] @ (frame.basis.T @ moved[:, used]).T)
         return source
 
     def held_response(self, held: NDArray[np.bool_], step: float) -> FloatArray:
@@ -342,7 +367,8 @@ class ModalRuns:
         """
         frame = _HeldFrame(self.modes, held)
         conductance = 1.0 - SHIFT * frame.capacity
-        outside = frame.basis.T @ self.modes.boundary.sum(axis=1)
+        temperatures = self.modes.boundary.shape[1] - self.modes.n_signal
+        outside = frame.basis.T @ self.modes.boundary[:, :temperatures].sum(axis=1)
         begin = np.column_stack([outside / conductance, frame.coupling / frame.capacity[:, None]])
         left = (frame.capacity / (frame.capacity + step * conductance))[:, None] ** elapsed
         turn = self.modes.states @ frame.basis

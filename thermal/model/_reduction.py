@@ -76,7 +76,7 @@ class ReducedModel(SymbolicModel):
             for m in (whole, small):
                 outside = -5.0 * (m.flow[:, m.n :] @ np.ones((m.n_boundary, 1)))
                 response = factorise(_shifted(m, shift))(np.hstack([m.heating @ heat, outside]))
-                seen.append(m.observation @ response)
+                seen.append(m.output @ response)
             worst = max(worst, float(np.abs(seen[0] - seen[1]).max()))
         return worst
 
@@ -118,8 +118,10 @@ def krylov_basis(
             size = np.linalg.norm(block, axis=0)
             blocks.append(block[:, size > 0] / size[size > 0])  # a boundary that no face touches moves nothing
     stacked = np.hstack(blocks)
-    capacity = np.abs(matrices[0].capacity.diagonal())
+    capacity = np.max([np.abs(m.capacity.diagonal()) for m in matrices], axis=0)
     weight = capacity + 1e-6 * capacity.max()
+    if matrices[0].reading is not None:  # a sensor holds hardly any heat, and yet is what is compared with telemetry
+        weight[matrices[0].reading.indices] = capacity.max()
     gram = stacked.T @ (weight[:, None] * stacked)
     norms = np.sqrt(np.diag(gram))
     values, vectors = np.linalg.eigh(gram / np.outer(norms, norms))
@@ -223,6 +225,8 @@ def _turned(m: Matrices, turn: FloatArray) -> Matrices:
         uniform=turn.T @ m.uniform,
         capacity_slopes=[],
         flow_slopes=[],
+        reading=None if m.reading is None else _dense(m.reading @ turn),
+        n_signal=m.n_signal,
     )
 
 

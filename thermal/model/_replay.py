@@ -15,6 +15,7 @@ from thermal.model._scheme import IMPLICIT_EULER, Scheme
 from thermal.model._stepper import Stepper
 from thermal.model._symbolic import Matrices
 from thermal.network import ThermalNetwork
+from thermal.signals import Drivers
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -49,7 +50,8 @@ class Inputs:
     heat : ndarray, shape (n_time, n_zone)
         Metered heat given to each zone [W].
     boundary : ndarray, shape (n_time, n_boundary)
-        Boundary temperatures, outdoor first [K].
+        Boundary temperatures, outdoor first [K]; then the signals of the effects in the model, counted from the
+        reference temperature like these [signal unit].
     airflow : ndarray, shape (n_time, n_airflow)
         Directed airflows [kg/s].
     zone : ndarray, shape (n_time, n_zone)
@@ -116,11 +118,13 @@ def replay_inputs(case: Case, network: ThermalNetwork) -> Inputs:
         raise SimulationError(f"telemetry: no step has all its inputs; {_most_missing(bridged)}")
     filled = [f.interpolate(limit_direction="both").fillna(0.0).to_numpy(dtype=float) for f in bridged]
     index = pd.DatetimeIndex(zone.index)
+    drivers = Drivers(case)
+    signals = [_REFERENCE + s.of(drivers)[:, None] for s in network.signals]
     return Inputs(
         stamps=index,
         step=step,
         heat=filled[0],
-        boundary=filled[1],
+        boundary=np.hstack([filled[1], *signals]),
         airflow=filled[2],
         zone=zone.to_numpy(dtype=float),
         bridged=(zone.ffill(limit=limit) if limit else zone).to_numpy(dtype=float),

@@ -255,16 +255,20 @@ def symbolic_step(model: SymbolicModel, step: float, scheme: Scheme = IMPLICIT_E
     x, u = ca.MX.sym("states", n), ca.MX.sym("boundary", network.n_boundary)
     q, v = ca.MX.sym("heat", len(network.zones)), ca.MX.sym("airflow", len(network.airflows))
     kappa, heat = model.classes(theta)
-    flow = _assembled(model.class_flows, kappa)
+    faces = len(model.class_flows)
+    flow = _assembled(model.class_flows, kappa[:faces])
     capacity = _assembled(model.class_masses, heat)
     stiffness, exchange = flow[:, :n], flow[:, n:]
     heating, observation = ca.DM(network.heating.tocsc()), ca.DM(network.observation.tocsc())
     mixing = _symbolic_mixing(network.airflows, len(network.zones), v) if network.airflows else None
+    given = heating @ q
+    if model.sources.signal.size:
+        given = given + ca.DM(model.sources.spread) @ (kappa[faces:] * u[model.sources.signal.tolist()])
     matrix = capacity + scheme.implicit * step * stiffness
     response = ca.solve(matrix, ca.densify(heating), "ldl") if mixing is not None else ca.MX()
 
     def inflow(state: ca.MX) -> ca.MX:
-        own = -(stiffness @ state) - exchange @ u + heating @ q
+        own = -(stiffness @ state) - exchange @ u + given
         return own if mixing is None else own + heating @ (mixing @ (observation @ state))
 
     def solved(stage: Stage, rhs: ca.MX) -> ca.MX:
@@ -277,11 +281,11 @@ def symbolic_step(model: SymbolicModel, step: float, scheme: Scheme = IMPLICIT_E
 
     trail = [x]
     for stage in scheme.stages:
-        rhs = capacity @ _weighted_sum(stage.weights, trail) + stage.implicit * step * (heating @ q - exchange @ u)
+        rhs = capacity @ _weighted_sum(stage.weights, trail) + stage.implicit * step * (given - exchange @ u)
         if stage.explicit:
             rhs = rhs + stage.explicit * step * inflow(x)
         trail.append(solved(stage, rhs))
-    mean = observation @ _weighted_sum(scheme.mean, trail)
+    mean = ca.DM(network.reading.tocsc()) @ _weighted_sum(scheme.mean, trail)
     return ca.Function("step", [x, u, q, v, theta], [trail[-1], mean])
 
 

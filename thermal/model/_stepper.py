@@ -113,10 +113,10 @@ class Stepper:
             if slopes is not None:
                 slope_trail.append(self._stage_slopes(stage, base, new, states, slope_trail, boundary, mixing))
             trail.append(new)
-        mean = np.asarray(m.observation @ _combine(scheme.mean, trail))
+        mean = np.asarray(m.output @ _combine(scheme.mean, trail))
         if slopes is None:
             return trail[-1], mean, None, None
-        return trail[-1], mean, slope_trail[-1], np.asarray(m.observation @ _combine(scheme.mean, slope_trail))
+        return trail[-1], mean, slope_trail[-1], np.asarray(m.output @ _combine(scheme.mean, slope_trail))
 
     def hold(
         self,

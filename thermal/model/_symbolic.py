@@ -42,6 +42,10 @@ class Matrices:
         The state in which every volume is at 1 K [K].
     capacity_slopes, flow_slopes : list of matrices
         dC/dθ_j and d[K, -B]/dθ_j, one a parameter.
+    reading : matrix, shape (n_zone, n), optional
+        What the zones' sensors read where these lag behind; see `output`.
+    n_signal : int
+        How many of the boundary columns, the last ones, are signals of effects.
     """
 
     capacity: Matrix
@@ -51,6 +55,8 @@ class Matrices:
     uniform: FloatArray
     capacity_slopes: list[Matrix]
     flow_slopes: list[Matrix]
+    reading: Matrix = None
+    n_signal: int = 0
 
     @property
     def n(self) -> int:
@@ -59,8 +65,13 @@ class Matrices:
 
     @property
     def n_boundary(self) -> int:
-        """Number of boundary temperatures."""
+        """Number of boundary temperatures and signals."""
         return int(self.flow.shape[1] - self.flow.shape[0])
+
+    @property
+    def output(self) -> Matrix:
+        """What is compared with telemetry, shape (n_zone, n): the sensors' readings, or the zone means."""
+        return self.observation if self.reading is None else self.reading
 
     @property
     def reduced(self) -> bool:
@@ -89,7 +100,9 @@ class SymbolicModel:
     classes : casadi.Function
         θ to κ and c.
     class_flows, class_masses : list of matrices
-        ``[K, -B]`` and C of each class at unit value.
+        ``[K, -B]`` and C of each class at unit value, sources left out.
+    sources : Sources
+        Columns of -B that the sources' classes bring; their values follow those of the faces in κ.
 
     Examples
     --------
@@ -101,7 +114,9 @@ class SymbolicModel:
 
     def __init__(self, network: ThermalNetwork, projection: FloatArray | None = None) -> None:
         self.network, self.projection = network, projection
-        kappa = ca.vertcat(*[c.value for c in network.conductances])
+        faces = [c for c in network.conductances if not c.source]
+        sources = [c for c in network.conductances if c.source]
+        kappa = ca.vertcat(*[c.value for c in (*faces, *sources)])
         heat = ca.vertcat(*[c.value for c in network.capacities])
         theta = network.symbols
         jacobians = [ca.densify(ca.jacobian(e, theta)) for e in (kappa, heat)]
@@ -109,21 +124,25 @@ class SymbolicModel:
         self._slopes = ca.Function("slopes", [theta], jacobians)
         self._heating: Matrix = network.heating
         self._observation: Matrix = network.observation
+        self._reading: Matrix = network.reading if network.readings else None
         self._uniform = np.ones(network.n_node)
+        self._faces = faces
+        self.sources = Sources(network, sources, projection)
         self.class_flows: list[Matrix]
         self.class_masses: list[Matrix]
         if projection is None:
-            self.class_flows = [_class_laplacian(network, k) for k in range(len(network.conductances))]
+            self.class_flows = [_class_laplacian(network, c) for c in faces]
             self.class_masses = [_class_mass(network, k) for k in range(len(network.capacities))]
         else:
             self._project(projection)
 
     def _project(self, v: FloatArray) -> None:
-        self.class_flows = [_projected_class(c, v, self.network.n_boundary) for c in self.network.conductances]
+        self.class_flows = [_projected_class(c, v, self.network.n_boundary) for c in self._faces]
         self.class_masses = [_congruent(v[c.node], c.weight) for c in self.network.capacities]
         self._uniform = v.T @ np.ones(self.network.n_node)
         self._heating = v.T @ self.network.heating.toarray()
         self._observation = self.network.observation @ v
+        self._reading = self.network.reading @ v if self.network.readings else None
 
     def matrices(self, theta: FloatArray, slopes: bool = False) -> Matrices:
         """Assemble the model at θ.
@@ -144,15 +163,19 @@ class SymbolicModel:
         names = [p.name for p in self.network.parameters]
         if theta.shape != (len(names),):
             raise ModelError(f"theta: expected shape ({len(names)},) for {names}, came {theta.shape}")
-        bad = [n for n, t in zip(names, theta, strict=True) if not (np.isfinite(t) and t > 0)]
+        bad = [
+            p.name
+            for p, t in zip(self.network.parameters, theta, strict=True)
+            if not np.isfinite(t) or (t <= 0 and p.scale != "linear")
+        ]
         if bad:
             raise ModelError(f"theta: expected positive finite values, came {theta[names.index(bad[0])]} for {bad[0]}")
         for p, t in zip(self.network.parameters, theta, strict=True):
-            if p.logit and t > 1:
+            if p.scale == "logit" and t > 1:
                 raise ModelError(f"theta: expected a probability of at most 1, came {t} for {p.name}")
         kappa, heat = (np.asarray(v).ravel() for v in self.classes(theta))
         negative = [
-            c.name for c, k in zip(self.network.conductances, kappa, strict=True) if not (np.isfinite(k) and k >= 0)
+            c.name for c, k in zip(self._faces, kappa, strict=False) if not (np.isfinite(k) and k >= 0)
         ]
         if negative:
             raise ModelError(
@@ -162,17 +185,71 @@ class SymbolicModel:
         capacity_slopes: list[Matrix] = []
         if slopes:
             d_kappa, d_heat = (np.asarray(v) for v in self._slopes(theta))
-            flow_slopes = [_weighted(self.class_flows, d_kappa[:, j]) for j in range(theta.size)]
+            flow_slopes = [self._flow(d_kappa[:, j]) for j in range(theta.size)]
             capacity_slopes = [_weighted(self.class_masses, d_heat[:, j]) for j in range(theta.size)]
         return Matrices(
             capacity=_weighted(self.class_masses, heat),
-            flow=_weighted(self.class_flows, kappa),
+            flow=self._flow(kappa),
             heating=self._heating,
             observation=self._observation,
             uniform=self._uniform,
             capacity_slopes=capacity_slopes,
             flow_slopes=flow_slopes,
+            reading=self._reading,
+            n_signal=len(self.network.signals),
         )
+
+    def _flow(self, weights: FloatArray) -> Matrix:
+        """Sum of the classes of faces, then of sources, with weights."""
+        count = len(self.class_flows)
+        return self.sources.added(_weighted(self.class_flows, weights[:count]), weights[count:])
+
+
+class Sources:
+    """Heat that signals bring: columns of -B, summed over classes.
+
+    Parameters
+    ----------
+    network : ThermalNetwork
+        For its sizes.
+    classes : list of ConductanceClass
+        Sources.
+    projection : ndarray, shape (n_node, r), optional
+        Basis of a reduction [-].
+    """
+
+    def __init__(
+        self, network: ThermalNetwork, classes: list[ConductanceClass], projection: FloatArray | None
+    ) -> None:
+        count, n = len(classes), network.n_node
+        sizes = [c.first.size for c in classes]
+        rows, column = np.concatenate([[], *[c.first for c in classes]]).astype(int), np.repeat(np.arange(count), sizes)
+        weight = np.concatenate([[], *[c.weight for c in classes]])
+        spread = sp.csc_matrix((weight, (rows, column)), shape=(n, count))
+        self.signal = np.array([c.second[0] - n for c in classes], dtype=np.int64)
+        self.spread: Matrix = spread if projection is None else np.asarray((spread.T @ projection).T)
+        self.n_boundary = network.n_boundary
+
+    def added(self, flow: Matrix, weights: FloatArray) -> Matrix:
+        """Add the sources to ``[K, -B]``.
+
+        Parameters
+        ----------
+        flow : matrix, shape (n, n + n_boundary)
+            Of the faces.
+        weights : ndarray, shape (n_source,)
+            Values of the classes, or their slopes.
+        """
+        there = np.flatnonzero(weights)
+        if not there.size:
+            return flow
+        n = flow.shape[0]
+        if sp.issparse(flow):
+            lift = sp.csr_matrix((-weights[there], (there, n + self.signal[there])), (weights.size, flow.shape[1]))
+            return sp.csr_matrix(flow + self.spread @ lift)
+        flow = flow.copy()
+        np.add.at(flow.T, n + self.signal[there], -weights[there, None] * self.spread[:, there].T)
+        return flow
 
 
 def _weighted(terms: list[Matrix], weights: FloatArray) -> Matrix:
@@ -212,9 +289,8 @@ def _congruent(rows: FloatArray, weight: FloatArray) -> FloatArray:
     return np.asarray(scaled.T @ scaled)
 
 
-def _class_laplacian(network: ThermalNetwork, k: int) -> sp.csr_matrix:
-    """Rows of the graph Laplacian of conductance class ``k`` at κ = 1, shape (n_node, n_node + n_boundary)."""
-    c = network.conductances[k]
+def _class_laplacian(network: ThermalNetwork, c: ConductanceClass) -> sp.csr_matrix:
+    """Rows of the graph Laplacian of a conductance class at κ = 1, shape (n_node, n_node + n_boundary)."""
     n, total = network.n_node, network.n_node + network.n_boundary
     rows = np.concatenate([c.first, c.second, c.first, c.second])
     columns = np.concatenate([c.first, c.second, c.second, c.first])

@@ -1,6 +1,8 @@
 """Control volumes and faces of a building, as one graph."""
 
+from thermal.network._anatomy import Anatomy, OuterFaces, Room
 from thermal.network._build import build_network
+from thermal.network._extension import Extension
 from thermal.network._films import series, surface_mesh
 from thermal.network._graph import GraphBuilder
 from thermal.network._grid import FloorGrid, floor_grid
@@ -10,11 +12,15 @@ from thermal.network._structure import BASELINE, Structure
 
 __all__ = [
     "BASELINE",
+    "Anatomy",
     "SHUFFLE_STEP",
     "CapacityClass",
     "ConductanceClass",
+    "Extension",
     "FloorGrid",
     "GraphBuilder",
+    "OuterFaces",
+    "Room",
     "Structure",
     "ThermalNetwork",
     "build_network",

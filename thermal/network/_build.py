@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from thermal.case import Building, ZoneTable
+from thermal.network._extension import Extension
 from thermal.network._network import ThermalNetwork
 from thermal.network._plan import plan_network
 from thermal.network._structure import BASELINE, Structure
@@ -23,6 +24,7 @@ def build_network(
     diffusers: Mapping[str, NDArray[np.bool_]] | None = None,
     mean_shuffle: bool = True,
     structure: Structure = BASELINE,
+    effects: Sequence[Extension] = (),
 ) -> ThermalNetwork:
     """Build the control volumes and faces of a building, from floor plans or from a zone table.
 
@@ -41,14 +43,16 @@ def build_network(
         Cells with a diffuser, per zone, at the plan's resolution; all air cells by default.
     mean_shuffle : bool
         Whether the mean of the shuffle is a term of K; off for a simulator that shuffles at random.
-
     structure : Structure
         What the model is made of beside its geometry: furniture, slabs, nodes of a wall, radiant node.
+    effects : sequence of Extension
+        What is added to the baseline: effects of the catalogue, `thermal.effects.chosen`.
 
     Returns
     -------
     ThermalNetwork
-        The baseline of the architecture: no sun, sky, leakage, gains, exchange between floors, ground or roof.
+        The baseline of the architecture (no sun, sky, leakage, gains, exchange between floors, ground or roof) and
+        the effects.
 
     Raises
     ------
@@ -65,5 +69,5 @@ def build_network(
     """
     geometry = building.geometry
     if isinstance(geometry, ZoneTable):
-        return table_network(building, geometry, scopes, structure)
-    return plan_network(building, geometry, dx, reach, scopes, diffusers, mean_shuffle, structure)
+        return table_network(building, geometry, scopes, structure, effects)
+    return plan_network(building, geometry, dx, reach, scopes, diffusers, mean_shuffle, structure, effects)

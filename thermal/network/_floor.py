@@ -76,6 +76,7 @@ class Floor:
             if reach is None or choose_equivalent(extent, reach) == "mixing":
                 star = graph.volumes("mixing", zone.number)
                 rate = exchange_rate(probability, SHUFFLE_STEP)
+                zone.mean = int(star[0])
                 key = graph.key("mixing", zone.name, "shuffle_probability")
                 graph.face(key, rate * heat, zone.air, star, area * self.plan.height * zone.share)
             else:

@@ -11,8 +11,10 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from thermal.errors import ScopeError
+from thermal.network._anatomy import Anatomy
 from thermal.network._network import CapacityClass, ConductanceClass, ThermalNetwork
 from thermal.network._structure import BASELINE, Structure
+from thermal.signals import Signal
 from thermal.parameters import ENVELOPE_PARAMETERS, FACADE_PREFIX, PARAMETERS, Parameter, Scope
 
 IntArray = NDArray[np.int64]
@@ -46,7 +48,11 @@ class GraphBuilder:
     ) -> None:
         _check_scopes(scopes, zones)
         self.zones, self.boundaries, self.scopes, self.structure = zones, boundaries, dict(scopes), structure
+        self.anatomy = Anatomy()
         self.nominal: dict[str, tuple[float, str]] = {}
+        self._signals: dict[str, Signal] = {}
+        self._readings: dict[int, int] = {}
+        self._sources: set[str] = set()
         self._parameters: dict[str, tuple[Parameter, ca.SX]] = {}
         self._kind: list[NDArray[np.str_]] = []
         self._zone: list[IntArray] = []
@@ -77,6 +83,18 @@ class GraphBuilder:
         if own.name not in self._parameters:
             self._parameters[own.name] = (own, ca.SX.sym(own.name))
         return self._parameters[own.name][1]
+
+    def own(self, parameter: Parameter) -> ca.SX:
+        """Symbol of a parameter that an effect brings.
+
+        Parameters
+        ----------
+        parameter : Parameter
+            Of the effect; one of a zone or a facade is that of `Parameter.of`.
+        """
+        if parameter.name not in self._parameters:
+            self._parameters[parameter.name] = (parameter, ca.SX.sym(parameter.name))
+        return self._parameters[parameter.name][1]
 
     @property
     def size(self) -> int:
@@ -156,6 +174,69 @@ class GraphBuilder:
         )
         self._faces.setdefault(key, (ca.SX(value), []))[1].append((first, second, weight))
 
+    def source(self, key: str, value: Any, node: Any, signal: Signal, weight: Any) -> None:
+        """Give volumes heat that a signal brings, ``value weight s(t)`` [W].
+
+        Parameters
+        ----------
+        key : str
+            Class name; sources of one name share their value and their signal.
+        value : casadi.SX or float
+            Heat per unit of signal and weight, as an expression of the parameter symbols.
+        node : int or ndarray of int, shape (n,)
+            Nodes.
+        signal : Signal
+            What drives it.
+        weight : float or ndarray, shape (n,)
+            Geometry, such as areas [m2].
+        """
+        name = f"{key} <- {signal.name}"
+        self._sources.add(name)
+        self.face(name, value, node, self.signal(signal), weight)
+
+    def signal(self, signal: Signal) -> int:
+        """Code of a signal in a face; there it is a temperature, counted from the reference of 20 degC.
+
+        Parameters
+        ----------
+        signal : Signal
+            Signals of one name are one.
+        """
+        self._signals.setdefault(signal.name, signal)
+        return -1 - len(self.boundaries) - list(self._signals).index(signal.name)
+
+    def touching(self, node: Any) -> list[tuple[ca.SX, IntArray, IntArray, FloatArray]]:
+        """Faces so far with one end among given nodes and the other not: κ, inner nodes, far ends and weights.
+
+        Parameters
+        ----------
+        node : ndarray of int, shape (n,)
+            Nodes.
+        """
+        found = []
+        for key, (value, faces) in self._faces.items():
+            if key in self._sources:
+                continue
+            first, second, weight = (np.concatenate([f[k] for f in faces]) for k in range(3))
+            inside = (np.isin(first, node), np.isin(second, node))
+            for here, there, ends in ((inside[0], inside[1], (first, second)), (inside[1], inside[0], (second, first))):
+                across = here & ~there
+                if across.any():
+                    found.append((value, ends[0][across], ends[1][across], weight[across].astype(float)))
+        return found
+
+    def reading(self, zone: int, node: int) -> None:
+        """Let a zone's sensor read a node instead of the mean of its air.
+
+        Parameters
+        ----------
+        zone : int
+            Number of the zone.
+        node : int
+            The sensor's node.
+        """
+        self._readings[zone] = node
+
     def capacity(self, key: str, value: ca.SX | float, node: Any, weight: Any) -> None:
         """Give volumes of one class their heat capacity.
 
@@ -203,7 +284,7 @@ class GraphBuilder:
             return np.where(joined < 0, self._count - 1 - joined, joined) if column < 2 else joined
 
         conductances = tuple(
-            ConductanceClass(k, v, join(f, 0), join(f, 1), join(f, 2).astype(float))
+            ConductanceClass(k, v, join(f, 0), join(f, 1), join(f, 2).astype(float), k in self._sources)
             for k, (v, f) in self._faces.items()
         )
         capacities = tuple(
@@ -226,6 +307,8 @@ class GraphBuilder:
             nominal=dict(self.nominal),
             spacing=spacing,
             floor_shapes=floor_shapes,
+            signals=tuple(self._signals.values()),
+            readings=dict(self._readings),
         )
 
     def _refuse_unused_scopes(self) -> None:

@@ -6,9 +6,10 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal.network._anatomy import VERTICAL, OuterFaces, Outlook, Pane, Room
 from thermal.network._films import series, surface_mesh
 from thermal.network._graph import GraphBuilder
-from thermal.network._materials import WINDOW_RATED_FILM
+from thermal.network._materials import RATED_OUTSIDE_FILM, WINDOW_RATED_FILM
 
 #: Parameters of the inside films with a radiant node, and of the one film without.
 _FILMS = {True: ("interior_film_coefficient", "radiant_coefficient"), False: ("combined_film_coefficient",)}
@@ -34,6 +35,9 @@ class Zone:
         self.number = graph.zones.index(name)
         self.film_names = _FILMS[graph.structure.radiant]
         self._inside: tuple[tuple[ca.SX, ...], int] | None = None
+        self.mean = int(air[0]) if air.size == 1 else -1
+        self._slab: tuple[int, ...] = ()
+        self._furniture = -1
         if graph.structure.furniture:
             self.inside()
 
@@ -56,6 +60,7 @@ class Zone:
         air: NDArray[np.int64] | None = None,
         depends: tuple[str, ...] = (),
         facade: str | None = None,
+        outlook: Outlook | None = None,
     ) -> None:
         """Add surfaces between this zone and a solid (or a boundary, for a window).
 
@@ -75,6 +80,8 @@ class Zone:
             Parameters inside ``solid_value``.
         facade : str, optional
             Facade that these belong to.
+        outlook : Outlook, optional
+            How a window looks outside.
         """
         graph = self.graph
         films, radiant = self.inside()
@@ -89,13 +96,37 @@ class Zone:
         else:
             air_solid, air_area, air_node = np.broadcast_to(solid_, air.shape), np.broadcast_to(area_, air.shape), air
         if radiant < 0:
-            graph.face(f"air-{key}", series(*films, solid_value), air_node, air_solid, air_area)
+            through = series(*films, solid_value)
+            graph.face(f"air-{key}", through, air_node, air_solid, air_area)
+            self._look(outlook, (through, air_node, air_area))
             return
         film, radiation = films
         to_air, to_radiant, across = surface_mesh(film, radiation, solid_value)
         graph.face(f"air-{key}", to_air, air_node, air_solid, air_area)
         graph.face(f"radiant-{key}", to_radiant, radiant, solid_, area_)
         graph.face(f"air-radiant past {key}", across, air_node, radiant, air_area)
+        self._look(outlook, (to_air, air_node, air_area), (to_radiant, np.full(area_.size, radiant), area_))
+
+    def _look(self, outlook: Outlook | None, *faces: tuple[ca.SX, NDArray[np.int64], NDArray[np.float64]]) -> None:
+        """Remember the faces of a window to the outdoor air."""
+        if outlook is not None:
+            self.graph.anatomy.outer += [OuterFaces(v, node, area, outlook, self.name) for v, node, area in faces]
+
+    def room(self, floor_area: float, volume: float) -> None:
+        """Remember the zone with what is in it, once it is complete [m2, m3]."""
+        radiant = self._inside[1] if self._inside is not None else -1
+        self.graph.anatomy.rooms[self.name] = Room(
+            self.name,
+            self.number,
+            self.air,
+            self.share,
+            self.mean,
+            radiant,
+            self._slab,
+            self._furniture,
+            floor_area,
+            volume,
+        )
 
     def slabs(self, area: float) -> None:
         """Floor and ceiling slab, adiabatic at their back: one chain of nodes for both [area: both faces, m2]."""
@@ -106,6 +137,7 @@ class Zone:
         coupling = graph.parameter("slab_coupling", self.name)
         heat = graph.parameter("slab_heat_capacity", self.name)
         nodes = graph.volumes("slab", np.full(layers, self.number))
+        self._slab = tuple(int(n) for n in nodes)
         graph.capacity(graph.key("slab", self.name, "slab_heat_capacity"), heat, nodes, area / layers)
         self.surface("slab", 2 * layers * coupling, nodes[0], area, depends=("slab_coupling",))
         graph.face(graph.key("slab-slab", self.name, "slab_coupling"), layers * coupling, nodes[:-1], nodes[1:], area)
@@ -118,6 +150,7 @@ class Zone:
         coupling = graph.parameter("furniture_coupling", self.name)
         heat = graph.parameter("furniture_heat_capacity", self.name)
         node = graph.volumes("furniture", self.number)
+        self._furniture = int(node[0])
         graph.capacity(graph.key("furniture", self.name, "furniture_heat_capacity"), heat, node, floor_area)
         films, radiant = self.inside()
         if radiant < 0:
@@ -130,8 +163,10 @@ class Zone:
         graph.face(f"air-{key}", coupling * film / total, self.air, node, floor_area * self.share)
         graph.face(f"radiant-{key}", coupling * radiation / total, radiant, node, floor_area)
 
-    def window(self, u_value: ca.SX, area: float, other: int, air: NDArray[np.int64], facade: str) -> None:
-        """Glass without mass towards boundary ``other``: ``u_value`` [W/m2/K] with the zone's own inside film."""
+    def window(self, u_value: ca.SX, area: float, air: NDArray[np.int64], facade: str, azimuth: float) -> None:
+        """Glass without mass towards outdoor: ``u_value`` [W/m2/K] with the zone's own inside film, azimuth [deg]."""
         pane = 1.0 / (1.0 / u_value - 1.0 / WINDOW_RATED_FILM)
-        far, each = np.full(air.size, other), np.full(air.size, area / air.size)
-        self.surface("window", pane, far, each, air, depends=("window_u_value",), facade=facade)
+        far, each = np.full(air.size, self.graph.boundary("outdoor")), np.full(air.size, area / air.size)
+        outlook = Outlook(azimuth, VERTICAL, RATED_OUTSIDE_FILM, glass=True)
+        self.surface("window", pane, far, each, air, ("window_u_value",), facade, outlook)
+        self.graph.anatomy.panes.append(Pane(self.name, azimuth, VERTICAL, area))

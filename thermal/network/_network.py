@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import casadi as ca
 import numpy as np
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 
 from thermal.errors import ModelError
 from thermal.parameters import Parameter
+from thermal.signals import Signal
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -31,6 +33,8 @@ class ConductanceClass:
         Node numbers; numbers from ``n_node`` on are boundaries.
     weight : ndarray, shape (n_face,)
         Geometry of the face, so that ``κ weight`` is in [W/K].
+    source : bool
+        Whether the second end is a signal s(t) that brings the first end ``κ weight s``, whatever its temperature.
     """
 
     name: str
@@ -38,6 +42,7 @@ class ConductanceClass:
     first: IntArray
     second: IntArray
     weight: FloatArray
+    source: bool = False
 
 
 @dataclass(frozen=True)
@@ -96,6 +101,10 @@ class ThermalNetwork:
         Distance between the volumes of a plan [m]; None for a zone table.
     floor_shapes : tuple of (int, int)
         Rows and columns of each floor's grid, outside included; empty for a zone table.
+    signals : tuple of Signal
+        What drives the effects beside the boundary temperatures; they are columns of B behind these.
+    readings : mapping of int to int
+        Sensor nodes by zone number, where a sensor does not read the mean of the air.
     """
 
     zones: tuple[str, ...]
@@ -113,6 +122,8 @@ class ThermalNetwork:
     nominal: Mapping[str, tuple[float, str]] = field(default_factory=dict)
     spacing: float | None = None
     floor_shapes: tuple[tuple[int, int], ...] = ()
+    signals: tuple[Signal, ...] = ()
+    readings: Mapping[int, int] = field(default_factory=dict)
 
     @property
     def n_node(self) -> int:
@@ -121,8 +132,19 @@ class ThermalNetwork:
 
     @property
     def n_boundary(self) -> int:
-        """Number of boundary temperatures."""
-        return len(self.boundaries)
+        """Number of boundary temperatures and signals."""
+        return len(self.boundaries) + len(self.signals)
+
+    @cached_property
+    def reading(self) -> sp.csr_matrix:
+        """What the zones' sensors read, shape (n_zone, n_node): the mean of the air, or a sensor's node."""
+        if not self.readings:
+            return self.observation
+        rows = self.observation.tolil(copy=True)
+        for zone, node in self.readings.items():
+            rows[zone] = 0.0
+            rows[zone, node] = 1.0
+        return rows.tocsr()
 
     @property
     def groups(self) -> dict[str, tuple[int, ...]]:
@@ -161,7 +183,10 @@ class ThermalNetwork:
         unknown = sorted(set(given) - set(names))
         if unknown:
             raise ModelError(f"parameters {unknown} are not of this building; it has {names}")
+        signed = {p.name for p in self.parameters if p.scale == "linear"}
         for name, value in given.items():
-            if isinstance(value, bool) or not isinstance(value, int | float | np.number) or not 0 < value < np.inf:
-                raise ModelError(f"{name}: expected a positive finite number, came {value!r}")
+            number = isinstance(value, int | float | np.number) and not isinstance(value, bool)
+            if not number or not np.isfinite(value) or (value <= 0 and name not in signed):
+                what = "a finite number" if name in signed else "a positive finite number"
+                raise ModelError(f"{name}: expected {what}, came {value!r}")
         return np.array([float(given.get(p.name, p.start)) for p in self.parameters])

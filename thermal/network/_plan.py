@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from thermal.case import Building, FloorPlans, zone_floor_areas
+from thermal.case import Building, FloorPlans, facade_areas, zone_floor_areas
 from thermal.errors import ModelError
+from thermal.network._anatomy import azimuth_of, partition_areas, stacked_areas
+from thermal.network._extension import Extension
 from thermal.network._floor import Floor
 from thermal.network._graph import GraphBuilder
 from thermal.network._grid import floor_grid
@@ -18,7 +20,7 @@ from thermal.network._network import ThermalNetwork
 from thermal.network._structure import BASELINE, Structure
 from thermal.network._walls import Walls
 from thermal.parameters import Scope
-from thermal.units import air_density
+from thermal.units import AIR_HEAT_CAPACITY, air_density
 
 FloatArray = NDArray[np.float64]
 
@@ -32,6 +34,7 @@ def plan_network(
     diffusers: Mapping[str, NDArray[np.bool_]] | None = None,
     mean_shuffle: bool = True,
     structure: Structure = BASELINE,
+    effects: Sequence[Extension] = (),
 ) -> ThermalNetwork:
     """Build the network of a building given by floor plans.
 
@@ -53,6 +56,8 @@ def plan_network(
         Whether the mean of the shuffle is a term of K; off for a simulator that shuffles at random.
     structure : Structure
         What the model is made of.
+    effects : sequence of Extension
+        What is added to the baseline.
 
     Returns
     -------
@@ -66,6 +71,7 @@ def plan_network(
         raise ModelError(f"diffusers: zones {unknown} are not of this building; it has {list(building.zone_names)}")
     areas = zone_floor_areas(plans)
     density = air_density(building.location.elevation)
+    graph.anatomy.air_heat_capacity = density * AIR_HEAT_CAPACITY
     diffuser_weight: dict[int, FloatArray] = {}
     zones: dict[str, Zone] = {}
     shapes = []
@@ -77,7 +83,11 @@ def plan_network(
             zones[name] = floor.zone(name, areas[name], density, reach, mean_shuffle)
             mask = (diffusers or {}).get(name)
             diffuser_weight[zones[name].number] = floor.diffuser_weight(name, mask)
-        Walls(floor, zones, plans.cell_size).add(plans.glazing)
+        Walls(floor, zones, plans.cell_size, building.orientation).add(plans.glazing)
+        graph.anatomy.partitions |= partition_areas(plan, plans.cell_size)
+    _remember(graph, building, plans, zones, areas)
+    for effect in effects:
+        effect.extend(graph)
     n = graph.size
     columns = [(z.air, np.full(z.air.size, z.number), diffuser_weight[z.number]) for z in zones.values()]
     node = np.concatenate([c[0] for c in columns])
@@ -89,3 +99,18 @@ def plan_network(
     observation = sp.csr_matrix((mean, (column, node)), shape=shape[::-1])
     flows = tuple((graph.zones.index(a.source), graph.zones.index(a.target)) for a in building.airflows)
     return graph.finish(observation, heating, flows, grid.spacing, tuple(shapes))
+
+
+def _remember(
+    graph: GraphBuilder, building: Building, plans: FloorPlans, zones: Mapping[str, Zone], areas: Mapping[str, float]
+) -> None:
+    """Complete the anatomy: rooms, what lies above and below them, and their facades."""
+    anatomy = graph.anatomy
+    for plan in plans.floors:
+        for name in plan.zone_names:
+            zones[name].room(areas[name], areas[name] * plan.height)
+    anatomy.stacked, anatomy.under_roof, anatomy.on_ground = stacked_areas(plans, areas)
+    for zone, sides in facade_areas(plans).items():
+        for side, area in sides.items():
+            if area > 0.0:
+                anatomy.facades[zone, azimuth_of(side, building.orientation)] = area

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import casadi as ca
 import numpy as np
 import scipy.sparse as sp
 
 from thermal.case import Building, Layer, Surface, ZoneTable
+from thermal.network._anatomy import DOWNWARD, UPWARD, VERTICAL, GroundFace, OuterFaces, Outlook, Pane
 from thermal.network._chains import Chain
+from thermal.network._extension import Extension
 from thermal.network._facades import facade_of
 from thermal.network._films import series
 from thermal.network._graph import GraphBuilder
@@ -31,6 +33,7 @@ def table_network(
     table: ZoneTable,
     scopes: Mapping[str, Scope] | None = None,
     structure: Structure = BASELINE,
+    effects: Sequence[Extension] = (),
 ) -> ThermalNetwork:
     """Build the network of a building given by a zone table.
 
@@ -44,6 +47,8 @@ def table_network(
         Parameters with one value a facade (`thermal.network._facades.facade_of`) or a zone.
     structure : Structure
         What the model is made of.
+    effects : sequence of Extension
+        What is added to the baseline.
 
     Returns
     -------
@@ -53,6 +58,7 @@ def table_network(
     """
     graph = GraphBuilder(building.zone_names, ("outdoor", *building.measured_boundaries), scopes or {}, structure)
     density = air_density(building.location.elevation)
+    graph.anatomy.air_heat_capacity = density * AIR_HEAT_CAPACITY
     zones: dict[str, Zone] = {}
     for entry in table.zones:
         air = graph.volumes("air", graph.zones.index(entry.name))
@@ -61,6 +67,10 @@ def table_network(
         zones[entry.name].furniture(entry.floor_area)
     for surface in table.surfaces:
         _add_surface(graph, zones, surface, table, density)
+    for entry in table.zones:
+        zones[entry.name].room(entry.floor_area, entry.volume)
+    for effect in effects:
+        effect.extend(graph)
     number = np.arange(len(zones))
     node = np.concatenate([zones[z].air for z in graph.zones])
     heating = sp.csr_matrix((np.ones(len(zones)), (node, number)), shape=(graph.size, len(zones)))
@@ -96,6 +106,7 @@ def _facade(graph: GraphBuilder, surface: Surface) -> str | None:
 def _add_window(graph: GraphBuilder, zones: Mapping[str, Zone], surface: Surface) -> None:
     """Glass: rated air-to-air u-value with its films replaced by the building's own."""
     zone, rated, facade = zones[surface.zone], float(surface.u_value or 0.0), _facade(graph, surface)
+    outlook = None
     multiplier = graph.parameter("window_conductance_multiplier", facade=facade)
     if surface.other in zones:
         far = zones[surface.other]
@@ -103,12 +114,25 @@ def _add_window(graph: GraphBuilder, zones: Mapping[str, Zone], surface: Surface
         return
     pane = multiplier / max(1.0 / rated - 1.0 / WINDOW_RATED_FILM - 1.0 / RATED_OUTSIDE_FILM, LEAST_PANE_RESISTANCE)
     if surface.other == "outdoor":
-        value = series(pane, graph.parameter("exterior_convection_coefficient", facade=facade))
+        film = graph.parameter("exterior_convection_coefficient", facade=facade)
+        value = series(pane, film)
+        azimuth = float(surface.azimuth or 0.0)
+        outlook = Outlook(azimuth, VERTICAL, film, glass=True)
+        transmittance = surface.solar_transmittance
+        graph.anatomy.panes.append(Pane(zone.name, azimuth, VERTICAL, surface.area, transmittance))
+        _count_facade(graph, surface)
     else:
         value = series(pane, 1.0 / BOUNDARY_FILM_RESISTANCE)
     kind = f"window u={rated:g} {'outdoor' if surface.other == 'outdoor' else 'boundary'}"
     depends = ("window_conductance_multiplier", "exterior_convection_coefficient")
-    zone.surface(kind, value, graph.boundary(surface.other), surface.area, depends=depends, facade=facade)
+    far_side = graph.boundary(surface.other)
+    zone.surface(kind, value, far_side, surface.area, depends=depends, facade=facade, outlook=outlook)
+
+
+def _count_facade(graph: GraphBuilder, surface: Surface) -> None:
+    """Add a wall's or a window's area to its facade."""
+    key = (surface.zone, float(surface.azimuth or 0.0))
+    graph.anatomy.facades[key] = graph.anatomy.facades.get(key, 0.0) + surface.area
 
 
 def _group(surface: Surface) -> str:
@@ -137,10 +161,24 @@ def _add_layers(graph: GraphBuilder, zones: Mapping[str, Zone], surface: Surface
     room_side(zones[surface.zone], wall.near, int(nodes[0]))
     if surface.other in zones:
         room_side(zones[surface.other], wall.far, int(nodes[-1]))
-    elif surface.other != "ground":
+        if surface.kind == "wall" and surface.other != surface.zone:
+            pair = (min(surface.zone, surface.other), max(surface.zone, surface.other))
+            graph.anatomy.partitions[pair] = graph.anatomy.partitions.get(pair, 0.0) + surface.area
+    elif surface.other == "ground":
+        face = GroundFace(surface.zone, int(nodes[-1]), surface.area, scale / wall.far)
+        graph.anatomy.ground_faces.append(face)
+    else:
         place, film = "boundary", ca.SX(1.0 / BOUNDARY_FILM_RESISTANCE)
         if surface.other == "outdoor":
             place, film = "outdoor", graph.parameter("exterior_convection_coefficient", facade=facade)
         depends = (conductivity, "exterior_convection_coefficient")
         key = graph.key(f"{group}-{place} r={2.0 * wall.far:.6g}", None, *depends, facade=facade)
-        graph.face(key, series(film, scale / wall.far), int(nodes[-1]), graph.boundary(surface.other), surface.area)
+        value = series(film, scale / wall.far)
+        graph.face(key, value, int(nodes[-1]), graph.boundary(surface.other), surface.area)
+        if surface.other == "outdoor":
+            tilt = {"wall": VERTICAL, "ceiling": UPWARD, "floor": DOWNWARD}[surface.kind]
+            outlook = Outlook(float(surface.azimuth or 0.0), tilt, film, glass=False)
+            outer = OuterFaces(value, nodes[-1:], np.array([float(surface.area)]), outlook)
+            graph.anatomy.outer.append(outer)
+            if surface.kind == "wall":
+                _count_facade(graph, surface)

@@ -9,6 +9,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal.network._anatomy import VERTICAL, OuterFaces, Outlook, azimuth_of
 from thermal.network._arms import Arms
 from thermal.network._facades import wall_facades
 from thermal.network._films import series
@@ -38,9 +39,12 @@ class Walls:
         Zones so far, those of this floor among them.
     thickness : float
         Of a wall, one cell of the plan [m].
+    orientation : float
+        Clockwise from true north to the plan's "up" [deg].
     """
 
-    def __init__(self, floor: Floor, zones: Mapping[str, Zone], thickness: float) -> None:
+    def __init__(self, floor: Floor, zones: Mapping[str, Zone], thickness: float, orientation: float) -> None:
+        self.orientation = orientation
         self.graph, self.grid, self.floor, self.thickness = floor.graph, floor.grid, floor, thickness
         self.zones = {name: zone for name, zone in zones.items() if (floor.grid.token == name).any()}
         self.height = floor.plan.height
@@ -103,6 +107,9 @@ class Walls:
             depends = ("exterior_convection_coefficient", *(("exterior_wall_conductivity",) if token == "#" else ()))
             key = graph.key(f"{_KINDS[token]}-outdoor", None, *depends, facade=facade)
             graph.face(key, value, nodes, outdoor, area)
+            if token == "#":
+                outlook = Outlook(azimuth_of(facade, self.orientation), VERTICAL, film, glass=False)
+                graph.anatomy.outer.append(OuterFaces(value, nodes, area, outlook))
 
     def _between_walls(self, facade: str, inner: ca.SX, along: FloatArray) -> None:
         """Faces between wall volumes in a direction; glass leaves the share ``along`` of those of exterior walls."""
@@ -176,7 +183,7 @@ class Walls:
             exposed = rows.size * grid.cell * self.height
             u_value = self.graph.parameter("window_u_value", name, facade=facade)
             air = self.floor.node[grid.volume[rows, columns]]
-            zone.window(u_value, area, self.graph.boundary("outdoor"), air, facade)
+            zone.window(u_value, area, air, facade, azimuth_of(facade, self.orientation))
             for k in range(1, depth + 1):
                 share[rows + k * row_step, columns + k * column_step] = max(0.0, 1.0 - area / exposed)
         return share

@@ -1,0 +1,181 @@
+"""Air that comes from outdoor or from the next zone: infiltration, thermal bridges, open windows, mixing."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from thermal.effects._effect import Effect, Joining, strength
+from thermal.network import Anatomy, Room
+from thermal.signals import Drivers, Signal
+
+FloatArray = NDArray[np.float64]
+
+#: Wind speed [m/s], root of temperature difference [K^0.5], presence and opening [-] at which a varying exchange is
+#: part of K; what they differ from it acts as heat at usual zone temperatures.
+_WIND, _ROOT, _PRESENCE, _OPEN = 3.0, 3.0, 0.3, 0.1
+
+#: Outdoor temperatures between which windows come to be opened [K].
+_MILD = (285.15, 295.15)
+
+_SHERMAN = "Sherman and Grimsrud (1980); Coblenz and Achenbach coefficients in EnergyPlus Engineering Reference"
+
+
+def _out(drivers: Drivers, zone: str) -> FloatArray:
+    return np.asarray(drivers.outdoor - drivers.usual[:, drivers.zones.index(zone)])
+
+
+def _by_wind(drivers: Drivers, zone: str) -> FloatArray:
+    return (drivers.wind - _WIND) * _out(drivers, zone)
+
+
+def _by_stack(drivers: Drivers, zone: str) -> FloatArray:
+    difference = _out(drivers, zone)
+    return (np.sqrt(np.abs(difference)) - _ROOT) * difference
+
+
+def _by_opening(drivers: Drivers, zone: str) -> FloatArray:
+    mild = np.clip((drivers.outdoor - _MILD[0]) / (_MILD[1] - _MILD[0]), 0.0, 1.0)
+    return (drivers.occupancy * mild - _OPEN) * _out(drivers, zone)
+
+
+def _by_presence(drivers: Drivers, first: str, second: str) -> FloatArray:
+    usual = [drivers.usual[:, drivers.zones.index(z)] for z in (first, second)]
+    return np.asarray((drivers.occupancy - _PRESENCE) * (usual[1] - usual[0]))
+
+
+def _exposed(join: Joining) -> list[Room]:
+    """Zones with an exterior wall; all of them where none is known."""
+    outside = {zone for zone, _ in join.anatomy.facades}
+    rooms = [r for r in join.rooms if r.name in outside]
+    return rooms or list(join.rooms)
+
+
+def _exchange(join: Joining, room: Room, value: ca.SX, mean: float, varying: Signal | None) -> None:
+    """Exchange ``value m(t)`` of a zone's air with outdoor [W/K]: its mean by K, the rest as heat."""
+    join.air_to(room, value * mean, join.graph.boundary("outdoor"), 1.0)
+    if varying is not None:
+        join.heat_air(room, value, varying, 1.0)
+
+
+def _build_infiltration(join: Joining) -> None:
+    names = ("infiltration_rate", "infiltration_by_wind", "infiltration_by_stack")
+    constant, wind, stack = (join.parameter(n) for n in names)
+    for room in _exposed(join):
+        heat = join.anatomy.air_heat_capacity * room.volume / 3600.0
+        _exchange(join, room, constant * heat, 1.0, None)
+        by_wind = Signal(f"wind and cold in {room.name}", "K*m/s", partial(_by_wind, zone=room.name))
+        _exchange(join, room, wind * heat, _WIND, by_wind)
+        by_stack = Signal(f"stack and cold in {room.name}", "K^1.5", partial(_by_stack, zone=room.name))
+        _exchange(join, room, stack * heat, _ROOT, by_stack)
+
+
+def _build_bridge(join: Joining) -> None:
+    value = join.parameter("thermal_bridge_u_value")
+    for (zone, azimuth), area in join.anatomy.facades.items():
+        room = join.anatomy.rooms[zone]
+        join.graph.face(
+            join.key(f"{zone} {azimuth:g}"), value, room.air, join.graph.boundary("outdoor"), area * room.share
+        )
+
+
+def _build_opening(join: Joining) -> None:
+    rate = join.parameter("window_opening_rate")
+    for room in _exposed(join):
+        heat = join.anatomy.air_heat_capacity * room.volume / 3600.0
+        varying = Signal(f"open windows of {room.name}", "K", partial(_by_opening, zone=room.name))
+        _exchange(join, room, rate * heat, _OPEN, varying)
+
+
+def _build_mixing(join: Joining) -> None:
+    constant, scheduled = join.parameter("door_airflow"), join.parameter("occupied_door_airflow")
+    heat = join.anatomy.air_heat_capacity
+    for first, second in join.anatomy.partitions:
+        a, b = join.anatomy.rooms[first], join.anatomy.rooms[second]
+        near, far, share = _ends(a, b)
+        pair = f"{first}-{second}"
+        join.graph.face(join.key(pair), heat * (constant + _PRESENCE * scheduled), near, far, share)
+        signal = Signal(f"presence and difference {pair}", "K", partial(_by_presence, first=first, second=second))
+        join.heat_air(a, heat * scheduled, signal, 1.0)
+        join.heat_air(b, -heat * scheduled, signal, 1.0)
+
+
+def _ends(a: Room, b: Room) -> tuple[NDArray[np.int64], NDArray[np.int64], FloatArray]:
+    """Nodes that an exchange between two zones joins: their means, or volumes in turn where they have none."""
+    if a.mean >= 0 and b.mean >= 0:
+        return np.array([a.mean]), np.array([b.mean]), np.ones(1)
+    count = max(a.air.size, b.air.size)
+    which = np.arange(count)
+    return a.air[which % a.air.size], b.air[which % b.air.size], np.full(count, 1.0 / count)
+
+
+def _no_facades(anatomy: Anatomy) -> str | None:
+    return None if anatomy.facades else "the building has no exterior walls"
+
+
+def _no_partitions(anatomy: Anatomy) -> str | None:
+    return None if anatomy.partitions else "no two zones share a partition"
+
+
+INFILTRATION = Effect(
+    id="infiltration",
+    title="outdoor air that leaks in",
+    equation="ρ c V (n + n_w v + n_s |ΔT|^½) (T_out - T)",
+    source=_SHERMAN,
+    acts_on="air of the zones with exterior walls",
+    confounders=("thermal_bridge", "wind_film", "window_opening"),
+    separated_by="CO2 or tracer gas; windy and calm nights; seasons",
+    parameters=(
+        strength("infiltration_rate", "1/h", 1.0, "0.05 to 1 per hour: ASHRAE Fundamentals 2017, ch. 16", "infiltration"),
+        strength("infiltration_by_wind", "s/m/h", 0.2, _SHERMAN, "infiltration"),
+        strength("infiltration_by_stack", "1/h/K^0.5", 0.15, _SHERMAN, "infiltration"),
+    ),
+    build=_build_infiltration,
+    applies=_no_facades,
+)
+
+THERMAL_BRIDGE = Effect(
+    id="thermal_bridge",
+    title="thermal bridges and windows worse than rated",
+    equation="ΔU A (T_out - T)",
+    source="ISO 10211:2017; ISO 14683:2017 (default linear transmittances)",
+    acts_on="air of the zones with exterior walls",
+    confounders=("infiltration", "longwave_sky"),
+    separated_by="blower door; windy and calm nights",
+    parameters=(strength("thermal_bridge_u_value", "W/m^2/K", 1.0, "ISO 14683:2017: up to 1 W/m/K an edge", "thermal_bridge"),),
+    build=_build_bridge,
+    applies=_no_facades,
+)
+
+WINDOW_OPENING = Effect(
+    id="window_opening",
+    title="windows opened when it is mild",
+    equation="ρ c V n occ(t) m(T_out) (T_out - T), m from 0 at 12 to 1 at 22 degC",
+    source="Rijal et al. (2007), doi:10.1016/j.enbuild.2007.02.003 (opening rises with outdoor temperature)",
+    acts_on="air of the zones with exterior walls",
+    confounders=("infiltration", "internal_gains"),
+    separated_by="window contacts; mild and cold days",
+    parameters=(strength("window_opening_rate", "1/h", 6.0, "single-sided ventilation: CIBSE AM10", "window_opening"),),
+    build=_build_opening,
+    applies=_no_facades,
+)
+
+ZONE_MIXING = Effect(
+    id="zone_mixing",
+    title="air exchanged between zones",
+    equation="ρ c (V̇ + V̇_occ occ(t)) (T_j - T_i)",
+    source="Allard and Utsumi (1992), Energy and Buildings 18, 133-145 (open doors)",
+    acts_on="air of zones that share a partition",
+    confounders=("interior_wall_conductivity",),
+    separated_by="door contacts; unequal set-points",
+    parameters=(
+        strength("door_airflow", "m^3/s", 0.3, "0.02 to 0.3 a door: Allard and Utsumi (1992)", "zone_mixing"),
+        strength("occupied_door_airflow", "m^3/s", 0.3, "doors open while people are there", "zone_mixing"),
+    ),
+    build=_build_mixing,
+    applies=_no_partitions,
+)
+

@@ -1,0 +1,269 @@
+"""What an effect of the catalogue is, and how it joins a building's network."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from thermal.errors import EffectError
+from thermal.network import Anatomy, GraphBuilder, Room
+from thermal.parameters import Parameter, Scale
+from thermal.signals import Drivers, Signal
+
+FloatArray = NDArray[np.float64]
+
+#: Adds an effect to a graph, in some of its zones (all of them when there are none).
+Builder = Callable[["Joining"], None]
+
+
+@dataclass(frozen=True)
+class Effect:
+    """An effect that a building may have and the baseline does not.
+
+    Parameters
+    ----------
+    id : str
+        Short name, fixed for good.
+    title : str
+        In plain words.
+    equation : str
+        Heat that it brings, with symbols as in the nomenclature.
+    source : str
+        Where equation and ranges come from.
+    acts_on : str
+        Control volumes that receive the heat.
+    confounders : tuple of str
+        What looks alike: ids of effects, or words.
+    separated_by : str
+        Experiment that tells it from these.
+    parameters : tuple of Parameter
+        What it brings; the first is its strength, 0 where it is absent.
+    build : callable
+        Adds its terms.
+    needs : tuple of str
+        Point types of the weather station that it cannot do without.
+    zonal : bool
+        Whether it may be there in some zones only; it then has a strength a zone.
+    requires : tuple of str
+        Effects that it modifies, and without which it means nothing.
+    applies : callable, optional
+        Says why a building cannot have it; None when it can.
+    """
+
+    id: str
+    title: str
+    equation: str
+    source: str
+    acts_on: str
+    confounders: tuple[str, ...]
+    separated_by: str
+    parameters: tuple[Parameter, ...]
+    build: Builder
+    needs: tuple[str, ...] = ()
+    zonal: bool = False
+    requires: tuple[str, ...] = ()
+    applies: Callable[[Anatomy], str | None] = lambda _: None
+
+    def untestable(self, drivers: Drivers, anatomy: Anatomy) -> str | None:
+        """Say why a case cannot tell whether the effect is there; None when it can.
+
+        Parameters
+        ----------
+        drivers : Drivers
+            The case's telemetry.
+        anatomy : Anatomy
+            Of its building.
+        """
+        missing = [point for point in self.needs if not drivers.measured(point)]
+        if missing:
+            return f"not measured: {', '.join(missing)}"
+        return self.applies(anatomy)
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """An effect in some zones of a building: what a network is extended by.
+
+    Parameters
+    ----------
+    effect : Effect
+        Which.
+    zones : tuple of str
+        Where; all zones when empty.
+    """
+
+    effect: Effect
+    zones: tuple[str, ...] = ()
+
+    def extend(self, graph: GraphBuilder) -> None:
+        """Add volumes, faces, sources and parameters to a graph whose baseline is complete.
+
+        Parameters
+        ----------
+        graph : GraphBuilder
+            With its anatomy.
+
+        Raises
+        ------
+        EffectError
+            When a zone is not of the building, or the effect cannot be in some zones only.
+        """
+        unknown = sorted(set(self.zones) - set(graph.zones))
+        if unknown:
+            raise EffectError(f"effect {self.effect.id}: zones {unknown} are not of this building")
+        if self.zones and not self.effect.zonal:
+            raise EffectError(f"effect {self.effect.id}: acts on the whole building, came zones {list(self.zones)}")
+        self.effect.build(Joining(graph, self.effect, self.zones or graph.zones))
+
+
+class Joining:
+    """A graph while one effect joins it.
+
+    Parameters
+    ----------
+    graph : GraphBuilder
+        The building.
+    effect : Effect
+        What joins.
+    zones : tuple of str
+        Where it may act.
+    """
+
+    def __init__(self, graph: GraphBuilder, effect: Effect, zones: Sequence[str]) -> None:
+        self.graph, self.effect, self.anatomy = graph, effect, graph.anatomy
+        self.rooms: tuple[Room, ...] = tuple(graph.anatomy.rooms[z] for z in zones)
+        self._count = 0
+
+    def parameter(self, name: str, zone: str | None = None, facade: str | None = None) -> ca.SX:
+        """Symbol of one of the effect's parameters, or that of a zone or a facade.
+
+        Parameters
+        ----------
+        name : str
+            Its name.
+        zone, facade : str, optional
+            Whose value it is.
+        """
+        found = next(p for p in self.effect.parameters if p.name == name)
+        if zone is not None:
+            found = found.of("zone", zone)
+        elif facade is not None:
+            found = found.of("facade", facade)
+        return self.graph.own(found)
+
+    def key(self, what: str = "") -> str:
+        """Name of a new class of this effect."""
+        self._count += 1
+        return f"{self.effect.id} {what} {self._count}".replace("  ", " ")
+
+    def heat_air(self, room: Room, value: ca.SX, signal: Signal, weight: float) -> None:
+        """Give heat to a zone's air, ``value weight s`` [W].
+
+        Parameters
+        ----------
+        room : Room
+            The zone.
+        value : casadi.SX
+            Heat per unit of weight and signal.
+        signal : Signal
+            What drives it.
+        weight : float
+            Geometry.
+        """
+        self.graph.source(self.key(room.name), value, room.air, signal, weight * room.share)
+
+    def heat_surfaces(self, room: Room, value: ca.SX, signal: Signal, weight: float) -> None:
+        """Give heat to a zone's surfaces by its radiant node; to its air where it has none.
+
+        Parameters
+        ----------
+        room : Room
+            The zone.
+        value : casadi.SX
+            Heat per unit of weight and signal.
+        signal : Signal
+            What drives it.
+        weight : float
+            Geometry.
+        """
+        if room.radiant < 0:
+            self.heat_air(room, value, signal, weight)
+        else:
+            self.graph.source(self.key(room.name), value, room.radiant, signal, weight)
+
+    def air_to(self, room: Room, value: ca.SX, far: int, weight: float) -> None:
+        """Join a zone's air to a node or a boundary, ``value weight`` [W/K].
+
+        Parameters
+        ----------
+        room : Room
+            The zone.
+        value : casadi.SX
+            Conductance per unit of weight.
+        far : int
+            Node, or code of a boundary.
+        weight : float
+            Geometry.
+        """
+        self.graph.face(self.key(room.name), value, room.air, far, weight * room.share)
+
+
+def strength(name: str, unit: str, upper: float, source: str, effect: str, lower: float = 0.0) -> Parameter:
+    """Parameter of an effect that is absent at 0.
+
+    Parameters
+    ----------
+    name, unit, source, effect : str
+        As in `Parameter`.
+    upper, lower : float
+        Plausible range [unit].
+    """
+    return Parameter(name, unit, 0.0, lower, upper, source, "linear", effect)
+
+
+def shape(
+    name: str, unit: str, start: float, lower: float, upper: float, source: str, effect: str, scale: Scale = "log"
+) -> Parameter:
+    """Parameter of an effect that has no value of absence.
+
+    Parameters
+    ----------
+    name, unit, source, effect : str
+        As in `Parameter`.
+    start, lower, upper : float
+        Centre of the prior and plausible range [unit].
+    scale : str
+        What it is estimated on.
+    """
+    return Parameter(name, unit, start, lower, upper, source, scale, effect)
+
+
+def hat(value: ca.SX, knots: Sequence[float], number: int) -> ca.SX:
+    """Weight of one knot in a linear interpolation between knots; flat beyond the ends.
+
+    Parameters
+    ----------
+    value : casadi.SX
+        Where.
+    knots : sequence of float
+        Increasing, as the value has them.
+    number : int
+        Which of them.
+    """
+    inside = ca.fmin(ca.fmax(value, knots[0]), knots[-1])
+    rise = (inside - knots[number - 1]) / (knots[number] - knots[number - 1]) if number else ca.SX(1.0)
+    last = number + 1 == len(knots)
+    fall = ca.SX(1.0) if last else (knots[number + 1] - inside) / (knots[number + 1] - knots[number])
+    return ca.fmax(0.0, ca.fmin(rise, fall))
+
+
+def _one(drivers: Drivers) -> FloatArray:
+    return np.ones(len(drivers.stamps))
+
+
+#: A signal that is 1 throughout.
+CONSTANT = Signal("constant", "1", _one)

@@ -1,0 +1,170 @@
+"""Heat from and to what the baseline takes for adiabatic: other floors, ground, roof, the neighbour; more mass."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermal.effects._effect import CONSTANT, Effect, Joining, shape, strength
+from thermal.network import Anatomy, OuterFaces, Room
+from thermal.network._anatomy import UPWARD, Outlook
+from thermal.network._materials import RATED_OUTSIDE_FILM
+from thermal.signals import Drivers, Signal
+
+FloatArray = NDArray[np.float64]
+
+#: Temperature from which signals count [degC].
+_REFERENCE = 20.0
+
+
+def _zero(drivers: Drivers) -> FloatArray:
+    return np.zeros(len(drivers.stamps))
+
+
+_STEADY = Signal("constant temperature", "K", _zero)
+
+
+def _backs(room: Room) -> tuple[NDArray[np.int64], FloatArray]:
+    """Back of a zone's slabs, or its air where it has none, with shares."""
+    return (np.array([room.slab[-1]]), np.ones(1)) if room.slab else (room.air, room.share)
+
+
+def _build_floors(join: Joining) -> None:
+    value = join.parameter("interfloor_u_value")
+    for (lower, upper), area in join.anatomy.stacked.items():
+        ends = [_backs(join.anatomy.rooms[z]) for z in (lower, upper)]
+        count = max(e[0].size for e in ends)
+        which = np.arange(count)
+        near, far = (e[0][which % e[0].size] for e in ends)
+        join.graph.face(join.key(f"{lower}-{upper}"), value, near, far, np.full(count, area / count))
+
+
+def _build_roof(join: Joining) -> None:
+    value = join.parameter("roof_u_value")
+    for zone, area in join.anatomy.under_roof.items():
+        node, share = _backs(join.anatomy.rooms[zone])
+        join.graph.face(join.key(zone), value, node, join.graph.boundary("outdoor"), area * share)
+        outlook = Outlook(0.0, UPWARD, RATED_OUTSIDE_FILM, glass=False)
+        join.anatomy.outer.append(OuterFaces(value, node, area * share, outlook))
+
+
+def _build_ground(join: Joining) -> None:
+    value, ground = join.parameter("ground_u_value"), join.parameter("ground_temperature")
+
+    def to_ground(node: NDArray[np.int64], conductance: object, weight: FloatArray) -> None:
+        join.graph.face(join.key(), conductance, node, join.graph.signal(_STEADY), weight)
+        join.graph.source(join.key(), conductance * (ground - _REFERENCE), node, CONSTANT, weight)  # type: ignore[operator]
+
+    for zone, area in join.anatomy.on_ground.items():
+        node, share = _backs(join.anatomy.rooms[zone])
+        to_ground(node, value, area * share)
+    for face in join.anatomy.ground_faces:
+        # at no strength nothing flows; with it in series, nothing either
+        to_ground(np.array([face.node]), value * face.value / (value + face.value), np.array([face.area]))
+
+
+def _build_neighbour(join: Joining) -> None:
+    other = join.parameter("neighbour_temperature")
+    for (zone, azimuth), area in join.anatomy.facades.items():
+        room, value = join.anatomy.rooms[zone], join.parameter("neighbour_u_value", facade=f"{azimuth:g} deg")
+        join.graph.face(join.key(zone), value, room.air, join.graph.signal(_STEADY), area * room.share)
+        join.heat_air(room, value * (other - _REFERENCE), CONSTANT, area)
+
+
+def _build_mass(join: Joining) -> None:
+    mass, coupling = join.parameter("hidden_heat_capacity"), join.parameter("hidden_coupling")
+    for room in join.rooms:
+        node = join.graph.volumes("hidden_mass", room.number)
+        join.graph.capacity(f"hidden_mass {room.name}", mass, node, room.floor_area)
+        join.air_to(room, coupling, int(node[0]), room.floor_area)
+
+
+def _no_stack(anatomy: Anatomy) -> str | None:
+    return None if anatomy.stacked else "no zone lies above another"
+
+
+def _no_roof(anatomy: Anatomy) -> str | None:
+    return None if anatomy.under_roof else "what lies above the zones is described by the case itself"
+
+
+def _no_ground(anatomy: Anatomy) -> str | None:
+    return None if anatomy.on_ground or anatomy.ground_faces else "no zone lies on the ground"
+
+
+def _no_facades(anatomy: Anatomy) -> str | None:
+    return None if anatomy.facades else "the building has no exterior walls"
+
+
+INTERFLOOR_EXCHANGE = Effect(
+    id="interfloor_exchange",
+    title="heat that flows between floors",
+    equation="U A (T_other - T), between the backs of the slabs",
+    source="ISO 6946:2017 (floor constructions)",
+    acts_on="slabs of zones that lie on each other",
+    confounders=("roof_exchange", "ground_exchange", "internal_gains"),
+    separated_by="unequal set-backs of the floors",
+    parameters=(strength("interfloor_u_value", "W/m^2/K", 3.0, "0.5 to 3: ISO 6946:2017", "interfloor_exchange"),),
+    build=_build_floors,
+    applies=_no_stack,
+)
+
+ROOF_EXCHANGE = Effect(
+    id="roof_exchange",
+    title="heat that flows through the roof",
+    equation="U A (T_out - T), at the back of the slab",
+    source="ISO 6946:2017; ASHRAE 90.1 (roofs)",
+    acts_on="slabs of zones under the roof",
+    confounders=("ground_exchange", "infiltration", "thermal_bridge"),
+    separated_by="top floor against the others",
+    parameters=(strength("roof_u_value", "W/m^2/K", 1.0, "0.1 to 1: ASHRAE 90.1-2019 tables 5.5", "roof_exchange"),),
+    build=_build_roof,
+    applies=_no_roof,
+)
+
+GROUND_EXCHANGE = Effect(
+    id="ground_exchange",
+    title="heat that flows to the ground",
+    equation="U A (T_g - T), at the back of the slab",
+    source="ISO 13370:2017",
+    acts_on="slabs of zones on the ground",
+    confounders=("internal_gains", "roof_exchange", "sensor_bias"),
+    separated_by="two seasons; the lowest floor against the others",
+    parameters=(
+        strength("ground_u_value", "W/m^2/K", 1.0, "0.1 to 1: ISO 13370:2017", "ground_exchange"),
+        shape("ground_temperature", "degC", 14.0, 4.0, 24.0, "under buildings: ISO 13370 Annex H", "ground_exchange", "linear"),
+    ),
+    build=_build_ground,
+    applies=_no_ground,
+)
+
+NEIGHBOUR = Effect(
+    id="neighbour",
+    title="a heated neighbour behind a wall",
+    equation="U A (T_n - T) on one facade",
+    source="ISO 13789:2017 (adjacent buildings)",
+    acts_on="air of the zones behind that facade",
+    confounders=("internal_gains", "thermal_bridge"),
+    separated_by="facades against each other; cold and mild days",
+    parameters=(
+        strength("neighbour_u_value", "W/m^2/K", 2.0, "party walls: ISO 6946:2017", "neighbour"),
+        shape("neighbour_temperature", "degC", 20.0, 14.0, 26.0, "heated rooms", "neighbour", "linear"),
+    ),
+    build=_build_neighbour,
+    applies=_no_facades,
+)
+
+HIDDEN_MASS = Effect(
+    id="hidden_mass",
+    title="mass that the model lacks",
+    equation="C_m dT_m/dt = h A (T - T_m)",
+    source="Johra and Heiselberg (2017), doi:10.1016/j.rser.2016.11.145",
+    acts_on="a further node a zone",
+    confounders=("flow_gain", "sensor_lag", "furniture_heat_capacity"),
+    separated_by="steps and pseudo-random heat",
+    parameters=(
+        strength("hidden_heat_capacity", "J/m^2/K", 1e5, "10 to 100 kJ/m2/K: Johra and Heiselberg (2017)", "hidden_mass"),
+        shape("hidden_coupling", "W/m^2/K", 3.5, 2.0, 6.0, "films of furniture", "hidden_mass"),
+    ),
+    build=_build_mass,
+)
+

@@ -1,0 +1,285 @@
+"""What a building's volumes and faces are part of: what the effects of the catalogue attach to."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from thermal.case import FloorPlan, FloorPlans
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+#: Tilt of a vertical, an upward and a downward face [deg].
+VERTICAL, UPWARD, DOWNWARD = 90.0, 0.0, 180.0
+
+#: Azimuth of a plan's sides before the building is turned [deg].
+_SIDES = {"north": 0.0, "east": 90.0, "south": 180.0, "west": 270.0}
+
+
+@dataclass(frozen=True)
+class Outlook:
+    """How a face looks outside.
+
+    Parameters
+    ----------
+    azimuth : float
+        Clockwise from true north [deg]; of no meaning where the face is horizontal.
+    tilt : float
+        Between its normal and the vertical [deg]: 90 for a wall, 0 for a roof, 180 for a floor over the open.
+    film : casadi.SX or float
+        Outside film [W/m2/K].
+    glass : bool
+        Whether it is a window.
+    """
+
+    azimuth: float
+    tilt: float
+    film: ca.SX | float
+    glass: bool
+
+
+@dataclass(frozen=True)
+class OuterFaces:
+    """Faces of one class towards the outdoor air: what sun, sky and wind act on.
+
+    Parameters
+    ----------
+    value : casadi.SX
+        Conductance κ from node to outdoor air [W/m2/K].
+    node : ndarray of int, shape (n,)
+        Nodes.
+    area : ndarray, shape (n,)
+        Areas [m2].
+    outlook : Outlook
+        Where they look.
+    zone : str or None
+        Zone of a window; None for walls, whose volumes belong to none.
+    """
+
+    value: ca.SX
+    node: IntArray
+    area: FloatArray
+    outlook: Outlook
+    zone: str | None = None
+
+
+@dataclass(frozen=True)
+class Pane:
+    """A window that the sun may enter by.
+
+    Parameters
+    ----------
+    zone : str
+        Where to.
+    azimuth, tilt : float
+        As in `Outlook` [deg].
+    area : float
+        Of glass [m2].
+    transmittance : float or None
+        Solar transmittance where it is known [-].
+    """
+
+    zone: str
+    azimuth: float
+    tilt: float
+    area: float
+    transmittance: float | None = None
+
+
+@dataclass(frozen=True)
+class Room:
+    """A zone with what is in it.
+
+    Parameters
+    ----------
+    name : str
+        Of the zone.
+    number : int
+        Its number.
+    air : ndarray of int, shape (n_air,)
+        Its air volumes.
+    share : ndarray, shape (n_air,)
+        Share of its air in each.
+    mean : int
+        Node at the mean of its air: the star of the shuffle, or the one volume; -1 without.
+    radiant : int
+        Its radiant node; -1 without.
+    slab : tuple of int
+        Nodes of its slabs, from the surface to the back; empty without.
+    furniture : int
+        Node of the furniture; -1 without.
+    floor_area, volume : float
+        [m2] and [m3].
+    """
+
+    name: str
+    number: int
+    air: IntArray
+    share: FloatArray
+    mean: int
+    radiant: int
+    slab: tuple[int, ...]
+    furniture: int
+    floor_area: float
+    volume: float
+
+
+@dataclass(frozen=True)
+class GroundFace:
+    """A face towards the ground of a zone table: adiabatic in the baseline.
+
+    Parameters
+    ----------
+    zone : str
+        Zone above.
+    node : int
+        Last node of the floor.
+    area : float
+        Area [m2].
+    value : casadi.SX
+        Conductance from that node to the face [W/m2/K].
+    """
+
+    zone: str
+    node: int
+    area: float
+    value: ca.SX
+
+
+@dataclass
+class Anatomy:
+    """All of them, collected while a network is built.
+
+    Parameters
+    ----------
+    outer : list of OuterFaces
+        Towards outdoor air.
+    panes : list of Pane
+        Windows to outdoor air.
+    rooms : dict of str to Room
+        By zone.
+    partitions : dict
+        Area between two zones of one floor, by their names in order [m2].
+    stacked : dict
+        Area between two zones of which the first lies under the second [m2].
+    under_roof, on_ground : dict of str to float
+        Area of a zone with nothing above, or below [m2].
+    ground_faces : list of GroundFace
+        Of a zone table.
+    facades : dict
+        Area of exterior wall, windows included, by zone and azimuth [m2].
+    air_heat_capacity : float
+        Volumetric heat capacity of the air [J/m3/K].
+    """
+
+    outer: list[OuterFaces] = field(default_factory=list)
+    panes: list[Pane] = field(default_factory=list)
+    rooms: dict[str, Room] = field(default_factory=dict)
+    partitions: dict[tuple[str, str], float] = field(default_factory=dict)
+    stacked: dict[tuple[str, str], float] = field(default_factory=dict)
+    under_roof: dict[str, float] = field(default_factory=dict)
+    on_ground: dict[str, float] = field(default_factory=dict)
+    ground_faces: list[GroundFace] = field(default_factory=list)
+    facades: dict[tuple[str, float], float] = field(default_factory=dict)
+    air_heat_capacity: float = 0.0
+
+
+def azimuth_of(side: str, orientation: float) -> float:
+    """Azimuth of a plan's side [deg].
+
+    Parameters
+    ----------
+    side : str
+        ``north`` is the plan's first row.
+    orientation : float
+        Clockwise from true north to the plan's "up" [deg].
+    """
+    return (_SIDES[side] + orientation) % 360.0
+
+
+def partition_areas(plan: FloorPlan, cell_size: float) -> dict[tuple[str, str], float]:
+    """Area of the partitions between zones of a floor, by their names in order [m2].
+
+    Parameters
+    ----------
+    plan : FloorPlan
+        The floor.
+    cell_size : float
+        Side of a cell [m].
+    """
+    tokens, zones = np.asarray(plan.tokens), set(plan.zone_names)
+    found: dict[tuple[str, str], float] = {}
+    for lines in (tokens, tokens.T):
+        before, wall, after = lines[:, :-2], lines[:, 1:-1], lines[:, 2:]
+        for a, b in zip(before[wall == "+"], after[wall == "+"], strict=True):
+            if a != b and {str(a), str(b)} <= zones:
+                pair = (min(str(a), str(b)), max(str(a), str(b)))
+                found[pair] = found.get(pair, 0.0) + cell_size * plan.height
+    return found
+
+
+def stacked_areas(
+    plans: FloorPlans, areas: Mapping[str, float]
+) -> tuple[dict[tuple[str, str], float], dict[str, float], dict[str, float]]:
+    """Areas between zones of floors that lie on each other, under the roof, and on the ground.
+
+    Parameters
+    ----------
+    plans : FloorPlans
+        Floors, the lowest first, with the same origin.
+    areas : mapping of str to float
+        Floor area of each zone [m2]; a zone's parts sum to it.
+
+    Returns
+    -------
+    tuple
+        Areas [m2] by (lower, upper) zone, and by zone under the roof and on the ground.
+    """
+    stacked: dict[tuple[str, str], float] = {}
+    roof: dict[str, float] = {}
+    ground: dict[str, float] = {}
+    shape = tuple(max(f.tokens.shape[axis] for f in plans.floors) for axis in (0, 1))
+    grids = [_padded(f, shape) for f in plans.floors]
+    for level, floor in enumerate(plans.floors):
+        for zone in floor.zone_names:
+            mine = grids[level] == zone
+            per_cell = areas[zone] / np.count_nonzero(mine)
+            above = grids[level + 1][mine] if level + 1 < len(grids) else np.full(mine.sum(), ".")
+            below = grids[level - 1][mine] if level else np.full(mine.sum(), ".")
+            _count(above, per_cell, stacked, roof, zone)
+            open_below = np.count_nonzero(below == ".")
+            if open_below:
+                ground[zone] = per_cell * open_below
+    return stacked, roof, ground
+
+
+def _count(
+    above: NDArray[np.str_],
+    per_cell: float,
+    stacked: dict[tuple[str, str], float],
+    roof: dict[str, float],
+    zone: str,
+) -> None:
+    """Share a zone's ceiling among what lies above it; walls above take part with the zones beside them."""
+    names, counts = np.unique(above, return_counts=True)
+    number = dict(zip(names.tolist(), counts.tolist(), strict=True))
+    walls = sum(number.pop(token, 0) for token in ("#", "+"))
+    total = sum(number.values())
+    if not total:  # under nothing but walls
+        return
+    for name, n in number.items():
+        area = per_cell * n * (1.0 + walls / total)
+        if name == ".":
+            roof[zone] = area
+        else:
+            stacked[zone, name] = area
+
+
+def _padded(floor: FloorPlan, shape: tuple[int, ...]) -> NDArray[np.str_]:
+    tokens = np.asarray(floor.tokens)
+    return np.pad(tokens, [(0, n - m) for n, m in zip(shape, tokens.shape, strict=True)], constant_values=".")

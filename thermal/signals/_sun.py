@@ -1,0 +1,142 @@
+"""Sun's place and irradiance on tilted planes, by pvlib, at the middle of each step."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from thermal.case.schema import Location
+
+FloatArray = NDArray[np.float64]
+
+#: Reflectance of the ground [-]: grass and worn concrete (ASHRAE Fundamentals 2017, ch. 14, table 5).
+GROUND_REFLECTANCE = 0.2
+
+#: Modifier of diffuse light through double glazing relative to normal incidence [-] (ISO 15099; ASHRAE Fundamentals
+#: 2017, ch. 15, table 10).
+GLASS_DIFFUSE = 0.86
+
+#: Coefficient b0 of the incidence angle modifier ``1 - b0 (1 / cos θ - 1)`` of double glazing [-] (Souka and Safwat
+#: 1966; ASHRAE 93; 0.1 to 0.17 for two panes).
+_INCIDENCE = 0.13
+
+#: Below this altitude the sun counts as set: beams divided by its sine are noise [deg].
+_LOWEST = 3.0
+
+_NORMAL = "direct_normal_irradiance_sensor"
+_DIFFUSE = "diffuse_horizontal_irradiance_sensor"
+_GLOBAL = "global_horizontal_irradiance_sensor"
+
+
+def incidence_modifier(cosine: FloatArray) -> FloatArray:
+    """Transmittance of double glazing at an angle of incidence relative to that at normal incidence [-].
+
+    Parameters
+    ----------
+    cosine : ndarray
+        Cosine of the angle of incidence [-]; 0 or less is behind the pane.
+    """
+    safe = np.maximum(cosine, 1e-3)
+    return np.where(cosine > 0.0, np.clip(1.0 - _INCIDENCE * (1.0 / safe - 1.0), 0.0, 1.0), 0.0)
+
+
+@dataclass(frozen=True)
+class Sun:
+    """Sun's place and irradiances, one value a step.
+
+    Parameters
+    ----------
+    azimuth, altitude : ndarray, shape (n_time,)
+        Of the sun, at the middle of the step [deg].
+    normal, diffuse, horizontal : ndarray, shape (n_time,)
+        Beam on a plane that faces the sun, diffuse and total on the horizontal [W/m2].
+    """
+
+    azimuth: FloatArray
+    altitude: FloatArray
+    normal: FloatArray
+    diffuse: FloatArray
+    horizontal: FloatArray
+
+    def cosine(self, azimuth: float, tilt: float) -> FloatArray:
+        """Cosine of the angle of incidence on a plane, negative behind it [-].
+
+        Parameters
+        ----------
+        azimuth, tilt : float
+            Of the plane's normal [deg]: clockwise from north, and from the vertical.
+        """
+        from pvlib.irradiance import aoi_projection  # here: pvlib takes a second to import
+
+        return np.asarray(aoi_projection(tilt, azimuth, 90.0 - self.altitude, self.azimuth), dtype=float)
+
+    def plane(self, azimuth: float, tilt: float) -> tuple[FloatArray, FloatArray]:
+        """Beam and diffuse irradiance on a plane; the diffuse part is isotropic sky and ground (Liu and Jordan 1963).
+
+        Parameters
+        ----------
+        azimuth, tilt : float
+            Of the plane's normal [deg].
+        """
+        beam = self.normal * np.maximum(self.cosine(azimuth, tilt), 0.0)
+        up = np.cos(np.radians(tilt))
+        diffuse = self.diffuse * (1.0 + up) / 2.0 + GROUND_REFLECTANCE * self.horizontal * (1.0 - up) / 2.0
+        return beam, np.asarray(diffuse)
+
+    def through_glass(self, azimuth: float, tilt: float) -> FloatArray:
+        """Irradiance that glass lets through relative to normal incidence, ``IAM I_b + 0.86 I_d`` [W/m2].
+
+        Parameters
+        ----------
+        azimuth, tilt : float
+            Of the pane's normal [deg].
+        """
+        beam, diffuse = self.plane(azimuth, tilt)
+        return np.asarray(incidence_modifier(self.cosine(azimuth, tilt)) * beam + GLASS_DIFFUSE * diffuse)
+
+
+def sun_of(location: Location, stamps: pd.DatetimeIndex, step: float, weather: pd.DataFrame) -> Sun:
+    """Sun at the middle of each step, with irradiances as measured or derived from those that are.
+
+    Beam, diffuse and global irradiance belong together as ``G = N sin h + D``: any two give the third, and the global
+    one alone is split by Erbs, Klein and Duffie (1982), doi:10.1016/0038-092X(82)90302-4.
+
+    Parameters
+    ----------
+    location : Location
+        Of the building.
+    stamps : DatetimeIndex
+        Ends of the steps.
+    step : float
+        Their length [s].
+    weather : DataFrame
+        Points of the weather station [W/m2].
+    """
+    from pvlib import irradiance, solarposition
+
+    middle = stamps - pd.Timedelta(seconds=step / 2.0)
+    place = solarposition.get_solarposition(middle, location.latitude, location.longitude, location.elevation)
+    altitude = place["elevation"].to_numpy(dtype=float)
+    rise = np.sin(np.radians(altitude))
+    seen: dict[str, FloatArray] = {
+        name: np.maximum(weather[name].fillna(0.0).to_numpy(dtype=float), 0.0)
+        for name in (_NORMAL, _DIFFUSE, _GLOBAL)
+        if name in weather.columns and weather[name].notna().any()
+    }
+    up = altitude > _LOWEST
+    normal, diffuse, total = seen.get(_NORMAL), seen.get(_DIFFUSE), seen.get(_GLOBAL)
+    if total is None:
+        total = (normal if normal is not None else 0.0) * np.maximum(rise, 0.0) + (diffuse if diffuse is not None else 0.0)
+    if diffuse is None and normal is None:
+        split = irradiance.erbs(total, 90.0 - altitude, middle)
+        normal, diffuse = (np.nan_to_num(np.asarray(split[k], dtype=float)) for k in ("dni", "dhi"))
+    elif diffuse is None and normal is not None:
+        diffuse = np.maximum(total - normal * np.maximum(rise, 0.0), 0.0)
+    elif normal is None and diffuse is not None:
+        normal = np.where(up, np.maximum(total - diffuse, 0.0) / np.maximum(rise, np.sin(np.radians(_LOWEST))), 0.0)
+    return Sun(
+        place["azimuth"].to_numpy(dtype=float), altitude, np.asarray(normal), np.asarray(diffuse), np.asarray(total)
+    )
