@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from thermal.effects._effect import Effect, Joining, strength
 from thermal.network import Anatomy, Room
-from thermal.signals import Drivers, Signal
+from thermal.signals import WIND, Drivers, Signal
 
 FloatArray = NDArray[np.float64]
 
 #: Wind speed [m/s], root of temperature difference [K^0.5], presence and opening [-] at which a varying exchange is
-#: part of K; what they differ from it acts as heat at usual zone temperatures.
+#: part of K; what they differ from it acts as heat at usual zone temperatures. Unmeasured wind blows at this speed.
 _WIND, _ROOT, _PRESENCE, _OPEN = 3.0, 3.0, 0.3, 0.1
 
 #: Outdoor temperatures between which windows come to be opened [K].
@@ -29,6 +29,8 @@ def _out(drivers: Drivers, zone: str) -> FloatArray:
 
 
 def _by_wind(drivers: Drivers, zone: str) -> FloatArray:
+    if not drivers.measured(WIND):
+        return np.zeros(len(drivers.stamps))
     return (drivers.wind - _WIND) * _out(drivers, zone)
 
 
@@ -75,11 +77,9 @@ def _build_infiltration(join: Joining) -> None:
 
 def _build_bridge(join: Joining) -> None:
     value = join.parameter("thermal_bridge_u_value")
-    for (zone, azimuth), area in join.anatomy.facades.items():
+    for (zone, _), area in join.anatomy.facades.items():
         room = join.anatomy.rooms[zone]
-        join.graph.face(
-            join.key(f"{zone} {azimuth:g}"), value, room.air, join.graph.boundary("outdoor"), area * room.share
-        )
+        join.air_to(room, value, join.graph.boundary("outdoor"), area)
 
 
 def _build_opening(join: Joining) -> None:
@@ -129,7 +129,7 @@ INFILTRATION = Effect(
     confounders=("thermal_bridge", "wind_film", "window_opening"),
     separated_by="CO2 or tracer gas; windy and calm nights; seasons",
     parameters=(
-        strength("infiltration_rate", "1/h", 1.0, "0.05 to 1 per hour: ASHRAE Fundamentals 2017, ch. 16", "infiltration"),
+        strength("infiltration_rate", "1/h", 1.0, "0.05 to 1: ASHRAE Fundamentals 2017, ch. 16", "infiltration"),
         strength("infiltration_by_wind", "s/m/h", 0.2, _SHERMAN, "infiltration"),
         strength("infiltration_by_stack", "1/h/K^0.5", 0.15, _SHERMAN, "infiltration"),
     ),
@@ -145,7 +145,9 @@ THERMAL_BRIDGE = Effect(
     acts_on="air of the zones with exterior walls",
     confounders=("infiltration", "longwave_sky"),
     separated_by="blower door; windy and calm nights",
-    parameters=(strength("thermal_bridge_u_value", "W/m^2/K", 1.0, "ISO 14683:2017: up to 1 W/m/K an edge", "thermal_bridge"),),
+    parameters=(
+        strength("thermal_bridge_u_value", "W/m^2/K", 1.0, "ISO 14683:2017: up to 1 W/m/K an edge", "thermal_bridge"),
+    ),
     build=_build_bridge,
     applies=_no_facades,
 )
@@ -178,4 +180,3 @@ ZONE_MIXING = Effect(
     build=_build_mixing,
     applies=_no_partitions,
 )
-

@@ -51,7 +51,7 @@ class Effect:
     requires : tuple of str
         Effects that it modifies, and without which it means nothing.
     applies : callable, optional
-        Says why a building cannot have it; None when it can.
+        Says why a building cannot have it, None when it can; every building can by default.
     """
 
     id: str
@@ -66,7 +66,7 @@ class Effect:
     needs: tuple[str, ...] = ()
     zonal: bool = False
     requires: tuple[str, ...] = ()
-    applies: Callable[[Anatomy], str | None] = lambda _: None
+    applies: Callable[[Anatomy], str | None] | None = None
 
     def untestable(self, drivers: Drivers, anatomy: Anatomy) -> str | None:
         """Say why a case cannot tell whether the effect is there; None when it can.
@@ -81,7 +81,7 @@ class Effect:
         missing = [point for point in self.needs if not drivers.measured(point)]
         if missing:
             return f"not measured: {', '.join(missing)}"
-        return self.applies(anatomy)
+        return None if self.applies is None else self.applies(anatomy)
 
 
 @dataclass(frozen=True)
@@ -156,7 +156,13 @@ class Joining:
         return self.graph.own(found)
 
     def key(self, what: str = "") -> str:
-        """Name of a new class of this effect."""
+        """Name of a new class of this effect.
+
+        Parameters
+        ----------
+        what : str
+            Where, for those who read it.
+        """
         self._count += 1
         return f"{self.effect.id} {what} {self._count}".replace("  ", " ")
 
@@ -168,11 +174,11 @@ class Joining:
         room : Room
             The zone.
         value : casadi.SX
-            Heat per unit of weight and signal.
+            Heat per unit of weight and signal [W per both].
         signal : Signal
             What drives it.
         weight : float
-            Geometry.
+            Geometry, such as an area [m2].
         """
         self.graph.source(self.key(room.name), value, room.air, signal, weight * room.share)
 
@@ -184,11 +190,11 @@ class Joining:
         room : Room
             The zone.
         value : casadi.SX
-            Heat per unit of weight and signal.
+            Heat per unit of weight and signal [W per both].
         signal : Signal
             What drives it.
         weight : float
-            Geometry.
+            Geometry, such as an area [m2].
         """
         if room.radiant < 0:
             self.heat_air(room, value, signal, weight)
@@ -203,11 +209,11 @@ class Joining:
         room : Room
             The zone.
         value : casadi.SX
-            Conductance per unit of weight.
+            Conductance per unit of weight [W/K per weight].
         far : int
             Node, or code of a boundary.
         weight : float
-            Geometry.
+            Geometry, such as an area [m2].
         """
         self.graph.face(self.key(room.name), value, room.air, far, weight * room.share)
 
@@ -242,7 +248,7 @@ def shape(
     return Parameter(name, unit, start, lower, upper, source, scale, effect)
 
 
-def hat(value: ca.SX, knots: Sequence[float], number: int) -> ca.SX:
+def hat(value: ca.SX, knots: Sequence[float], number: int, signed: bool = False) -> ca.SX:
     """Weight of one knot in a linear interpolation between knots; flat beyond the ends.
 
     Parameters
@@ -250,14 +256,18 @@ def hat(value: ca.SX, knots: Sequence[float], number: int) -> ca.SX:
     value : casadi.SX
         Where.
     knots : sequence of float
-        Increasing, as the value has them.
+        Increasing, in the value's unit [parameter unit].
     number : int
         Which of them.
+    signed : bool
+        Whether the line from the first to the second knot goes on below the first: at a strength of zero an
+        interpolation that is flat on one side has half a slope.
     """
-    inside = ca.fmin(ca.fmax(value, knots[0]), knots[-1])
-    rise = (inside - knots[number - 1]) / (knots[number] - knots[number - 1]) if number else ca.SX(1.0)
     last = number + 1 == len(knots)
-    fall = ca.SX(1.0) if last else (knots[number + 1] - inside) / (knots[number + 1] - knots[number])
+    rise = (value - knots[number - 1]) / (knots[number] - knots[number - 1]) if number else ca.SX(1.0)
+    fall = ca.SX(1.0) if last else (knots[number + 1] - value) / (knots[number + 1] - knots[number])
+    if signed and number == 1:
+        return ca.fmin(rise, ca.fmax(0.0, fall))
     return ca.fmax(0.0, ca.fmin(rise, fall))
 
 

@@ -9,15 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal.effects._effect import CONSTANT, Effect, Joining, hat, strength
-from thermal.network import Anatomy
 from thermal.signals import Drivers, Signal
 from thermal.units import AIR_HEAT_CAPACITY
 
 FloatArray = NDArray[np.float64]
 
-#: Heat that a sensor takes up in a minute over that of the zone's air [-]: too little to cool the zone, and enough for a
-#: reduced model to see.
-_SENSOR = 1e-3
+#: Heat that a sensor takes up in a minute over that of the zone's air [-]: too little to cool the zone, and enough for
+#: a reduced model to see.
+_SENSOR = 1e-4
 
 #: NTU at which the loss of a duct is linearised [-].
 _NTU = 0.1
@@ -28,6 +27,10 @@ _LOST = (0.0, 0.1, 0.2, 0.35, 0.5, 0.7)
 
 def _flow(drivers: Drivers, zone: str) -> FloatArray:
     return np.asarray(AIR_HEAT_CAPACITY * drivers.supply[0][:, drivers.zones.index(zone)])
+
+
+def _passing(drivers: Drivers, number: int) -> FloatArray:
+    return np.asarray(AIR_HEAT_CAPACITY * drivers.airflow[:, number])
 
 
 def _heat(drivers: Drivers, zone: str) -> FloatArray:
@@ -67,6 +70,12 @@ def _build_bias(join: Joining) -> None:
             if beyond.any():
                 join.graph.source(join.key(room.name), -bias * value, far[beyond], CONSTANT, weight[beyond])
         join.heat_air(room, bias, Signal(f"supply air of {room.name}", "W/K", partial(_flow, zone=room.name)), 1.0)
+        for number, (source, target) in enumerate(join.anatomy.airflows):
+            # air that passes from zone to zone brings what its sensors make of it, and not the bias
+            if room.number in (source, target):
+                entered = join.anatomy.rooms[join.graph.zones[target]]
+                signal = Signal(f"passing air {number}", "W/K", partial(_passing, number=number))
+                join.heat_air(entered, bias if room.number == target else -bias, signal, 1.0)
 
 
 def _build_lag(join: Joining) -> None:
@@ -97,17 +106,13 @@ def _build_limit(join: Joining) -> None:
             signal = Signal(
                 f"heat of {room.name} over {1.0 - knot:.0%}", "W", partial(_over, zone=room.name, lost=knot)
             )
-            join.heat_air(room, -hat(lost, _LOST, number), signal, 1.0)
+            join.heat_air(room, -hat(lost, _LOST, number, signed=True), signal, 1.0)
 
 
 def _build_leak(join: Joining) -> None:
     for room in join.rooms:
         signal = Signal(f"fan without heat in {room.name}", "1", partial(_closed, zone=room.name))
         join.heat_air(room, join.parameter("valve_leak", zone=room.name), signal, room.floor_area)
-
-
-def _none(_: Anatomy) -> str | None:
-    return None
 
 
 SENSOR_BIAS = Effect(
@@ -121,7 +126,6 @@ SENSOR_BIAS = Effect(
     parameters=(strength("sensor_bias", "K", 1.5, "plus or minus 1.5 K", "sensor_bias", -1.5),),
     build=_build_bias,
     zonal=True,
-    applies=_none,
 )
 
 SENSOR_LAG = Effect(

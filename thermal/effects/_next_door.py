@@ -2,25 +2,22 @@
 
 from __future__ import annotations
 
+import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
 from thermal.effects._effect import CONSTANT, Effect, Joining, shape, strength
-from thermal.network import Anatomy, OuterFaces, Room
-from thermal.network._anatomy import UPWARD, Outlook
-from thermal.network._materials import RATED_OUTSIDE_FILM
-from thermal.signals import Drivers, Signal
+from thermal.network import RATED_OUTSIDE_FILM, UPWARD, Anatomy, OuterFaces, Outlook, Room
+from thermal.signals import REFERENCE_TEMPERATURE, Drivers, Signal
 
 FloatArray = NDArray[np.float64]
-
-#: Temperature from which signals count [degC].
-_REFERENCE = 20.0
 
 
 def _zero(drivers: Drivers) -> FloatArray:
     return np.zeros(len(drivers.stamps))
 
 
+#: A temperature that stays at the reference; what differs from it acts as heat.
 _STEADY = Signal("constant temperature", "K", _zero)
 
 
@@ -51,9 +48,9 @@ def _build_roof(join: Joining) -> None:
 def _build_ground(join: Joining) -> None:
     value, ground = join.parameter("ground_u_value"), join.parameter("ground_temperature")
 
-    def to_ground(node: NDArray[np.int64], conductance: object, weight: FloatArray) -> None:
+    def to_ground(node: NDArray[np.int64], conductance: ca.SX, weight: FloatArray) -> None:
         join.graph.face(join.key(), conductance, node, join.graph.signal(_STEADY), weight)
-        join.graph.source(join.key(), conductance * (ground - _REFERENCE), node, CONSTANT, weight)  # type: ignore[operator]
+        join.graph.source(join.key(), conductance * (ground - REFERENCE_TEMPERATURE), node, CONSTANT, weight)
 
     for zone, area in join.anatomy.on_ground.items():
         node, share = _backs(join.anatomy.rooms[zone])
@@ -68,7 +65,7 @@ def _build_neighbour(join: Joining) -> None:
     for (zone, azimuth), area in join.anatomy.facades.items():
         room, value = join.anatomy.rooms[zone], join.parameter("neighbour_u_value", facade=f"{azimuth:g} deg")
         join.graph.face(join.key(zone), value, room.air, join.graph.signal(_STEADY), area * room.share)
-        join.heat_air(room, value * (other - _REFERENCE), CONSTANT, area)
+        join.heat_air(room, value * (other - REFERENCE_TEMPERATURE), CONSTANT, area)
 
 
 def _build_mass(join: Joining) -> None:
@@ -76,7 +73,10 @@ def _build_mass(join: Joining) -> None:
     for room in join.rooms:
         node = join.graph.volumes("hidden_mass", room.number)
         join.graph.capacity(f"hidden_mass {room.name}", mass, node, room.floor_area)
-        join.air_to(room, coupling, int(node[0]), room.floor_area)
+        if room.mean >= 0:  # at no capacity, a node that hangs on several volumes would mix these
+            join.graph.face(join.key(room.name), coupling, room.mean, node, room.floor_area)
+        else:
+            join.air_to(room, coupling, int(node[0]), room.floor_area)
 
 
 def _no_stack(anatomy: Anatomy) -> str | None:
@@ -131,7 +131,7 @@ GROUND_EXCHANGE = Effect(
     separated_by="two seasons; the lowest floor against the others",
     parameters=(
         strength("ground_u_value", "W/m^2/K", 1.0, "0.1 to 1: ISO 13370:2017", "ground_exchange"),
-        shape("ground_temperature", "degC", 14.0, 4.0, 24.0, "under buildings: ISO 13370 Annex H", "ground_exchange", "linear"),
+        shape("ground_temperature", "K", 287.15, 277.15, 297.15, "ISO 13370:2017 Annex H", "ground_exchange", "linear"),
     ),
     build=_build_ground,
     applies=_no_ground,
@@ -147,7 +147,7 @@ NEIGHBOUR = Effect(
     separated_by="facades against each other; cold and mild days",
     parameters=(
         strength("neighbour_u_value", "W/m^2/K", 2.0, "party walls: ISO 6946:2017", "neighbour"),
-        shape("neighbour_temperature", "degC", 20.0, 14.0, 26.0, "heated rooms", "neighbour", "linear"),
+        shape("neighbour_temperature", "K", 293.15, 287.15, 299.15, "heated rooms", "neighbour", "linear"),
     ),
     build=_build_neighbour,
     applies=_no_facades,
@@ -162,9 +162,8 @@ HIDDEN_MASS = Effect(
     confounders=("flow_gain", "sensor_lag", "furniture_heat_capacity"),
     separated_by="steps and pseudo-random heat",
     parameters=(
-        strength("hidden_heat_capacity", "J/m^2/K", 1e5, "10 to 100 kJ/m2/K: Johra and Heiselberg (2017)", "hidden_mass"),
+        strength("hidden_heat_capacity", "J/m^2/K", 1e5, "10 to 100 kJ/m2/K: Johra, Heiselberg (2017)", "hidden_mass"),
         shape("hidden_coupling", "W/m^2/K", 3.5, 2.0, 6.0, "films of furniture", "hidden_mass"),
     ),
     build=_build_mass,
 )
-

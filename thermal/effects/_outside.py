@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from thermal.effects._effect import Effect, Joining, strength
 from thermal.network import Anatomy
-from thermal.signals import Drivers, Signal
+from thermal.signals import INFRARED, WIND, Drivers, Signal
 
 FloatArray = NDArray[np.float64]
 
@@ -55,7 +55,7 @@ LONGWAVE_SKY = Effect(
     separated_by="clear and cloudy nights at equal outdoor temperature",
     parameters=(strength("sky_exchange_factor", "1", 0.95, "emissivity 0.2 (low-e) to 0.95", "longwave_sky"),),
     build=_build_sky,
-    needs=("horizontal_infrared_irradiance_sensor",),
+    needs=(INFRARED,),
     applies=_no_faces,
 )
 
@@ -69,6 +69,6 @@ WIND_FILM = Effect(
     separated_by="windy and calm nights; lag through the wall",
     parameters=(strength("wind_film_slope", "W*s/m^3/K", 6.0, "2 to 6 (McAdams 1954; ISO 6946)", "wind_film"),),
     build=_build_film,
-    needs=("wind_speed_sensor",),
+    needs=(WIND,),
     applies=_no_faces,
 )

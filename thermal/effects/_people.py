@@ -58,8 +58,8 @@ def _build_shift(join: Joining) -> None:
         signal = Signal(f"change of heat in {room.name}", "W/h", partial(_heat_slope, zone=room.name))
         join.heat_air(room, -heat, signal, 1.0)
     outdoor = Signal("change of outdoor temperature", "K/h", _outdoor_slope)
-    for faces in join.anatomy.outer:
-        join.graph.source(join.key(), -weather * faces.value, faces.node, outdoor, faces.area)
+    for value, _, node, weight in join.graph.touching(np.array([join.graph.boundary("outdoor")])):
+        join.graph.source(join.key(), -weather * value, node, outdoor, weight)
 
 
 INTERNAL_GAINS = Effect(
@@ -72,7 +72,7 @@ INTERNAL_GAINS = Effect(
     separated_by="weekends; plug meters; CO2",
     parameters=(
         strength("internal_gain", "W/m^2", 30.0, "2 to 30: ASHRAE Fundamentals 2017, ch. 18", "internal_gains"),
-        shape("internal_gain_delay", "h", 0.0, -1.0, 1.0, "against working hours from 8 to 18", "internal_gains", "linear"),
+        shape("internal_gain_delay", "h", 0.0, -1.0, 1.0, "against hours from 8 to 18", "internal_gains", "linear"),
         strength("base_load", "W/m^2", 6.0, "0 to 6: equipment at night", "internal_gains"),
     ),
     build=_build_gains,
@@ -96,7 +96,7 @@ CLOCK_SHIFT = Effect(
     title="a clock that is off",
     equation="-τ dq/dt; -τ κ dT_out/dt",
     source="first order of q(t - τ) and T_out(t - τ)",
-    acts_on="air, and exterior walls",
+    acts_on="air, and whatever touches the outdoor air",
     confounders=("internal_gains", "solar_gain", "sensor_lag"),
     separated_by="sun time and office time",
     parameters=(

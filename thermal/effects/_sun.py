@@ -10,11 +10,10 @@ from numpy.typing import NDArray
 
 from thermal.effects._effect import Effect, Joining, hat, shape, strength
 from thermal.network import Anatomy
-from thermal.signals import Drivers, Signal
+from thermal.signals import IRRADIANCE, Drivers, Signal
 
 FloatArray = NDArray[np.float64]
 
-_IRRADIANCE = "direct_normal_irradiance_sensor"
 _ASHRAE = "ASHRAE Fundamentals 2017, ch. 15 (fenestration)"
 
 #: Solar transmittance that a window is taken for where another's is known [-]: double glazing (EN 410).
@@ -23,9 +22,9 @@ _USUAL_TRANSMITTANCE = 0.6
 #: Irradiance on a facade at which blinds may be drawn [W/m2]: knots of the interpolation in between.
 _DRAWN_AT = (100.0, 200.0, 300.0, 400.0)
 
-SHGC = strength("solar_heat_gain_coefficient", "1", 0.8, f"{_ASHRAE}, table 10: clear single glazing 0.8", "solar_gain")
+SHGC = strength("solar_heat_gain_coefficient", "1", 0.8, f"{_ASHRAE}, table 10: single glazing 0.8", "solar_gain")
 TO_MASS = shape(
-    "solar_share_to_floor", "1", 0.5, 0.1, 0.9, "EnergyPlus puts all beams on the floor; ISO 52016-1 none", "solar_gain",
+    "solar_share_to_floor", "1", 0.5, 0.1, 0.9, "EnergyPlus: all beams on the floor; ISO 52016-1: none", "solar_gain",
     "logit",
 )  # fmt: skip
 
@@ -104,7 +103,7 @@ SOLAR_GAIN = Effect(
     separated_by="sunny and overcast days; the morning of east and the afternoon of west zones",
     parameters=(SHGC, TO_MASS),
     build=_build_gain,
-    needs=(_IRRADIANCE,),
+    needs=(IRRADIANCE,),
     applies=_no_panes,
 )
 
@@ -121,7 +120,7 @@ BLINDS = Effect(
         shape("blind_irradiance", "W/m^2", 200.0, 100.0, 400.0, "O'Brien et al. (2013), table 2", "blinds"),
     ),
     build=_build_blinds,
-    needs=(_IRRADIANCE,),
+    needs=(IRRADIANCE,),
     requires=("solar_gain",),
     applies=_no_panes,
 )
@@ -134,8 +133,10 @@ SOLAR_OPAQUE = Effect(
     acts_on="exterior walls",
     confounders=("solar_gain", "longwave_sky"),
     separated_by="the lag of two to eight hours; zones with walls and no windows",
-    parameters=(strength("solar_absorptance", "1", 0.9, "light to dark finishes: ISO 52016-1 table A.15", "solar_opaque"),),
+    parameters=(
+        strength("solar_absorptance", "1", 0.9, "light to dark finishes: ISO 52016-1 table A.15", "solar_opaque"),
+    ),
     build=_build_opaque,
-    needs=(_IRRADIANCE,),
+    needs=(IRRADIANCE,),
     applies=_no_walls,
 )

@@ -11,10 +11,10 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-import scipy.linalg as sl
 from numpy.typing import NDArray
 
 from thermal.model._modal import SHIFT, ModalModel, divided_differences, modal_model, propagator_functions
+from thermal.model._modal_held import HeldFrame, scan, scan_at
 from thermal.model._scheme import Scheme
 
 if TYPE_CHECKING:
@@ -289,13 +289,13 @@ class ModalRuns:
         """
         modes, count = self.modes, int(keep[-1]) + 1
         held = np.isfinite(zone[0])
-        frame = _HeldFrame(modes, held)
+        frame = HeldFrame(modes, held)
         inputs = np.hstack([boundary[:count], heat[:count] * ~held]).T
         start = modes.coordinates @ states[:, 0]
         wanted = np.vstack([modes.observation[held] @ start, zone[:count, held]]).T
         push = step * ((frame.basis.T @ np.hstack([modes.boundary, modes.heating])) @ inputs)
         push -= frame.coupling @ (np.diff(wanted) - step * SHIFT * wanted[:, 1:])
-        inner = _scan(frame.capacity, step, frame.basis.T @ (start - frame.lift @ wanted[:, 0]), push)
+        inner = scan(frame.capacity, step, frame.basis.T @ (start - frame.lift @ wanted[:, 0]), push)
         path = frame.lift @ wanted + frame.basis @ inner
         kept = modes.states @ path[:, keep + 1]
         if slopes is None:
@@ -311,12 +311,12 @@ class ModalRuns:
             sources = [self._held_source(frame, j, change, after, boundary[:count], step) for j in part]
             source = np.stack(sources, axis=1)
             source[0] += (frame.coupling @ lifted[:, part]).T
-            turned = _scan_at(frame.capacity, step, first[:, part].T, source, keep)
+            turned = scan_at(frame.capacity, step, first[:, part].T, source, keep)
             out[:, part] = np.tensordot(modes.states @ frame.basis, turned, axes=(1, 2)).transpose(0, 2, 1)
         return kept, out.reshape(states.shape[0], -1)
 
     def _held_source(
-        self, frame: _HeldFrame, j: int, change: FloatArray, after: FloatArray, boundary: FloatArray, step: float
+        self, frame: HeldFrame, j: int, change: FloatArray, after: FloatArray, boundary: FloatArray, step: float
     ) -> FloatArray:
         """Source of one parameter's slopes in every held step, (n_time, r)."""
         tables = (self.slopes.capacity, self.slopes.stiffness, self.slopes.boundary)
@@ -341,7 +341,7 @@ class ModalRuns:
         step : float
             Time step [s].
         """
-        frame = _HeldFrame(self.modes, held)
+        frame = HeldFrame(self.modes, held)
         system = frame.capacity + step * (1.0 - SHIFT * frame.capacity)
         inner = -(frame.coupling * (1.0 - step * SHIFT)) / system[:, None]
         return np.asarray(self.modes.states @ (frame.lift + frame.basis @ inner))
@@ -365,7 +365,7 @@ class ModalRuns:
         ndarray, shape (n, m, 1 + n_held)
             All boundaries together, then every held zone [K/K].
         """
-        frame = _HeldFrame(self.modes, held)
+        frame = HeldFrame(self.modes, held)
         conductance = 1.0 - SHIFT * frame.capacity
         temperatures = self.modes.boundary.shape[1] - self.modes.n_signal
         outside = frame.basis.T @ self.modes.boundary[:, :temperatures].sum(axis=1)
@@ -374,44 +374,3 @@ class ModalRuns:
         turn = self.modes.states @ frame.basis
         return np.asarray((turn @ (left[:, :, None] * begin[:, None, :]).reshape(begin.shape[0], -1)).reshape(
             turn.shape[0], elapsed.size, -1))  # fmt: skip
-
-
-class _HeldFrame:
-    """States with given means of the held zones, ``ξ = lift y + basis ζ``, where C is diagonal in ζ."""
-
-    def __init__(self, modes: ModalModel, held: NDArray[np.bool_]) -> None:
-        observe = modes.observation[held]
-        count = observe.shape[0]
-        q, upper = sl.qr(observe.T)
-        self.lift = sl.solve_triangular(upper[:count], q[:, :count].T).T if count else observe.T
-        null = q[:, count:]
-        self.capacity, turn = np.linalg.eigh(null.T @ (modes.capacity[:, None] * null))
-        self.basis = null @ turn
-        self.coupling = self.basis.T @ (modes.capacity[:, None] * self.lift)
-
-
-def _scan_at(
-    capacity: FloatArray, step: float, start: FloatArray, push: FloatArray, keep: NDArray[np.int64]
-) -> FloatArray:
-    """`_scan` of several columns at once, kept after some steps only, (n_keep, p, r)."""
-    system = capacity + step * (1.0 - SHIFT * capacity)
-    stay, current, position = capacity / system, start, 0
-    kept = np.empty((keep.size, *start.shape))
-    push /= system
-    for k in range(len(push)):
-        current = stay * current + push[k]
-        if k == keep[position]:
-            kept[position] = current
-            position += 1
-    return kept
-
-
-def _scan(capacity: FloatArray, step: float, start: FloatArray, push: FloatArray) -> FloatArray:
-    """``c (ζ' - ζ) + Δt k ζ' = push`` over all steps, (r, n_time + 1)."""
-    system = capacity + step * (1.0 - SHIFT * capacity)
-    stay, gain = capacity / system, push.T / system
-    path = np.empty((push.shape[1] + 1, start.size))
-    path[0] = start
-    for k in range(push.shape[1]):
-        path[k + 1] = stay * path[k] + gain[k]
-    return path.T

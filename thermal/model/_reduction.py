@@ -74,7 +74,7 @@ class ReducedModel(SymbolicModel):
         for shift in _PROBES:
             seen = []
             for m in (whole, small):
-                outside = -5.0 * (m.flow[:, m.n :] @ np.ones((m.n_boundary, 1)))
+                outside = -5.0 * (m.flow[:, m.n :] @ (np.arange(m.n_boundary) < m.n_boundary - m.n_signal)[:, None])
                 response = factorise(_shifted(m, shift))(np.hstack([m.heating @ heat, outside]))
                 seen.append(m.output @ response)
             worst = max(worst, float(np.abs(seen[0] - seen[1]).max()))

@@ -15,7 +15,7 @@ from thermal.model._scheme import IMPLICIT_EULER, Scheme
 from thermal.model._stepper import Stepper
 from thermal.model._symbolic import Matrices
 from thermal.network import ThermalNetwork
-from thermal.signals import Drivers
+from thermal.signals import REFERENCE_TEMPERATURE, Drivers, signal_values
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -29,9 +29,9 @@ SPIN_UP = 3 * 86400.0
 #: The least spin-up that is accepted [s] (results contract: 12 hours).
 LEAST_SPIN_UP = 12 * 3600.0
 
-#: Temperatures are stepped as differences from this one [K]: rows of ``[K, -B]`` sum to zero, so nothing changes but
-#: round-off.
-_REFERENCE = 293.15
+#: Temperatures are stepped as differences from this one [K]: rows of ``[K, -B]`` sum to zero but for signals,
+#: which are counted from it, so nothing changes but round-off.
+_REFERENCE = REFERENCE_TEMPERATURE
 
 #: One long implicit step towards the steady state that a spin-up starts from [s].
 _STEADY_STEP = 10 * 86400.0
@@ -78,7 +78,7 @@ class Inputs:
         return len(self.stamps)
 
 
-def replay_inputs(case: Case, network: ThermalNetwork) -> Inputs:
+def replay_inputs(case: Case, network: ThermalNetwork, drivers: Drivers | None = None) -> Inputs:
     """Collect the inputs of a replay from a case's telemetry.
 
     Parameters
@@ -86,7 +86,9 @@ def replay_inputs(case: Case, network: ThermalNetwork) -> Inputs:
     case : Case
         With telemetry.
     network : ThermalNetwork
-        Says which boundaries and airflows the model has.
+        Says which boundaries, airflows and signals the model has.
+    drivers : Drivers, optional
+        Of the same case, where they are at hand.
 
     Returns
     -------
@@ -118,13 +120,12 @@ def replay_inputs(case: Case, network: ThermalNetwork) -> Inputs:
         raise SimulationError(f"telemetry: no step has all its inputs; {_most_missing(bridged)}")
     filled = [f.interpolate(limit_direction="both").fillna(0.0).to_numpy(dtype=float) for f in bridged]
     index = pd.DatetimeIndex(zone.index)
-    drivers = Drivers(case)
-    signals = [_REFERENCE + s.of(drivers)[:, None] for s in network.signals]
+    signals = _REFERENCE + signal_values(network.signals, drivers or Drivers(case))
     return Inputs(
         stamps=index,
         step=step,
         heat=filled[0],
-        boundary=np.hstack([filled[1], *signals]),
+        boundary=np.hstack([filled[1], signals]),
         airflow=filled[2],
         zone=zone.to_numpy(dtype=float),
         bridged=(zone.ffill(limit=limit) if limit else zone).to_numpy(dtype=float),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
 import numpy as np
@@ -14,9 +14,10 @@ from thermal.model._replay import LEAST_SPIN_UP, SPIN_UP, replay_inputs, spin_up
 from thermal.model._scheme import SCHEMES
 from thermal.model._stepper import Stepper
 from thermal.model._symbolic import Matrices, SymbolicModel
-from thermal.network import SHUFFLE_STEP, build_network
+from thermal.network import SHUFFLE_STEP, Extension, build_network
 from thermal.parameters import Scope
 from thermal.shuffle import RandomShuffle
+from thermal.signals import REFERENCE_TEMPERATURE
 
 FloatArray = NDArray[np.float64]
 
@@ -55,6 +56,8 @@ class Simulator:
         Seed of the random shuffle.
     scopes : mapping of str to {"global", "zone"}, optional
         Parameters with one value a zone, as they were calibrated.
+    effects : sequence of Extension
+        What is added to the baseline: effects of the catalogue, `thermal.effects.chosen`.
 
     Raises
     ------
@@ -82,6 +85,7 @@ class Simulator:
         reach: float | None = None,
         seed: int = 0,
         scopes: Mapping[str, Scope] | None = None,
+        effects: Sequence[Extension] = (),
     ) -> None:
         if scheme not in SCHEMES:
             raise ModelError(f"scheme: expected one of {sorted(SCHEMES)}, came {scheme!r}")
@@ -91,12 +95,15 @@ class Simulator:
             raise ModelError(f"shuffle: expected 'mean' or 'random', came {shuffle!r}")
         if not (np.isfinite(step_seconds) and step_seconds > 0):
             raise ModelError(f"step_seconds: expected a positive number of seconds, came {step_seconds}")
-        network = build_network(building, dx=dx, reach=reach, scopes=scopes, mean_shuffle=shuffle == "mean")
+        network = build_network(
+            building, dx=dx, reach=reach, scopes=scopes, mean_shuffle=shuffle == "mean", effects=effects
+        )
         self.network = network
         # a steady state or a spin-up needs the mean of the shuffle, also where the steps shuffle at random
         self.model = self._start_model = SymbolicModel(network)
         if shuffle == "random":
-            self._start_model = SymbolicModel(build_network(building, dx=dx, reach=reach, scopes=scopes))
+            mean = build_network(building, dx=dx, reach=reach, scopes=scopes, effects=effects)
+            self._start_model = SymbolicModel(mean)
         given = dict(parameters or {})
         names = [p.name for p in self._start_model.network.parameters]
         if probability is not None and "shuffle_probability" in names:
@@ -118,6 +125,8 @@ class Simulator:
         )
         self._states: FloatArray | None = None
         self._elapsed = 0.0
+        # signals that stand for a temperature are counted from the reference; without any, nothing need be
+        self._reference = REFERENCE_TEMPERATURE if network.signals else 0.0
 
     @property
     def zone_names(self) -> tuple[str, ...]:
@@ -130,16 +139,26 @@ class Simulator:
         return self.network.boundaries
 
     @property
+    def signal_names(self) -> tuple[str, ...]:
+        """Signals that drive the effects, the order of the signals' axis; none in the baseline."""
+        return tuple(s.name for s in self.network.signals)
+
+    @property
     def states(self) -> FloatArray:
         """Temperatures of all control volumes, shape (n_node,) [K]; a copy."""
         return self._current()[:, 0].copy()
 
     @property
     def zone_temperatures(self) -> FloatArray:
-        """Zone means now, shape (n_zone,) [K]."""
-        return np.asarray(self.network.observation @ self._current())[:, 0]
+        """What the zones' sensors read now, shape (n_zone,) [K]: the means of the air, unless a sensor lags behind."""
+        return np.asarray(self.network.reading @ self._current())[:, 0]
 
-    def reset(self, zone_temperatures: FloatArray, boundary_temperatures: FloatArray | None = None) -> FloatArray:
+    def reset(
+        self,
+        zone_temperatures: FloatArray,
+        boundary_temperatures: FloatArray | None = None,
+        signals: FloatArray | None = None,
+    ) -> FloatArray:
         """Start from the steady state that holds the zones at given temperatures.
 
         Parameters
@@ -148,6 +167,8 @@ class Simulator:
             Zone means [K].
         boundary_temperatures : ndarray, shape (n_boundary,), optional
             Boundary temperatures [K]; the mean of the zones by default.
+        signals : ndarray, shape (n_signal,), optional
+            Signals of the effects [signal unit]; none are needed in the baseline.
 
         Returns
         -------
@@ -156,12 +177,12 @@ class Simulator:
         """
         zone = self._checked("zone_temperatures", zone_temperatures, len(self.network.zones), PLAUSIBLE)
         if boundary_temperatures is None:
-            boundary_temperatures = np.full(self.network.n_boundary, zone.mean())
-        boundary = self._checked("boundary_temperatures", boundary_temperatures, self.network.n_boundary, PLAUSIBLE)
+            boundary_temperatures = np.full(len(self.network.boundaries), zone.mean())
+        outside, zero = self._outside(boundary_temperatures, signals), self._reference
         matrices = self._start_matrices()
-        start = zone.mean() * matrices.uniform[:, None]
-        states, _, _ = Stepper(matrices, _STEADY_STEP).hold(start, boundary[:, None], zone[:, None])
-        self._states, self._elapsed = self._without_stars(states), 0.0
+        start = (zone.mean() - zero) * matrices.uniform[:, None]
+        states, _, _ = Stepper(matrices, _STEADY_STEP).hold(start, outside, zone[:, None] - zero)
+        self._states, self._elapsed = self._without_stars(states) + zero, 0.0
         return self.zone_temperatures
 
     def reset_from(self, case: Case, stamp: int, spin_up_seconds: float = SPIN_UP) -> FloatArray:
@@ -207,8 +228,19 @@ class Simulator:
         """Drop the star nodes that stand for the mean of the shuffle where this simulator has none."""
         return states if self._shuffle is None else states[self._start_model.network.kind != "mixing"]
 
+    def _outside(self, boundary_temperatures: FloatArray, signals: FloatArray | None) -> FloatArray:
+        """Boundary temperatures, counted from the reference, then signals, shape (n_boundary, 1)."""
+        network = self.network
+        boundary = self._checked("boundary_temperatures", boundary_temperatures, len(network.boundaries), PLAUSIBLE)
+        given = self._checked("signals", np.empty(0) if signals is None else signals, len(network.signals))
+        return np.concatenate([boundary - self._reference, given])[:, None]
+
     def step(
-        self, zone_heat: FloatArray, boundary_temperatures: FloatArray, airflow: FloatArray | None = None
+        self,
+        zone_heat: FloatArray,
+        boundary_temperatures: FloatArray,
+        airflow: FloatArray | None = None,
+        signals: FloatArray | None = None,
     ) -> FloatArray:
         """Advance one step.
 
@@ -220,6 +252,9 @@ class Simulator:
             Boundary temperatures during the step [K].
         airflow : ndarray, shape (n_airflow,), optional
             Directed airflows during the step [kg/s]; zero by default.
+        signals : ndarray, shape (n_signal,), optional
+            Signals of the effects during the step [signal unit], as `thermal.signals.signal_values` makes them from
+            telemetry; none are needed in the baseline.
 
         Returns
         -------
@@ -233,13 +268,13 @@ class Simulator:
         """
         network = self.network
         heat = self._checked("zone_heat", zone_heat, len(network.zones))
-        boundary = self._checked("boundary_temperatures", boundary_temperatures, network.n_boundary, PLAUSIBLE)
+        outside, zero = self._outside(boundary_temperatures, signals), self._reference
         n_flow = len(network.airflows)
         flow = self._checked("airflow", np.zeros(n_flow) if airflow is None else airflow, n_flow, (0.0, np.inf))
-        states, mean, _, _ = self._stepper.advance(self._current(), boundary[:, None], heat[:, None], flow[:, None])
-        self._states = states
+        states, mean, _, _ = self._stepper.advance(self._current() - zero, outside, heat[:, None], flow[:, None])
+        self._states = states + zero
         self._shuffle_when_due()
-        return mean[:, 0]
+        return np.asarray(mean[:, 0] + zero)
 
     def field(self, floor: int) -> FloatArray:
         """Temperatures of one floor of a plan on its grid, shape (n_row, n_column) [K]; NaN outside.

@@ -101,7 +101,7 @@ class SymbolicModel:
         θ to κ and c.
     class_flows, class_masses : list of matrices
         ``[K, -B]`` and C of each class at unit value, sources left out.
-    sources : Sources
+    sources : object
         Columns of -B that the sources' classes bring; their values follow those of the faces in κ.
 
     Examples
@@ -127,7 +127,7 @@ class SymbolicModel:
         self._reading: Matrix = network.reading if network.readings else None
         self._uniform = np.ones(network.n_node)
         self._faces = faces
-        self.sources = Sources(network, sources, projection)
+        self.sources = _Sources(network, sources, projection)
         self.class_flows: list[Matrix]
         self.class_masses: list[Matrix]
         if projection is None:
@@ -174,9 +174,7 @@ class SymbolicModel:
             if p.scale == "logit" and t > 1:
                 raise ModelError(f"theta: expected a probability of at most 1, came {t} for {p.name}")
         kappa, heat = (np.asarray(v).ravel() for v in self.classes(theta))
-        negative = [
-            c.name for c, k in zip(self._faces, kappa, strict=False) if not (np.isfinite(k) and k >= 0)
-        ]
+        negative = [c.name for c, k in zip(self._faces, kappa, strict=False) if not (np.isfinite(k) and k >= 0)]
         if negative:
             raise ModelError(
                 f"theta: makes the conductance of {negative} negative; a parameter lies outside of its physical range"
@@ -205,7 +203,7 @@ class SymbolicModel:
         return self.sources.added(_weighted(self.class_flows, weights[:count]), weights[count:])
 
 
-class Sources:
+class _Sources:
     """Heat that signals bring: columns of -B, summed over classes.
 
     Parameters
@@ -218,9 +216,7 @@ class Sources:
         Basis of a reduction [-].
     """
 
-    def __init__(
-        self, network: ThermalNetwork, classes: list[ConductanceClass], projection: FloatArray | None
-    ) -> None:
+    def __init__(self, network: ThermalNetwork, classes: list[ConductanceClass], projection: FloatArray | None) -> None:
         count, n = len(classes), network.n_node
         sizes = [c.first.size for c in classes]
         rows, column = np.concatenate([[], *[c.first for c in classes]]).astype(int), np.repeat(np.arange(count), sizes)

@@ -17,6 +17,10 @@ IntArray = NDArray[np.int64]
 #: Tilt of a vertical, an upward and a downward face [deg].
 VERTICAL, UPWARD, DOWNWARD = 90.0, 0.0, 180.0
 
+#: Share of a facade's wall that is taken for glass where a plan knows of no glazing at all [-]: with a solar heat gain
+#: coefficient up to 0.8, gains of up to 0.4 of the facade.
+UNKNOWN_GLAZING = 0.5
+
 #: Azimuth of a plan's sides before the building is turned [deg].
 _SIDES = {"north": 0.0, "east": 90.0, "south": 180.0, "west": 270.0}
 
@@ -104,7 +108,7 @@ class Room:
     air : ndarray of int, shape (n_air,)
         Its air volumes.
     share : ndarray, shape (n_air,)
-        Share of its air in each.
+        Share of its air in each [-].
     mean : int
         Node at the mean of its air: the star of the shuffle, or the one volume; -1 without.
     radiant : int
@@ -168,13 +172,15 @@ class Anatomy:
     stacked : dict
         Area between two zones of which the first lies under the second [m2].
     under_roof, on_ground : dict of str to float
-        Area of a zone with nothing above, or below [m2].
+        Area of a zone with nothing above, or of one on the lowest floor [m2].
     ground_faces : list of GroundFace
         Of a zone table.
     facades : dict
         Area of exterior wall, windows included, by zone and azimuth [m2].
     air_heat_capacity : float
         Volumetric heat capacity of the air [J/m3/K].
+    airflows : tuple of (int, int)
+        Directed airflows (number of the source zone, of the target zone), in the order of the building's.
     """
 
     outer: list[OuterFaces] = field(default_factory=list)
@@ -187,6 +193,7 @@ class Anatomy:
     ground_faces: list[GroundFace] = field(default_factory=list)
     facades: dict[tuple[str, float], float] = field(default_factory=dict)
     air_heat_capacity: float = 0.0
+    airflows: tuple[tuple[int, int], ...] = ()
 
 
 def azimuth_of(side: str, orientation: float) -> float:
@@ -228,6 +235,8 @@ def stacked_areas(
 ) -> tuple[dict[tuple[str, str], float], dict[str, float], dict[str, float]]:
     """Areas between zones of floors that lie on each other, under the roof, and on the ground.
 
+    What juts out over the floor below is not on the ground.
+
     Parameters
     ----------
     plans : FloorPlans
@@ -250,11 +259,9 @@ def stacked_areas(
             mine = grids[level] == zone
             per_cell = areas[zone] / np.count_nonzero(mine)
             above = grids[level + 1][mine] if level + 1 < len(grids) else np.full(mine.sum(), ".")
-            below = grids[level - 1][mine] if level else np.full(mine.sum(), ".")
             _count(above, per_cell, stacked, roof, zone)
-            open_below = np.count_nonzero(below == ".")
-            if open_below:
-                ground[zone] = per_cell * open_below
+            if level == 0:
+                ground[zone] = areas[zone]
     return stacked, roof, ground
 
 

@@ -14,8 +14,8 @@ from thermal.errors import ScopeError
 from thermal.network._anatomy import Anatomy
 from thermal.network._network import CapacityClass, ConductanceClass, ThermalNetwork
 from thermal.network._structure import BASELINE, Structure
-from thermal.signals import Signal
 from thermal.parameters import ENVELOPE_PARAMETERS, FACADE_PREFIX, PARAMETERS, Parameter, Scope
+from thermal.signals import Signal
 
 IntArray = NDArray[np.int64]
 FloatArray = NDArray[np.float64]
@@ -182,7 +182,7 @@ class GraphBuilder:
         key : str
             Class name; sources of one name share their value and their signal.
         value : casadi.SX or float
-            Heat per unit of signal and weight, as an expression of the parameter symbols.
+            Heat per unit of signal and weight, as an expression of the parameter symbols [W per both].
         node : int or ndarray of int, shape (n,)
             Nodes.
         signal : Signal

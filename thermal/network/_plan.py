@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from thermal.case import Building, FloorPlans, facade_areas, zone_floor_areas
 from thermal.errors import ModelError
-from thermal.network._anatomy import azimuth_of, partition_areas, stacked_areas
+from thermal.network._anatomy import UNKNOWN_GLAZING, VERTICAL, Pane, azimuth_of, partition_areas, stacked_areas
 from thermal.network._extension import Extension
 from thermal.network._floor import Floor
 from thermal.network._graph import GraphBuilder
@@ -97,8 +97,7 @@ def plan_network(
     shape = (n, len(graph.zones))
     heating = sp.csr_matrix((share, (node, column)), shape=shape)
     observation = sp.csr_matrix((mean, (column, node)), shape=shape[::-1])
-    flows = tuple((graph.zones.index(a.source), graph.zones.index(a.target)) for a in building.airflows)
-    return graph.finish(observation, heating, flows, grid.spacing, tuple(shapes))
+    return graph.finish(observation, heating, graph.anatomy.airflows, grid.spacing, tuple(shapes))
 
 
 def _remember(
@@ -106,6 +105,7 @@ def _remember(
 ) -> None:
     """Complete the anatomy: rooms, what lies above and below them, and their facades."""
     anatomy = graph.anatomy
+    anatomy.airflows = tuple((graph.zones.index(a.source), graph.zones.index(a.target)) for a in building.airflows)
     for plan in plans.floors:
         for name in plan.zone_names:
             zones[name].room(areas[name], areas[name] * plan.height)
@@ -113,4 +113,7 @@ def _remember(
     for zone, sides in facade_areas(plans).items():
         for side, area in sides.items():
             if area > 0.0:
-                anatomy.facades[zone, azimuth_of(side, building.orientation)] = area
+                azimuth = azimuth_of(side, building.orientation)
+                anatomy.facades[zone, azimuth] = area
+                if not plans.glazing:
+                    anatomy.panes.append(Pane(zone, azimuth, VERTICAL, UNKNOWN_GLAZING * area))

@@ -69,13 +69,15 @@ def table_network(
         _add_surface(graph, zones, surface, table, density)
     for entry in table.zones:
         zones[entry.name].room(entry.floor_area, entry.volume)
+    graph.anatomy.airflows = tuple(
+        (graph.zones.index(a.source), graph.zones.index(a.target)) for a in building.airflows
+    )
     for effect in effects:
         effect.extend(graph)
     number = np.arange(len(zones))
     node = np.concatenate([zones[z].air for z in graph.zones])
     heating = sp.csr_matrix((np.ones(len(zones)), (node, number)), shape=(graph.size, len(zones)))
-    flows = tuple((graph.zones.index(a.source), graph.zones.index(a.target)) for a in building.airflows)
-    return graph.finish(heating.T.tocsr(), heating, flows)
+    return graph.finish(heating.T.tocsr(), heating, graph.anatomy.airflows)
 
 
 def _add_surface(

@@ -1,6 +1,25 @@
 """What drives the effects of the catalogue: sun, sky, wind and schedules, from a case's telemetry."""
 
-from thermal.signals._drivers import Drivers, Signal
-from thermal.signals._sun import GLASS_DIFFUSE, incidence_modifier
+from thermal.signals._drivers import (
+    INFRARED,
+    IRRADIANCE,
+    REFERENCE_TEMPERATURE,
+    WIND,
+    Drivers,
+    Signal,
+    signal_values,
+)
+from thermal.signals._sun import Sun, incidence_modifier, sun_of
 
-__all__ = ["GLASS_DIFFUSE", "Drivers", "Signal", "incidence_modifier"]
+__all__ = [
+    "INFRARED",
+    "IRRADIANCE",
+    "REFERENCE_TEMPERATURE",
+    "WIND",
+    "Drivers",
+    "Signal",
+    "Sun",
+    "incidence_modifier",
+    "signal_values",
+    "sun_of",
+]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -12,10 +12,14 @@ from numpy.typing import NDArray
 
 from thermal.case import Case
 from thermal.case.points import DISCHARGE_TEMPERATURE, SUPPLY_FLOW
-from thermal.signals._sun import Sun, sun_of
+from thermal.errors import EffectError
+from thermal.signals._sun import Sun, suffices, sun_of
 from thermal.units import AIR_HEAT_CAPACITY
 
 FloatArray = NDArray[np.float64]
+
+#: Temperature from which states, boundaries and signals that stand for a temperature are counted in a replay [K].
+REFERENCE_TEMPERATURE = 293.15
 
 #: Stefan-Boltzmann constant [W/m2/K4].
 STEFAN_BOLTZMANN = 5.670374419e-8
@@ -23,8 +27,12 @@ STEFAN_BOLTZMANN = 5.670374419e-8
 #: Hours of a working day unless occupancy is measured, and how long people take to come and go [h].
 _WORK, _RAMP = (8.0, 18.0), 1.0
 
-_INFRARED = "horizontal_infrared_irradiance_sensor"
-_WIND = "wind_speed_sensor"
+#: Points of the weather station that effects need.
+IRRADIANCE, INFRARED, WIND = (
+    "direct_normal_irradiance_sensor",
+    "horizontal_infrared_irradiance_sensor",
+    "wind_speed_sensor",
+)
 _OCCUPANCY = "occupancy_count_sensor"
 
 
@@ -52,14 +60,20 @@ class Drivers:
         return self.case.weather().interpolate(limit_direction="both")
 
     def measured(self, point: str) -> bool:
-        """Whether the weather station has a point.
+        """Whether the weather station has a point, or those that it follows from.
 
         Parameters
         ----------
         point : str
-            Point type.
+            Point type. Beam and diffuse irradiance follow from the global one, and from each other with it.
         """
+        if point == IRRADIANCE:
+            return suffices(self.weather)
         return point in self.weather.columns and bool(self.weather[point].notna().any())
+
+    def _need(self, point: str) -> None:
+        if not self.measured(point):
+            raise EffectError(f"weather station: expected {point}, which an effect of the model needs, came none")
 
     @cached_property
     def outdoor(self) -> FloatArray:
@@ -69,23 +83,31 @@ class Drivers:
     @cached_property
     def wind(self) -> FloatArray:
         """Wind speed at the station, shape (n_time,) [m/s]."""
-        return np.maximum(self._filled(self.weather[_WIND]), 0.0)
+        self._need(WIND)
+        return np.maximum(self._filled(self.weather[WIND]), 0.0)
 
     @cached_property
     def sky(self) -> FloatArray:
         """Longwave from the sky less that of a black body at outdoor temperature, shape (n_time,) [W/m2]; negative."""
-        infrared = self._filled(self.weather[_INFRARED])
+        self._need(INFRARED)
+        infrared = self._filled(self.weather[INFRARED])
         return np.asarray(infrared - STEFAN_BOLTZMANN * self.outdoor**4)
 
     @cached_property
     def sun(self) -> Sun:
         """Sun's place and irradiances."""
+        self._need(IRRADIANCE)
         return sun_of(self.case.building.location, self.stamps, self.case.step, self.weather)
 
     @cached_property
     def heat(self) -> FloatArray:
         """Metered heat of the zones, shape (n_time, n_zone) [W]."""
         return self._filled(self.case.zone_heat())
+
+    @cached_property
+    def airflow(self) -> FloatArray:
+        """Directed airflows from zone to zone, shape (n_time, n_airflow) [kg/s]."""
+        return self._filled(self.case.airflow_rates())
 
     @cached_property
     def usual(self) -> FloatArray:
@@ -96,7 +118,7 @@ class Drivers:
         """
         zone = self.case.zone_temperatures()
         local = self.stamps
-        slot = [(local.dayofweek < 5), np.asarray(local.hour)]
+        slot = [(local.day_of_week < 5), np.asarray(local.hour)]
         profile = zone.groupby(slot).transform("mean")
         filled = profile.fillna(zone.mean()).fillna(float(np.nanmean(zone.to_numpy(dtype=float))))
         return filled.to_numpy(dtype=float)
@@ -113,7 +135,7 @@ class Drivers:
         hour = np.asarray(middle.hour + middle.minute / 60.0 + middle.second / 3600.0, dtype=float)
         rise = np.clip((hour - _WORK[0]) / _RAMP + 0.5, 0.0, 1.0)
         fall = np.clip((_WORK[1] - hour) / _RAMP + 0.5, 0.0, 1.0)
-        return np.where(middle.dayofweek < 5, rise * fall, 0.0)
+        return np.where(middle.day_of_week < 5, rise * fall, 0.0)
 
     @cached_property
     def supply(self) -> tuple[FloatArray, FloatArray]:
@@ -129,7 +151,8 @@ class Drivers:
             flow[:, k] += self._filled(rate)
             warm = frame.get(f"{device.name}/{DISCHARGE_TEMPERATURE}")
             if warm is not None:
-                heat[:, k] += self._filled((rate * AIR_HEAT_CAPACITY * (warm - zones[device.zone])).where(rate != 0, 0.0))
+                brought = rate * AIR_HEAT_CAPACITY * (warm - zones[device.zone])
+                heat[:, k] += self._filled(brought.where(rate != 0.0, 0.0))
         return flow, heat
 
     def _filled(self, values: pd.Series | pd.DataFrame) -> FloatArray:
@@ -154,3 +177,26 @@ class Signal:
     name: str
     unit: str
     of: Callable[[Drivers], FloatArray]
+
+
+def signal_values(signals: Sequence[Signal], drivers: Drivers) -> FloatArray:
+    """Make signals from a case.
+
+    Parameters
+    ----------
+    signals : sequence of Signal
+        Such as `ThermalNetwork.signals`.
+    drivers : Drivers
+        Of the case.
+
+    Returns
+    -------
+    ndarray, shape (n_time, n_signal)
+        One column a signal [signal unit].
+
+    Raises
+    ------
+    EffectError
+        When the weather station lacks what a signal is made of.
+    """
+    return np.column_stack([np.empty((len(drivers.stamps), 0)), *(s.of(drivers) for s in signals)])

@@ -9,6 +9,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from thermal.case.schema import Location
+from thermal.errors import EffectError
 
 FloatArray = NDArray[np.float64]
 
@@ -98,6 +99,23 @@ class Sun:
         return np.asarray(incidence_modifier(self.cosine(azimuth, tilt)) * beam + GLASS_DIFFUSE * diffuse)
 
 
+def _irradiances(weather: pd.DataFrame) -> set[str]:
+    """Irradiances of the sun that are measured."""
+    return {n for n in (_NORMAL, _DIFFUSE, _GLOBAL) if n in weather.columns and weather[n].notna().any()}
+
+
+def suffices(weather: pd.DataFrame) -> bool:
+    """Whether beam and diffuse irradiance are measured or follow from what is.
+
+    Parameters
+    ----------
+    weather : DataFrame
+        Points of the weather station [W/m2].
+    """
+    seen = _irradiances(weather)
+    return _GLOBAL in seen or {_NORMAL, _DIFFUSE} <= seen
+
+
 def sun_of(location: Location, stamps: pd.DatetimeIndex, step: float, weather: pd.DataFrame) -> Sun:
     """Sun at the middle of each step, with irradiances as measured or derived from those that are.
 
@@ -114,6 +132,11 @@ def sun_of(location: Location, stamps: pd.DatetimeIndex, step: float, weather: p
         Their length [s].
     weather : DataFrame
         Points of the weather station [W/m2].
+
+    Raises
+    ------
+    EffectError
+        When what is measured does not tell beam and diffuse apart.
     """
     from pvlib import irradiance, solarposition
 
@@ -122,21 +145,24 @@ def sun_of(location: Location, stamps: pd.DatetimeIndex, step: float, weather: p
     altitude = place["elevation"].to_numpy(dtype=float)
     rise = np.sin(np.radians(altitude))
     seen: dict[str, FloatArray] = {
-        name: np.maximum(weather[name].fillna(0.0).to_numpy(dtype=float), 0.0)
-        for name in (_NORMAL, _DIFFUSE, _GLOBAL)
-        if name in weather.columns and weather[name].notna().any()
+        name: np.maximum(weather[name].fillna(0.0).to_numpy(dtype=float), 0.0) for name in _irradiances(weather)
     }
     up = altitude > _LOWEST
     normal, diffuse, total = seen.get(_NORMAL), seen.get(_DIFFUSE), seen.get(_GLOBAL)
-    if total is None:
-        total = (normal if normal is not None else 0.0) * np.maximum(rise, 0.0) + (diffuse if diffuse is not None else 0.0)
-    if diffuse is None and normal is None:
+    if normal is not None and diffuse is not None:
+        total = normal * np.maximum(rise, 0.0) + diffuse if total is None else total
+    elif total is None:
+        raise EffectError(
+            "weather station: expected global_horizontal_irradiance_sensor, or direct_normal_irradiance_sensor and "
+            f"diffuse_horizontal_irradiance_sensor, came {sorted(seen) or 'none'}"
+        )
+    elif normal is not None:
+        diffuse = np.maximum(total - normal * np.maximum(rise, 0.0), 0.0)
+    elif diffuse is not None:
+        normal = np.where(up, np.maximum(total - diffuse, 0.0) / np.maximum(rise, np.sin(np.radians(_LOWEST))), 0.0)
+    else:
         split = irradiance.erbs(total, 90.0 - altitude, middle)
         normal, diffuse = (np.nan_to_num(np.asarray(split[k], dtype=float)) for k in ("dni", "dhi"))
-    elif diffuse is None and normal is not None:
-        diffuse = np.maximum(total - normal * np.maximum(rise, 0.0), 0.0)
-    elif normal is None and diffuse is not None:
-        normal = np.where(up, np.maximum(total - diffuse, 0.0) / np.maximum(rise, np.sin(np.radians(_LOWEST))), 0.0)
     return Sun(
         place["azimuth"].to_numpy(dtype=float), altitude, np.asarray(normal), np.asarray(diffuse), np.asarray(total)
     )
