@@ -8,7 +8,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal.effects._effect import Effect, Joining, strength
+from thermal.effects._effect import Effect, Joining, paired, strength
 from thermal.network import Anatomy, Room
 from thermal.signals import WIND, Drivers, Signal
 
@@ -95,21 +95,12 @@ def _build_mixing(join: Joining) -> None:
     heat = join.anatomy.air_heat_capacity
     for first, second in join.anatomy.partitions:
         a, b = join.anatomy.rooms[first], join.anatomy.rooms[second]
-        near, far, share = _ends(a, b)
+        near, far, share = paired((a.air, a.share), (b.air, b.share))
         pair = f"{first}-{second}"
         join.graph.face(join.key(pair), heat * (constant + _PRESENCE * scheduled), near, far, share)
         signal = Signal(f"presence and difference {pair}", "K", partial(_by_presence, first=first, second=second))
         join.heat_air(a, heat * scheduled, signal, 1.0)
         join.heat_air(b, -heat * scheduled, signal, 1.0)
-
-
-def _ends(a: Room, b: Room) -> tuple[NDArray[np.int64], NDArray[np.int64], FloatArray]:
-    """Nodes that an exchange between two zones joins: their means, or volumes in turn where they have none."""
-    if a.mean >= 0 and b.mean >= 0:
-        return np.array([a.mean]), np.array([b.mean]), np.ones(1)
-    count = max(a.air.size, b.air.size)
-    which = np.arange(count)
-    return a.air[which % a.air.size], b.air[which % b.air.size], np.full(count, 1.0 / count)
 
 
 def _no_facades(anatomy: Anatomy) -> str | None:

@@ -15,6 +15,8 @@ from thermal.parameters import Parameter, Scale
 from thermal.signals import Drivers, Signal
 
 FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+_Part = tuple[IntArray, FloatArray]
 
 #: Adds an effect to a graph, in some of its zones (all of them when there are none).
 Builder = Callable[["Joining"], None]
@@ -216,6 +218,29 @@ class Joining:
             Geometry, such as an area [m2].
         """
         self.graph.face(self.key(room.name), value, room.air, far, weight * room.share)
+
+
+def paired(first: _Part, second: _Part) -> tuple[IntArray, IntArray, FloatArray]:
+    """Faces between two sets of volumes whose flow is that between their means, in as few as can be.
+
+    Every volume takes part by its share on both sides: the north-west corner of a transport problem (Dantzig 1951).
+
+    Parameters
+    ----------
+    first, second : tuple of ndarray
+        Nodes and their shares, which sum to 1 [-].
+
+    Returns
+    -------
+    tuple of ndarray
+        Nodes of the first set, nodes of the second, shares that sum to 1 [-].
+    """
+    ends = [np.cumsum(share) / np.sum(share) for _, share in (first, second)]
+    cuts = np.union1d(*ends)
+    cuts = cuts[np.append(np.diff(cuts) > 1e-12, True)]
+    middle = cuts - np.diff(cuts, prepend=0.0) / 2.0
+    numbers = [np.minimum(np.searchsorted(e, middle), e.size - 1) for e in ends]
+    return first[0][numbers[0]], second[0][numbers[1]], np.diff(cuts, prepend=0.0)
 
 
 def strength(name: str, unit: str, upper: float, source: str, effect: str, lower: float = 0.0) -> Parameter:

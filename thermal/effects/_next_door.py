@@ -6,7 +6,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal.effects._effect import CONSTANT, Effect, Joining, shape, strength
+from thermal.effects._effect import CONSTANT, Effect, Joining, paired, shape, strength
 from thermal.network import RATED_OUTSIDE_FILM, UPWARD, Anatomy, OuterFaces, Outlook, Room
 from thermal.signals import REFERENCE_TEMPERATURE, Drivers, Signal
 
@@ -30,10 +30,8 @@ def _build_floors(join: Joining) -> None:
     value = join.parameter("interfloor_u_value")
     for (lower, upper), area in join.anatomy.stacked.items():
         ends = [_backs(join.anatomy.rooms[z]) for z in (lower, upper)]
-        count = max(e[0].size for e in ends)
-        which = np.arange(count)
-        near, far = (e[0][which % e[0].size] for e in ends)
-        join.graph.face(join.key(f"{lower}-{upper}"), value, near, far, np.full(count, area / count))
+        near, far, share = paired(*ends)
+        join.graph.face(join.key(f"{lower}-{upper}"), value, near, far, area * share)
 
 
 def _build_roof(join: Joining) -> None:

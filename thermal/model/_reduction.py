@@ -99,7 +99,7 @@ def krylov_basis(
     Parameters
     ----------
     matrices : sequence of Matrices
-        The grid model at the θ to be accurate for.
+        The grid model at the θ to be accurate for; with slopes, also for sources whose strength is zero there.
     shifts : sequence of float
         Expansion points [1/s], positive.
     tolerance : float
@@ -112,22 +112,49 @@ def krylov_basis(
     """
     blocks = [np.ones((matrices[0].n, 1))]
     for m in matrices:
-        inputs = np.hstack([m.heating.toarray(), -m.flow[:, m.n :].toarray()])
+        inputs = _inputs(m)
         for shift in shifts:
             block = factorise(_shifted(m, shift))(inputs)
-            size = np.linalg.norm(block, axis=0)
-            blocks.append(block[:, size > 0] / size[size > 0])  # a boundary that no face touches moves nothing
+            blocks.append(block / np.linalg.norm(block, axis=0))
     stacked = np.hstack(blocks)
-    capacity = np.max([np.abs(m.capacity.diagonal()) for m in matrices], axis=0)
+    sensors = _sensors(matrices[0])
+    stacked[sensors] = 0.0
+    capacity = np.abs(matrices[0].capacity.diagonal())
     weight = capacity + 1e-6 * capacity.max()
-    if matrices[0].reading is not None:  # a sensor holds hardly any heat, and yet is what is compared with telemetry
-        weight[matrices[0].reading.indices] = capacity.max()
     gram = stacked.T @ (weight[:, None] * stacked)
     norms = np.sqrt(np.diag(gram))
     values, vectors = np.linalg.eigh(gram / np.outer(norms, norms))
     keep = values > tolerance * values[-1]
     basis = (stacked / norms) @ (vectors[:, keep] / np.sqrt(values[keep]))
-    return np.asarray(np.linalg.qr(np.hstack([np.ones((basis.shape[0], 1)), basis]))[0])
+    own = np.eye(basis.shape[0])[:, sensors]
+    return np.asarray(np.linalg.qr(np.hstack([1.0 - own.sum(axis=1, keepdims=True), basis, own]))[0])
+
+
+def _inputs(m: Matrices) -> FloatArray:
+    """Patterns of heat that drive a model: zones, boundaries and sources, each once, shape (n, n_input)."""
+    signals = m.flow.shape[1] - m.n_signal
+    sources = [s[:, signals:] for s in m.flow_slopes] if m.n_signal else []
+    columns = sp.csc_matrix(sp.hstack([m.heating, -m.flow[:, m.n :], *sources]))
+    size = np.sqrt(np.asarray(columns.multiply(columns).sum(axis=0)).ravel())
+    there = np.flatnonzero(size)  # a boundary that no face touches moves nothing
+    unit = sp.csc_matrix(columns[:, there] @ sp.diags(1.0 / size[there]))
+    unit.sort_indices()
+    seen = {}
+    for k in range(there.size):
+        part = slice(unit.indptr[k], unit.indptr[k + 1])
+        values = np.round(unit.data[part] * np.sign(unit.data[part][0]), 9)
+        seen.setdefault((unit.indices[part].tobytes(), values.tobytes()), k)
+    return np.asarray(columns[:, there[list(seen.values())]].toarray())
+
+
+def _sensors(m: Matrices) -> NDArray[np.int64]:
+    """Nodes of sensors that lag behind: each is a state of its own.
+
+    They hold hardly any heat, so that a Galerkin projection, which weighs errors by heat, would not care for them.
+    """
+    if m.reading is None:
+        return np.zeros(0, dtype=np.int64)
+    return np.setdiff1d(m.reading.indices, m.observation.indices).astype(np.int64)
 
 
 def reduced_model(
@@ -178,9 +205,9 @@ def reduced_model(
         raise ModelError("reduced model: expected an order or a tolerance, came both")
     if order is not None and order < 2:
         raise ModelError(f"order: expected at least 2 states, came {order}")
-    inputs = len(model.network.zones) + model.network.n_boundary
+    inputs = len(model.network.zones) + len(model.network.boundaries)
     chosen = shifts or (SHIFTS if inputs < _MANY_INPUTS else FEW_SHIFTS)
-    whole = [model.matrices(t) for t in thetas]
+    whole = [model.matrices(t, slopes=bool(model.network.signals)) for t in thetas]
     basis, replay = krylov_basis(whole, chosen), closed_loop(whole[0])
     small = _turned(whole[0], basis)
     errors = differences(small, replay)
@@ -207,7 +234,7 @@ def _ranked(m: Matrices) -> FloatArray:
     gain = np.abs(np.diag(modes.observation @ (modes.heating / modes.conductance[:, None])))
     drive = np.hstack([modes.boundary / np.sqrt(m.n_boundary), modes.heating / gain])
     gramian = np.zeros((rate.size, rate.size))
-    for factor in (drive / root[:, None], modes.observation.T / root[:, None]):
+    for factor in (drive / root[:, None], modes.output.T / root[:, None]):
         part = (factor @ factor.T) / (rate[:, None] + rate[None, :])
         gramian += part / np.trace(part)
     vectors = np.linalg.eigh(gramian)[1][:, ::-1]
