@@ -161,7 +161,7 @@ def sun_of(location: Location, stamps: pd.DatetimeIndex, step: float, weather: p
     elif diffuse is not None:
         normal = np.where(up, np.maximum(total - diffuse, 0.0) / np.maximum(rise, np.sin(np.radians(_LOWEST))), 0.0)
     else:
-        split = irradiance.erbs(total, 90.0 - altitude, middle)
+        split = irradiance.erbs(total, 90.0 - altitude, np.asarray(middle.day_of_year))
         normal, diffuse = (np.nan_to_num(np.asarray(split[k], dtype=float)) for k in ("dni", "dhi"))
     return Sun(
         place["azimuth"].to_numpy(dtype=float), altitude, np.asarray(normal), np.asarray(diffuse), np.asarray(total)
