@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from thermal.case.points import POINT_TYPES
+from thermal.effects import CATALOGUE
 from thermal.parameters import PARAMETERS
 from thermal.units import QUANTITIES
 
@@ -27,6 +28,7 @@ def cells(name: str) -> list[str]:
 
 def test_nomenclature_has_every_parameter_and_point_with_its_unit(expect_none: Check) -> None:
     units = {name: p.unit for name, p in PARAMETERS.items()}
+    units |= {p.name: p.unit for effect in CATALOGUE.values() for p in effect.parameters}
     units |= {name: QUANTITIES[point.quantity].file_unit for name, point in POINT_TYPES.items()}
     wrong = [name for name, unit in units.items() if unit not in cells(name)]
     expect_none([f"docs/nomenclature.md:1: has no row '| `{n}` | ...' with a cell '{units[n]}'; add it" for n in wrong])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pandas as pd
@@ -111,7 +112,7 @@ def test_a_lagging_sensor_is_a_first_order_filter(lively_case: CaseOf) -> None:
         sensor.append(plant.zone_temperatures)
         air.append(plant.network.observation @ plant.states)
     filtered, held = [], np.array(sensor[0])
-    for before, after in zip(air[:-1], air[1:], strict=True):  # exact for an air temperature that is straight in a step
+    for before, after in pairwise(air):  # exact for an air temperature that is straight in a step
         left, slope, tau = np.exp(-5.0 / (60.0 * minutes)), (after - before) / 5.0, 60.0 * minutes
         held = after - slope * tau + (held - before + slope * tau) * left
         filtered.append(held)
@@ -138,7 +139,7 @@ def test_hidden_mass_is_a_second_node(lively_case: CaseOf) -> None:
         mass.append(plant.states[node])
         air.append(plant.zone_temperatures[0])
     tau, expected = 5e4 / 3.0, [mass[0]]
-    for before, after in zip(air[:-1], air[1:], strict=True):
+    for before, after in pairwise(air):
         slope = (after - before) / 20.0
         expected.append(after - slope * tau + (expected[-1] - before + slope * tau) * np.exp(-20.0 / tau))
     assert mass[-1] - mass[0] > 0.5

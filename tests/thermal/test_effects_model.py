@@ -9,8 +9,17 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from thermal import Case, Simulator, SymbolicModel, ThermalNetwork, build_network, free_runs, reduced_model
-from thermal import replay_inputs, spin_up
+from thermal import (
+    Case,
+    Simulator,
+    SymbolicModel,
+    ThermalNetwork,
+    build_network,
+    free_runs,
+    reduced_model,
+    replay_inputs,
+    spin_up,
+)
 from thermal.effects import CATALOGUE, chosen
 from thermal.errors import InputShapeError
 from thermal.model import IMPLICIT_EULER, TR_BDF2, Inputs, RolloutData, Scheme, rollout

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 
 from thermal.effects._air import INFILTRATION, THERMAL_BRIDGE, WINDOW_OPENING, ZONE_MIXING
-from thermal.effects._effect import CONSTANT, Chosen, Effect, Joining, strength
+from thermal.effects._effect import CONSTANT, Chosen, Effect, Joining, shape, strength
 from thermal.effects._metering import CAPACITY_LIMIT, DUCT_LOSS, FLOW_GAIN, SENSOR_BIAS, SENSOR_LAG, VALVE_LEAK
 from thermal.effects._next_door import GROUND_EXCHANGE, HIDDEN_MASS, INTERFLOOR_EXCHANGE, NEIGHBOUR, ROOF_EXCHANGE
 from thermal.effects._outside import LONGWAVE_SKY, WIND_FILM
 from thermal.effects._people import CLOCK_SHIFT, INTERNAL_GAINS, LATENT_LOAD
 from thermal.effects._sun import BLINDS, SOLAR_GAIN, SOLAR_OPAQUE
+from thermal.effects._words import catalogue_table
 from thermal.errors import EffectError, nearest
 
 #: Effects by id, in the order in which they join a network: what others look at comes first, sensors come last.
@@ -43,6 +44,9 @@ def chosen(effects: Iterable[str] | Mapping[str, Sequence[str]]) -> tuple[Chosen
     ['solar_gain', 'blinds']
     """
     zones = dict(effects) if isinstance(effects, Mapping) else {name: () for name in effects}
+    for name, where in zones.items():
+        if isinstance(where, str):
+            raise EffectError(f"effect {name}: expected a sequence of zones, came {where!r}")
     for name in zones:
         if name not in CATALOGUE:
             raise EffectError(f"effect {name!r}: not in the catalogue; {nearest(name, CATALOGUE)}")
@@ -52,4 +56,4 @@ def chosen(effects: Iterable[str] | Mapping[str, Sequence[str]]) -> tuple[Chosen
     return tuple(Chosen(e, tuple(zones[e.id])) for e in CATALOGUE.values() if e.id in zones)
 
 
-__all__ = ["CATALOGUE", "CONSTANT", "Chosen", "Effect", "Joining", "chosen", "strength"]
+__all__ = ["CATALOGUE", "CONSTANT", "Chosen", "Effect", "Joining", "catalogue_table", "chosen", "shape", "strength"]

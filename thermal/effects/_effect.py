@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal.errors import EffectError
+from thermal.errors import EffectError, nearest
 from thermal.network import Anatomy, GraphBuilder, Room
 from thermal.parameters import Parameter, Scale
 from thermal.signals import Drivers, Signal
@@ -116,9 +116,12 @@ class Chosen:
         """
         unknown = sorted(set(self.zones) - set(graph.zones))
         if unknown:
-            raise EffectError(f"effect {self.effect.id}: zones {unknown} are not of this building")
+            known = nearest(unknown[0], graph.zones)
+            raise EffectError(f"effect {self.effect.id}: zones {unknown} are not of this building; {known}")
         if self.zones and not self.effect.zonal:
-            raise EffectError(f"effect {self.effect.id}: acts on the whole building, came zones {list(self.zones)}")
+            raise EffectError(
+                f"effect {self.effect.id}: acts on the whole building, came zones {list(self.zones)}; leave them out"
+            )
         self.effect.build(Joining(graph, self.effect, self.zones or graph.zones))
 
 

@@ -139,7 +139,7 @@ def _inputs(m: Matrices) -> FloatArray:
     there = np.flatnonzero(size)  # a boundary that no face touches moves nothing
     unit = sp.csc_matrix(columns[:, there] @ sp.diags(1.0 / size[there]))
     unit.sort_indices()
-    seen = {}
+    seen: dict[tuple[bytes, bytes], int] = {}
     for k in range(there.size):
         part = slice(unit.indptr[k], unit.indptr[k + 1])
         values = np.round(unit.data[part] * np.sign(unit.data[part][0]), 9)

@@ -309,6 +309,7 @@ class GraphBuilder:
             floor_shapes=floor_shapes,
             signals=tuple(self._signals.values()),
             readings=dict(self._readings),
+            anatomy=self.anatomy,
         )
 
     def _refuse_unused_scopes(self) -> None:

@@ -12,6 +12,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from thermal.errors import ModelError
+from thermal.network._anatomy import Anatomy
 from thermal.parameters import Parameter
 from thermal.signals import Signal
 
@@ -105,6 +106,8 @@ class ThermalNetwork:
         What drives the effects beside the boundary temperatures; they are columns of B behind these.
     readings : mapping of int to int
         Sensor nodes by zone number, where a sensor does not read the mean of the air.
+    anatomy : Anatomy
+        What its volumes and faces are part of.
     """
 
     zones: tuple[str, ...]
@@ -124,6 +127,7 @@ class ThermalNetwork:
     floor_shapes: tuple[tuple[int, int], ...] = ()
     signals: tuple[Signal, ...] = ()
     readings: Mapping[int, int] = field(default_factory=dict)
+    anatomy: Anatomy = field(default_factory=Anatomy)
 
     @property
     def n_node(self) -> int:

@@ -1,0 +1,140 @@
+"""The catalogue: its contract, its errors, what cannot be tested and why, and the page that documents it."""
+
+from __future__ import annotations
+
+import doctest
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import pint
+import pytest
+
+from thermal import Case, Telemetry, ZoneTable, build_network
+from thermal.effects import CATALOGUE, Chosen, catalogue_table, chosen
+from thermal.errors import EffectError
+from thermal.parameters import PARAMETERS
+from thermal.signals import INFRARED, IRRADIANCE, WIND, Drivers
+
+CaseOf = Callable[[str], Case]
+UNITS = pint.UnitRegistry()
+DOCS = Path(__file__).parents[2] / "docs"
+
+# Fixed for all who read or write a diagnosis.
+IDS = (
+    "solar_gain solar_opaque longwave_sky wind_film infiltration internal_gains interfloor_exchange ground_exchange "
+    "roof_exchange hidden_mass zone_mixing sensor_bias sensor_lag duct_loss flow_gain capacity_limit valve_leak "
+    "clock_shift latent_load neighbour window_opening thermal_bridge blinds"
+).split()
+
+
+def test_every_id_is_there() -> None:
+    assert set(CATALOGUE) == set(IDS)
+
+
+@pytest.mark.parametrize("name", CATALOGUE)
+def test_an_effect_keeps_its_contract(name: str) -> None:
+    effect = CATALOGUE[name]
+    assert effect.parameters[0].start == 0.0 and effect.parameters[0].scale == "linear"
+    assert not {p.name for p in effect.parameters} & set(PARAMETERS)
+    for p in effect.parameters:
+        assert p.effect == name and len(p.source) > 5
+        UNITS.parse_units(p.unit)
+    known = set(CATALOGUE) | set(PARAMETERS)
+    assert not [c for c in effect.confounders if "_" in c and c not in known]
+    order = list(CATALOGUE)
+    assert all(order.index(r) < order.index(name) for r in effect.requires)
+    assert effect.separated_by and effect.source and effect.acts_on and effect.title and effect.equation
+
+
+def test_names_of_parameters_are_one_effects_own() -> None:
+    names = [p.name for e in CATALOGUE.values() for p in e.parameters]
+    assert len(names) == len(set(names))
+
+
+@pytest.mark.parametrize(
+    ("effects", "message"),
+    [
+        (["solar_gains"], "'solar_gains': not in the catalogue; the nearest valid one is 'solar_gain'"),
+        (["blinds"], "effect blinds: modifies solar_gain; add that too"),
+        ({"sensor_bias": "A"}, "effect sensor_bias: expected a sequence of zones, came 'A'"),
+    ],
+)
+def test_what_cannot_be_chosen(effects: object, message: str) -> None:
+    with pytest.raises(EffectError, match=message):
+        chosen(effects)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("effects", "message"),
+    [
+        ({"sensor_bias": ["A", "Z"]}, r"effect sensor_bias: zones \['Z'\] are not of this building"),
+        ({"infiltration": ["A"]}, r"effect infiltration: acts on the whole building, came zones \['A'\]"),
+    ],
+)
+def test_where_an_effect_cannot_be(lively_case: CaseOf, effects: dict[str, list[str]], message: str) -> None:
+    with pytest.raises(EffectError, match=message):
+        build_network(lively_case("plan").building, effects=chosen(effects))
+
+
+def test_an_effect_of_some_zones_has_their_parameters(lively_case: CaseOf) -> None:
+    network = build_network(lively_case("plan").building, effects=(Chosen(CATALOGUE["flow_gain"], ("C", "B")),))
+    assert {p.name for p in network.parameters if p.effect} == {"flow_gain@B", "flow_gain@C"}
+
+
+def reasons(case: Case) -> dict[str, str]:
+    drivers, anatomy = Drivers(case), build_network(case.building).anatomy
+    return {name: reason for name, e in CATALOGUE.items() if (reason := e.untestable(drivers, anatomy)) is not None}
+
+
+def without(case: Case, *points: str) -> Case:
+    frame = case.telemetry.frame.drop(columns=[f"weather_station/{p}" for p in points])
+    return replace(case, telemetry=Telemetry.from_frame(frame), judged=None)
+
+
+def test_what_a_complete_case_cannot_tell(lively_case: CaseOf) -> None:
+    humid = {"latent_load": "not measured: zone_air_relative_humidity_sensor"}
+    assert reasons(lively_case("plan")) == humid
+    assert reasons(lively_case("table")) == humid | {
+        "interfloor_exchange": "no zone lies above another",
+        "roof_exchange": "what lies above the zones is described by the case itself",
+    }
+
+
+def test_what_a_poor_weather_station_cannot_tell(lively_case: CaseOf) -> None:
+    case = lively_case("plan")
+    sun = dict.fromkeys(("solar_gain", "blinds", "solar_opaque"), f"not measured: {IRRADIANCE}")
+    poor = reasons(without(case, IRRADIANCE, WIND, INFRARED))
+    assert poor == reasons(case) | sun | {
+        "wind_film": f"not measured: {WIND}",
+        "longwave_sky": f"not measured: {INFRARED}",
+    }
+
+
+def test_what_a_building_without_the_part_cannot_have(lively_case: CaseOf) -> None:
+    case = lively_case("table")
+    table = case.building.geometry
+    assert isinstance(table, ZoneTable)
+    inside = tuple(s for s in table.surfaces if s.other in ("A", "B", "attic"))
+    closed = replace(case, building=replace(case.building, geometry=replace(table, surfaces=inside)), judged=None)
+    said = reasons(closed)
+    assert said["solar_gain"] == "the building has no windows to outdoor"
+    assert said["solar_opaque"] == "the building has no opaque walls to outdoor"
+    assert said["infiltration"] == said["neighbour"] == "the building has no exterior walls"
+    assert said["ground_exchange"] == "no zone lies on the ground"
+    assert said["wind_film"] == "the building has no surfaces to outdoor"
+    single = replace(table, surfaces=tuple(s for s in table.surfaces if s.name in "WG"))
+    alone = replace(case, building=replace(case.building, geometry=single, airflows=()), judged=None)
+    assert reasons(alone)["zone_mixing"] == "no two zones share a partition"
+
+
+def test_the_page_has_the_catalogue() -> None:
+    page = (DOCS / "effects.md").read_text(encoding="utf-8")
+    shown = page.partition("<!-- catalogue -->\n")[2].partition("<!-- end -->")[0]
+    wanted = catalogue_table(CATALOGUE.values())
+    assert shown == wanted, f"docs/effects.md: put this between its marks:\n{wanted}"
+
+
+def test_the_examples_of_the_page_run() -> None:
+    failed, tried = doctest.testfile(str(DOCS / "effects.md"), module_relative=False, encoding="utf-8")
+    assert tried > 20 and failed == 0
