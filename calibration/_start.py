@@ -42,7 +42,7 @@ def start_spread(modes: ModalModel, step: float, steps: int, held: BoolArray) ->
     observe, heat, k = modes.observation[held], modes.heating[:, held], modes.conductance[:, None]
     unit = heat / k
     by_zone = unit @ np.linalg.inv(observe @ unit)
-    by_boundary = modes.boundary / k
+    by_boundary = modes.boundary[:, : modes.boundary.shape[1] - modes.n_signal] / k
     by_boundary = by_boundary - by_zone @ (observe @ by_boundary)
     columns = np.hstack([ZONE_SPREAD * by_zone, BOUNDARY_SPREAD * by_boundary])
     system = modes.capacity[:, None] + step * k
