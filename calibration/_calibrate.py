@@ -8,23 +8,21 @@ from importlib.metadata import version
 from typing import get_args
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from calibration._case_model import CaseModel
 from calibration._describe import describe
-from calibration._estimate import Estimate, Tuner, compensated_start, draw_starts, estimate
 from calibration._evaluate import HORIZONS, Evaluation, Progress, evaluate_model
 from calibration._information import information_of
-from calibration._intervals import Interval, Runs, default_intervals, horizon_steps, select_runs
+from calibration._intervals import Interval, default_intervals, horizon_steps, select_runs
 from calibration._likelihood import InnovationsProblem
-from calibration._problem import Loss, Objective, Problem, thin
+from calibration._problem import Loss, Objective, Problem
 from calibration._result import CalibrationResult, GridCheck, SolverReport
 from calibration._settings import ModelSettings
-from calibration._tuner import tune
-from calibration.errors import CalibrationError, NotEnoughDataError
-from thermal import Case, Inputs, ModelError, Structure, SymbolicModel, reduced_model, replay_inputs
-from thermal.model import LEAST_SPIN_UP, SPIN_UP, ReducedModel
+from calibration._starts import solve_starts, tuning_runs
+from calibration.errors import CalibrationError
+from thermal import Case, Structure, SymbolicModel, reduced_model, replay_inputs
+from thermal.model import SPIN_UP, ReducedModel
 from thermal.network import BASELINE
 from thermal.parameters import Scope
 
@@ -32,9 +30,6 @@ FloatArray = NDArray[np.float64]
 
 #: Starts that are tried unless told otherwise: the given one, where compensation would lead, and a draw.
 STARTS = 3
-
-#: Objectives closer than this are one optimum [-].
-_SAME = 1.0
 
 
 def calibrate(
@@ -50,6 +45,7 @@ def calibrate(
     reach: float | None = None,
     spin_up_seconds: float = SPIN_UP,
     structure: Structure = BASELINE,
+    effects: Sequence[str] = (),
     objective: Objective = "multi_step",
     loss: Loss = "linear",
     starts: int = STARTS,
@@ -86,6 +82,8 @@ def calibrate(
         Length of the spin-up before an interval [s].
     structure : Structure
         What the model is made of: furniture, slabs, nodes of a wall, radiant node.
+    effects : sequence of str
+        Effects of the catalogue that are known to be there.
     objective : {"multi_step", "innovations"}
         Errors of N-step runs, or the likelihood of a Kalman filter's innovations, whose disturbance is tuned with the
         parameters in turn.
@@ -117,7 +115,9 @@ def calibrate(
     True
     """
     began = time.perf_counter()
-    settings = ModelSettings(dx, reach, scheme, dict(scopes or {}), spin_up_seconds, structure)
+    settings = ModelSettings(
+        dx, reach, scheme, dict(scopes or {}), spin_up_seconds, structure, {e: () for e in effects}
+    )
     for name, text, known in (("loss", loss, get_args(Loss)), ("objective", objective, get_args(Objective))):
         if text not in known:
             raise CalibrationError(f"{name}: expected one of {', '.join(known)}, came {text!r}")
@@ -137,7 +137,7 @@ def calibrate(
             f"fixed: expected a parameter that is left to estimate, came all {len(given)}; evaluate instead"
         )
     steps = horizon_steps(horizon, inputs.step)
-    runs = _tuning_runs(inputs, tuned, steps, spin_up_seconds)
+    runs = tuning_runs(inputs, tuned, steps, spin_up_seconds)
     for interval in judged:
         select_runs(inputs, interval, steps, spin_up=spin_up_seconds)  # refused now rather than after the solve
     problem = Problem(grid, inputs, runs, steps, free, given, settings.stepping, loss=loss)
@@ -147,7 +147,7 @@ def calibrate(
             grid, inputs, runs, steps, free, given, settings.stepping, loss=loss, intervals=tuple(tuned),
             spin_up_seconds=spin_up_seconds,
         ).at(first, given)  # fmt: skip
-    best, failures = _solve(problem, first, starts, seed, progress)
+    best, failures = solve_starts(problem, first, starts, seed, progress)
     before, _ = _evaluated(CaseModel(case, settings, grid, inputs, given, "start"), first, intervals, horizon, progress)
     found = CaseModel(case, settings, grid, inputs, best.theta, "estimate")
     after, check = _evaluated(found, best.model, intervals, horizon, progress)
@@ -212,30 +212,6 @@ def _evaluated(
     return errors, check
 
 
-def _tuning_runs(inputs: Inputs, intervals: Sequence[Interval], steps: int, spin_up: float) -> tuple[Runs, ...]:
-    """Choose runs that tile the tuning intervals, with a full spin-up where that leaves half of the telemetry.
-
-    A run after 12 hours starts from walls and slabs that are still wrong, and the fit would take that for physics: on a
-    twin of known parameters it cost 0.013 K of held-out error.
-    """
-    chosen = []
-    for interval in intervals:
-        begin = max(inputs.stamps[0], interval.start - pd.Timedelta(seconds=spin_up))
-        half = 0.5 * (interval.end - begin).total_seconds()
-        try:
-            found = select_runs(inputs, interval, steps, spin_up=spin_up, least=max(LEAST_SPIN_UP, min(spin_up, half)))
-        except NotEnoughDataError:
-            found = select_runs(inputs, interval, steps, spin_up=spin_up)
-        inside = found.starts >= inputs.stamps.searchsorted(interval.start)  # every residual lies in the interval
-        chosen.append(Runs(found.begin, found.starts[inside], found.skipped))
-    runs = tuple(r for r in thin(chosen, steps) if r.starts.size)
-    if not runs:
-        raise NotEnoughDataError(
-            "tuning: every run misses inputs or zone temperatures; `buildingmpc check` shows the gaps"
-        )
-    return runs
-
-
 def _refuse_overlap(tuning: Sequence[Interval], held_out: Sequence[Interval]) -> None:
     for a in tuning:
         for b in held_out:
@@ -244,43 +220,3 @@ def _refuse_overlap(tuning: Sequence[Interval], held_out: Sequence[Interval]) ->
                     f"intervals: tuning {a.start}/{a.end} and held-out {b.start}/{b.end} overlap; "
                     "a held-out target may not be tuned on"
                 )
-
-
-def _solve(
-    problem: Problem, first: ReducedModel, starts: int, seed: int, progress: Progress | None
-) -> tuple[Estimate, list[str]]:
-    """Best estimate over the starts; a start that fails costs that start only, Ctrl-C those that are left."""
-    best: Estimate | None = None
-    failures = []
-    draws = draw_starts(problem, max(1, starts - 1), seed)
-    for number in range(starts):
-        try:
-            if number == 1:
-                begun = best.problem if best is not None else problem
-                z = compensated_start(begun, problem.point(problem.start), first)
-            else:
-                z = draws[max(0, number - 1)]
-            model = first if number == 0 else None
-            found = estimate(problem, z, progress, model, tune if best is None else _as(best))
-        except (ArithmeticError, np.linalg.LinAlgError, CalibrationError, ModelError) as error:
-            failures.append(f"start {number + 1}: {error}")
-            continue
-        except KeyboardInterrupt:
-            if best is None:
-                raise
-            failures.append(f"start {number + 1}: stopped by Ctrl-C")
-            break
-        if best is None or found.better_than(best):
-            best = found
-        if found.solve.interrupted:
-            failures.append(f"start {number + 1}: stopped by Ctrl-C")
-            break
-    if best is None:
-        raise CalibrationError(f"every start failed: {'; '.join(failures)}")
-    return best, failures
-
-
-def _as(found: Estimate) -> Tuner | None:
-    """Disturbance of an earlier start, so that starts are weighed alike."""
-    disturbance = found.disturbance
-    return None if disturbance is None else lambda *_: disturbance

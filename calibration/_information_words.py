@@ -66,7 +66,7 @@ def combination_words(parameters: Mapping[str, Parameter], exponents: Mapping[st
     'ratio slab heat capacity / slab coupling'
     """
     names = {
-        name: f"odds of the {spoken(parameters[name])}" if parameters[name].scale == "logit" else spoken(parameters[name])
+        name: ("odds of the " if parameters[name].scale == "logit" else "") + spoken(parameters[name])
         for name in exponents
     }
     if any(abs(abs(e) - 1.0) > 1e-9 for e in exponents.values()):

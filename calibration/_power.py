@@ -9,7 +9,6 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from calibration._calibrate import _tuning_runs
 from calibration._evaluate import Progress
 from calibration._information import Information, fisher_information, split_jacobian
 from calibration._information_search import DETERMINED
@@ -17,6 +16,7 @@ from calibration._information_words import spoken
 from calibration._intervals import Interval, default_intervals, horizon_steps, merge
 from calibration._problem import FIRST_DEVIATION, Loss, Problem
 from calibration._settings import ModelSettings
+from calibration._starts import tuning_runs
 from calibration.errors import CalibrationError
 from thermal import Case, Parameter, SymbolicModel, reduced_model, replay_inputs
 from thermal.errors import nearest
@@ -208,7 +208,7 @@ def tuning_problem(
     inputs = replay_inputs(case, network)
     steps = horizon_steps(horizon, inputs.step)
     intervals = merge(tune) or default_intervals(case)[0]
-    runs = _tuning_runs(inputs, intervals, steps, chosen.spin_up_seconds)
+    runs = tuning_runs(inputs, intervals, steps, chosen.spin_up_seconds)
     free = tuple(i for i, p in enumerate(network.parameters) if p.name not in (fixed or {}))
     start = network.values(fixed or {})
     return Problem(SymbolicModel(network), inputs, runs, steps, free, start, chosen.stepping, loss=loss)

@@ -19,6 +19,7 @@ from calibration._problem import Objective
 from calibration._settings import ModelSettings
 from calibration.errors import ParameterFileError
 from thermal import ThermalNetwork
+from thermal.effects import CATALOGUE
 
 FloatArray = NDArray[np.float64]
 
@@ -188,6 +189,17 @@ class CalibrationResult:
     version: str = field(default="")
     objective: Objective = "multi_step"
 
+    def effects(self) -> list[dict[str, Any]]:
+        """Effects in the model with their zones and parameters, an entry of ``calibration.json`` each."""
+        entries = []
+        for name, zones in self.settings.effects.items():
+            own = {p.name for p in CATALOGUE[name].parameters}
+            values = {
+                p.name: {"value": p.value, "unit": p.unit} for p in self.parameters if p.name.partition("@")[0] in own
+            }
+            entries.append({"effect": name, "zones": list(zones), "parameters": values})
+        return entries
+
     def to_dict(self) -> dict[str, Any]:
         """Contents of ``calibration.json``."""
 
@@ -198,7 +210,7 @@ class CalibrationResult:
             "parameters": {p.name: p.to_dict() for p in self.parameters},
             "uncalibrated": errors(self.uncalibrated),
             "calibrated": errors(self.calibrated),
-            "effects": [],
+            "effects": self.effects(),
             "solver": self.solver.to_dict(),
             "grid_check": self.grid_check.to_dict(),
             "disturbance": None if self.disturbance is None else self.disturbance.to_dict(),
@@ -252,11 +264,17 @@ def load_parameters(path: str | Path, network: ThermalNetwork) -> FloatArray:
     values: dict[str, float] = {}
     for name, entry in entries.items():
         value = entry.get("value") if isinstance(entry, dict) else entry
-        if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value) or value <= 0:
+        if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value):
             raise ParameterFileError(
                 f"{path}: parameters.{name}: expected a positive number under 'value', found {value!r}"
             )
         values[name] = float(value)
+    signed = {p.name for p in network.parameters if p.scale == "linear"}
+    wrong = [name for name, value in values.items() if value <= 0 and name not in signed]
+    if wrong:
+        raise ParameterFileError(
+            f"{path}: parameters.{wrong[0]}: expected a positive number under 'value', found {values[wrong[0]]!r}"
+        )
     for p in network.parameters:
         if p.scale == "logit" and values.get(p.name, 0.0) > 1.0:
             raise ParameterFileError(f"{path}: parameters.{p.name}: expected at most 1, found {values[p.name]!r}")

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, get_args
 
 from calibration.errors import CalibrationError, ParameterFileError
 from thermal import Building, ModelError, Structure, ThermalNetwork, build_network
+from thermal.effects import CATALOGUE, chosen
 from thermal.model import LEAST_SPIN_UP, SCHEMES, SPIN_UP, Scheme
 from thermal.network import BASELINE
 from thermal.parameters import Scope
@@ -33,6 +34,8 @@ class ModelSettings:
         Length of the spin-up before an interval [s].
     structure : Structure
         What the model is made of: furniture, slabs, nodes of a wall, radiant node.
+    effects : mapping of str to sequence of str
+        Effects of the catalogue in the model, each with its zones; none is the whole building.
 
     Raises
     ------
@@ -46,6 +49,7 @@ class ModelSettings:
     scopes: Mapping[str, Scope] = field(default_factory=dict)
     spin_up_seconds: float = SPIN_UP
     structure: Structure = BASELINE
+    effects: Mapping[str, Sequence[str]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if self.scheme not in SCHEMES:
@@ -70,11 +74,19 @@ class ModelSettings:
         building : Building
             What the case folder describes.
         """
-        return build_network(building, dx=self.dx, reach=self.reach, scopes=self.scopes, structure=self.structure)
+        return build_network(
+            building,
+            dx=self.dx,
+            reach=self.reach,
+            scopes=self.scopes,
+            structure=self.structure,
+            effects=chosen(self.effects),
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """Entry of ``calibration.json``."""
         plain = {"scopes": dict(self.scopes), "structure": asdict(self.structure)}
+        plain["effects"] = {name: list(zones) for name, zones in self.effects.items()}
         return {**{k: getattr(self, k) for k in self.__dataclass_fields__}, **plain}
 
 
@@ -111,6 +123,8 @@ def read_settings(path: str | Path) -> dict[str, Any]:
             raise ParameterFileError(f"{path}: settings.{name}: expected a positive number or null, found {value!r}")
     if "scopes" in settings:
         _check_scopes(path, settings["scopes"])
+    if "effects" in settings:
+        _check_effects(path, settings["effects"])
     if "structure" in settings:
         settings["structure"] = _structure(path, settings["structure"])
     return settings
@@ -121,6 +135,16 @@ def _check_scopes(path: Path, scopes: Any) -> None:
     if not isinstance(scopes, dict) or not all(scope in get_args(Scope) for scope in scopes.values()):
         raise ParameterFileError(
             f"{path}: settings.scopes: expected a mapping to {', '.join(get_args(Scope))}, found {scopes!r}"
+        )
+
+
+def _check_effects(path: Path, effects: Any) -> None:
+    """Refuse effects that are not as `ModelSettings` writes them; the network says whether they fit the building."""
+    lists = isinstance(effects, dict) and all(isinstance(zones, list) for zones in effects.values())
+    if not lists or not set(effects) <= set(CATALOGUE):
+        raise ParameterFileError(
+            f"{path}: settings.effects: expected a mapping from effects of the catalogue to lists of zones, "
+            f"found {effects!r}"
         )
 
 

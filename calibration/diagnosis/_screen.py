@@ -1,0 +1,248 @@
+"""Every effect of the catalogue at once: what each could explain of the errors, by their tangents at the estimate.
+
+Errors of the fitted model are ``e(p) = e + J_θ dθ + J_k p`` to first order, where J_k are the sensitivities to the
+strengths of an effect that is not there. With θ free to follow, held by its priors, what remains of an effect is its
+part that calibration cannot imitate; its gain in log-likelihood is a small quadratic programme in the Gram matrix of
+all, so that zones, pairs and generic heat are compared without another run of the model.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibration.diagnosis._bench import TYPICAL, Bench, Fit, is_strength
+from calibration.diagnosis._generic import GENERIC, ZONE_HEAT
+from thermal import Parameter, reduced_model
+from thermal.effects import CATALOGUE, Chosen
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+#: Sweeps of the quadratic programme, and the change of an estimate in prior deviations that ends them [-].
+_SWEEPS, _TOLERANCE = 200, 1e-6
+
+#: Sizes that generic heat may have over its prior's [-]; the likeliest counts (empirical Bayes).
+_TIGHTNESS = (0.003, 0.01, 0.03, 0.1, 0.3)
+
+
+@dataclass(frozen=True)
+class Gain:
+    """What an effect could explain.
+
+    Parameters
+    ----------
+    effect : str
+        Its id.
+    zones : tuple of str
+        Where; empty for the whole building.
+    gain : float
+        Logarithm of the Bayes factor against the model without it, by tangents [-].
+    share : float
+        Share of the squared tuning error that it explains [-].
+    strengths : mapping of str to float
+        Its parameters [parameter units].
+    retained : float
+        Share of its signature that calibration cannot imitate [-].
+    direction : ndarray, shape (n_strength,)
+        Its strengths among all those screened, for cosines [parameter units].
+    """
+
+    effect: str
+    zones: tuple[str, ...]
+    gain: float
+    share: float
+    strengths: Mapping[str, float]
+    retained: float
+    direction: FloatArray
+
+
+class Screening:
+    """Gram matrix of all strengths that a fitted model lacks, the fitted parameters projected out.
+
+    Parameters
+    ----------
+    bench : Bench
+        The case.
+    fit : Fit
+        The model.
+    candidates : sequence of str
+        Effects to screen.
+    generic : bool
+        Also heat of any shape.
+    """
+
+    def __init__(self, bench: Bench, fit: Fit, candidates: Sequence[str], generic: bool = True) -> None:
+        lacking = {e: () for e in candidates if e not in fit.effects}
+        further = (Chosen(GENERIC),) if generic else ()
+        built = bench.build({**fit.effects, **lacking}, further)
+        theta = built.theta(fit.values)
+        model = reduced_model(built.grid, [theta, built.theta(fit.values, TYPICAL)])
+        problem = bench.problem(built, theta)
+        parts = [problem.errors(model, theta, runs, slopes=True) for runs in problem.runs]
+        slopes = np.concatenate([m.reshape(-1, m.shape[-1]) for _, m in parts if m is not None])
+        error = np.concatenate([
+            fit.estimate.problem.errors(fit.estimate.model, fit.estimate.theta, runs, slopes=False)[0].ravel()
+            for runs in fit.estimate.problem.runs
+        ])  # fmt: skip
+        seen = np.isfinite(error)
+        self.parameters: tuple[Parameter, ...] = built.network.parameters
+        self.count = problem.effective_size()
+        self.scale = self.count / float(np.sum(error[seen] ** 2))
+        jacobian = slopes[seen] * problem.slopes(theta)
+        gram = self.scale * jacobian.T @ jacobian
+        score = -self.scale * jacobian.T @ error[seen]
+        known = np.array([p.name in fit.values for p in self.parameters])
+        prior = np.array([p.prior_deviation for p in self.parameters])
+        away = problem.point(theta)[known] - np.array([p.transform(p.start) for p in self.parameters])[known]
+        self._raw = np.diag(gram).copy()
+        hessian = gram[np.ix_(known, known)] + np.diag(prior[known] ** -2.0)
+        turn = np.linalg.solve(hessian, gram[known])
+        self.score = score - turn.T @ (score[known] - away / prior[known] ** 2)
+        self.gram = gram - gram[:, known] @ turn
+        self.prior = prior
+        self.lower = np.array([p.lower for p in self.parameters])
+        self.upper = np.array([p.upper for p in self.parameters])
+        self.rooms = built.network.zones
+
+    def of(self, effect: str) -> Gain:
+        """Gain of one effect: over the building, or in the zones where it explains most.
+
+        Parameters
+        ----------
+        effect : str
+            Its id.
+        """
+        index = self._strengths(effect)
+        if effect == GENERIC.id:
+            return self._likeliest(index)
+        if not CATALOGUE[effect].zonal:
+            return self._gain(effect, index, ())
+        zones = [self.parameters[i].member or "" for i in index]
+        each = [self._gain(effect, index[[k]], (zones[k],)) for k in range(len(zones))]
+        return self._grow(effect, index, zones, each)
+
+    def pair(self, first: Gain, second: Gain) -> float:
+        """Gain of two effects together [-].
+
+        Parameters
+        ----------
+        first, second : Gain
+            Of each alone.
+        """
+        index = np.array([i for g in (first, second) for i in np.flatnonzero(self._members(g))], dtype=np.int64)
+        return self._solve(index)[1]
+
+    def cosine(self, first: Gain, second: Gain) -> float:
+        """Cosine of the projected signatures of two effects at their estimates [-].
+
+        Parameters
+        ----------
+        first, second : Gain
+            With their strengths.
+        """
+        a, b = first.direction, second.direction
+        size = np.sqrt((a @ self.gram @ a) * (b @ self.gram @ b))
+        return float(a @ self.gram @ b / size) if size > 0 else 0.0
+
+    def detectable(self, gain: float) -> dict[str, float]:
+        """Constant heat of each zone that would gain so much, by zone [W/m2].
+
+        Parameters
+        ----------
+        gain : float
+            Logarithm of a Bayes factor [-].
+        """
+        found = {}
+        for i, p in enumerate(self.parameters):
+            if p.base == ZONE_HEAT and p.member is not None:
+                information = max(float(self.gram[i, i]), 1e-12)
+                occam = 0.5 * np.log1p(information * self.prior[i] ** 2)
+                found[p.member] = float(np.sqrt(2.0 * (gain + occam) / information))
+        return found
+
+    def _likeliest(self, index: IntArray) -> Gain:
+        """Find generic heat of the likeliest kind and size: by time, by zone, by outdoor temperature, or all of them."""
+        kinds = np.array([self.parameters[i].base for i in index])
+        families = [index, *(index[kinds == k] for k in np.unique(kinds) if not k.startswith("heat_from"))]
+        families.append(index[np.char.startswith(kinds, "heat_from")])
+        sizes = [self._gain(GENERIC.id, f, (), tightness=t) for f in families for t in _TIGHTNESS]
+        return max(sizes, key=lambda g: g.gain)
+
+    def _strengths(self, effect: str) -> IntArray:
+        return np.array(
+            [i for i, p in enumerate(self.parameters) if p.effect == effect and is_strength(p.name, effect)],
+            dtype=np.int64,
+        )
+
+    def _members(self, gain: Gain) -> NDArray[np.bool_]:
+        names = set(gain.strengths)
+        return np.array([p.name in names for p in self.parameters])
+
+    def _grow(self, effect: str, index: IntArray, zones: list[str], each: list[Gain]) -> Gain:
+        """Add zones as long as each more than pays for having been chosen among all."""
+        choice = np.log(len(zones))
+        order = sorted(range(len(zones)), key=lambda k: -each[k].gain)
+        members = [order[0]]
+        best = self._gain(effect, index[members], (zones[order[0]],), choice)
+        for k in order[1:]:
+            trial = [*members, k]
+            found = self._gain(effect, index[trial], tuple(zones[i] for i in trial), choice * len(trial))
+            if found.gain > best.gain:
+                members, best = trial, found
+        return best
+
+    def _gain(
+        self, effect: str, index: IntArray, zones: tuple[str, ...], choice: float = 0.0, tightness: float = 1.0
+    ) -> Gain:
+        x, gain, share = self._solve(index, tightness)
+        direction = np.zeros(len(self.parameters))
+        direction[index] = x
+        strengths = {self.parameters[i].name: float(v) for i, v in zip(index, x, strict=True)}
+        raw = float(direction**2 @ self._raw)
+        kept = float(direction @ self.gram @ direction) / raw if raw > 0 else 0.0
+        if not raw:
+            size = self._raw[index]
+            kept = float(np.sum(np.diag(self.gram)[index]) / size.sum()) if size.sum() > 0 else 0.0
+        return Gain(effect, zones, gain - choice, share, strengths, kept, direction)
+
+    def _solve(self, index: IntArray, tightness: float = 1.0) -> tuple[FloatArray, float, float]:
+        """Strengths, gain and share of the squared error: coordinate descent within the ranges."""
+        gram, score = self.gram[np.ix_(index, index)], self.score[index]
+        prior = tightness * self.prior[index]
+        hessian = gram + np.diag(prior**-2.0)
+        x = np.zeros(len(index))
+        for _ in range(_SWEEPS):
+            before = x.copy()
+            for j in range(len(index)):
+                step = (score[j] - hessian[j] @ x) / hessian[j, j]
+                x[j] = np.clip(x[j] + step, self.lower[index[j]], self.upper[index[j]])
+            if np.max(np.abs(x - before) / prior, initial=0.0) < _TOLERANCE:
+                break
+        share = float(np.clip((2.0 * score @ x - x @ gram @ x) / self.count, 0.0, 0.999))
+        pull = float(np.sum((x / prior) ** 2))
+        sharper = gram / (1.0 - share) * np.outer(prior, prior)
+        occam = np.linalg.slogdet(np.eye(len(index)) + sharper)[1]
+        gain = -0.5 * self.count * np.log1p(-share) - 0.5 * pull - 0.5 * occam
+        gain += np.log(2.0) * np.count_nonzero((self.lower[index] == 0.0) & (x > 0.0))
+        return x, float(gain), share
+
+
+def screen(bench: Bench, fit: Fit, candidates: Sequence[str]) -> tuple[Screening, list[Gain], Gain]:
+    """Screen all candidates; they come by what they gain, and the generic heat beside them.
+
+    Parameters
+    ----------
+    bench : Bench
+        The case.
+    fit : Fit
+        The model so far.
+    candidates : sequence of str
+        Effects that the case can tell.
+    """
+    made = Screening(bench, fit, candidates)
+    gains = [made.of(e) for e in candidates if e not in fit.effects]
+    return made, sorted(gains, key=lambda g: -g.gain), made.of(GENERIC.id)

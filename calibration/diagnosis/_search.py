@@ -1,0 +1,132 @@
+"""Rounds of screening and re-fitting: one effect after another, each sought with the earlier ones in the model."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibration._evaluate import Progress
+from calibration.diagnosis._bench import Bench, Fit
+from calibration.diagnosis._screen import Gain, Screening, screen
+from calibration.errors import CalibrationError
+from thermal import ModelError
+from thermal.effects import CATALOGUE
+
+FloatArray = NDArray[np.float64]
+
+#: Most rounds, and most effects that a round fits anew.
+ROUNDS, MOST_REFITS = 6, 4
+
+#: Gain by tangents from which an effect is fitted anew [-], and the least share of the best's that it must have.
+LEAST_GAIN, LEAST_SHARE = 3.0, 0.4
+
+#: Gain of the fit from which an effect is accepted [-]; set by null cases, see `calibration.diagnosis._levels`.
+ACCEPTED = 6.0
+
+
+@dataclass(frozen=True)
+class Refit:
+    """An effect fitted together with all that was accepted before.
+
+    Parameters
+    ----------
+    screened : Gain
+        What its tangents promised.
+    fit : Fit
+        The model with it.
+    gain : float
+        Logarithm of its Bayes factor against the model without it [-].
+    """
+
+    screened: Gain
+    fit: Fit
+    gain: float
+
+
+@dataclass(frozen=True)
+class Round:
+    """What was sought and found with the model of the round before.
+
+    Parameters
+    ----------
+    before : Fit
+        The model that a cause was sought for.
+    screening : Screening
+        All effects by tangents.
+    gains : tuple of Gain
+        Them, the best first.
+    generic : Gain
+        Heat of any shape.
+    refits : tuple of Refit
+        Effects fitted anew, the best first.
+    accepted : Refit or None
+        What the next round starts from.
+    """
+
+    before: Fit
+    screening: Screening
+    gains: tuple[Gain, ...]
+    generic: Gain
+    refits: tuple[Refit, ...]
+    accepted: Refit | None
+
+
+def search(
+    bench: Bench, baseline: Fit, candidates: Sequence[str], progress: Progress | None = None, rounds: int = ROUNDS
+) -> tuple[Round, ...]:
+    """Seek effects in rounds until none gains enough.
+
+    Parameters
+    ----------
+    bench : Bench
+        The case.
+    baseline : Fit
+        The calibrated model without any effect.
+    candidates : sequence of str
+        Effects that the case can tell.
+    progress : callable, optional
+        Called with stage, done, total.
+    rounds : int
+        Most rounds.
+    """
+    done: list[Round] = []
+    fit = baseline
+    for number in range(rounds):
+        if progress is not None:
+            progress("diagnose", number, rounds)
+        open_ = [e for e in candidates if all(r in fit.effects for r in CATALOGUE[e].requires)]
+        made, gains, generic = screen(bench, fit, open_)
+        refits = _refits(bench, fit, gains)
+        best = refits[0] if refits and refits[0].gain > ACCEPTED else None
+        done.append(Round(fit, made, tuple(gains), generic, tuple(refits), best))
+        if best is None:
+            break
+        fit = best.fit
+    if progress is not None:
+        progress("diagnose", rounds, rounds)
+    return tuple(done)
+
+
+def _refits(bench: Bench, fit: Fit, gains: Sequence[Gain]) -> list[Refit]:
+    """Fit the few best anew, each from where the fit is and from the priors."""
+    chosen = [g for g in gains if g.gain > max(LEAST_GAIN, LEAST_SHARE * gains[0].gain)][:MOST_REFITS]
+    found = []
+    for g in chosen:
+        effects = {**fit.effects, g.effect: g.zones}
+        promised = {**fit.values, **g.strengths}
+        earlier = {name: v for name, v in fit.values.items() if _of_effect(name, fit)}
+        try:
+            made = bench.fit(effects, [promised, {**earlier, **g.strengths}])
+        except (ArithmeticError, np.linalg.LinAlgError, CalibrationError, ModelError):
+            continue  # a fit that fails costs that effect only
+        choice = len(g.zones) * np.log(len(bench.case.building.zone_names))
+        found.append(Refit(g, made, made.evidence - fit.evidence - choice))
+    return sorted(found, key=lambda r: -r.gain)
+
+
+def _of_effect(name: str, fit: Fit) -> bool:
+    parameter = next(p for p in fit.built.network.parameters if p.name == name)
+    return parameter.effect is not None
