@@ -10,7 +10,8 @@ import scipy.sparse as sp
 from thermal import SymbolicModel
 from thermal.errors import ModelError
 from thermal.network import GraphBuilder, ThermalNetwork
-from thermal.parameters import PARAMETERS
+from thermal.parameters import PARAMETERS, Parameter
+from thermal.signals import Signal
 
 
 def three_nodes(scope: bool = False) -> ThermalNetwork:
@@ -67,3 +68,43 @@ def test_unknown_names_are_refused() -> None:
         three_nodes().values({"interior_film_coeficient": 4.0})
     with pytest.raises(ModelError, match="radiant_coeff"):
         GraphBuilder(("one",), ("outdoor",), {"radiant_coeff": "zone"})
+
+
+def graph_with_sources() -> GraphBuilder:
+    """A room on a mass, lit through two classes by one signal, and warmed by another."""
+    graph = GraphBuilder(("one",), ("outdoor",), {})
+    room, mass = graph.volumes("air", 0), graph.volumes("mass", -1)
+    graph.capacity("air", 1200.0, room, 10.0)
+    graph.capacity("mass", 1e6, mass, 1.0)
+    graph.face("a", ca.SX(2.0), room, mass, 3.0)
+    graph.face("b", ca.SX(7.0), mass, graph.boundary("outdoor"), 1.0)
+    sun, fire = (Signal(name, "W/m^2", lambda d: d.outdoor) for name in ("sun", "fire"))
+    strength = graph.own(Parameter("strength", "1", 0.0, -1.0, 1.0, "made up", "linear", "made_up"))
+    graph.source("light", strength, room, sun, 5.0)
+    graph.source("light", strength, mass, sun, 2.0)
+    graph.source("light", strength, mass, fire, 11.0)
+    graph.source("glow", -2.0 * strength, mass, sun, 1.0)
+    return graph
+
+
+def test_sources_are_columns_that_no_temperature_moves() -> None:
+    graph = graph_with_sources()
+    heating = sp.csr_matrix(([1.0], ([0], [0])), shape=(2, 1))
+    network = graph.finish(heating.T.tocsr(), heating, ())
+    assert [s.name for s in network.signals] == ["sun", "fire"]
+    matrices = SymbolicModel(network).matrices(np.array([0.5]), slopes=True)
+    # nodes room, mass; outdoor, sun, fire
+    wanted = [[6.0, -6.0, 0.0, -2.5, 0.0], [-6.0, 13.0, -7.0, 0.0, -5.5]]
+    np.testing.assert_allclose(matrices.flow.toarray(), wanted, rtol=1e-14, atol=1e-14)
+    np.testing.assert_allclose(matrices.flow_slopes[0].toarray()[:, 3:], [[-5.0, 0.0], [0.0, -11.0]], atol=1e-14)
+    assert matrices.n_boundary == 3 and matrices.n_signal == 2
+
+
+def test_faces_that_touch_some_nodes() -> None:
+    graph = graph_with_sources()
+    found = graph.touching(np.array([0]))
+    assert [(float(v), n.tolist(), f.tolist(), w.tolist()) for v, n, f, w in found] == [(2.0, [0], [1], [3.0])]
+    graph.face("c", ca.SX(1.0), graph.boundary("outdoor"), 0, 4.0)
+    assert [(float(v), f.tolist()) for v, _, f, _ in graph.touching(np.array([0]))] == [(2.0, [1]), (1.0, [-1])]
+    assert len(graph.touching(np.array([0, 1]))) == 2  # what joins the two is inside
+    assert len(graph.touching(np.array([graph.boundary("outdoor")]))) == 2

@@ -96,3 +96,18 @@ def test_nomenclature_lists_every_parameter_with_its_unit() -> None:
     }
     for name, p in PARAMETERS.items():
         assert rows.get(name) == p.unit, name
+
+
+def test_a_strength_may_be_absent_or_of_either_sign() -> None:
+    p = Parameter("bias", "K", 0.0, -1.5, 1.5, "made up", "linear", "sensor_bias")
+    assert (p.transform(-0.3), p.inverse(-0.3), p.slope(-0.3)) == (-0.3, -0.3, 1.0)
+    assert p.prior_deviation == 0.75  # the range is its 95 % interval
+    half = Parameter("rate", "1/h", 0.0, 0.0, 1.0, "made up", "linear", "infiltration")
+    assert half.prior_deviation == 0.5  # of the half of a normal distribution
+
+
+def test_order_of_a_range() -> None:
+    with pytest.raises(ValueError, match="expected lower <= start <= upper"):
+        Parameter("bias", "K", 2.0, -1.5, 1.5, "made up", "linear")
+    with pytest.raises(ValueError, match="expected 0 < lower < start < upper"):
+        Parameter("bias", "K", 0.0, 0.0, 1.5, "made up")

@@ -56,23 +56,23 @@ def _exposed(join: Joining) -> list[Room]:
     return rooms or list(join.rooms)
 
 
-def _exchange(join: Joining, room: Room, value: ca.SX, mean: float, varying: Signal | None) -> None:
-    """Exchange ``value m(t)`` of a zone's air with outdoor [W/K]: its mean by K, the rest as heat."""
-    join.air_to(room, value * mean, join.graph.boundary("outdoor"), 1.0)
+def _exchange(join: Joining, room: Room, rate: ca.SX, mean: float, varying: Signal | None) -> None:
+    """Exchange a zone's air with outdoor at ``rate m(t)`` [1/h]: its mean by K, the rest as heat."""
+    heat = join.anatomy.air_heat_capacity * room.volume / 3600.0
+    join.air_to(room, rate, join.graph.boundary("outdoor"), mean * heat)
     if varying is not None:
-        join.heat_air(room, value, varying, 1.0)
+        join.heat_air(room, rate, varying, heat)
 
 
 def _build_infiltration(join: Joining) -> None:
     names = ("infiltration_rate", "infiltration_by_wind", "infiltration_by_stack")
     constant, wind, stack = (join.parameter(n) for n in names)
     for room in _exposed(join):
-        heat = join.anatomy.air_heat_capacity * room.volume / 3600.0
-        _exchange(join, room, constant * heat, 1.0, None)
+        _exchange(join, room, constant, 1.0, None)
         by_wind = Signal(f"wind and cold in {room.name}", "K*m/s", partial(_by_wind, zone=room.name))
-        _exchange(join, room, wind * heat, _WIND, by_wind)
+        _exchange(join, room, wind, _WIND, by_wind)
         by_stack = Signal(f"stack and cold in {room.name}", "K^1.5", partial(_by_stack, zone=room.name))
-        _exchange(join, room, stack * heat, _ROOT, by_stack)
+        _exchange(join, room, stack, _ROOT, by_stack)
 
 
 def _build_bridge(join: Joining) -> None:
@@ -85,9 +85,8 @@ def _build_bridge(join: Joining) -> None:
 def _build_opening(join: Joining) -> None:
     rate = join.parameter("window_opening_rate")
     for room in _exposed(join):
-        heat = join.anatomy.air_heat_capacity * room.volume / 3600.0
         varying = Signal(f"open windows of {room.name}", "K", partial(_by_opening, zone=room.name))
-        _exchange(join, room, rate * heat, _OPEN, varying)
+        _exchange(join, room, rate, _OPEN, varying)
 
 
 def _build_mixing(join: Joining) -> None:
@@ -97,10 +96,10 @@ def _build_mixing(join: Joining) -> None:
         a, b = join.anatomy.rooms[first], join.anatomy.rooms[second]
         near, far, share = paired((a.air, a.share), (b.air, b.share))
         pair = f"{first}-{second}"
-        join.graph.face(join.key(pair), heat * (constant + _PRESENCE * scheduled), near, far, share)
+        join.graph.face("zone_mixing", constant + _PRESENCE * scheduled, near, far, heat * share)
         signal = Signal(f"presence and difference {pair}", "K", partial(_by_presence, first=first, second=second))
-        join.heat_air(a, heat * scheduled, signal, 1.0)
-        join.heat_air(b, -heat * scheduled, signal, 1.0)
+        join.heat_air(a, scheduled, signal, heat)
+        join.heat_air(b, scheduled, signal, -heat)
 
 
 def _no_facades(anatomy: Anatomy) -> str | None:

@@ -142,6 +142,7 @@ class Joining:
         self.graph, self.effect, self.anatomy = graph, effect, graph.anatomy
         self.rooms: tuple[Room, ...] = tuple(graph.anatomy.rooms[z] for z in zones)
         self._count = 0
+        self._keys: dict[int, tuple[str, ca.SX]] = {}
 
     def parameter(self, name: str, zone: str | None = None, facade: str | None = None) -> ca.SX:
         """Symbol of one of the effect's parameters, or that of a zone or a facade.
@@ -185,7 +186,7 @@ class Joining:
         weight : float
             Geometry, such as an area [m2].
         """
-        self.graph.source(self.key(room.name), value, room.air, signal, weight * room.share)
+        self.graph.source(self._shared(value), value, room.air, signal, weight * room.share)
 
     def heat_surfaces(self, room: Room, value: ca.SX, signal: Signal, weight: float) -> None:
         """Give heat to a zone's surfaces by its radiant node; to its air where it has none.
@@ -204,7 +205,7 @@ class Joining:
         if room.radiant < 0:
             self.heat_air(room, value, signal, weight)
         else:
-            self.graph.source(self.key(room.name), value, room.radiant, signal, weight)
+            self.graph.source(self._shared(value), value, room.radiant, signal, weight)
 
     def air_to(self, room: Room, value: ca.SX, far: int, weight: float) -> None:
         """Join a zone's air to a node or a boundary, ``value weight`` [W/K].
@@ -220,7 +221,14 @@ class Joining:
         weight : float
             Geometry, such as an area [m2].
         """
-        self.graph.face(self.key(room.name), value, room.air, far, weight * room.share)
+        self.graph.face(self._shared(value), value, room.air, far, weight * room.share)
+
+    def _shared(self, value: ca.SX) -> str:
+        """Class of all faces of one kind with this very value: many classes make a large building slow."""
+        number = value.element_hash()
+        if number not in self._keys:
+            self._keys[number] = (self.key(), value)  # the value is kept, or another might get its number
+        return self._keys[number][0]
 
 
 def paired(first: _Part, second: _Part) -> tuple[IntArray, IntArray, FloatArray]:

@@ -79,11 +79,11 @@ def _build_bias(join: Joining) -> None:
 
 
 def _build_lag(join: Joining) -> None:
-    lag = join.parameter("sensor_lag")
+    lag, link = join.parameter("sensor_lag"), ca.SX(_SENSOR / 60.0)
     for room in join.rooms:
         node, heat = join.graph.volumes("sensor", room.number), join.anatomy.air_heat_capacity * room.volume
         join.graph.capacity("sensor", lag * _SENSOR, node, heat)
-        join.air_to(room, ca.SX(_SENSOR / 60.0), int(node[0]), heat)
+        join.air_to(room, link, int(node[0]), heat)
         join.graph.reading(room.number, int(node[0]))
 
 

@@ -31,14 +31,14 @@ def _build_floors(join: Joining) -> None:
     for (lower, upper), area in join.anatomy.stacked.items():
         ends = [_backs(join.anatomy.rooms[z]) for z in (lower, upper)]
         near, far, share = paired(*ends)
-        join.graph.face(join.key(f"{lower}-{upper}"), value, near, far, area * share)
+        join.graph.face("interfloor_exchange", value, near, far, area * share)
 
 
 def _build_roof(join: Joining) -> None:
     value = join.parameter("roof_u_value")
     for zone, area in join.anatomy.under_roof.items():
         node, share = _backs(join.anatomy.rooms[zone])
-        join.graph.face(join.key(zone), value, node, join.graph.boundary("outdoor"), area * share)
+        join.graph.face("roof_exchange", value, node, join.graph.boundary("outdoor"), area * share)
         outlook = Outlook(0.0, UPWARD, RATED_OUTSIDE_FILM, glass=False)
         join.anatomy.outer.append(OuterFaces(value, node, area * share, outlook))
 
@@ -46,23 +46,25 @@ def _build_roof(join: Joining) -> None:
 def _build_ground(join: Joining) -> None:
     value, ground = join.parameter("ground_u_value"), join.parameter("ground_temperature")
 
-    def to_ground(node: NDArray[np.int64], conductance: ca.SX, weight: FloatArray) -> None:
-        join.graph.face(join.key(), conductance, node, join.graph.signal(_STEADY), weight)
-        join.graph.source(join.key(), conductance * (ground - REFERENCE_TEMPERATURE), node, CONSTANT, weight)
+    def to_ground(key: str, conductance: ca.SX, parts: list[tuple[NDArray[np.int64], FloatArray]]) -> None:
+        node, weight = (np.concatenate([p[k] for p in parts]) for k in (0, 1))
+        join.graph.face(key, conductance, node, join.graph.signal(_STEADY), weight)
+        join.graph.source(key, conductance * (ground - REFERENCE_TEMPERATURE), node, CONSTANT, weight)
 
-    for zone, area in join.anatomy.on_ground.items():
-        node, share = _backs(join.anatomy.rooms[zone])
-        to_ground(node, value, area * share)
+    floors = [(*_backs(join.anatomy.rooms[zone]), area) for zone, area in join.anatomy.on_ground.items()]
+    if floors:
+        to_ground(join.key("slabs"), value, [(node, area * share) for node, share, area in floors])
     for face in join.anatomy.ground_faces:
         # at no strength nothing flows; with it in series, nothing either
-        to_ground(np.array([face.node]), value * face.value / (value + face.value), np.array([face.area]))
+        in_series = value * face.value / (value + face.value)
+        to_ground(join.key("layers"), in_series, [(np.array([face.node]), np.array([face.area]))])
 
 
 def _build_neighbour(join: Joining) -> None:
     other = join.parameter("neighbour_temperature")
     for (zone, azimuth), area in join.anatomy.facades.items():
         room, value = join.anatomy.rooms[zone], join.parameter("neighbour_u_value", facade=f"{azimuth:g} deg")
-        join.graph.face(join.key(zone), value, room.air, join.graph.signal(_STEADY), area * room.share)
+        join.air_to(room, value, join.graph.signal(_STEADY), area)
         join.heat_air(room, value * (other - REFERENCE_TEMPERATURE), CONSTANT, area)
 
 
@@ -70,9 +72,9 @@ def _build_mass(join: Joining) -> None:
     mass, coupling = join.parameter("hidden_heat_capacity"), join.parameter("hidden_coupling")
     for room in join.rooms:
         node = join.graph.volumes("hidden_mass", room.number)
-        join.graph.capacity(f"hidden_mass {room.name}", mass, node, room.floor_area)
+        join.graph.capacity("hidden_mass", mass, node, room.floor_area)
         if room.mean >= 0:  # at no capacity, a node that hangs on several volumes would mix these
-            join.graph.face(join.key(room.name), coupling, room.mean, node, room.floor_area)
+            join.graph.face("hidden_mass", coupling, room.mean, node, room.floor_area)
         else:
             join.air_to(room, coupling, int(node[0]), room.floor_area)
 

@@ -40,23 +40,23 @@ PRESENCE = Signal("presence", "1", _occupancy)
 def _build_gains(join: Joining) -> None:
     peak, shift, base = (join.parameter(n) for n in ("internal_gain", "internal_gain_delay", "base_load"))
     arrival = Signal("coming and going", "1/h", _arrival)
-    for room in join.rooms:
-        for value, signal in ((peak, PRESENCE), (-peak * shift, arrival), (base, CONSTANT)):
-            join.heat_air(room, 0.5 * value, signal, room.floor_area)
-            join.heat_surfaces(room, 0.5 * value, signal, room.floor_area)
+    for value, signal in ((peak, PRESENCE), (-peak * shift, arrival), (base, CONSTANT)):
+        for room in join.rooms:
+            join.heat_air(room, value, signal, 0.5 * room.floor_area)
+            join.heat_surfaces(room, value, signal, 0.5 * room.floor_area)
 
 
 def _build_latent(join: Joining) -> None:
     load = join.parameter("latent_load")
     for room in join.rooms:
-        join.heat_air(room, -load, PRESENCE, room.floor_area)
+        join.heat_air(room, load, PRESENCE, -room.floor_area)
 
 
 def _build_shift(join: Joining) -> None:
     heat, weather = join.parameter("heat_clock_shift"), join.parameter("weather_clock_shift")
     for room in join.rooms:
         signal = Signal(f"change of heat in {room.name}", "W/h", partial(_heat_slope, zone=room.name))
-        join.heat_air(room, -heat, signal, 1.0)
+        join.heat_air(room, heat, signal, -1.0)
     outdoor = Signal("change of outdoor temperature", "K/h", _outdoor_slope)
     for value, _, node, weight in join.graph.touching(np.array([join.graph.boundary("outdoor")])):
         join.graph.source(join.key(), -weather * value, node, outdoor, weight)

@@ -45,6 +45,7 @@ def _on_plane(drivers: Drivers, azimuth: float, tilt: float) -> FloatArray:
 def _panes(join: Joining, value: ca.SX, signal_of: partial[FloatArray], name: str) -> None:
     """Bring sun through every pane: a share to the floor or furniture, the rest to the other surfaces."""
     share = join.graph.own(TO_MASS)
+    to_mass, to_surfaces = value * share, value * (1.0 - share)
     for pane in join.anatomy.panes:
         room = join.anatomy.rooms[pane.zone]
         signal = Signal(
@@ -56,8 +57,8 @@ def _panes(join: Joining, value: ca.SX, signal_of: partial[FloatArray], name: st
         if mass < 0:
             join.heat_surfaces(room, value, signal, known * pane.area)
             continue
-        join.graph.source(join.key(room.name), value * share, mass, signal, known * pane.area)
-        join.heat_surfaces(room, value * (1.0 - share), signal, known * pane.area)
+        join.graph.source(name, to_mass, mass, signal, known * pane.area)
+        join.heat_surfaces(room, to_surfaces, signal, known * pane.area)
 
 
 def _build_gain(join: Joining) -> None:

@@ -51,6 +51,8 @@ class GraphBuilder:
         self.anatomy = Anatomy()
         self.nominal: dict[str, tuple[float, str]] = {}
         self._signals: dict[str, Signal] = {}
+        self._numbers: dict[str, int] = {}
+        self._joined: tuple[Any, ...] = (0,)
         self._readings: dict[int, int] = {}
         self._sources: set[str] = set()
         self._parameters: dict[str, tuple[Parameter, ca.SX]] = {}
@@ -203,7 +205,7 @@ class GraphBuilder:
             Signals of one name are one.
         """
         self._signals.setdefault(signal.name, signal)
-        return -1 - len(self.boundaries) - list(self._signals).index(signal.name)
+        return -1 - len(self.boundaries) - self._numbers.setdefault(signal.name, len(self._numbers))
 
     def touching(self, node: Any) -> list[tuple[ca.SX, IntArray, IntArray, FloatArray]]:
         """Faces so far with one end among given nodes and the other not: κ, inner nodes, far ends and weights.
@@ -213,16 +215,19 @@ class GraphBuilder:
         node : ndarray of int, shape (n,)
             Nodes.
         """
+        classes = [c for key, c in self._faces.items() if key not in self._sources]
+        parts = [(number, f) for number, (_, faces) in enumerate(classes) for f in faces]
+        if len(parts) != self._joined[0]:  # sources that are added change nothing
+            kind = np.repeat([number for number, _ in parts], [f[0].size for _, f in parts])
+            self._joined = (len(parts), kind, *(np.concatenate([f[k] for _, f in parts]) for k in range(3)))
+        _, kind, first, second, weight = self._joined
+        inside = (np.isin(first, node), np.isin(second, node))
         found = []
-        for key, (value, faces) in self._faces.items():
-            if key in self._sources:
-                continue
-            first, second, weight = (np.concatenate([f[k] for f in faces]) for k in range(3))
-            inside = (np.isin(first, node), np.isin(second, node))
-            for here, there, ends in ((inside[0], inside[1], (first, second)), (inside[1], inside[0], (second, first))):
-                across = here & ~there
-                if across.any():
-                    found.append((value, ends[0][across], ends[1][across], weight[across].astype(float)))
+        for here, there, near, far in ((inside[0], inside[1], first, second), (inside[1], inside[0], second, first)):
+            across = np.flatnonzero(here & ~there)
+            for group in np.split(across, np.flatnonzero(np.diff(kind[across])) + 1):
+                if group.size:
+                    found.append((classes[kind[group[0]]][0], near[group], far[group], weight[group].astype(float)))
         return found
 
     def reading(self, zone: int, node: int) -> None:

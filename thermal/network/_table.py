@@ -118,7 +118,7 @@ def _add_window(graph: GraphBuilder, zones: Mapping[str, Zone], surface: Surface
     if surface.other == "outdoor":
         film = graph.parameter("exterior_convection_coefficient", facade=facade)
         value = series(pane, film)
-        azimuth = float(surface.azimuth or 0.0)
+        azimuth = _azimuth(surface)
         outlook = Outlook(azimuth, VERTICAL, film, glass=True)
         transmittance = surface.solar_transmittance
         graph.anatomy.panes.append(Pane(zone.name, azimuth, VERTICAL, surface.area, transmittance))
@@ -133,8 +133,13 @@ def _add_window(graph: GraphBuilder, zones: Mapping[str, Zone], surface: Surface
 
 def _count_facade(graph: GraphBuilder, surface: Surface) -> None:
     """Add a wall's or a window's area to its facade."""
-    key = (surface.zone, float(surface.azimuth or 0.0))
+    key = (surface.zone, _azimuth(surface))
     graph.anatomy.facades[key] = graph.anatomy.facades.get(key, 0.0) + surface.area
+
+
+def _azimuth(surface: Surface) -> float:
+    """Where the outer face looks to, from 0 to 360 deg."""
+    return float(surface.azimuth or 0.0) % 360.0
 
 
 def _group(surface: Surface) -> str:
@@ -179,7 +184,7 @@ def _add_layers(graph: GraphBuilder, zones: Mapping[str, Zone], surface: Surface
         graph.face(key, value, int(nodes[-1]), graph.boundary(surface.other), surface.area)
         if surface.other == "outdoor":
             tilt = {"wall": VERTICAL, "ceiling": UPWARD, "floor": DOWNWARD}[surface.kind]
-            outlook = Outlook(float(surface.azimuth or 0.0), tilt, film, glass=False)
+            outlook = Outlook(_azimuth(surface), tilt, film, glass=False)
             outer = OuterFaces(value, nodes[-1:], np.array([float(surface.area)]), outlook)
             graph.anatomy.outer.append(outer)
             if surface.kind == "wall":
