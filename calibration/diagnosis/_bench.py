@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import log_ndtr
 
-from calibration._estimate import Estimate, estimate
+from calibration._estimate import DRIFT_TOLERANCE
 from calibration._evaluate import Predictions, evaluate_model
 from calibration._intervals import Interval, default_intervals, horizon_steps
 from calibration._problem import Problem
 from calibration._settings import ModelSettings
 from calibration._starts import tuning_runs
+from calibration.diagnosis._fit import Found, descend, evidence_of
 from thermal import Case, Inputs, SymbolicModel, ThermalNetwork, build_network, reduced_model, replay_inputs
 from thermal.effects import CATALOGUE, chosen
+from thermal.model import ReducedModel
 from thermal.network import Anatomy, Extension
 from thermal.signals import Drivers
 
@@ -30,8 +31,9 @@ Effects = Mapping[str, Sequence[str]]
 TYPICAL = 0.25
 
 
-#: Rounds of a fit: models are compared by what they explain, which the last digits of θ do not change.
-_ROUNDS = 2
+#: Evaluations of a fit, and of what follows when its model had to be reduced anew: models are compared by what they
+#: explain, which the last digits of θ do not change.
+EVALUATIONS, _AFTER = 14, 4
 
 
 @dataclass(frozen=True)
@@ -98,28 +100,33 @@ class Fit:
         Effects with their zones.
     built : Built
         The model.
-    estimate : Estimate
-        Of its parameters.
+    problem : Problem
+        What was fitted.
+    model : ReducedModel
+        That serves the estimate.
+    found : Found
+        The estimate.
     evidence : float
         Logarithm of the marginal likelihood of the tuning errors, but for a constant [-]; see `evidence_of`.
     """
 
     effects: Mapping[str, tuple[str, ...]]
     built: Built
-    estimate: Estimate
+    problem: Problem
+    model: ReducedModel
+    found: Found
     evidence: float
+
+    @cached_property
+    def theta(self) -> FloatArray:
+        """Parameters, shape (n_parameter,) [parameter units]."""
+        return self.problem.theta(self.found.point)
 
     @cached_property
     def values(self) -> dict[str, float]:
         """Parameters by name [parameter units]."""
         names = (p.name for p in self.built.network.parameters)
-        return dict(zip(names, self.estimate.theta.tolist(), strict=True))
-
-    @property
-    def mean_square(self) -> float:
-        """Mean square of the tuning errors [K²]."""
-        error = self.estimate.problem.residuals_only(self.estimate.model, self.estimate.theta)
-        return float(np.mean(error**2))
+        return dict(zip(names, self.theta.tolist(), strict=True))
 
 
 @dataclass
@@ -193,7 +200,13 @@ class Bench:
         free = tuple(range(len(theta)))
         return Problem(built.grid, built.inputs, runs, steps, free, theta, self.settings.stepping)
 
-    def fit(self, effects: Effects, starts: Sequence[Mapping[str, float]], built: Built | None = None) -> Fit:
+    def fit(
+        self,
+        effects: Effects,
+        starts: Sequence[Mapping[str, float]],
+        built: Built | None = None,
+        evaluations: int = EVALUATIONS,
+    ) -> Fit:
         """Fit a model with effects from several starts; the one of most evidence is kept.
 
         Parameters
@@ -204,19 +217,22 @@ class Bench:
             Values by name; what they do not name starts at its prior, strengths at a quarter of their range.
         built : Built, optional
             The model, where it is at hand.
+        evaluations : int
+            Most evaluations of errors with derivatives from a start.
         """
         built = built or self.build(effects)
         best: Fit | None = None
         for known in starts:
             theta = built.theta(known, TYPICAL)
             problem = self.problem(built, theta)
-            if best is not None:
-                problem = replace(problem, deviation=best.estimate.problem.deviation)
             model = reduced_model(built.grid, [theta])
-            found = estimate(problem, problem.point(theta), model=model, most_rounds=_ROUNDS)
-            value = evidence_of(found)
+            found = descend(problem, model, problem.point(theta), evaluations)
+            if model.drift(problem.theta(found.point)) > DRIFT_TOLERANCE:
+                model = reduced_model(built.grid, [problem.theta(found.point)])
+                found = descend(problem, model, found.point, _AFTER)
+            value = evidence_of(problem, found)
             if best is None or value > best.evidence:
-                best = Fit({e: tuple(z) for e, z in effects.items()}, built, found, value)
+                best = Fit({e: tuple(z) for e, z in effects.items()}, built, problem, model, found, value)
         if best is None:
             raise ValueError("fit: expected at least one start")
         return best
@@ -235,47 +251,9 @@ class Bench:
         trajectories : bool
             Keep every step.
         """
-        e, s = fit.estimate, self.settings
+        s = self.settings
         found = evaluate_model(
-            e.model, e.theta, fit.built.inputs, intervals or self.judged, self.horizon,
+            fit.model, fit.theta, fit.built.inputs, intervals or self.judged, self.horizon,
             trajectories=trajectories, scheme=s.stepping, spin_up_seconds=s.spin_up_seconds,
         )  # fmt: skip
         return list(found.predictions)
-
-
-def evidence_of(found: Estimate) -> float:
-    """Logarithm of the marginal likelihood of an estimate's errors, but for a constant [-].
-
-    Laplace's approximation about the estimate (Kass and Raftery 1995, doi:10.1080/01621459.1995.10476572): errors are
-    normal with the deviation that they have and count as one a day and zone, priors are normal on the estimation scale
-    and cut at the physical range, ``-n/2 log(mean e²) - ½ |Λ^½ (z - z_0)|² - ½ log |H| + ½ log |Λ|`` with
-    ``H = J'J + Λ``, and the share of the posterior within the range over that of the prior for every strength.
-
-    Parameters
-    ----------
-    found : Estimate
-        Of one model.
-    """
-    problem, z = found.problem, found.point
-    error = problem.residuals_only(found.model, found.theta)
-    mean = float(np.mean(error**2))
-    problem = replace(problem, deviation=float(np.sqrt(mean)))
-    residual, jacobian = problem.weighted(found.model, z)
-    prior, count = residual[-z.size :], problem.effective_size()
-    hessian = jacobian.T @ jacobian
-    whiten = jacobian[-z.size :]
-    value = -0.5 * count * np.log(mean) - 0.5 * float(prior @ prior)
-    value += np.linalg.slogdet(whiten)[1] - 0.5 * np.linalg.slogdet(hessian)[1]
-    spread = np.sqrt(np.diag(np.linalg.inv(hessian)))
-    lower, upper = problem.bounds
-    for i, p in enumerate(problem.parameters):
-        if p.scale == "linear":
-            deviation = p.prior_deviation
-            value += _log_inside((lower[i] - z[i]) / spread[i], (upper[i] - z[i]) / spread[i])
-            value -= _log_inside((lower[i] - p.start) / deviation, (upper[i] - p.start) / deviation)
-    return float(value)
-
-
-def _log_inside(low: float, high: float) -> float:
-    """Logarithm of the share of a standard normal between two points."""
-    return float(log_ndtr(high) + np.log1p(-np.exp(min(log_ndtr(low) - log_ndtr(high), -1e-12))))

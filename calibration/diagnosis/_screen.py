@@ -85,8 +85,8 @@ class Screening:
         parts = [problem.errors(model, theta, runs, slopes=True) for runs in problem.runs]
         slopes = np.concatenate([m.reshape(-1, m.shape[-1]) for _, m in parts if m is not None])
         error = np.concatenate([
-            fit.estimate.problem.errors(fit.estimate.model, fit.estimate.theta, runs, slopes=False)[0].ravel()
-            for runs in fit.estimate.problem.runs
+            fit.problem.errors(fit.model, fit.theta, runs, slopes=False)[0].ravel()
+            for runs in fit.problem.runs
         ])  # fmt: skip
         seen = np.isfinite(error)
         self.parameters: tuple[Parameter, ...] = built.network.parameters
@@ -101,7 +101,10 @@ class Screening:
         self._raw = np.diag(gram).copy()
         hessian = gram[np.ix_(known, known)] + np.diag(prior[known] ** -2.0)
         turn = np.linalg.solve(hessian, gram[known])
-        self.score = score - turn.T @ (score[known] - away / prior[known] ** 2)
+        pull = score[known] - away / prior[known] ** 2
+        self._known, self._turn, self._home = known, turn, np.linalg.solve(hessian, pull)
+        self._point = problem.point(theta)
+        self.score = score - turn.T @ pull
         self.gram = gram - gram[:, known] @ turn
         self.prior = prior
         self.lower = np.array([p.lower for p in self.parameters])
@@ -124,6 +127,23 @@ class Screening:
         zones = [self.parameters[i].member or "" for i in index]
         each = [self._gain(effect, index[[k]], (zones[k],)) for k in range(len(zones))]
         return self._grow(effect, index, zones, each)
+
+    def promised(self, gain: Gain) -> dict[str, float]:
+        """Parameters where the tangents point: the effect's strengths, and what the fitted ones then would be.
+
+        Parameters
+        ----------
+        gain : Gain
+            Of the effect.
+        """
+        moved = self._point.copy()
+        moved[self._known] += self._home - self._turn @ gain.direction
+        known = [p for p, k in zip(self.parameters, self._known, strict=True) if k]
+        values = {
+            p.name: float(np.clip(p.inverse(v), p.lower, p.upper))
+            for p, v in zip(known, moved[self._known], strict=True)
+        }
+        return values | dict(gain.strengths)
 
     def pair(self, first: Gain, second: Gain) -> float:
         """Gain of two effects together [-].
@@ -165,7 +185,7 @@ class Screening:
         return found
 
     def _likeliest(self, index: IntArray) -> Gain:
-        """Find generic heat of the likeliest kind and size: by time, by zone, by outdoor temperature, or all of them."""
+        """Find the likeliest generic heat, of any size: by time, by zone, by outdoor temperature, or all of them."""
         kinds = np.array([self.parameters[i].base for i in index])
         families = [index, *(index[kinds == k] for k in np.unique(kinds) if not k.startswith("heat_from"))]
         families.append(index[np.char.startswith(kinds, "heat_from")])

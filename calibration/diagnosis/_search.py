@@ -23,6 +23,9 @@ ROUNDS, MOST_REFITS = 6, 4
 #: Gain by tangents from which an effect is fitted anew [-], and the least share of the best's that it must have.
 LEAST_GAIN, LEAST_SHARE = 3.0, 0.4
 
+#: Evaluations of a fit from one start.
+_EVALUATIONS = 6
+
 #: Gain of the fit from which an effect is accepted [-]; set by null cases, see `calibration.diagnosis._levels`.
 ACCEPTED = 6.0
 
@@ -99,7 +102,7 @@ def search(
             progress("diagnose", number, rounds)
         open_ = [e for e in candidates if all(r in fit.effects for r in CATALOGUE[e].requires)]
         made, gains, generic = screen(bench, fit, open_)
-        refits = _refits(bench, fit, gains)
+        refits = _refits(bench, fit, made, gains)
         best = refits[0] if refits and refits[0].gain > ACCEPTED else None
         done.append(Round(fit, made, tuple(gains), generic, tuple(refits), best))
         if best is None:
@@ -110,20 +113,21 @@ def search(
     return tuple(done)
 
 
-def _refits(bench: Bench, fit: Fit, gains: Sequence[Gain]) -> list[Refit]:
-    """Fit the few best anew, each from where the fit is and from the priors."""
+def _refits(bench: Bench, fit: Fit, made: Screening, gains: Sequence[Gain]) -> list[Refit]:
+    """Fit the few best anew from where their tangents point; the very best also from the priors."""
     chosen = [g for g in gains if g.gain > max(LEAST_GAIN, LEAST_SHARE * gains[0].gain)][:MOST_REFITS]
     found = []
     for g in chosen:
         effects = {**fit.effects, g.effect: g.zones}
-        promised = {**fit.values, **g.strengths}
-        earlier = {name: v for name, v in fit.values.items() if _of_effect(name, fit)}
+        starts = [made.promised(g)]
+        if g is chosen[0]:
+            starts.append({name: v for name, v in fit.values.items() if _of_effect(name, fit)} | dict(g.strengths))
         try:
-            made = bench.fit(effects, [promised, {**earlier, **g.strengths}])
+            anew = bench.fit(effects, starts, evaluations=_EVALUATIONS)
         except (ArithmeticError, np.linalg.LinAlgError, CalibrationError, ModelError):
             continue  # a fit that fails costs that effect only
         choice = len(g.zones) * np.log(len(bench.case.building.zone_names))
-        found.append(Refit(g, made, made.evidence - fit.evidence - choice))
+        found.append(Refit(g, anew, anew.evidence - fit.evidence - choice))
     return sorted(found, key=lambda r: -r.gain)
 
 

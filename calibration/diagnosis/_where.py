@@ -97,7 +97,7 @@ def where_it_lies(bench: Bench, fit: Fit) -> Where:
     zones = parts.zone_groups()
     times = parts.times()
     single = {z: parts.zone_mask([z]) for z in parts.zones}
-    balance = heat_balance(fit.estimate.model, fit.estimate.theta, fit.built.inputs, bench.judged)
+    balance = heat_balance(fit.model, fit.theta, fit.built.inputs, bench.judged)
     missing = pd.DataFrame(balance.needed - balance.metered, index=balance.stamps, columns=list(parts.zones))
     sizes = {z: float(np.sqrt(np.nanmean(missing[z] ** 2))) if missing[z].notna().any() else 0.0 for z in parts.zones}
     return Where(
@@ -118,7 +118,7 @@ class _Parts:
         self.bench, self.zones = bench, fit.built.network.zones
         step = pd.Timedelta(seconds=fit.built.inputs.step)
         targets = [p.start + int(p.steps[-1]) * step for p in predictions]
-        self.target = targets[0].append(targets[1:]) if len(targets) > 1 else targets[0]
+        self.target = pd.DatetimeIndex(targets[0].append(targets[1:]))
         squared = np.concatenate([p.error for p in predictions]) ** 2
         self.known = np.isfinite(squared)
         self.squared = np.where(self.known, squared, 0.0)

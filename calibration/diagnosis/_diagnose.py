@@ -1,0 +1,207 @@
+"""Diagnosis of a case: where model and building disagree, which effect causes it, how far the gap shrinks with it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from importlib.metadata import version
+from typing import Any
+
+from calibration._evaluate import Progress
+from calibration._intervals import Interval
+from calibration._settings import ModelSettings
+from calibration.diagnosis._bench import Bench, Fit
+from calibration.diagnosis._how_far import Errors, Step, floor_of, held_out, how_far
+from calibration.diagnosis._levels import p_value
+from calibration.diagnosis._search import ACCEPTED, Round, search
+from calibration.diagnosis._verdict import Verdict, judge
+from calibration.diagnosis._where import Where, where_it_lies
+from thermal import Case
+from thermal.effects import CATALOGUE
+
+#: Subsystem that an effect belongs to.
+SUBSYSTEMS = {
+    **dict.fromkeys(("flow_gain", "duct_loss", "capacity_limit", "valve_leak"), "terminal"),
+    **dict.fromkeys(("sensor_bias", "sensor_lag", "clock_shift"), "sensor"),
+    **dict.fromkeys(("internal_gains", "latent_load"), "use"),
+}
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """Outcome of `diagnose`.
+
+    Parameters
+    ----------
+    case : str
+        Name of the case.
+    verdict : Verdict
+        Which effect.
+    where : Where
+        Where the calibrated baseline is wrong.
+    steps : tuple of Step
+        How far each accepted effect closes the gap.
+    gap, floor : float
+        Held-out mean absolute error of the calibrated baseline, and that below which nothing found lowers it [K].
+    p_value : float
+        Probability of as large a gain where nothing is missing [-].
+    detectable : mapping of str to float
+        Smallest constant heat that would have been found, by zone [W].
+    rounds : tuple of Round
+        Of the search.
+    tuned, judged : tuple of Interval
+        Where models were fitted, and where errors are measured.
+    seconds : float
+        Wall time [s].
+    version : str
+        Of the library.
+    seed : int
+        Of all resampling; it is fixed.
+    """
+
+    case: str
+    verdict: Verdict
+    where: Where
+    steps: tuple[Step, ...]
+    gap: float
+    floor: float
+    p_value: float
+    detectable: Mapping[str, float]
+    rounds: tuple[Round, ...]
+    tuned: tuple[Interval, ...]
+    judged: tuple[Interval, ...]
+    seconds: float
+    version: str
+    seed: int = field(default=0)
+
+    @property
+    def final(self) -> Fit:
+        """Model with all accepted effects."""
+        return self.rounds[-1].accepted.fit if self.rounds[-1].accepted else self.rounds[-1].before
+
+    @property
+    def subsystem(self) -> str:
+        """Part of the building that the first accepted effect belongs to; ``none`` where nothing is accepted."""
+        first = self.rounds[0].accepted
+        if first is None:
+            return "unknown" if self.verdict.name == "unexplained" else "none"
+        return SUBSYSTEMS.get(first.screened.effect, "envelope")
+
+    def to_dict(self) -> dict[str, Any]:
+        """Contents of ``diagnosis.json``."""
+        w = self.where
+        return {
+            "verdict": self.verdict.name,
+            "gap": {
+                "mae": self.gap,
+                "floor": self.floor,
+                "p_value": self.p_value,
+                "smallest_detectable_watts": dict(self.detectable),
+            },
+            "where": {
+                "sentence": w.sentence,
+                "zones": [
+                    {"zone": s.name, "share": s.share, "missing_watts_rms": w.missing_watts[s.name]} for s in w.zones
+                ],
+                "hours": w.hours.tolist(),
+                "subsystem": self.subsystem,
+                "modes": {name: _share(s) for name, s in w.modes.items()},
+                "groups": {s.name: _share(s) for s in w.groups},
+            },
+            "which": [s.to_dict() for s in self.verdict.suspects],
+            "set90": list(self.verdict.set90),
+            "combinations": [{"effects": list(e), "probability": p} for e, p in self.verdict.combinations],
+            "how_far": [_step(s) for s in self.steps],
+            "intervals": {
+                "tuning": [i.to_dict() for i in self.tuned],
+                "held_out": [i.to_dict() for i in self.judged],
+            },
+            "seconds": self.seconds,
+            "case": self.case,
+            "version": self.version,
+            "seed": self.seed,
+        }
+
+
+def diagnose(
+    case: Case,
+    tune: Sequence[Interval] = (),
+    hold_out: Sequence[Interval] = (),
+    *,
+    dx: float | None = None,
+    horizon: str = "6h",
+    progress: Progress | None = None,
+) -> Diagnosis:
+    """Say where model and building disagree, which unmodelled effect causes it, and how far the gap shrinks with it.
+
+    The baseline is calibrated; every effect of the catalogue that the case can tell is then screened by its tangents,
+    with the calibrated parameters free to follow, and the few best are fitted anew. The best is accepted where its
+    evidence exceeds what cases without any missing effect show, and the next is sought with it in the model.
+
+    Parameters
+    ----------
+    case : Case
+        Building and telemetry.
+    tune, hold_out : sequence of Interval
+        First two thirds and last third of the telemetry when both are empty; what the other leaves when one is.
+    dx : float, optional
+        Distance between control volumes of a plan [m]; the plan's cell size by default.
+    horizon : str
+        Prediction horizon, such as ``6h``.
+    progress : callable, optional
+        Called with stage, done, total.
+
+    Raises
+    ------
+    CalibrationError
+        When an interval has no usable run.
+
+    Examples
+    --------
+    >>> from thermal import load_bundled_case
+    >>> diagnose(load_bundled_case(), dx=1.0).verdict.suspects[0].effect
+    'solar_gain'
+    """
+    began = time.perf_counter()
+    bench = Bench(case, ModelSettings(dx=dx), tune, hold_out, horizon)
+    untestable = bench.untestable()
+    baseline = bench.fit({}, [{}])
+    where = where_it_lies(bench, baseline)
+    rounds = search(bench, baseline, [e for e in CATALOGUE if e not in untestable], progress)
+    steps, floor = how_far(bench, rounds)
+    areas = {name: room.floor_area for name, room in bench.anatomy.rooms.items()}
+    watts = rounds[0].screening.detectable(ACCEPTED)
+    gap: Errors = held_out(bench, baseline)
+    return Diagnosis(
+        case=case.building.name,
+        verdict=judge(rounds, untestable),
+        where=where,
+        steps=steps,
+        gap=gap.mae,
+        floor=floor if steps else floor_of(bench, rounds[-1]).mae,
+        p_value=p_value(max((r.gain for r in rounds[0].refits), default=rounds[0].gains[0].gain)),
+        detectable={zone: w * areas[zone] for zone, w in watts.items()},
+        rounds=rounds,
+        tuned=tuple(bench.tuned),
+        judged=tuple(bench.judged),
+        seconds=time.perf_counter() - began,
+        version=version("buildingmpc"),
+    )
+
+
+def _share(share: Any) -> dict[str, Any]:
+    return {"share": share.share, "predictions": share.predictions, "interval": list(share.interval)}
+
+
+def _step(step: Step) -> dict[str, Any]:
+    return {
+        "effects": list(step.effects),
+        "held_out_mae_before": step.before,
+        "held_out_mae_after": step.after,
+        "floor": step.floor,
+        "share_closed": step.share_closed,
+        "interval": None if step.interval is None else list(step.interval),
+        "placebo": {"shuffled": step.shuffled, "runner_up": step.runner_up},
+        "on_bound": list(step.bounds),
+    }

@@ -1,0 +1,142 @@
+"""A quick fit: Gauss-Newton within bounds on the errors' own scale, and the evidence of what it finds.
+
+Diagnosis fits dozens of models that differ in one effect and starts each where its tangents point, so a few steps are
+enough. Errors count as one a day and zone, with the deviation that they have: the cost is
+``n/2 log(mean e²) + ½ |Λ^½ (z - z_0)|²``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import lsq_linear
+from scipy.special import log_ndtr
+
+from calibration._problem import Problem
+from thermal import SymbolicModel
+
+FloatArray = NDArray[np.float64]
+
+#: Longest change of a parameter in a step, in deviations of its prior [-].
+_LONGEST = 1.5
+
+#: Length of a step in standard errors a parameter below which another would change nothing [-].
+_SHORTEST = 0.1
+
+#: Times that a step is halved before it is given up.
+_HALVINGS = 4
+
+
+@dataclass(frozen=True)
+class Found:
+    """Where a fit came to rest.
+
+    Parameters
+    ----------
+    point : ndarray, shape (n_parameter,)
+        On the estimation scale [-].
+    mean_square : float
+        Of the errors [K²].
+    cost : float
+        See the module [-].
+    jacobian : ndarray
+        Of weighted errors and priors there [-].
+    evaluations : int
+        Of the errors with their derivatives.
+    settled : bool
+        Whether it came to rest within the evaluations allowed.
+    """
+
+    point: FloatArray
+    mean_square: float
+    cost: float
+    jacobian: FloatArray
+    evaluations: int
+    settled: bool
+
+
+def descend(problem: Problem, model: SymbolicModel, z: FloatArray, evaluations: int) -> Found:
+    """Fit by Gauss-Newton steps.
+
+    Parameters
+    ----------
+    problem : Problem
+        What to fit.
+    model : SymbolicModel
+        Reduced.
+    z : ndarray, shape (n_parameter,)
+        Start on the estimation scale [-].
+    evaluations : int
+        Most evaluations of errors with derivatives.
+    """
+    lower, upper = problem.bounds
+    reach = _LONGEST * np.array([p.prior_deviation for p in problem.parameters])
+    cost, mean, residual, jacobian = _at(problem, model, z)
+    used, settled, factor = 1, False, 1.0
+    step = np.zeros_like(z)
+    while used < evaluations:
+        if factor == 1.0:
+            low, high = np.maximum(lower - z, -reach), np.minimum(upper - z, reach)
+            step = lsq_linear(jacobian, -residual, (np.minimum(low, -1e-12), np.maximum(high, 1e-12))).x
+            if np.linalg.norm(jacobian @ step) < _SHORTEST * np.sqrt(z.size):
+                settled = True
+                break
+        trial = np.clip(z + factor * step, lower, upper)
+        new = _at(problem, model, trial)
+        used += 1
+        if new[0] < cost:
+            z, (cost, mean, residual, jacobian), factor = trial, new, 1.0
+        elif factor <= 0.5**_HALVINGS:
+            settled = True
+            break
+        else:
+            factor *= 0.5
+    return Found(z, mean, cost, jacobian, used, settled)
+
+
+def evidence_of(problem: Problem, found: Found) -> float:
+    """Logarithm of the marginal likelihood of a fit's errors, but for a constant [-].
+
+    Laplace's approximation about the estimate (Kass and Raftery 1995, doi:10.1080/01621459.1995.10476572):
+    ``-cost - ½ log |H| + ½ log |Λ|`` with ``H = J'J + Λ``, and for every strength the share of the posterior within its
+    range over that of the prior.
+
+    Parameters
+    ----------
+    problem : Problem
+        What was fitted.
+    found : Found
+        The fit.
+    """
+    z, size = found.point, found.point.size
+    hessian = found.jacobian.T @ found.jacobian
+    value = -found.cost + np.linalg.slogdet(found.jacobian[-size:])[1] - 0.5 * np.linalg.slogdet(hessian)[1]
+    spread = np.sqrt(np.diag(np.linalg.inv(hessian)))
+    lower, upper = problem.bounds
+    for i, p in enumerate(problem.parameters):
+        if p.scale == "linear":
+            deviation = p.prior_deviation
+            value += _log_inside((lower[i] - z[i]) / spread[i], (upper[i] - z[i]) / spread[i])
+            value -= _log_inside((lower[i] - p.start) / deviation, (upper[i] - p.start) / deviation)
+    return float(value)
+
+
+def _at(problem: Problem, model: SymbolicModel, z: FloatArray) -> tuple[float, float, FloatArray, FloatArray]:
+    """Cost, mean square, weighted residuals with the priors', and their Jacobian."""
+    theta = problem.theta(z)
+    error, slopes = problem.residuals(model, theta)
+    mean = float(np.mean(error**2))
+    count = problem.effective_size()
+    weight = np.sqrt(count / error.size / mean)
+    whiten = np.linalg.inv(np.linalg.cholesky(problem.prior_covariance()))
+    prior = whiten @ (z - np.array([p.transform(p.start) for p in problem.parameters]))
+    residual = np.concatenate([weight * error, prior])
+    jacobian = np.vstack([weight * slopes * problem.slopes(theta), whiten])
+    return 0.5 * count * np.log(mean) + 0.5 * float(prior @ prior), mean, residual, jacobian
+
+
+def _log_inside(low: float, high: float) -> float:
+    """Logarithm of the share of a standard normal between two points."""
+    return float(log_ndtr(high) + np.log1p(-np.exp(min(log_ndtr(low) - log_ndtr(high), -1e-12))))

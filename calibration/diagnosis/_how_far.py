@@ -1,0 +1,219 @@
+"""How far the gap shrinks: held-out errors before and after each effect, the floor, and two placebos."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from calibration.diagnosis._bench import Bench, Built, Fit
+from calibration.diagnosis._generic import GENERIC
+from calibration.diagnosis._search import Refit, Round
+from thermal import Inputs, reduced_model
+from thermal.effects import Chosen
+
+FloatArray = NDArray[np.float64]
+
+#: Resamples of days for intervals, and the share of them that an interval holds [-].
+_RESAMPLES, _LEVEL = 1000, 0.9
+
+#: Evaluations of the fit of a placebo.
+_EVALUATIONS = 6
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Held-out errors of the six-hour predictions of one model.
+
+    Parameters
+    ----------
+    daily : ndarray, shape (n_day,)
+        Mean over runs and zones of their size, by day [K].
+    weight : ndarray, shape (n_day,)
+        Number of runs of each day.
+    """
+
+    daily: FloatArray
+    weight: FloatArray
+
+    @property
+    def mae(self) -> float:
+        """Mean absolute error [K]."""
+        return float(np.average(self.daily, weights=self.weight))
+
+
+@dataclass(frozen=True)
+class Step:
+    """What the effects up to one round close of the gap.
+
+    Parameters
+    ----------
+    effects : tuple of str
+        Those in the model.
+    before, after, floor : float
+        Held-out mean absolute error of the calibrated baseline, with the effects, and that which nothing that is
+        smooth in time of day and outdoor temperature would lower [K].
+    share_closed : float or None
+        ``(before - after) / (before - floor)`` [-]; None where there is no gap to close within two standard errors.
+    interval : tuple of float or None
+        90 % interval of it, from resampled days [-].
+    shuffled, runner_up : float or None
+        Held-out error with the signals of the last effect permuted by days, and with the effect that came next in its
+        place [K]; None where there is no such placebo.
+    bounds : tuple of str
+        Baseline parameters on a bound with the effects.
+    """
+
+    effects: tuple[str, ...]
+    before: float
+    after: float
+    floor: float
+    share_closed: float | None
+    interval: tuple[float, float] | None
+    shuffled: float | None
+    runner_up: float | None
+    bounds: tuple[str, ...]
+
+
+def how_far(bench: Bench, rounds: Sequence[Round]) -> tuple[tuple[Step, ...], float]:
+    """Measure what each accepted effect closes of the gap, and the floor under it [K].
+
+    Parameters
+    ----------
+    bench : Bench
+        The case.
+    rounds : sequence of Round
+        Of the search.
+    """
+    baseline = rounds[0].before
+    before = held_out(bench, baseline)
+    last = rounds[-1]
+    floor = floor_of(bench, last)
+    steps = []
+    for r in rounds:
+        if r.accepted is None:
+            break
+        after = held_out(bench, r.accepted.fit)
+        others = [x for x in r.refits if x is not r.accepted]
+        runner = held_out(bench, others[0].fit).mae if others else None
+        share, interval = _closed(before, after, floor)
+        effects = tuple(r.accepted.fit.effects)
+        steps.append(
+            Step(
+                effects,
+                before.mae,
+                after.mae,
+                floor.mae,
+                share,
+                interval,
+                _shuffled(bench, r, r.accepted),
+                runner,
+                on_bound(r.accepted.fit),
+            )
+        )
+    return tuple(steps), floor.mae
+
+
+def held_out(bench: Bench, fit: Fit) -> Errors:
+    """Held-out errors of a fitted model, by day.
+
+    Parameters
+    ----------
+    bench : Bench
+        The case.
+    fit : Fit
+        The model.
+    """
+    size, day = [], []
+    for p in bench.predictions(fit):
+        step = pd.Timedelta(seconds=fit.built.inputs.step)
+        size.append(np.nanmean(np.abs(p.error), axis=1))
+        day.append((p.start + int(p.steps[-1]) * step).normalize().asi8)
+    sizes, days = np.concatenate(size), np.concatenate(day)
+    known = np.isfinite(sizes)
+    _, index = np.unique(days[known], return_inverse=True)
+    weight = np.bincount(index).astype(float)
+    return Errors(np.bincount(index, sizes[known]) / weight, weight)
+
+
+def floor_of(bench: Bench, last: Round) -> Errors:
+    """Held-out errors with generic heat added to the last model: zone by zone, by time of day and outdoor temperature.
+
+    Its strengths come from the tuning intervals, so nothing held out is in it. Where it only adds noise, the floor is
+    the model itself.
+
+    Parameters
+    ----------
+    bench : Bench
+        The case.
+    last : Round
+        The last of the search.
+    """
+    own = held_out(bench, last.before)
+    if last.generic.gain <= 0.0:
+        return own
+    built = bench.build(last.before.effects, (Chosen(GENERIC),))
+    theta = built.theta({**last.before.values, **last.screening.promised(last.generic)})
+    problem = bench.problem(built, theta)
+    fit = replace(last.before, built=built, problem=problem, model=reduced_model(built.grid, [theta]))
+    found = replace(last.before.found, point=problem.point(theta))
+    errors = held_out(bench, replace(fit, found=found))
+    return errors if errors.mae < own.mae else own
+
+
+def on_bound(fit: Fit) -> tuple[str, ...]:
+    """Baseline parameters that lie on a bound of their range.
+
+    Parameters
+    ----------
+    fit : Fit
+        A fitted model.
+    """
+    lower, upper = fit.problem.bounds
+    close = np.minimum(fit.found.point - lower, upper - fit.found.point) < 0.01 * (upper - lower)
+    names = ((p.name, p.effect) for p in fit.problem.parameters)
+    return tuple(name for (name, effect), c in zip(names, close, strict=True) if c and effect is None)
+
+
+def _closed(before: Errors, after: Errors, floor: Errors) -> tuple[float | None, tuple[float, float] | None]:
+    """Share of the gap that is closed with its interval; None where the gap is within two standard errors."""
+    rng = np.random.default_rng(0)
+    drawn = rng.integers(before.daily.size, size=(_RESAMPLES, before.daily.size))
+    weight = before.weight[drawn]
+    means = [(e.daily[drawn] * weight).sum(axis=1) / weight.sum(axis=1) for e in (before, after, floor)]
+    gap = means[0] - means[2]
+    if before.mae - floor.mae < 2.0 * float(gap.std()) or before.mae <= floor.mae:
+        return None, None
+    shares = (means[0] - means[1]) / np.where(np.abs(gap) > 1e-9, gap, 1e-9)
+    ends = np.quantile(shares, [(1.0 - _LEVEL) / 2.0, (1.0 + _LEVEL) / 2.0])
+    return (before.mae - after.mae) / (before.mae - floor.mae), (float(ends[0]), float(ends[1]))
+
+
+def _shuffled(bench: Bench, r: Round, accepted: Refit) -> float | None:
+    """Held-out error with the signals of the round's effect permuted by days; None where it has none that vary."""
+    fit = accepted.fit
+    built = fit.built
+    earlier = {s.name for s in r.before.built.network.signals}
+    first = len(built.network.boundaries)
+    columns = [first + i for i, s in enumerate(built.network.signals) if s.name not in earlier]
+    varying = [c for c in columns if float(np.std(built.inputs.boundary[:, c])) > 0.0]
+    if not varying:
+        return None
+    permuted = Built(built.network, built.grid, _permuted(built.inputs, varying))
+    start = {**fit.values}
+    found = bench.fit(fit.effects, [start], permuted, _EVALUATIONS)
+    return held_out(bench, found).mae
+
+
+def _permuted(inputs: Inputs, columns: Sequence[int]) -> Inputs:
+    """Put whole days of some columns of the inputs in another order."""
+    day = max(1, round(86400.0 / inputs.step))
+    whole = len(inputs) // day
+    order = np.random.default_rng(0).permutation(whole)
+    boundary = inputs.boundary.copy()
+    part = boundary[: whole * day, columns].reshape(whole, day, len(columns))
+    boundary[: whole * day, columns] = part[order].reshape(whole * day, len(columns))
+    return replace(inputs, boundary=boundary)

@@ -1,0 +1,41 @@
+"""Levels of the verdict: what null cases and trials of known causes say of gains; see `benchmarks/blind_trials.py`."""
+
+from __future__ import annotations
+
+import numpy as np
+
+#: Gain of generic heat above which a gap is there though no effect of the catalogue explains it [-].
+GENERIC_GAP = 8.0
+
+#: Least share of what generic heat could explain after the last round that leaves the verdict alone [-].
+LEFT_OVER = 0.5
+
+#: Difference of gains within which effects of a round cannot be told apart [-].
+APART = 3.0
+
+#: Cosine of projected signatures from which effects are one group [-].
+ALIKE = 0.9
+
+#: Largest group that a verdict may name.
+LARGEST_GROUP = 4
+
+#: Temperature by which gains are divided before they become probabilities [-]: likelihoods of a model that is wrong in
+#: many small ways are too sure of themselves.
+TEMPERATURE = 3.0
+
+#: Probability from which an effect belongs to the 90 % set [-].
+IN_SET = 0.05
+
+#: Scale of the exponential tail of the largest gain in null cases, and its location [-].
+NULL_LOCATION, NULL_SCALE = 1.5, 1.0
+
+
+def p_value(gain: float) -> float:
+    """Probability that a case without any missing effect shows so large a gain [-].
+
+    Parameters
+    ----------
+    gain : float
+        Largest gain of the first round [-].
+    """
+    return float(min(1.0, np.exp(-(gain - NULL_LOCATION) / NULL_SCALE)))

@@ -1,0 +1,223 @@
+"""Which effect: probabilities, groups that cannot be told apart, and the verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from calibration.diagnosis._levels import ALIKE, APART, GENERIC_GAP, IN_SET, LARGEST_GROUP, TEMPERATURE
+from calibration.diagnosis._screen import Gain
+from calibration.diagnosis._search import ACCEPTED, Refit, Round
+from thermal.effects import CATALOGUE
+
+VerdictName = Literal["no_gap", "named", "group", "unexplained"]
+
+
+@dataclass(frozen=True)
+class Suspect:
+    """One effect of the catalogue, as a case sees it.
+
+    Parameters
+    ----------
+    effect : str
+        Its id.
+    probability : float
+        That it is there [-].
+    score : float
+        Largest logarithm of a Bayes factor that it reached in any round, fitted or by tangents [-].
+    group : tuple of str
+        What cannot be told from it on this data, itself included.
+    zones : tuple of str
+        Where; empty for the whole building.
+    parameters : mapping of str to (float, str, (float, float))
+        Estimate, unit and 90 % interval by name.
+    retained_share : float
+        Share of its signature that calibration cannot imitate [-].
+    separate_by : str
+        Experiment that would tell it from its group.
+    testable : bool
+        Whether the case can tell.
+    reason : str
+        Why not, where it cannot.
+    """
+
+    effect: str
+    probability: float
+    score: float
+    group: tuple[str, ...]
+    zones: tuple[str, ...]
+    parameters: Mapping[str, tuple[float, str, tuple[float, float]]]
+    retained_share: float
+    separate_by: str
+    testable: bool
+    reason: str = ""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Entry of ``which`` in ``diagnosis.json``."""
+        return {
+            "effect": self.effect,
+            "probability": self.probability,
+            "score": self.score,
+            "group": list(self.group),
+            "zones": list(self.zones),
+            "parameters": {
+                name: {"value": value, "unit": unit, "interval": list(ends)}
+                for name, (value, unit, ends) in self.parameters.items()
+            },
+            "retained_share": self.retained_share,
+            "separate_by": self.separate_by,
+            "testable": self.testable,
+            "reason": self.reason,
+        }
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What a search says.
+
+    Parameters
+    ----------
+    name : {"no_gap", "named", "group", "unexplained"}
+        In a word.
+    suspects : tuple of Suspect
+        Every effect of the catalogue, the likeliest first.
+    set90 : tuple of str
+        Effects that hold all present ones with 90 % probability; empty when the answer may be none.
+    combinations : tuple of (tuple of str, float)
+        Sets of effects with their probability.
+    """
+
+    name: VerdictName
+    suspects: tuple[Suspect, ...]
+    set90: tuple[str, ...]
+    combinations: tuple[tuple[tuple[str, ...], float], ...]
+
+
+def judge(rounds: Sequence[Round], untestable: Mapping[str, str]) -> Verdict:
+    """Judge what the rounds of a search found.
+
+    Parameters
+    ----------
+    rounds : sequence of Round
+        Of the search.
+    untestable : mapping of str to str
+        Effects that the case cannot tell, with the reason.
+    """
+    probability: dict[str, float] = dict.fromkeys(CATALOGUE, 0.0)
+    score: dict[str, float] = dict.fromkeys(CATALOGUE, -np.inf)
+    best: dict[str, Gain | Refit] = {}
+    real = 1.0  # that all rounds before found something that is there
+    chain: list[tuple[tuple[str, ...], float]] = []
+    for r in rounds:
+        gains = _gains(r)
+        found = _probabilities(gains)
+        for effect, gain in gains.items():
+            probability[effect] = max(probability[effect], real * found[effect])
+            if gain > score[effect]:
+                score[effect] = gain
+                best[effect] = _source(r, effect)
+        chain.append((tuple(r.before.effects), real * (1.0 - sum(found.values()))))
+        if r.accepted is not None:
+            real *= sum(found.values())
+            chain.append((tuple(r.accepted.fit.effects), real))
+    suspects = sorted(
+        (_suspect(e, probability[e], score[e], best.get(e), rounds, untestable.get(e)) for e in CATALOGUE),
+        key=lambda s: (-s.probability, -s.score),
+    )
+    name = _name(rounds)
+    inside = tuple(s.effect for s in suspects if s.probability >= IN_SET) if name in ("named", "group") else ()
+    return Verdict(name, tuple(suspects), inside, tuple(chain))
+
+
+def group_of(r: Round, effect: str) -> tuple[str, ...]:
+    """Effects of a round that cannot be told from one of them, itself first.
+
+    Parameters
+    ----------
+    r : Round
+        Of the search.
+    effect : str
+        Its id.
+    """
+    gains = _gains(r)
+    own = next((g for g in r.gains if g.effect == effect), None)
+    alike = [effect]
+    for g in r.gains:
+        if g.effect == effect or gains[g.effect] < gains[effect] - APART * 2.0:
+            continue
+        near = abs(gains[g.effect] - gains[effect]) < APART
+        same = own is not None and abs(r.screening.cosine(own, g)) > ALIKE and gains[g.effect] > ACCEPTED
+        if near or same:
+            alike.append(g.effect)
+    return tuple(alike)
+
+
+def _name(rounds: Sequence[Round]) -> VerdictName:
+    first = rounds[0]
+    if first.accepted is None:
+        return "unexplained" if first.generic.gain > GENERIC_GAP else "no_gap"
+    size = len(group_of(first, first.accepted.screened.effect))
+    if size > LARGEST_GROUP:
+        return "unexplained"
+    return "named" if size == 1 else "group"
+
+
+def _gains(r: Round) -> dict[str, float]:
+    """Gain of every effect of a round: fitted where it was, by tangents otherwise."""
+    gains = {g.effect: g.gain for g in r.gains}
+    return gains | {x.screened.effect: x.gain for x in r.refits}
+
+
+def _source(r: Round, effect: str) -> Gain | Refit:
+    fitted = next((x for x in r.refits if x.screened.effect == effect), None)
+    return fitted or next(g for g in r.gains if g.effect == effect)
+
+
+def _probabilities(gains: Mapping[str, float]) -> dict[str, float]:
+    """Share of each effect against all others and none, gains tempered; none has the gain at which effects count."""
+    size = np.array(list(gains.values())) / TEMPERATURE
+    top = max(float(size.max(initial=-np.inf)), ACCEPTED / TEMPERATURE)
+    weight = np.exp(size - top)
+    whole = float(weight.sum()) + float(np.exp(ACCEPTED / TEMPERATURE - top))
+    return {effect: float(w) / whole for effect, w in zip(gains, weight, strict=True)}
+
+
+def _suspect(
+    effect: str,
+    probability: float,
+    score: float,
+    best: Gain | Refit | None,
+    rounds: Sequence[Round],
+    reason: str | None,
+) -> Suspect:
+    known = CATALOGUE[effect]
+    if best is None:
+        return Suspect(effect, 0.0, 0.0, (effect,), (), {}, 0.0, known.separated_by, reason is None, reason or "")
+    gain = best.screened if isinstance(best, Refit) else best
+    home = next(r for r in rounds if any(g is gain for g in r.gains))
+    return Suspect(
+        effect, probability, score, group_of(home, effect)[:LARGEST_GROUP], gain.zones, _parameters(best, effect),
+        gain.retained, known.separated_by, True,
+    )  # fmt: skip
+
+
+def _parameters(best: Gain | Refit, effect: str) -> dict[str, tuple[float, str, tuple[float, float]]]:
+    """Estimates of an effect's parameters, with intervals where it was fitted."""
+    if isinstance(best, Gain):
+        units = {p.name: p.unit for p in CATALOGUE[effect].parameters}
+        return {
+            name: (value, units[name.partition("@")[0]], (float("nan"), float("nan")))
+            for name, value in best.strengths.items()
+        }
+    problem, found = best.fit.problem, best.fit.found
+    spread = np.sqrt(np.diag(np.linalg.inv(found.jacobian.T @ found.jacobian)))
+    told = {}
+    for i, p in enumerate(problem.parameters):
+        if p.effect == effect:
+            z = found.point[i]
+            ends = [float(np.clip(p.inverse(z + s * 1.645 * spread[i]), p.lower, p.upper)) for s in (-1.0, 1.0)]
+            told[p.name] = (float(p.inverse(z)), p.unit, (ends[0], ends[1]))
+    return told
