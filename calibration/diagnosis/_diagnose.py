@@ -58,6 +58,10 @@ class Diagnosis:
         Of the library.
     seed : int
         Of all resampling; it is fixed.
+    settings : ModelSettings
+        How the baseline was built and run.
+    horizon : str
+        Prediction horizon.
     """
 
     case: str
@@ -74,6 +78,8 @@ class Diagnosis:
     seconds: float
     version: str
     seed: int = field(default=0)
+    settings: ModelSettings = field(default_factory=ModelSettings)
+    horizon: str = "6h"
 
     @property
     def final(self) -> Fit:
@@ -187,6 +193,8 @@ def diagnose(
         judged=tuple(bench.judged),
         seconds=time.perf_counter() - began,
         version=version("buildingmpc"),
+        settings=bench.settings,
+        horizon=horizon,
     )
 
 
