@@ -129,7 +129,7 @@ def test_a_lagging_sensor_is_a_first_order_filter(lively_case: CaseOf) -> None:
 def test_hidden_mass_is_a_second_node(lively_case: CaseOf) -> None:
     # from the model's own air temperature: C_m T_m' = h A (T - T_m), to the second order of the scheme
     case = lively_case("table")
-    values = {"hidden_heat_capacity": 5e4, "hidden_coupling": 3.0}
+    values = {"hidden_heat_capacity@A": 5e4, "hidden_coupling": 3.0}
     plant = Simulator(case.building, values, step_seconds=20.0, scheme="tr_bdf2", effects=chosen(["hidden_mass"]))
     plant.reset(np.array([293.15, 293.15]), np.array([273.15, 280.15]))
     (node,) = np.flatnonzero((plant.network.kind == "hidden_mass") & (plant.network.zone == 0))
@@ -203,15 +203,12 @@ def test_a_terminal_with_a_limit(lively_case: CaseOf) -> None:
     assert np.abs(whole).max() < 0.1 * largest
 
 
-def test_a_valve_that_leaks_while_it_should_be_closed(lively_case: CaseOf) -> None:
+def test_a_valve_that_leaks_warms_the_air_that_flows(lively_case: CaseOf) -> None:
     case = lively_case("plan")
-    frame = case.telemetry.frame.copy()
-    flow = frame["VAV_A/supply_air_flowrate_sensor"].to_numpy()
-    cool = np.arange(len(flow)) % 3 == 0
-    frame["VAV_A/discharge_air_temperature_sensor"] = np.where(cool, 288.0, 305.0)
-    told = replace(case, telemetry=Telemetry.from_frame(frame), judged=None)
-    expected = 8.0 * 10.5 * (cool & (flow > 0.02 * flow.max()))
-    assert signal_heat(told, "valve_leak", "A", **{"valve_leak@A": 8.0}) == pytest.approx(expected)
+    flow = case.telemetry.frame["VAV_A/supply_air_flowrate_sensor"].to_numpy()
+    expected = 8.0 * 10.5 * (flow > 0.02 * flow.max())
+    assert 0.0 < np.count_nonzero(expected) < len(flow)
+    assert signal_heat(case, "valve_leak", "A", **{"valve_leak@A": 8.0}) == pytest.approx(expected)
 
 
 def test_clocks_that_are_off_move_heat_and_weather(lively_case: CaseOf) -> None:
