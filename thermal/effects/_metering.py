@@ -52,12 +52,9 @@ def _over(drivers: Drivers, zone: str, lost: float) -> FloatArray:
     return np.asarray(np.sign(heat) * np.maximum(np.abs(heat) - limit, 0.0))
 
 
-def _closed(drivers: Drivers, zone: str) -> FloatArray:
-    k = drivers.zones.index(zone)
-    flow, heat = drivers.supply[0][:, k], _heat(drivers, zone)
-    fan = flow > 0.02 * max(float(flow.max()), 1e-9)
-    idle = heat < 0.05 * max(float(heat.max()), 1e-9)
-    return (fan & idle).astype(float)
+def _running(drivers: Drivers, zone: str) -> FloatArray:
+    flow = drivers.supply[0][:, drivers.zones.index(zone)]
+    return (flow > 0.02 * max(float(flow.max()), 1e-9)).astype(float)
 
 
 def _build_bias(join: Joining) -> None:
@@ -111,7 +108,7 @@ def _build_limit(join: Joining) -> None:
 
 def _build_leak(join: Joining) -> None:
     for room in join.rooms:
-        signal = Signal(f"fan without heat in {room.name}", "1", partial(_closed, zone=room.name))
+        signal = Signal(f"air flows into {room.name}", "1", partial(_running, zone=room.name))
         join.heat_air(room, join.parameter("valve_leak", zone=room.name), signal, room.floor_area)
 
 
@@ -182,10 +179,10 @@ CAPACITY_LIMIT = Effect(
 VALVE_LEAK = Effect(
     id="valve_leak",
     title="a heating valve that leaks",
-    equation="Q_l 1[fan on, no heat]",
+    equation="Q_l 1[air flows]",
     source="leaking valves: Katipamula and Brambley (2005), doi:10.1080/10789669.2005.10391133",
     acts_on="air of the zones concerned",
-    confounders=("internal_gains",),
+    confounders=("internal_gains", "sensor_bias"),
     separated_by="valve closed with the fan on",
     parameters=(strength("valve_leak", "W/m^2", 20.0, "up to a third of a coil", "valve_leak"),),
     build=_build_leak,

@@ -69,10 +69,11 @@ def _build_neighbour(join: Joining) -> None:
 
 
 def _build_mass(join: Joining) -> None:
-    mass, coupling = join.parameter("hidden_heat_capacity"), join.parameter("hidden_coupling")
+    coupling = join.parameter("hidden_coupling")
     for room in join.rooms:
         node = join.graph.volumes("hidden_mass", room.number)
-        join.graph.capacity("hidden_mass", mass, node, room.floor_area)
+        mass = join.parameter("hidden_heat_capacity", zone=room.name)
+        join.graph.capacity(f"hidden_mass {room.name}", mass, node, room.floor_area)
         if room.mean >= 0:  # at no capacity, a node that hangs on several volumes would mix these
             join.graph.face("hidden_mass", coupling, room.mean, node, room.floor_area)
         else:
@@ -166,4 +167,5 @@ HIDDEN_MASS = Effect(
         shape("hidden_coupling", "W/m^2/K", 3.5, 2.0, 6.0, "films of furniture", "hidden_mass"),
     ),
     build=_build_mass,
+    zonal=True,
 )
