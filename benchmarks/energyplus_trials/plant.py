@@ -1,0 +1,184 @@
+"""Runs a trial's building in EnergyPlus, in a process of its own, and checks how the run ended."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import subprocess
+import sys
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from energyplus_trials import climate, model
+from energyplus_trials.fabric import Objects
+from energyplus_trials.specification import TrialSpec
+
+RUN_IN_DAYS = 10
+_WORKER = Path(__file__).with_name("worker.py")
+# Said of every building of this kind, and harmless.
+_EXPECTED_WARNINGS = re.compile(r"No reporting elements|Did not find|not enclosed|does not affect|will be used|is not between|\bunused\b", re.I)
+
+
+class TrialError(Exception):
+    """A trial could not be made; the message says what and where."""
+
+
+class EnergyPlusMissingError(TrialError):
+    """EnergyPlus is not installed."""
+
+
+class EnergyPlusRunError(TrialError):
+    """EnergyPlus stopped, or ended with severe errors."""
+
+
+@dataclass
+class Plant:
+    """What EnergyPlus gets: the null's input until effects change it.
+
+    Parameters
+    ----------
+    spec : TrialSpec
+        Of the trial.
+    station : DataFrame, shape (n_time, 6)
+        Weather of run-in and telemetry that the station sees.
+    objects : dict
+        EnergyPlus objects by class and name.
+    drive : dict
+        Series of driven schedules, shape (n_time,), by schedule.
+    laws : list of dict
+        Heat that depends on the building's state.
+    sun : bool
+        Whether the sun reaches the building.
+    sky : float
+        Share of the difference between air and sky that does [-].
+    """
+
+    spec: TrialSpec
+    station: pd.DataFrame
+    objects: Objects
+    drive: dict[str, NDArray[np.float64]] = field(default_factory=dict)
+    laws: list[dict[str, Any]] = field(default_factory=list)
+    sun: bool = False
+    sky: float = 0.0
+
+    @property
+    def starts(self) -> pd.DatetimeIndex:
+        """Starts of all intervals of the run."""
+        return pd.DatetimeIndex(self.station.index - climate.STEP)
+
+    def add(self, kind: str, name: str, **fields: Any) -> None:
+        """Add an object.
+
+        Parameters
+        ----------
+        kind, name : str
+            EnergyPlus class and name.
+        **fields
+            Of the object.
+        """
+        self.objects.setdefault(kind, {})[name] = fields
+
+    def add_schedule(self, name: str, values: NDArray[np.float64] | float) -> str:
+        """Add a schedule that follows a series, and return its name.
+
+        Parameters
+        ----------
+        name : str
+            Of the schedule.
+        values : ndarray, shape (n_time,), or float
+            Its values.
+        """
+        series = np.broadcast_to(np.asarray(values, dtype=float), (len(self.station),))
+        self.add("Schedule:Constant", name, **model.constant(float(series[0])))
+        if np.ptp(series) > 0.0:
+            self.drive[name] = series
+        return name
+
+
+def simulate(plant: Plant, audit: Mapping[str, tuple[str, str]] | None = None) -> pd.DataFrame:
+    """Run EnergyPlus and return the outputs of run-in and telemetry, columns (entity, output), ends of intervals.
+
+    Parameters
+    ----------
+    plant : Plant
+        With set points and effects.
+    audit : dict, optional
+        Further outputs of each zone: EnergyPlus's name and key by output.
+
+    Returns
+    -------
+    DataFrame
+        Of zones and of `site`, in EnergyPlus's units [degC], [kg/s], [W], [W/m2].
+
+    Raises
+    ------
+    EnergyPlusMissingError, EnergyPlusRunError
+        Not installed; stopped, severe errors, or steps without values.
+    """
+    outputs = model.ZONE_OUTPUTS | dict(audit or {})
+    variables = [["site", ours, name, "Environment"] for ours, name in model.SITE_OUTPUTS.items()]
+    for zone in plant.spec.zone_names:
+        variables += [[zone, ours, name, key.format(zone=zone)] for ours, (name, key) in outputs.items()]
+    weather = climate.building_weather(plant.station, sun=plant.sun, sky=plant.sky)
+    with tempfile.TemporaryDirectory(prefix="energyplus_") as name:
+        values = _run(Path(name), plant, weather, variables)
+    if np.isnan(values).any():
+        raise EnergyPlusRunError(f"{plant.spec.name}: {int(np.isnan(values).any(axis=1).sum())} steps without values")
+    return pd.DataFrame(values, plant.station.index, pd.MultiIndex.from_tuples([(v[0], v[1]) for v in variables]))
+
+
+def _run(
+    folder: Path, plant: Plant, weather: pd.DataFrame, variables: Sequence[Sequence[str]]
+) -> NDArray[np.float64]:
+    climate.write_epw(folder / "in.epw", weather, plant.spec.climate)
+    (folder / "in.epJSON").write_text(json.dumps(plant.objects), encoding="utf-8")
+    drive = np.column_stack(list(plant.drive.values()))
+    np.savez(folder / "drive.npz", names=np.array(list(plant.drive)), values=drive)
+    job = {
+        "input": str(folder / "in.epJSON"),
+        "weather": str(folder / "in.epw"),
+        "out": str(folder / "out"),
+        "drive": str(folder / "drive.npz"),
+        "result": str(folder / "result.npy"),
+        "laws": plant.laws,
+        "variables": variables,
+        "rows": len(weather),
+        "first_day": int(plant.starts[0].dayofyear),
+    }
+    (folder / "job.json").write_text(json.dumps(job), encoding="utf-8")
+    environment = os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    done = subprocess.run(
+        [sys.executable, str(_WORKER), str(folder / "job.json")], env=environment, capture_output=True, text=True
+    )
+    if "No module named 'pyenergyplus'" in done.stderr:
+        raise EnergyPlusMissingError("EnergyPlus is not installed: pip install -e .[energyplus]")
+    _check_end(folder / "out", done, plant.spec)
+    values: NDArray[np.float64] = np.load(folder / "result.npy")
+    return values
+
+
+def _check_end(out: Path, done: subprocess.CompletedProcess[str], spec: TrialSpec) -> None:
+    """Refuse a run that did not end well, or that warned of what this kind of building should not be warned of."""
+    end, log = (
+        (out / name).read_text(encoding="utf-8", errors="replace") if (out / name).exists() else ""
+        for name in ("eplusout.end", "eplusout.err")
+    )
+    severe = re.search(r"(\d+) Severe Errors", end)
+    if done.returncode != 0 or "Completed Successfully" not in end or severe is None or int(severe[1]) != 0:
+        said = "\n".join(line for line in log.splitlines() if "Severe" in line or "Fatal" in line or "~~~" in line)
+        raise EnergyPlusRunError(
+            f"{spec.name}: expected a run without severe errors, EnergyPlus returned {done.returncode}: "
+            f"{end.strip() or 'no end file'}\n{said[:3000]}\n{done.stderr[-2000:]}"
+        )
+    warnings = [line for line in log.splitlines() if "** Warning **" in line]
+    unexpected = [line.strip() for line in warnings if not _EXPECTED_WARNINGS.search(line)]
+    if unexpected and os.environ.get("TRIAL_WARNINGS"):
+        print("\n".join(unexpected[:20]))
