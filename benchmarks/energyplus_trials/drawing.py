@@ -91,6 +91,7 @@ def _fabric(rng: np.random.Generator) -> Fabric:
         furniture_thickness=round(float(rng.uniform(0.02, 0.04)), 3),
         window_u_value=round(float(rng.uniform(1.1, 2.9)), 2),
         exterior_film=round(float(rng.uniform(12.0, 22.0)), 1),
+        interior_convection=str(rng.choice(["TARP", "Simple"], p=[0.7, 0.3])),
     )
 
 

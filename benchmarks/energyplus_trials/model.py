@@ -194,7 +194,7 @@ def _climate(spec: TrialSpec) -> Objects:
             "height": {"wind_speed_profile_exponent": 0.0, "air_temperature_gradient_coefficient": 0.0}
         },
         "Site:WeatherStation": {"station": {"wind_speed_profile_exponent": 0.0}},
-        "SurfaceConvectionAlgorithm:Inside": {"inside": {"algorithm": "TARP"}},
+        "SurfaceConvectionAlgorithm:Inside": {"inside": {"algorithm": spec.fabric.interior_convection}},
         "SurfaceConvectionAlgorithm:Outside": {"outside": {"algorithm": "SimpleCombined"}},
         "SurfaceProperty:ConvectionCoefficients:MultipleSurface": {
             kind: {

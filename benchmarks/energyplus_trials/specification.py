@@ -86,6 +86,8 @@ class Fabric:
         [W/m2/K], air to air.
     exterior_film : float
         Convection outside [W/m2/K].
+    interior_convection : str
+        EnergyPlus's algorithm: `TARP` depends on the temperature difference, `Simple` on the direction of heat only.
     """
 
     wall: str
@@ -97,6 +99,7 @@ class Fabric:
     furniture_thickness: float
     window_u_value: float
     exterior_film: float
+    interior_convection: str
 
 
 @dataclass(frozen=True)
