@@ -22,7 +22,7 @@ from concurrent.futures import Future, ThreadPoolExecutor, as_completed
 from pathlib import Path
 
 from energyplus_trials.drawing import DAYS, draw_spec
-from energyplus_trials.plant import EnergyPlusMissingError, TrialError
+from energyplus_trials.errors import EnergyPlusMissingError, TrialError
 from energyplus_trials.specification import KINDS, TrialSpec
 from energyplus_trials.trial import make_trial
 

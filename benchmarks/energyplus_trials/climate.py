@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +10,8 @@ import pvlib
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from energyplus_trials.errors import EnergyPlusMissingError
+from energyplus_trials.sites import GENERATED
 from energyplus_trials.specification import Climate
 from thermal.case import Location
 from thermal.pilot import generate_weather
@@ -22,7 +23,6 @@ STEPS_PER_DAY = 288
 STEFAN_BOLTZMANN = 5.6697e-8  # [W/m2/K4], the value that EnergyPlus computes the sky with
 FREEZING = 273.15  # [K]
 YEAR = 2023  # stands for the typical years, which have none
-GENERATED_SITES = ((59.3, 18.1, 30.0, 1), (51.5, -0.1, 20.0, 0), (45.5, 9.2, 120.0, 1), (40.4, -3.7, 650.0, 1))
 POINTS = {
     "outside_air_temperature_sensor": "degC",
     "wind_speed_sensor": "m/s",
@@ -38,22 +38,11 @@ _DEW_POINT = -23.0  # [degC]
 
 def weather_folder() -> Path:
     """Return the folder of the weather files that come with EnergyPlus."""
-    import pyenergyplus
-
+    try:
+        import pyenergyplus
+    except ImportError as error:
+        raise EnergyPlusMissingError("EnergyPlus is not installed: pip install -e .[energyplus]") from error
     return Path(pyenergyplus.__file__).parent / "data" / "weather"
-
-
-def read_site(path: Path) -> tuple[float, float, float, int]:
-    """Return latitude, longitude [degree], elevation [m] and standard time [h] of a weather file.
-
-    Parameters
-    ----------
-    path : Path
-        EPW file.
-    """
-    with path.open(encoding="latin-1") as source:
-        fields = source.readline().strip().split(",")
-    return float(fields[6]), float(fields[7]), float(fields[9]), round(float(fields[8]))
 
 
 def timezone(climate: Climate) -> str:
@@ -79,7 +68,7 @@ def station_weather(climate: Climate, run_in: int, days: int) -> pd.DataFrame:
     """
     first = pd.Timestamp(climate.start) - pd.Timedelta(days=run_in)
     index = pd.date_range(first + STEP, periods=(run_in + days) * STEPS_PER_DAY, freq=STEP, name="timestamp")
-    if climate.source == "generated":
+    if climate.source == GENERATED:
         weather = _generated(climate, index)
     else:
         weather = _from_file(climate, index)
@@ -205,7 +194,7 @@ def building_weather(station: pd.DataFrame, *, sun: bool, sky: float) -> pd.Data
     return weather
 
 
-def write_epw(path: Path, weather: pd.DataFrame, climate: Climate, moisture: Mapping[str, float] | None = None) -> None:
+def write_epw(path: Path, weather: pd.DataFrame, climate: Climate) -> None:
     """Write a weather file of twelve records an hour that holds just the days of the run.
 
     Parameters
@@ -216,10 +205,7 @@ def write_epw(path: Path, weather: pd.DataFrame, climate: Climate, moisture: Map
         Ends of intervals, whole days.
     climate : Climate
         Where.
-    moisture : dict, optional
-        `dew_point` of the air [degC]; the default is as dry as the supply air.
     """
-    dew_point = (moisture or {}).get("dew_point", _DEW_POINT)
     starts = weather.index - STEP
     first, last = starts[0], starts[-1]
     head = [
@@ -237,9 +223,9 @@ def write_epw(path: Path, weather: pd.DataFrame, climate: Climate, moisture: Map
     columns = weather[list(POINTS)].to_numpy()
     rows = []
     for start, (air, speed, direction, infrared, direct, diffuse) in zip(starts, columns, strict=True):
-        humidity = 100.0 * np.exp(17.27 * dew_point / (237.7 + dew_point) - 17.27 * air / (237.7 + air))
+        humidity = 100.0 * np.exp(17.27 * _DEW_POINT / (237.7 + _DEW_POINT) - 17.27 * air / (237.7 + air))
         rows.append(
-            f"{start.year},{start.month},{start.day},{start.hour + 1},{start.minute + 5},-,{air:.4f},{dew_point},"
+            f"{start.year},{start.month},{start.day},{start.hour + 1},{start.minute + 5},-,{air:.4f},{_DEW_POINT},"
             f"{min(humidity, 100.0):.3f},{pressure:.0f},0,0,{infrared:.4f},0,{direct:.4f},{diffuse:.4f},"
             f"0,0,0,0,{direction:.2f},{speed:.4f},0,0,20,77777,9,999999999,0,0.1,0,88,0.2,0,0"
         )

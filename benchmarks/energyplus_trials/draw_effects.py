@@ -193,7 +193,9 @@ def _flow_gain(*forms: str) -> Draw:
 
 def _capacity_limit(spec: TrialSpec, rng: np.random.Generator, s: float) -> Effect:
     zones = _some(rng, spec.zone_names, 2, 4)
-    return Effect("capacity_limit", "damper", s, zones, {"lost_share": round(min(0.4 * s, 0.8), 3)}, ("capacity_limit",))
+    return Effect(
+        "capacity_limit", "damper", s, zones, {"lost_share": round(min(0.4 * s, 0.8), 3)}, ("capacity_limit",)
+    )
 
 
 def _valve_leak(spec: TrialSpec, rng: np.random.Generator, s: float) -> Effect:

@@ -8,6 +8,7 @@ import numpy as np
 
 from energyplus_trials import climate, plan
 from energyplus_trials.draw_effects import draw_effects
+from energyplus_trials.sites import TOWNS, WEATHER_FILES
 from energyplus_trials.specification import (
     CONFIRMATION,
     DEVELOPMENT,
@@ -96,18 +97,26 @@ def _fabric(rng: np.random.Generator) -> Fabric:
 
 
 def _climate(rng: np.random.Generator, days: int) -> Climate:
-    files = sorted(path.name for path in climate.weather_folder().glob("*.epw"))
     low, high = _SEASONS[str(rng.choice(list(_SEASONS)))]
     start = date(climate.YEAR, 1, 1) + timedelta(days=int(rng.integers(low, min(high, 365 - days) + 1)) - 1)
     seed, warmer = int(rng.integers(2**31)), round(float(rng.normal(0.0, 1.5)), 2)
-    source = "generated" if rng.random() < 0.2 else str(rng.choice(files))
-    if source == "generated":
-        latitude, longitude, elevation, offset = climate.GENERATED_SITES[rng.integers(len(climate.GENERATED_SITES))]
-        warmer -= round(float(rng.uniform(0.0, 9.0)), 2)  # the generator's own climate is a mild one
-    else:
-        latitude, longitude, elevation, offset = climate.read_site(climate.weather_folder() / source)
+    generated = rng.random() < 0.2
+    places = TOWNS if generated else WEATHER_FILES
+    site = places[int(rng.integers(len(places)))]
+    if generated:
+        warmer = round(warmer - float(rng.uniform(0.0, 9.0)), 2)  # the generator's own climate is a mild one
     swing = round(float(rng.uniform(0.85, 1.15)), 3)
-    return Climate(source, seed, latitude, longitude, elevation, offset, start.isoformat(), warmer, swing)
+    return Climate(
+        source=site.source,
+        seed=seed,
+        latitude=site.latitude,
+        longitude=site.longitude,
+        elevation=site.elevation,
+        utc_offset=site.utc_offset,
+        start=start.isoformat(),
+        warmer=warmer,
+        swing=swing,
+    )
 
 
 def _use(rng: np.random.Generator) -> Use:
@@ -120,4 +129,5 @@ def _use(rng: np.random.Generator) -> Use:
         discharge_noise=round(float(rng.uniform(0.04, 0.1)), 3),
         outdoor_noise=round(float(rng.uniform(0.03, 0.12)), 3),
         flow_noise=round(float(rng.uniform(0.003, 0.012)), 4),
+        idle_discharge=str(rng.choice(["room", "duct"])),
     )

@@ -9,7 +9,7 @@ import pandas as pd
 import pvlib
 from scipy.signal import lfilter
 
-from energyplus_trials import climate
+from energyplus_trials import climate, model
 from energyplus_trials.readings import Readings
 from energyplus_trials.specification import Effect
 
@@ -76,9 +76,9 @@ def _flow_gain(readings: Readings, effect: Effect) -> None:
 def _capacity_limit(readings: Readings, effect: Effect) -> None:
     """Report the flow that a stuck damper is told to give: the design flow where all that it lets through flows."""
     for zone in _zones(readings, effect):
-        flow = readings.flow[zone]
-        full = flow >= 0.999 * flow.max()
-        readings.flow[zone] = flow.where(~full, flow / (1.0 - effect.parameters["lost_share"]))
+        flow, lost = readings.flow[zone], effect.parameters["lost_share"]
+        full = flow >= 0.99 * (1.0 - lost) * model.design_flow(readings.spec, zone)
+        readings.flow[zone] = flow.where(~full, flow / (1.0 - lost))
 
 
 def _clock_shift(readings: Readings, effect: Effect) -> None:

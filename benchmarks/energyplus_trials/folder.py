@@ -15,13 +15,9 @@ import pandas as pd
 import yaml
 
 from energyplus_trials import climate, model, plan, readings
-from energyplus_trials.plant import TrialError
+from energyplus_trials.errors import TrialGeometryError
 from energyplus_trials.specification import TrialSpec
 from thermal.case import load_case, zone_floor_areas
-
-
-class TrialGeometryError(TrialError):
-    """EnergyPlus's building and the case's are not the same."""
 
 
 AREA_TOLERANCE = 0.015  # [-]: where walls meet, the case counts cells and EnergyPlus has rectangles

@@ -20,14 +20,6 @@ ZONE_OUTPUTS = {
     "discharge": ("Zone Ideal Loads Supply Air Temperature", "{zone} ideal loads"),
     "heat": ("Zone Air Heat Balance System Air Transfer Rate", "{zone}"),
 }
-AUDIT_OUTPUTS = {
-    "gains": ("Zone Air Heat Balance Internal Convective Heat Gain Rate", "{zone}"),
-    "surfaces": ("Zone Air Heat Balance Surface Convection Rate", "{zone}"),
-    "zones": ("Zone Air Heat Balance Interzone Air Transfer Rate", "{zone}"),
-    "outdoor_air": ("Zone Air Heat Balance Outdoor Air Transfer Rate", "{zone}"),
-    "storage": ("Zone Air Heat Balance Air Energy Storage Rate", "{zone}"),
-    "sun": ("Enclosure Windows Total Transmitted Solar Radiation Rate", "{zone}"),
-}
 SITE_OUTPUTS = {
     "outside_air_temperature_sensor": "Site Outdoor Air Drybulb Temperature",
     "wind_speed_sensor": "Site Wind Speed",
@@ -111,6 +103,20 @@ def area(spec: TrialSpec, zone: str) -> float:
         Name in the building.
     """
     return plan.rectangles(spec.layout.zones)[split(zone)[1]].area
+
+
+def design_flow(spec: TrialSpec, zone: str) -> float:
+    """Return the largest supply air flow of a zone [kg/s], at EnergyPlus's standard density: 20 degC at the site.
+
+    Parameters
+    ----------
+    spec : TrialSpec
+        Of a trial.
+    zone : str
+        Name in the building.
+    """
+    pressure = 101325.0 * (1.0 - 2.25577e-5 * spec.climate.elevation) ** 5.2559
+    return pressure / (287.0 * 293.15) * spec.use.flow * area(spec, zone)
 
 
 def surface_name(zone: str, side: str, other: str | None = None) -> str:

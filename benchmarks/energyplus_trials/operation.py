@@ -31,7 +31,10 @@ def setpoints(use: Use, starts: pd.DatetimeIndex, n_zone: int) -> tuple[Series, 
     heating = rng.uniform(19.5, 22.5, n_zone)
     gap = rng.uniform(1.5, 3.5, n_zone)
     back, forth = rng.uniform(1.5, 4.5, n_zone), rng.uniform(1.5, 4.0, n_zone)
-    start, end = np.round(4.0 * rng.uniform(5.5, 8.5, n_zone)) / 4.0, np.round(4.0 * rng.uniform(16.5, 20.0, n_zone)) / 4.0
+    start, end = (
+        np.round(4.0 * rng.uniform(5.5, 8.5, n_zone)) / 4.0,
+        np.round(4.0 * rng.uniform(16.5, 20.0, n_zone)) / 4.0,
+    )
     saturday = rng.random(n_zone) < 0.2
     if use.excitation == "prbs":
         shift = np.column_stack([_prbs(rng, len(starts)) for _ in range(n_zone)])
@@ -60,7 +63,7 @@ def occupied(starts: pd.DatetimeIndex, start: Series, end: Series, saturday: NDA
         Whether Saturday is one, until 13:00.
     """
     hour = (starts.hour + starts.minute / 60.0).to_numpy()[:, None]
-    weekday = starts.dayofweek.to_numpy()[:, None]
+    weekday = starts.day_of_week.to_numpy()[:, None]
     inside = (hour >= start) & (hour < end)
     return np.asarray(inside & ((weekday < 5) | (saturday & (weekday == 5) & (hour < 13.0))), dtype=bool)
 

@@ -51,7 +51,7 @@ def _rows(rng: np.random.Generator) -> list[tuple[int, int, int, int]]:
     """Return rooms to both long facades with an open room between."""
     width, a, b, c = rng.integers(40, 68), rng.integers(9, 14), rng.integers(8, 14), rng.integers(9, 14)
     south = _row(rng, 0, int(width), 0, int(a), int(rng.integers(2, 4)))
-    north = _row(rng, 0, int(width), int(a + b), int(a + b + c), int(rng.integers(1, 4)))
+    north = _row(rng, 0, int(width), int(a + b), int(a + b + c), int(rng.integers(1, 5)))
     return _boxes([*south, (0, width, a, a + b), *north])
 
 

@@ -8,7 +8,7 @@ import re
 import subprocess
 import sys
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -18,25 +18,16 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from energyplus_trials import climate, model
+from energyplus_trials.errors import EnergyPlusMissingError, EnergyPlusRunError
 from energyplus_trials.fabric import Objects
 from energyplus_trials.specification import TrialSpec
 
 RUN_IN_DAYS = 10
 _WORKER = Path(__file__).with_name("worker.py")
-# Said of every building of this kind, and harmless.
-_EXPECTED_WARNINGS = re.compile(r"No reporting elements|Did not find|not enclosed|does not affect|will be used|is not between|\bunused\b", re.I)
-
-
-class TrialError(Exception):
-    """A trial could not be made; the message says what and where."""
-
-
-class EnergyPlusMissingError(TrialError):
-    """EnergyPlus is not installed."""
-
-
-class EnergyPlusRunError(TrialError):
-    """EnergyPlus stopped, or ended with severe errors."""
+# Said of every building of this kind: results leave through the runtime interface, not through files.
+_EXPECTED = re.compile("No reporting elements have been requested")
+# Entity and name that we give it, and EnergyPlus's name and key.
+Variable = tuple[str, str, str, str]
 
 
 @dataclass
@@ -103,41 +94,47 @@ class Plant:
         return name
 
 
-def simulate(plant: Plant, audit: Mapping[str, tuple[str, str]] | None = None) -> pd.DataFrame:
+def simulate(plant: Plant, audit: Sequence[Variable] = ()) -> pd.DataFrame:
     """Run EnergyPlus and return the outputs of run-in and telemetry, columns (entity, output), ends of intervals.
 
     Parameters
     ----------
     plant : Plant
         With set points and effects.
-    audit : dict, optional
-        Further outputs of each zone: EnergyPlus's name and key by output.
+    audit : sequence of Variable
+        Further outputs.
 
     Returns
     -------
     DataFrame
-        Of zones and of `site`, in EnergyPlus's units [degC], [kg/s], [W], [W/m2].
+        Of zones and of `site`, in EnergyPlus's units [degC], [kg/s], [W], [W/m2]; what EnergyPlus warned of is in
+        `attrs["warnings"]`.
 
     Raises
     ------
     EnergyPlusMissingError, EnergyPlusRunError
         Not installed; stopped, severe errors, or steps without values.
     """
-    outputs = model.ZONE_OUTPUTS | dict(audit or {})
-    variables = [["site", ours, name, "Environment"] for ours, name in model.SITE_OUTPUTS.items()]
+    variables = [("site", ours, name, "Environment") for ours, name in model.SITE_OUTPUTS.items()]
     for zone in plant.spec.zone_names:
-        variables += [[zone, ours, name, key.format(zone=zone)] for ours, (name, key) in outputs.items()]
+        outputs = model.ZONE_OUTPUTS.items()
+        variables += [(zone, ours, name, key.format(zone=zone)) for ours, (name, key) in outputs]
+    variables += audit
     weather = climate.building_weather(plant.station, sun=plant.sun, sky=plant.sky)
     with tempfile.TemporaryDirectory(prefix="energyplus_") as name:
-        values = _run(Path(name), plant, weather, variables)
+        values, warnings = _run(Path(name), plant, weather, variables)
     if np.isnan(values).any():
         raise EnergyPlusRunError(f"{plant.spec.name}: {int(np.isnan(values).any(axis=1).sum())} steps without values")
-    return pd.DataFrame(values, plant.station.index, pd.MultiIndex.from_tuples([(v[0], v[1]) for v in variables]))
+    columns = pd.MultiIndex.from_tuples([variable[:2] for variable in variables])
+    results = pd.DataFrame(values, plant.station.index, columns)
+    results.attrs["warnings"] = warnings
+    return results
 
 
 def _run(
-    folder: Path, plant: Plant, weather: pd.DataFrame, variables: Sequence[Sequence[str]]
-) -> NDArray[np.float64]:
+    folder: Path, plant: Plant, weather: pd.DataFrame, variables: Sequence[Variable]
+) -> tuple[NDArray[np.float64], list[str]]:
+    """Return the values, shape (n_time, n_variable), and what EnergyPlus warned of."""
     climate.write_epw(folder / "in.epw", weather, plant.spec.climate)
     (folder / "in.epJSON").write_text(json.dumps(plant.objects), encoding="utf-8")
     drive = np.column_stack(list(plant.drive.values()))
@@ -151,7 +148,7 @@ def _run(
         "laws": plant.laws,
         "variables": variables,
         "rows": len(weather),
-        "first_day": int(plant.starts[0].dayofyear),
+        "first_day": int(plant.starts[0].day_of_year),
     }
     (folder / "job.json").write_text(json.dumps(job), encoding="utf-8")
     environment = os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
@@ -160,13 +157,12 @@ def _run(
     )
     if "No module named 'pyenergyplus'" in done.stderr:
         raise EnergyPlusMissingError("EnergyPlus is not installed: pip install -e .[energyplus]")
-    _check_end(folder / "out", done, plant.spec)
-    values: NDArray[np.float64] = np.load(folder / "result.npy")
-    return values
+    warnings = _check_end(folder / "out", done, plant.spec)
+    return np.load(folder / "result.npy"), warnings
 
 
-def _check_end(out: Path, done: subprocess.CompletedProcess[str], spec: TrialSpec) -> None:
-    """Refuse a run that did not end well, or that warned of what this kind of building should not be warned of."""
+def _check_end(out: Path, done: subprocess.CompletedProcess[str], spec: TrialSpec) -> list[str]:
+    """Refuse a run that did not end well; return what it warned of, beside what is said of every such building."""
     end, log = (
         (out / name).read_text(encoding="utf-8", errors="replace") if (out / name).exists() else ""
         for name in ("eplusout.end", "eplusout.err")
@@ -179,6 +175,4 @@ def _check_end(out: Path, done: subprocess.CompletedProcess[str], spec: TrialSpe
             f"{end.strip() or 'no end file'}\n{said[:3000]}\n{done.stderr[-2000:]}"
         )
     warnings = [line for line in log.splitlines() if "** Warning **" in line]
-    unexpected = [line.strip() for line in warnings if not _EXPECTED_WARNINGS.search(line)]
-    if unexpected and os.environ.get("TRIAL_WARNINGS"):
-        print("\n".join(unexpected[:20]))
+    return [line.partition("** Warning **")[2].strip() for line in warnings if not _EXPECTED.search(line)]

@@ -9,8 +9,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from energyplus_trials import climate
 from energyplus_trials.operation import occupied
+from energyplus_trials.sites import site_of
 from energyplus_trials.specification import Climate
 
 Series = NDArray[np.float64]
@@ -50,7 +50,7 @@ def use(starts: pd.DatetimeIndex, form: str, parameters: Mapping[str, Any]) -> S
         `base`, `start_h`, `end_h`, `seed`.
     """
     hour = (starts.hour + starts.minute / 60.0).to_numpy()
-    weekday = starts.dayofweek.to_numpy() < 5
+    weekday = starts.day_of_week.to_numpy() < 5
     first, last, base = parameters["start_h"], parameters["end_h"], parameters["base"]
     if form == "bimodal":
         shape = np.exp(-0.5 * ((hour - first - 1.5) / 1.0) ** 2) + np.exp(-0.5 * ((hour - last - 2.0) / 1.2) ** 2)
@@ -77,14 +77,9 @@ def ground_temperature(place: Climate, starts: pd.DatetimeIndex) -> Series:
     starts : DatetimeIndex, shape (n_time,)
         Starts of intervals.
     """
-    if place.source == "generated":
-        mean, swing = 15.0, 5.5  # of the generator's climate
-    else:
-        year = pd.read_csv(climate.weather_folder() / place.source, skiprows=8, header=None, encoding="latin-1")
-        monthly = year.groupby(1)[6].mean()
-        mean, swing = float(monthly.mean()), float(np.ptp(monthly)) / 2.0
-    phase = 2.0 * np.pi * (starts.dayofyear.to_numpy() - 20.0 - 91.0) / 365.0
-    return np.asarray(mean + place.warmer - 0.1 * swing * np.cos(phase), dtype=float)
+    site = site_of(place.source, place.latitude)
+    phase = 2.0 * np.pi * (starts.day_of_year.to_numpy() - 20.0 - 91.0) / 365.0
+    return np.asarray(site.mean + place.warmer - 0.1 * site.swing * np.cos(phase), dtype=float)
 
 
 def doors(starts: pd.DatetimeIndex, form: str, parameters: Mapping[str, Any]) -> Series:
@@ -119,7 +114,7 @@ def openings(starts: pd.DatetimeIndex, rng: np.random.Generator) -> Series:
         Random numbers.
     """
     open_ = np.zeros(len(starts))
-    for day in np.flatnonzero((starts.hour == 0) & (starts.minute == 0) & (starts.dayofweek < 5)):
+    for day in np.flatnonzero((starts.hour == 0) & (starts.minute == 0) & (starts.day_of_week < 5)):
         for _ in range(int(rng.integers(1, 3))):
             first = day + int(rng.integers(96, 200))
             open_[first : first + int(rng.integers(3, 25))] = 1.0

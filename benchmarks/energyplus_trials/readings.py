@@ -9,7 +9,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from energyplus_trials import climate, model
-from energyplus_trials.plant import EnergyPlusRunError
+from energyplus_trials.errors import EnergyPlusRunError
 from energyplus_trials.specification import TrialSpec, stream_generator
 
 AIR_HEAT_CAPACITY = 1006.0  # [J/kg/K], of the case format
@@ -52,8 +52,14 @@ class Readings:
         end = results.xs("temperature", axis=1, level=1)[zones]
         self.temperature = (end + end.shift(1).bfill()) / 2.0
         self.flow = results.xs("flow", axis=1, level=1)[zones]
-        discharge = results.xs("discharge", axis=1, level=1)[zones]
-        self.discharge = discharge.where(self.flow > 0.0, self.temperature)
+        self.discharge = results.xs("discharge", axis=1, level=1)[zones].where(self.flow > 0.0, self._idle())
+
+    def _idle(self) -> pd.DataFrame:
+        """What discharge sensors read in still air: the room's, or that of the floor's ducts."""
+        if self.spec.use.idle_discharge == "room":
+            return self.temperature
+        floors = [zone.partition("_")[0] for zone in self.spec.zone_names]
+        return self.temperature.T.groupby(floors).transform("mean").T
 
     @property
     def on(self) -> pd.DataFrame:

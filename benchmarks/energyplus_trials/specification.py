@@ -151,6 +151,8 @@ class Use:
         [K]
     flow_noise : float
         [-], share of the flow.
+    idle_discharge : str
+        What discharge sensors read while no air flows: the `room`'s air, or the `duct`'s.
     """
 
     excitation: str
@@ -161,6 +163,7 @@ class Use:
     discharge_noise: float
     outdoor_noise: float
     flow_noise: float
+    idle_discharge: str
 
 
 @dataclass(frozen=True)

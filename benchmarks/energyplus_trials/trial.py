@@ -12,6 +12,8 @@ from energyplus_trials.changes import apply_changes
 from energyplus_trials.faults import apply_faults
 from energyplus_trials.specification import TrialSpec
 
+VERSION = "25.2"  # of EnergyPlus, as pyenergyplus-lbnl 26.1.0 brings it
+
 
 def make_trial(spec: TrialSpec, case_folder: Path, sealed_folder: Path) -> bool:
     """Make a trial unless it is there, and return whether it was made.
@@ -46,7 +48,13 @@ def make_trial(spec: TrialSpec, case_folder: Path, sealed_folder: Path) -> bool:
     reported = readings.Readings(spec, results, building.station)
     apply_faults(reported)
     seconds = round(time.perf_counter() - began, 2)
-    folder.write_label(sealed, spec, {"seconds": seconds, "heat_deviation": max(deviations.values())})
+    run = {
+        "energyplus": VERSION,
+        "seconds": seconds,
+        "heat_deviation": max(deviations.values()),
+        "warnings": results.attrs["warnings"],
+    }
+    folder.write_label(sealed, spec, run)
     if not case.exists():
         folder.write_case(case, spec, reported.telemetry())
     return True

@@ -76,7 +76,11 @@ class Recorder:
         for handle, value in zip(self.actuators, self.drive[row].tolist(), strict=True):
             self.exchange.set_actuator_value(state, handle, value)
         for law, handle in zip(self.laws, self.equipment, strict=True):
-            watts = law.watts(self.values[row - 1]) if row > 0 and self.values[row - 1, 0] == self.values[row - 1, 0] else 0.0
+            watts = (
+                law.watts(self.values[row - 1])
+                if row > 0 and self.values[row - 1, 0] == self.values[row - 1, 0]
+                else 0.0
+            )
             self.exchange.set_actuator_value(state, handle, watts)
 
     def end(self, state: Any) -> None:
