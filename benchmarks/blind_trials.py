@@ -1,4 +1,4 @@
-"""Blind trials of the diagnosis: offices in EnergyPlus whose effects are switched on one by one, in pairs, or not at all.
+"""Blind trials of the diagnosis: offices in EnergyPlus with effects switched on one by one, in pairs, or not at all.
 
 `make` draws trials from seeds and makes them. What the diagnosis may see goes to `DIR/cases/NAME`, what a trial truly
 holds to `DIR/sealed/NAME.json`; names tell nothing. Seeds of development and of confirmation are streams of their own,

@@ -14,6 +14,7 @@ PARTY_WALL_FILM = 7.7  # [W/m2/K], ISO 6946
 
 
 def solar_gain(plant: Plant, effect: Effect) -> None:
+    """Let the sun in through glass; behind a horizon in that form."""
     plant.sun = True
     u_value = plant.spec.fabric.window_u_value
     plant.objects["WindowMaterial:Glazing"]["glass"] = fabric.pane(u_value, effect.parameters["transmittance"])
@@ -34,6 +35,7 @@ def _horizon(plant: Plant, azimuth: float, elevation: float) -> None:
 
 
 def blinds(plant: Plant, effect: Effect) -> None:
+    """Lower exterior shades, window by window, while more sun falls on it than a threshold."""
     through = 1.0 - effect.parameters["beta"]
     optics = {
         f"{band}_{what}": value
@@ -60,6 +62,7 @@ def blinds(plant: Plant, effect: Effect) -> None:
 
 
 def solar_opaque(plant: Plant, effect: Effect) -> None:
+    """Let the sun warm opaque walls; a roof, too, where there is one."""
     plant.sun = True
     layers = fabric.constructions(plant.spec.fabric)
     wall = fabric.objects({"exterior wall": layers["exterior wall"]}, effect.parameters["absorptance"])
@@ -67,6 +70,7 @@ def solar_opaque(plant: Plant, effect: Effect) -> None:
 
 
 def longwave_sky(plant: Plant, effect: Effect) -> None:
+    """Let the building see the sky: part of its difference from the air, or more than all of it."""
     plant.sky = effect.parameters["share"]
 
 
@@ -140,6 +144,7 @@ def other_side(plant: Plant, name: str, schedule: str, film: float) -> None:
 
 
 def roof(plant: Plant, effect: Effect) -> None:
+    """Open the top ceilings to outdoors, behind insulation."""
     concrete = plant.spec.fabric.slab
     between = 1.0 / effect.parameters["u_value_W_m2_K"] - 0.14 - concrete / fabric.SOLIDS["concrete"][0]
     layers: fabric.Layers = [("render", 0.01), ("", round(max(between, 0.01), 4)), ("concrete", concrete)]
@@ -155,7 +160,7 @@ def roof(plant: Plant, effect: Effect) -> None:
 
 
 def thermal_bridge(plant: Plant, effect: Effect) -> None:
-    """Give each exterior wall a strip without mass at its foot, of the wall's U-value and the bridge's over its height."""
+    """Give each exterior wall a strip without mass at its foot, of the wall's U-value and the bridge's."""
     u_value = plant.spec.fabric.wall_u_value + effect.parameters["psi_W_m_K"] / STRIP
     layers: fabric.Layers = [("", round(max(1.0 / u_value - fabric.FILMS, 0.01), 4))]
     model.merge(plant.objects, fabric.objects({"bridge": layers}, fabric.NO_SOLAR_ABSORPTANCE))
@@ -170,6 +175,7 @@ def thermal_bridge(plant: Plant, effect: Effect) -> None:
 
 
 def neighbour(plant: Plant, effect: Effect) -> None:
+    """Put a neighbour behind the walls of the facade without windows, in place of outdoors."""
     brick = 0.15
     between = 1.0 / effect.parameters["u_value_W_m2_K"] - 0.26 - 2.0 * brick / fabric.SOLIDS["brick"][0]
     layers: fabric.Layers = [("brick", brick), ("", round(max(between, 0.01), 4)), ("brick", brick)]

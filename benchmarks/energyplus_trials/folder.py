@@ -19,7 +19,6 @@ from energyplus_trials.errors import TrialGeometryError
 from energyplus_trials.specification import TrialSpec
 from thermal.case import load_case, zone_floor_areas
 
-
 AREA_TOLERANCE = 0.015  # [-]: where walls meet, the case counts cells and EnergyPlus has rectangles
 
 

@@ -51,6 +51,7 @@ def heat(plant: Plant, zone: str, name: str, watts: float, schedule: str, radian
 
 
 def internal_gains(plant: Plant, effect: Effect) -> None:
+    """Add heat of people, light and equipment, which follows one profile in zones of unequal strength."""
     rng = np.random.default_rng(effect.parameters["seed"])
     shared = plant.add_schedule("use", profiles.use(plant.starts, effect.form, effect.parameters))
     for zone in zones_of(plant, effect):
@@ -59,6 +60,7 @@ def internal_gains(plant: Plant, effect: Effect) -> None:
 
 
 def hidden_mass(plant: Plant, effect: Effect) -> None:
+    """Stand concrete in the rooms."""
     layers: fabric.Layers = [("concrete", HIDDEN_MASS_THICKNESS)]
     model.merge(plant.objects, fabric.objects({"hidden mass": layers}, fabric.NO_SOLAR_ABSORPTANCE))
     _, density, capacity = fabric.SOLIDS["concrete"]
@@ -72,6 +74,7 @@ def hidden_mass(plant: Plant, effect: Effect) -> None:
 
 
 def zone_mixing(plant: Plant, effect: Effect) -> None:
+    """Open doors: as much air goes one way as the other."""
     open_ = profiles.doors(plant.starts, effect.form, effect.parameters)
     schedule = plant.add_schedule("doors", open_)
     for zone, other in effect.parameters["pairs"]:
@@ -134,7 +137,7 @@ def latent_load(plant: Plant, effect: Effect) -> None:
 
 
 def valve_leak(plant: Plant, effect: Effect) -> None:
-    """Heat that no meter sees, whenever air flows."""
+    """Give heat that no meter sees, whenever air flows."""
     always = plant.add_schedule("leaking", 1.0)
     for zone in effect.zones:
         watts = effect.parameters["power_W_m2"] * model.area(plant.spec, zone)
@@ -198,7 +201,7 @@ def ventilate(plant: Plant, zone: str, changes: float, schedule: str, coldest: f
 
 
 def server_room(plant: Plant, effect: Effect) -> None:
-    """A load by day and night that is on or off for random stretches."""
+    """Run a load by day and night, on or off for random stretches."""
     rng = np.random.default_rng(effect.parameters["seed"])
     for zone in effect.zones:
         schedule = plant.add_schedule(f"{zone} servers", profiles.on_and_off(rng, len(plant.starts)))
@@ -207,7 +210,7 @@ def server_room(plant: Plant, effect: Effect) -> None:
 
 
 def phase_change(plant: Plant, effect: Effect) -> None:
-    """Boards that melt about the rooms' temperature."""
+    """Hang boards that melt about the rooms' temperature."""
     always = plant.add_schedule("boards", 1.0)
     for zone in zones_of(plant, effect):
         area = model.area(plant.spec, zone)
@@ -222,7 +225,7 @@ def phase_change(plant: Plant, effect: Effect) -> None:
 
 
 def unmetered_heating(plant: Plant, effect: Effect) -> None:
-    """Radiators that follow the outdoor temperature and that no meter counts; below 16 degC, in the hours of the boiler."""
+    """Heat with radiators that no meter counts and that follow the outdoor temperature below 16 degC by day."""
     need = np.maximum(16.0 - plant.station["outside_air_temperature_sensor"].to_numpy(), 0.0)
     schedule = plant.add_schedule("radiators", need * profiles.hours(plant.starts, 4.0, 21.0, every_day=True))
     for zone in effect.zones:

@@ -6,14 +6,11 @@ from typing import Any
 
 import pandas as pd
 
-from energyplus_trials import fabric, plan
+from energyplus_trials import fabric, plan, terminals
 from energyplus_trials.fabric import Objects
 from energyplus_trials.specification import TrialSpec
 
 STEPS_PER_HOUR = 12
-HEATING_SUPPLY, COOLING_SUPPLY = 35.0, 14.0  # [degC]
-# So dry that EnergyPlus's cp of air (1004.84 + 1858.95 w) is the case format's 1006 J/kg/K; no moisture anywhere else.
-SUPPLY_HUMIDITY_RATIO = 0.000624  # [kg/kg]
 ZONE_OUTPUTS = {
     "temperature": ("Zone Mean Air Temperature", "{zone}"),
     "flow": ("Zone Ideal Loads Supply Air Mass Flow Rate", "{zone} ideal loads"),
@@ -47,8 +44,8 @@ def null_model(spec: TrialSpec, first: pd.Timestamp, last: pd.Timestamp) -> Obje
         {"WindowMaterial:Glazing": {"glass": fabric.pane(spec.fabric.window_u_value, 0.0)}},
         {"Construction": {"window": {"outside_layer": "glass"}}},
         _surfaces(spec),
-        {"Schedule:Constant": {"dual setpoint": constant(4.0)}, "ScheduleTypeLimits": {"any": {}}},
-        *(_zone_air(zone, spec.use.flow * area(spec, zone)) for zone in spec.zone_names),
+        {"Schedule:Constant": {terminals.DUAL_SETPOINT: terminals.constant(4.0)}, "ScheduleTypeLimits": {"any": {}}},
+        *(terminals.terminal(zone, spec.use.flow * area(spec, zone)) for zone in spec.zone_names),
     )
     for part in parts:
         merge(objects, part)
@@ -67,17 +64,6 @@ def merge(objects: Objects, part: Objects) -> None:
     """
     for kind, content in part.items():
         objects.setdefault(kind, {}).update(content)
-
-
-def constant(value: float) -> dict[str, Any]:
-    """Return a schedule that stays at a value unless the run drives it.
-
-    Parameters
-    ----------
-    value : float
-        Any unit.
-    """
-    return {"schedule_type_limits_name": "any", "hourly_value": value}
 
 
 def split(zone: str) -> tuple[int, str]:
@@ -299,60 +285,3 @@ def _slabs(spec: TrialSpec, zone: str) -> dict[str, dict[str, Any]]:
             **polygon([(x, y, z) for x, y in ring]),
         }
     return slabs
-
-
-def _zone_air(zone: str, flow: float) -> Objects:
-    return {
-        "Schedule:Constant": {f"{zone} heating": constant(20.0), f"{zone} cooling": constant(25.0)},
-        "ZoneControl:Thermostat": {
-            f"{zone} thermostat": {
-                "zone_or_zonelist_name": zone,
-                "control_type_schedule_name": "dual setpoint",
-                "control_1_object_type": "ThermostatSetpoint:DualSetpoint",
-                "control_1_name": f"{zone} setpoints",
-            }
-        },
-        "ThermostatSetpoint:DualSetpoint": {
-            f"{zone} setpoints": {
-                "heating_setpoint_temperature_schedule_name": f"{zone} heating",
-                "cooling_setpoint_temperature_schedule_name": f"{zone} cooling",
-            }
-        },
-        "ZoneHVAC:EquipmentConnections": {
-            f"{zone} connections": {
-                "zone_name": zone,
-                "zone_conditioning_equipment_list_name": f"{zone} equipment",
-                "zone_air_inlet_node_or_nodelist_name": f"{zone} inlet",
-                "zone_air_node_name": f"{zone} air",
-                "zone_return_air_node_or_nodelist_name": f"{zone} return",
-            }
-        },
-        "ZoneHVAC:EquipmentList": {
-            f"{zone} equipment": {
-                "load_distribution_scheme": "SequentialLoad",
-                "equipment": [
-                    {
-                        "zone_equipment_object_type": "ZoneHVAC:IdealLoadsAirSystem",
-                        "zone_equipment_name": f"{zone} ideal loads",
-                        "zone_equipment_cooling_sequence": 1,
-                        "zone_equipment_heating_or_no_load_sequence": 1,
-                    }
-                ],
-            }
-        },
-        "ZoneHVAC:IdealLoadsAirSystem": {
-            f"{zone} ideal loads": {
-                "zone_supply_air_node_name": f"{zone} inlet",
-                "maximum_heating_supply_air_temperature": HEATING_SUPPLY,
-                "minimum_cooling_supply_air_temperature": COOLING_SUPPLY,
-                "maximum_heating_supply_air_humidity_ratio": SUPPLY_HUMIDITY_RATIO,
-                "minimum_cooling_supply_air_humidity_ratio": SUPPLY_HUMIDITY_RATIO,
-                "heating_limit": "LimitFlowRate",
-                "maximum_heating_air_flow_rate": round(flow, 6),
-                "cooling_limit": "LimitFlowRate",
-                "maximum_cooling_air_flow_rate": round(flow, 6),
-                "dehumidification_control_type": "ConstantSupplyHumidityRatio",
-                "humidification_control_type": "ConstantSupplyHumidityRatio",
-            }
-        },
-    }

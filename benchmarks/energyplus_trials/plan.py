@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -44,7 +45,7 @@ def _cuts(rng: np.random.Generator, low: int, high: int, parts: int) -> list[int
 
 def _row(rng: np.random.Generator, west: int, east: int, south: int, north: int, parts: int) -> list[tuple[int, ...]]:
     lines = _cuts(rng, west, east, parts)
-    return [(a, b, south, north) for a, b in zip(lines, lines[1:], strict=False)]
+    return [(a, b, south, north) for a, b in itertools.pairwise(lines)]
 
 
 def _rows(rng: np.random.Generator) -> list[tuple[int, int, int, int]]:
@@ -81,7 +82,7 @@ def _ell(rng: np.random.Generator) -> list[tuple[int, int, int, int]]:
     width, depth = x + rng.integers(18, 40), y + rng.integers(14, 34)
     wing = _row(rng, int(x), int(width), 0, int(y), int(rng.integers(1, 4)))
     lines = _cuts(rng, int(y), int(depth), int(rng.integers(1, 3)))
-    other = [(0, x, a, b) for a, b in zip(lines, lines[1:], strict=False)]
+    other = [(0, x, a, b) for a, b in itertools.pairwise(lines)]
     return _boxes([(0, x, 0, y), *wing, *other])
 
 

@@ -55,7 +55,7 @@ class Readings:
         self.discharge = results.xs("discharge", axis=1, level=1)[zones].where(self.flow > 0.0, self._idle())
 
     def _idle(self) -> pd.DataFrame:
-        """What discharge sensors read in still air: the room's, or that of the floor's ducts."""
+        """Return what discharge sensors read in still air: the room's, or that of the floor's ducts."""
         if self.spec.use.idle_discharge == "room":
             return self.temperature
         floors = [zone.partition("_")[0] for zone in self.spec.zone_names]
