@@ -140,7 +140,7 @@ def _infiltration(*forms: str) -> Draw:
 def _internal_gains(*forms: str) -> Draw:
     def draw(spec: TrialSpec, rng: np.random.Generator, s: float) -> Effect:
         numbers = {
-            "power_W_m2": round(12.0 * s, 3),
+            "power_W_m2": round(16.0 * s, 3),
             "base": round(rng.uniform(0.05, 0.3), 3),
             "start_h": round(rng.uniform(7.0, 9.0), 2),
             "end_h": round(rng.uniform(16.5, 18.5), 2),
@@ -152,7 +152,7 @@ def _internal_gains(*forms: str) -> Draw:
 
 
 def _ground(spec: TrialSpec, rng: np.random.Generator, s: float) -> Effect:
-    numbers = {"u_value_W_m2_K": round(0.45 * s, 4), "warmer_K": round(rng.uniform(0.0, 3.0), 2)}
+    numbers = {"u_value_W_m2_K": round(0.7 * s, 4), "warmer_K": round(rng.uniform(0.0, 3.0), 2)}
     return Effect("ground_exchange", "slab", s, (), numbers, ("ground_exchange",))
 
 
@@ -267,7 +267,7 @@ CATALOGUE: dict[str, Draw] = {
     "internal_gains": _internal_gains("office"),
     "interfloor_exchange": _simple("interfloor_exchange", "slab", u_value_W_m2_K=1.5),
     "ground_exchange": _ground,
-    "roof_exchange": _simple("roof_exchange", "slab", u_value_W_m2_K=0.4),
+    "roof_exchange": _simple("roof_exchange", "slab", u_value_W_m2_K=0.6),
     "hidden_mass": _simple("hidden_mass", "concrete", capacity_kJ_m2_K=60.0),
     "zone_mixing": _zone_mixing,
     "sensor_bias": _sensor_bias,

@@ -183,6 +183,7 @@ def neighbour(plant: Plant, effect: Effect) -> None:
     schedule = plant.add_schedule("next door", effect.parameters["temperature_degC"])
     other_side(plant, "next door", schedule, PARTY_WALL_FILM)
     for zone in effect.zones:
+        plant.objects.get("Door", {}).pop(f"{zone} {effect.parameters['side']} bridge", None)  # not to a neighbour
         plant.objects["BuildingSurface:Detailed"][model.surface_name(zone, effect.parameters["side"])] |= {
             "construction_name": "party wall", "outside_boundary_condition": "OtherSideCoefficients",
             "outside_boundary_condition_object": "next door", "sun_exposure": "NoSun", "wind_exposure": "NoWind",

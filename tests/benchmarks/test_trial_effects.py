@@ -153,6 +153,15 @@ def test_an_effect_of_the_building_touches_its_own_objects(trials, null, name):
     pd.testing.assert_frame_equal(before.station, after.station)
 
 
+def test_a_party_wall_has_no_bridge_to_outdoors(trials, null):
+    effects, build = trials("draw_effects"), trials("trial").build
+    bridged = with_effect(trials, null, "thermal_bridge")
+    both = effects.with_effect(bridged, "neighbour", np.random.default_rng(3), 1.0)
+    doors, left = (set(build(spec).objects["Door"]) for spec in (bridged, both))
+    side = both.effects[1].parameters["side"]
+    assert doors - left == {f"{zone} {side} bridge" for zone in both.effects[1].zones}
+
+
 def test_a_biased_thermostat_keeps_its_reading_at_the_set_point(trials, null):
     build = trials("trial").build
     spec = with_effect(trials, null, "sensor_bias")
