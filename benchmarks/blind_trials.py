@@ -1,0 +1,114 @@
+"""Blind trials of the diagnosis: offices in EnergyPlus with effects switched on one by one, in pairs, or not at all.
+
+`make` draws trials from seeds and makes them. What the diagnosis may see goes to `DIR/cases/NAME`, what a trial truly
+holds to `DIR/sealed/NAME.json`; names tell nothing. Seeds of development and of confirmation are streams of their own,
+so that no trial of one is ever in the other; trials of one seed share building, weather, use and noise, so that the
+null of a seed is the twin of its other trials.
+
+Run from the repository's root, in an environment with Python 3.11 or newer::
+
+    pip install -e .[energyplus]
+    python benchmarks/blind_trials.py make --out results/blind --kind single --seeds 0-9
+
+An interrupted run goes on where it was: trials that are there are left alone.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import time
+from concurrent.futures import Future, ThreadPoolExecutor, as_completed
+from pathlib import Path
+
+from energyplus_trials.drawing import DAYS, draw_spec
+from energyplus_trials.errors import EnergyPlusMissingError, TrialError
+from energyplus_trials.specification import KINDS, TrialSpec
+from energyplus_trials.trial import make_trial
+
+CASES, SEALED = "cases", "sealed"
+
+
+def seed_range(text: str) -> range:
+    """Read `A-B`, both included, or one seed.
+
+    Parameters
+    ----------
+    text : str
+        Of the command line.
+    """
+    first, _, last = text.partition("-")
+    try:
+        found = range(int(first), int(last or first) + 1)
+    except ValueError:
+        found = range(0)
+    if not found:
+        raise argparse.ArgumentTypeError(f"expected seeds such as 0-19, found {text!r}")
+    return found
+
+
+def make(specs: list[TrialSpec], out: Path, workers: int) -> list[str]:
+    """Make trials that are not there yet and return the names of those that failed.
+
+    Each runs EnergyPlus in a process of its own; the threads only wait for them.
+
+    Parameters
+    ----------
+    specs : list of TrialSpec
+        What to make.
+    out : Path
+        Folder of cases and sealed labels.
+    workers : int
+        EnergyPlus runs at a time.
+    """
+    failed = []
+    with ThreadPoolExecutor(workers) as pool:
+        tasks: dict[Future[bool], TrialSpec] = {
+            pool.submit(make_trial, spec, out / CASES, out / SEALED): spec for spec in specs
+        }
+        began = time.perf_counter()
+        try:
+            for number, task in enumerate(as_completed(tasks), 1):
+                spec, outcome = tasks[task], "there already"
+                try:
+                    outcome = "made" if task.result() else outcome
+                except EnergyPlusMissingError as error:
+                    raise SystemExit(str(error)) from error
+                except TrialError as error:  # the others are worth having
+                    failed.append(spec.name)
+                    outcome = f"FAILED: {error}"
+                seconds = time.perf_counter() - began
+                print(f"{number} of {len(specs)} ({seconds:.0f} s): {spec.name}: {outcome}", flush=True)
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+    return failed
+
+
+def _make(options: argparse.Namespace) -> int:
+    specs = [
+        draw_spec(seed, kind, confirmation=options.confirmation, days=options.days)
+        for seed in options.seeds
+        for kind in (KINDS if options.kind == "all" else (options.kind,))
+    ]
+    return 1 if make(specs, options.out, options.workers) else 0
+
+
+def main() -> int:
+    """Run the command."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    commands = parser.add_subparsers(required=True)
+    command = commands.add_parser("make", help="make trials and seal their labels")
+    command.add_argument("--out", type=Path, required=True, help="folder of cases and sealed labels")
+    command.add_argument("--kind", choices=(*KINDS, "all"), required=True, help="which effects the trials hold")
+    command.add_argument("--seeds", type=seed_range, required=True, help="first and last, such as 0-19")
+    command.add_argument("--confirmation", action="store_true", help="the stream of seeds that nothing is tuned on")
+    command.add_argument("--days", type=int, default=DAYS, help="length of the telemetry")
+    command.add_argument("--workers", type=int, default=min(2, os.cpu_count() or 1), help="runs at a time")
+    command.set_defaults(run=_make)
+    options = parser.parse_args()
+    return int(options.run(options))
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

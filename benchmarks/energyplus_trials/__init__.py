@@ -1,0 +1,1 @@
+"""Offices in EnergyPlus whose physics is switched on effect by effect, for blind trials of a diagnosis."""

@@ -1,0 +1,287 @@
+"""The EnergyPlus input (epJSON) of a trial's null: walls, windows, slabs, furniture and heat, nothing else."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pandas as pd
+
+from energyplus_trials import fabric, plan, terminals
+from energyplus_trials.fabric import Objects
+from energyplus_trials.specification import TrialSpec
+
+STEPS_PER_HOUR = 12
+ZONE_OUTPUTS = {
+    "temperature": ("Zone Mean Air Temperature", "{zone}"),
+    "flow": ("Zone Ideal Loads Supply Air Mass Flow Rate", "{zone} ideal loads"),
+    "discharge": ("Zone Ideal Loads Supply Air Temperature", "{zone} ideal loads"),
+    "heat": ("Zone Air Heat Balance System Air Transfer Rate", "{zone}"),
+}
+SITE_OUTPUTS = {
+    "outside_air_temperature_sensor": "Site Outdoor Air Drybulb Temperature",
+    "wind_speed_sensor": "Site Wind Speed",
+    "wind_direction_sensor": "Site Wind Direction",
+    "horizontal_infrared_irradiance_sensor": "Site Horizontal Infrared Radiation Rate per Area",
+    "direct_normal_irradiance_sensor": "Site Direct Solar Radiation Rate per Area",
+    "diffuse_horizontal_irradiance_sensor": "Site Diffuse Solar Radiation Rate per Area",
+}
+
+
+def null_model(spec: TrialSpec, first: pd.Timestamp, last: pd.Timestamp) -> Objects:
+    """Return the input by EnergyPlus class and object name.
+
+    Parameters
+    ----------
+    spec : TrialSpec
+        Of which the effects are not read.
+    first, last : Timestamp
+        First and last day of the run.
+    """
+    objects = _control(spec, first, last)
+    parts = (
+        _climate(spec),
+        fabric.objects(fabric.constructions(spec.fabric), fabric.NO_SOLAR_ABSORPTANCE),
+        {"WindowMaterial:Glazing": {"glass": fabric.pane(spec.fabric.window_u_value, 0.0)}},
+        {"Construction": {"window": {"outside_layer": "glass"}}},
+        _surfaces(spec),
+        {"Schedule:Constant": {terminals.DUAL_SETPOINT: terminals.constant(4.0)}, "ScheduleTypeLimits": {"any": {}}},
+        *(terminals.terminal(zone, spec.use.flow * area(spec, zone)) for zone in spec.zone_names),
+    )
+    for part in parts:
+        merge(objects, part)
+    return objects
+
+
+def merge(objects: Objects, part: Objects) -> None:
+    """Add objects, class by class.
+
+    Parameters
+    ----------
+    objects : dict
+        By class and name; changed.
+    part : dict
+        What to add.
+    """
+    for kind, content in part.items():
+        objects.setdefault(kind, {}).update(content)
+
+
+def split(zone: str) -> tuple[int, str]:
+    """Return floor, from 0, and name on the floor of a zone.
+
+    Parameters
+    ----------
+    zone : str
+        Name in the building.
+    """
+    floor, _, name = zone.partition("_")
+    return int(floor[1:]) - 1, name
+
+
+def area(spec: TrialSpec, zone: str) -> float:
+    """Return the floor area of a zone [m2].
+
+    Parameters
+    ----------
+    spec : TrialSpec
+        Of a trial.
+    zone : str
+        Name in the building.
+    """
+    return plan.rectangles(spec.layout.zones)[split(zone)[1]].area
+
+
+def design_flow(spec: TrialSpec, zone: str) -> float:
+    """Return the largest supply air flow of a zone [kg/s], at EnergyPlus's standard density: 20 degC at the site.
+
+    Parameters
+    ----------
+    spec : TrialSpec
+        Of a trial.
+    zone : str
+        Name in the building.
+    """
+    pressure = 101325.0 * (1.0 - 2.25577e-5 * spec.climate.elevation) ** 5.2559
+    return pressure / (287.0 * 293.15) * spec.use.flow * area(spec, zone)
+
+
+def surface_name(zone: str, side: str, other: str | None = None) -> str:
+    """Return the name of a wall.
+
+    Parameters
+    ----------
+    zone : str
+        Name in the building.
+    side : str
+        Of the zone.
+    other : str or None
+        Zone on the far side, on the same floor.
+    """
+    return f"{zone} {side} {other or 'outdoor'}"
+
+
+def _control(spec: TrialSpec, first: pd.Timestamp, last: pd.Timestamp) -> Objects:
+    return {
+        "Version": {"Version 1": {"version_identifier": "25.2"}},
+        "Building": {
+            "building": {
+                "north_axis": spec.layout.orientation,
+                "terrain": "Suburbs",
+                "solar_distribution": "FullExterior",
+                # The run-in, which is not reported, does what the warm-up would.
+                "loads_convergence_tolerance_value": 0.5,
+                "temperature_convergence_tolerance_value": 0.5,
+                "minimum_number_of_warmup_days": 3,
+                "maximum_number_of_warmup_days": 60,
+            }
+        },
+        "Timestep": {"Timestep 1": {"number_of_timesteps_per_hour": STEPS_PER_HOUR}},
+        # No system step shorter than a zone step: what is reported over a step is then what the heat balance used.
+        "ConvergenceLimits": {"ConvergenceLimits 1": {"minimum_system_timestep": 60 // STEPS_PER_HOUR}},
+        "ZoneAirHeatBalanceAlgorithm": {"air": {"algorithm": "EulerMethod"}},
+        "SimulationControl": {
+            "SimulationControl 1": {
+                "do_zone_sizing_calculation": "No",
+                "do_system_sizing_calculation": "No",
+                "do_plant_sizing_calculation": "No",
+                "run_simulation_for_sizing_periods": "No",
+                "run_simulation_for_weather_file_run_periods": "Yes",
+            }
+        },
+        "RunPeriod": {
+            "run": {
+                "begin_month": first.month,
+                "begin_day_of_month": first.day,
+                "begin_year": first.year,
+                "end_month": last.month,
+                "end_day_of_month": last.day,
+                "end_year": last.year,
+                "use_weather_file_daylight_saving_period": "No",
+                "use_weather_file_holidays_and_special_days": "No",
+            }
+        },
+        "GlobalGeometryRules": {
+            "rules": {
+                "starting_vertex_position": "UpperLeftCorner",
+                "vertex_entry_direction": "Counterclockwise",
+                "coordinate_system": "Relative",  # in world coordinates EnergyPlus ignores the north axis
+            }
+        },
+        "OutputControl:Files": {"files": dict.fromkeys(_FILES, "No") | {"output_csv": "No"}},
+    }
+
+
+_FILES = tuple(
+    f"output_{name}"
+    for name in ("mtr", "eso", "eio", "tabular", "sqlite", "json", "audit", "zone_sizing", "system_sizing", "dxf",
+                 "bnd", "rdd", "mdd", "mtd", "shd", "dfs", "glhe", "delightin", "delighteldmp", "delightdfdmp", "edd",
+                 "dbg", "perflog", "sln", "sci", "wrl", "screen", "tarcog", "extshd")
+)  # fmt: skip
+
+
+def _climate(spec: TrialSpec) -> Objects:
+    return {
+        # Neither air temperature nor wind changes with height: walls see what the station measures.
+        "Site:HeightVariation": {
+            "height": {"wind_speed_profile_exponent": 0.0, "air_temperature_gradient_coefficient": 0.0}
+        },
+        "Site:WeatherStation": {"station": {"wind_speed_profile_exponent": 0.0}},
+        "SurfaceConvectionAlgorithm:Inside": {"inside": {"algorithm": spec.fabric.interior_convection}},
+        "SurfaceConvectionAlgorithm:Outside": {"outside": {"algorithm": "SimpleCombined"}},
+        "SurfaceProperty:ConvectionCoefficients:MultipleSurface": {
+            kind: {
+                "surface_type": kind,
+                "convection_coefficient_1_location": "Outside",
+                "convection_coefficient_1_type": "Value",
+                "convection_coefficient_1": spec.fabric.exterior_film,
+            }
+            for kind in ("AllExteriorWalls", "AllExteriorWindows", "AllExteriorRoofs")
+        },
+        "ShadowCalculation": {
+            "sun": {
+                "shading_calculation_method": "PolygonClipping",
+                "shading_calculation_update_frequency_method": "Periodic",
+                "shading_calculation_update_frequency": 4,
+                "sky_diffuse_modeling_algorithm": "SimpleSkyDiffuseModeling",
+            }
+        },
+    }
+
+
+def polygon(points: list[tuple[float, float, float]]) -> dict[str, Any]:
+    """Return the vertices of a surface.
+
+    Parameters
+    ----------
+    points : list of (x, y, z)
+        Corners [m].
+    """
+    names = ("vertex_x_coordinate", "vertex_y_coordinate", "vertex_z_coordinate")
+    return {"vertices": [dict(zip(names, point, strict=True)) for point in points]}
+
+
+def _surfaces(spec: TrialSpec) -> Objects:
+    layout, found = spec.layout, {"Zone": {}, "BuildingSurface:Detailed": {}, "Window": {}, "InternalMass": {}}
+    sides = {(s.zone, s.other): s.side for s in plan.segments(layout.zones) if s.other}
+    lengths = plan.panes(layout)
+    for zone in spec.zone_names:
+        floor, name = split(zone)
+        found["Zone"][zone] = {
+            "volume": round(area(spec, zone) * layout.height, 6), "floor_area": round(area(spec, zone), 6),
+        }  # fmt: skip
+        found["InternalMass"][f"{zone} furniture"] = {
+            "construction_name": "furniture",
+            "zone_or_zonelist_name": zone,
+            "surface_area": round(spec.fabric.furniture_area * area(spec, zone), 4),
+        }
+        found["BuildingSurface:Detailed"] |= _slabs(spec, zone)
+        for s in plan.segments(layout.zones):
+            if s.zone != name:
+                continue
+            wall = _wall(s, zone, floor * layout.height, layout.height)
+            found["BuildingSurface:Detailed"][surface_name(zone, s.side, s.other)] = wall
+            if s.other is not None:
+                far = surface_name(f"F{floor + 1}_{s.other}", sides[s.other, s.zone], s.zone)
+                wall["outside_boundary_condition_object"] = far
+            elif (name, s.side) in lengths:
+                length = lengths[name, s.side]
+                found["Window"][f"{zone} {s.side} pane"] = {
+                    "construction_name": "window",
+                    "building_surface_name": surface_name(zone, s.side),
+                    "starting_x_coordinate": round((s.length - length) / 2.0, 4),
+                    "starting_z_coordinate": plan.SILL,
+                    "length": length,
+                    "height": layout.pane_height,
+                }
+    return found
+
+
+def _wall(s: plan.Segment, zone: str, bottom: float, height: float) -> dict[str, Any]:
+    (x0, y0), (x1, y1), top, inside = s.start, s.end, bottom + height, s.other is not None
+    return {
+        "surface_type": "Wall",
+        "construction_name": "partition" if inside else "exterior wall",
+        "zone_name": zone,
+        "outside_boundary_condition": "Surface" if inside else "Outdoors",
+        "sun_exposure": "NoSun" if inside else "SunExposed",
+        "wind_exposure": "NoWind" if inside else "WindExposed",
+        **polygon([(x0, y0, top), (x0, y0, bottom), (x1, y1, bottom), (x1, y1, top)]),
+    }
+
+
+def _slabs(spec: TrialSpec, zone: str) -> dict[str, dict[str, Any]]:
+    floor, name = split(zone)
+    r = plan.rectangles(spec.layout.zones)[name]
+    corners = [(r.west, r.south), (r.east, r.south), (r.east, r.north), (r.west, r.north)]
+    bottom, slabs = floor * spec.layout.height, {}
+    for kind, z, ring in (("Floor", bottom, corners[::-1]), ("Ceiling", bottom + spec.layout.height, corners)):
+        slabs[f"{zone} {kind.lower()}"] = {
+            "surface_type": kind,
+            "construction_name": "slab",
+            "zone_name": zone,
+            "outside_boundary_condition": "Adiabatic",
+            "sun_exposure": "NoSun",
+            "wind_exposure": "NoWind",
+            **polygon([(x, y, z) for x, y in ring]),
+        }
+    return slabs
