@@ -45,7 +45,7 @@ def calibrate(
     reach: float | None = None,
     spin_up_seconds: float = SPIN_UP,
     structure: Structure = BASELINE,
-    effects: Sequence[str] = (),
+    effects: Sequence[str] | Mapping[str, Sequence[str]] = (),
     objective: Objective = "multi_step",
     loss: Loss = "linear",
     starts: int = STARTS,
@@ -82,8 +82,9 @@ def calibrate(
         Length of the spin-up before an interval [s].
     structure : Structure
         What the model is made of: furniture, slabs, nodes of a wall, radiant node.
-    effects : sequence of str
-        Effects of the catalogue that are known to be there.
+    effects : sequence of str, or mapping of str to sequence of str
+        Effects of the catalogue that are known to be there; a mapping has the zones of each, none for the whole
+        building.
     objective : {"multi_step", "innovations"}
         Errors of N-step runs, or the likelihood of a Kalman filter's innovations, whose disturbance is tuned with the
         parameters in turn.
@@ -115,9 +116,8 @@ def calibrate(
     True
     """
     began = time.perf_counter()
-    settings = ModelSettings(
-        dx, reach, scheme, dict(scopes or {}), spin_up_seconds, structure, {e: () for e in effects}
-    )
+    chosen = dict(effects) if isinstance(effects, Mapping) else {e: () for e in effects}
+    settings = ModelSettings(dx, reach, scheme, dict(scopes or {}), spin_up_seconds, structure, chosen)
     for name, text, known in (("loss", loss, get_args(Loss)), ("objective", objective, get_args(Objective))):
         if text not in known:
             raise CalibrationError(f"{name}: expected one of {', '.join(known)}, came {text!r}")

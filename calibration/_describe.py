@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import stats
 
 from calibration._estimate import Estimate
 from calibration._result import ParameterEstimate
 from thermal import Parameter
+
+FloatArray = NDArray[np.float64]
 
 #: A bound counts as hit within this share of the range, on the estimation scale [-].
 BOUND_SHARE = 0.01
@@ -32,10 +35,29 @@ def describe(found: Estimate, nominal: Mapping[str, tuple[float, str]]) -> tuple
         Values that were never estimated, with their units.
     """
     deviations = dict(zip(found.problem.free, np.sqrt(np.diag(found.covariance)), strict=True))
-    described = [
-        _estimated(p, float(found.theta[i]), deviations.get(i))
-        for i, p in enumerate(found.problem.grid.network.parameters)
-    ]
+    return describe_parameters(found.problem.grid.network.parameters, found.theta, deviations, nominal)
+
+
+def describe_parameters(
+    parameters: Sequence[Parameter],
+    theta: FloatArray,
+    deviations: Mapping[int, float],
+    nominal: Mapping[str, tuple[float, str]],
+) -> tuple[ParameterEstimate, ...]:
+    """Parameters of a network with what is known of each.
+
+    Parameters
+    ----------
+    parameters : sequence of Parameter
+        Of the network.
+    theta : ndarray, shape (n_parameter,)
+        Their values [parameter units].
+    deviations : mapping of int to float
+        Standard errors on the estimation scale [-], by position; the others were fixed.
+    nominal : mapping of str to (float, str)
+        Values that were never estimated, with their units.
+    """
+    described = [_estimated(p, float(theta[i]), deviations.get(i)) for i, p in enumerate(parameters)]
     for name, (value, unit) in nominal.items():
         source = "nominal: enters only as a product with the heat capacity"
         described.append(ParameterEstimate(name, unit, value, None, None, value, False, None, False, source))

@@ -55,6 +55,17 @@ def signed(value: float) -> str:
     return f"{value:+.3f}".replace("-", "−") if math.isfinite(value) else _NO_NUMBER
 
 
+def watts(value: float) -> str:
+    """Spell a heat with two significant digits and its unit.
+
+    Examples
+    --------
+    >>> watts(1234.0), watts(-87.6), watts(0.31)
+    ('1 200 W', '−88 W', '0.31 W')
+    """
+    return f"{significant(value, 2)} W" if math.isfinite(value) else "not known"
+
+
 def significant(value: float | None, digits: int = 3) -> str:
     """Spell a number with a few significant digits.
 

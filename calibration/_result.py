@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -191,14 +191,7 @@ class CalibrationResult:
 
     def effects(self) -> list[dict[str, Any]]:
         """Effects in the model with their zones and parameters, an entry of ``calibration.json`` each."""
-        entries = []
-        for name, zones in self.settings.effects.items():
-            own = {p.name for p in CATALOGUE[name].parameters}
-            values = {
-                p.name: {"value": p.value, "unit": p.unit} for p in self.parameters if p.name.partition("@")[0] in own
-            }
-            entries.append({"effect": name, "zones": list(zones), "parameters": values})
-        return entries
+        return effect_entries(self.settings.effects, self.parameters)
 
     def to_dict(self) -> dict[str, Any]:
         """Contents of ``calibration.json``."""
@@ -227,6 +220,26 @@ class CalibrationResult:
             "version": self.version,
             "seed": self.seed,
         }
+
+
+def effect_entries(
+    effects: Mapping[str, Sequence[str]], parameters: Sequence[ParameterEstimate]
+) -> list[dict[str, Any]]:
+    """Effects of a model with their zones and parameters, an entry of ``calibration.json`` each.
+
+    Parameters
+    ----------
+    effects : mapping of str to sequence of str
+        Ids, each with its zones.
+    parameters : sequence of ParameterEstimate
+        Of the model.
+    """
+    entries = []
+    for name, zones in effects.items():
+        own = {p.name for p in CATALOGUE[name].parameters}
+        values = {p.name: {"value": p.value, "unit": p.unit} for p in parameters if p.name.partition("@")[0] in own}
+        entries.append({"effect": name, "zones": list(zones), "parameters": values})
+    return entries
 
 
 def load_parameters(path: str | Path, network: ThermalNetwork) -> FloatArray:

@@ -1,5 +1,6 @@
 """Figures of the reports: each a picture that carries its own data, so that a page needs nothing else."""
 
+from calibration._figures._diagnosis import change_panels, heat_maps, hour_bars
 from calibration._figures._drift import drift_boxes, median_run
 from calibration._figures._error import error_growth
 from calibration._figures._field import Field, spatial_field
@@ -17,11 +18,14 @@ __all__ = [
     "Field",
     "Picture",
     "Series",
+    "change_panels",
     "drift_boxes",
     "error_band",
     "error_growth",
     "floor_maps",
     "heat_lines",
+    "heat_maps",
+    "hour_bars",
     "median_run",
     "paper_values",
     "parameter_ranges",

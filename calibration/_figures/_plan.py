@@ -24,8 +24,9 @@ ERROR_COLOURS = colormaps["RdBu_r"]
 #: Labels below this size are left out [pt].
 SMALLEST_LABEL = 4.6
 
-_WALLS = {"#": to_rgb("#3A3F45"), "+": to_rgb("#8E949B"), ".": to_rgb("white")}
-_UNMEASURED = to_rgb("#E3E5E8")
+#: Colours of what is drawn in a plan beside its zones, and of what is not measured.
+WALLS = {"#": to_rgb("#3A3F45"), "+": to_rgb("#8E949B"), ".": to_rgb("white")}
+UNMEASURED = to_rgb("#E3E5E8")
 _ZONES = [to_rgb(c) for c in ("#D7E8F5", "#FBE3D0", "#DDEFDC", "#F3E6F3", "#FFF3C9", "#DDEFEF", "#F0E4DA", "#E5E6F4")]
 
 
@@ -49,7 +50,7 @@ def colour_bar(figure: Figure, axes: Axes, scale: float) -> None:
 def error_colour(value: float, scale: float) -> tuple[float, float, float]:
     """Colour of an error; grey where nothing is measured."""
     if not np.isfinite(value):
-        return _UNMEASURED
+        return UNMEASURED
     red, green, blue, _ = ERROR_COLOURS(0.5 + 0.5 * value / scale)
     return red, green, blue
 
@@ -73,9 +74,9 @@ def plan_drawings(plans: FloorPlans, orientation: float) -> list[Picture]:
     drawn = []
     for floor in plans.floors:
         colours = {zone: _ZONES[i % len(_ZONES)] for i, zone in enumerate(floor.zone_names)}
-        image = np.array([[_WALLS.get(str(t)) or colours[str(t)] for t in row] for row in floor.tokens])
+        image = np.array([[WALLS.get(str(t)) or colours[str(t)] for t in row] for row in floor.tokens])
         labels = {zone: (zone, colours[zone]) for zone in floor.zone_names}
-        figure, _ = _canvas(floor, plans.cell_size, orientation, image, f"floor {floor.name}", labels)
+        figure, _ = canvas(floor, plans.cell_size, orientation, image, f"floor {floor.name}", labels)
         drawn.append(picture(figure, f"Plan of floor {floor.name} with {len(labels)} zones"))
     return drawn
 
@@ -114,16 +115,16 @@ def floor_maps(
     drawn = []
     for floor, cells in zip(plans.floors, values, strict=True):
         image = ERROR_COLOURS(0.5 + 0.5 * cells / scale)[..., :3]
-        image[~np.isfinite(cells)] = _UNMEASURED
+        image[~np.isfinite(cells)] = UNMEASURED
         split = cells.shape[0] // floor.tokens.shape[0]
         tokens = np.repeat(np.repeat(floor.tokens, split, axis=0), split, axis=1)
-        for token, colour in _WALLS.items():
+        for token, colour in WALLS.items():
             image[tokens == token] = colour
         labels = {
             z: (f"{z}\n{signed_kelvin(by_zone[z])}", error_colour(float(np.median(cells[tokens == z])), scale))
             for z in floor.zone_names
         }
-        figure, axes = _canvas(floor, plans.cell_size, orientation, image, f"floor {floor.name}, {title}", labels)
+        figure, axes = canvas(floor, plans.cell_size, orientation, image, f"floor {floor.name}, {title}", labels)
         colour_bar(figure, axes, scale)
         worst = max(floor.zone_names, key=lambda z: np.nan_to_num(abs(by_zone[z]), nan=-1.0))
         alt = f"Error on floor {floor.name}, {title}; largest in zone {worst}: {signed_kelvin(by_zone[worst])}"
@@ -162,7 +163,7 @@ def _cell_errors(
     return out
 
 
-def _canvas(
+def canvas(
     floor: FloorPlan,
     cell: float,
     orientation: float,

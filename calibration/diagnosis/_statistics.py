@@ -1,0 +1,122 @@
+"""The statistics behind a diagnosis's page: rounds, likeness, placebos, bounds and what would have been found."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from calibration._page import clock, kelvin, plain, significant, unit, watts
+from calibration._result import ParameterEstimate
+from calibration.diagnosis._diagnose import Diagnosis
+from calibration.diagnosis._final import describe_fit
+from calibration.diagnosis._levels import GENERIC_GAP
+from calibration.diagnosis._search import ACCEPTED, Round
+from calibration.diagnosis._words import called, in_zones, listed, sure
+
+#: Effects of a round that are listed, and those whose likeness is.
+_MOST_GAINS, _MOST_ALIKE = 10, 6
+
+
+def statistics_content(result: Diagnosis) -> dict[str, Any]:
+    """Entries of the fold of the page.
+
+    Parameters
+    ----------
+    result : Diagnosis
+        From `diagnose`.
+    """
+    baseline, final = describe_fit(result.rounds[0].before), describe_fit(result.final)
+    return {
+        "p_value": significant(result.p_value, 2),
+        "accepted": plain(ACCEPTED),
+        "generic": plain(GENERIC_GAP),
+        "set90": listed([called(e) for e in result.verdict.set90]) if result.verdict.set90 else "",
+        "combinations": [
+            (listed([called(e) for e in effects]).capitalize() if effects else "Nothing", sure(p))
+            for effects, p in result.verdict.combinations
+        ],
+        "rounds": [_round(i, r) for i, r in enumerate(result.rounds, 1)],
+        "effects": _effects(result),
+        "placebos": _placebos(result),
+        "detectable": [(zone, watts(w)) for zone, w in result.detectable.items()],
+        "parameters": _parameters(baseline, final if result.final.effects else ()),
+        "bounds": _bounds(baseline, final if result.final.effects else ()),
+        "intervals": [
+            (name, clock(i.start), clock(i.end))
+            for name, part in (("tuning", result.tuned), ("held out", result.judged))
+            for i in part
+        ],
+    }
+
+
+def _round(number: int, r: Round) -> dict[str, Any]:
+    fitted = {x.screened.effect: x for x in r.refits}
+    rows = [
+        [
+            called(g.effect), in_zones(g.zones), f"{g.gain:.1f}",
+            f"{fitted[g.effect].gain:.1f}" if g.effect in fitted else "–",
+            f"{100 * g.share:.0f} %", f"{100 * g.retained:.0f} %",
+        ]
+        for g in r.gains[:_MOST_GAINS]
+    ]  # fmt: skip
+    generic = r.generic
+    rows.append(["heat of any regular kind", "–", f"{generic.gain:.1f}", "–", f"{100 * generic.share:.0f} %", "–"])
+    best = [g for g in r.gains if g.share > 0.0][:_MOST_ALIKE]
+    inside = [called(e) for e in r.before.effects]
+    return {
+        "title": f"Round {number}: " + (f"with {listed(inside)}" if inside else "the calibrated model"),
+        "outcome": "nothing gains enough" if r.accepted is None else f"accepted: {called(r.accepted.screened.effect)}",
+        "rows": rows,
+        "alike_names": [called(g.effect) for g in best],
+        "alike": [
+            [called(a.effect), *(f"{abs(r.screening.cosine(a, b)):.2f}" for b in best)] for a in best
+        ] if len(best) > 1 else [],
+    }  # fmt: skip
+
+
+def _effects(result: Diagnosis) -> list[list[str]]:
+    return [
+        [
+            called(s.effect), s.effect, sure(s.probability) if s.testable else "not testable",
+            f"{s.score:.1f}" if s.testable and np.isfinite(s.score) else "–", in_zones(s.zones) if s.testable else "–",
+            f"{100 * s.retained_share:.0f} %" if s.testable else "–",
+        ]
+        for s in result.verdict.suspects
+    ]  # fmt: skip
+
+
+def _placebos(result: Diagnosis) -> list[list[str]]:
+    return [
+        [
+            listed([called(e) for e in s.effects]), f"{s.before:.3f}", f"{s.after:.3f}", f"{s.floor:.3f}",
+            "–" if s.share_closed is None else f"{100 * s.share_closed:.0f} %",
+            "–" if s.interval is None else f"{100 * s.interval[0]:.0f} to {100 * s.interval[1]:.0f} %",
+            "–" if s.shuffled is None else kelvin(s.shuffled), "–" if s.runner_up is None else kelvin(s.runner_up),
+        ]
+        for s in result.steps
+    ]  # fmt: skip
+
+
+def _parameters(before: tuple[ParameterEstimate, ...], after: tuple[ParameterEstimate, ...]) -> list[list[str]]:
+    first = {p.name: p for p in before}
+    estimated = [p for p in (after or before) if p.standard_error is not None]
+    return [
+        [
+            p.name.replace("_", " "), unit(p.unit).replace("*", "·"),
+            significant(first[p.name].value) if p.name in first else "absent",
+            significant(p.value) if after else "–",
+            " to ".join(significant(end) for end in p.interval90) if p.interval90 else "–",
+        ]
+        for p in estimated
+    ]  # fmt: skip
+
+
+def _bounds(before: tuple[ParameterEstimate, ...], after: tuple[ParameterEstimate, ...]) -> str:
+    """Say which parameters lie on a bound of their range, without and with the effects found."""
+
+    def on(parameters: tuple[ParameterEstimate, ...]) -> str:
+        names = [p.name.replace("_", " ") for p in parameters if p.at_bound]
+        return listed(names) if names else "none"
+
+    return f"On a bound of their range: {on(before)}" + (f"; with the effects found: {on(after)}." if after else ".")

@@ -1,0 +1,217 @@
+"""A diagnosis in plain words: the verdict, effects and where they are, and what would tell them apart."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from calibration._page import duration, kelvin, watts
+from calibration.diagnosis._diagnose import Diagnosis
+from calibration.diagnosis._levels import LARGEST_GROUP
+from calibration.diagnosis._search import Refit
+from calibration.diagnosis._verdict import Suspect, group_of
+from thermal.effects import CATALOGUE
+
+#: What an effect is called where its title would read oddly after "leaves out".
+_CALLED = {"hidden_mass": "mass that stores heat"}
+
+#: More zones than this are counted, not named.
+_MOST_NAMED = 4
+
+
+def diagnosis_verdict(result: Diagnosis) -> str:
+    """Say in plain words what a diagnosis found.
+
+    Parameters
+    ----------
+    result : Diagnosis
+        From `diagnose`.
+    """
+    if result.verdict.name == "no_gap":
+        return _no_gap(result)
+    if result.verdict.name == "unexplained":
+        return _unexplained(result)
+    found = accepted(result)
+    if result.verdict.name == "group":
+        first, *others = found
+        alike = [suspect(result, e) for e in suspect(result, first.screened.effect).group]
+        named = listed([f"{called(s.effect)} ({sure(s.probability)})" for s in alike], "or")
+        text = f"The model leaves out one of {len(alike)} things that these data cannot tell apart: {named}."
+        if others:
+            text += f" It also leaves out {listed([_found(result, r) for r in others])}."
+    else:
+        text = f"The model leaves out {listed([_found(result, r) for r in found])}."
+    return f"{text} {_how_far(result, len(found))}"
+
+
+def accepted(result: Diagnosis) -> list[Refit]:
+    """Effects that the rounds accepted, in order.
+
+    Parameters
+    ----------
+    result : Diagnosis
+        From `diagnose`.
+    """
+    return [r.accepted for r in result.rounds if r.accepted is not None]
+
+
+def suspect(result: Diagnosis, effect: str) -> Suspect:
+    """Suspect of an id.
+
+    Parameters
+    ----------
+    result : Diagnosis
+        From `diagnose`.
+    effect : str
+        Its id.
+    """
+    return next(s for s in result.verdict.suspects if s.effect == effect)
+
+
+def called(effect: str, zones: Sequence[str] = ()) -> str:
+    """Call an effect by what it is, and where.
+
+    Parameters
+    ----------
+    effect : str
+        Its id.
+    zones : sequence of str
+        Where; none is the whole building.
+
+    Examples
+    --------
+    >>> called("sensor_bias", ["F1_N"])
+    'a zone sensor that reads wrong, in zone F1_N'
+    """
+    name = _CALLED.get(effect, CATALOGUE[effect].title)
+    return f"{name}, {in_zones(zones)}" if zones else name
+
+
+def in_zones(zones: Sequence[str]) -> str:
+    """Say where an effect is.
+
+    Parameters
+    ----------
+    zones : sequence of str
+        Zones; none is the whole building.
+
+    Examples
+    --------
+    >>> in_zones([]), in_zones(["A", "B"]), in_zones(list("ABCDE"))
+    ('the whole building', 'in zones A and B', 'in 5 zones')
+    """
+    if not zones:
+        return "the whole building"
+    if len(zones) > _MOST_NAMED:
+        return f"in {len(zones)} zones"
+    return f"in zone{'s' if len(zones) > 1 else ''} {listed(zones)}"
+
+
+def listed(names: Sequence[str], last: str = "and") -> str:
+    """Join names to a sentence's list.
+
+    Parameters
+    ----------
+    names : sequence of str
+        At least one.
+    last : str
+        Word before the last.
+
+    Examples
+    --------
+    >>> listed(["sun", "wind", "rain"], "or")
+    'sun, wind or rain'
+    """
+    return f" {last} ".join(filter(None, [", ".join(names[:-1]), names[-1]]))
+
+
+def sure(probability: float) -> str:
+    """Spell a probability, never as certainty.
+
+    Parameters
+    ----------
+    probability : float
+        In [0, 1] [-].
+
+    Examples
+    --------
+    >>> sure(0.937), sure(0.9999), sure(0.001)
+    ('94 %', 'over 99 %', 'under 1 %')
+    """
+    if probability > 0.99:
+        return "over 99 %"
+    return f"{100 * probability:.0f} %" if probability >= 0.01 else "under 1 %"
+
+
+def ahead(result: Diagnosis) -> str:
+    """Spell how far ahead predictions are judged, such as ``6 hours ahead``.
+
+    Parameters
+    ----------
+    result : Diagnosis
+        From `diagnose`.
+    """
+    problem = result.rounds[0].before.problem
+    return f"{duration(problem.steps * problem.inputs.step)} ahead"
+
+
+def _found(result: Diagnosis, fitted: Refit) -> str:
+    gain = fitted.screened
+    return f"{called(gain.effect, gain.zones)} ({sure(suspect(result, gain.effect).probability)} sure)"
+
+
+def _how_far(result: Diagnosis, found: int) -> str:
+    """Say what the error becomes; a share of the gap only where there is one."""
+    if not result.steps:
+        return ""
+    step = result.steps[-1]
+    them = "With it" if found == 1 else "With them"
+    if result.verdict.name == "group":
+        them = "With the likeliest" + (" and the others" if found > 1 else "")
+    there = f"{them} in the model, its error {ahead(result)}, on days that it was not fitted to,"
+    if step.after >= step.before:
+        return (
+            f"{there} does not fall: {kelvin(step.before)} K before, {kelvin(step.after)} K after. What the tuning "
+            "days say does not carry over, so do not rely on it yet."
+        )
+    text = f"{there} falls from {kelvin(step.before)} to {kelvin(step.after)} K"
+    if step.share_closed is None:
+        return f"{text}; the gap is too small beside its own scatter to state a share of it."
+    return f"{text}: {min(100.0, 100 * step.share_closed):.0f} % of the gap is closed."
+
+
+def _no_gap(result: Diagnosis) -> str:
+    text = (
+        f"These data show nothing that the model leaves out. {ahead(result).capitalize()}, on days that it was not "
+        f"fitted to, the calibrated model misses the measured zone temperatures by {kelvin(result.gap)} K on average."
+    )
+    sizes = [w for w in result.detectable.values() if np.isfinite(w)]
+    if not sizes:
+        return text
+    between = watts(min(sizes)) + (f" to {watts(max(sizes))}" if len(sizes) > 1 else "")
+    return f"{text} Steady heat that is missing in one zone would have been noticed from {between} on, by zone."
+
+
+def _unexplained(result: Diagnosis) -> str:
+    found = accepted(result)
+    error = (
+        f"{ahead(result).capitalize()} it misses the measured zone temperatures by {kelvin(result.gap)} K on average"
+    )
+    best = result.verdict.suspects[0]
+    if found:
+        alike = group_of(result.rounds[0], found[0].screened.effect)
+        if len(alike) > LARGEST_GROUP:
+            names = listed([called(e) for e in alike[:LARGEST_GROUP]])
+            return (
+                f"The model leaves something out, but these data cannot tell what: {len(alike)} effects explain it "
+                f"about equally well, among them {names}. {error}."
+            )
+        return (
+            f"The model leaves something out that no effect we know of explains: {called(best.effect)} "
+            f"({sure(best.probability)}) explains a part, and a systematic error remains. {_how_far(result, len(found))}"
+        )
+    text = f"The model leaves something out that no effect we know of explains. {error}"
+    if result.floor < result.gap:
+        text += f", and {kelvin(result.gap - result.floor)} K of it follow time of day, zone or outdoor temperature"
+    return f"{text}. The best single guess is {called(best.effect)} ({sure(best.probability)}): not enough to name it."
