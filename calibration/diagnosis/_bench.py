@@ -123,6 +123,14 @@ class Fit:
         return self.problem.theta(self.found.point)
 
     @cached_property
+    def by_zone(self) -> FloatArray:
+        """Mean squared tuning error of each zone, shape (n_zone,) [K²]; 0 where nothing is measured."""
+        errors = [self.problem.errors(self.model, self.theta, r, slopes=False)[0] for r in self.problem.runs]
+        squared = np.concatenate([e.reshape(-1, e.shape[-1]) for e in errors]) ** 2
+        known = np.isfinite(squared)
+        return np.asarray(np.where(known, squared, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1))
+
+    @cached_property
     def values(self) -> dict[str, float]:
         """Parameters by name [parameter units]."""
         names = (p.name for p in self.built.network.parameters)

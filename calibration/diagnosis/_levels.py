@@ -7,8 +7,12 @@ import numpy as np
 #: Gain of generic heat above which a gap is there though no effect of the catalogue explains it [-].
 GENERIC_GAP = 8.0
 
-#: Least share of what generic heat could explain after the last round that leaves the verdict alone [-].
-LEFT_OVER = 0.5
+#: Root mean square of the tuning errors of the last model above which something is left unexplained [K]; where one zone
+#: has over so many times its share of the squared error, the smaller one counts [K, -].
+LEFT_OVER, LEFT_IN_A_ZONE, CONCENTRATED = 0.2, 0.1, 3.5
+
+#: Least share of the squared tuning error that accepted effects must explain for a cause to be named [-].
+EXPLAINED = 0.35
 
 #: Difference of gains within which effects of a round cannot be told apart [-].
 APART = 3.0

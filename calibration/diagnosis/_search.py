@@ -26,6 +26,9 @@ LEAST_GAIN, LEAST_SHARE = 3.0, 0.4
 #: Evaluations of a fit from one start.
 _EVALUATIONS = 6
 
+#: Least fall of the root mean square of the tuning errors by which an effect matters to predictions [K].
+MATTERS = 0.02
+
 #: Gain of the fit from which an effect is accepted [-]; set by null cases, see `calibration.diagnosis._levels`.
 ACCEPTED = 6.0
 
@@ -103,7 +106,7 @@ def search(
         open_ = [e for e in candidates if all(r in fit.effects for r in CATALOGUE[e].requires)]
         made, gains, generic = screen(bench, fit, open_)
         refits = _refits(bench, fit, made, gains)
-        best = refits[0] if refits and refits[0].gain > ACCEPTED else None
+        best = next((r for r in refits if r.gain > ACCEPTED and _fall(fit, r.fit) > MATTERS), None)
         done.append(Round(fit, made, tuple(gains), generic, tuple(refits), best))
         if best is None:
             break
@@ -129,6 +132,11 @@ def _refits(bench: Bench, fit: Fit, made: Screening, gains: Sequence[Gain]) -> l
         choice = len(g.zones) * np.log(len(bench.case.building.zone_names))
         found.append(Refit(g, anew, anew.evidence - fit.evidence - choice))
     return sorted(found, key=lambda r: -r.gain)
+
+
+def _fall(before: Fit, after: Fit) -> float:
+    """How far the root mean square of the tuning errors falls [K]."""
+    return float(np.sqrt(before.found.mean_square) - np.sqrt(after.found.mean_square))
 
 
 def _of_effect(name: str, fit: Fit) -> bool:

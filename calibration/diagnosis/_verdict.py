@@ -8,7 +8,19 @@ from typing import Any, Literal
 
 import numpy as np
 
-from calibration.diagnosis._levels import ALIKE, APART, GENERIC_GAP, IN_SET, LARGEST_GROUP, TEMPERATURE
+from calibration.diagnosis._bench import Fit
+from calibration.diagnosis._levels import (
+    ALIKE,
+    APART,
+    CONCENTRATED,
+    EXPLAINED,
+    GENERIC_GAP,
+    IN_SET,
+    LARGEST_GROUP,
+    LEFT_IN_A_ZONE,
+    LEFT_OVER,
+    TEMPERATURE,
+)
 from calibration.diagnosis._screen import Gain
 from calibration.diagnosis._search import ACCEPTED, Refit, Round
 from thermal.effects import CATALOGUE
@@ -156,13 +168,22 @@ def group_of(r: Round, effect: str) -> tuple[str, ...]:
 
 
 def _name(rounds: Sequence[Round]) -> VerdictName:
-    first = rounds[0]
-    if first.accepted is None:
-        return "unexplained" if first.generic.gain > GENERIC_GAP else "no_gap"
-    size = len(group_of(first, first.accepted.screened.effect))
-    if size > LARGEST_GROUP:
+    first, last = rounds[0], rounds[-1]
+    final = last.accepted.fit if last.accepted is not None else last.before
+    explained = 1.0 - final.found.mean_square / first.before.found.mean_square
+    if first.accepted is not None and explained >= EXPLAINED:
+        size = len(group_of(first, first.accepted.screened.effect))
+        if size <= LARGEST_GROUP:
+            return "named" if size == 1 else "group"
         return "unexplained"
-    return "named" if size == 1 else "group"
+    return "unexplained" if first.generic.gain > GENERIC_GAP or _left_over(final) else "no_gap"
+
+
+def _left_over(fit: Fit) -> bool:
+    """Whether the errors of a model are larger than what cases without a missing effect keep."""
+    zones = fit.by_zone[fit.by_zone > 0.0]
+    size = float(np.sqrt(fit.found.mean_square))
+    return size > LEFT_OVER or (size > LEFT_IN_A_ZONE and float(zones.max() / zones.mean()) > CONCENTRATED)
 
 
 def _gains(r: Round) -> dict[str, float]:

@@ -1,0 +1,132 @@
+"""Diagnosis on twins: our own plant with nothing missing, and with one thing changed in its telemetry or in it."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from calibration.diagnosis import Diagnosis, diagnose
+from calibration.diagnosis._bench import Bench
+from calibration.diagnosis._screen import Screening
+from calibration.diagnosis._search import ACCEPTED
+from thermal import Building, Case, Telemetry
+from thermal.effects import CATALOGUE
+from thermal.pilot import MOUNTAIN_VIEW, TwinRanges, devices, generate_office, generate_twin
+
+#: Share by which the flow of one zone is under-reported [-].
+ERROR = 0.25
+
+
+@cache
+def twin() -> Case:
+    """Three weeks of an office of four zones, quiet but for its thermostats."""
+    plans = generate_office(3, floor_area=120.0, zones=4, floors=1)
+    building = Building("office", MOUNTAIN_VIEW, 0.0, plans, devices(plans))
+    quiet = TwinRanges(disturbance_deviation=(0.05, 0.1), noise=(0.005, 0.01))
+    return generate_twin(building, 3, days=15.0, step_seconds=900.0, dx=1.0, meter="exact", ranges=quiet)[0]
+
+
+def changed(zone: str) -> Case:
+    """The same telemetry with the air of one zone read too low."""
+    case = twin()
+    frame = case.telemetry.frame.copy()
+    (device,) = case.building.devices_of(zone)
+    frame[f"{device.name}/supply_air_flowrate_sensor"] /= 1.0 + ERROR
+    return Case(case.building, Telemetry.from_frame(frame))
+
+
+@cache
+def diagnosed(zone: str | None) -> Diagnosis:
+    return diagnose(twin() if zone is None else changed(zone), dx=1.0)
+
+
+def test_nothing_is_found_where_nothing_is_missing() -> None:
+    found = diagnosed(None)
+    assert found.verdict.name == "no_gap"
+    assert found.steps == ()
+    assert found.verdict.set90 == ()
+    assert max(g.gain for g in found.rounds[0].gains) < ACCEPTED
+    assert found.final.effects == {}
+
+
+@pytest.mark.parametrize("number", [1, 3])
+def test_a_meter_that_reads_too_low_is_named_with_its_zone_and_its_error(number: int) -> None:
+    zone = twin().building.zone_names[number]
+    found = diagnosed(zone)
+    best = found.verdict.suspects[0]
+    assert found.verdict.name in ("named", "group")
+    assert best.effect in ("flow_gain", "duct_loss")
+    assert "flow_gain" in best.group or best.effect == "flow_gain"
+    assert best.zones == (zone,)
+    if best.effect == "flow_gain":
+        value, _, (low, high) = best.parameters[f"flow_gain@{zone}"]
+        assert low < ERROR < high or abs(value - ERROR) < 0.06
+    assert best.probability > 0.5
+    assert zone in found.where.sentence
+    assert max(found.where.zones, key=lambda s: s.share).name == zone
+
+
+def test_how_far_closes_the_gap_and_the_placebo_does_not() -> None:
+    found = diagnosed(twin().building.zone_names[1])
+    (step, *_) = found.steps
+    assert step.share_closed is not None and step.interval is not None
+    assert step.share_closed > 0.7
+    assert step.interval[0] <= step.share_closed <= step.interval[1] + 1e-9
+    assert step.floor <= step.after < step.before == found.gap
+    assert step.shuffled is not None and step.shuffled > step.after
+
+
+def test_the_file_holds_every_effect_and_what_the_contract_asks() -> None:
+    content = diagnosed(twin().building.zone_names[1]).to_dict()
+    assert {s["effect"] for s in content["which"]} == set(CATALOGUE)
+    keys = (
+        "effect",
+        "probability",
+        "score",
+        "group",
+        "zones",
+        "parameters",
+        "retained_share",
+        "separate_by",
+        "testable",
+    )
+    for suspect in content["which"]:
+        assert set(keys) <= set(suspect)
+        assert 0.0 <= suspect["probability"] <= 1.0
+        assert suspect["testable"] or suspect["reason"]
+        assert len(suspect["group"]) <= 4
+    assert [s["probability"] for s in content["which"]] == sorted(
+        (s["probability"] for s in content["which"]), reverse=True
+    )
+    latent = next(s for s in content["which"] if s["effect"] == "latent_load")
+    assert not latent["testable"] and "humidity" in latent["reason"]
+    assert sum(content["where"]["hours"]) == pytest.approx(1.0)
+    assert sum(z["share"] for z in content["where"]["zones"]) == pytest.approx(1.0)
+    assert set(content["gap"]["smallest_detectable_watts"]) == set(twin().building.zone_names)
+
+
+def test_tangents_promise_what_a_fit_keeps() -> None:
+    """Gain and strength of the one true effect, by tangents at the baseline and fitted anew."""
+    zone = twin().building.zone_names[1]
+    first = diagnosed(zone).rounds[0]
+    refit = next(r for r in first.refits if r.screened.effect == "flow_gain")
+    assert refit.gain == pytest.approx(refit.screened.gain, rel=0.5)
+    name = f"flow_gain@{zone}"
+    assert refit.fit.values[name] == pytest.approx(refit.screened.strengths[name], abs=0.1)
+
+
+def test_screening_is_about_the_estimate() -> None:
+    """An effect without strength gains nothing; cosines are those of a Gram matrix; detectable heat grows with gain."""
+    bench = Bench(twin(), tune=(), hold_out=())
+    made = diagnosed(None).rounds[0].screening
+    gains = [made.of(e) for e in ("flow_gain", "duct_loss", "internal_gains")]
+    for g in gains:
+        assert 0.0 <= g.retained <= 1.0 + 1e-9
+        assert 0.0 <= g.share < 1.0
+    assert abs(made.cosine(gains[0], gains[1])) <= 1.0 + 1e-9
+    small, large = made.detectable(3.0), made.detectable(12.0)
+    assert all(0.0 < small[z] < large[z] for z in bench.case.building.zone_names)
+    assert np.all(np.linalg.eigvalsh(made.gram) > -1e-6 * np.abs(made.gram).max())
+    assert isinstance(made, Screening)
