@@ -17,6 +17,9 @@ EXPLAINED = 0.35
 #: Difference of gains within which effects of a round cannot be told apart [-].
 APART = 3.0
 
+#: Share of an effect's gain from which what the catalogue says it is confounded with is one group with it [-].
+RIVAL = 0.6
+
 #: Cosine of projected signatures from which effects are one group [-].
 ALIKE = 0.9
 
@@ -25,10 +28,10 @@ LARGEST_GROUP = 4
 
 #: Temperature by which gains are divided before they become probabilities [-]: likelihoods of a model that is wrong in
 #: many small ways are too sure of themselves.
-TEMPERATURE = 3.0
+TEMPERATURE = 2.0
 
 #: Probability from which an effect belongs to the 90 % set [-].
-IN_SET = 0.05
+IN_SET = 0.1
 
 #: Scale of the exponential tail of the largest gain in null cases, and its location [-].
 NULL_LOCATION, NULL_SCALE = 1.5, 1.0

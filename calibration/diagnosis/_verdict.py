@@ -19,6 +19,7 @@ from calibration.diagnosis._levels import (
     LARGEST_GROUP,
     LEFT_IN_A_ZONE,
     LEFT_OVER,
+    RIVAL,
     TEMPERATURE,
 )
 from calibration.diagnosis._screen import Gain
@@ -158,11 +159,14 @@ def group_of(r: Round, effect: str) -> tuple[str, ...]:
     own = next((g for g in r.gains if g.effect == effect), None)
     alike = [effect]
     for g in r.gains:
-        if g.effect == effect or gains[g.effect] < gains[effect] - APART * 2.0:
+        if g.effect == effect:
             continue
         near = abs(gains[g.effect] - gains[effect]) < APART
-        same = own is not None and abs(r.screening.cosine(own, g)) > ALIKE and gains[g.effect] > ACCEPTED
-        if near or same:
+        rival = gains[g.effect] > ACCEPTED and (
+            (own is not None and abs(r.screening.cosine(own, g)) > ALIKE)
+            or (g.effect in CATALOGUE[effect].confounders and gains[g.effect] > RIVAL * gains[effect])
+        )
+        if near or rival:
             alike.append(g.effect)
     return tuple(alike)
 

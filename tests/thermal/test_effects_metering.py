@@ -168,14 +168,16 @@ def test_a_heat_meter_that_reads_low(lively_case: CaseOf) -> None:
 
 
 def test_a_duct_loses_what_its_ntu_says(lively_case: CaseOf) -> None:
-    # (1 - e^-NTU) of the heat above the room's own; NTU grows as the flow falls. Exact at an NTU of 0.1
+    # (1 - e^-NTU) of the heat above the room's own, of two laws: NTU constant, and growing as the flow falls. Exact at 0.1
     case = lively_case("plan")
     flow = case.telemetry.frame["VAV_B/supply_air_flowrate_sensor"].to_numpy()
     heat = case.zone_heat()["B"].to_numpy()
     for ntu, most in ((0.1, 1e-12), (0.3, 0.2)):
         local = ntu * np.quantile(flow, 0.99) / np.where(flow > 0.0, flow, np.inf)
-        exact = -(1.0 - np.exp(-local)) * heat
-        found = signal_heat(case, "duct_loss", "B", **{"duct_ntu@B": ntu})
+        constant = np.where(flow > 0.0, ntu, 0.0)
+        by_flow = 0.4
+        exact = -(1.0 - by_flow) * (1.0 - np.exp(-constant)) * heat - by_flow * (1.0 - np.exp(-local)) * heat
+        found = signal_heat(case, "duct_loss", "B", **{"duct_ntu@B": ntu, "duct_flow_dependence": by_flow})
         assert np.abs(found - exact).max() <= most * np.abs(exact).max() + 1e-9
     assert found.min() < -50.0
 

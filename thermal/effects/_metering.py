@@ -8,7 +8,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal.effects._effect import CONSTANT, Effect, Joining, hat, strength
+from thermal.effects._effect import CONSTANT, Effect, Joining, hat, shape, strength
 from thermal.signals import Drivers, Signal
 from thermal.units import AIR_HEAT_CAPACITY
 
@@ -37,12 +37,13 @@ def _heat(drivers: Drivers, zone: str) -> FloatArray:
     return np.asarray(drivers.heat[:, drivers.zones.index(zone)])
 
 
-def _duct(drivers: Drivers, zone: str) -> FloatArray:
+def _duct(drivers: Drivers, zone: str, exponent: float) -> FloatArray:
+    """Heat lost per unit of NTU at the largest flow; NTU grows as flow falls, to a power."""
     k = drivers.zones.index(zone)
     flow, heat = (v[:, k] for v in drivers.supply)
     most = float(np.quantile(flow, 0.99))
     running = flow > 1e-3 * max(most, 1e-9)
-    ntu = _NTU * most / np.where(running, flow, 1.0)
+    ntu = _NTU * (most / np.where(running, flow, 1.0)) ** exponent
     return np.where(running, heat * -np.expm1(-ntu) / _NTU, 0.0)
 
 
@@ -91,9 +92,15 @@ def _build_gain(join: Joining) -> None:
 
 
 def _build_duct(join: Joining) -> None:
+    by_flow = join.parameter("duct_flow_dependence")
     for room in join.rooms:
-        signal = Signal(f"heat in the ducts of {room.name}", "W", partial(_duct, zone=room.name))
-        join.heat_air(room, -join.parameter("duct_ntu", zone=room.name), signal, 1.0)
+        lost = join.parameter("duct_ntu", zone=room.name)
+        for share, exponent in ((1.0 - by_flow, 0.0), (by_flow, 1.0)):
+            signal = Signal(
+                f"heat in the ducts of {room.name}, flow to the power {exponent:g}", "W",
+                partial(_duct, zone=room.name, exponent=exponent),
+            )  # fmt: skip
+            join.heat_air(room, -lost * share, signal, 1.0)
 
 
 def _build_limit(join: Joining) -> None:
@@ -153,12 +160,15 @@ FLOW_GAIN = Effect(
 DUCT_LOSS = Effect(
     id="duct_loss",
     title="heat lost from ducts",
-    equation="-(1 - e^-NTU) ṁ c (T_d - T)",
-    source="ASHRAE 152-2014 (duct losses)",
+    equation="-(1 - e^-NTU) ṁ c (T_d - T), NTU between constant and falling with flow",
+    source="ASHRAE 152-2014 (duct losses): NTU falls with flow where the film outside of the duct governs",
     acts_on="air of the zones concerned",
     confounders=("flow_gain",),
     separated_by="low and high flow at equal heat",
-    parameters=(strength("duct_ntu", "1", 0.3, "0.02 to 0.3", "duct_loss"),),
+    parameters=(
+        strength("duct_ntu", "1", 0.3, "0.02 to 0.3", "duct_loss"),
+        shape("duct_flow_dependence", "1", 0.3, 0.02, 0.98, "any share of the two laws", "duct_loss", "logit"),
+    ),
     build=_build_duct,
     zonal=True,
 )
