@@ -9,8 +9,12 @@ Run from the repository's root, in an environment with Python 3.11 or newer::
 
     pip install -e .[energyplus]
     python benchmarks/blind_trials.py make --out results/blind --kind single --seeds 0-9
+    python benchmarks/blind_trials.py make --out results/blind --kind null --seeds 0-9      # their twins
+    python benchmarks/blind_trials.py diagnose --out results/blind
+    python benchmarks/blind_trials.py score --out results/blind
 
-An interrupted run goes on where it was: trials that are there are left alone.
+`diagnose` answers each trial in a process of its own, which gets the case folder and nothing else; `score` opens the
+seals of what is answered. An interrupted run goes on where it was: trials and answers that are there are left alone.
 """
 
 from __future__ import annotations
@@ -21,12 +25,11 @@ import time
 from concurrent.futures import Future, ThreadPoolExecutor, as_completed
 from pathlib import Path
 
+from _trial_answers import CASES, SEALED, answer_all, report
 from energyplus_trials.drawing import DAYS, draw_spec
 from energyplus_trials.errors import EnergyPlusMissingError, TrialError
 from energyplus_trials.specification import KINDS, TrialSpec
 from energyplus_trials.trial import make_trial
-
-CASES, SEALED = "cases", "sealed"
 
 
 def seed_range(text: str) -> range:
@@ -106,8 +109,22 @@ def main() -> int:
     command.add_argument("--days", type=int, default=DAYS, help="length of the telemetry")
     command.add_argument("--workers", type=int, default=min(2, os.cpu_count() or 1), help="runs at a time")
     command.set_defaults(run=_make)
+    command = commands.add_parser("diagnose", help="diagnose trials that have no answer yet, one process each")
+    command.add_argument("--out", type=Path, required=True, help="folder of the trials")
+    command.add_argument("--workers", type=int, default=min(2, os.cpu_count() or 1), help="processes at a time")
+    command.add_argument("--most", type=int, help="most trials to answer now")
+    command.set_defaults(run=lambda o: 1 if answer_all(o.out, o.workers, o.most) else 0)
+    command = commands.add_parser("score", help="open the seals of answered trials and score the answers")
+    command.add_argument("--out", type=Path, required=True, help="folder of the trials")
+    command.add_argument("--readme", action="store_true", help="replace the table in the README")
+    command.set_defaults(run=_score)
     options = parser.parse_args()
     return int(options.run(options))
+
+
+def _score(options: argparse.Namespace) -> int:
+    print(report(options.out, options.readme))
+    return 0
 
 
 if __name__ == "__main__":

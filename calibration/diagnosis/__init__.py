@@ -2,6 +2,18 @@
 
 from calibration.diagnosis._diagnose import Diagnosis, diagnose
 from calibration.diagnosis._page import write_diagnosis
+from calibration.diagnosis._scoring import Rate, Trial, score, trial_of
 from calibration.diagnosis._words import called, diagnosis_verdict, in_zones
 
-__all__ = ["Diagnosis", "called", "diagnose", "diagnosis_verdict", "in_zones", "write_diagnosis"]
+__all__ = [
+    "Diagnosis",
+    "Rate",
+    "Trial",
+    "called",
+    "diagnose",
+    "diagnosis_verdict",
+    "in_zones",
+    "score",
+    "trial_of",
+    "write_diagnosis",
+]

@@ -1,0 +1,173 @@
+"""Answers of the diagnosis to blind trials, one process a trial, and the tables of their scores."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from pathlib import Path
+from typing import Any
+
+from _table import ROOT, markdown, replace_section, write
+from energyplus_trials.drawing import draw_spec
+from parameter_recovery import code
+
+from calibration.diagnosis import Trial, score, trial_of
+
+NAME = "blind_trials"
+CASES, SEALED, ANSWERS = "cases", "sealed", "answers"
+
+#: The program of the process that answers one trial: it gets the case folder and a file to write to, and nothing else.
+_PROGRAM = """
+import json, sys
+from pathlib import Path
+from calibration.diagnosis import diagnose
+from thermal import load_case
+answer = diagnose(load_case(sys.argv[1])).to_dict() | {"code": sys.argv[3]}
+part = Path(sys.argv[2] + ".part")
+part.write_text(json.dumps(answer), encoding="utf-8")
+part.replace(sys.argv[2])
+"""
+
+
+def answer_all(out: Path, workers: int, most: int | None = None) -> list[str]:
+    """Diagnose every trial that has no answer yet; returns the names of those that failed.
+
+    Parameters
+    ----------
+    out : Path
+        Folder of the trials.
+    workers : int
+        Processes at a time, one thread each.
+    most : int, optional
+        Most trials to answer now.
+    """
+    folder = out / ANSWERS
+    folder.mkdir(exist_ok=True)
+    waiting = [p for p in sorted((out / CASES).iterdir()) if not (folder / f"{p.name}.json").exists()][:most]
+    failed, began = [], time.perf_counter()
+    with ThreadPoolExecutor(workers) as pool:
+        tasks = {pool.submit(_answer, case, folder / f"{case.name}.json"): case.name for case in waiting}
+        for number, task in enumerate(as_completed(tasks), 1):
+            error = task.result()
+            if error:
+                failed.append(tasks[task])
+            seconds = time.perf_counter() - began
+            print(f"{number} of {len(waiting)} ({seconds:.0f} s): {tasks[task]}: {error or 'answered'}", flush=True)
+    return failed
+
+
+def _answer(case: Path, answer: Path) -> str:
+    """Run one process; returns the last line of what went wrong."""
+    quiet = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")}
+    command = [sys.executable, "-c", _PROGRAM, str(case), str(answer), code()]
+    done = subprocess.run(command, env={**os.environ, **quiet}, capture_output=True, text=True, check=False)
+    return "" if done.returncode == 0 else (done.stderr.strip().splitlines() or ["no message"])[-1]
+
+
+def read_trials(out: Path) -> list[Trial]:
+    """Open the seals of the trials that are answered.
+
+    Parameters
+    ----------
+    out : Path
+        Folder of the trials.
+    """
+    answers = {p.stem: json.loads(p.read_text(encoding="utf-8")) for p in sorted((out / ANSWERS).glob("*.json"))}
+    labels = {name: json.loads((out / SEALED / f"{name}.json").read_text(encoding="utf-8")) for name in answers}
+    found = []
+    for name, label in labels.items():
+        null = draw_spec(label["seed"], "null", confirmation=bool(label["stream"]), days=label["days"]).name
+        twin = answers[null]["gap"]["mae"] if null in answers else float("nan")
+        found.append(trial_of(name, label, answers[name], twin))
+    return found
+
+
+def report(out: Path, readme: bool) -> str:
+    """Score what is answered, and write the tables.
+
+    Parameters
+    ----------
+    out : Path
+        Folder of the trials.
+    readme : bool
+        Also replace the table in the README.
+    """
+    trials = read_trials(out)
+    if not trials:
+        raise SystemExit(f"{out}: expected answered trials, found none; run `diagnose` first")
+    scored = score(trials)
+    versions = sorted({str(t.answer.get("code")) for t in trials})
+    streams = sorted(
+        {json.loads((out / SEALED / f"{t.name}.json").read_text(encoding="utf-8"))["stream"] for t in trials}
+    )
+    head = (
+        f"{len(trials)} trials ({', '.join(f'{sum(t.kind == k for t in trials)} {k}' for k in _kinds(trials))}), "
+        f"{'confirmation' if streams == [1] else 'development'} seeds, method {', '.join(versions)}; "
+        f"{sum(not t.counted for t in trials)} whose effects leave no gap over 0.05 K are not counted."
+    )
+    if len(versions) > 1:
+        head += " **The answers come from several versions of the method; answer again before quoting.**"
+    short = f"{head}\n\n{_rates(scored)}\n{_summary(scored)}\n"
+    page = "\n".join(
+        [
+            short,
+            "By effect:\n",
+            _rows(scored["by_effect"]),
+            "By strength:\n",
+            _rows(scored["by_strength"]),
+            "Reliability of the probabilities:\n",
+            _reliability(scored["reliability"]),
+        ]
+    )
+    plain = {**scored, "rates": {name: r.to_dict() for name, r in scored["rates"].items()}}
+    write(out, NAME, page, plain, readme=False)
+    if readme:
+        replace_section(ROOT / "README.md", NAME, short)
+    return page
+
+
+def _kinds(trials: Sequence[Trial]) -> list[str]:
+    return sorted({t.kind for t in trials})
+
+
+def _rates(scored: Mapping[str, Any]) -> str:
+    rows = [
+        [
+            name,
+            f"{r.share:.0%}" if r.of else "-",
+            f"{r.interval[0]:.0%} to {r.interval[1]:.0%}" if r.of else "-",
+            f"{r.hits} of {r.of}",
+        ]
+        for name, r in scored["rates"].items()
+    ]
+    return markdown(("of trials", "share", "95 % interval", "number"), rows)
+
+
+def _summary(scored: Mapping[str, Any]) -> str:
+    hidden = ", ".join(f"{v} {n}" for v, n in scored["uncounted"].items() if n)
+    return (
+        f"Median share of the gap closed: {scored['closed']:.0%}. Effects in a 90 % set: {scored['set_size']:.1f} on "
+        f"average. Trials without a gap: {hidden or 'none'}. Median time of a diagnosis: {scored['seconds']:.0f} s."
+    )
+
+
+def _rows(table: Mapping[str, Mapping[str, Any]]) -> str:
+    columns = ("trials", "right first", "right group", "abstained", "wrong name")
+    rows = [
+        [name, *(row[c] if c == "trials" else f"{row[c]:.0%}" for c in columns)]
+        for name, row in table.items()
+        if row["trials"]
+    ]
+    return markdown(("", *columns), rows)
+
+
+def _reliability(rows: Sequence[Mapping[str, float]]) -> str:
+    shown = [
+        [f"{r['from']:g} to {r['to']:g}", f"{r['stated']:.2f}", f"{r['present']:.2f}", int(r["count"])] for r in rows
+    ]
+    return markdown(("probability", "stated", "there", "effects"), shown)
