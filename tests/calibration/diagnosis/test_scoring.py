@@ -1,0 +1,95 @@
+"""Scores of blind trials on answers made up by hand."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+
+from calibration.diagnosis import Rate, Trial, score, trial_of
+
+
+def answer(verdict: str, first: str, group: tuple[str, ...] = (), mae: float = 0.3, **more: Any) -> dict[str, Any]:
+    effects = [first, *[e for e in ("solar_gain", "infiltration", "roof_exchange", "sensor_bias") if e != first]]
+    which = [
+        {
+            "effect": e,
+            "probability": 0.8 / (k + 1) ** 3,
+            "group": list(group) if not k else [e],
+            "zones": [],
+            "testable": True,
+        }
+        for k, e in enumerate(effects)
+    ]
+    how_far = [{"share_closed": 0.9}] if verdict in ("named", "group") else []
+    return {
+        "verdict": verdict, "which": which, "set90": [first], "gap": {"mae": mae}, "how_far": how_far, "seconds": 20.0
+    } | more  # fmt: skip
+
+
+def trial(kind: str, truths: tuple[str, ...], told: dict[str, Any], twin: float = 0.05, strength: float = 1.0) -> Trial:
+    effects = [
+        {"name": t, "answers": [t], "strength": strength, "zones": [], "unexplained_is_right": kind == "outside"}
+        for t in truths
+    ]
+    return trial_of("made_up", {"kind": kind, "effects": effects}, told, twin)
+
+
+TRIALS = [
+    trial("null", (), answer("no_gap", "solar_gain", mae=0.05)),
+    trial("null", (), answer("named", "solar_gain", ("solar_gain",), mae=0.06)),
+    trial("null", (), answer("unexplained", "solar_gain", mae=0.08)),
+    trial("single", ("solar_gain",), answer("named", "solar_gain", ("solar_gain",)), strength=0.5),
+    trial("single", ("infiltration",), answer("group", "solar_gain", ("solar_gain", "infiltration"))),
+    trial("single", ("roof_exchange",), answer("named", "solar_gain", ("solar_gain",)), strength=1.5),
+    trial("single", ("roof_exchange",), answer("no_gap", "solar_gain", mae=0.07)),  # leaves no gap
+    trial("pair", ("solar_gain", "infiltration"), answer("named", "infiltration", ("infiltration",))),
+    trial("outside", ("ghosts",), answer("unexplained", "sensor_bias")),
+    trial("outside", ("ghosts",), answer("named", "sensor_bias", ("sensor_bias",))),
+]
+
+
+def test_rates_are_of_the_trials_that_count() -> None:
+    rates = score(TRIALS)["rates"]
+    wanted = {
+        "nulls named": (1, 3),
+        "nulls unexplained": (1, 3),
+        "right first": (1, 3),
+        "right group": (2, 3),
+        "right in the first three": (3, 3),
+        "named right": (2, 3),
+        "abstained": (0, 3),
+        "wrong name, of all trials": (3, 10),
+        "outside called unexplained": (1, 2),
+        "both of a pair in the first two": (1, 1),
+        "90 % set covers": (1, 4),
+    }
+    for name, (hits, of) in wanted.items():
+        assert (rates[name].hits, rates[name].of) == (hits, of), name
+
+
+def test_what_leaves_no_gap_is_shown_apart() -> None:
+    found = score(TRIALS)
+    assert found["uncounted"] == {"no_gap": 1, "named": 0, "group": 0, "unexplained": 0}
+    assert found["by_effect"]["roof_exchange"]["trials"] == 1
+    assert found["by_strength"]["0.35 to 0.7"]["right first"] == 1.0
+    assert found["closed"] == pytest.approx(0.9)
+
+
+def test_reliability_counts_every_stated_probability_once() -> None:
+    rows = score(TRIALS)["reliability"]
+    assert sum(r["count"] for r in rows) == 4 * 7  # four effects in each of three nulls, three singles and a pair
+    for r in rows:
+        assert r["from"] - 1e-9 <= r["stated"] <= r["to"] + 1e-9
+        assert 0.0 <= r["present"] <= 1.0
+
+
+def test_intervals_are_those_of_wilson() -> None:
+    low, high = Rate(8, 10).interval
+    assert (low, high) == (pytest.approx(0.4902, abs=1e-4), pytest.approx(0.9433, abs=1e-4))
+    assert math.isnan(Rate(0, 0).share)
+
+
+def test_without_a_twin_a_trial_counts() -> None:
+    assert trial("single", ("solar_gain",), answer("no_gap", "solar_gain"), twin=float("nan")).counted
