@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pandas as pd
@@ -101,35 +101,33 @@ def hour_bars(shares: FloatArray) -> list[Picture]:
 
 @styled
 def change_panels(
-    before: Series, after: Series | None, zones: Sequence[str], errors: Sequence[dict[str, float]]
+    models: Mapping[str, Series], zones: Sequence[str], errors: Sequence[Mapping[str, float]]
 ) -> list[Picture]:
-    """Draw measured temperatures and those of the models without and with effects, one picture a zone, worst first.
+    """Draw measured temperatures and those of one or two models, one picture a zone, the worst first.
 
     Parameters
     ----------
-    before, after : Series
-        Runs of the two models; the second may be absent.
+    models : mapping of str to Series
+        Runs of each model by what it is called; zones are chosen by the first.
     zones : sequence of str
         Zone names.
-    errors : sequence of dict of str to float
+    errors : sequence of mapping of str to float
         Mean absolute error of each measured zone, of each model [K].
     """
     chosen = sorted(errors[0], key=lambda z: -errors[0][z])[:MOST_CHANGED]
+    before = next(iter(models.values()))
     first, last = _stretch(before)
-    shown = [s for s in (before, after) if s is not None]
-    inside = [(s.stamps >= first) & (s.stamps <= last) for s in shown]
     pictures = []
     for zone in chosen:
         column = list(zones).index(zone)
         figure = Figure(figsize=(5.6, 2.7))
         axes = figure.subplots()
-        for s, rows, colour, label in zip(
-            shown, inside, (MUTED, SIMULATED), ("without", "with the effects found"), strict=False
-        ):
-            text = "model" if after is None else f"model {label}"
-            axes.plot(day_numbers(s.stamps[rows]), s.simulated[rows, column] - CELSIUS, color=colour, label=text)
-        x = day_numbers(before.stamps[inside[0]])
-        axes.plot(x, before.measured[inside[0], column] - CELSIUS, color=MEASURED, label="measured")
+        for (name, s), colour in zip(models.items(), (MUTED, SIMULATED), strict=False):
+            rows = (s.stamps >= first) & (s.stamps <= last)
+            axes.plot(day_numbers(s.stamps[rows]), s.simulated[rows, column] - CELSIUS, color=colour, label=name)
+        rows = (before.stamps >= first) & (before.stamps <= last)
+        x = day_numbers(before.stamps[rows])
+        axes.plot(x, before.measured[rows, column] - CELSIUS, color=MEASURED, linewidth=1.1, label="measured")
         axes.set_xlim(x[0], x[-1])
         told = " → ".join(f"{e[zone]:.2f}" for e in errors if zone in e)
         axes.set(title=f"{zone}: {told} K", ylabel="temperature [°C]")

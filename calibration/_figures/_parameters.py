@@ -12,6 +12,7 @@ from matplotlib.lines import Line2D
 from calibration._figures._style import INK, MEASURED, MUTED, WARNING, Picture, picture, styled
 from calibration._result import ParameterEstimate
 from thermal import PARAMETERS, Parameter
+from thermal.effects import CATALOGUE
 
 #: More rows than this are not drawn; the table has them all.
 MOST_ROWS = 40
@@ -25,6 +26,9 @@ PAPER_WALLS = {  # conductivity [W/m/K], density [kg/m^3], heat capacity [J/kg/K
     "exterior_wall": (0.01, 2748.0, 2500.0),
     "interior_wall": (780.0, 0.5, 500.0),
 }
+
+#: Parameters of the baseline and of the effects by name.
+_KINDS = PARAMETERS | {p.name: p for effect in CATALOGUE.values() for p in effect.parameters}
 
 
 def paper_values(parameters: Sequence[ParameterEstimate]) -> dict[str, float]:
@@ -67,7 +71,8 @@ def parameter_ranges(parameters: Sequence[ParameterEstimate]) -> list[Picture]:
     for row, p in enumerate(shown):
         _row(axes, row, p, paper.get(p.name))
     axes.set_yticks(range(len(shown)), [p.name.replace("_", " ") for p in shown], fontsize=8)
-    axes.set_xticks([0, 0.25, 0.5, 0.75, 1.0], ["lower bound", "", "middle (log scale)", "", "upper bound"])
+    middle = "middle (log scale" + ("; of effects, linear)" if any(_scale(p).scale == "linear" for p in shown) else ")")
+    axes.set_xticks([0, 0.25, 0.5, 0.75, 1.0], ["lower bound", "", middle, "", "upper bound"])
     axes.set(xlim=(-0.05, 1.05), ylim=(len(shown) - 0.4, -0.6))
     axes.grid(axis="y", visible=False)
     axes.spines["left"].set_visible(False)
@@ -115,7 +120,7 @@ def _paper_mark(axes: Axes, row: int, at: float, above: bool) -> None:
 
 def _scale(p: ParameterEstimate) -> Parameter:
     """Range and scale of estimation of an estimate; a parameter of one zone has those of its kind."""
-    kind = PARAMETERS.get(p.name.partition("@")[0])
+    kind = _KINDS.get(p.name.partition("@")[0])
     if kind is None or p.lower is None or p.upper is None:
         return Parameter(p.name, p.unit, p.start, p.lower or p.value / 2, p.upper or p.value * 2, p.source)
     return replace(kind, start=p.start, lower=p.lower, upper=p.upper)

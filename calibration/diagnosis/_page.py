@@ -1,4 +1,4 @@
-"""What a diagnosis leaves behind: its numbers as JSON and Parquet, its final model, and a page for the building's manager."""
+"""What a diagnosis leaves behind: its numbers, the final model, and a page for those who run the building."""
 
 from __future__ import annotations
 
@@ -6,27 +6,41 @@ import platform
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pandas as pd
 
 from calibration import _figures as figures
-from calibration._page import clock, counted, duration, kelvin, render, signed, significant, unit, watts
+from calibration._page import clock, counted, duration, kelvin, render, signed, significant, unit
 from calibration._report_evaluation import CELSIUS, subtitle
 from calibration._results import check_results_folder, write_results
 from calibration.diagnosis._diagnose import Diagnosis
-from calibration.diagnosis._final import Replay, both_predictions, final_calibration, missing_table, replays
+from calibration.diagnosis._final import (
+    Replay,
+    both_predictions,
+    describe_fit,
+    final_calibration,
+    missing_table,
+    replays,
+)
+from calibration.diagnosis._levels import LARGEST_GROUP
+from calibration.diagnosis._page_where import where_content
 from calibration.diagnosis._statistics import statistics_content
 from calibration.diagnosis._verdict import Suspect
-from calibration.diagnosis._where import Share
-from calibration.diagnosis._words import accepted, ahead, called, diagnosis_verdict, in_zones, listed, suspect, sure
-from thermal import Case, FloorPlans
+from calibration.diagnosis._words import (
+    accepted,
+    ahead,
+    alike,
+    called,
+    diagnosis_verdict,
+    in_zones,
+    listed,
+    sure,
+    suspect,
+)
+from thermal import Case
 from thermal.effects import CATALOGUE
 
 #: Effects shown at the top: those at least so probable [-], and how many at least and at most.
 _LIKELY, _FEWEST, _MOST = 0.05, 3, 6
-
-#: Rows of a table of zones, and of parts of the day and the building.
-_MOST_ZONES, _MOST_PARTS = 24, 10
 
 #: Parameters of an effect that are spelled out.
 _MOST_VALUES = 4
@@ -78,19 +92,29 @@ def _content(result: Diagnosis, case: Case, before: Replay, after: Replay | None
         "subtitle": subtitle(case, before.evaluation),
         "verdict": diagnosis_verdict(result),
         "fine": result.verdict.name != "unexplained",
-        "found": bool(accepted(result)),
+        "found": _found(result),
         "ahead": ahead(result),
         "cards": _cards(result),
         "suspects": [_suspect_entry(result, s) for s in suspects],
         "next": _measure_next(result),
-        "untestable": [(called(s.effect).capitalize(), s.reason) for s in result.verdict.suspects if not s.testable],
-        **_where_content(result, case, before, after),
+        "untestable": [
+            (called(s.effect).capitalize(), s.reason.replace("_sensor", "").replace("_", " "))
+            for s in result.verdict.suspects
+            if not s.testable
+        ],
+        **where_content(result, case, before, after, _found(result)),
         "waterfall": _waterfall(result),
         "tests": _placebo_sentences(result),
-        "panels": _panels(before, after),
+        "panels": _panels(before, after, _found(result)),
         "statistics": statistics_content(result),
         "reproduce": _reproduce(result, case),
     }
+
+
+def _found(result: Diagnosis) -> str:
+    """Call the final model beside the baseline; nothing where it has no effect."""
+    count = len(accepted(result))
+    return f"with the effect{'s' if count > 1 else ''} found" if count else ""
 
 
 def _cards(result: Diagnosis) -> list[tuple[str, str]]:
@@ -98,13 +122,13 @@ def _cards(result: Diagnosis) -> list[tuple[str, str]]:
     if result.steps:
         last = result.steps[-1]
         share = "–" if last.share_closed is None else f"{min(100.0, 100 * last.share_closed):.0f} %"
-        told = "of the gap closed" if last.share_closed is not None else "share closed: gap too small to say"
-        cards += [(f"{kelvin(last.after)} K", "with the effects found"), (share, told)]
+        told = "of what could be closed" if last.share_closed is not None else "share closed: gap too small to say"
+        cards += [(f"{kelvin(last.after)} K", _found(result)), (share, told)]
     cards.append((f"{kelvin(result.floor)} K", "floor: no regular missing heat would take it lower"))
-    if result.steps:
-        best = suspect(result, accepted(result)[0].screened.effect)
-        cards.append((sure(best.probability), f"probability of {called(best.effect)}"))
-    return cards
+    found = accepted(result)
+    best = suspect(result, found[0].screened.effect) if found else result.verdict.suspects[0]
+    told = "probability of" if found else "is the highest probability of any effect:"
+    return [*cards, (sure(best.probability), f"{told} {called(best.effect)}")]
 
 
 def _shown(result: Diagnosis) -> list[Suspect]:
@@ -115,89 +139,49 @@ def _shown(result: Diagnosis) -> list[Suspect]:
 
 
 def _suspect_entry(result: Diagnosis, s: Suspect) -> dict[str, Any]:
-    inside = s.effect in {r.screened.effect for r in accepted(result)}
-    alike = [called(e) for e in s.group if e != s.effect] if inside or result.verdict.name == "unexplained" else []
+    fitted = next((r for r in accepted(result) if r.screened.effect == s.effect), None)
+    shown = fitted is not None or result.verdict.name == "unexplained"
+    others = [called(e) for e in alike(result, s.effect)[:LARGEST_GROUP] if e != s.effect] if shown else []
     return {
         "name": called(s.effect).capitalize(),
         "probability": sure(s.probability),
         "width": f"{100 * s.probability:.1f}",
-        "accepted": inside,
-        "where": in_zones(s.zones),
+        "accepted": fitted is not None,
+        "where": in_zones(s.zones if fitted is None else fitted.screened.zones),
         "acts_on": CATALOGUE[s.effect].acts_on,
-        "values": _values(s) if inside else [],
-        "alike": listed(alike, "or") if alike else "",
+        "values": [] if fitted is None else _values(result, s.effect),
+        "alike": listed(others, "or") if others else "",
         "separate_by": s.separate_by,
     }
 
 
-def _values(s: Suspect) -> list[str]:
+def _values(result: Diagnosis, effect: str) -> list[str]:
+    """Spell the parameters of an effect as the final model has them."""
+    own = {p.name for p in CATALOGUE[effect].parameters}
+    found = [p for p in describe_fit(result.final) if p.name.partition("@")[0] in own]
     spelled = []
-    for name, (value, of, (low, high)) in list(s.parameters.items())[:_MOST_VALUES]:
-        shift, text = (CELSIUS, "°C") if of == "K" and "temperature" in name else (0.0, unit(of).replace("*", "·"))
-        base, _, member = name.partition("@")
-        place = f" ({member.replace('facade:', 'facade at ')})" if member else ""
-        told = significant(value - shift) + ("" if text == "–" else f" {text}")
-        if np.isfinite(low) and np.isfinite(high):
-            told += f" (90 %: {significant(low - shift)} to {significant(high - shift)})"
-        spelled.append(f"{base.replace('_', ' ')}{place}: {told}")
-    more = len(s.parameters) - _MOST_VALUES
+    for p in found[:_MOST_VALUES]:
+        base, _, member = p.name.partition("@")
+        shift, of = (CELSIUS, "°C") if p.unit == "K" and "temperature" in base else (0.0, unit(p.unit))
+        place = f" ({member.replace('facade:', 'facade at ').replace(' deg', '°')})" if member else ""
+        told = significant(p.value - shift) + ("" if of == "–" else f" {of.replace('*', '·')}")
+        if p.interval90 is not None:
+            told += f" (90 %: {' to '.join(significant(end - shift) for end in p.interval90)})"
+        if p.at_bound and p.value != 0.0:
+            told += ", at the end of its range"
+        spelled.append(f"{base.replace('_', ' ').replace('u value', 'U-value')}{place}: {told}")
+    more = len(found) - _MOST_VALUES
     return [*spelled, f"and {more} more"] if more > 0 else spelled
 
 
 def _measure_next(result: Diagnosis) -> list[tuple[str, str]]:
-    """What would tell effects of the verdict apart, or confirm the one that was named."""
+    """List what would tell effects of the verdict apart, or confirm the one that was named."""
     if result.verdict.name == "no_gap":
         return []
     names = [r.screened.effect for r in accepted(result)]
     for name in list(names) or [result.verdict.suspects[0].effect]:
-        names += [e for e in (name, *suspect(result, name).group) if e not in names]
+        names += [e for e in (name, *alike(result, name)[:LARGEST_GROUP]) if e not in names]
     return [(called(e).capitalize(), CATALOGUE[e].separated_by) for e in names if CATALOGUE[e].separated_by]
-
-
-def _where_content(result: Diagnosis, case: Case, before: Replay, after: Replay | None) -> dict[str, Any]:
-    where, geometry = result.where, case.building.geometry
-    zones = list(before.missing.columns)
-    sizes = [_rms(r.missing) for r in (before, after) if r is not None]
-    maps: list[figures.Picture] = []
-    if isinstance(geometry, FloorPlans):
-        top = max(1.0, float(np.nanmax(sizes[0], initial=1.0)))
-        for heat, title in zip(sizes, ("calibrated model", "with the effects found"), strict=False):
-            maps += figures.heat_maps(geometry, case.building.orientation, zones, heat, title, top)
-    shares = {s.name: s for s in where.zones}
-    means = before.missing.mean()
-    worst = sorted(range(len(zones)), key=lambda i: -shares[zones[i]].share)
-    rows = [
-        {
-            "zone": zones[i],
-            "share": f"{shares[zones[i]].share:.0%}".replace("%", " %"),
-            "width": f"{100 * shares[zones[i]].share:.1f}",
-            "mean": _signed_watts(float(means.iloc[i])),
-            "sizes": [watts(float(s[i])) for s in sizes],
-        }
-        for i in worst[:_MOST_ZONES]
-    ]
-    parts = [p for p in (*where.groups, *where.modes.values()) if p.predictions > 0.0]
-    parts = sorted(parts, key=lambda p: p.predictions - p.share)[:_MOST_PARTS]
-    return {
-        "sentence": where.sentence,
-        "maps": maps,
-        "zones": rows,
-        "zone_count": len(zones),
-        "parts": [_part(p) for p in parts],
-        "hours": figures.hour_bars(where.hours),
-    }
-
-
-def _part(p: Share) -> dict[str, str]:
-    name = p.name if p.name.startswith(("in ", "with")) else f"in {p.name}" if p.name[:3] == "the" else p.name
-    return {
-        "name": name.capitalize() if name.startswith("in the ") or " " not in name else name[0].upper() + name[1:],
-        "share": f"{100 * p.share:.0f} %",
-        "width": f"{100 * p.share:.1f}",
-        "predictions": f"{100 * p.predictions:.0f} %",
-        "mark": f"{100 * p.predictions:.1f}",
-        "interval": f"{100 * p.interval[0]:.0f} to {100 * p.interval[1]:.0f} %",
-    }
 
 
 def _waterfall(result: Diagnosis) -> list[dict[str, Any]]:
@@ -227,36 +211,28 @@ def _bar(name: str, value: float, previous: float, top: float, change: str) -> d
 
 def _placebo_sentences(result: Diagnosis) -> list[str]:
     sentences = []
-    for step, r in zip(result.steps, result.rounds, strict=False):
+    for i, (step, r) in enumerate(zip(result.steps, result.rounds, strict=False)):
         name = called(step.effects[-1])
-        if step.shuffled is not None:
-            real = step.shuffled > step.after
-            verdict = "so its course over these very days is what explains" if real else "so be careful with this one"
+        real = step.shuffled is None or step.shuffled > step.after
+        if step.shuffled is not None and (i == 0 or not real):
+            verdict = "their course over these very days is what explains" if real else "be careful with this effect"
             sentences.append(
-                f"With the days of {name} shuffled the error is {kelvin(step.shuffled)} K instead of "
-                f"{kelvin(step.after)} K, {verdict}."
+                f"With the signals behind {name} put on other days the error is {kelvin(step.shuffled)} K instead of "
+                f"{kelvin(step.after)} K: {verdict}."
             )
         others = [x for x in r.refits if x is not r.accepted]
-        if step.runner_up is not None and others:
-            sentences.append(
-                f"The next best in its place, {called(others[0].screened.effect)}, reaches {kelvin(step.runner_up)} K."
-            )
+        if step.runner_up is not None and others and (i == 0 or step.runner_up < step.after):
+            other = called(others[0].screened.effect)
+            sentences.append(f"In place of {name}, the next best, {other}, reaches {kelvin(step.runner_up)} K.")
     return sentences
 
 
-def _panels(before: Replay, after: Replay | None) -> list[figures.Picture]:
+def _panels(before: Replay, after: Replay | None, found: str) -> list[figures.Picture]:
     both = [r.evaluation for r in (before, after) if r is not None]
     series = [figures.series_of_runs(e) for e in both]
     errors = [{z: e["mae"] for z, e in one.by_zone().items()} for one in both]
-    return figures.change_panels(series[0], series[1] if len(series) > 1 else None, both[0].zones, errors)
-
-
-def _rms(missing: pd.DataFrame) -> Any:
-    return np.sqrt((missing**2).mean()).to_numpy()
-
-
-def _signed_watts(value: float) -> str:
-    return ("+" if value > 0 else "") + watts(value) if np.isfinite(value) else "not known"
+    models = dict(zip(("calibrated model", found), series, strict=False))
+    return figures.change_panels(models, both[0].zones, errors)
 
 
 def _reproduce(result: Diagnosis, case: Case) -> list[tuple[str, str]]:

@@ -28,14 +28,10 @@ def statistics_content(result: Diagnosis) -> dict[str, Any]:
     """
     baseline, final = describe_fit(result.rounds[0].before), describe_fit(result.final)
     return {
-        "p_value": significant(result.p_value, 2),
+        "p_value": "under 0.001" if result.p_value < 0.001 else significant(result.p_value, 2),
         "accepted": plain(ACCEPTED),
         "generic": plain(GENERIC_GAP),
         "set90": listed([called(e) for e in result.verdict.set90]) if result.verdict.set90 else "",
-        "combinations": [
-            (listed([called(e) for e in effects]).capitalize() if effects else "Nothing", sure(p))
-            for effects, p in result.verdict.combinations
-        ],
         "rounds": [_round(i, r) for i, r in enumerate(result.rounds, 1)],
         "effects": _effects(result),
         "placebos": _placebos(result),
@@ -54,14 +50,14 @@ def _round(number: int, r: Round) -> dict[str, Any]:
     fitted = {x.screened.effect: x for x in r.refits}
     rows = [
         [
-            called(g.effect), in_zones(g.zones), f"{g.gain:.1f}",
-            f"{fitted[g.effect].gain:.1f}" if g.effect in fitted else "–",
+            called(g.effect), in_zones(g.zones), _gain(g.gain),
+            _gain(fitted[g.effect].gain) if g.effect in fitted else "–",
             f"{100 * g.share:.0f} %", f"{100 * g.retained:.0f} %",
         ]
         for g in r.gains[:_MOST_GAINS]
     ]  # fmt: skip
     generic = r.generic
-    rows.append(["heat of any regular kind", "–", f"{generic.gain:.1f}", "–", f"{100 * generic.share:.0f} %", "–"])
+    rows.append(["heat of any regular kind", "–", _gain(generic.gain), "–", f"{100 * generic.share:.0f} %", "–"])
     best = [g for g in r.gains if g.share > 0.0][:_MOST_ALIKE]
     inside = [called(e) for e in r.before.effects]
     return {
@@ -75,11 +71,15 @@ def _round(number: int, r: Round) -> dict[str, Any]:
     }  # fmt: skip
 
 
+def _gain(value: float) -> str:
+    return f"{value:.1f}".replace("-", "−") if np.isfinite(value) else "–"
+
+
 def _effects(result: Diagnosis) -> list[list[str]]:
     return [
         [
-            called(s.effect), s.effect, sure(s.probability) if s.testable else "not testable",
-            f"{s.score:.1f}" if s.testable and np.isfinite(s.score) else "–", in_zones(s.zones) if s.testable else "–",
+            called(s.effect), s.effect, in_zones(s.zones) if s.testable else "–",
+            sure(s.probability) if s.testable else "not testable", _gain(s.score) if s.testable else "–",
             f"{100 * s.retained_share:.0f} %" if s.testable else "–",
         ]
         for s in result.verdict.suspects
@@ -113,10 +113,10 @@ def _parameters(before: tuple[ParameterEstimate, ...], after: tuple[ParameterEst
 
 
 def _bounds(before: tuple[ParameterEstimate, ...], after: tuple[ParameterEstimate, ...]) -> str:
-    """Say which parameters lie on a bound of their range, without and with the effects found."""
+    """Say which parameters lie on a bound of their range, in the calibrated and the final model."""
 
     def on(parameters: tuple[ParameterEstimate, ...]) -> str:
         names = [p.name.replace("_", " ") for p in parameters if p.at_bound]
         return listed(names) if names else "none"
 
-    return f"On a bound of their range: {on(before)}" + (f"; with the effects found: {on(after)}." if after else ".")
+    return f"On a bound of their range: {on(before)}" + (f"; in the final model: {on(after)}." if after else ".")

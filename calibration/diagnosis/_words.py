@@ -16,6 +16,9 @@ from thermal.effects import CATALOGUE
 #: What an effect is called where its title would read oddly after "leaves out".
 _CALLED = {"hidden_mass": "mass that stores heat"}
 
+#: Probability from which an effect is said to be left out, rather than perhaps [-].
+_LIKELY = 0.5
+
 #: More zones than this are counted, not named.
 _MOST_NAMED = 4
 
@@ -35,13 +38,13 @@ def diagnosis_verdict(result: Diagnosis) -> str:
     found = accepted(result)
     if result.verdict.name == "group":
         first, *others = found
-        alike = [suspect(result, e) for e in suspect(result, first.screened.effect).group]
-        named = listed([f"{called(s.effect)} ({sure(s.probability)})" for s in alike], "or")
-        text = f"The model leaves out one of {len(alike)} things that these data cannot tell apart: {named}."
+        members = [suspect(result, e) for e in alike(result, first.screened.effect)]
+        named = listed([f"{called(s.effect)} ({sure(s.probability)})" for s in members], "or")
+        text = f"The model leaves out one of {len(members)} things that these data cannot tell apart: {named}."
         if others:
             text += f" It also leaves out {listed([_found(result, r) for r in others])}."
     else:
-        text = f"The model leaves out {listed([_found(result, r) for r in found])}."
+        text = _named(result, found)
     return f"{text} {_how_far(result, len(found))}"
 
 
@@ -67,6 +70,22 @@ def suspect(result: Diagnosis, effect: str) -> Suspect:
         Its id.
     """
     return next(s for s in result.verdict.suspects if s.effect == effect)
+
+
+def alike(result: Diagnosis, effect: str) -> tuple[str, ...]:
+    """Effects that the data cannot tell from an accepted one, itself first; or what its suspect says of another.
+
+    Parameters
+    ----------
+    result : Diagnosis
+        From `diagnose`.
+    effect : str
+        Its id.
+    """
+    for r in result.rounds:
+        if r.accepted is not None and r.accepted.screened.effect == effect:
+            return group_of(r, effect)
+    return suspect(result, effect).group
 
 
 def called(effect: str, zones: Sequence[str] = ()) -> str:
@@ -156,6 +175,18 @@ def ahead(result: Diagnosis) -> str:
     return f"{duration(problem.steps * problem.inputs.step)} ahead"
 
 
+def _named(result: Diagnosis, found: Sequence[Refit]) -> str:
+    """Name effects: those more likely there than not, and what may be there besides."""
+    likely = [r for r in found if suspect(result, r.screened.effect).probability >= _LIKELY]
+    rest = [r for r in found if r not in likely]
+    if not likely:
+        likely, rest = rest[:1], rest[1:]
+        text = f"Most likely the model leaves out {_found(result, likely[0])}"
+    else:
+        text = f"The model leaves out {listed([_found(result, r) for r in likely])}"
+    return text + (f", and perhaps {listed([_found(result, r) for r in rest])}." if rest else ".")
+
+
 def _found(result: Diagnosis, fitted: Refit) -> str:
     gain = fitted.screened
     return f"{called(gain.effect, gain.zones)} ({sure(suspect(result, gain.effect).probability)} sure)"
@@ -178,7 +209,7 @@ def _how_far(result: Diagnosis, found: int) -> str:
     text = f"{there} falls from {kelvin(step.before)} to {kelvin(step.after)} K"
     if step.share_closed is None:
         return f"{text}; the gap is too small beside its own scatter to state a share of it."
-    return f"{text}: {min(100.0, 100 * step.share_closed):.0f} % of the gap is closed."
+    return f"{text}, {min(100.0, 100 * step.share_closed):.0f} % of what could be closed."
 
 
 def _no_gap(result: Diagnosis) -> str:
@@ -186,6 +217,9 @@ def _no_gap(result: Diagnosis) -> str:
         f"These data show nothing that the model leaves out. {ahead(result).capitalize()}, on days that it was not "
         f"fitted to, the calibrated model misses the measured zone temperatures by {kelvin(result.gap)} K on average."
     )
+    if found := accepted(result):
+        names = listed([called(r.screened.effect, r.screened.zones) for r in found])
+        text += f" A trace of {names} explains too little of the error to be named."
     sizes = [w for w in result.detectable.values() if np.isfinite(w)]
     if not sizes:
         return text
@@ -200,17 +234,16 @@ def _unexplained(result: Diagnosis) -> str:
     )
     best = result.verdict.suspects[0]
     if found:
-        alike = group_of(result.rounds[0], found[0].screened.effect)
-        if len(alike) > LARGEST_GROUP:
-            names = listed([called(e) for e in alike[:LARGEST_GROUP]])
+        group = alike(result, found[0].screened.effect)
+        if len(group) > LARGEST_GROUP:
+            names = listed([called(e) for e in group[:LARGEST_GROUP]])
             return (
-                f"The model leaves something out, but these data cannot tell what: {len(alike)} effects explain it "
+                f"The model leaves something out, but these data cannot tell what: {len(group)} effects explain it "
                 f"about equally well, among them {names}. {error}."
             )
-        return (
-            f"The model leaves something out that no effect we know of explains: {called(best.effect)} "
-            f"({sure(best.probability)}) explains a part, and a systematic error remains. {_how_far(result, len(found))}"
-        )
+        part = f"{listed([called(r.screened.effect) for r in found])} would be a part of it, and not enough"
+        how_far = _how_far(result, len(found))
+        return f"The model leaves something out that no effect we know of explains: {part}. {how_far}"
     text = f"The model leaves something out that no effect we know of explains. {error}"
     if result.floor < result.gap:
         text += f", and {kelvin(result.gap - result.floor)} K of it follow time of day, zone or outdoor temperature"

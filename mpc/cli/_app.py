@@ -16,6 +16,7 @@ import typer
 from mpc.cli._calibrate import calibrate
 from mpc.cli._check import check
 from mpc.cli._demo import demo
+from mpc.cli._diagnose import diagnose
 from mpc.cli._doctor import doctor
 from mpc.cli._evaluate import evaluate
 from mpc.cli._simulate import simulate
@@ -108,6 +109,11 @@ for _command, _help, _example in (
         calibrate,
         "Fit the physical parameters of a building to its telemetry; of each case in a folder of cases.",
         "calibrate cases/office --tune 2023-10-02/2023-10-16 --hold-out 2023-10-16T00:05/2023-10-23 --out results",
+    ),
+    (
+        diagnose,
+        "Say where model and building disagree, which missing effect causes it, and how far the error falls with it.",
+        "diagnose cases/office --out diagnosis",
     ),
 ):
     app.command(help=_help, epilog=f"Example: buildingmpc {_example}")(_guarded(_command))

@@ -38,6 +38,10 @@ def calibrate(
         typer.Option(metavar="START/END", help="Held-out interval, repeatable; default: the last third."),
     ] = None,
     dx: Dx = None,
+    effects: Annotated[
+        str | None,
+        typer.Option(metavar="ID,...", help="Effects that are known to be there, in the whole building."),
+    ] = None,
     horizon: Annotated[str, typer.Option(metavar="TIME", help="Prediction horizon, such as 6h or 90min.")] = "6h",
     scheme: SchemeName = None,
     objective: Annotated[
@@ -64,6 +68,7 @@ def calibrate(
     settings = {
         "tune": tune or [], "hold_out": hold_out or [], "dx": dx, "horizon": horizon,
         "scheme": scheme or "implicit_euler", "objective": objective, "loss": loss, "starts": starts, "seed": seed,
+        "effects": [name.strip() for name in (effects or "").split(",") if name.strip()],
     }  # fmt: skip
     if workers is not None and scheduler is not None:
         raise CalibrationError("--workers and --scheduler: expected one of them; a cluster has workers of its own")

@@ -14,7 +14,7 @@ from mpc.cli._app import app
 from thermal.data import bundled_case_path
 
 CASE = str(bundled_case_path())
-EPILOGS = ("check", "simulate", "evaluate", "calibrate", "demo", "doctor")
+EPILOGS = ("check", "simulate", "evaluate", "calibrate", "diagnose", "demo", "doctor")
 
 
 def run(*arguments: str | Path) -> Any:

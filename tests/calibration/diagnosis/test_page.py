@@ -1,0 +1,129 @@
+"""What a diagnosis leaves behind: files that others read, words that follow the verdict, a page that loads nothing."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from calibration import CalibrationError, evaluate_case
+from calibration.diagnosis import Diagnosis, diagnose, diagnosis_verdict, write_diagnosis
+from thermal import load_bundled_case
+from thermal.effects import CATALOGUE
+
+
+@cache
+def diagnosed() -> Diagnosis:
+    return diagnose(load_bundled_case(), dx=2.0)
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_diagnosis(diagnosed(), load_bundled_case(), tmp_path_factory.mktemp("gap") / "results").parent
+
+
+def named(name: str) -> Diagnosis:
+    """The same diagnosis with another verdict."""
+    return replace(diagnosed(), verdict=replace(diagnosed().verdict, name=name))
+
+
+def nothing_found() -> Diagnosis:
+    """What the first round leaves when it accepts nothing."""
+    rounds = (replace(diagnosed().rounds[0], accepted=None),)
+    verdict = replace(diagnosed().verdict, name="no_gap", set90=())
+    return replace(diagnosed(), rounds=rounds, steps=(), verdict=verdict)
+
+
+def test_the_numbers_are_those_of_the_contract(written: Path) -> None:
+    content = json.loads((written / "diagnosis.json").read_text(encoding="utf-8"))
+    assert {"verdict", "gap", "where", "which", "set90", "combinations", "how_far", "seconds", "case", "version",
+            "seed"} <= set(content)  # fmt: skip
+    assert {s["effect"] for s in content["which"]} == set(CATALOGUE)
+    assert len(content["where"]["hours"]) == 24
+    step = content["how_far"][-1]
+    if step["share_closed"] is not None:
+        share = (step["held_out_mae_before"] - step["held_out_mae_after"]) / (
+            step["held_out_mae_before"] - step["floor"]
+        )
+        assert step["share_closed"] == pytest.approx(share)
+    assert "NaN" not in (written / "diagnosis.json").read_text(encoding="utf-8")
+
+
+def test_the_final_model_predicts_elsewhere_what_it_did_here(written: Path) -> None:
+    result, content = diagnosed(), json.loads((written / "calibration.json").read_text(encoding="utf-8"))
+    found = evaluate_case(load_bundled_case(), result.judged, parameters=written / "calibration.json")
+    assert content["calibrated"]["held_out"]["mae"] == pytest.approx(result.steps[-1].after, abs=1e-9)
+    assert found.metrics.mae == pytest.approx(result.steps[-1].after, abs=5e-3)
+    assert [e["effect"] for e in content["effects"]] == list(result.final.effects)
+    assert content["uncalibrated"]["held_out"]["mae"] > content["calibrated"]["held_out"]["mae"]
+
+
+def test_series_are_those_of_both_models(written: Path) -> None:
+    result = diagnosed()
+    heat = pd.read_parquet(written / "missing_watts.parquet")
+    for zone, watts in result.where.missing_watts.items():
+        own = heat.loc[heat["zone"] == zone, "baseline"].to_numpy()
+        assert np.sqrt(np.nanmean(own**2)) == pytest.approx(watts)
+    runs = pd.read_parquet(written / "predictions.parquet")
+    last = runs[(runs.index - runs["run_start"]) == pd.Timedelta("6h")]
+    for column, mae in (("baseline", result.gap), ("with_effects", result.steps[-1].after)):
+        assert (last[column] - last["measured"]).abs().groupby(last.index).mean().mean() == pytest.approx(mae)
+
+
+def test_the_page_loads_nothing_and_says_what_pictures_show(written: Path) -> None:
+    page = (written / "report.html").read_text(encoding="utf-8")
+    assert not re.search(r'(?:src|href)="(?!data:)', page) and "<script" not in page
+    pictures = re.findall(r"<img [^>]*>", page)
+    assert pictures and all(re.search(r'alt="[^"]{10,}"', p) for p in pictures)
+    assert diagnosis_verdict(diagnosed()) in page
+    for title in ("Where the model is wrong", "What it leaves out", "How far it closes the gap",
+                  "What to measure next", "What these data cannot test", "<details>"):  # fmt: skip
+        assert title in page
+    for s in diagnosed().verdict.suspects:
+        assert s.effect in page and (s.testable or s.reason.split(":")[0] in page)
+
+
+def test_a_named_effect_comes_with_its_probability_and_the_fall_of_the_error() -> None:
+    text = diagnosis_verdict(named("named"))
+    assert "leaves out sun through the windows" in text and "% sure" in text and "falls from" in text
+
+
+def test_no_share_is_told_where_there_is_none() -> None:
+    step = replace(diagnosed().steps[-1], share_closed=None, interval=None)
+    text = diagnosis_verdict(replace(named("named"), steps=(step,)))
+    assert "too small" in text and "% of what" not in text
+
+
+def test_an_error_that_does_not_fall_is_said_to_be_no_help() -> None:
+    step = replace(diagnosed().steps[-1], after=2.0 * diagnosed().gap)
+    assert "does not fall" in diagnosis_verdict(replace(named("named"), steps=(step,)))
+
+
+def test_other_verdicts_name_nothing() -> None:
+    assert "cannot tell apart" in diagnosis_verdict(named("group"))
+    assert "explains" in diagnosis_verdict(named("unexplained"))
+    assert "explains too little" in diagnosis_verdict(named("no_gap"))
+    nothing = diagnosis_verdict(nothing_found())
+    assert nothing.startswith("These data show nothing") and " W on" in nothing
+    other = replace(nothing_found(), verdict=replace(nothing_found().verdict, name="unexplained"))
+    assert "not enough to name it" in diagnosis_verdict(other)
+
+
+def test_a_diagnosis_without_effects_is_written_too(tmp_path: Path) -> None:
+    report = write_diagnosis(nothing_found(), load_bundled_case(), tmp_path / "none")
+    assert "in the model</span>" not in report.read_text(encoding="utf-8")
+    assert json.loads((tmp_path / "none" / "calibration.json").read_text(encoding="utf-8"))["effects"] == []
+    assert "with_effects" not in pd.read_parquet(tmp_path / "none" / "predictions.parquet")
+
+
+def test_results_are_not_overwritten(written: Path) -> None:
+    before = (written / "diagnosis.json").read_bytes()
+    with pytest.raises(CalibrationError, match="force=True"):
+        write_diagnosis(diagnosed(), load_bundled_case(), written)
+    assert (written / "diagnosis.json").read_bytes() == before
