@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from calibration.diagnosis._bench import TYPICAL, Bench, Fit, is_strength
 from calibration.diagnosis._generic import GENERIC, ZONE_HEAT
 from thermal import Parameter, reduced_model
-from thermal.effects import CATALOGUE, Chosen
+from thermal.effects import CATALOGUE, PAIR, Chosen
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -98,7 +98,7 @@ class Screening:
         known = np.array([p.name in fit.values for p in self.parameters])
         prior = np.array([p.prior_deviation for p in self.parameters])
         away = problem.point(theta)[known] - np.array([p.transform(p.start) for p in self.parameters])[known]
-        self._raw = np.diag(gram).copy()
+        self._whole = gram
         hessian = gram[np.ix_(known, known)] + np.diag(prior[known] ** -2.0)
         turn = np.linalg.solve(hessian, gram[known])
         pull = score[known] - away / prior[known] ** 2
@@ -124,9 +124,10 @@ class Screening:
             return self._likeliest(index)
         if not CATALOGUE[effect].zonal:
             return self._gain(effect, index, ())
-        zones = [self.parameters[i].member or "" for i in index]
-        each = [self._gain(effect, index[[k]], (zones[k],)) for k in range(len(zones))]
-        return self._grow(effect, index, zones, each)
+        members: dict[str, list[int]] = {}
+        for i in index:
+            members.setdefault(self.parameters[i].member or "", []).append(int(i))
+        return self._grow(effect, {name: np.array(found) for name, found in members.items()})
 
     def promised(self, gain: Gain) -> dict[str, float]:
         """Parameters where the tangents point: the effect's strengths, and what the fitted ones then would be.
@@ -202,17 +203,22 @@ class Screening:
         names = set(gain.strengths)
         return np.array([p.name in names for p in self.parameters])
 
-    def _grow(self, effect: str, index: IntArray, zones: list[str], each: list[Gain]) -> Gain:
-        """Add zones as long as each more than pays for having been chosen among all."""
-        choice = np.log(len(zones))
-        order = sorted(range(len(zones)), key=lambda k: -each[k].gain)
-        members = [order[0]]
-        best = self._gain(effect, index[members], (zones[order[0]],), choice)
-        for k in order[1:]:
-            trial = [*members, k]
-            found = self._gain(effect, index[trial], tuple(zones[i] for i in trial), choice * len(trial))
-            if found.gain > best.gain:
-                members, best = trial, found
+    def _grow(self, effect: str, members: Mapping[str, IntArray]) -> Gain:
+        """Add zones, or pairs of them, as long as each more than pays for having been chosen among all."""
+        choice = np.log(len(members))
+        alone = {name: self._gain(effect, index, (name,)).gain for name, index in members.items()}
+        order = sorted(members, key=lambda name: -alone[name])
+        chosen: list[str] = []
+        best: Gain | None = None
+        for name in order:
+            trial = [*chosen, name]
+            index = np.concatenate([members[m] for m in trial])
+            zones = dict.fromkeys(z for m in trial for z in m.split(PAIR))
+            found = self._gain(effect, index, tuple(zones), choice * len(trial))
+            if best is None or found.gain > best.gain:
+                chosen, best = trial, found
+        if best is None:
+            raise ValueError(f"{effect}: expected at least one zone")
         return best
 
     def _gain(
@@ -222,11 +228,9 @@ class Screening:
         direction = np.zeros(len(self.parameters))
         direction[index] = x
         strengths = {self.parameters[i].name: float(v) for i, v in zip(index, x, strict=True)}
-        raw = float(direction**2 @ self._raw)
-        kept = float(direction @ self.gram @ direction) / raw if raw > 0 else 0.0
-        if not raw:
-            size = self._raw[index]
-            kept = float(np.sum(np.diag(self.gram)[index]) / size.sum()) if size.sum() > 0 else 0.0
+        along = direction if np.any(direction) else np.isin(np.arange(len(direction)), index).astype(float)
+        whole = float(along @ self._whole @ along)
+        kept = float(along @ self.gram @ along) / whole if whole > 0.0 else 0.0
         return Gain(effect, zones, gain - choice, share, strengths, kept, direction)
 
     def _solve(self, index: IntArray, tightness: float = 1.0) -> tuple[FloatArray, float, float]:

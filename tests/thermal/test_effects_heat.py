@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pvlib import irradiance, solarposition
 
 from thermal import Case, SymbolicModel, ThermalNetwork, build_network
-from thermal.effects import CATALOGUE, chosen
+from thermal.effects import CATALOGUE, PAIR, chosen
 from thermal.signals import Drivers, incidence_modifier, signal_values
 from thermal.units import air_density
 
@@ -360,8 +360,10 @@ def test_water_that_evaporates(lively_case: CaseOf) -> None:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_air_between_zones(lively_case: CaseOf, kind: str) -> None:
-    b = bench(lively_case(kind), "zone_mixing", door_airflow=0.1, occupied_door_airflow=0.05)
     pairs = {"plan": (("A", "B"), ("C", "D")), "table": (("A", "B"),)}[kind]
+    flows = {"door_airflow": 0.1, "occupied_door_airflow": 0.05}
+    values = {f"{name}@{PAIR.join(pair)}": v for name, v in flows.items() for pair in pairs}
+    b = bench(lively_case(kind), "zone_mixing", **values)
     heat = b.heat()
     assert heat.sum() == pytest.approx(0.0, abs=1e-9)  # what one zone gives, the other receives
     assert set(b.network.kind[np.abs(heat) > 1e-9]) == {"air"}

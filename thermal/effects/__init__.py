@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 
 from thermal.effects._air import INFILTRATION, THERMAL_BRIDGE, WINDOW_OPENING, ZONE_MIXING
-from thermal.effects._effect import CONSTANT, Chosen, Effect, Joining, shape, strength
+from thermal.effects._effect import CONSTANT, PAIR, Chosen, Effect, Joining, shape, strength
 from thermal.effects._metering import CAPACITY_LIMIT, DUCT_LOSS, FLOW_GAIN, SENSOR_BIAS, SENSOR_LAG, VALVE_LEAK
 from thermal.effects._next_door import GROUND_EXCHANGE, HIDDEN_MASS, INTERFLOOR_EXCHANGE, NEIGHBOUR, ROOF_EXCHANGE
 from thermal.effects._outside import LONGWAVE_SKY, WIND_FILM
@@ -56,4 +56,15 @@ def chosen(effects: Iterable[str] | Mapping[str, Sequence[str]]) -> tuple[Chosen
     return tuple(Chosen(e, tuple(zones[e.id])) for e in CATALOGUE.values() if e.id in zones)
 
 
-__all__ = ["CATALOGUE", "CONSTANT", "Chosen", "Effect", "Joining", "catalogue_table", "chosen", "shape", "strength"]
+__all__ = [
+    "CATALOGUE",
+    "CONSTANT",
+    "PAIR",
+    "Chosen",
+    "Effect",
+    "Joining",
+    "catalogue_table",
+    "chosen",
+    "shape",
+    "strength",
+]

@@ -8,7 +8,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal.effects._effect import Effect, Joining, paired, strength
+from thermal.effects._effect import PAIR, Effect, Joining, paired, strength
 from thermal.network import Anatomy, Room
 from thermal.signals import WIND, Drivers, Signal
 
@@ -90,13 +90,14 @@ def _build_opening(join: Joining) -> None:
 
 
 def _build_mixing(join: Joining) -> None:
-    constant, scheduled = join.parameter("door_airflow"), join.parameter("occupied_door_airflow")
-    heat = join.anatomy.air_heat_capacity
+    heat, inside = join.anatomy.air_heat_capacity, {room.name for room in join.rooms}
     for first, second in join.anatomy.partitions:
-        a, b = join.anatomy.rooms[first], join.anatomy.rooms[second]
+        if not {first, second} <= inside:
+            continue
+        a, b, pair = join.anatomy.rooms[first], join.anatomy.rooms[second], f"{first}{PAIR}{second}"
+        constant, scheduled = (join.parameter(n, zone=pair) for n in ("door_airflow", "occupied_door_airflow"))
         near, far, share = paired((a.air, a.share), (b.air, b.share))
-        pair = f"{first}-{second}"
-        join.graph.face("zone_mixing", constant + _PRESENCE * scheduled, near, far, heat * share)
+        join.graph.face(f"zone_mixing {pair}", constant + _PRESENCE * scheduled, near, far, heat * share)
         signal = Signal(f"presence and difference {pair}", "K", partial(_by_presence, first=first, second=second))
         join.heat_air(a, scheduled, signal, heat)
         join.heat_air(b, scheduled, signal, -heat)
@@ -168,5 +169,6 @@ ZONE_MIXING = Effect(
         strength("occupied_door_airflow", "m^3/s", 0.3, "doors open while people are there", "zone_mixing"),
     ),
     build=_build_mixing,
+    zonal=True,
     applies=_no_partitions,
 )

@@ -22,6 +22,10 @@ _Part = tuple[IntArray, FloatArray]
 Builder = Callable[["Joining"], None]
 
 
+#: Between the names of two zones, where a strength belongs to both.
+PAIR = " + "
+
+
 @dataclass(frozen=True)
 class Effect:
     """An effect that a building may have and the baseline does not.
