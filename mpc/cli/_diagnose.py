@@ -54,19 +54,12 @@ def diagnose(
     if json:
         write_json(result.to_dict())
         return 0
-    show_diagnosis(result)
+    _show(result)
     say(f"Report: {report}")
     return 0
 
 
-def show_diagnosis(result: Diagnosis) -> None:
-    """Write what a diagnosis found to stdout.
-
-    Parameters
-    ----------
-    result : Diagnosis
-        From `calibration.diagnosis.diagnose`.
-    """
+def _show(result: Diagnosis) -> None:
     from calibration.diagnosis import called, diagnosis_verdict, in_zones
 
     say(diagnosis_verdict(result))

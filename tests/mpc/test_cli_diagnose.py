@@ -37,11 +37,11 @@ def test_diagnose_writes_what_it_says(tmp_path: Path) -> None:
 
 def test_the_terminal_has_verdict_suspects_and_how_far(capsys: pytest.CaptureFixture[str]) -> None:
     from calibration.diagnosis import diagnose, diagnosis_verdict
-    from mpc.cli._diagnose import show_diagnosis
+    from mpc.cli._diagnose import _show
     from thermal import load_bundled_case
 
     result = diagnose(load_bundled_case(), dx=2.0)
-    show_diagnosis(result)
+    _show(result)
     text = capsys.readouterr().out
     assert text.startswith(diagnosis_verdict(result)) and result.where.sentence in text
     for s in result.verdict.suspects[:5]:
