@@ -246,7 +246,7 @@ class Bench:
         return best
 
     def predictions(
-        self, fit: Fit, intervals: Sequence[Interval] = (), trajectories: bool = False
+        self, fit: Fit, intervals: Sequence[Interval] = (), trajectories: bool = False, horizon: str | None = None
     ) -> list[Predictions]:
         """Hourly N-step predictions of a fitted model, one entry an interval.
 
@@ -258,10 +258,12 @@ class Bench:
             Where the targets lie; held out by default.
         trajectories : bool
             Keep every step.
+        horizon : str, optional
+            The bench's own by default.
         """
         s = self.settings
         found = evaluate_model(
-            fit.model, fit.theta, fit.built.inputs, intervals or self.judged, self.horizon,
+            fit.model, fit.theta, fit.built.inputs, intervals or self.judged, horizon or self.horizon,
             trajectories=trajectories, scheme=s.stepping, spin_up_seconds=s.spin_up_seconds,
         )  # fmt: skip
         return list(found.predictions)

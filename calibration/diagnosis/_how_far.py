@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from calibration.diagnosis._bench import Bench, Built, Fit
 from calibration.diagnosis._generic import GENERIC
 from calibration.diagnosis._search import Refit, Round
+from calibration.errors import HorizonError, NotEnoughDataError
 from thermal import Inputs, reduced_model
 from thermal.effects import Chosen
 
@@ -19,6 +21,9 @@ FloatArray = NDArray[np.float64]
 
 #: Resamples of days for intervals, and the share of them that an interval holds [-].
 _RESAMPLES, _LEVEL = 1000, 0.9
+
+#: Horizon at which missing heat is hardly felt yet.
+_SOON = pd.Timedelta("1h")
 
 #: Evaluations of the fit of a placebo.
 _EVALUATIONS = 6
@@ -30,12 +35,15 @@ class Errors:
 
     Parameters
     ----------
+    days : ndarray of int, shape (n_day,)
+        Midnights, as numbers that grow with time [-].
     daily : ndarray, shape (n_day,)
         Mean over runs and zones of their size, by day [K].
     weight : ndarray, shape (n_day,)
         Number of runs of each day.
     """
 
+    days: NDArray[np.int64]
     daily: FloatArray
     weight: FloatArray
 
@@ -117,7 +125,7 @@ def how_far(bench: Bench, rounds: Sequence[Round]) -> tuple[tuple[Step, ...], fl
     return tuple(steps), floor.mae
 
 
-def held_out(bench: Bench, fit: Fit) -> Errors:
+def held_out(bench: Bench, fit: Fit, horizon: str | None = None) -> Errors:
     """Held-out errors of a fitted model, by day.
 
     Parameters
@@ -126,24 +134,27 @@ def held_out(bench: Bench, fit: Fit) -> Errors:
         The case.
     fit : Fit
         The model.
+    horizon : str, optional
+        The bench's own by default.
     """
     size, day = [], []
-    for p in bench.predictions(fit):
+    for p in bench.predictions(fit, horizon=horizon):
         step = pd.Timedelta(seconds=fit.built.inputs.step)
         size.append(np.nanmean(np.abs(p.error), axis=1))
         day.append((p.start + int(p.steps[-1]) * step).normalize().asi8)
     sizes, days = np.concatenate(size), np.concatenate(day)
     known = np.isfinite(sizes)
-    _, index = np.unique(days[known], return_inverse=True)
+    there, index = np.unique(days[known], return_inverse=True)
     weight = np.bincount(index).astype(float)
-    return Errors(np.bincount(index, sizes[known]) / weight, weight)
+    return Errors(there, np.bincount(index, sizes[known]) / weight, weight)
 
 
 def floor_of(bench: Bench, last: Round) -> Errors:
-    """Held-out errors with generic heat added to the last model: zone by zone, by time of day and outdoor temperature.
+    """Held-out errors below which nothing regular that is missing would take the last model.
 
-    Its strengths come from the tuning intervals, so nothing held out is in it. Where it only adds noise, the floor is
-    the model itself.
+    The least of three: the model's own; those with generic heat added, zone by zone, by time of day and outdoor
+    temperature, its strengths from the tuning intervals; and those one hour ahead, for what is missing steadily takes
+    hours to be felt, while sensors' noise and random heat are felt at once.
 
     Parameters
     ----------
@@ -152,16 +163,18 @@ def floor_of(bench: Bench, last: Round) -> Errors:
     last : Round
         The last of the search.
     """
-    own = held_out(bench, last.before)
-    if last.generic.gain <= 0.0:
-        return own
-    built = bench.build(last.before.effects, (Chosen(GENERIC),))
-    theta = built.theta({**last.before.values, **last.screening.promised(last.generic)})
-    problem = bench.problem(built, theta)
-    fit = replace(last.before, built=built, problem=problem, model=reduced_model(built.grid, [theta]))
-    found = replace(last.before.found, point=problem.point(theta))
-    errors = held_out(bench, replace(fit, found=found))
-    return errors if errors.mae < own.mae else own
+    final = last.accepted.fit if last.accepted is not None else last.before
+    found = [held_out(bench, final)]
+    if _SOON < pd.Timedelta(bench.horizon):
+        with suppress(HorizonError, NotEnoughDataError):  # an hour may be no multiple of the step
+            found.append(held_out(bench, final, "1h"))
+    if last.accepted is None and last.generic.gain > 0.0:
+        built = bench.build(final.effects, (Chosen(GENERIC),))
+        theta = built.theta({**final.values, **last.screening.promised(last.generic)})
+        problem = bench.problem(built, theta)
+        fit = replace(final, built=built, problem=problem, model=reduced_model(built.grid, [theta]))
+        found.append(held_out(bench, replace(fit, found=replace(final.found, point=problem.point(theta)))))
+    return min(found, key=lambda e: e.mae)
 
 
 def on_bound(fit: Fit) -> tuple[str, ...]:
@@ -180,10 +193,10 @@ def on_bound(fit: Fit) -> tuple[str, ...]:
 
 def _closed(before: Errors, after: Errors, floor: Errors) -> tuple[float | None, tuple[float, float] | None]:
     """Share of the gap that is closed with its interval; None where the gap is within two standard errors."""
-    rng = np.random.default_rng(0)
-    drawn = rng.integers(before.daily.size, size=(_RESAMPLES, before.daily.size))
-    weight = before.weight[drawn]
-    means = [(e.daily[drawn] * weight).sum(axis=1) / weight.sum(axis=1) for e in (before, after, floor)]
+    common = np.intersect1d(np.intersect1d(before.days, after.days), floor.days)
+    parts = [(e.daily[np.isin(e.days, common)], e.weight[np.isin(e.days, common)]) for e in (before, after, floor)]
+    drawn = np.random.default_rng(0).integers(common.size, size=(_RESAMPLES, common.size))
+    means = [(daily[drawn] * weight[drawn]).sum(axis=1) / weight[drawn].sum(axis=1) for daily, weight in parts]
     gap = means[0] - means[2]
     if before.mae - floor.mae < 2.0 * float(gap.std()) or before.mae <= floor.mae:
         return None, None
