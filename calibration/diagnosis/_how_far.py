@@ -119,7 +119,7 @@ def how_far(bench: Bench, rounds: Sequence[Round]) -> tuple[tuple[Step, ...], fl
                 interval,
                 _shuffled(bench, r, r.accepted),
                 runner,
-                on_bound(r.accepted.fit),
+                _on_bound(r.accepted.fit),
             )
         )
     return tuple(steps), floor.mae
@@ -177,14 +177,8 @@ def floor_of(bench: Bench, last: Round) -> Errors:
     return min(found, key=lambda e: e.mae)
 
 
-def on_bound(fit: Fit) -> tuple[str, ...]:
-    """Baseline parameters that lie on a bound of their range.
-
-    Parameters
-    ----------
-    fit : Fit
-        A fitted model.
-    """
+def _on_bound(fit: Fit) -> tuple[str, ...]:
+    """Baseline parameters that lie on a bound of their range."""
     lower, upper = fit.problem.bounds
     close = np.minimum(fit.found.point - lower, upper - fit.found.point) < 0.01 * (upper - lower)
     names = ((p.name, p.effect) for p in fit.problem.parameters)

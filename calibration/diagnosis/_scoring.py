@@ -170,14 +170,8 @@ class Rate:
         return {"hits": self.hits, "of": self.of, "share": self.share, "interval": list(self.interval)}
 
 
-def rate(hits: Iterable[bool]) -> Rate:
-    """Count trials.
-
-    Parameters
-    ----------
-    hits : iterable of bool
-        Whether each has it.
-    """
+def _rate(hits: Iterable[bool]) -> Rate:
+    """Count trials."""
     seen = [bool(h) for h in hits]
     return Rate(sum(seen), len(seen))
 
@@ -203,18 +197,18 @@ def score(trials: Sequence[Trial]) -> dict[str, Any]:
     inside = [*singles, *pairs]
     hidden = [t for t in trials if not t.counted]
     rates = {
-        "nulls named": rate(t.named for t in nulls),
-        "nulls unexplained": rate(t.answer["verdict"] == "unexplained" for t in nulls),
-        "right first": rate(t.right_first for t in singles),
-        "right group": rate(t.right_group for t in singles),
-        "right in the first three": rate(t.holds(t.ranked(3)) for t in singles),
-        "named right": rate(t.named and t.right_group for t in singles),
-        "abstained": rate(not t.named for t in singles),
-        "wrong name, of all trials": rate(t.wrong_name for t in trials),
-        "outside called unexplained": rate(_outside_right(t) for t in outside),
-        "both of a pair in the first two": rate(_both(t) for t in pairs),
-        "90 % set covers": rate(t.covered for t in inside if t.named),
-        "right zones": rate(_zones(t) for t in singles if t.named and t.right_first and t.zones),
+        "nulls named": _rate(t.named for t in nulls),
+        "nulls unexplained": _rate(t.answer["verdict"] == "unexplained" for t in nulls),
+        "right first": _rate(t.right_first for t in singles),
+        "right group": _rate(t.right_group for t in singles),
+        "right in the first three": _rate(t.holds(t.ranked(3)) for t in singles),
+        "named right": _rate(t.named and t.right_group for t in singles),
+        "abstained": _rate(not t.named for t in singles),
+        "wrong name, of all trials": _rate(t.wrong_name for t in trials),
+        "outside called unexplained": _rate(_outside_right(t) for t in outside),
+        "both of a pair in the first two": _rate(_both(t) for t in pairs),
+        "90 % set covers": _rate(t.covered for t in inside if t.named),
+        "right zones": _rate(_zones(t) for t in singles if t.named and t.right_first and t.zones),
     }
     closed = [t.answer["how_far"][-1]["share_closed"] for t in inside if t.named and t.answer["how_far"]]
     known = [c for c in closed if c is not None]
@@ -253,10 +247,10 @@ def _zones(t: Trial) -> bool:
 def _row(trials: Sequence[Trial]) -> dict[str, Any]:
     return {
         "trials": len(trials),
-        "right first": rate(t.right_first for t in trials).share,
-        "right group": rate(t.right_group for t in trials).share,
-        "abstained": rate(not t.named for t in trials).share,
-        "wrong name": rate(t.wrong_name for t in trials).share,
+        "right first": _rate(t.right_first for t in trials).share,
+        "right group": _rate(t.right_group for t in trials).share,
+        "abstained": _rate(not t.named for t in trials).share,
+        "wrong name": _rate(t.wrong_name for t in trials).share,
     }
 
 
