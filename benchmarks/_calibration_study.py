@@ -25,9 +25,9 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from _code import code
 from _paper_search import EVALUATIONS, RANGES, Search, bayesian_search, sobol_search, theta, values
 from numpy.typing import NDArray
-from parameter_recovery import code
 
 from calibration import (
     CalibrationResult,

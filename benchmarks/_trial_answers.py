@@ -12,9 +12,9 @@ from concurrent.futures import ThreadPoolExecutor, as_completed
 from pathlib import Path
 from typing import Any
 
+from _code import code
 from _table import ROOT, markdown, replace_section, write
 from energyplus_trials.drawing import draw_spec
-from parameter_recovery import code
 
 from calibration.diagnosis import Trial, score, trial_of
 

@@ -24,7 +24,6 @@ where it was. A seed that fails is a line too, named in the table, and tried aga
 from __future__ import annotations
 
 import argparse
-import hashlib
 import json
 import os
 import tempfile
@@ -33,16 +32,14 @@ import traceback
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import asdict, dataclass
-from functools import cache
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any, Literal
 
+from _code import code
 from _recovery_tables import report
 from _table import ROOT, replace_section, write
 
-import calibration
-import thermal
 from calibration import CalibrationResult, ParameterEstimate, calibrate, evaluate_case
 from thermal import Building, Case, Parameter, load_case
 from thermal.pilot import MOUNTAIN_VIEW, Excitation, Meter, TwinTruth, devices, generate_office, generate_twin
@@ -146,16 +143,6 @@ def true_error(case: Case, truth: TwinTruth, result: CalibrationResult, dx: floa
         path = Path(folder) / "truth.json"
         path.write_text(json.dumps({"parameters": truth.to_dict()["parameters"]}), encoding="utf-8")
         return evaluate_case(case, result.held_out, parameters=path, horizon=result.horizon, dx=dx).metrics.mae
-
-
-@cache
-def code() -> str:
-    """Digest of the library's sources: lines of different code do not belong into one table."""
-    digest = hashlib.sha256()
-    for package in (thermal, calibration):
-        for path in sorted(Path(str(package.__file__)).parent.rglob("*.py")):
-            digest.update(path.read_bytes())
-    return digest.hexdigest()[:12]
 
 
 def read_lines(path: Path, study: Study) -> dict[int, dict[str, Any]]:

@@ -28,6 +28,8 @@ def trials(package: Callable[[str], ModuleType]) -> Callable[[str], ModuleType]:
 @pytest.fixture(scope="module")
 def command(trials, script: Callable[[str], ModuleType]) -> ModuleType:
     trials("trial")
+    for name in ("_table", "_code", "_trial_answers"):
+        script(name)
     return script("blind_trials")
 
 

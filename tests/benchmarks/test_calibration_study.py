@@ -27,7 +27,7 @@ SCRIPTS = Path(__file__).parents[2] / "benchmarks"
 
 @pytest.fixture(scope="module")
 def study(script: Callable[[str], ModuleType]) -> ModuleType:
-    for name in ("_table", "_coverage", "_recovery_tables", "parameter_recovery", "_paper_search"):
+    for name in ("_table", "_code", "_coverage", "_recovery_tables", "parameter_recovery", "_paper_search"):
         script(name)
     return script("_calibration_study")
 

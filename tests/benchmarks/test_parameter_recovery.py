@@ -21,7 +21,7 @@ Lines = Callable[..., list[dict[str, Any]]]
 
 @pytest.fixture(scope="module")
 def recovery(script: Callable[[str], ModuleType]) -> ModuleType:
-    for name in ("_table", "_coverage", "_recovery_tables"):
+    for name in ("_table", "_code", "_coverage", "_recovery_tables"):
         script(name)
     return script("parameter_recovery")
 
