@@ -158,6 +158,8 @@ def group_of(r: Round, effect: str) -> tuple[str, ...]:
     gains = _gains(r)
     own = next((g for g in r.gains if g.effect == effect), None)
     alike = [effect]
+    if gains[effect] <= ACCEPTED:  # what hardly gains is not there, whatever else looks like it
+        return (effect,)
     for g in r.gains:
         if g.effect == effect:
             continue

@@ -19,6 +19,9 @@ _CALLED = {"hidden_mass": "mass that stores heat"}
 #: Probability from which an effect is said to be left out, rather than perhaps [-].
 _LIKELY = 0.5
 
+#: Sizes that a group may have, spelled.
+_COUNTS = {1: "one", 2: "two", 3: "three", 4: "four"}
+
 #: More zones than this are counted, not named.
 _MOST_NAMED = 4
 
@@ -40,11 +43,11 @@ def diagnosis_verdict(result: Diagnosis) -> str:
         first, *others = found
         members = [suspect(result, e) for e in alike(result, first.screened.effect)]
         named = listed([f"{called(s.effect)} ({sure(s.probability)})" for s in members], "or")
-        text = f"The model leaves out one of {len(members)} things that these data cannot tell apart: {named}."
+        text = f"The model leaves out one of {_COUNTS[len(members)]} things that these data cannot tell apart: {named}."
         if others:
-            text += f" It also leaves out {listed([_found(result, r) for r in others])}."
+            text += f" {_named(result, others, 'Besides, it leaves out', 'Perhaps it also leaves out')}"
     else:
-        text = _named(result, found)
+        text = _named(result, found, "The model leaves out", "Most likely the model leaves out")
     return f"{text} {_how_far(result, len(found))}"
 
 
@@ -175,15 +178,13 @@ def ahead(result: Diagnosis) -> str:
     return f"{duration(problem.steps * problem.inputs.step)} ahead"
 
 
-def _named(result: Diagnosis, found: Sequence[Refit]) -> str:
+def _named(result: Diagnosis, found: Sequence[Refit], begin: str, doubt: str) -> str:
     """Name effects: those more likely there than not, and what may be there besides."""
     likely = [r for r in found if suspect(result, r.screened.effect).probability >= _LIKELY]
     rest = [r for r in found if r not in likely]
     if not likely:
-        likely, rest = rest[:1], rest[1:]
-        text = f"Most likely the model leaves out {_found(result, likely[0])}"
-    else:
-        text = f"The model leaves out {listed([_found(result, r) for r in likely])}"
+        begin, likely, rest = doubt, rest[:1], rest[1:]
+    text = f"{begin} {listed([_found(result, r) for r in likely])}"
     return text + (f", and perhaps {listed([_found(result, r) for r in rest])}." if rest else ".")
 
 
