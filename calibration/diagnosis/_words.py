@@ -43,7 +43,8 @@ def diagnosis_verdict(result: Diagnosis) -> str:
         first, *others = found
         members = [suspect(result, e) for e in alike(result, first.screened.effect)]
         named = listed([f"{called(s.effect)} ({sure(s.probability)})" for s in members], "or")
-        text = f"The model leaves out one of {_COUNTS.get(len(members), len(members))} things that these data cannot tell apart: {named}."
+        count = _COUNTS.get(len(members), str(len(members)))
+        text = f"The model leaves out one of {count} things that these data cannot tell apart: {named}."
         if others:
             text += f" {_named(result, others, 'Besides, it leaves out', 'Perhaps it also leaves out')}"
     else:
