@@ -107,7 +107,6 @@ def estimate(
     progress: Progress | None = None,
     model: ReducedModel | None = None,
     tuner: Tuner | None = None,
-    most_rounds: int = ROUNDS,
 ) -> Estimate:
     """Solve the problem from one start.
 
@@ -129,8 +128,6 @@ def estimate(
         Finds the disturbance model that standard errors follow, and weights where it finds the errors worth less than
         one a day and zone. It never makes them worth more: disturbances of zones are independent, while what a model
         lacks is common to them, and priors must hold against it.
-    most_rounds : int
-        Most rounds.
 
     Returns
     -------
@@ -139,10 +136,10 @@ def estimate(
     """
     rounds = _Rounds(problem, model or reduced_model(problem.grid, [problem.theta(z)]), tuner)
     rounds.whiten(problem.theta(z))
-    for number in range(most_rounds):
+    for number in range(ROUNDS):
         z = rounds.solve(z, 1e-2 if number == 0 else 1e-3)
         if progress is not None:
-            progress("calibrate", number + 1, most_rounds)
+            progress("calibrate", number + 1, ROUNDS)
         if rounds.interrupted or (rounds.next_round(z, number) and number):
             break
     return rounds.result(z)

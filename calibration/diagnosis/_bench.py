@@ -30,10 +30,12 @@ Effects = Mapping[str, Sequence[str]]
 #: Share of its plausible range that the strength of an effect has where a basis is made and a fit begins [-].
 TYPICAL = 0.25
 
-
 #: Evaluations of a fit, and of what follows when its model had to be reduced anew: models are compared by what they
 #: explain, which the last digits of θ do not change.
 EVALUATIONS, _AFTER = 14, 4
+
+#: Parameters on the linear scale that are no strength: they act on one.
+_SHIFTS = ("internal_gain_delay",)
 
 
 @dataclass(frozen=True)
@@ -83,11 +85,7 @@ def is_strength(name: str, effect: str | None) -> bool:
         return False
     kinds = {p.name: p for p in CATALOGUE[effect].parameters} if effect in CATALOGUE else {}
     kind = kinds.get(name.partition("@")[0])
-    return kind is None or (kind.scale == "linear" and kind.start == 0.0 and kind.name not in SHIFTS)
-
-
-#: Parameters on the linear scale that are no strength: they act on one.
-SHIFTS = ("internal_gain_delay",)
+    return kind is None or (kind.scale == "linear" and kind.start == 0.0 and kind.name not in _SHIFTS)
 
 
 @dataclass(frozen=True)
@@ -245,25 +243,19 @@ class Bench:
             raise ValueError("fit: expected at least one start")
         return best
 
-    def predictions(
-        self, fit: Fit, intervals: Sequence[Interval] = (), trajectories: bool = False, horizon: str | None = None
-    ) -> list[Predictions]:
-        """Hourly N-step predictions of a fitted model, one entry an interval.
+    def predictions(self, fit: Fit, horizon: str | None = None) -> list[Predictions]:
+        """Hourly N-step predictions of a fitted model on the held-out intervals, one entry an interval.
 
         Parameters
         ----------
         fit : Fit
             The model.
-        intervals : sequence of Interval
-            Where the targets lie; held out by default.
-        trajectories : bool
-            Keep every step.
         horizon : str, optional
             The bench's own by default.
         """
         s = self.settings
         found = evaluate_model(
-            fit.model, fit.theta, fit.built.inputs, intervals or self.judged, horizon or self.horizon,
-            trajectories=trajectories, scheme=s.stepping, spin_up_seconds=s.spin_up_seconds,
+            fit.model, fit.theta, fit.built.inputs, self.judged, horizon or self.horizon,
+            scheme=s.stepping, spin_up_seconds=s.spin_up_seconds,
         )  # fmt: skip
         return list(found.predictions)

@@ -12,7 +12,7 @@ from calibration._evaluate import Progress
 from calibration._intervals import Interval
 from calibration._settings import ModelSettings
 from calibration.diagnosis._bench import Bench, Fit
-from calibration.diagnosis._how_far import Errors, Step, floor_of, held_out, how_far
+from calibration.diagnosis._how_far import Step, how_far
 from calibration.diagnosis._levels import p_value
 from calibration.diagnosis._search import ACCEPTED, Round, search
 from calibration.diagnosis._verdict import Verdict, judge
@@ -84,7 +84,7 @@ class Diagnosis:
     @property
     def final(self) -> Fit:
         """Model with all accepted effects."""
-        return self.rounds[-1].accepted.fit if self.rounds[-1].accepted else self.rounds[-1].before
+        return self.rounds[-1].after
 
     @property
     def subsystem(self) -> str:
@@ -175,17 +175,16 @@ def diagnose(
     baseline = bench.fit({}, [{}])
     where = where_it_lies(bench, baseline)
     rounds = search(bench, baseline, [e for e in CATALOGUE if e not in untestable], progress)
-    steps, floor = how_far(bench, rounds)
+    steps, gap, floor = how_far(bench, rounds)
     areas = {name: room.floor_area for name, room in bench.anatomy.rooms.items()}
     watts = rounds[0].screening.detectable(ACCEPTED)
-    gap: Errors = held_out(bench, baseline)
     return Diagnosis(
         case=case.building.name,
         verdict=judge(rounds, untestable),
         where=where,
         steps=steps,
-        gap=gap.mae,
-        floor=floor if steps else floor_of(bench, rounds[-1]).mae,
+        gap=gap,
+        floor=floor,
         p_value=p_value(max((r.gain for r in rounds[0].refits), default=rounds[0].gains[0].gain)),
         detectable={zone: w * areas[zone] for zone, w in watts.items()},
         rounds=rounds,

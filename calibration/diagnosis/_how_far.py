@@ -30,7 +30,7 @@ _EVALUATIONS = 6
 
 
 @dataclass(frozen=True)
-class Errors:
+class _Errors:
     """Held-out errors of the six-hour predictions of one model.
 
     Parameters
@@ -86,8 +86,8 @@ class Step:
     bounds: tuple[str, ...]
 
 
-def how_far(bench: Bench, rounds: Sequence[Round]) -> tuple[tuple[Step, ...], float]:
-    """Measure what each accepted effect closes of the gap, and the floor under it [K].
+def how_far(bench: Bench, rounds: Sequence[Round]) -> tuple[tuple[Step, ...], float, float]:
+    """Measure what each accepted effect closes of the gap.
 
     Parameters
     ----------
@@ -95,18 +95,21 @@ def how_far(bench: Bench, rounds: Sequence[Round]) -> tuple[tuple[Step, ...], fl
         The case.
     rounds : sequence of Round
         Of the search.
+
+    Returns
+    -------
+    tuple
+        The steps, the held-out error of the calibrated baseline, and the floor under it [K].
     """
-    baseline = rounds[0].before
-    before = held_out(bench, baseline)
-    last = rounds[-1]
-    floor = floor_of(bench, last)
+    before = _held_out(bench, rounds[0].before)
+    floor = _floor_of(bench, rounds[-1])
     steps = []
     for r in rounds:
         if r.accepted is None:
             break
-        after = held_out(bench, r.accepted.fit)
+        after = _held_out(bench, r.accepted.fit)
         others = [x for x in r.refits if x is not r.accepted]
-        runner = held_out(bench, others[0].fit).mae if others else None
+        runner = _held_out(bench, others[0].fit).mae if others else None
         share, interval = _closed(before, after, floor)
         effects = tuple(r.accepted.fit.effects)
         steps.append(
@@ -122,10 +125,10 @@ def how_far(bench: Bench, rounds: Sequence[Round]) -> tuple[tuple[Step, ...], fl
                 _on_bound(r.accepted.fit),
             )
         )
-    return tuple(steps), floor.mae
+    return tuple(steps), before.mae, floor.mae
 
 
-def held_out(bench: Bench, fit: Fit, horizon: str | None = None) -> Errors:
+def _held_out(bench: Bench, fit: Fit, horizon: str | None = None) -> _Errors:
     """Held-out errors of a fitted model, by day.
 
     Parameters
@@ -146,10 +149,10 @@ def held_out(bench: Bench, fit: Fit, horizon: str | None = None) -> Errors:
     known = np.isfinite(sizes)
     there, index = np.unique(days[known], return_inverse=True)
     weight = np.bincount(index).astype(float)
-    return Errors(there, np.bincount(index, sizes[known]) / weight, weight)
+    return _Errors(there, np.bincount(index, sizes[known]) / weight, weight)
 
 
-def floor_of(bench: Bench, last: Round) -> Errors:
+def _floor_of(bench: Bench, last: Round) -> _Errors:
     """Held-out errors below which nothing regular that is missing would take the last model.
 
     The least of three: the model's own; those with generic heat added, zone by zone, by time of day and outdoor
@@ -163,17 +166,17 @@ def floor_of(bench: Bench, last: Round) -> Errors:
     last : Round
         The last of the search.
     """
-    final = last.accepted.fit if last.accepted is not None else last.before
-    found = [held_out(bench, final)]
+    final = last.after
+    found = [_held_out(bench, final)]
     if _SOON < pd.Timedelta(bench.horizon):
         with suppress(HorizonError, NotEnoughDataError):  # an hour may be no multiple of the step
-            found.append(held_out(bench, final, "1h"))
+            found.append(_held_out(bench, final, "1h"))
     if last.accepted is None and last.generic.gain > 0.0:
         built = bench.build(final.effects, (Chosen(GENERIC),))
         theta = built.theta({**final.values, **last.screening.promised(last.generic)})
         problem = bench.problem(built, theta)
         fit = replace(final, built=built, problem=problem, model=reduced_model(built.grid, [theta]))
-        found.append(held_out(bench, replace(fit, found=replace(final.found, point=problem.point(theta)))))
+        found.append(_held_out(bench, replace(fit, found=replace(final.found, point=problem.point(theta)))))
     return min(found, key=lambda e: e.mae)
 
 
@@ -185,7 +188,7 @@ def _on_bound(fit: Fit) -> tuple[str, ...]:
     return tuple(name for (name, effect), c in zip(names, close, strict=True) if c and effect is None)
 
 
-def _closed(before: Errors, after: Errors, floor: Errors) -> tuple[float | None, tuple[float, float] | None]:
+def _closed(before: _Errors, after: _Errors, floor: _Errors) -> tuple[float | None, tuple[float, float] | None]:
     """Share of the gap that is closed with its interval; None where the gap is within two standard errors."""
     common = np.intersect1d(np.intersect1d(before.days, after.days), floor.days)
     parts = [(e.daily[np.isin(e.days, common)], e.weight[np.isin(e.days, common)]) for e in (before, after, floor)]
@@ -212,7 +215,7 @@ def _shuffled(bench: Bench, r: Round, accepted: Refit) -> float | None:
     permuted = Built(built.network, built.grid, _permuted(built.inputs, varying))
     start = {**fit.values}
     found = bench.fit(fit.effects, [start], permuted, _EVALUATIONS)
-    return held_out(bench, found).mae
+    return _held_out(bench, found).mae
 
 
 def _permuted(inputs: Inputs, columns: Sequence[int]) -> Inputs:

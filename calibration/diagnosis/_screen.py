@@ -71,14 +71,11 @@ class Screening:
         The model.
     candidates : sequence of str
         Effects to screen.
-    generic : bool
-        Also heat of any shape.
     """
 
-    def __init__(self, bench: Bench, fit: Fit, candidates: Sequence[str], generic: bool = True) -> None:
+    def __init__(self, bench: Bench, fit: Fit, candidates: Sequence[str]) -> None:
         lacking = {e: () for e in candidates if e not in fit.effects}
-        further = (Chosen(GENERIC),) if generic else ()
-        built = bench.build({**fit.effects, **lacking}, further)
+        built = bench.build({**fit.effects, **lacking}, (Chosen(GENERIC),))
         theta = built.theta(fit.values)
         model = reduced_model(built.grid, [theta, built.theta(fit.values, TYPICAL)])
         problem = bench.problem(built, theta)
@@ -109,7 +106,6 @@ class Screening:
         self.prior = prior
         self.lower = np.array([p.lower for p in self.parameters])
         self.upper = np.array([p.upper for p in self.parameters])
-        self.rooms = built.network.zones
 
     def of(self, effect: str) -> Gain:
         """Gain of one effect: over the building, or in the zones where it explains most.
@@ -145,17 +141,6 @@ class Screening:
             for p, v in zip(known, moved[self._known], strict=True)
         }
         return values | dict(gain.strengths)
-
-    def pair(self, first: Gain, second: Gain) -> float:
-        """Gain of two effects together [-].
-
-        Parameters
-        ----------
-        first, second : Gain
-            Of each alone.
-        """
-        index = np.array([i for g in (first, second) for i in np.flatnonzero(self._members(g))], dtype=np.int64)
-        return self._solve(index)[1]
 
     def cosine(self, first: Gain, second: Gain) -> float:
         """Cosine of the projected signatures of two effects at their estimates [-].
@@ -198,10 +183,6 @@ class Screening:
             [i for i, p in enumerate(self.parameters) if p.effect == effect and is_strength(p.name, effect)],
             dtype=np.int64,
         )
-
-    def _members(self, gain: Gain) -> NDArray[np.bool_]:
-        names = set(gain.strengths)
-        return np.array([p.name in names for p in self.parameters])
 
     def _grow(self, effect: str, members: Mapping[str, IntArray]) -> Gain:
         """Add zones, or pairs of them, as long as each more than pays for having been chosen among all."""

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from calibration._evaluate import Progress
 from calibration.diagnosis._bench import Bench, Fit
@@ -14,8 +13,6 @@ from calibration.diagnosis._screen import Gain, Screening, screen
 from calibration.errors import CalibrationError
 from thermal import ModelError
 from thermal.effects import CATALOGUE
-
-FloatArray = NDArray[np.float64]
 
 #: Most rounds, and most effects that a round fits anew.
 ROUNDS, MOST_REFITS = 6, 4
@@ -29,7 +26,7 @@ _EVALUATIONS = 6
 #: Least fall of the root mean square of the tuning errors by which an effect matters to predictions [K].
 MATTERS = 0.02
 
-#: Gain of the fit from which an effect is accepted [-]; set by null cases, see `calibration.diagnosis._levels`.
+#: Gain of the fit from which an effect is accepted [-]; null cases stay below, as with `calibration.diagnosis._levels`.
 ACCEPTED = 6.0
 
 
@@ -79,9 +76,14 @@ class Round:
     refits: tuple[Refit, ...]
     accepted: Refit | None
 
+    @property
+    def after(self) -> Fit:
+        """The model that it leaves: with what it accepted, or as it was."""
+        return self.before if self.accepted is None else self.accepted.fit
+
 
 def search(
-    bench: Bench, baseline: Fit, candidates: Sequence[str], progress: Progress | None = None, rounds: int = ROUNDS
+    bench: Bench, baseline: Fit, candidates: Sequence[str], progress: Progress | None = None
 ) -> tuple[Round, ...]:
     """Seek effects in rounds until none gains enough.
 
@@ -95,14 +97,12 @@ def search(
         Effects that the case can tell.
     progress : callable, optional
         Called with stage, done, total.
-    rounds : int
-        Most rounds.
     """
     done: list[Round] = []
     fit = baseline
-    for number in range(rounds):
+    for number in range(ROUNDS):
         if progress is not None:
-            progress("diagnose", number, rounds)
+            progress("diagnose", number, ROUNDS)
         open_ = [e for e in candidates if all(r in fit.effects for r in CATALOGUE[e].requires)]
         made, gains, generic = screen(bench, fit, open_)
         refits = _refits(bench, fit, made, gains)
@@ -112,19 +112,20 @@ def search(
             break
         fit = best.fit
     if progress is not None:
-        progress("diagnose", rounds, rounds)
+        progress("diagnose", ROUNDS, ROUNDS)
     return tuple(done)
 
 
 def _refits(bench: Bench, fit: Fit, made: Screening, gains: Sequence[Gain]) -> list[Refit]:
     """Fit the few best anew from where their tangents point; the very best also from the priors."""
     chosen = [g for g in gains if g.gain > max(LEAST_GAIN, LEAST_SHARE * gains[0].gain)][:MOST_REFITS]
+    accepted = {p.name: fit.values[p.name] for p in fit.built.network.parameters if p.effect is not None}
     found = []
     for g in chosen:
         effects = {**fit.effects, g.effect: g.zones}
         starts = [made.promised(g)]
         if g is chosen[0]:
-            starts.append({name: v for name, v in fit.values.items() if _of_effect(name, fit)} | dict(g.strengths))
+            starts.append(accepted | dict(g.strengths))
         try:
             anew = bench.fit(effects, starts, evaluations=_EVALUATIONS)
         except (ArithmeticError, np.linalg.LinAlgError, CalibrationError, ModelError):
@@ -137,8 +138,3 @@ def _refits(bench: Bench, fit: Fit, made: Screening, gains: Sequence[Gain]) -> l
 def _fall(before: Fit, after: Fit) -> float:
     """How far the root mean square of the tuning errors falls [K]."""
     return float(np.sqrt(before.found.mean_square) - np.sqrt(after.found.mean_square))
-
-
-def _of_effect(name: str, fit: Fit) -> bool:
-    parameter = next(p for p in fit.built.network.parameters if p.name == name)
-    return parameter.effect is not None

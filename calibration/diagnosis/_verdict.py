@@ -174,8 +174,7 @@ def group_of(r: Round, effect: str) -> tuple[str, ...]:
 
 
 def _name(rounds: Sequence[Round]) -> VerdictName:
-    first, last = rounds[0], rounds[-1]
-    final = last.accepted.fit if last.accepted is not None else last.before
+    first, final = rounds[0], rounds[-1].after
     explained = 1.0 - final.found.mean_square / first.before.found.mean_square
     if first.accepted is not None and explained >= EXPLAINED:
         size = len(group_of(first, first.accepted.screened.effect))

@@ -8,7 +8,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal.effects._effect import PAIR, Effect, Joining, paired, strength
+from thermal.effects._effect import PAIR, Effect, Joining, paired, strength, without_facades
 from thermal.network import Anatomy, Room
 from thermal.signals import WIND, Drivers, Signal
 
@@ -103,10 +103,6 @@ def _build_mixing(join: Joining) -> None:
         join.heat_air(b, scheduled, signal, -heat)
 
 
-def _no_facades(anatomy: Anatomy) -> str | None:
-    return None if anatomy.facades else "the building has no exterior walls"
-
-
 def _no_partitions(anatomy: Anatomy) -> str | None:
     return None if anatomy.partitions else "no two zones share a partition"
 
@@ -125,7 +121,7 @@ INFILTRATION = Effect(
         strength("infiltration_by_stack", "1/h/K^0.5", 0.15, _SHERMAN, "infiltration"),
     ),
     build=_build_infiltration,
-    applies=_no_facades,
+    applies=without_facades,
 )
 
 THERMAL_BRIDGE = Effect(
@@ -140,7 +136,7 @@ THERMAL_BRIDGE = Effect(
         strength("thermal_bridge_u_value", "W/m^2/K", 1.0, "ISO 14683:2017: up to 1 W/m/K an edge", "thermal_bridge"),
     ),
     build=_build_bridge,
-    applies=_no_facades,
+    applies=without_facades,
 )
 
 WINDOW_OPENING = Effect(
@@ -153,7 +149,7 @@ WINDOW_OPENING = Effect(
     separated_by="window contacts; mild and cold days",
     parameters=(strength("window_opening_rate", "1/h", 6.0, "single-sided ventilation: CIBSE AM10", "window_opening"),),
     build=_build_opening,
-    applies=_no_facades,
+    applies=without_facades,
 )
 
 ZONE_MIXING = Effect(

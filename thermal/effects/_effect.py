@@ -317,3 +317,14 @@ def _one(drivers: Drivers) -> FloatArray:
 
 #: A signal that is 1 throughout.
 CONSTANT = Signal("constant", "1", _one)
+
+
+def without_facades(anatomy: Anatomy) -> str | None:
+    """Say that a building has no exterior walls; None where it has.
+
+    Parameters
+    ----------
+    anatomy : Anatomy
+        Of the building.
+    """
+    return None if anatomy.facades else "the building has no exterior walls"

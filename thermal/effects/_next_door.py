@@ -6,7 +6,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal.effects._effect import CONSTANT, Effect, Joining, paired, shape, strength
+from thermal.effects._effect import CONSTANT, Effect, Joining, paired, shape, strength, without_facades
 from thermal.network import RATED_OUTSIDE_FILM, UPWARD, Anatomy, OuterFaces, Outlook, Room
 from thermal.signals import REFERENCE_TEMPERATURE, Drivers, Signal
 
@@ -92,10 +92,6 @@ def _no_ground(anatomy: Anatomy) -> str | None:
     return None if anatomy.on_ground or anatomy.ground_faces else "no zone lies on the ground"
 
 
-def _no_facades(anatomy: Anatomy) -> str | None:
-    return None if anatomy.facades else "the building has no exterior walls"
-
-
 INTERFLOOR_EXCHANGE = Effect(
     id="interfloor_exchange",
     title="heat that flows between floors",
@@ -151,7 +147,7 @@ NEIGHBOUR = Effect(
         shape("neighbour_temperature", "K", 293.15, 287.15, 299.15, "heated rooms", "neighbour", "linear"),
     ),
     build=_build_neighbour,
-    applies=_no_facades,
+    applies=without_facades,
 )
 
 HIDDEN_MASS = Effect(
