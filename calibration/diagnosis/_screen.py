@@ -45,6 +45,8 @@ class Gain:
         Share of the squared tuning error that it explains [-].
     strengths : mapping of str to float
         Its parameters [parameter units].
+    deviations : mapping of str to float
+        Standard errors of them, by tangents [parameter units].
     retained : float
         Share of its signature that calibration cannot imitate [-].
     direction : ndarray, shape (n_strength,)
@@ -56,6 +58,7 @@ class Gain:
     gain: float
     share: float
     strengths: Mapping[str, float]
+    deviations: Mapping[str, float]
     retained: float
     direction: FloatArray
 
@@ -208,11 +211,14 @@ class Screening:
         x, gain, share = self._solve(index, tightness)
         direction = np.zeros(len(self.parameters))
         direction[index] = x
-        strengths = {self.parameters[i].name: float(v) for i, v in zip(index, x, strict=True)}
+        names = [self.parameters[i].name for i in index]
+        sharper = self.gram[np.ix_(index, index)] / (1.0 - share) + np.diag(self.prior[index] ** -2.0)
+        deviations = np.sqrt(np.diag(np.linalg.inv(sharper)))
         along = direction if np.any(direction) else np.isin(np.arange(len(direction)), index).astype(float)
         whole = float(along @ self._whole @ along)
         kept = float(along @ self.gram @ along) / whole if whole > 0.0 else 0.0
-        return Gain(effect, zones, gain - choice, share, strengths, kept, direction)
+        strengths, errors = (dict(zip(names, v.tolist(), strict=True)) for v in (x, deviations))
+        return Gain(effect, zones, gain - choice, share, strengths, errors, kept, direction)
 
     def _solve(self, index: IntArray, tightness: float = 1.0) -> tuple[FloatArray, float, float]:
         """Strengths, gain and share of the squared error: coordinate descent within the ranges."""

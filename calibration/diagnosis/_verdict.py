@@ -26,6 +26,9 @@ from calibration.diagnosis._screen import Gain
 from calibration.diagnosis._search import ACCEPTED, Refit, Round
 from thermal.effects import CATALOGUE
 
+#: Standard deviations from the estimate to an end of a 90 % interval [-].
+_NINETY = 1.645
+
 VerdictName = Literal["no_gap", "named", "group", "unexplained"]
 
 
@@ -231,19 +234,21 @@ def _suspect(
 
 
 def _parameters(best: Gain | Refit, effect: str) -> dict[str, tuple[float, str, tuple[float, float]]]:
-    """Estimates of an effect's parameters, with intervals where it was fitted."""
+    """Estimates of an effect's parameters with 90 % intervals: of the fit, or by tangents where it was not fitted."""
     if isinstance(best, Gain):
-        units = {p.name: p.unit for p in CATALOGUE[effect].parameters}
-        return {
-            name: (value, units[name.partition("@")[0]], (float("nan"), float("nan")))
-            for name, value in best.strengths.items()
-        }
+        kinds = {p.name: p for p in CATALOGUE[effect].parameters}
+        told = {}
+        for name, value in best.strengths.items():
+            kind, reach = kinds[name.partition("@")[0]], _NINETY * best.deviations[name]
+            ends = [float(np.clip(value + s * reach, kind.lower, kind.upper)) for s in (-1.0, 1.0)]
+            told[name] = (value, kind.unit, (ends[0], ends[1]))
+        return told
     problem, found = best.fit.problem, best.fit.found
     spread = np.sqrt(np.diag(np.linalg.inv(found.jacobian.T @ found.jacobian)))
     told = {}
     for i, p in enumerate(problem.parameters):
         if p.effect == effect:
             z = found.point[i]
-            ends = [float(np.clip(p.inverse(z + s * 1.645 * spread[i]), p.lower, p.upper)) for s in (-1.0, 1.0)]
+            ends = [float(np.clip(p.inverse(z + s * _NINETY * spread[i]), p.lower, p.upper)) for s in (-1.0, 1.0)]
             told[p.name] = (float(p.inverse(z)), p.unit, (ends[0], ends[1]))
     return told
