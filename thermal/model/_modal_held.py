@@ -25,22 +25,6 @@ class HeldFrame:
         self.coupling = self.basis.T @ (modes.capacity[:, None] * self.lift)
 
 
-def scan_at(
-    capacity: FloatArray, step: float, start: FloatArray, push: FloatArray, keep: NDArray[np.int64]
-) -> FloatArray:
-    """`scan` of several columns at once, kept after some steps only, (n_keep, p, r)."""
-    system = capacity + step * (1.0 - SHIFT * capacity)
-    stay, current, position = capacity / system, start, 0
-    kept = np.empty((keep.size, *start.shape))
-    push /= system
-    for k in range(len(push)):
-        current = stay * current + push[k]
-        if k == keep[position]:
-            kept[position] = current
-            position += 1
-    return kept
-
-
 def scan(capacity: FloatArray, step: float, start: FloatArray, push: FloatArray) -> FloatArray:
     """``c (ζ' - ζ) + Δt k ζ' = push`` over all steps, (r, n_time + 1)."""
     system = capacity + step * (1.0 - SHIFT * capacity)

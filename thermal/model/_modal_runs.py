@@ -14,16 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal.model._modal import SHIFT, ModalModel, divided_differences, modal_model, propagator_functions
-from thermal.model._modal_held import HeldFrame, scan, scan_at
+from thermal.model._modal_fading import Stack, fading_sums, rows_of
+from thermal.model._modal_held import HeldFrame, scan
 from thermal.model._scheme import Scheme
 
 if TYPE_CHECKING:
     from thermal.model._symbolic import Matrices
 
 FloatArray = NDArray[np.float64]
-
-#: Most numbers of an array that the slopes of a spin-up are made in.
-_LARGEST = 10_000_000
 
 
 class _ModalSlopes:
@@ -58,18 +56,8 @@ class _ModalSlopes:
     def __len__(self) -> int:
         return len(self.capacity)
 
-    def brings_heat_only(self, j: int) -> bool:
-        """Whether a parameter moves B alone, as the strength of a source does.
-
-        Parameters
-        ----------
-        j : int
-            Number of the parameter.
-        """
-        return self.capacity[j] is None and self.stiffness[j] is None
-
-    def turn(self, j: int) -> tuple[FloatArray, FloatArray]:
-        """``dC - d(K + s C) c`` and ``d(K + s C)`` of one parameter.
+    def turn(self, j: int) -> tuple[FloatArray | None, FloatArray | None]:
+        """``dC - d(K + s C) c`` and ``d(K + s C)`` of one parameter; None where it moves B alone, as sources do.
 
         Parameters
         ----------
@@ -77,10 +65,9 @@ class _ModalSlopes:
             Number of the parameter.
         """
         c, capacity, stiffness = self._capacities, self.capacity[j], self.stiffness[j]
-        stiffer = np.zeros((c.size, c.size)) if stiffness is None else stiffness
         if capacity is None:
-            return -stiffer * c, stiffer
-        stiffer = stiffer + SHIFT * capacity
+            return (None, None) if stiffness is None else (-stiffness * c, stiffness)
+        stiffer = SHIFT * capacity if stiffness is None else stiffness + SHIFT * capacity
         return capacity - stiffer * c, stiffer
 
 
@@ -176,47 +163,42 @@ class ModalRuns:
         functions = propagator_functions(step, scheme)
         end, end_gain, mean, mean_gain = (divided_differences(f, modes.capacity) for f in functions)
         observe, drive, last = modes.output, np.hstack([modes.boundary, modes.heating]), keep - 1
-        stay = propagator.end[:, None]
         seen_path = path[:, last].reshape(r, -1)
         seen_inputs = inputs.reshape(-1, count, m)[:, last].reshape(-1, keep.size * m)
-        starts = (modes.coordinates @ slopes).reshape(r, -1, m)
-        out = np.empty((m, keep.size, observe.shape[0], len(self.slopes)))
-        flat = path.reshape(r, -1)
-        for j in range(len(self.slopes)):
-            if self.slopes.brings_heat_only(j):
-                heat = self._heat_of(j, inputs)
-                source, direct = propagator.end_gain[:, None] * heat, heat.reshape(r, count, m)[:, last].reshape(r, -1)
-                seen = (observe * propagator.mean_gain) @ direct
-            else:
-                turn, stiffer = self.slopes.turn(j)
-                pushed = self._pushed(j, stiffer)
-                source = (turn * end) @ flat
-                source += (propagator.end_gain[:, None] * pushed + (turn * end_gain) @ drive) @ inputs
-                seen = (observe @ (turn * mean)) @ seen_path
-                seen += (observe @ (propagator.mean_gain[:, None] * pushed + (turn * mean_gain) @ drive)) @ seen_inputs
-            source = np.ascontiguousarray(source.reshape(r, count, m).transpose(1, 0, 2))
-            moved = np.empty((count, r, m))  # time first: a step then lies together in memory
-            moved[0] = starts[:, j]
-            for k in range(count - 1):
-                np.multiply(stay, moved[k], out=moved[k + 1])
-                moved[k + 1] += source[k]
-            seen += np.tensordot(observe * propagator.mean, moved[last], axes=(1, 1)).reshape(observe.shape[0], -1)
-            out[..., j] = seen.reshape(-1, keep.size, m).transpose(2, 1, 0)
-        return out
+        p = len(self.slopes)
+        out = np.empty((p, observe.shape[0], keep.size * m))
+        from_path: list[FloatArray | None] = []
+        from_inputs: list[FloatArray | None] = []
+        for j in range(p):
+            turn, stiffer = self.slopes.turn(j)
+            pushed = self._pushed(j, stiffer)
+            by_input = propagator.end_gain[:, None] * pushed
+            out[j] = ((observe * propagator.mean_gain) @ pushed) @ seen_inputs
+            if turn is not None:
+                by_input += (turn * end_gain) @ drive
+                out[j] += (observe @ (turn * mean)) @ seen_path
+                out[j] += (observe @ ((turn * mean_gain) @ drive)) @ seen_inputs
+            from_path.append(None if turn is None else turn * end)
+            from_inputs.append(by_input)
+        out = out.reshape(p, observe.shape[0], keep.size, m)
+        stacks = Stack(from_path), Stack(from_inputs)
+        driven = np.concatenate([path, inputs.reshape(-1, count, m)]).transpose(1, 0, 2)
+        starts = (modes.coordinates @ slopes).reshape(r, p, m)
+        seen = observe * propagator.mean
+        for rows in rows_of(r, (driven.shape[1] + p) * m):
+            stay = propagator.end[rows]
+            for position, sums in enumerate(fading_sums(stay, driven, last)):
+                moved = stay[:, None, None] ** last[position] * starts[rows]
+                stacks[0].add(moved, rows, sums[:, :r])
+                stacks[1].add(moved, rows, sums[:, r:])
+                part = seen[:, rows] @ moved.reshape(stay.size, -1)
+                out[:, :, position] += part.reshape(-1, p, m).transpose(1, 0, 2)
+        return out.transpose(3, 2, 1, 0)
 
-    def _heat_of(self, j: int, inputs: FloatArray) -> FloatArray:
-        """Modal heat that a unit of a source's strength brings at every input, (r, n)."""
-        moved = self.slopes.boundary[j]
-        if moved is None:
-            return np.zeros((self.modes.capacity.size, inputs.shape[1]))
-        used = np.flatnonzero(np.any(moved, axis=0))
-        return np.asarray(moved[:, used] @ inputs[used])
-
-    def _pushed(self, j: int, stiffer: FloatArray) -> FloatArray:
+    def _pushed(self, j: int, stiffer: FloatArray | None) -> FloatArray:
         """Differentiate ``(K + s C)^-1 [B, H]`` with respect to one parameter, (r, n_boundary + n_zone)."""
-        modes = self.modes
-        pushed = -stiffer @ np.hstack([modes.boundary, modes.heating])
-        moved = self.slopes.boundary[j]
+        drive, moved = np.hstack([self.modes.boundary, self.modes.heating]), self.slopes.boundary[j]
+        pushed = np.zeros_like(drive) if stiffer is None else -stiffer @ drive
         if moved is not None:
             pushed[:, : moved.shape[1]] += moved
         return np.asarray(pushed)
@@ -300,36 +282,39 @@ class ModalRuns:
         kept = modes.states @ path[:, keep + 1]
         if slopes is None:
             return kept, None
-        change, after = np.diff(path), path[:, 1:]
         begin = modes.coordinates @ slopes
         lifted = modes.observation[held] @ begin  # of the held means at the start, nothing from there on
         first = frame.basis.T @ (begin - frame.lift @ lifted)
-        out = np.empty((states.shape[0], len(self.slopes), keep.size))
-        together = max(1, _LARGEST // (count * first.shape[0]))
-        for low in range(0, len(self.slopes), together):
-            part = range(low, min(low + together, len(self.slopes)))
-            sources = [self._held_source(frame, j, change, after, boundary[:count], step) for j in part]
-            source = np.stack(sources, axis=1)
-            source[0] += (frame.coupling @ lifted[:, part]).T
-            turned = scan_at(frame.capacity, step, first[:, part].T, source, keep)
-            out[:, part] = np.tensordot(modes.states @ frame.basis, turned, axes=(1, 2)).transpose(0, 2, 1)
-        return kept, out.reshape(states.shape[0], -1)
+        moved = self._held_slopes(frame, path, boundary[:count], keep + 1, step, first, frame.coupling @ lifted)
+        return kept, np.tensordot(modes.states @ frame.basis, moved, axes=1).reshape(states.shape[0], -1)
 
-    def _held_source(
-        self, frame: HeldFrame, j: int, change: FloatArray, after: FloatArray, boundary: FloatArray, step: float
+    def _held_slopes(
+        self,
+        frame: HeldFrame,
+        path: FloatArray,
+        boundary: FloatArray,
+        ends: NDArray[np.int64],
+        step: float,
+        first: FloatArray,
+        kick: FloatArray,
     ) -> FloatArray:
-        """Source of one parameter's slopes in every held step, (n_time, r)."""
-        tables = (self.slopes.capacity, self.slopes.stiffness, self.slopes.boundary)
-        capacity, stiffness, moved = (table[j] for table in tables)
-        source = np.zeros((change.shape[1], frame.capacity.size))
-        if capacity is not None:
-            source -= change.T @ (frame.basis.T @ capacity).T
-        if stiffness is not None:
-            source -= step * (after.T @ (frame.basis.T @ stiffness).T)
-        if moved is not None:
-            used = np.flatnonzero(np.any(moved, axis=0))
-            source += step * (boundary[:, used] @ (frame.basis.T @ moved[:, used]).T)
-        return source
+        """Slopes of the held frame's states after some steps, (r, n_parameter, n_end), from ``first`` and one kick."""
+        system = frame.capacity + step * (1.0 - SHIFT * frame.capacity)
+        stay, gain = frame.capacity / system, frame.basis.T / system[:, None]
+        slopes = self.slopes
+        parts = (
+            (np.diff(path), [None if m is None else -gain @ m for m in slopes.capacity]),
+            (path[:, 1:], [None if m is None else -step * (gain @ m) for m in slopes.stiffness]),
+            (boundary.T, [None if m is None else step * (gain @ m) for m in slopes.boundary]),
+        )
+        left, since = (stay[:, None, None] ** n for n in (ends, ends - 1))
+        out = first[:, :, None] * left + (kick / system[:, None])[:, :, None] * since
+        for drive, matrices in parts:
+            stack = Stack(matrices)
+            for rows in rows_of(stay.size, len(drive) * ends.size):
+                sums = np.stack([f.copy() for f in fading_sums(stay[rows], drive.T, ends)], axis=2)
+                stack.add(out[rows], rows, sums)
+        return np.asarray(out)
 
     def held_response(self, held: NDArray[np.bool_], step: float) -> FloatArray:
         """States at the end of a held step per kelvin of each held zone mean, shape (n, n_held) [K/K].
