@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from calibration.diagnosis._bench import Bench, Built, Fit
 from calibration.diagnosis._generic import GENERIC
+from calibration.diagnosis._held_out import HeldOut, held_out
 from calibration.diagnosis._search import Refit, Round
 from calibration.errors import HorizonError, NotEnoughDataError
 from thermal import Inputs, reduced_model
@@ -27,30 +28,6 @@ _SOON = pd.Timedelta("1h")
 
 #: Evaluations of the fit of a placebo.
 _EVALUATIONS = 6
-
-
-@dataclass(frozen=True)
-class _Errors:
-    """Held-out errors of the six-hour predictions of one model.
-
-    Parameters
-    ----------
-    days : ndarray of int, shape (n_day,)
-        Midnights, as numbers that grow with time [-].
-    daily : ndarray, shape (n_day,)
-        Mean over runs and zones of their size, by day [K].
-    weight : ndarray, shape (n_day,)
-        Number of runs of each day.
-    """
-
-    days: NDArray[np.int64]
-    daily: FloatArray
-    weight: FloatArray
-
-    @property
-    def mae(self) -> float:
-        """Mean absolute error [K]."""
-        return float(np.average(self.daily, weights=self.weight))
 
 
 @dataclass(frozen=True)
@@ -101,15 +78,15 @@ def how_far(bench: Bench, rounds: Sequence[Round]) -> tuple[tuple[Step, ...], fl
     tuple
         The steps, the held-out error of the calibrated baseline, and the floor under it [K].
     """
-    before = _held_out(bench, rounds[0].before)
+    before = rounds[0].held_out
     floor = _floor_of(bench, rounds[-1])
     steps = []
     for r in rounds:
         if r.accepted is None:
             break
-        after = _held_out(bench, r.accepted.fit)
+        after = r.accepted.held_out
         others = [x for x in r.refits if x is not r.accepted]
-        runner = _held_out(bench, others[0].fit).mae if others else None
+        runner = others[0].held_out.mae if others else None
         share, interval = _closed(before, after, floor)
         effects = tuple(r.accepted.fit.effects)
         steps.append(
@@ -128,31 +105,7 @@ def how_far(bench: Bench, rounds: Sequence[Round]) -> tuple[tuple[Step, ...], fl
     return tuple(steps), before.mae, floor.mae
 
 
-def _held_out(bench: Bench, fit: Fit, horizon: str | None = None) -> _Errors:
-    """Held-out errors of a fitted model, by day.
-
-    Parameters
-    ----------
-    bench : Bench
-        The case.
-    fit : Fit
-        The model.
-    horizon : str, optional
-        The bench's own by default.
-    """
-    size, day = [], []
-    for p in bench.predictions(fit, horizon=horizon):
-        step = pd.Timedelta(seconds=fit.built.inputs.step)
-        size.append(np.nanmean(np.abs(p.error), axis=1))
-        day.append((p.start + int(p.steps[-1]) * step).normalize().asi8)
-    sizes, days = np.concatenate(size), np.concatenate(day)
-    known = np.isfinite(sizes)
-    there, index = np.unique(days[known], return_inverse=True)
-    weight = np.bincount(index).astype(float)
-    return _Errors(there, np.bincount(index, sizes[known]) / weight, weight)
-
-
-def _floor_of(bench: Bench, last: Round) -> _Errors:
+def _floor_of(bench: Bench, last: Round) -> HeldOut:
     """Held-out errors below which nothing regular that is missing would take the last model.
 
     The least of three: the model's own; those with generic heat added, zone by zone, by time of day and outdoor
@@ -167,16 +120,16 @@ def _floor_of(bench: Bench, last: Round) -> _Errors:
         The last of the search.
     """
     final = last.after
-    found = [_held_out(bench, final)]
+    found = [last.after_held_out]
     if _SOON < pd.Timedelta(bench.horizon):
         with suppress(HorizonError, NotEnoughDataError):  # an hour may be no multiple of the step
-            found.append(_held_out(bench, final, "1h"))
+            found.append(held_out(bench, final, "1h"))
     if last.accepted is None and last.generic.gain > 0.0:
         built = bench.build(final.effects, (Chosen(GENERIC),))
         theta = built.theta({**final.values, **last.screening.promised(last.generic)})
         problem = bench.problem(built, theta)
         fit = replace(final, built=built, problem=problem, model=reduced_model(built.grid, [theta]))
-        found.append(_held_out(bench, replace(fit, found=replace(final.found, point=problem.point(theta)))))
+        found.append(held_out(bench, replace(fit, found=replace(final.found, point=problem.point(theta)))))
     return min(found, key=lambda e: e.mae)
 
 
@@ -188,7 +141,7 @@ def _on_bound(fit: Fit) -> tuple[str, ...]:
     return tuple(name for (name, effect), c in zip(names, close, strict=True) if c and effect is None)
 
 
-def _closed(before: _Errors, after: _Errors, floor: _Errors) -> tuple[float | None, tuple[float, float] | None]:
+def _closed(before: HeldOut, after: HeldOut, floor: HeldOut) -> tuple[float | None, tuple[float, float] | None]:
     """Share of the gap that is closed with its interval; None where the gap is within two standard errors."""
     common = np.intersect1d(np.intersect1d(before.days, after.days), floor.days)
     parts = [(e.daily[np.isin(e.days, common)], e.weight[np.isin(e.days, common)]) for e in (before, after, floor)]
@@ -215,7 +168,7 @@ def _shuffled(bench: Bench, r: Round, accepted: Refit) -> float | None:
     permuted = Built(built.network, built.grid, _permuted(built.inputs, varying))
     start = {**fit.values}
     found = bench.fit(fit.effects, [start], permuted, _EVALUATIONS)
-    return _held_out(bench, found).mae
+    return held_out(bench, found).mae
 
 
 def _permuted(inputs: Inputs, columns: Sequence[int]) -> Inputs:

@@ -11,8 +11,9 @@ GENERIC_GAP = 8.0
 #: has over so many times its share of the squared error, the smaller one counts [K, -].
 LEFT_OVER, LEFT_IN_A_ZONE, CONCENTRATED = 0.2, 0.1, 3.5
 
-#: Least share of the squared tuning error that accepted effects must explain for a cause to be named [-].
-EXPLAINED = 0.35
+#: Least share of the squared tuning error that accepted effects must explain for a cause to be named [-]; and where
+#: something is left over all the same.
+EXPLAINED, EXPLAINED_ALL_THE_SAME = 0.35, 0.6
 
 #: Difference of gains within which effects of a round cannot be told apart [-].
 APART = 3.0
@@ -29,6 +30,9 @@ LARGEST_GROUP = 4
 #: Temperature by which gains are divided before they become probabilities [-]: likelihoods of a model that is wrong in
 #: many small ways are too sure of themselves.
 TEMPERATURE = 2.0
+
+#: Most gain that an effect is worth that matters to no prediction, or makes those worse that it was not fitted to [-].
+DOUBTFUL = 3.0
 
 #: Probability from which an effect belongs to the 90 % set [-].
 IN_SET = 0.1

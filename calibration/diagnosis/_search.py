@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from calibration._evaluate import Progress
-from calibration.diagnosis._bench import Bench, Fit
-from calibration.diagnosis._screen import Gain, Screening, screen
+from calibration.diagnosis._bench import Bench, Fit, is_strength
+from calibration.diagnosis._held_out import HeldOut, held_out
+from calibration.diagnosis._screen import Gain, Screening, choice_of, screen
 from calibration.errors import CalibrationError
 from thermal import ModelError
 from thermal.effects import CATALOGUE
@@ -23,8 +24,9 @@ LEAST_GAIN, LEAST_SHARE = 3.0, 0.4
 #: Evaluations of a fit from one start.
 _EVALUATIONS = 6
 
-#: Least fall of the root mean square of the tuning errors by which an effect matters to predictions [K].
-MATTERS = 0.02
+#: Least fall of an error by which an effect matters to predictions, of the root mean square where it is fitted or of
+#: the mean where it is held out, and by how much the latter may grow [K].
+MATTERS, NO_WORSE = 0.03, 0.005
 
 #: Gain of the fit from which an effect is accepted [-]; null cases stay below, as with `calibration.diagnosis._levels`.
 ACCEPTED = 6.0
@@ -42,11 +44,20 @@ class Refit:
         The model with it.
     gain : float
         Logarithm of its Bayes factor against the model without it [-].
+    fall : float
+        How far the root mean square of the tuning errors falls with it [K].
+    held_out : HeldOut
+        Held-out errors with it.
+    counts : bool
+        Whether it may be accepted: beyond doubt, of some size, and no worse where it was not fitted.
     """
 
     screened: Gain
     fit: Fit
     gain: float
+    fall: float
+    held_out: HeldOut
+    counts: bool
 
 
 @dataclass(frozen=True)
@@ -57,6 +68,8 @@ class Round:
     ----------
     before : Fit
         The model that a cause was sought for.
+    held_out : HeldOut
+        Its held-out errors.
     screening : Screening
         All effects by tangents.
     gains : tuple of Gain
@@ -70,6 +83,7 @@ class Round:
     """
 
     before: Fit
+    held_out: HeldOut
     screening: Screening
     gains: tuple[Gain, ...]
     generic: Gain
@@ -80,6 +94,11 @@ class Round:
     def after(self) -> Fit:
         """The model that it leaves: with what it accepted, or as it was."""
         return self.before if self.accepted is None else self.accepted.fit
+
+    @property
+    def after_held_out(self) -> HeldOut:
+        """Held-out errors of the model that it leaves."""
+        return self.held_out if self.accepted is None else self.accepted.held_out
 
 
 def search(
@@ -99,24 +118,24 @@ def search(
         Called with stage, done, total.
     """
     done: list[Round] = []
-    fit = baseline
+    fit, errors = baseline, held_out(bench, baseline)
     for number in range(ROUNDS):
         if progress is not None:
             progress("diagnose", number, ROUNDS)
         open_ = [e for e in candidates if all(r in fit.effects for r in CATALOGUE[e].requires)]
         made, gains, generic = screen(bench, fit, open_)
-        refits = _refits(bench, fit, made, gains)
-        best = next((r for r in refits if r.gain > ACCEPTED and _fall(fit, r.fit) > MATTERS), None)
-        done.append(Round(fit, made, tuple(gains), generic, tuple(refits), best))
+        refits = _refits(bench, fit, errors, made, gains)
+        best = next((r for r in refits if r.counts), None)
+        done.append(Round(fit, errors, made, tuple(gains), generic, tuple(refits), best))
         if best is None:
             break
-        fit = best.fit
+        fit, errors = best.fit, best.held_out
     if progress is not None:
         progress("diagnose", ROUNDS, ROUNDS)
     return tuple(done)
 
 
-def _refits(bench: Bench, fit: Fit, made: Screening, gains: Sequence[Gain]) -> list[Refit]:
+def _refits(bench: Bench, fit: Fit, before: HeldOut, made: Screening, gains: Sequence[Gain]) -> list[Refit]:
     """Fit the few best anew from where their tangents point; the very best also from the priors."""
     chosen = [g for g in gains if g.gain > max(LEAST_GAIN, LEAST_SHARE * gains[0].gain)][:MOST_REFITS]
     accepted = {p.name: fit.values[p.name] for p in fit.built.network.parameters if p.effect is not None}
@@ -130,11 +149,17 @@ def _refits(bench: Bench, fit: Fit, made: Screening, gains: Sequence[Gain]) -> l
             anew = bench.fit(effects, starts, evaluations=_EVALUATIONS)
         except (ArithmeticError, np.linalg.LinAlgError, CalibrationError, ModelError):
             continue  # a fit that fails costs that effect only
-        choice = len(g.zones) * np.log(len(bench.case.building.zone_names))
-        found.append(Refit(g, anew, anew.evidence - fit.evidence - choice))
+        choice = choice_of(_places(anew, g.effect), g.places) if g.places else 0.0
+        gain = anew.evidence - fit.evidence - choice
+        fall = float(np.sqrt(fit.found.mean_square) - np.sqrt(anew.found.mean_square))
+        errors = held_out(bench, anew)
+        closer = before.mae - errors.mae
+        counts = gain > ACCEPTED and closer > -NO_WORSE and max(fall, closer) > MATTERS
+        found.append(Refit(g, anew, float(gain), fall, errors, counts))
     return sorted(found, key=lambda r: -r.gain)
 
 
-def _fall(before: Fit, after: Fit) -> float:
-    """How far the root mean square of the tuning errors falls [K]."""
-    return float(np.sqrt(before.found.mean_square) - np.sqrt(after.found.mean_square))
+def _places(fit: Fit, effect: str) -> int:
+    """Count the zones, or pairs of zones, in which a fitted model has an effect."""
+    mine = (p for p in fit.problem.parameters if p.effect == effect and is_strength(p.name, effect))
+    return len({p.member for p in mine})

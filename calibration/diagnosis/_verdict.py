@@ -13,7 +13,9 @@ from calibration.diagnosis._levels import (
     ALIKE,
     APART,
     CONCENTRATED,
+    DOUBTFUL,
     EXPLAINED,
+    EXPLAINED_ALL_THE_SAME,
     GENERIC_GAP,
     IN_SET,
     LARGEST_GROUP,
@@ -179,7 +181,7 @@ def group_of(r: Round, effect: str) -> tuple[str, ...]:
 def _name(rounds: Sequence[Round]) -> VerdictName:
     first, final = rounds[0], rounds[-1].after
     explained = 1.0 - final.found.mean_square / first.before.found.mean_square
-    if first.accepted is not None and explained >= EXPLAINED:
+    if first.accepted is not None and explained >= (EXPLAINED_ALL_THE_SAME if _left_over(final) else EXPLAINED):
         size = len(group_of(first, first.accepted.screened.effect))
         if size <= LARGEST_GROUP:
             return "named" if size == 1 else "group"
@@ -195,9 +197,9 @@ def _left_over(fit: Fit) -> bool:
 
 
 def _gains(r: Round) -> dict[str, float]:
-    """Gain of every effect of a round: fitted where it was, by tangents otherwise."""
+    """Gain of every effect of a round: fitted where it was, by tangents otherwise; little where it does not count."""
     gains = {g.effect: g.gain for g in r.gains}
-    return gains | {x.screened.effect: x.gain for x in r.refits}
+    return gains | {x.screened.effect: x.gain if x.counts else min(x.gain, DOUBTFUL) for x in r.refits}
 
 
 def _source(r: Round, effect: str) -> Gain | Refit:

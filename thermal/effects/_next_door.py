@@ -62,7 +62,12 @@ def _build_ground(join: Joining) -> None:
 
 def _build_neighbour(join: Joining) -> None:
     other = join.parameter("neighbour_temperature")
+    glazed = {pane.azimuth for pane in join.anatomy.panes}
+    # a side with windows is no party wall; all sides may be where drawings tell windows of all, or of none
+    bare = {azimuth for _, azimuth in join.anatomy.facades} - glazed
     for (zone, azimuth), area in join.anatomy.facades.items():
+        if bare and azimuth not in bare:
+            continue
         room, value = join.anatomy.rooms[zone], join.parameter("neighbour_u_value", facade=f"{azimuth:g} deg")
         join.air_to(room, value, join.graph.signal(_STEADY), area)
         join.heat_air(room, value * (other - REFERENCE_TEMPERATURE), CONSTANT, area)
@@ -144,7 +149,7 @@ NEIGHBOUR = Effect(
     separated_by="facades against each other; cold and mild days",
     parameters=(
         strength("neighbour_u_value", "W/m^2/K", 2.0, "party walls: ISO 6946:2017", "neighbour"),
-        shape("neighbour_temperature", "K", 293.15, 287.15, 299.15, "heated rooms", "neighbour", "linear"),
+        shape("neighbour_temperature", "K", 293.15, 278.15, 300.15, "unheated to warm", "neighbour", "linear"),
     ),
     build=_build_neighbour,
     applies=without_facades,

@@ -84,11 +84,10 @@ LATENT_LOAD = Effect(
     equation="-L A occ(t)",
     source="ASHRAE Fundamentals 2017, ch. 18, table 1 (latent heat of people)",
     acts_on="air of every zone",
-    confounders=("internal_gains",),
-    separated_by="humidity sensors",
+    confounders=("internal_gains", "window_opening", "infiltration"),
+    separated_by="humidity sensors; humidifiers off for a week",
     parameters=(strength("latent_load", "W/m^2", 10.0, "55 W a person at 5 to 10 m2", "latent_load"),),
     build=_build_latent,
-    needs=("zone_air_relative_humidity_sensor",),
 )
 
 CLOCK_SHIFT = Effect(

@@ -1,0 +1,61 @@
+"""Held-out errors of one model, by day."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from calibration.diagnosis._bench import Bench, Fit
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """Held-out errors of the N-step predictions of one model.
+
+    Parameters
+    ----------
+    days : ndarray of int, shape (n_day,)
+        Midnights, as numbers that grow with time [-].
+    daily : ndarray, shape (n_day,)
+        Mean over runs and zones of their size, by day [K].
+    weight : ndarray, shape (n_day,)
+        Number of runs of each day.
+    """
+
+    days: NDArray[np.int64]
+    daily: FloatArray
+    weight: FloatArray
+
+    @property
+    def mae(self) -> float:
+        """Mean absolute error [K]."""
+        return float(np.average(self.daily, weights=self.weight))
+
+
+def held_out(bench: Bench, fit: Fit, horizon: str | None = None) -> HeldOut:
+    """Held-out errors of a fitted model, by day.
+
+    Parameters
+    ----------
+    bench : Bench
+        The case.
+    fit : Fit
+        The model.
+    horizon : str, optional
+        The bench's own by default.
+    """
+    size, day = [], []
+    for p in bench.predictions(fit, horizon=horizon):
+        step = pd.Timedelta(seconds=fit.built.inputs.step)
+        size.append(np.nanmean(np.abs(p.error), axis=1))
+        day.append((p.start + int(p.steps[-1]) * step).normalize().asi8)
+    sizes, days = np.concatenate(size), np.concatenate(day)
+    known = np.isfinite(sizes)
+    there, index = np.unique(days[known], return_inverse=True)
+    weight = np.bincount(index).astype(float)
+    return HeldOut(there, np.bincount(index, sizes[known]) / weight, weight)
