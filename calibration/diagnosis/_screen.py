@@ -30,6 +30,9 @@ _SWEEPS, _TOLERANCE = 200, 1e-6
 #: and change no gain by 0.01.
 _SHIFTS = (1.0 / 86400.0, 1.0 / 14400.0, 1.0 / 2400.0, 1.0 / 400.0)
 
+#: Most zones in which effects of single zones are sought.
+_MOST_ZONES = 24
+
 #: Sizes that generic heat may have over its prior's [-]; the likeliest counts (empirical Bayes).
 _TIGHTNESS = (0.003, 0.01, 0.03, 0.1, 0.3)
 
@@ -85,8 +88,10 @@ class Screening:
     """
 
     def __init__(self, bench: Bench, fit: Fit, candidates: Sequence[str]) -> None:
-        lacking = {e: () for e in candidates if e not in fit.effects}
-        built = bench.build({**fit.effects, **lacking}, (Chosen(GENERIC),))
+        here = _worst_zones(fit)
+        lacking = {e: here if CATALOGUE[e].zonal else () for e in candidates if e not in fit.effects}
+        built = bench.build({**fit.effects, **lacking}, (Chosen(GENERIC, here),))
+        self._elsewhere = len(built.network.zones) - len(here) if here else 0
         theta = built.theta(fit.values)
         model = reduced_model(built.grid, [theta, built.theta(fit.values, TYPICAL)], shifts=_SHIFTS)
         problem = bench.problem(built, theta)
@@ -197,7 +202,7 @@ class Screening:
 
     def _grow(self, effect: str, members: Mapping[str, IntArray]) -> Gain:
         """Add zones, or pairs of them, as long as each more than pays for having been chosen among all."""
-        places = len(members)
+        places = len(members) + self._elsewhere
         alone = {name: self._gain(effect, index, (name,)).gain for name, index in members.items()}
         order = sorted(members, key=lambda name: -alone[name])
         chosen: list[str] = []
@@ -254,6 +259,15 @@ class Screening:
         gain = -0.5 * self.count * np.log1p(-share) - 0.5 * pull - 0.5 * occam
         gain += np.log(2.0) * np.count_nonzero((self.lower[index] == 0.0) & (x > 0.0))
         return x, float(gain), share
+
+
+def _worst_zones(fit: Fit) -> tuple[str, ...]:
+    """Zones with the largest errors, in which effects of single zones are sought; none where that is all of them."""
+    zones = fit.built.network.zones
+    if len(zones) <= _MOST_ZONES:
+        return ()
+    worst = set(np.argsort(-fit.by_zone, kind="stable")[:_MOST_ZONES].tolist())
+    return tuple(z for k, z in enumerate(zones) if k in worst)
 
 
 def choice_of(count: int, places: int) -> float:
