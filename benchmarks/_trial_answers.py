@@ -102,12 +102,10 @@ def report(out: Path, readme: bool) -> str:
         raise SystemExit(f"{out}: expected answered trials, found none; run `diagnose` first")
     scored = score(trials)
     versions = sorted({str(t.answer.get("code")) for t in trials})
-    streams = sorted(
-        {json.loads((out / SEALED / f"{t.name}.json").read_text(encoding="utf-8"))["stream"] for t in trials}
-    )
+    seeds = "confirmation" if all(t.confirmation for t in trials) else "development"
     head = (
         f"{len(trials)} trials ({', '.join(f'{sum(t.kind == k for t in trials)} {k}' for k in _kinds(trials))}), "
-        f"{'confirmation' if streams == [1] else 'development'} seeds, method {', '.join(versions)}; "
+        f"{seeds} seeds, method {', '.join(versions)}; "
         f"{sum(not t.counted for t in trials)} whose effects leave no gap over 0.05 K are not counted."
     )
     if len(versions) > 1:

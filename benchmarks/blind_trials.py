@@ -12,6 +12,7 @@ Run from the repository's root, in an environment with Python 3.11 or newer::
     python benchmarks/blind_trials.py make --out results/blind --kind null --seeds 0-9      # their twins
     python benchmarks/blind_trials.py diagnose --out results/blind
     python benchmarks/blind_trials.py score --out results/blind
+    python benchmarks/blind_trials.py levels --out results/blind    # null levels, from development seeds only
 
 `diagnose` answers each trial in a process of its own, which gets the case folder and nothing else; `score` opens the
 seals of what is answered. An interrupted run goes on where it was: trials and answers that are there are left alone.
@@ -25,6 +26,7 @@ import time
 from concurrent.futures import Future, ThreadPoolExecutor, as_completed
 from pathlib import Path
 
+from _null_levels import make_levels
 from _trial_answers import CASES, SEALED, answer_all, report
 from energyplus_trials.drawing import DAYS, draw_spec
 from energyplus_trials.errors import EnergyPlusMissingError, TrialError
@@ -118,8 +120,16 @@ def main() -> int:
     command.add_argument("--out", type=Path, required=True, help="folder of the trials")
     command.add_argument("--readme", action="store_true", help="replace the table in the README")
     command.set_defaults(run=_score)
+    command = commands.add_parser("levels", help="write the levels of answered development nulls into the package")
+    command.add_argument("--out", type=Path, required=True, help="folder of the trials")
+    command.set_defaults(run=_levels)
     options = parser.parse_args()
     return int(options.run(options))
+
+
+def _levels(options: argparse.Namespace) -> int:
+    print(make_levels(options.out))
+    return 0
 
 
 def _score(options: argparse.Namespace) -> int:

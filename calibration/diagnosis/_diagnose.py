@@ -15,7 +15,7 @@ from calibration.diagnosis._bench import Bench, Fit
 from calibration.diagnosis._how_far import Step, how_far
 from calibration.diagnosis._levels import p_value
 from calibration.diagnosis._search import ACCEPTED, Round, search
-from calibration.diagnosis._verdict import Verdict, judge
+from calibration.diagnosis._verdict import Verdict, gains_of, judge
 from calibration.diagnosis._where import Where, where_it_lies
 from thermal import Case
 from thermal.effects import CATALOGUE
@@ -119,6 +119,7 @@ class Diagnosis:
             "set90": list(self.verdict.set90),
             "combinations": [{"effects": list(e), "probability": p} for e, p in self.verdict.combinations],
             "how_far": [_step(s) for s in self.steps],
+            "rounds": [r.to_dict() | {"worth": gains_of(r)} for r in self.rounds],
             "intervals": {
                 "tuning": [i.to_dict() for i in self.tuned],
                 "held_out": [i.to_dict() for i in self.judged],
@@ -185,7 +186,7 @@ def diagnose(
         steps=steps,
         gap=gap,
         floor=floor,
-        p_value=p_value(max((r.gain for r in rounds[0].refits), default=rounds[0].gains[0].gain)),
+        p_value=p_value(max(gains_of(rounds[0]).values())),
         detectable={zone: w * areas[zone] for zone, w in watts.items()},
         rounds=rounds,
         tuned=tuple(bench.tuned),

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import json
+from importlib.resources import files
+
 import numpy as np
 
 #: Gain of generic heat above which a gap is there though no effect of the catalogue explains it [-].
@@ -11,8 +14,8 @@ GENERIC_GAP = 8.0
 #: has over so many times its share of the squared error, the smaller one counts [K, -].
 LEFT_OVER, LEFT_IN_A_ZONE, CONCENTRATED = 0.2, 0.1, 3.5
 
-#: Least share of the squared tuning error that accepted effects must explain for a cause to be named [-]; and where
-#: something is left over all the same.
+#: Least share of the squared error, tuning or held out, that accepted effects must explain for a cause to be named [-];
+#: and where something is left over all the same.
 EXPLAINED, EXPLAINED_ALL_THE_SAME = 0.35, 0.6
 
 #: Difference of gains within which effects of a round cannot be told apart [-].
@@ -37,16 +40,26 @@ DOUBTFUL = 3.0
 #: Probability from which an effect belongs to the 90 % set [-].
 IN_SET = 0.1
 
-#: Scale of the exponential tail of the largest gain in null cases, and its location [-].
-NULL_LOCATION, NULL_SCALE = 1.5, 1.0
+#: Largest gains of the first round in development cases without any missing effect, in order [-]: made by
+#: ``benchmarks/blind_trials.py levels``.
+NULL_GAINS: tuple[float, ...] = tuple(
+    json.loads((files("calibration") / "diagnosis" / "null_levels.json").read_text(encoding="utf-8"))["largest"]
+)
 
 
 def p_value(gain: float) -> float:
     """Probability that a case without any missing effect shows so large a gain [-].
+
+    The share of null cases that do, and beyond all of these an exponential tail with their mean excess over the median.
 
     Parameters
     ----------
     gain : float
         Largest gain of the first round [-].
     """
-    return float(min(1.0, np.exp(-(gain - NULL_LOCATION) / NULL_SCALE)))
+    nulls = np.array(NULL_GAINS)
+    above = int(np.count_nonzero(nulls >= gain))
+    if above:
+        return (1 + above) / (1 + nulls.size)
+    excess = nulls[nulls > np.median(nulls)] - np.median(nulls)
+    return float(np.exp(-(gain - nulls.max()) / excess.mean()) / (1 + nulls.size))

@@ -47,6 +47,8 @@ class Trial:
         Held-out error of the calibrated baseline on the twin without the effects [K]; NaN where there is none.
     answer : mapping
         Contents of ``diagnosis.json``.
+    confirmation : bool
+        Whether its seed is one that nothing is tuned on.
     """
 
     name: str
@@ -58,6 +60,7 @@ class Trial:
     unexplained_is_right: bool
     twin: float
     answer: Mapping[str, Any]
+    confirmation: bool = False
 
     @property
     def counted(self) -> bool:
@@ -136,6 +139,7 @@ def trial_of(name: str, label: Mapping[str, Any], answer: Mapping[str, Any], twi
         any(e["unexplained_is_right"] for e in effects),
         twin,
         answer,
+        bool(label["stream"]),
     )
 
 
@@ -235,8 +239,9 @@ def _outside_right(t: Trial) -> bool:
 
 
 def _both(t: Trial) -> bool:
-    first = t.ranked(2)
-    return all(any(e in truth for e in first) for truth in t.truths)
+    """Whether the first two are both there, each for an effect of its own."""
+    first, second = ({k for k, truth in enumerate(t.truths) if e in truth} for e in t.ranked(2))
+    return bool(first) and bool(second) and len(first | second) > 1
 
 
 def _zones(t: Trial) -> bool:

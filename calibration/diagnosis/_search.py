@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -100,6 +101,26 @@ class Round:
         """Held-out errors of the model that it leaves."""
         return self.held_out if self.accepted is None else self.accepted.held_out
 
+    def to_dict(self) -> dict[str, Any]:
+        """Entry of ``rounds`` in ``diagnosis.json``."""
+        return {
+            "before": list(self.before.effects),
+            "tuning_rms": float(np.sqrt(self.before.found.mean_square)),
+            "held_out_mae": self.held_out.mae,
+            "generic": self.generic.gain,
+            "gains": {
+                g.effect: {"gain": g.gain, "zones": list(g.zones), "share": g.share, "retained": g.retained}
+                for g in self.gains
+            },
+            "refits": {
+                r.screened.effect: {
+                    "gain": r.gain, "fall": r.fall, "held_out_mae": r.held_out.mae, "counts": r.counts,
+                }
+                for r in self.refits
+            },
+            "accepted": None if self.accepted is None else self.accepted.screened.effect,
+        }  # fmt: skip
+
 
 def search(
     bench: Bench, baseline: Fit, candidates: Sequence[str], progress: Progress | None = None
@@ -136,27 +157,32 @@ def search(
 
 
 def _refits(bench: Bench, fit: Fit, before: HeldOut, made: Screening, gains: Sequence[Gain]) -> list[Refit]:
-    """Fit the few best anew from where their tangents point; the very best also from the priors."""
-    chosen = [g for g in gains if g.gain > max(LEAST_GAIN, LEAST_SHARE * gains[0].gain)][:MOST_REFITS]
+    """Fit the few best anew, and lesser ones too as long as none counts; the very best also from the priors."""
     accepted = {p.name: fit.values[p.name] for p in fit.built.network.parameters if p.effect is not None}
-    found = []
-    for g in chosen:
-        effects = {**fit.effects, g.effect: g.zones}
+    found: list[Refit] = []
+    for g in [g for g in gains if g.gain > LEAST_GAIN][:MOST_REFITS]:
+        if g.gain < LEAST_SHARE * gains[0].gain and any(r.counts for r in found):
+            break
         starts = [made.promised(g)]
-        if g is chosen[0]:
+        if g is gains[0]:
             starts.append(accepted | dict(g.strengths))
         try:
-            anew = bench.fit(effects, starts, evaluations=_EVALUATIONS)
+            anew = bench.fit({**fit.effects, g.effect: g.zones}, starts, evaluations=_EVALUATIONS)
         except (ArithmeticError, np.linalg.LinAlgError, CalibrationError, ModelError):
             continue  # a fit that fails costs that effect only
-        choice = choice_of(_places(anew, g.effect), g.places) if g.places else 0.0
-        gain = anew.evidence - fit.evidence - choice
-        fall = float(np.sqrt(fit.found.mean_square) - np.sqrt(anew.found.mean_square))
-        errors = held_out(bench, anew)
-        closer = before.mae - errors.mae
-        counts = gain > ACCEPTED and closer > -NO_WORSE and max(fall, closer) > MATTERS
-        found.append(Refit(g, anew, float(gain), fall, errors, counts))
+        found.append(_weighed(bench, fit, before, g, anew))
     return sorted(found, key=lambda r: -r.gain)
+
+
+def _weighed(bench: Bench, fit: Fit, before: HeldOut, screened: Gain, anew: Fit) -> Refit:
+    """Compare a model with one effect more with the one without it."""
+    choice = choice_of(_places(anew, screened.effect), screened.places) if screened.places else 0.0
+    gain = float(anew.evidence - fit.evidence - choice)
+    fall = float(np.sqrt(fit.found.mean_square) - np.sqrt(anew.found.mean_square))
+    errors = held_out(bench, anew)
+    closer = before.mae - errors.mae
+    counts = gain > ACCEPTED and closer > -NO_WORSE and max(fall, closer) > MATTERS
+    return Refit(screened, anew, gain, fall, errors, counts)
 
 
 def _places(fit: Fit, effect: str) -> int:

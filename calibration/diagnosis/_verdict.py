@@ -130,7 +130,7 @@ def judge(rounds: Sequence[Round], untestable: Mapping[str, str]) -> Verdict:
     real = 1.0  # that all rounds before found something that is there
     chain: list[tuple[tuple[str, ...], float]] = []
     for r in rounds:
-        gains = _gains(r)
+        gains = gains_of(r)
         found = _probabilities(gains)
         for effect, gain in gains.items():
             probability[effect] = max(probability[effect], real * found[effect])
@@ -160,7 +160,7 @@ def group_of(r: Round, effect: str) -> tuple[str, ...]:
     effect : str
         Its id.
     """
-    gains = _gains(r)
+    gains = gains_of(r)
     own = next((g for g in r.gains if g.effect == effect), None)
     alike = [effect]
     if gains[effect] <= ACCEPTED:  # what hardly gains is not there, whatever else looks like it
@@ -178,9 +178,24 @@ def group_of(r: Round, effect: str) -> tuple[str, ...]:
     return tuple(alike)
 
 
+def gains_of(r: Round) -> dict[str, float]:
+    """Gain of every effect of a round: fitted where it was, by tangents otherwise; little where it does not count.
+
+    Parameters
+    ----------
+    r : Round
+        Of the search.
+    """
+    gains = {g.effect: g.gain for g in r.gains}
+    return gains | {x.screened.effect: x.gain if x.counts else min(x.gain, DOUBTFUL) for x in r.refits}
+
+
 def _name(rounds: Sequence[Round]) -> VerdictName:
     first, final = rounds[0], rounds[-1].after
-    explained = 1.0 - final.found.mean_square / first.before.found.mean_square
+    explained = 1.0 - min(
+        final.found.mean_square / first.before.found.mean_square,
+        (rounds[-1].after_held_out.mae / first.held_out.mae) ** 2,
+    )
     if first.accepted is not None and explained >= (EXPLAINED_ALL_THE_SAME if _left_over(final) else EXPLAINED):
         size = len(group_of(first, first.accepted.screened.effect))
         if size <= LARGEST_GROUP:
@@ -194,12 +209,6 @@ def _left_over(fit: Fit) -> bool:
     zones = fit.by_zone[fit.by_zone > 0.0]
     size = float(np.sqrt(fit.found.mean_square))
     return size > LEFT_OVER or (size > LEFT_IN_A_ZONE and float(zones.max() / zones.mean()) > CONCENTRATED)
-
-
-def _gains(r: Round) -> dict[str, float]:
-    """Gain of every effect of a round: fitted where it was, by tangents otherwise; little where it does not count."""
-    gains = {g.effect: g.gain for g in r.gains}
-    return gains | {x.screened.effect: x.gain if x.counts else min(x.gain, DOUBTFUL) for x in r.refits}
 
 
 def _source(r: Round, effect: str) -> Gain | Refit:
