@@ -146,8 +146,13 @@ def judge(rounds: Sequence[Round], untestable: Mapping[str, str]) -> Verdict:
         key=lambda s: (-s.probability, -s.score),
     )
     name = _name(rounds)
-    inside = tuple(s.effect for s in suspects if s.probability >= IN_SET) if name in ("named", "group") else ()
-    return Verdict(name, tuple(suspects), inside, tuple(chain))
+    return Verdict(name, tuple(suspects), _inside(rounds, suspects) if name in ("named", "group") else (), tuple(chain))
+
+
+def _inside(rounds: Sequence[Round], suspects: Sequence[Suspect]) -> tuple[str, ...]:
+    """Effects of the 90 % set: those that are likely enough, and what cannot be told from one that was accepted."""
+    alike = {e for r in rounds if r.accepted is not None for e in group_of(r, r.accepted.screened.effect)}
+    return tuple(s.effect for s in suspects if s.probability >= IN_SET or s.effect in alike)
 
 
 def group_of(r: Round, effect: str) -> tuple[str, ...]:
@@ -160,7 +165,7 @@ def group_of(r: Round, effect: str) -> tuple[str, ...]:
     effect : str
         Its id.
     """
-    gains = gains_of(r)
+    gains = {g.effect: g.gain for g in r.gains} | {x.screened.effect: x.gain for x in r.refits}
     own = next((g for g in r.gains if g.effect == effect), None)
     alike = [effect]
     if gains[effect] <= ACCEPTED:  # what hardly gains is not there, whatever else looks like it
