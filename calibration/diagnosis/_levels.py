@@ -14,9 +14,8 @@ GENERIC_GAP = 8.0
 #: has over so many times its share of the squared error, the smaller one counts [K, -].
 LEFT_OVER, LEFT_IN_A_ZONE, CONCENTRATED = 0.2, 0.1, 3.5
 
-#: Least share of the squared error, tuning or held out, that accepted effects must explain for a cause to be named [-];
-#: and where something is left over all the same.
-EXPLAINED, EXPLAINED_ALL_THE_SAME = 0.35, 0.6
+#: Least share of the squared error that accepted effects must explain for a cause to be named [-].
+EXPLAINED = 0.4
 
 #: Difference of gains within which effects of a round cannot be told apart [-].
 APART = 3.0

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,7 @@ from thermal import ModelError
 from thermal.effects import CATALOGUE
 
 #: Most rounds, and most effects that a round fits anew.
-ROUNDS, MOST_REFITS = 6, 4
+ROUNDS, MOST_REFITS = 8, 4
 
 #: Gain by tangents from which an effect is fitted anew [-], and the least share of the best's that it must have.
 LEAST_GAIN, LEAST_SHARE = 3.0, 0.4
@@ -157,20 +157,28 @@ def search(
 
 
 def _refits(bench: Bench, fit: Fit, before: HeldOut, made: Screening, gains: Sequence[Gain]) -> list[Refit]:
-    """Fit the few best anew, and lesser ones too as long as none counts; the very best also from the priors."""
+    """Fit the few best anew, lesser ones too as long as none counts, and what the best is confounded with."""
     accepted = {p.name: fit.values[p.name] for p in fit.built.network.parameters if p.effect is not None}
     found: list[Refit] = []
-    for g in [g for g in gains if g.gain > LEAST_GAIN][:MOST_REFITS]:
-        if g.gain < LEAST_SHARE * gains[0].gain and any(r.counts for r in found):
-            break
-        starts = [made.promised(g)]
-        if g is gains[0]:
-            starts.append(accepted | dict(g.strengths))
+
+    def refit(g: Gain, starts: Sequence[Mapping[str, float]]) -> None:
         try:
             anew = bench.fit({**fit.effects, g.effect: g.zones}, starts, evaluations=_EVALUATIONS)
         except (ArithmeticError, np.linalg.LinAlgError, CalibrationError, ModelError):
-            continue  # a fit that fails costs that effect only
+            return  # a fit that fails costs that effect only
         found.append(_weighed(bench, fit, before, g, anew))
+
+    for g in [g for g in gains if g.gain > LEAST_GAIN][:MOST_REFITS]:
+        if g.gain < LEAST_SHARE * gains[0].gain and any(r.counts for r in found):
+            break
+        refit(g, [made.promised(g), accepted | dict(g.strengths)] if g is gains[0] else [made.promised(g)])
+    best = max((r for r in found if r.counts), key=lambda r: r.gain, default=None)
+    if best is not None and best.screened.zones:
+        fitted = {r.screened.effect for r in found}
+        for g in gains:
+            alike = g.effect in CATALOGUE[best.screened.effect].confounders and CATALOGUE[g.effect].zonal
+            if alike and g.effect not in fitted:  # tangents at no strength may miss where it is, or what it does
+                refit(replace(g, zones=best.screened.zones), [accepted])
     return sorted(found, key=lambda r: -r.gain)
 
 

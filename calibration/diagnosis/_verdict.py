@@ -15,7 +15,6 @@ from calibration.diagnosis._levels import (
     CONCENTRATED,
     DOUBTFUL,
     EXPLAINED,
-    EXPLAINED_ALL_THE_SAME,
     GENERIC_GAP,
     IN_SET,
     LARGEST_GROUP,
@@ -197,16 +196,21 @@ def gains_of(r: Round) -> dict[str, float]:
 
 def _name(rounds: Sequence[Round]) -> VerdictName:
     first, final = rounds[0], rounds[-1].after
-    explained = 1.0 - min(
-        final.found.mean_square / first.before.found.mean_square,
-        (rounds[-1].after_held_out.mae / first.held_out.mae) ** 2,
-    )
-    if first.accepted is not None and explained >= (EXPLAINED_ALL_THE_SAME if _left_over(final) else EXPLAINED):
+    left_over = _left_over(final)
+    if first.accepted is not None and _explained(rounds, left_over) >= EXPLAINED:
         size = len(group_of(first, first.accepted.screened.effect))
         if size <= LARGEST_GROUP:
             return "named" if size == 1 else "group"
         return "unexplained"
-    return "unexplained" if first.generic.gain > GENERIC_GAP or _left_over(final) else "no_gap"
+    return "unexplained" if first.generic.gain > GENERIC_GAP or left_over else "no_gap"
+
+
+def _explained(rounds: Sequence[Round], left_over: bool) -> float:
+    """Share of the squared error that is explained: where it was fitted, or held out unless much is left over."""
+    first, last = rounds[0], rounds[-1]
+    tuning = last.after.found.mean_square / first.before.found.mean_square
+    held_out = (last.after_held_out.mae / first.held_out.mae) ** 2
+    return 1.0 - (tuning if left_over else min(tuning, held_out))
 
 
 def _left_over(fit: Fit) -> bool:
@@ -242,7 +246,7 @@ def _suspect(
     if best is None:
         return Suspect(effect, 0.0, 0.0, (effect,), (), {}, 0.0, known.separated_by, reason is None, reason or "")
     gain = best.screened if isinstance(best, Refit) else best
-    home = next(r for r in rounds if any(g is gain for g in r.gains))
+    home = next(r for r in rounds if any(found is best for found in (*r.gains, *r.refits)))
     return Suspect(
         effect, probability, score, group_of(home, effect)[:LARGEST_GROUP], gain.zones, _parameters(best, effect),
         gain.retained, known.separated_by, True,

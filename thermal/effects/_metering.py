@@ -163,7 +163,7 @@ DUCT_LOSS = Effect(
     equation="-(1 - e^-NTU) ṁ c (T_d - T), NTU between constant and falling with flow",
     source="ASHRAE 152-2014 (duct losses): NTU falls with flow where the film outside of the duct governs",
     acts_on="air of the zones concerned",
-    confounders=("flow_gain",),
+    confounders=("flow_gain", "hidden_mass"),
     separated_by="low and high flow at equal heat",
     parameters=(
         strength("duct_ntu", "1", 0.3, "0.02 to 0.3", "duct_loss"),

@@ -21,23 +21,24 @@ def _zero(drivers: Drivers) -> FloatArray:
 _STEADY = Signal("constant temperature", "K", _zero)
 
 
-def _backs(room: Room) -> tuple[NDArray[np.int64], FloatArray]:
-    """Back of a zone's slabs, or its air where it has none, with shares."""
-    return (np.array([room.slab[-1]]), np.ones(1)) if room.slab else (room.air, room.share)
+def _back(room: Room, slab: tuple[int, ...]) -> tuple[NDArray[np.int64], FloatArray]:
+    """Back of one of a zone's slabs, or its air where it has none, with shares."""
+    return (np.array([slab[-1]]), np.ones(1)) if slab else (room.air, room.share)
 
 
 def _build_floors(join: Joining) -> None:
     value = join.parameter("interfloor_u_value")
     for (lower, upper), area in join.anatomy.stacked.items():
-        ends = [_backs(join.anatomy.rooms[z]) for z in (lower, upper)]
-        near, far, share = paired(*ends)
+        below, above = join.anatomy.rooms[lower], join.anatomy.rooms[upper]
+        near, far, share = paired(_back(below, below.ceiling), _back(above, above.floor))
         join.graph.face("interfloor_exchange", value, near, far, area * share)
 
 
 def _build_roof(join: Joining) -> None:
     value = join.parameter("roof_u_value")
     for zone, area in join.anatomy.under_roof.items():
-        node, share = _backs(join.anatomy.rooms[zone])
+        room = join.anatomy.rooms[zone]
+        node, share = _back(room, room.ceiling)
         join.graph.face("roof_exchange", value, node, join.graph.boundary("outdoor"), area * share)
         outlook = Outlook(0.0, UPWARD, RATED_OUTSIDE_FILM, glass=False)
         join.anatomy.outer.append(OuterFaces(value, node, area * share, outlook))
@@ -51,7 +52,8 @@ def _build_ground(join: Joining) -> None:
         join.graph.face(key, conductance, node, join.graph.signal(_STEADY), weight)
         join.graph.source(key, conductance * (ground - REFERENCE_TEMPERATURE), node, CONSTANT, weight)
 
-    floors = [(*_backs(join.anatomy.rooms[zone]), area) for zone, area in join.anatomy.on_ground.items()]
+    rooms = join.anatomy.rooms
+    floors = [(*_back(rooms[zone], rooms[zone].floor), area) for zone, area in join.anatomy.on_ground.items()]
     if floors:
         to_ground(join.key("slabs"), value, [(node, area * share) for node, share, area in floors])
     for face in join.anatomy.ground_faces:

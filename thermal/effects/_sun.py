@@ -53,7 +53,7 @@ def _panes(join: Joining, value: ca.SX, signal_of: partial[FloatArray], name: st
             partial(signal_of, azimuth=pane.azimuth, tilt=pane.tilt),
         )  # fmt: skip
         known = 1.0 if pane.transmittance is None else pane.transmittance / _USUAL_TRANSMITTANCE
-        mass = room.slab[0] if room.slab else room.furniture
+        mass = room.floor[0] if room.floor else room.furniture
         if mass < 0:
             join.heat_surfaces(room, value, signal, known * pane.area)
             continue

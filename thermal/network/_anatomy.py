@@ -113,7 +113,7 @@ class Room:
         Node at the mean of its air: the star of the shuffle, or the one volume; -1 without.
     radiant : int
         Its radiant node; -1 without.
-    slab : tuple of int
+    floor, ceiling : tuple of int
         Nodes of its slabs, from the surface to the back; empty without.
     furniture : int
         Node of the furniture; -1 without.
@@ -127,7 +127,8 @@ class Room:
     share: FloatArray
     mean: int
     radiant: int
-    slab: tuple[int, ...]
+    floor: tuple[int, ...]
+    ceiling: tuple[int, ...]
     furniture: int
     floor_area: float
     volume: float

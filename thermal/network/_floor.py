@@ -60,7 +60,7 @@ class Floor:
         graph.capacity("air", heat, air, area * self.plan.height * zone.share)
         if air.size > 1:
             self._air(zone, area, heat, reach, mean_shuffle)
-        zone.slabs(2.0 * area)
+        zone.slabs(area)
         zone.furniture(area)
         return zone
 

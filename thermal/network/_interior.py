@@ -36,7 +36,8 @@ class Zone:
         self.film_names = _FILMS[graph.structure.radiant]
         self._inside: tuple[tuple[ca.SX, ...], int] | None = None
         self.mean = int(air[0]) if air.size == 1 else -1
-        self._slab: tuple[int, ...] = ()
+        self._floor: tuple[int, ...] = ()
+        self._ceiling: tuple[int, ...] = ()
         self._furniture = -1
         if graph.structure.furniture:
             self.inside()
@@ -122,25 +123,27 @@ class Zone:
             self.share,
             self.mean,
             radiant,
-            self._slab,
+            self._floor,
+            self._ceiling,
             self._furniture,
             floor_area,
             volume,
         )
 
     def slabs(self, area: float) -> None:
-        """Floor and ceiling slab, adiabatic at their back: one chain of nodes for both [area: both faces, m2]."""
+        """Floor and ceiling slab, adiabatic at their backs: a chain of nodes each, of one make [area: of each, m2]."""
         graph = self.graph
         layers = graph.structure.slab_nodes
         if layers == 0:
             return
         coupling = graph.parameter("slab_coupling", self.name)
         heat = graph.parameter("slab_heat_capacity", self.name)
-        nodes = graph.volumes("slab", np.full(layers, self.number))
-        self._slab = tuple(int(n) for n in nodes)
-        graph.capacity(graph.key("slab", self.name, "slab_heat_capacity"), heat, nodes, area / layers)
-        self.surface("slab", 2 * layers * coupling, nodes[0], area, depends=("slab_coupling",))
-        graph.face(graph.key("slab-slab", self.name, "slab_coupling"), layers * coupling, nodes[:-1], nodes[1:], area)
+        nodes = graph.volumes("slab", np.full(2 * layers, self.number)).reshape(2, layers)
+        self._floor, self._ceiling = (tuple(int(n) for n in chain) for chain in nodes)
+        graph.capacity(graph.key("slab", self.name, "slab_heat_capacity"), heat, nodes.ravel(), area / layers)
+        self.surface("slab", 2 * layers * coupling, nodes[:, 0], np.full(2, area), depends=("slab_coupling",))
+        near, far = nodes[:, :-1].ravel(), nodes[:, 1:].ravel()
+        graph.face(graph.key("slab-slab", self.name, "slab_coupling"), layers * coupling, near, far, area)
 
     def furniture(self, floor_area: float) -> None:
         """Furniture: one node, coupled to air and radiant node in the ratio of the films [floor_area: m2]."""
