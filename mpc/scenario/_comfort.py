@@ -79,7 +79,5 @@ class ComfortBand:
             Steps in the building's time zone.
         """
         occupied = self.occupied_share(grid) > 0.0
-        lower, upper = (
-            np.where(occupied, self.occupied[side], self.unoccupied[side]).astype(float) for side in (0, 1)
-        )
+        lower, upper = (np.where(occupied, self.occupied[side], self.unoccupied[side]).astype(float) for side in (0, 1))
         return lower, upper

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Literal, Protocol
 
@@ -139,6 +140,38 @@ def _month_hours(values: ArrayLike, name: str) -> FloatArray:
         expected = "24 finite numbers, or 12 rows of 24, one an hour of the local day"
         raise TariffError(describe(f"hourly rate: {name}", expected, f"shape {table.shape}"))
     return np.array(np.broadcast_to(table, (12, 24)))
+
+
+@dataclass(frozen=True, eq=False)
+class MonthlyRate:
+    """A rate that changes with the local month.
+
+    Parameters
+    ----------
+    values : sequence of float
+        January to December [1/kWh].
+
+    Raises
+    ------
+    TariffError
+        When there are not 12 finite numbers.
+    """
+
+    values: Sequence[float]
+
+    def __post_init__(self) -> None:
+        if np.shape(self.values) != (12,) or not np.isfinite(self.values).all():
+            raise TariffError(describe("monthly rate", "12 finite numbers", repr(self.values)))
+
+    def on(self, grid: StepGrid) -> FloatArray:
+        """Average over each step of a grid, shape (n_steps,) [per kWh].
+
+        Parameters
+        ----------
+        grid : StepGrid
+            Steps in the building's time zone.
+        """
+        return grid.mean(np.asarray(self.values, dtype=float)[np.asarray(grid.middles.month) - 1])
 
 
 @dataclass(frozen=True, eq=False)
