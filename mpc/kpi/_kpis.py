@@ -119,9 +119,10 @@ def measure_kpis(
 ) -> Kpis:
     """Measure a run on the plant's own steps.
 
-    Integrals are exact for what the plant says: powers are constant over its steps, temperatures straight lines between
-    their edges. So they do not depend on where a step is cut in two. BOPTEST (Blum et al. 2021,
-    doi:10.1080/19401493.2021.1986574) takes trapezoids of values every 30 s, which tend to the same as that time shrinks.
+    Integrals are exact for what the plant says: powers are constant over its steps, temperatures straight lines
+    between their edges. So they do not depend on where a step is cut in two. BOPTEST (Blum et al. 2021,
+    doi:10.1080/19401493.2021.1986574) takes trapezoids of values every 30 s, which tend to the same as that time
+    shrinks.
 
     Parameters
     ----------

@@ -47,10 +47,10 @@ class PaperReward:
     ``r = (u c - v f / f_max - w g / g_max) / (u + v + w)``, each term between -1 and 0. The paper gives the sum; how
     each term is normalised is that of its simulator (google/sbsim, SetpointEnergyCarbonRegretFunction):
 
-    - **comfort** c, ``productivity``: a person earns P_max an hour within the band, and ``P_max / (1 + e^{-s (m - d)})``
-      at a distance d outside of it: half at d = m. The sum over zones, weighed with their people, is at least P_min for
-      each, and ``c = (P - P_min) / (P_max - P_min) - 1``; 0 when nobody is in. (At the edge itself the curve jumps from
-      1 to ``1 / (1 + e^{-s m})``, 0.90 with the defaults, in the simulator too.)
+    - **comfort** c, ``productivity``: a person earns P_max an hour within the band, and
+      ``P_max / (1 + e^{-s (m - d)})`` at a distance d outside of it: half at d = m. The sum over zones, weighed with
+      their people, is at least P_min for each, and ``c = (P - P_min) / (P_max - P_min) - 1``; 0 when nobody is in. (At
+      the edge itself the curve jumps from 1 to ``1 / (1 + e^{-s m})``, 0.90 with the defaults, in the simulator too.)
     - **comfort** c, ``setpoint_deviation``: the paper's words instead: minus the mean over zones of d, occupied or not,
       as a share of `deviation_scale`, at most 1.
     - **cost** f: energy prices times powers, powers capped at their highest; f_max with the highest powers.

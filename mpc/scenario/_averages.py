@@ -59,9 +59,8 @@ def means_of_means(source: FloatArray, values: FloatArray, edges: FloatArray) ->
     same = source[start : start + len(edges)]
     if len(same) == len(edges) and (same == edges).all():
         return np.asarray(values[start : start + len(edges) - 1])
-    level = values.mean()  # keeps the digits of the differences
-    integral = np.concatenate([[0.0], np.cumsum((values - level) * np.diff(source))])
-    return np.asarray(level + np.diff(PchipInterpolator(source, integral)(edges)) / np.diff(edges))
+    integral = np.concatenate([[0.0], np.cumsum(values * np.diff(source))])
+    return np.asarray(np.diff(PchipInterpolator(source, integral)(edges)) / np.diff(edges))
 
 
 def means_by_shape(source: FloatArray, values: FloatArray, pieces: FloatArray, shape: FloatArray) -> FloatArray:

@@ -32,7 +32,7 @@ _QUANTITY = {"internal_gain": "power", "comfort_lower_temperature": "temperature
 
 
 def column_unit(column: str) -> str:
-    """Unit of a column of a forecast inside the library.
+    """Name the unit that a column of a forecast has inside the library.
 
     Parameters
     ----------
@@ -177,7 +177,7 @@ class Forecast:
             known = columns[k] in self.table
             near = "" if known else f" ({nearest(columns[k], self.table.columns)})"
             raise ForecastError(
-                f"forecast lacks {columns[k]!r}{near} for {count} of {len(index)} steps (first {first:%Y-%m-%d %H:%M}); "
-                f"{advice}"
+                f"forecast lacks {columns[k]!r}{near} for {count} of {len(index)} steps "
+                f"(first {first:%Y-%m-%d %H:%M}); {advice}"
             )
         return values

@@ -42,8 +42,7 @@ class ErrorGrowth:
     Parameters
     ----------
     deviation : float
-        Standard deviation σ at long leads, 0 or more; of the sun's irradiances relative to the truth
-        [K, m/s, W/m2 or -].
+        Standard deviation σ at long leads, 0 or more [K or m/s or W/m2; - for the sun: relative to the truth].
     time_constant : float
         τ [s], positive.
 
@@ -67,7 +66,7 @@ class ErrorGrowth:
             raise ForecastError(describe("error", "a deviation of 0 or more and a positive time", found))
 
     def after(self, lead: float) -> float:
-        """Standard deviation of the error after a lead [unit of the deviation].
+        """Tell the standard deviation of the error after a lead [unit of the deviation].
 
         Parameters
         ----------
@@ -93,8 +92,8 @@ class ErrorGrowth:
         return np.asarray(lfilter([1.0], [1.0, -keep], drive), dtype=float)
 
 
-#: Assumed errors, of the size that day-ahead numerical weather prediction has at a site: 2 K and 1.5 m/s, a third of the
-#: sun, 15 W/m2 of the sky. They are no fit to any service: replace them where one is known.
+#: Assumed errors, of the size that day-ahead numerical weather prediction has at a site: 2 K and 1.5 m/s, a third of
+#: the sun, 15 W/m2 of the sky. They are no fit to any service: replace them where one is known.
 DAY_AHEAD_ERRORS: Mapping[str, ErrorGrowth] = {
     "temperature": ErrorGrowth(2.0, 24 * 3600.0),
     "wind": ErrorGrowth(1.5, 12 * 3600.0),

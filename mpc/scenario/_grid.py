@@ -95,7 +95,7 @@ class StepGrid:
     @cached_property
     def edges(self) -> NDArray[np.int64]:
         """Starts and ends of the steps, shape (n_steps + 1,), seconds since 1970 in UTC [s]."""
-        return seconds_of(self.start) + np.arange(self.n_steps + 1, dtype=np.int64) * int(self.step)
+        return int(self.start.timestamp()) + np.arange(self.n_steps + 1, dtype=np.int64) * int(self.step)
 
     @cached_property
     def per_step(self) -> int:
@@ -127,22 +127,13 @@ class StepGrid:
         ndarray, shape (n_steps,)
             Means over the steps [as given].
         """
-        return np.asarray(pieces, dtype=float).reshape(self.n_steps, self.per_step).mean(axis=1)
+        parts = np.asarray(pieces, dtype=float).reshape(self.n_steps, self.per_step)
+        first = parts[:, 0]  # so that the mean of equal values is that value, to the last digit
+        return np.asarray(first + (parts - first[:, None]).mean(axis=1))
 
     def _times(self, first: float, spacing: float, count: int) -> pd.DatetimeIndex:
         start = self.start + pd.Timedelta(seconds=first)
         return pd.date_range(start, periods=count, freq=pd.Timedelta(seconds=spacing), name="timestamp")
-
-
-def seconds_of(time: pd.Timestamp) -> int:
-    """Seconds since 1970 in UTC [s].
-
-    Parameters
-    ----------
-    time : pandas.Timestamp
-        With a time zone.
-    """
-    return int(time.timestamp())
 
 
 def index_seconds(stamps: pd.DatetimeIndex) -> NDArray[np.int64]:
@@ -198,7 +189,7 @@ class Calendar:
             Local.
         """
         number, days = pd.factorize(times.tz_localize(None).normalize())
-        return np.asarray(self.kind(days.date)[number])
+        return np.asarray(self.kind(pd.DatetimeIndex(days).date)[number])
 
 
 def local_hours(times: pd.DatetimeIndex) -> FloatArray:

@@ -129,7 +129,7 @@ class ScheduledOccupancy:
         return np.outer(share, self.people(zones))
 
     def draw(self, grid: StepGrid, zones: Sequence[str], seed: int) -> FloatArray:
-        """The same as `expected`: nothing is random.
+        """Repeat what is `expected`: nothing is random.
 
         Parameters
         ----------
@@ -150,8 +150,8 @@ class RandomOccupancy:
     ``exponential`` is the law of the paper's simulator in continuous time: from the window's opening a person arrives,
     and departs, at the constant rate ``2 / W`` (W the window's length), so that half the window is the mean. Who has
     not arrived when the window closes stays away that day (13.5 %); who has not left by its close leaves then.
-    ``uniform`` is what the name says: everybody comes. Arrivals end before departures begin, so that the chance to be in
-    is ``F_a(t) (1 - F_d(t))``.
+    ``uniform`` is what the name says: everybody comes. Arrivals end before departures begin, so that the chance to be
+    in is ``F_a(t) (1 - F_d(t))``.
 
     Parameters
     ----------

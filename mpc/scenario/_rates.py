@@ -131,7 +131,7 @@ def by_month_and_hour(weekday: FloatArray, weekend: FloatArray, calendar: Calend
     """
     times = grid.middles
     month, hour = np.asarray(times.month) - 1, np.asarray(times.hour)
-    return np.where(calendar.kinds_on(times) == WEEKDAY, weekday[month, hour], weekend[month, hour])
+    return np.asarray(np.where(calendar.kinds_on(times) == WEEKDAY, weekday[month, hour], weekend[month, hour]))
 
 
 def _month_hours(values: ArrayLike, name: str) -> FloatArray:

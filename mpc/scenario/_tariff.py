@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from mpc.errors import TariffError
@@ -133,9 +132,10 @@ class DemandCharge:
     rates : sequence of float
         Charge of each period [currency/kW].
     weekday : array_like of int, shape (12, 24)
-        Period of each month and local hour, numbers into `rates`; -1 is free. Default: period 0 always, a flat charge.
+        Period of each month and local hour [-], numbers into `rates`; -1 is free. Default: period 0 always, a flat
+        charge.
     weekend : array_like of int, shape (12, 24)
-        The same for Saturdays, Sundays and holidays; default as on weekdays.
+        The same for Saturdays, Sundays and holidays [-]; default as on weekdays.
     window : float
         Length of the mean [s]; default a quarter of an hour, as BOPTEST's peaks and most tariffs have it.
     name : str
@@ -150,6 +150,7 @@ class DemandCharge:
 
     Examples
     --------
+    >>> import pandas as pd
     >>> flat = DemandCharge([12.5])
     >>> hours = StepGrid(pd.Timestamp("2023-07-31 22:00", tz="America/Chicago"), 3600.0, 4)
     >>> flat.on(hours).names, flat.on(hours).cost([5000.0, 3000.0, 1000.0, 2000.0])

@@ -77,7 +77,7 @@ def read_urdb(
     tables = [prices[table] + adjustment[:, None] for table in (weekday, weekend)]
     demand = _demand(item, tier, days, where)
     name = " ".join(str(item[key]) for key in ("utility", "name") if item.get(key))
-    return Tariff(HourlyRate(*tables, days), gas, demand, "USD", name)
+    return Tariff(HourlyRate(tables[0], tables[1], days), gas, demand, "USD", name)
 
 
 def _item(source: str | Path | Mapping[str, Any]) -> tuple[Mapping[str, Any], str]:
@@ -104,8 +104,8 @@ def _demand(item: Mapping[str, Any], tier: int | None, days: Calendar, where: st
         charges.append(DemandCharge(rates.tolist(), np.repeat(months[:, None], 24, axis=1), None, window, "flat", days))
     if item.get("demandratestructure"):
         rates = _prices(item, "demandratestructure", tier, where, "kW", item.get("demandrateunit"))
-        tables = [_schedule(item, f"demand{day}schedule", len(rates), where) for day in ("weekday", "weekend")]
-        charges.append(DemandCharge(rates.tolist(), *tables, window, "time of use", days))
+        week, end = (_schedule(item, f"demand{day}schedule", len(rates), where) for day in ("weekday", "weekend"))
+        charges.append(DemandCharge(rates.tolist(), week, end, window, "time of use", days))
     return [charge for charge in charges if any(charge.rates)]
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
@@ -54,6 +54,8 @@ class Weather:
         step. Irradiances are means over the step always.
     typical : bool
         True for a year of hours that stands for any year: it repeats, and 29 February is like the day before.
+    step : float
+        Length of a step [s]; default 0: the time between stamps. Needed for a single row.
 
     Raises
     ------
@@ -65,15 +67,15 @@ class Weather:
     location: Location
     readings: bool = False
     typical: bool = False
-    step: float = field(init=False)
+    step: float = 0.0
 
     def __post_init__(self) -> None:
         index = self.frame.index
-        if not isinstance(index, pd.DatetimeIndex) or index.tz is None or len(index) < 2:
+        if not isinstance(index, pd.DatetimeIndex) or index.tz is None or len(index) < 1 + (not self.step):
             found = f"{len(index)} of {index.dtype}"
             raise WeatherError(describe("weather", "at least two stamps with a time zone", found))
-        gaps = np.diff(index_seconds(index))
-        uneven = (gaps != gaps[0]) | (gaps <= 0) | (gaps > _LONGEST_STEP)
+        gaps = np.diff(index_seconds(index)) if len(index) > 1 else np.array([int(self.step)])
+        uneven = (gaps != gaps[0]) | (gaps <= 0) | (gaps > max(_LONGEST_STEP, self.step))
         if uneven.any():
             row = int(np.argmax(uneven))
             found = f"{index[row + 1]} after {index[row]}"
@@ -185,7 +187,7 @@ class Weather:
             values = source.frame[point].interpolate(limit_direction="both").to_numpy(dtype=float)
             mean = source._means(str(point), values, grid, sun)
             columns[str(point)] = mean if whole.all() else np.where(_covered(source, whole, grid), mean, np.nan)
-        return Weather(pd.DataFrame(columns, index=grid.stamps), self.location)
+        return Weather(pd.DataFrame(columns, index=grid.stamps), self.location, step=grid.step)
 
     def _means(self, point: str, values: FloatArray, grid: StepGrid, sun: _Pieces | None) -> FloatArray:
         stamps, edges = index_seconds(self.stamps).astype(float), grid.edges.astype(float)
@@ -199,7 +201,8 @@ class Weather:
             return np.asarray(fine[start : start + grid.n_steps * count].reshape(grid.n_steps, count).mean(axis=1))
         if point == DIRECTION:
             angle = np.radians(values)
-            east, north = (self._plain(part, bounds, edges) for part in (np.sin(angle), np.cos(angle)))
+            # 2 is added since a monotone cubic stands still where what it integrates changes its sign.
+            east, north = (self._plain(part + 2.0, bounds, edges) - 2.0 for part in (np.sin(angle), np.cos(angle)))
             return np.asarray(np.degrees(np.arctan2(east, north)) % 360.0)
         if point in SUN_POINTS or point == SKY:
             return means_of_means(bounds, values, edges)
@@ -261,7 +264,7 @@ class _Pieces(NamedTuple):
 
 
 def _covered(source: Weather, known: NDArray[np.bool_], grid: StepGrid) -> NDArray[np.bool_]:
-    """Steps of a grid that lie wholly within known intervals of the source."""
+    """Find the steps of a grid that lie wholly within known intervals of the source."""
     stamps = index_seconds(source.stamps)
     gap = np.concatenate([[0], np.cumsum(~known)])
     first = np.clip(np.searchsorted(stamps, grid.edges[:-1], side="right"), 0, len(known))

@@ -237,5 +237,5 @@ def weather_of_case(case: Case, longest_gap: float = 3600.0) -> Weather:
     for point in frame:
         empty = frame[point].isna()
         length = empty.groupby((~empty).cumsum()).transform("sum")
-        frame[point] = filled[point].where(length <= steps)
+        frame[point] = filled[point].where(~empty | (length <= steps))
     return Weather(frame, case.building.location)
