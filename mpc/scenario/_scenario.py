@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -60,6 +60,10 @@ class Scenario:
         Of the prices.
     carbon_kind : str
         ``average`` or ``marginal``; empty when emissions are not counted.
+    people : Occupancy
+        Where the people come from.
+    heat : InternalGains
+        What they and their equipment give off.
     """
 
     building: Building
@@ -80,6 +84,20 @@ class Scenario:
     demand: tuple[DemandBuckets, ...]
     currency: str
     carbon_kind: str
+    people: Occupancy
+    heat: InternalGains
+
+    def redrawn(self, seed: int) -> Scenario:
+        """Let other people come and go, as for the next episode of a training; all else stays.
+
+        Parameters
+        ----------
+        seed : int
+            Same seed, same people at the same times; 0 or more.
+        """
+        drawn = self.people.draw(self.grid, self.zones, seed)
+        gains = self.heat.heat(drawn, self.people.people(self.zones), self.areas)
+        return replace(self, occupancy=drawn, gains=gains, latent=self.heat.moisture_heat(drawn))
 
     @property
     def zones(self) -> tuple[str, ...]:
@@ -189,6 +207,8 @@ def build_scenario(
         demand=tuple(charge.on(grid) for charge in tariff.demand),
         currency=tariff.currency,
         carbon_kind="" if carbon is None else carbon.kind,
+        people=people,
+        heat=heat,
     )
 
 

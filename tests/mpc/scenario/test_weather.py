@@ -80,7 +80,7 @@ def test_radiation_follows_the_sun_within_the_hour() -> None:
 
 
 def test_beam_and_diffuse_add_up_as_in_the_hour() -> None:
-    minute, hour = clear_day("2023-03-20")
+    _, hour = clear_day("2023-03-20")
     fine = Weather(hour, BAY).on(grid("2023-03-20", 300.0, 288))
     place = get_solarposition(
         fine.stamps - pd.Timedelta("150s"), BAY.latitude, BAY.longitude, BAY.elevation

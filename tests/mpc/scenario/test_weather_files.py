@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 import pvlib
 import pytest
+from pvlib.iotools import read_epw as pvlib_epw
 from pvlib.iotools import read_tmy3 as pvlib_tmy3
 
 from mpc.errors import WeatherError
@@ -84,6 +85,10 @@ def test_energyplus_files_are_read() -> None:
     weather = read_epw(file)
     weather.require([AIR, WIND, FROM, GLOBAL, SKY])
     assert weather.frame[AIR].mean() == pytest.approx(273.15 + 13.8, abs=0.2)  # the site's known mean
+    data, _ = pvlib_epw(str(file), coerce_year=2023)
+    air, dew = (data[name].to_numpy(dtype=float) + 273.15 for name in ("temp_air", "temp_dew"))
+    sky = sky_radiation(air, dew, data["opaque_sky_cover"].to_numpy(dtype=float))
+    assert np.abs(sky - weather.frame[SKY].to_numpy()).mean() < 3.0  # the file's own, by the same model
 
 
 def test_csv_in_units_of_its_own(tmp_path: Path) -> None:
