@@ -55,7 +55,7 @@ class Weather:
     typical : bool
         True for a year of hours that stands for any year: it repeats, and 29 February is like the day before.
     step : float
-        Length of a step [s]; default 0: the time between stamps. Needed for a single row.
+        Length of a step [s]; default 0: the time between stamps, which a single row does not tell.
 
     Raises
     ------
@@ -75,7 +75,7 @@ class Weather:
             found = f"{len(index)} of {index.dtype}"
             raise WeatherError(describe("weather", "at least two stamps with a time zone", found))
         gaps = np.diff(index_seconds(index)) if len(index) > 1 else np.array([int(self.step)])
-        uneven = (gaps != gaps[0]) | (gaps <= 0) | (gaps > max(_LONGEST_STEP, self.step))
+        uneven = (gaps != (self.step or gaps[0])) | (gaps <= 0) | (gaps > max(_LONGEST_STEP, self.step))
         if uneven.any():
             row = int(np.argmax(uneven))
             found = f"{index[row + 1]} after {index[row]}"

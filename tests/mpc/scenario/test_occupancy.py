@@ -65,6 +65,13 @@ def test_the_chance_worked_by_hand() -> None:
     assert RandomOccupancy(law="uniform").chance([7.5, 12.5, 18.0]).tolist() == [0.5, 1.0, 0.5]
 
 
+def test_the_chance_is_that_of_trials_in_every_step() -> None:
+    # the paper's simulator tries each 5 minutes with the chance 2 / (steps of the window)
+    steps = np.arange(108)
+    tried = 1.0 - (1.0 - 2.0 / 108.0) ** steps
+    assert RandomOccupancy().chance(3.0 + steps / 12.0) == pytest.approx(tried, abs=0.006)
+
+
 @pytest.mark.parametrize("law", LAWS)
 def test_draws_have_the_expected_mean(law: str) -> None:
     people = RandomOccupancy(400.0, law=law)  # type: ignore[arg-type]

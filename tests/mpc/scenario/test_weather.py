@@ -150,6 +150,8 @@ def test_what_is_no_weather_is_refused() -> None:
         (pd.DataFrame({AIR: [1.0] * 4}, index=index.tz_localize(None)), {}, "time zone"),
         (pd.DataFrame({AIR: [1.0] * 3}, index=index[[0, 1, 3]]), {}, "03:00:00.* after"),
         (pd.DataFrame({"air": [1.0] * 4}, index=index), {}, "a weather point"),
+        (pd.DataFrame({AIR: [1.0] * 4}, index=index), {"step": 600.0}, "one step of up to"),
+        (pd.DataFrame({AIR: [1.0]}, index=index[:1]), {}, "at least two stamps"),
         (pd.DataFrame({AIR: [1.0] * 4}, index=index), {"typical": True}, "8760 hours"),
     ):
         with pytest.raises(WeatherError, match=message):
