@@ -5,3 +5,23 @@ from __future__ import annotations
 
 class MpcError(Exception):
     """Base of every error that `mpc` raises on purpose."""
+
+
+class ScenarioError(MpcError):
+    """What drives a closed loop is inconsistent, or does not cover the time asked for."""
+
+
+class WeatherError(ScenarioError):
+    """Weather that cannot be read, or lacks what is needed of it."""
+
+
+class TariffError(ScenarioError):
+    """A tariff that cannot be read, or has a part that is not supported."""
+
+
+class ForecastError(ScenarioError):
+    """A forecast that lacks a column or a step."""
+
+
+class KpiError(MpcError):
+    """A record of a closed loop that cannot be measured."""

@@ -1,0 +1,16 @@
+"""How well a closed loop did: BOPTEST's indicators, and the rewards of its steps."""
+
+from mpc.kpi._kpis import PEAK_WINDOW, Kpis, ZoneComfort, measure_kpis
+from mpc.kpi._record import PlantRecord
+from mpc.kpi._rewards import PaperReward, RewardTerms, StageCost
+
+__all__ = [
+    "PEAK_WINDOW",
+    "Kpis",
+    "PaperReward",
+    "PlantRecord",
+    "RewardTerms",
+    "StageCost",
+    "ZoneComfort",
+    "measure_kpis",
+]

@@ -1,0 +1,203 @@
+"""The clock of a closed loop: regular steps in the building's time zone, and its calendar."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from datetime import date, datetime
+from functools import cached_property
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from mpc.errors import ScenarioError
+from thermal import Building, local_timestamp
+from thermal.errors import describe
+
+FloatArray = NDArray[np.float64]
+
+#: Local clocks, schedules and tariffs change on multiples of this [s]; offsets of time zones are whole quarter hours.
+RESOLUTION = 300
+
+WEEKDAY, SATURDAY, SUNDAY = 0, 1, 2  # kinds of a day; a holiday is like a Sunday
+
+
+@dataclass(frozen=True)
+class StepGrid:
+    """Regular steps of time, each known by the stamp at its end.
+
+    Parameters
+    ----------
+    start : pandas.Timestamp
+        Start of the first step, in the building's time zone; a whole second.
+    step : float
+        Length of a step [s], a whole number.
+    n_steps : int
+        Number of steps, at least 1.
+
+    Raises
+    ------
+    ScenarioError
+        When the start has no time zone, or a number is out of range.
+
+    Examples
+    --------
+    >>> day = StepGrid(pd.Timestamp("2023-03-26", tz="Europe/Berlin"), 3600.0, 23)  # clocks go forward
+    >>> day.stamps[-1].isoformat()
+    '2023-03-27T00:00:00+02:00'
+    """
+
+    start: pd.Timestamp
+    step: float
+    n_steps: int
+
+    def __post_init__(self) -> None:
+        if self.start.tzinfo is None or self.start.microsecond:
+            raise ScenarioError(describe("start", "a whole second in a time zone", repr(self.start)))
+        if not (self.step >= 1 and float(self.step).is_integer() and self.n_steps >= 1):
+            found = f"{self.n_steps} steps of {self.step} s"
+            raise ScenarioError(describe("grid", "at least one step of a whole number of seconds", found))
+
+    @classmethod
+    def between(cls, start: str | datetime, end: str | datetime, step: float, building: Building) -> StepGrid:
+        """Cover a stretch of local time.
+
+        Parameters
+        ----------
+        start, end : str or datetime
+            ISO 8601; without an offset local to the building.
+        step : float
+            Length of a step [s].
+        building : Building
+            Whose clock counts.
+
+        Raises
+        ------
+        ScenarioError
+            When there is not a whole number of steps between them, at least one.
+        InvalidTimeError
+            When a time cannot be read, or is one that the local clock skips or shows twice.
+        """
+        first, last = (local_timestamp(time, building) for time in (start, end))
+        count = (last - first).total_seconds() / step if step > 0 else 0.0
+        if count < 1 or not count.is_integer():
+            expected = f"a whole number of steps of {step:g} s from start to end"
+            raise ScenarioError(describe("grid", expected, f"{first} to {last}"))
+        return cls(first, step, int(count))
+
+    @cached_property
+    def stamps(self) -> pd.DatetimeIndex:
+        """Ends of the steps, shape (n_steps,), local."""
+        return self._times(self.step, self.step, self.n_steps)
+
+    @cached_property
+    def edges(self) -> NDArray[np.int64]:
+        """Starts and ends of the steps, shape (n_steps + 1,), seconds since 1970 in UTC [s]."""
+        return int(self.start.timestamp()) + np.arange(self.n_steps + 1, dtype=np.int64) * int(self.step)
+
+    @cached_property
+    def per_step(self) -> int:
+        """Pieces of a step; within a piece no local clock, schedule or tariff changes."""
+        return int(self.step) // math.gcd(int(self.step), RESOLUTION, int(self.edges[0]))
+
+    @cached_property
+    def middles(self) -> pd.DatetimeIndex:
+        """Middles of the pieces, shape (n_steps * per_step,), local."""
+        piece = self.step / self.per_step
+        return self._times(piece / 2.0, piece, self.n_steps * self.per_step)
+
+    @cached_property
+    def days(self) -> tuple[date, ...]:
+        """Local days that the grid touches, in order."""
+        last = self.stamps[-1] - pd.Timedelta(seconds=1)
+        return tuple(pd.date_range(self.start.date(), last.date()).date)
+
+    def mean(self, pieces: FloatArray) -> FloatArray:
+        """Average what is known at the pieces over each step.
+
+        Parameters
+        ----------
+        pieces : ndarray, shape (n_steps * per_step,)
+            A value a piece [any].
+
+        Returns
+        -------
+        ndarray, shape (n_steps,)
+            Means over the steps [as given].
+        """
+        parts = np.asarray(pieces, dtype=float).reshape(self.n_steps, self.per_step)
+        first = parts[:, 0]  # so that the mean of equal values is that value, to the last digit
+        return np.asarray(first + (parts - first[:, None]).mean(axis=1))
+
+    def _times(self, first: float, spacing: float, count: int) -> pd.DatetimeIndex:
+        start = self.start + pd.Timedelta(seconds=first)
+        return pd.date_range(start, periods=count, freq=pd.Timedelta(seconds=spacing), name="timestamp")
+
+
+def index_seconds(stamps: pd.DatetimeIndex) -> NDArray[np.int64]:
+    """Seconds since 1970 in UTC [s].
+
+    Parameters
+    ----------
+    stamps : DatetimeIndex
+        With a time zone.
+    """
+    return np.asarray(stamps.as_unit("s").asi8, dtype=np.int64)
+
+
+@dataclass(frozen=True)
+class Calendar:
+    """Which days are working days.
+
+    Parameters
+    ----------
+    holidays : iterable of datetime.date
+        Local days that count as Sundays, such as those of `pandas.tseries.holiday.USFederalHolidayCalendar`. Default
+        none.
+
+    Examples
+    --------
+    >>> Calendar([date(2023, 7, 4)]).kind([date(2023, 7, 3), date(2023, 7, 4), date(2023, 7, 8)]).tolist()
+    [0, 2, 1]
+    """
+
+    holidays: Iterable[date] = field(default_factory=frozenset)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "holidays", frozenset(pd.Timestamp(day).date() for day in self.holidays))
+
+    def kind(self, days: Iterable[date]) -> NDArray[np.int64]:
+        """Tell the kinds of days: 0 a weekday, 1 a Saturday, 2 a Sunday or holiday.
+
+        Parameters
+        ----------
+        days : iterable of datetime.date
+            Local days.
+        """
+        holidays = frozenset(self.holidays)
+        kinds = (SUNDAY if day in holidays else max(day.weekday() - 4, WEEKDAY) for day in days)
+        return np.fromiter(kinds, dtype=np.int64)
+
+    def kinds_on(self, times: pd.DatetimeIndex) -> NDArray[np.int64]:
+        """Tell the kind of the day of each time.
+
+        Parameters
+        ----------
+        times : DatetimeIndex
+            Local.
+        """
+        number, days = pd.factorize(times.tz_localize(None).normalize())
+        return np.asarray(self.kind(pd.DatetimeIndex(days).date)[number])
+
+
+def local_hours(times: pd.DatetimeIndex) -> FloatArray:
+    """Hour that the local clock shows, with its fraction [h].
+
+    Parameters
+    ----------
+    times : DatetimeIndex
+        Local.
+    """
+    return np.asarray(times.hour + times.minute / 60.0 + times.second / 3600.0, dtype=float)
