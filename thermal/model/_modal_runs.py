@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal.model._modal import SHIFT, ModalModel, divided_differences, modal_model, propagator_functions
-from thermal.model._modal_held import HeldFrame, scan, scan_at
+from thermal.model._modal_held import HeldFrame, HeldRun
 from thermal.model._scheme import Scheme
 
 if TYPE_CHECKING:
@@ -96,11 +96,19 @@ class ModalRuns:
     def __init__(self, matrices: Matrices) -> None:
         self.matrices = matrices
         self.modes = modal_model(matrices)
+        self._frames: dict[bytes, HeldFrame] = {}
 
     @cached_property
     def slopes(self) -> _ModalSlopes:
         """Derivatives of the matrices in the modes."""
         return _ModalSlopes(self.matrices, self.modes)
+
+    def _frame(self, held: NDArray[np.bool_]) -> HeldFrame:
+        """Frame of held zones; a spin-up needs it for its steady state, its steps and its derivatives."""
+        key = held.tobytes()
+        if key not in self._frames:
+            self._frames[key] = HeldFrame(self.modes, held)
+        return self._frames[key]
 
     @property
     def heated_as_observed(self) -> bool:
@@ -288,48 +296,19 @@ class ModalRuns:
             Kept states (n, m) and derivatives (n, n_parameter m) parameter by parameter, or None.
         """
         modes, count = self.modes, int(keep[-1]) + 1
-        held = np.isfinite(zone[0])
-        frame = HeldFrame(modes, held)
-        inputs = np.hstack([boundary[:count], heat[:count] * ~held]).T
-        start = modes.coordinates @ states[:, 0]
-        wanted = np.vstack([modes.observation[held] @ start, zone[:count, held]]).T
-        push = step * ((frame.basis.T @ np.hstack([modes.boundary, modes.heating])) @ inputs)
-        push -= frame.coupling @ (np.diff(wanted) - step * SHIFT * wanted[:, 1:])
-        inner = scan(frame.capacity, step, frame.basis.T @ (start - frame.lift @ wanted[:, 0]), push)
-        path = frame.lift @ wanted + frame.basis @ inner
-        kept = modes.states @ path[:, keep + 1]
+        start, frame = modes.coordinates @ states[:, 0], self._frame(np.isfinite(zone[0]))
+        run = HeldRun(modes, frame, start, boundary[:count], heat[:count], zone[:count], step)
+        kept = modes.states @ run.states(keep)
         if slopes is None:
             return kept, None
-        change, after = np.diff(path), path[:, 1:]
-        begin = modes.coordinates @ slopes
-        lifted = modes.observation[held] @ begin  # of the held means at the start, nothing from there on
-        first = frame.basis.T @ (begin - frame.lift @ lifted)
+        begin, turn = modes.coordinates @ slopes, modes.states @ frame.basis
         out = np.empty((states.shape[0], len(self.slopes), keep.size))
-        together = max(1, _LARGEST // (count * first.shape[0]))
+        together = max(1, _LARGEST // (run.gain.size + keep.size * run.stay.size))
         for low in range(0, len(self.slopes), together):
             part = range(low, min(low + together, len(self.slopes)))
-            sources = [self._held_source(frame, j, change, after, boundary[:count], step) for j in part]
-            source = np.stack(sources, axis=1)
-            source[0] += (frame.coupling @ lifted[:, part]).T
-            turned = scan_at(frame.capacity, step, first[:, part].T, source, keep)
-            out[:, part] = np.tensordot(modes.states @ frame.basis, turned, axes=(1, 2)).transpose(0, 2, 1)
+            moved = run.slopes(self.slopes, part, begin[:, part], keep)
+            out[:, part] = np.tensordot(turn, moved, axes=(1, 2)).transpose(0, 2, 1)
         return kept, out.reshape(states.shape[0], -1)
-
-    def _held_source(
-        self, frame: HeldFrame, j: int, change: FloatArray, after: FloatArray, boundary: FloatArray, step: float
-    ) -> FloatArray:
-        """Source of one parameter's slopes in every held step, (n_time, r)."""
-        tables = (self.slopes.capacity, self.slopes.stiffness, self.slopes.boundary)
-        capacity, stiffness, moved = (table[j] for table in tables)
-        source = np.zeros((change.shape[1], frame.capacity.size))
-        if capacity is not None:
-            source -= change.T @ (frame.basis.T @ capacity).T
-        if stiffness is not None:
-            source -= step * (after.T @ (frame.basis.T @ stiffness).T)
-        if moved is not None:
-            used = np.flatnonzero(np.any(moved, axis=0))
-            source += step * (boundary[:, used] @ (frame.basis.T @ moved[:, used]).T)
-        return source
 
     def held_response(self, held: NDArray[np.bool_], step: float) -> FloatArray:
         """States at the end of a held step per kelvin of each held zone mean, shape (n, n_held) [K/K].
@@ -341,7 +320,7 @@ class ModalRuns:
         step : float
             Time step [s].
         """
-        frame = HeldFrame(self.modes, held)
+        frame = self._frame(held)
         system = frame.capacity + step * (1.0 - SHIFT * frame.capacity)
         inner = -(frame.coupling * (1.0 - step * SHIFT)) / system[:, None]
         return np.asarray(self.modes.states @ (frame.lift + frame.basis @ inner))
@@ -365,7 +344,7 @@ class ModalRuns:
         ndarray, shape (n, m, 1 + n_held)
             All boundaries together, then every held zone [K/K].
         """
-        frame = HeldFrame(self.modes, held)
+        frame = self._frame(held)
         conductance = 1.0 - SHIFT * frame.capacity
         temperatures = self.modes.boundary.shape[1] - self.modes.n_signal
         outside = frame.basis.T @ self.modes.boundary[:, :temperatures].sum(axis=1)
