@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from _energyplus import Objects
 
 from energyplus_trials.specification import Fabric
 
@@ -25,7 +26,6 @@ THERMAL_ABSORPTANCE = 0.9
 INSIDE_SOLAR_ABSORPTANCE = 0.6
 NO_SOLAR_ABSORPTANCE = 0.001  # EnergyPlus wants more than 0
 
-Objects = dict[str, dict[str, dict[str, Any]]]
 Layers = list[tuple[str, float]]  # of a solid and its thickness [m], or of "" and a resistance [m2 K/W]
 
 

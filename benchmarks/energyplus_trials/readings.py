@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 import pandas as pd
+from _energyplus import SITE_OUTPUTS
 from numpy.typing import NDArray
 
 from energyplus_trials import climate, model
@@ -112,7 +113,7 @@ def check_run(spec: TrialSpec, results: pd.DataFrame, weather: pd.DataFrame) -> 
     EnergyPlusRunError
         One of them differs.
     """
-    for point in model.SITE_OUTPUTS:
+    for point in SITE_OUTPUTS:
         if point == "wind_direction_sensor":  # 0 is 360
             continue
         # in the mean, since EnergyPlus's own sun rises a minute earlier or later

@@ -1,6 +1,6 @@
 """A reduced model while some of its zones are held: their means are a constraint, the rest decouples in turn.
 
-With decay ``a_i`` of mode i in a step and ``F_i[x](k) = Σ_t<=k a_i^(k-t) x_t``, slopes need ``F_i`` of the path of every
+With decay ``a_i`` of mode i in a step and ``F_i[x](k) = Σ_t<=k a_i^(k-t) x_t``, slopes need ``F_i`` of the path of each
 other mode. That path ``ζ_j(t) = a_j ζ_j(t-1) + g_j(t)`` is itself such a sum, of inputs, so that
 ``Σ_t<=k a_i^(k-t) ζ_j(t-1) = (a_i^k ζ_j(0) + F_i[g_j](k) - ζ_j(k)) / (a_i - a_j)``: the inputs' sums serve all
 parameters, and none of them costs a product over all steps. Modes that decay alike are summed step by step.
