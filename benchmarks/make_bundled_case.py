@@ -18,8 +18,8 @@ from datetime import date, timedelta
 from pathlib import Path
 
 import pandas as pd
-from _energyplus import SITE_OUTPUTS, STEPS_PER_HOUR
 from energyplus_case import folder, model, run, sensors
+from energyplus_trials.frame import SITE_OUTPUTS, STEPS_PER_HOUR
 from rich.logging import RichHandler
 
 from thermal.case import load_case

@@ -4,7 +4,7 @@ from datetime import date
 from pathlib import Path
 from typing import Any
 
-from _energyplus import SITE_OUTPUTS, STEPS_PER_HOUR, Objects, frame
+from energyplus_trials.frame import SITE_OUTPUTS, STEPS_PER_HOUR, Objects, frame
 
 from energyplus_case import layout, materials
 

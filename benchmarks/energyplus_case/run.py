@@ -10,7 +10,7 @@ from datetime import date
 from pathlib import Path
 
 import pandas as pd
-from _energyplus import SITE_OUTPUTS, STEPS_PER_HOUR
+from energyplus_trials.frame import SITE_OUTPUTS, STEPS_PER_HOUR
 
 from energyplus_case import layout, model
 from energyplus_case.thermostats import setpoints

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pandas as pd
-from _energyplus import SITE_OUTPUTS
+from energyplus_trials.frame import SITE_OUTPUTS
 
 from energyplus_case import layout, model
 from energyplus_case.run import EnergyPlusError

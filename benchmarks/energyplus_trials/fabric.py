@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from _energyplus import Objects
 
+from energyplus_trials.frame import Objects
 from energyplus_trials.specification import Fabric
 
 # Conductivity [W/m/K], density [kg/m3], heat capacity [J/kg/K]: usual design values of ISO 10456, rounded.

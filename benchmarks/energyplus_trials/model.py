@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 import pandas as pd
-from _energyplus import Objects, frame
 
 from energyplus_trials import fabric, plan, terminals
+from energyplus_trials.frame import Objects, frame
 from energyplus_trials.specification import TrialSpec
 
 ZONE_OUTPUTS = {

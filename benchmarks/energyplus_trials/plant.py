@@ -15,11 +15,11 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from _energyplus import SITE_OUTPUTS, Objects
 from numpy.typing import NDArray
 
 from energyplus_trials import climate, model, terminals
 from energyplus_trials.errors import EnergyPlusMissingError, EnergyPlusRunError
+from energyplus_trials.frame import SITE_OUTPUTS, Objects
 from energyplus_trials.specification import TrialSpec
 
 RUN_IN_DAYS = 10

@@ -6,11 +6,11 @@ from collections.abc import Mapping
 
 import numpy as np
 import pandas as pd
-from _energyplus import SITE_OUTPUTS
 from numpy.typing import NDArray
 
 from energyplus_trials import climate, model
 from energyplus_trials.errors import EnergyPlusRunError
+from energyplus_trials.frame import SITE_OUTPUTS
 from energyplus_trials.specification import TrialSpec, stream_generator
 
 AIR_HEAT_CAPACITY = 1006.0  # [J/kg/K], of the case format
