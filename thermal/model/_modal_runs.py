@@ -7,6 +7,7 @@ With ``S = (K + s C)^-1 C`` a step is ``x' = f(S) x + g(S) (K + s C)^-1 b``, and
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -94,7 +95,8 @@ class ModalRuns:
     """
 
     def __init__(self, matrices: Matrices) -> None:
-        self.matrices = matrices
+        # a copy, as matrices keep their runs: what refers to each other stays in memory until it is looked for
+        self.matrices = replace(matrices)
         self.modes = modal_model(matrices)
         self._frames: dict[bytes, HeldFrame] = {}
 
