@@ -202,7 +202,7 @@ def _nominal(named: Mapping[str, Parameter], told: set[str], name: str, value: f
     """Say what a nominal value hides: a density, that only its product with the heat capacity counts."""
     base = name.removesuffix(_DENSITY)
     partners = [p.name for p in named.values() if p.base == base + _CAPACITY]
-    thing, number = base.replace("_", " "), f"{value:g} {unit(of)}"
+    thing, number = base.replace("_", " "), f"{value:g}" if of == "1" else f"{value:g} {unit(of)}"
     stays = f"the density stays at its nominal {number}"
     if name.endswith(_DENSITY) and partners and set(partners) <= told:
         return f"Only the product density × heat capacity of the {thing} is determined: {stays}."

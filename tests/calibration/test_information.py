@@ -233,7 +233,7 @@ def test_densities_enter_as_products() -> None:
         "120 kg/m³.",
     )
     other = informed(names, [[20.0, 0.0]], nominal={"emissivity": (0.9, "1")})
-    assert other.sentences[-1] == "Emissivity enters only as a product and stays at its nominal 0.9 1."
+    assert other.sentences[-1] == "Emissivity enters only as a product and stays at its nominal 0.9."
 
 
 def test_strong_correlations_are_named() -> None:

@@ -27,7 +27,7 @@ _ALIKE = 1e-5
 _TOGETHER = 2048
 
 
-class Derivatives(Protocol):
+class _Derivatives(Protocol):
     """Derivatives of a reduced model's matrices in its modes: see `thermal.model._modal_runs`."""
 
     capacity: list[FloatArray | None]
@@ -107,13 +107,13 @@ class HeldRun:
         frame = self.frame
         return np.asarray(frame.lift @ self.wanted[keep + 1].T + frame.basis @ self.path[keep + 1].T)
 
-    def slopes(self, derivatives: Derivatives, part: range, begin: FloatArray, keep: IntArray) -> FloatArray:
+    def slopes(self, derivatives: _Derivatives, part: range, begin: FloatArray, keep: IntArray) -> FloatArray:
         """Differentiate ζ after some steps with respect to some parameters, shape (n_keep, n_part, q).
 
         Parameters
         ----------
-        derivatives : Derivatives
-            Of the matrices.
+        derivatives : object
+            ``capacity``, ``stiffness`` and ``boundary``: derivatives of the matrices in the modes, by parameter.
         part : range
             Numbers of the parameters.
         begin : ndarray, shape (r, n_part)
@@ -143,7 +143,7 @@ class HeldRun:
             out[position] += self.stay**steps * first + self.stay ** (steps - 1) * jump
         return np.asarray(out)
 
-    def _sources(self, derivatives: Derivatives, j: int) -> tuple[FloatArray, FloatArray]:
+    def _sources(self, derivatives: _Derivatives, j: int) -> tuple[FloatArray, FloatArray]:
         """Source of one parameter's slopes per path of the step before (q, q) and per series (q, n_series)."""
         basis, lift, step, n_held = self.frame.basis, self.frame.lift, self.step, self.frame.lift.shape[1]
         path, given = np.zeros((basis.shape[1],) * 2), np.zeros_like(self.gain)
