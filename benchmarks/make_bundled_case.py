@@ -19,6 +19,7 @@ from pathlib import Path
 
 import pandas as pd
 from energyplus_case import folder, model, run, sensors
+from energyplus_trials.frame import SITE_OUTPUTS, STEPS_PER_HOUR
 from rich.logging import RichHandler
 
 from thermal.case import load_case
@@ -68,14 +69,14 @@ def _simulate(effects: str, seed: int) -> tuple[pd.DataFrame, pd.DataFrame]:
     weather = _weather_file()
     logger.info("EnergyPlus from %s to %s", first, last)
     results = run.simulate(weather, first, last, seed)
-    site = pd.DataFrame({point: results["site", point] for point in model.OUTPUTS_SITE})
+    site = pd.DataFrame({point: results["site", point] for point in SITE_OUTPUTS})
     if effects == "none":
         with tempfile.TemporaryDirectory(prefix="weather_") as name:
             run.without_sun(weather, Path(name) / WEATHER)
             logger.info("EnergyPlus again, without sun")
             results = run.simulate(Path(name) / WEATHER, first, last, seed)
     saved = results.index > pd.Timestamp(FIRST)
-    expected = DAYS * 24 * model.STEPS_PER_HOUR
+    expected = DAYS * 24 * STEPS_PER_HOUR
     if saved.sum() != expected:
         raise run.EnergyPlusError(f"expected {expected} rows to save, found {saved.sum()}")
     return results[saved], site[saved]

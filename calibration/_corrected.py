@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibration._disturbance import DisturbanceModel
-from calibration._evaluate import Evaluation, Predictions, Progress, spatial_metrics
-from calibration._gain import Covariance
-from calibration._intervals import Interval, Runs, horizon_steps, select_runs
+from calibration._evaluate import Evaluation, Progress, Wanted, evaluate_runs
+from calibration._gain import TOLERANCE, Covariance
+from calibration._intervals import Interval
 from calibration._kalman import Filtered, KalmanFilter
 from calibration._start import start_spread
 from calibration._state_space import StateSpace, mean_flow, state_space
-from calibration.errors import FilterError, HorizonError, NotEnoughDataError
+from calibration.errors import FilterError
 from thermal import Inputs, SymbolicModel, spin_up
 from thermal.model import IMPLICIT_EULER, LEAST_SPIN_UP, SPIN_UP, Matrices, Scheme
 
@@ -32,6 +32,7 @@ def filter_interval(
     scheme: Scheme = IMPLICIT_EULER,
     covariance: Covariance = "exact",
     spin_up_seconds: float = SPIN_UP,
+    tolerance: float = TOLERANCE,
 ) -> Filtered:
     """Filter one interval of telemetry; the states at its beginning come from a spin-up.
 
@@ -53,6 +54,8 @@ def filter_interval(
         See `KalmanFilter`.
     spin_up_seconds : float
         Telemetry before the interval that the spin-up may use [s].
+    tolerance : float
+        See `KalmanFilter` [-].
 
     Raises
     ------
@@ -60,7 +63,7 @@ def filter_interval(
         When the model is not reduced, or the interval too short.
     """
     ready = prepare(model, theta, inputs, scheme)
-    kalman = KalmanFilter(ready.space, disturbance, covariance=covariance)
+    kalman = KalmanFilter(ready.space, disturbance, covariance=covariance, tolerance=tolerance)
     begin, at, stop = rows_of(inputs, interval, spin_up_seconds, covariance)
     return kalman.filter(inputs, at, stop, *ready.start(begin, at))
 
@@ -217,49 +220,30 @@ def evaluate_filter(
     """
     ready = prepare(model, theta, inputs, scheme)
     kalman = KalmanFilter(ready.space, disturbance, covariance=covariance)
-    steps = horizon_steps(horizon, inputs.step)
-    main: list[Predictions] = []
-    errors: dict[str, list[FloatArray]] = {name: [] for name in horizons}
-    for done, interval in enumerate(intervals):
-        runs = select_runs(inputs, interval, steps, spin_up=spin_up_seconds)
-        if runs.starts.size == 0:
-            raise NotEnoughDataError(
-                f"interval {interval.start} to {interval.end}: all {runs.skipped} runs miss telemetry"
-            )
-        further = {name: _runs(inputs, interval, name, spin_up_seconds) for name in horizons}
-        last = max(int(r.starts[-1]) for r in (runs, *(f for f in further.values() if f is not None)))
-        at = runs.begin + int(np.ceil(LEAST_SPIN_UP / inputs.step))
-        filtered = kalman.filter(inputs, at, max(last, at + 1), *ready.start(runs.begin, at))
-        keep = np.arange(1, steps + 1) if trajectories else np.array([steps])
-        main.append(_predictions(filtered, inputs, interval, runs, keep))
-        for name, others in further.items():
-            if others is not None:
-                ahead = np.array([horizon_steps(name, inputs.step)])
-                errors[name].append(_predictions(filtered, inputs, interval, others, ahead).error)
-        if progress is not None:
-            progress("predict", done + 1, len(intervals))
-    by_horizon = {n: spatial_metrics(np.concatenate(e)).mae for n, e in errors.items() if len(e) == len(intervals)}
-    return Evaluation(steps, inputs.step, tuple(main), model.network.zones, by_horizon)
+
+    def simulate(wanted: Sequence[Wanted]) -> list[FloatArray]:
+        begin, last = wanted[0].runs.begin, max(int(w.runs.starts[-1]) for w in wanted)
+        at = begin + int(np.ceil(LEAST_SPIN_UP / inputs.step))
+        filtered = kalman.filter(inputs, at, max(last, at + 1), *ready.start(begin, at))
+        return [_predicted(filtered, inputs, w) for w in wanted]
+
+    return evaluate_runs(
+        simulate,
+        inputs,
+        model.network.zones,
+        intervals,
+        horizon,
+        trajectories=trajectories,
+        horizons=horizons,
+        spin_up_seconds=spin_up_seconds,
+        progress=progress,
+    )
 
 
-def _runs(inputs: Inputs, interval: Interval, horizon: str, spin_up_seconds: float) -> Runs | None:
-    """Find the runs of a further horizon, None where there are none."""
-    try:
-        runs = select_runs(inputs, interval, horizon_steps(horizon, inputs.step), spin_up=spin_up_seconds)
-    except (HorizonError, NotEnoughDataError):
-        return None
-    return runs if runs.starts.size else None
-
-
-def _predictions(
-    filtered: Filtered, inputs: Inputs, interval: Interval, runs: Runs, keep: NDArray[np.int64]
-) -> Predictions:
-    """Predict the runs of an interval from the filtered states at their starts."""
-    starts, steps = runs.starts, int(keep[-1])
-    rows = starts + np.arange(1, steps + 1)[:, None]
+def _predicted(filtered: Filtered, inputs: Inputs, wanted: Wanted) -> FloatArray:
+    """Predict runs from the filtered states at their starts, (n_run, n_kept, n_zone) [K]."""
+    starts, keep = wanted.runs.starts, wanted.keep
+    rows = starts + np.arange(1, int(keep[-1]) + 1)[:, None]
     boundary, heat, airflow = (v[rows].transpose(0, 2, 1) for v in (inputs.boundary, inputs.heat, inputs.airflow))
     states = filtered.states[starts - filtered.begin].T
-    simulated = filtered.kalman.predict(states, boundary, heat, keep, airflow)
-    known = inputs.bridged[starts]
-    measured = np.where(np.isfinite(known)[:, None, :], inputs.zone[starts[:, None] + keep[None, :]], np.nan)
-    return Predictions(interval, inputs.stamps[starts], simulated, measured, keep, known, runs.skipped)
+    return filtered.kalman.predict(states, boundary, heat, keep, airflow)

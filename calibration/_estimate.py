@@ -155,6 +155,7 @@ class _Rounds:
         self.disturbance: DisturbanceModel | None = None
         self.excess, self.retune = 1.0, True
         self.last: LeastSquaresResult | None = None
+        self.known: Precision | None = None  # at the θ of the last solve
         self.large = problem.inputs.zone.shape[1] > _MOST_ZONES
 
     def whiten(self, theta: FloatArray) -> None:
@@ -170,6 +171,7 @@ class _Rounds:
     def solve(self, z: FloatArray, tolerance: float) -> FloatArray:
         """One solve; returns the point found."""
         problem, model = self.problem, self.model
+        self.known = None
 
         def weighted(x: FloatArray) -> tuple[FloatArray, FloatArray]:
             self.evaluations += 1
@@ -203,9 +205,9 @@ class _Rounds:
             if self.disturbance is None:
                 self.disturbance = self.tuner(self.problem, self.model, theta)
             self.excess = max(1.0, unexplained(self.problem, self.model, theta, self.disturbance))
-            known = precision(self.problem, self.model, theta, self.disturbance)
+            self.known = precision(self.problem, self.model, theta, self.disturbance)
             most = replace(self.problem, effective=None).effective_size()
-            worth = min(most, known.effective(deviation) / self.excess)
+            worth = min(most, self.known.effective(deviation) / self.excess)
             self.problem = replace(self.problem, effective=worth)
             still = still and abs(self.problem.effective_size() - before) < _WORTH_TOLERANCE * before
         self.settled = bool(still)
@@ -221,21 +223,13 @@ class _Rounds:
         covariance = np.asarray(np.linalg.inv(jacobian.T @ jacobian), dtype=float)
         theta = self.problem.theta(z)
         if self.disturbance is not None:
-            known, weight = _known(self.problem, self.model, theta, self.disturbance, self.excess)
-            covariance = known.covariance(weight)
+            known = self.known or precision(self.problem, self.model, theta, self.disturbance)
+            weight = self.problem.effective_size() / (known.errors * self.problem.deviation**2)
+            covariance = replace(known, score=self.excess * known.score).covariance(weight)
         return Estimate(
             theta, self.last, self.problem, self.model, self.iterations, self.evaluations, covariance,
             self.disturbance, self.excess, self.settled,
         )  # fmt: skip
-
-
-def _known(
-    problem: Problem, model: ReducedModel, theta: FloatArray, disturbance: DisturbanceModel, excess: float
-) -> tuple[Precision, float]:
-    """Work out what the errors tell, and the weight w² that they were given [1/K²]."""
-    known = precision(problem, model, theta, disturbance)
-    weight = problem.effective_size() / (known.errors * problem.deviation**2)
-    return replace(known, score=excess * known.score), weight
 
 
 def _shrinkage(problem: Problem, z: FloatArray, solve: LeastSquaresResult | None) -> dict[str, float]:

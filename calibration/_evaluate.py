@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from calibration._intervals import Interval, Runs, horizon_steps, select_runs
 from calibration.errors import HorizonError, NotEnoughDataError
-from thermal import Inputs, SymbolicModel, free_runs, spin_up
+from thermal import Inputs, SymbolicModel, ThermalNetwork, free_runs, spin_up
 from thermal.model import IMPLICIT_EULER, SPIN_UP, Matrices, Scheme
 
 FloatArray = NDArray[np.float64]
@@ -164,46 +164,86 @@ def spatial_metrics(error: FloatArray) -> Metrics:
     )
 
 
-def _predict(
-    model: SymbolicModel,
-    matrices: Matrices,
+class Wanted(NamedTuple):
+    """Runs of one interval, and the steps of them that are wanted."""
+
+    runs: Runs
+    keep: NDArray[np.int64]
+
+
+#: Simulates sets of runs of one interval, each to zone means at its kept steps (n_run, n_kept, n_zone) [K].
+Simulate = Callable[[Sequence[Wanted]], list[FloatArray]]
+
+
+def evaluate_runs(
+    simulate: Simulate,
     inputs: Inputs,
-    interval: Interval,
-    runs: Runs,
-    steps: int,
-    keep: NDArray[np.int64] | None = None,
-    scheme: Scheme = IMPLICIT_EULER,
-) -> Predictions:
-    """Simulate the runs of one interval: spin-up with the zones held, then N free steps.
+    zones: tuple[str, ...],
+    intervals: Sequence[Interval],
+    horizon: str,
+    *,
+    trajectories: bool,
+    horizons: Sequence[str],
+    spin_up_seconds: float,
+    progress: Progress | None,
+) -> Evaluation:
+    """Choose the runs of every interval and horizon, simulate them, and compare them with what was measured.
 
     Parameters
     ----------
-    model : SymbolicModel
-        For its network.
-    matrices : Matrices
-        The model at one θ.
+    simulate : callable
+        Simulates all the runs of one interval.
     inputs : Inputs
         The telemetry.
-    interval : Interval
-        Where the targets lie.
-    runs : Runs
-        From `select_runs`.
-    steps : int
-        N.
-    keep : ndarray of int, optional
-        Steps to keep; the last only by default.
-    scheme : Scheme
-        Time stepping of the free runs.
+    zones : tuple of str
+        Zone names.
+    intervals, horizon, trajectories, horizons, spin_up_seconds, progress
+        As in `evaluate_model`.
+
+    Raises
+    ------
+    NotEnoughDataError
+        When an interval has no run.
     """
-    keep = np.array([steps]) if keep is None else keep
-    states, _ = spin_up(matrices, inputs, runs.begin, runs.starts)
-    simulated, _ = free_runs(matrices, model.network, inputs, runs.starts, steps, states, scheme=scheme, keep=keep)
-    measured = np.where(
-        np.isfinite(inputs.bridged[runs.starts])[:, None, :], inputs.zone[runs.starts[:, None] + keep[None, :]], np.nan
-    )
-    return Predictions(
-        interval, inputs.stamps[runs.starts], simulated, measured, keep, inputs.bridged[runs.starts], runs.skipped
-    )
+    steps = horizon_steps(horizon, inputs.step)
+    keep = np.arange(1, steps + 1) if trajectories else np.array([steps])
+    main: list[Predictions] = []
+    errors: dict[str, list[FloatArray]] = {name: [] for name in horizons}
+    for done, interval in enumerate(intervals):
+        runs = select_runs(inputs, interval, steps, spin_up=spin_up_seconds)
+        if runs.starts.size == 0:
+            raise NotEnoughDataError(
+                f"interval {interval.start} to {interval.end}: all {runs.skipped} runs miss telemetry"
+            )
+        found = {name: _further(inputs, interval, name, spin_up_seconds) for name in horizons}
+        further = {name: wanted for name, wanted in found.items() if wanted is not None}
+        wanted = [Wanted(runs, keep), *further.values()]
+        predicted = [_predictions(inputs, interval, w, s) for w, s in zip(wanted, simulate(wanted), strict=True)]
+        main.append(predicted[0])
+        for name, others in zip(further, predicted[1:], strict=True):
+            errors[name].append(others.error)
+        if progress is not None:
+            progress("predict", done + 1, len(intervals))
+    by_horizon = {n: spatial_metrics(np.concatenate(e)).mae for n, e in errors.items() if len(e) == len(intervals)}
+    return Evaluation(steps, inputs.step, tuple(main), zones, by_horizon)
+
+
+def _further(inputs: Inputs, interval: Interval, horizon: str, spin_up_seconds: float) -> Wanted | None:
+    """Find the runs of a further horizon, None where there are none."""
+    try:
+        steps = horizon_steps(horizon, inputs.step)
+        runs = select_runs(inputs, interval, steps, spin_up=spin_up_seconds)
+    except (HorizonError, NotEnoughDataError):
+        return None
+    return Wanted(runs, np.array([steps])) if runs.starts.size else None
+
+
+def _predictions(inputs: Inputs, interval: Interval, wanted: Wanted, simulated: FloatArray) -> Predictions:
+    """Put runs beside what was measured; a zone that could not be matched at its start has no error."""
+    runs, keep = wanted
+    known = inputs.bridged[runs.starts]
+    measured = np.where(np.isfinite(known)[:, None, :], inputs.zone[runs.starts[:, None] + keep[None, :]], np.nan)
+    return Predictions(interval, inputs.stamps[runs.starts], simulated, measured, keep, known, runs.skipped)
 
 
 def evaluate_model(
@@ -250,33 +290,41 @@ def evaluate_model(
         When an interval has no run.
     """
     matrices = model.matrices(theta)
-    steps = horizon_steps(horizon, inputs.step)
-    total = len(intervals) * (1 + len(horizons))
+    return evaluate_runs(
+        lambda wanted: _simulate(model.network, matrices, inputs, wanted, scheme),
+        inputs,
+        model.network.zones,
+        intervals,
+        horizon,
+        trajectories=trajectories,
+        horizons=horizons,
+        spin_up_seconds=spin_up_seconds,
+        progress=progress,
+    )
 
-    def runs_of(n: int, keep: NDArray[np.int64] | None, interval: Interval) -> Predictions:
-        runs = select_runs(inputs, interval, n, spin_up=spin_up_seconds)
-        if runs.starts.size == 0:
-            raise NotEnoughDataError(
-                f"interval {interval.start} to {interval.end}: all {runs.skipped} runs miss telemetry"
-            )
-        return _predict(model, matrices, inputs, interval, runs, n, keep, scheme)
 
-    main, done = [], 0
-    for interval in intervals:
-        main.append(runs_of(steps, np.arange(1, steps + 1) if trajectories else None, interval))
-        done += 1
-        if progress is not None:
-            progress("predict", done, total)
-    by_horizon = {}
-    for name in horizons:
-        try:
-            n = horizon_steps(name, inputs.step)
-            errors = [runs_of(n, None, interval).error for interval in intervals]
-        except (HorizonError, NotEnoughDataError):
-            errors = []
-        if errors:
-            by_horizon[name] = spatial_metrics(np.concatenate(errors)).mae
-        done += len(intervals)
-        if progress is not None:
-            progress("predict", done, total)
-    return Evaluation(steps, inputs.step, tuple(main), model.network.zones, by_horizon)
+def _simulate(
+    network: ThermalNetwork, matrices: Matrices, inputs: Inputs, wanted: Sequence[Wanted], scheme: Scheme
+) -> list[FloatArray]:
+    """Spin up and run every start once, as far as any set of runs wants it: on the way it meets the others' targets."""
+    simulated: dict[int, FloatArray] = {}
+    day = wanted[0].runs.begin + int(86400.0 / inputs.step)
+    # a spin-up begins from the mean of its first day, or of what lies before its first start
+    begins = [min(int(w.runs.starts[0]), day) for w in wanted]
+    for begin in set(begins):
+        numbers = [i for i, other in enumerate(begins) if other == begin]
+        alike = [wanted[i] for i in numbers]
+        starts = np.unique(np.concatenate([w.runs.starts for w in alike]))
+        steps = np.unique(np.concatenate([w.keep for w in alike]))
+        rows, reach = [np.searchsorted(starts, w.runs.starts) for w in alike], np.zeros(starts.size, dtype=np.int64)
+        for w, row in zip(alike, rows, strict=True):
+            reach[row] = np.maximum(reach[row], w.keep[-1])
+        states, _ = spin_up(matrices, inputs, wanted[0].runs.begin, starts)
+        means = np.full((starts.size, steps.size, len(network.zones)), np.nan)
+        for last in np.unique(reach):
+            part, keep = np.flatnonzero(reach == last), steps[steps <= last]
+            found = free_runs(matrices, network, inputs, starts[part], last, states[:, part], scheme=scheme, keep=keep)
+            means[part, : keep.size] = found[0]
+        for i, w, row in zip(numbers, alike, rows, strict=True):
+            simulated[i] = means[row][:, np.searchsorted(steps, w.keep)]
+    return [simulated[i] for i in range(len(wanted))]

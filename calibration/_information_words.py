@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from calibration._page import unit
 from thermal import Parameter
 from thermal.parameters import FACADE_PREFIX
 
@@ -21,6 +22,22 @@ MOST_NAMED = 3
 _DENSITY, _CAPACITY = "_density", "_heat_capacity"
 
 
+def in_words(name: str) -> str:
+    """Spell the name of a parameter as people write it.
+
+    Parameters
+    ----------
+    name : str
+        Such as ``window_u_value``.
+
+    Examples
+    --------
+    >>> in_words("window_u_value")
+    'window U-value'
+    """
+    return name.replace("_u_value", "_U-value").replace("_", " ")
+
+
 def spoken(parameter: Parameter) -> str:
     """Name a parameter as one says it.
 
@@ -29,7 +46,7 @@ def spoken(parameter: Parameter) -> str:
     parameter : Parameter
         Of the building, a facade or a zone.
     """
-    name = parameter.base.replace("_u_value", "_U-value").replace("_", " ")
+    name = in_words(parameter.base)
     if parameter.scope == "facade":
         return f"{name} of the {str(parameter.member).removeprefix(FACADE_PREFIX)} facade"
     return f"{name} of zone {parameter.member}" if parameter.scope == "zone" else name
@@ -181,14 +198,14 @@ def _gathered(parameters: Sequence[tuple[Parameter, float]], words: Callable[[Pa
     return named
 
 
-def _nominal(named: Mapping[str, Parameter], told: set[str], name: str, value: float, unit: str) -> str:
+def _nominal(named: Mapping[str, Parameter], told: set[str], name: str, value: float, of: str) -> str:
     """Say what a nominal value hides: a density, that only its product with the heat capacity counts."""
     base = name.removesuffix(_DENSITY)
     partners = [p.name for p in named.values() if p.base == base + _CAPACITY]
-    thing = base.replace("_", " ")
-    stays = f"the density stays at its nominal {value:g} {unit}"
+    thing, number = base.replace("_", " "), f"{value:g}" if of == "1" else f"{value:g} {unit(of)}"
+    stays = f"the density stays at its nominal {number}"
     if name.endswith(_DENSITY) and partners and set(partners) <= told:
         return f"Only the product density × heat capacity of the {thing} is determined: {stays}."
     if name.endswith(_DENSITY):
         return f"Density and heat capacity of the {thing} enter only as a product: {stays}."
-    return f"{name.replace('_', ' ').capitalize()} enters only as a product and stays at its nominal {value:g} {unit}."
+    return f"{name.replace('_', ' ').capitalize()} enters only as a product and stays at its nominal {number}."

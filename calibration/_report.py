@@ -11,6 +11,7 @@ import pandas as pd
 
 from calibration import _figures as figures
 from calibration._case_model import CHECK_TOLERANCE
+from calibration._information_words import in_words
 from calibration._page import clock, counted, duration, kelvin, plain, render, signed, significant, unit
 from calibration._report_diagnostics import diagnostics_content
 from calibration._report_evaluation import (
@@ -107,7 +108,7 @@ def _change(before: float, after: float) -> str:
 def _parameter_sentence(parameters: Sequence[ParameterEstimate]) -> str:
     estimated = [p for p in parameters if p.standard_error is not None]
     told = sum(p.identifiable for p in estimated)
-    bound = [p.name.replace("_", " ") for p in estimated if p.at_bound]
+    bound = [in_words(p.name) for p in estimated if p.at_bound]
     free = len(estimated) - told - len(bound)
     parts = [f"Of {counted(len(estimated), 'estimated parameter')} the data determine {told or 'none'}"]
     if free:
@@ -189,7 +190,7 @@ def _parameter_row(p: ParameterEstimate, paper: float | None) -> dict[str, str]:
     else:
         told, kind = ("yes", "good") if p.identifiable else ("no", "soft")
     return {
-        "name": p.name.replace("_", " "),
+        "name": in_words(p.name),
         "value": significant(p.value),
         "unit": unit(p.unit),
         "error": significant(p.standard_error, 2),

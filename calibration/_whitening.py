@@ -7,11 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from calibration._corrected import prepare, rows_of
+from calibration._corrected import filter_interval, rows_of
 from calibration._disturbance import DisturbanceModel, DisturbedSpace
 from calibration._gain import Covariance, Gain
 from calibration._intervals import Interval
-from calibration._kalman import KalmanFilter
 from thermal import Inputs, SymbolicModel
 from thermal.model import Scheme
 
@@ -119,18 +118,19 @@ def whitening(
     FilterError
         When the model is not reduced, or the interval too short.
     """
-    ready = prepare(model, theta, inputs, scheme)
-    kalman = KalmanFilter(ready.space, disturbance, covariance=covariance, tolerance=_TOLERANCE)
+    filtered = filter_interval(
+        model, theta, inputs, interval, disturbance,
+        scheme=scheme, covariance=covariance, spin_up_seconds=spin_up_seconds, tolerance=_TOLERANCE,
+    )  # fmt: skip
     begin, at, stop = rows_of(inputs, interval, spin_up_seconds, covariance)
-    filtered = kalman.filter(inputs, at, stop, *ready.start(begin, at))
     return Whitening(
         begin,
         at,
         stop,
-        kalman.whole,
+        filtered.kalman.whole,
         np.array([gain.reach @ gain.weight for gain in filtered.gains]),
         filtered.gain_of,
-        np.array([_root(gain, kalman.whole.noise_variance) for gain in filtered.gains]),
+        np.array([_root(gain, filtered.kalman.whole.noise_variance) for gain in filtered.gains]),
         np.isfinite(inputs.zone[at + 1 : stop + 1]),
         filtered.log_likelihood,
     )

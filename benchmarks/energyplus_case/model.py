@@ -4,9 +4,10 @@ from datetime import date
 from pathlib import Path
 from typing import Any
 
+from energyplus_trials.frame import SITE_OUTPUTS, STEPS_PER_HOUR, Objects, frame
+
 from energyplus_case import layout, materials
 
-STEPS_PER_HOUR = 12
 RUN_PERIOD = "run-in and saved stretch"
 SUPPLY_TEMPERATURE_HEATING = 35.0  # [degC]
 SUPPLY_TEMPERATURE_COOLING = 14.0  # [degC]
@@ -22,16 +23,6 @@ OUTPUTS_ZONE = {
     "balance": ("Zone Air Heat Balance System Air Transfer Rate", "{zone}"),
     "transmitted_sun": ("Enclosure Windows Total Transmitted Solar Radiation Rate", "{zone}"),
 }
-OUTPUTS_SITE = {
-    "outside_air_temperature_sensor": "Site Outdoor Air Drybulb Temperature",
-    "wind_speed_sensor": "Site Wind Speed",
-    "wind_direction_sensor": "Site Wind Direction",
-    "horizontal_infrared_irradiance_sensor": "Site Horizontal Infrared Radiation Rate per Area",
-    "direct_normal_irradiance_sensor": "Site Direct Solar Radiation Rate per Area",
-    "diffuse_horizontal_irradiance_sensor": "Site Diffuse Solar Radiation Rate per Area",
-}
-
-Objects = dict[str, dict[str, dict[str, Any]]]
 
 
 def epjson(first: date, last: date, schedules: Path, columns: list[tuple[str, str]]) -> Objects:
@@ -46,12 +37,19 @@ def epjson(first: date, last: date, schedules: Path, columns: list[tuple[str, st
     columns : list of (zone, kind)
         What its columns hold, in order.
     """
-    return _control(first, last) | _climate() | _constructions() | _surfaces() | _air(schedules, columns) | _outputs()
+    return (
+        frame(RUN_PERIOD, first, last)
+        | _building()
+        | _climate()
+        | _constructions()
+        | _surfaces()
+        | _air(schedules, columns)
+        | _outputs()
+    )
 
 
-def _control(first: date, last: date) -> Objects:
+def _building() -> Objects:
     return {
-        "Version": {"Version 1": {"version_identifier": "25.2"}},
         "Building": {
             "bundled case": {
                 "north_axis": layout.ORIENTATION,
@@ -59,37 +57,6 @@ def _control(first: date, last: date) -> Objects:
                 "solar_distribution": "FullInteriorAndExterior",
                 "maximum_number_of_warmup_days": 50,
                 "minimum_number_of_warmup_days": 6,
-            }
-        },
-        "Timestep": {"Timestep 1": {"number_of_timesteps_per_hour": STEPS_PER_HOUR}},
-        # No system step shorter than a zone step: averages over a step are then what the heat balance used.
-        "ConvergenceLimits": {"ConvergenceLimits 1": {"minimum_system_timestep": 60 // STEPS_PER_HOUR}},
-        "SimulationControl": {
-            "SimulationControl 1": {
-                "do_zone_sizing_calculation": "No",
-                "do_system_sizing_calculation": "No",
-                "do_plant_sizing_calculation": "No",
-                "run_simulation_for_sizing_periods": "No",
-                "run_simulation_for_weather_file_run_periods": "Yes",
-            }
-        },
-        "RunPeriod": {
-            RUN_PERIOD: {
-                "begin_month": first.month,
-                "begin_day_of_month": first.day,
-                "begin_year": first.year,
-                "end_month": last.month,
-                "end_day_of_month": last.day,
-                "end_year": last.year,
-                "use_weather_file_daylight_saving_period": "No",
-                "use_weather_file_holidays_and_special_days": "No",
-            }
-        },
-        "GlobalGeometryRules": {
-            "rules": {
-                "starting_vertex_position": "UpperLeftCorner",
-                "vertex_entry_direction": "Counterclockwise",
-                "coordinate_system": "Relative",  # in world coordinates EnergyPlus ignores the north axis
             }
         },
     }
@@ -293,7 +260,7 @@ def _zone_air(zone: str, flow: float) -> Objects:
 
 
 def _outputs() -> Objects:
-    names = list(OUTPUTS_SITE.values()) + [variable for variable, _ in OUTPUTS_ZONE.values()]
+    names = list(SITE_OUTPUTS.values()) + [variable for variable, _ in OUTPUTS_ZONE.values()]
     return {
         "Output:SQLite": {"sql": {"option_type": "Simple"}},
         "Output:Variable": {

@@ -10,11 +10,12 @@ from datetime import date
 from pathlib import Path
 
 import pandas as pd
+from energyplus_trials.frame import SITE_OUTPUTS, STEPS_PER_HOUR
 
 from energyplus_case import layout, model
 from energyplus_case.thermostats import setpoints
 
-STEP = pd.Timedelta(minutes=60 // model.STEPS_PER_HOUR)
+STEP = pd.Timedelta(minutes=60 // STEPS_PER_HOUR)
 
 
 class EnergyPlusError(Exception):
@@ -129,7 +130,7 @@ def _read(database: sqlite3.Connection) -> pd.DataFrame:
 
 
 def _select(table: pd.DataFrame) -> pd.DataFrame:
-    wanted = {("site", ours): ("ENVIRONMENT", name) for ours, name in model.OUTPUTS_SITE.items()}
+    wanted = {("site", ours): ("ENVIRONMENT", name) for ours, name in SITE_OUTPUTS.items()}
     for zone in layout.ZONES:
         for ours, (name, key) in model.OUTPUTS_ZONE.items():
             wanted[zone, ours] = (key.format(zone=zone).upper(), name)

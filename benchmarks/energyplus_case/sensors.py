@@ -2,6 +2,7 @@
 
 import numpy as np
 import pandas as pd
+from energyplus_trials.frame import SITE_OUTPUTS
 
 from energyplus_case import layout, model
 from energyplus_case.run import EnergyPlusError
@@ -77,7 +78,7 @@ def telemetry(results: pd.DataFrame, weather: pd.DataFrame, timezone: str, seed:
     """
     rng = np.random.default_rng([seed, 2])
     n = len(results)
-    columns = {f"weather_station/{point}": weather[point].to_numpy() for point in model.OUTPUTS_SITE}
+    columns = {f"weather_station/{point}": weather[point].to_numpy() for point in SITE_OUTPUTS}
     for zone in layout.ZONES:
         outputs = {name: results[zone, name].to_numpy() for name in model.OUTPUTS_ZONE}
         measured = outputs["zone_temperature"] + rng.normal(0.0, TEMPERATURE_NOISE, n)

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from energyplus_trials.frame import Objects
 from energyplus_trials.specification import Fabric
 
 # Conductivity [W/m/K], density [kg/m3], heat capacity [J/kg/K]: usual design values of ISO 10456, rounded.
@@ -25,7 +26,6 @@ THERMAL_ABSORPTANCE = 0.9
 INSIDE_SOLAR_ABSORPTANCE = 0.6
 NO_SOLAR_ABSORPTANCE = 0.001  # EnergyPlus wants more than 0
 
-Objects = dict[str, dict[str, dict[str, Any]]]
 Layers = list[tuple[str, float]]  # of a solid and its thickness [m], or of "" and a resistance [m2 K/W]
 
 

@@ -7,23 +7,14 @@ from typing import Any
 import pandas as pd
 
 from energyplus_trials import fabric, plan, terminals
-from energyplus_trials.fabric import Objects
+from energyplus_trials.frame import Objects, frame
 from energyplus_trials.specification import TrialSpec
 
-STEPS_PER_HOUR = 12
 ZONE_OUTPUTS = {
     "temperature": ("Zone Mean Air Temperature", "{zone}"),
     "flow": ("Zone Ideal Loads Supply Air Mass Flow Rate", "{zone} ideal loads"),
     "discharge": ("Zone Ideal Loads Supply Air Temperature", "{zone} ideal loads"),
     "heat": ("Zone Air Heat Balance System Air Transfer Rate", "{zone}"),
-}
-SITE_OUTPUTS = {
-    "outside_air_temperature_sensor": "Site Outdoor Air Drybulb Temperature",
-    "wind_speed_sensor": "Site Wind Speed",
-    "wind_direction_sensor": "Site Wind Direction",
-    "horizontal_infrared_irradiance_sensor": "Site Horizontal Infrared Radiation Rate per Area",
-    "direct_normal_irradiance_sensor": "Site Direct Solar Radiation Rate per Area",
-    "diffuse_horizontal_irradiance_sensor": "Site Diffuse Solar Radiation Rate per Area",
 }
 
 
@@ -37,8 +28,9 @@ def null_model(spec: TrialSpec, first: pd.Timestamp, last: pd.Timestamp) -> Obje
     first, last : Timestamp
         First and last day of the run.
     """
-    objects = _control(spec, first, last)
+    objects = frame("run", first, last)
     parts = (
+        _building(spec),
         _climate(spec),
         fabric.objects(fabric.constructions(spec.fabric), fabric.NO_SOLAR_ABSORPTANCE),
         {"WindowMaterial:Glazing": {"glass": fabric.pane(spec.fabric.window_u_value, 0.0)}},
@@ -120,9 +112,8 @@ def surface_name(zone: str, side: str, other: str | None = None) -> str:
     return f"{zone} {side} {other or 'outdoor'}"
 
 
-def _control(spec: TrialSpec, first: pd.Timestamp, last: pd.Timestamp) -> Objects:
+def _building(spec: TrialSpec) -> Objects:
     return {
-        "Version": {"Version 1": {"version_identifier": "25.2"}},
         "Building": {
             "building": {
                 "north_axis": spec.layout.orientation,
@@ -135,38 +126,7 @@ def _control(spec: TrialSpec, first: pd.Timestamp, last: pd.Timestamp) -> Object
                 "maximum_number_of_warmup_days": 60,
             }
         },
-        "Timestep": {"Timestep 1": {"number_of_timesteps_per_hour": STEPS_PER_HOUR}},
-        # No system step shorter than a zone step: what is reported over a step is then what the heat balance used.
-        "ConvergenceLimits": {"ConvergenceLimits 1": {"minimum_system_timestep": 60 // STEPS_PER_HOUR}},
         "ZoneAirHeatBalanceAlgorithm": {"air": {"algorithm": "EulerMethod"}},
-        "SimulationControl": {
-            "SimulationControl 1": {
-                "do_zone_sizing_calculation": "No",
-                "do_system_sizing_calculation": "No",
-                "do_plant_sizing_calculation": "No",
-                "run_simulation_for_sizing_periods": "No",
-                "run_simulation_for_weather_file_run_periods": "Yes",
-            }
-        },
-        "RunPeriod": {
-            "run": {
-                "begin_month": first.month,
-                "begin_day_of_month": first.day,
-                "begin_year": first.year,
-                "end_month": last.month,
-                "end_day_of_month": last.day,
-                "end_year": last.year,
-                "use_weather_file_daylight_saving_period": "No",
-                "use_weather_file_holidays_and_special_days": "No",
-            }
-        },
-        "GlobalGeometryRules": {
-            "rules": {
-                "starting_vertex_position": "UpperLeftCorner",
-                "vertex_entry_direction": "Counterclockwise",
-                "coordinate_system": "Relative",  # in world coordinates EnergyPlus ignores the north axis
-            }
-        },
         "OutputControl:Files": {"files": dict.fromkeys(_FILES, "No") | {"output_csv": "No"}},
     }
 

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from energyplus_trials import climate, model, terminals
 from energyplus_trials.errors import EnergyPlusMissingError, EnergyPlusRunError
-from energyplus_trials.fabric import Objects
+from energyplus_trials.frame import SITE_OUTPUTS, Objects
 from energyplus_trials.specification import TrialSpec
 
 RUN_IN_DAYS = 10
@@ -118,7 +118,7 @@ def simulate(plant: Plant, audit: Sequence[Variable] = ()) -> pd.DataFrame:
     EnergyPlusMissingError, EnergyPlusRunError
         Not installed; stopped, severe errors, or steps without values.
     """
-    variables = [("site", ours, name, "Environment") for ours, name in model.SITE_OUTPUTS.items()]
+    variables = [("site", ours, name, "Environment") for ours, name in SITE_OUTPUTS.items()]
     for zone in plant.spec.zone_names:
         outputs = model.ZONE_OUTPUTS.items()
         variables += [(zone, ours, name, key.format(zone=zone)) for ours, (name, key) in outputs]

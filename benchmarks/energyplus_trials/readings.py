@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from energyplus_trials import climate, model
 from energyplus_trials.errors import EnergyPlusRunError
+from energyplus_trials.frame import SITE_OUTPUTS
 from energyplus_trials.specification import TrialSpec, stream_generator
 
 AIR_HEAT_CAPACITY = 1006.0  # [J/kg/K], of the case format
@@ -112,7 +113,7 @@ def check_run(spec: TrialSpec, results: pd.DataFrame, weather: pd.DataFrame) -> 
     EnergyPlusRunError
         One of them differs.
     """
-    for point in model.SITE_OUTPUTS:
+    for point in SITE_OUTPUTS:
         if point == "wind_direction_sensor":  # 0 is 360
             continue
         # in the mean, since EnergyPlus's own sun rises a minute earlier or later

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from energyplus_trials.fabric import Objects
+from energyplus_trials.frame import Objects
 
 HEATING_SUPPLY, COOLING_SUPPLY = 35.0, 14.0  # [degC]
 # So dry that EnergyPlus's cp of air (1004.84 + 1858.95 w) is the case format's 1006 J/kg/K; no moisture anywhere else.

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from calibration._figures._style import INK, MEASURED, MUTED, WARNING, Picture, picture, styled
+from calibration._information_words import in_words
 from calibration._result import ParameterEstimate
 from thermal import PARAMETERS, Parameter
 from thermal.effects import CATALOGUE
@@ -70,7 +71,7 @@ def parameter_ranges(parameters: Sequence[ParameterEstimate]) -> list[Picture]:
     paper = paper_values(parameters)
     for row, p in enumerate(shown):
         _row(axes, row, p, paper.get(p.name))
-    axes.set_yticks(range(len(shown)), [p.name.replace("_", " ") for p in shown], fontsize=8)
+    axes.set_yticks(range(len(shown)), [in_words(p.name) for p in shown], fontsize=8)
     middle = "middle (log scale" + ("; of effects, linear)" if any(_scale(p).scale == "linear" for p in shown) else ")")
     axes.set_xticks([0, 0.25, 0.5, 0.75, 1.0], ["lower bound", "", middle, "", "upper bound"])
     axes.set(xlim=(-0.05, 1.05), ylim=(len(shown) - 0.4, -0.6))

@@ -1,4 +1,4 @@
-"""Small cases for runs over many, and what kills the workers of such a run."""
+"""Small cases for runs over many, what kills the workers of such a run, and a small model with made-up telemetry."""
 
 from __future__ import annotations
 
@@ -9,17 +9,25 @@ import signal
 import time
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from threading import Event, Thread
 from typing import Any
 
+import numpy as np
+import pandas as pd
 import pytest
+from numpy.typing import NDArray
 
-from calibration import CaseOutcome
+from calibration import CaseOutcome, DisturbanceModel, StateSpace, state_space
 from calibration._many_record import RECORD
+from thermal import Inputs
+from thermal.model import Matrices
 from thermal.pilot import generate_pilot
 
 FILES = ["calibration.json", RECORD, "evaluation.json", "predictions.parquet", "report.html"]
+FloatArray = NDArray[np.float64]
+
 PATIENCE = 60.0  # s, for what a busy machine is slow to do
 
 
@@ -132,3 +140,96 @@ def kill_always() -> type[KillAlways]:
 def check_nothing_is_lost() -> Callable[[Path, tuple[CaseOutcome, ...], int], None]:
     """Compares a folder of results of `cases` with what a run returned, in which one worker was killed."""
     return _nothing_is_lost
+
+
+# A small model
+
+
+STEP, REFERENCE = 300.0, 293.15
+DISTURBANCE = DisturbanceModel(np.array([150.0, 60.0, 100.0]), 3600.0, np.array([0.05, 0.1, 0.07]))
+
+
+def _pencil(n_zone: int = 3, n: int = 9, seed: int = 0) -> Matrices:
+    rng = np.random.default_rng(seed)
+    links = np.triu(rng.random((n, n)), 1) * 60.0
+    links += links.T
+    leak = 20.0 * rng.random(n)
+    observation = np.eye(n)[:n_zone]
+    return Matrices(
+        capacity=np.diag(np.concatenate([rng.uniform(1e5, 3e5, n_zone), rng.uniform(1e6, 2e7, n - n_zone)])),
+        flow=np.hstack([np.diag(links.sum(axis=1) + leak) - links, -leak[:, None]]),
+        heating=observation.T.copy(),
+        observation=observation,
+        uniform=np.ones(n),
+        capacity_slopes=[],
+        flow_slopes=[],
+    )
+
+
+def _telemetry(zone: FloatArray, heat: FloatArray, boundary: FloatArray, airflow: FloatArray | None = None) -> Inputs:
+    frame = pd.DataFrame(zone)
+    return Inputs(
+        stamps=pd.date_range("2024-01-01", periods=len(zone), freq=f"{STEP:g}s", tz="UTC"),
+        step=STEP,
+        heat=heat,
+        boundary=boundary,
+        airflow=np.zeros((len(zone), 0)) if airflow is None else airflow,
+        zone=zone,
+        bridged=frame.ffill(limit=6).to_numpy(),
+        held=frame.ffill().bfill().to_numpy(),
+        complete=np.ones(len(zone), dtype=bool),
+    )
+
+
+def _gaps(inputs: Inputs) -> Inputs:
+    zone = inputs.zone.copy()
+    zone[10, 0] = zone[20:25, 1] = np.nan
+    zone[30:90, 2] = zone[60:70, 0] = np.nan
+    zone[120:123] = np.nan
+    return replace(inputs, zone=zone)
+
+
+@pytest.fixture(scope="session")
+def pencil() -> Callable[..., Matrices]:
+    """Random symmetric models: the first volumes are the zones' air, light; the others walls, heavy."""
+    return _pencil
+
+
+@pytest.fixture(scope="session")
+def telemetry() -> Callable[..., Inputs]:
+    """Makes inputs of zone temperatures, heat, boundaries and airflows."""
+    return _telemetry
+
+
+@pytest.fixture(scope="session")
+def gaps() -> Callable[[Inputs], Inputs]:
+    """Makes sensors come and go: short, long, all at once."""
+    return _gaps
+
+
+@pytest.fixture(scope="session")
+def building(pencil: Callable[..., Matrices]) -> StateSpace:
+    """A small model's state space."""
+    return state_space(pencil().modal.modes, STEP)
+
+
+@pytest.fixture(scope="session")
+def simulate(building: StateSpace) -> Callable[..., tuple[Inputs, FloatArray]]:
+    """Simulates a small model with a known disturbance: telemetry from row 1 on, and the disturbance of its rows [W]."""
+    space = building
+
+    def simulated(count: int, seed: int, disturbance: DisturbanceModel = DISTURBANCE) -> tuple[Inputs, FloatArray]:
+        rng = np.random.default_rng(seed)
+        keep, drive = disturbance.discrete(STEP)
+        heat, boundary = 500.0 * rng.random((count + 1, 3)), 283.15 + 3.0 * rng.random((count + 1, 1))
+        d, x = np.asarray(disturbance.deviation) * rng.standard_normal(3), np.zeros(space.order)
+        zone, truth = np.full((count + 1, 3), REFERENCE), np.zeros((count + 1, 3))
+        for k in range(1, count + 1):
+            u = space.drives(boundary[k], heat[k] + d)
+            zone[k] = space.observation @ x + space.feedthrough @ u + REFERENCE
+            x, truth[k] = space.advance(x) + space.drive @ u, d
+            d = keep * d + drive * rng.standard_normal(3)
+        noise = np.asarray(disturbance.sensor_deviation) * rng.standard_normal(zone.shape)
+        return _telemetry(zone + noise, heat, boundary), truth[1:]
+
+    return simulated

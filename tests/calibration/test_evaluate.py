@@ -167,7 +167,7 @@ def test_progress_counts_to_its_total() -> None:
     _, model, inputs = setting()
     told: list[tuple[str, int, int]] = []
     evaluate_model(
-        model, model.network.start(), inputs, [part(1200, 1300)], horizons=("1h",),
+        model, model.network.start(), inputs, [part(1200, 1300), part(1400, 1500)], horizons=("1h",),
         progress=lambda *message: told.append(message),
     )  # fmt: skip
     assert [done for _, done, _ in told] == [1, 2]

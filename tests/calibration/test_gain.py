@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-import pandas as pd
 import pytest
 from numpy.typing import NDArray
 
-from calibration import DisturbanceModel, Filtered, KalmanFilter, StateSpace, state_space
+from calibration import DisturbanceModel, Filtered, KalmanFilter, StateSpace
 from thermal import Inputs
-from thermal.model import Matrices
 
 FloatArray = NDArray[np.float64]
 
@@ -20,76 +19,20 @@ STEP = 300.0
 START = np.full((9, 1), REFERENCE)
 
 
-def pencil(n_zone: int = 3, n: int = 9, seed: int = 0) -> Matrices:
-    """Random symmetric model: the first volumes are the zones' air, light; the others walls, heavy."""
-    rng = np.random.default_rng(seed)
-    links = np.triu(rng.random((n, n)), 1) * 60.0
-    links += links.T
-    leak = 20.0 * rng.random(n)
-    observation = np.eye(n)[:n_zone]
-    return Matrices(
-        capacity=np.diag(np.concatenate([rng.uniform(1e5, 3e5, n_zone), rng.uniform(1e6, 2e7, n - n_zone)])),
-        flow=np.hstack([np.diag(links.sum(axis=1) + leak) - links, -leak[:, None]]),
-        heating=observation.T.copy(),
-        observation=observation,
-        uniform=np.ones(n),
-        capacity_slopes=[],
-        flow_slopes=[],
-    )
-
-
-def telemetry(zone: FloatArray, heat: FloatArray, boundary: FloatArray, airflow: FloatArray | None = None) -> Inputs:
-    frame = pd.DataFrame(zone)
-    return Inputs(
-        stamps=pd.date_range("2024-01-01", periods=len(zone), freq=f"{STEP:g}s", tz="UTC"),
-        step=STEP,
-        heat=heat,
-        boundary=boundary,
-        airflow=np.zeros((len(zone), 0)) if airflow is None else airflow,
-        zone=zone,
-        bridged=frame.ffill(limit=6).to_numpy(),
-        held=frame.ffill().bfill().to_numpy(),
-        complete=np.ones(len(zone), dtype=bool),
-    )
-
+Simulate = Callable[..., tuple[Inputs, FloatArray]]
+Gaps = Callable[[Inputs], Inputs]
 
 DISTURBANCE = DisturbanceModel(np.array([150.0, 60.0, 100.0]), 3600.0, np.array([0.05, 0.1, 0.07]))
-
-
-def building() -> StateSpace:
-    return state_space(pencil().modal.modes, STEP)
-
-
-def simulate(count: int, seed: int) -> tuple[Inputs, FloatArray]:
-    """Telemetry from row 1 on, and the disturbance of its rows [W]."""
-    space, rng = building(), np.random.default_rng(seed)
-    keep, drive = DISTURBANCE.discrete(STEP)
-    heat, boundary = 500.0 * rng.random((count + 1, 3)), 283.15 + 3.0 * rng.random((count + 1, 1))
-    d, x = np.asarray(DISTURBANCE.deviation) * rng.standard_normal(3), np.zeros(space.order)
-    zone, truth = np.full((count + 1, 3), REFERENCE), np.zeros((count + 1, 3))
-    for k in range(1, count + 1):
-        u = space.drives(boundary[k], heat[k] + d)
-        zone[k] = space.observation @ x + space.feedthrough @ u + REFERENCE
-        x, truth[k] = space.advance(x) + space.drive @ u, d
-        d = keep * d + drive * rng.standard_normal(3)
-    noise = np.asarray(DISTURBANCE.sensor_deviation) * rng.standard_normal(zone.shape)
-    return telemetry(zone + noise, heat, boundary), truth[1:]
-
-
-def gaps(inputs: Inputs) -> Inputs:
-    zone = inputs.zone.copy()
-    zone[10, 0] = zone[20:25, 1] = np.nan
-    zone[30:90, 2] = zone[60:70, 0] = np.nan
-    zone[120:123] = np.nan
-    return replace(inputs, zone=zone)
 
 
 # Shortcuts
 
 
-def test_steady_covariance_is_taken_up_again_within_the_tolerance() -> None:
+def test_steady_covariance_is_taken_up_again_within_the_tolerance(
+    building: StateSpace, simulate: Simulate, gaps: Gaps
+) -> None:
     """Walls forget a gap in days: 4000 steps after it the covariance has been steady for long."""
-    space = building()
+    space = building
     inputs = gaps(simulate(4000, 2)[0])
     exact, usual, loose = (
         KalmanFilter(space, DISTURBANCE, tolerance=t).filter(inputs, 0, 4000, START) for t in (0.0, 1e-8, 1e-5)
@@ -102,14 +45,14 @@ def test_steady_covariance_is_taken_up_again_within_the_tolerance() -> None:
         assert found.log_likelihood == pytest.approx(exact.log_likelihood, abs=likelihood)
 
 
-def test_complete_data_need_one_gain() -> None:
-    space = building()
+def test_complete_data_need_one_gain(building: StateSpace, simulate: Simulate) -> None:
+    space = building
     found = KalmanFilter(space, DISTURBANCE).filter(simulate(300, 2)[0], 0, 300, START)
     assert len(found.gains) == 1
 
 
-def test_steady_gains_hardly_differ_over_short_gaps() -> None:
-    space = building()
+def test_steady_gains_hardly_differ_over_short_gaps(building: StateSpace, simulate: Simulate) -> None:
+    space = building
     inputs = simulate(600, 4)[0]
     zone = inputs.zone.copy()
     zone[np.random.default_rng(0).random(zone.shape) < 0.02] = np.nan
@@ -129,8 +72,8 @@ def test_steady_gains_hardly_differ_over_short_gaps() -> None:
 # What is not measured
 
 
-def test_nothing_that_is_estimated_is_nan() -> None:
-    space = building()
+def test_nothing_that_is_estimated_is_nan(building: StateSpace, simulate: Simulate, gaps: Gaps) -> None:
+    space = building
     inputs = gaps(simulate(200, 5)[0])
     zone = inputs.zone.copy()
     zone[:, 1] = np.nan
@@ -144,9 +87,9 @@ def test_nothing_that_is_estimated_is_nan() -> None:
     np.testing.assert_allclose(found.disturbance_deviation[:, 1], 60.0, rtol=0.05)
 
 
-def test_unknown_heat_does_not_mislead_the_filter() -> None:
+def test_unknown_heat_does_not_mislead_the_filter(building: StateSpace, simulate: Simulate) -> None:
     """4 kW that no meter reports for two hours: the zone is followed all the same, and forgotten soon after."""
-    space = building()
+    space = building
     made, truth = simulate(400, 6)
     heat = made.heat.copy()
     heat[:, 0] += 2000.0 * (np.arange(401) % 100 < 50)  # the zone's heat varies by kilowatts

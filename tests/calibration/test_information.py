@@ -228,12 +228,12 @@ def test_densities_enter_as_products() -> None:
     found = informed(names, [[20.0, 0.0]], nominal=nominal)
     assert found.sentences[-2:] == (
         "Only the product density × heat capacity of the exterior wall is determined: the density stays at its nominal "
-        "300 kg/m^3.",
+        "300 kg/m³.",
         "Density and heat capacity of the interior wall enter only as a product: the density stays at its nominal "
-        "120 kg/m^3.",
+        "120 kg/m³.",
     )
     other = informed(names, [[20.0, 0.0]], nominal={"emissivity": (0.9, "1")})
-    assert other.sentences[-1] == "Emissivity enters only as a product and stays at its nominal 0.9 1."
+    assert other.sentences[-1] == "Emissivity enters only as a product and stays at its nominal 0.9."
 
 
 def test_strong_correlations_are_named() -> None:

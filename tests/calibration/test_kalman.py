@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
-import pandas as pd
 import pytest
 from numpy.typing import NDArray
 from scipy.stats import multivariate_normal
@@ -23,38 +24,8 @@ STEP = 300.0
 AIRFLOWS, FLOW = ((0, 1), (1, 2)), np.array([0.05, 0.02])
 
 
-def pencil(n_zone: int = 3, n: int = 9, seed: int = 0) -> Matrices:
-    """Random symmetric model: the first volumes are the zones' air, light; the others walls, heavy."""
-    rng = np.random.default_rng(seed)
-    links = np.triu(rng.random((n, n)), 1) * 60.0
-    links += links.T
-    leak = 20.0 * rng.random(n)
-    observation = np.eye(n)[:n_zone]
-    return Matrices(
-        capacity=np.diag(np.concatenate([rng.uniform(1e5, 3e5, n_zone), rng.uniform(1e6, 2e7, n - n_zone)])),
-        flow=np.hstack([np.diag(links.sum(axis=1) + leak) - links, -leak[:, None]]),
-        heating=observation.T.copy(),
-        observation=observation,
-        uniform=np.ones(n),
-        capacity_slopes=[],
-        flow_slopes=[],
-    )
-
-
-def telemetry(zone: FloatArray, heat: FloatArray, boundary: FloatArray, airflow: FloatArray | None = None) -> Inputs:
-    frame = pd.DataFrame(zone)
-    return Inputs(
-        stamps=pd.date_range("2024-01-01", periods=len(zone), freq=f"{STEP:g}s", tz="UTC"),
-        step=STEP,
-        heat=heat,
-        boundary=boundary,
-        airflow=np.zeros((len(zone), 0)) if airflow is None else airflow,
-        zone=zone,
-        bridged=frame.ffill(limit=6).to_numpy(),
-        held=frame.ffill().bfill().to_numpy(),
-        complete=np.ones(len(zone), dtype=bool),
-    )
-
+Pencil, Telemetry = Callable[..., Matrices], Callable[..., Inputs]
+Gaps = Callable[[Inputs], Inputs]
 
 DISTURBANCE = DisturbanceModel(np.array([150.0, 60.0, 100.0]), 3600.0, np.array([0.05, 0.1, 0.07]))
 
@@ -69,7 +40,9 @@ class Simulated:
     states: FloatArray
 
 
-def simulate(space: StateSpace, count: int, seed: int, constant: float | None = None) -> Simulated:
+def simulate_with(
+    telemetry: Telemetry, space: StateSpace, count: int, seed: int, constant: float | None = None
+) -> Simulated:
     """Rows 1 to ``count`` of a building that starts at 293.15 K throughout; the disturbance has its model's law."""
     rng, n_zone = np.random.default_rng(seed), space.n_zone
     keep, drive = DISTURBANCE.discrete(STEP)
@@ -95,18 +68,21 @@ def simulate(space: StateSpace, count: int, seed: int, constant: float | None = 
     return Simulated(space, inputs, truth, states)
 
 
-def building(mixed: bool = False, n_zone: int = 3) -> StateSpace:
-    modes = pencil(n_zone).modal.modes
-    return state_space(modes, STEP, airflows=AIRFLOWS, flow=FLOW) if mixed else state_space(modes, STEP)
+SpaceOf, Simulate = Callable[..., StateSpace], Callable[..., Simulated]
 
 
-def gaps(inputs: Inputs) -> Inputs:
-    """Sensors that come and go: short, long, all at once."""
-    zone = inputs.zone.copy()
-    zone[10, 0] = zone[20:25, 1] = np.nan
-    zone[30:90, 2] = zone[60:70, 0] = np.nan
-    zone[120:123] = np.nan
-    return replace(inputs, zone=zone)
+@pytest.fixture(scope="module")
+def space_of(pencil: Pencil) -> SpaceOf:
+    def space(mixed: bool = False, n_zone: int = 3) -> StateSpace:
+        modes = pencil(n_zone).modal.modes
+        return state_space(modes, STEP, airflows=AIRFLOWS, flow=FLOW) if mixed else state_space(modes, STEP)
+
+    return space
+
+
+@pytest.fixture(scope="module")
+def simulated(telemetry: Telemetry) -> Simulate:
+    return partial(simulate_with, telemetry)
 
 
 START = np.full((9, 1), REFERENCE)
@@ -158,7 +134,7 @@ def textbook(kalman: KalmanFilter, inputs: Inputs, unknown: FloatArray) -> Textb
 # Oracles
 
 
-def test_scalar_filter_by_hand() -> None:
+def test_scalar_filter_by_hand(telemetry: Telemetry) -> None:
     """One volume without disturbance: P = q = 0, so the filter only predicts; with it, two steps by hand."""
     m = Matrices(
         capacity=np.array([[3e5]]), flow=np.array([[100.0, -100.0]]), heating=np.array([[1.0]]),
@@ -191,9 +167,11 @@ def test_scalar_filter_by_hand() -> None:
 
 @pytest.mark.parametrize("mixed", [False, True])
 @pytest.mark.parametrize("complete", [True, False])
-def test_it_is_the_textbook_s_filter_with_missing_data(mixed: bool, complete: bool) -> None:
-    space = building(mixed)
-    inputs = gaps(simulate(space, 200, 0).inputs)
+def test_it_is_the_textbook_s_filter_with_missing_data(
+    mixed: bool, complete: bool, space_of: SpaceOf, simulated: Simulate, gaps: Gaps
+) -> None:
+    space = space_of(mixed)
+    inputs = gaps(simulated(space, 200, 0).inputs)
     if not complete:
         known = inputs.complete.copy()
         known[100:110] = known[150] = False
@@ -218,12 +196,12 @@ def test_it_is_the_textbook_s_filter_with_missing_data(mixed: bool, complete: bo
     assert found.count == (~unseen).sum()
 
 
-def test_likelihood_is_the_normal_density_of_all_measurements() -> None:
+def test_likelihood_is_the_normal_density_of_all_measurements(space_of: SpaceOf, simulated: Simulate) -> None:
     """The stacked measurements of 12 steps, jointly normal with means and covariances from the matrices' powers."""
-    space = building()
-    zone = simulate(space, 12, 3).inputs.zone
+    space = space_of()
+    zone = simulated(space, 12, 3).inputs.zone
     zone[4, 1] = zone[7:9, 0] = np.nan
-    inputs = replace(simulate(space, 12, 3).inputs, zone=zone)
+    inputs = replace(simulated(space, 12, 3).inputs, zone=zone)
     kalman = KalmanFilter(space, DISTURBANCE)
     whole, r = kalman.whole, space.order
     a, c = whole.dense(), whole.observation
@@ -249,9 +227,9 @@ def test_likelihood_is_the_normal_density_of_all_measurements() -> None:
     assert kalman.filter(inputs, 0, 12, START).log_likelihood == pytest.approx(wanted, abs=1e-8)
 
 
-def test_against_statsmodels() -> None:
-    space = building()
-    inputs = gaps(simulate(space, 200, 1).inputs)
+def test_against_statsmodels(space_of: SpaceOf, simulated: Simulate, gaps: Gaps) -> None:
+    space = space_of()
+    inputs = gaps(simulated(space, 200, 1).inputs)
     kalman = KalmanFilter(space, DISTURBANCE, tolerance=0.0)
     whole = kalman.whole
     scale = np.sqrt(np.diag(kalman.steady(np.ones(3, dtype=bool))[0]))  # statsmodels wants states of like size
@@ -273,10 +251,12 @@ def test_against_statsmodels() -> None:
     np.testing.assert_allclose(found.disturbance, scale[-3:] * result.filtered_state[-3:].T, rtol=0, atol=1e-6)
 
 
-def test_what_is_unknown_at_the_start_adds_to_the_covariance() -> None:
+def test_what_is_unknown_at_the_start_adds_to_the_covariance(
+    space_of: SpaceOf, simulated: Simulate, gaps: Gaps
+) -> None:
     """The textbook's filter from the steady covariance and two columns beside it."""
-    space = building()
-    inputs = gaps(simulate(space, 200, 0).inputs)
+    space = space_of()
+    inputs = gaps(simulated(space, 200, 0).inputs)
     spread = np.zeros((9, 2))
     spread[[4, 7], [0, 1]] = 300.0, 500.0
     kalman = KalmanFilter(space, DISTURBANCE, tolerance=0.0)
@@ -294,9 +274,9 @@ def test_what_is_unknown_at_the_start_adds_to_the_covariance() -> None:
 
 
 @pytest.mark.parametrize("mixed", [False, True])
-def test_prediction_is_the_model_with_a_fading_disturbance(mixed: bool) -> None:
-    space = building(mixed)
-    made = simulate(space, 150, 7)
+def test_prediction_is_the_model_with_a_fading_disturbance(mixed: bool, space_of: SpaceOf, simulated: Simulate) -> None:
+    space = space_of(mixed)
+    made = simulated(space, 150, 7)
     kalman = KalmanFilter(space, DISTURBANCE)
     found = kalman.filter(made.inputs, 0, 100, START)
     starts, steps, r = np.array([60, 100]), 30, space.order
@@ -323,10 +303,10 @@ def test_prediction_is_the_model_with_a_fading_disturbance(mixed: bool) -> None:
     np.testing.assert_allclose(first[0, 0], found.predicted[60], rtol=0, atol=1e-9)
 
 
-def test_constant_unmeasured_heat_leaves_no_offset() -> None:
+def test_constant_unmeasured_heat_leaves_no_offset(space_of: SpaceOf, simulated: Simulate) -> None:
     """150 W in every zone that nobody measures: the model alone drifts off, the predictor with it does not."""
-    space = building()
-    made = simulate(space, 4000, 8, constant=150.0)
+    space = space_of()
+    made = simulated(space, 4000, 8, constant=150.0)
     horizon, start = 72, 3900
     rows = start + np.arange(1, horizon + 1)
     truth = made.inputs.zone[rows[-1]]
@@ -347,8 +327,8 @@ def test_constant_unmeasured_heat_leaves_no_offset() -> None:
     assert errors["fading"] < 0.03 * errors["alone"]
 
 
-def test_deviation_of_a_prediction_is_that_of_the_covariance_run_forward() -> None:
-    space = building()
+def test_deviation_of_a_prediction_is_that_of_the_covariance_run_forward(space_of: SpaceOf) -> None:
+    space = space_of()
     kalman = KalmanFilter(space, DISTURBANCE)
     p = kalman.steady(np.ones(3, dtype=bool))[0]
     c, wanted = kalman.whole.observation, []
@@ -358,9 +338,9 @@ def test_deviation_of_a_prediction_is_that_of_the_covariance_run_forward() -> No
     np.testing.assert_allclose(kalman.prediction_deviation(50), wanted, rtol=1e-10)
 
 
-def test_errors_of_predictions_are_as_large_as_their_deviation_says() -> None:
-    space = building()
-    made = simulate(space, 6000, 9)
+def test_errors_of_predictions_are_as_large_as_their_deviation_says(space_of: SpaceOf, simulated: Simulate) -> None:
+    space = space_of()
+    made = simulated(space, 6000, 9)
     kalman = KalmanFilter(space, DISTURBANCE)
     found = kalman.filter(made.inputs, 0, 6000, START)
     starts = np.arange(300, 5960, 40)
@@ -376,9 +356,9 @@ def test_errors_of_predictions_are_as_large_as_their_deviation_says() -> None:
 # Refusals
 
 
-def test_bad_wishes_are_refused() -> None:
-    space = building()
-    inputs = simulate(space, 20, 0).inputs
+def test_bad_wishes_are_refused(space_of: SpaceOf, simulated: Simulate) -> None:
+    space = space_of()
+    inputs = simulated(space, 20, 0).inputs
     kalman = KalmanFilter(space, DISTURBANCE)
     with pytest.raises(FilterError, match="covariance: expected one of exact, steady, came 'fast'"):
         KalmanFilter(space, DISTURBANCE, covariance="fast")  # type: ignore[arg-type]
@@ -390,7 +370,7 @@ def test_bad_wishes_are_refused() -> None:
         kalman.filter(replace(inputs, zone=np.full(inputs.zone.shape, np.nan)), 0, 20, START)
 
 
-def test_exact_hold_runs_too() -> None:
+def test_exact_hold_runs_too(simulated: Simulate, pencil: Pencil) -> None:
     space = state_space(pencil().modal.modes, STEP, EXACT)
-    found = KalmanFilter(space, DISTURBANCE).filter(simulate(space, 400, 1).inputs, 0, 400, START)
+    found = KalmanFilter(space, DISTURBANCE).filter(simulated(space, 400, 1).inputs, 0, 400, START)
     assert np.nanstd(found.standardised) == pytest.approx(1.0, abs=0.08)

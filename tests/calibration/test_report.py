@@ -144,7 +144,7 @@ def test_the_page_holds_the_numbers_and_nothing_else_is_loaded(written: Path, re
     for text in (calibration_verdict(result), "Solve_Succeeded", "--seed 0", result.version, "--dx 1"):
         assert text in page.text
     for p in result.parameters:
-        assert p.name.replace("_", " ") in page.text and p.source in page.text
+        assert p.name.replace("_", " ").replace("u value", "U-value") in page.text and p.source in page.text
     drawn = "".join(page.svgs())
     for text in (
         "held out",

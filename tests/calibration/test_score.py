@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-import pandas as pd
 import pytest
 from numpy.typing import NDArray
 
@@ -21,43 +21,12 @@ STEP = 300.0
 START = np.full((9, 1), REFERENCE)
 
 
-def pencil(n_zone: int = 3, n: int = 9, seed: int = 0) -> Matrices:
-    """Random symmetric model: the first volumes are the zones' air, light; the others walls, heavy."""
-    rng = np.random.default_rng(seed)
-    links = np.triu(rng.random((n, n)), 1) * 60.0
-    links += links.T
-    leak = 20.0 * rng.random(n)
-    observation = np.eye(n)[:n_zone]
-    return Matrices(
-        capacity=np.diag(np.concatenate([rng.uniform(1e5, 3e5, n_zone), rng.uniform(1e6, 2e7, n - n_zone)])),
-        flow=np.hstack([np.diag(links.sum(axis=1) + leak) - links, -leak[:, None]]),
-        heating=observation.T.copy(),
-        observation=observation,
-        uniform=np.ones(n),
-        capacity_slopes=[],
-        flow_slopes=[],
-    )
-
-
-def telemetry(zone: FloatArray, heat: FloatArray, boundary: FloatArray, airflow: FloatArray | None = None) -> Inputs:
-    frame = pd.DataFrame(zone)
-    return Inputs(
-        stamps=pd.date_range("2024-01-01", periods=len(zone), freq=f"{STEP:g}s", tz="UTC"),
-        step=STEP,
-        heat=heat,
-        boundary=boundary,
-        airflow=np.zeros((len(zone), 0)) if airflow is None else airflow,
-        zone=zone,
-        bridged=frame.ffill(limit=6).to_numpy(),
-        held=frame.ffill().bfill().to_numpy(),
-        complete=np.ones(len(zone), dtype=bool),
-    )
-
+Pencil, Telemetry = Callable[..., Matrices], Callable[..., Inputs]
 
 AIRFLOWS, FLOW = ((0, 1), (1, 2)), np.array([0.05, 0.02])
 
 
-def record(space: StateSpace, kind: str, swing: float = 0.0) -> Inputs:
+def record(telemetry: Telemetry, space: StateSpace, kind: str, swing: float = 0.0) -> Inputs:
     """Something like telemetry; the likelihood of any numbers has derivatives."""
     rng = np.random.default_rng(0)
     zone = REFERENCE + np.cumsum(0.1 * rng.standard_normal((150, 3)), axis=0)
@@ -85,10 +54,12 @@ def filtered(
 @pytest.mark.parametrize("mixed", [False, True])
 @pytest.mark.parametrize("covariance", ["exact", "steady"])
 @pytest.mark.parametrize("kind", ["complete", "gaps"])
-def test_slopes_are_those_of_differences(mixed: bool, covariance: str, kind: str) -> None:
+def test_slopes_are_those_of_differences(
+    mixed: bool, covariance: str, kind: str, pencil: Pencil, telemetry: Telemetry
+) -> None:
     modes = pencil().modal.modes
     space = state_space(modes, STEP, airflows=AIRFLOWS, flow=FLOW) if mixed else state_space(modes, STEP)
-    inputs = record(space, kind)
+    inputs = record(telemetry, space, kind)
     if covariance == "steady":  # which leaves its steady covariance where inputs are incomplete
         inputs = replace(inputs, complete=np.ones(150, dtype=bool))
     drive, keep, noise = np.array([40.0, 25.0, 60.0]) ** 2, 0.93, np.array([0.05, 0.08, 0.11]) ** 2
@@ -112,10 +83,10 @@ def test_slopes_are_those_of_differences(mixed: bool, covariance: str, kind: str
     assert by_keep * 1e-5 == pytest.approx(difference(none, 1e-5, none), rel=1e-4, abs=1e-7)
 
 
-def test_airflows_that_change_are_taken_as_given() -> None:
+def test_airflows_that_change_are_taken_as_given(pencil: Pencil, telemetry: Telemetry) -> None:
     """Their heat follows the filtered temperatures, whose own derivative is left out: 30 % of swing make 1 %."""
     space = state_space(pencil().modal.modes, STEP, airflows=AIRFLOWS, flow=FLOW)
-    inputs = record(space, "gaps", swing=0.3)
+    inputs = record(telemetry, space, "gaps", swing=0.3)
     drive, noise = np.array([40.0, 25.0, 60.0]) ** 2, np.array([0.05, 0.08, 0.11]) ** 2
     by_drive, _, by_noise = log_likelihood_slopes(filtered(space, inputs, drive, 0.93, noise))
     up, down = (filtered(space, inputs, s * drive, 0.93, noise).log_likelihood for s in (1.0001, 0.9999))
@@ -124,9 +95,9 @@ def test_airflows_that_change_are_taken_as_given() -> None:
     assert by_noise @ noise == pytest.approx((up - down) / 2e-4, rel=0.01)
 
 
-def test_zone_without_a_sensor_tells_nothing_of_its_noise() -> None:
+def test_zone_without_a_sensor_tells_nothing_of_its_noise(pencil: Pencil, telemetry: Telemetry) -> None:
     space = state_space(pencil().modal.modes, STEP)
-    inputs = record(space, "complete")
+    inputs = record(telemetry, space, "complete")
     zone = inputs.zone.copy()
     zone[:, 1] = np.nan
     by_drive, _, by_noise = log_likelihood_slopes(

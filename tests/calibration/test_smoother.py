@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-import pandas as pd
 import pytest
 from numpy.typing import NDArray
 from statsmodels.tsa.statespace.kalman_smoother import KalmanSmoother as Reference
 
-from calibration import DisturbanceModel, Filtered, KalmanFilter, StateSpace, smooth, state_space
+from calibration import DisturbanceModel, Filtered, KalmanFilter, StateSpace, smooth
 from calibration.errors import FilterError
 from thermal import Inputs
-from thermal.model import Matrices
 
 FloatArray = NDArray[np.float64]
 
@@ -22,68 +21,10 @@ STEP = 300.0
 START = np.full((9, 1), REFERENCE)
 
 
-def pencil(n_zone: int = 3, n: int = 9, seed: int = 0) -> Matrices:
-    """Random symmetric model: the first volumes are the zones' air, light; the others walls, heavy."""
-    rng = np.random.default_rng(seed)
-    links = np.triu(rng.random((n, n)), 1) * 60.0
-    links += links.T
-    leak = 20.0 * rng.random(n)
-    observation = np.eye(n)[:n_zone]
-    return Matrices(
-        capacity=np.diag(np.concatenate([rng.uniform(1e5, 3e5, n_zone), rng.uniform(1e6, 2e7, n - n_zone)])),
-        flow=np.hstack([np.diag(links.sum(axis=1) + leak) - links, -leak[:, None]]),
-        heating=observation.T.copy(),
-        observation=observation,
-        uniform=np.ones(n),
-        capacity_slopes=[],
-        flow_slopes=[],
-    )
-
-
-def telemetry(zone: FloatArray, heat: FloatArray, boundary: FloatArray, airflow: FloatArray | None = None) -> Inputs:
-    frame = pd.DataFrame(zone)
-    return Inputs(
-        stamps=pd.date_range("2024-01-01", periods=len(zone), freq=f"{STEP:g}s", tz="UTC"),
-        step=STEP,
-        heat=heat,
-        boundary=boundary,
-        airflow=np.zeros((len(zone), 0)) if airflow is None else airflow,
-        zone=zone,
-        bridged=frame.ffill(limit=6).to_numpy(),
-        held=frame.ffill().bfill().to_numpy(),
-        complete=np.ones(len(zone), dtype=bool),
-    )
-
+Simulate = Callable[..., tuple[Inputs, FloatArray]]
+Gaps = Callable[[Inputs], Inputs]
 
 DISTURBANCE = DisturbanceModel(np.array([150.0, 60.0, 100.0]), 3600.0, np.array([0.05, 0.1, 0.07]))
-
-
-def building() -> StateSpace:
-    return state_space(pencil().modal.modes, STEP)
-
-
-def simulate(count: int, seed: int, disturbance: DisturbanceModel = DISTURBANCE) -> tuple[Inputs, FloatArray]:
-    """Telemetry from row 1 on, and the disturbance of its rows [W]."""
-    space, rng = building(), np.random.default_rng(seed)
-    keep, drive = disturbance.discrete(STEP)
-    heat, boundary = 500.0 * rng.random((count + 1, 3)), 283.15 + 3.0 * rng.random((count + 1, 1))
-    d, x = np.asarray(disturbance.deviation) * rng.standard_normal(3), np.zeros(space.order)
-    zone, truth = np.full((count + 1, 3), REFERENCE), np.zeros((count + 1, 3))
-    for k in range(1, count + 1):
-        u = space.drives(boundary[k], heat[k] + d)
-        zone[k] = space.observation @ x + space.feedthrough @ u + REFERENCE
-        x, truth[k] = space.advance(x) + space.drive @ u, d
-        d = keep * d + drive * rng.standard_normal(3)
-    noise = np.asarray(disturbance.sensor_deviation) * rng.standard_normal(zone.shape)
-    return telemetry(zone + noise, heat, boundary), truth[1:]
-
-
-def gaps(inputs: Inputs) -> Inputs:
-    zone = inputs.zone.copy()
-    zone[10, 0] = zone[20:25, 1] = np.nan
-    zone[30:90, 2] = zone[60:70, 0] = np.nan
-    zone[120:123] = np.nan
-    return replace(inputs, zone=zone)
 
 
 def textbook(found: Filtered, inputs: Inputs) -> tuple[FloatArray, FloatArray]:
@@ -113,9 +54,9 @@ def textbook(found: Filtered, inputs: Inputs) -> tuple[FloatArray, FloatArray]:
     return np.array(means), np.array(spreads)
 
 
-def test_it_is_the_textbook_s_smoother_with_missing_data() -> None:
+def test_it_is_the_textbook_s_smoother_with_missing_data(building: StateSpace, simulate: Simulate, gaps: Gaps) -> None:
     inputs = gaps(simulate(200, 0)[0])
-    filtered = KalmanFilter(building(), DISTURBANCE, tolerance=0.0).filter(inputs, 0, 200, START)
+    filtered = KalmanFilter(building, DISTURBANCE, tolerance=0.0).filter(inputs, 0, 200, START)
     found = smooth(filtered)
     means, spreads = textbook(filtered, inputs)
     np.testing.assert_allclose(found.disturbance, means[:, -3:], rtol=0, atol=1e-6)
@@ -128,9 +69,9 @@ def test_it_is_the_textbook_s_smoother_with_missing_data() -> None:
     np.testing.assert_allclose(found.zone_deviation, wanted, rtol=1e-6)
 
 
-def test_against_statsmodels() -> None:
+def test_against_statsmodels(building: StateSpace, simulate: Simulate, gaps: Gaps) -> None:
     inputs = gaps(simulate(150, 1)[0])
-    kalman = KalmanFilter(building(), DISTURBANCE, tolerance=0.0)
+    kalman = KalmanFilter(building, DISTURBANCE, tolerance=0.0)
     whole, space = kalman.whole, kalman.space
     steady = kalman.steady(np.ones(3, dtype=bool))[0]
     scale = np.sqrt(np.diag(steady))
@@ -152,12 +93,12 @@ def test_against_statsmodels() -> None:
     np.testing.assert_allclose(found.disturbance_deviation, scale[-3:] * np.sqrt(variance), rtol=1e-7)
 
 
-def test_band_covers_the_disturbance_at_its_rate() -> None:
+def test_band_covers_the_disturbance_at_its_rate(building: StateSpace, simulate: Simulate) -> None:
     """Pooled over 10 buildings of 3 zones and 1000 steps; errors are correlated over an hour or so."""
     inside, widths = [], []
     for seed in range(10):
         inputs, truth = simulate(1000, seed)
-        found = smooth(KalmanFilter(building(), DISTURBANCE).filter(inputs, 0, 1000, START))
+        found = smooth(KalmanFilter(building, DISTURBANCE).filter(inputs, 0, 1000, START))
         low, high = found.band(0.9)
         inside.append(((low < truth) & (truth < high)).mean(axis=0))
         widths.append(np.sqrt(np.mean((found.disturbance - truth) ** 2, axis=0)) / found.disturbance_deviation[500])
@@ -165,39 +106,39 @@ def test_band_covers_the_disturbance_at_its_rate() -> None:
     np.testing.assert_allclose(np.mean(widths, axis=0), 1.0, atol=0.07)
 
 
-def test_smoothed_is_nearer_than_filtered() -> None:
+def test_smoothed_is_nearer_than_filtered(building: StateSpace, simulate: Simulate) -> None:
     inputs, truth = simulate(1500, 3)
-    filtered = KalmanFilter(building(), DISTURBANCE).filter(inputs, 0, 1500, START)
+    filtered = KalmanFilter(building, DISTURBANCE).filter(inputs, 0, 1500, START)
     found = smooth(filtered)
     assert (found.disturbance_deviation < filtered.disturbance_deviation + 1e-12).all()
     errors = [np.sqrt(np.mean((d - truth) ** 2)) for d in (found.disturbance, filtered.disturbance)]
     assert errors[0] < 0.9 * errors[1]
 
 
-def test_at_the_end_it_knows_what_the_filter_knows() -> None:
-    filtered = KalmanFilter(building(), DISTURBANCE).filter(simulate(100, 4)[0], 0, 100, START)
+def test_at_the_end_it_knows_what_the_filter_knows(building: StateSpace, simulate: Simulate) -> None:
+    filtered = KalmanFilter(building, DISTURBANCE).filter(simulate(100, 4)[0], 0, 100, START)
     found = smooth(filtered)
     np.testing.assert_allclose(found.disturbance[-1], filtered.disturbance[-1], rtol=0, atol=1e-9)
     np.testing.assert_allclose(found.disturbance_deviation[-1], filtered.disturbance_deviation[-1], rtol=1e-9)
     np.testing.assert_allclose(found.zone[-1], filtered.zone[-1], rtol=0, atol=1e-9)
 
 
-def test_a_gap_is_bridged_and_its_band_is_wide() -> None:
+def test_a_gap_is_bridged_and_its_band_is_wide(building: StateSpace, simulate: Simulate) -> None:
     inputs, truth = simulate(600, 5)
     zone = inputs.zone.copy()
     zone[300:348, 0] = np.nan
     holed = replace(inputs, zone=zone)
-    found = smooth(KalmanFilter(building(), DISTURBANCE).filter(holed, 0, 600, START))
+    found = smooth(KalmanFilter(building, DISTURBANCE).filter(holed, 0, 600, START))
     assert np.isfinite(found.zone).all()
     assert np.abs(found.zone[299:347, 0] - inputs.zone[300:348, 0]).max() < 3.5 * found.zone_deviation[323, 0] + 0.2
     assert found.disturbance_deviation[323, 0] > 1.3 * found.disturbance_deviation[200, 0]
     assert np.abs(found.disturbance[323, 0] - truth[323, 0]) < 4.0 * found.disturbance_deviation[323, 0]
 
 
-def test_steady_gains_give_the_same_where_nothing_is_missing() -> None:
+def test_steady_gains_give_the_same_where_nothing_is_missing(building: StateSpace, simulate: Simulate) -> None:
     inputs, _ = simulate(3000, 6)
     exact, steady = (
-        smooth(KalmanFilter(building(), DISTURBANCE, covariance=c).filter(inputs, 0, 3000, START))
+        smooth(KalmanFilter(building, DISTURBANCE, covariance=c).filter(inputs, 0, 3000, START))
         for c in ("exact", "steady")
     )
     np.testing.assert_allclose(steady.disturbance, exact.disturbance, rtol=0, atol=1e-9)
@@ -207,16 +148,16 @@ def test_steady_gains_give_the_same_where_nothing_is_missing() -> None:
     )  # fmt: skip
 
 
-def test_random_walk_is_smoothed() -> None:
+def test_random_walk_is_smoothed(building: StateSpace, simulate: Simulate) -> None:
     walk = DisturbanceModel(np.array([300.0, 200.0, 250.0]), np.inf, 0.05)
     inputs, truth = simulate(800, 7, walk)
-    found = smooth(KalmanFilter(building(), walk).filter(inputs, 0, 800, START))
+    found = smooth(KalmanFilter(building, walk).filter(inputs, 0, 800, START))
     low, high = found.band(0.9)
     assert ((low < truth) & (truth < high))[100:].mean() > 0.8
 
 
 @pytest.mark.parametrize("level", [0.0, 1.0, 1.5])
-def test_level_must_be_a_probability(level: float) -> None:
-    found = smooth(KalmanFilter(building(), DISTURBANCE).filter(simulate(20, 0)[0], 0, 20, START))
+def test_level_must_be_a_probability(level: float, building: StateSpace, simulate: Simulate) -> None:
+    found = smooth(KalmanFilter(building, DISTURBANCE).filter(simulate(20, 0)[0], 0, 20, START))
     with pytest.raises(FilterError, match="expected a probability between 0 and 1"):
         found.band(level)

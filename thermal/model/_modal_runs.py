@@ -7,6 +7,7 @@ With ``S = (K + s C)^-1 C`` a step is ``x' = f(S) x + g(S) (K + s C)^-1 b``, and
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -81,13 +82,22 @@ class ModalRuns:
     """
 
     def __init__(self, matrices: Matrices) -> None:
-        self.matrices = matrices
+        # a copy, as matrices keep their runs: what refers to each other stays in memory until it is looked for
+        self.matrices = replace(matrices)
         self.modes = modal_model(matrices)
+        self._frames: dict[bytes, HeldFrame] = {}
 
     @cached_property
     def slopes(self) -> _ModalSlopes:
         """Derivatives of the matrices in the modes."""
         return _ModalSlopes(self.matrices, self.modes)
+
+    def _frame(self, held: NDArray[np.bool_]) -> HeldFrame:
+        """Frame of held zones; a spin-up needs it for its steady state, its steps and its derivatives."""
+        key = held.tobytes()
+        if key not in self._frames:
+            self._frames[key] = HeldFrame(self.modes, held)
+        return self._frames[key]
 
     @property
     def heated_as_observed(self) -> bool:
@@ -271,7 +281,7 @@ class ModalRuns:
         """
         modes, count = self.modes, int(keep[-1]) + 1
         held = np.isfinite(zone[0])
-        frame = HeldFrame(modes, held)
+        frame = self._frame(held)
         inputs = np.hstack([boundary[:count], heat[:count] * ~held]).T
         start = modes.coordinates @ states[:, 0]
         wanted = np.vstack([modes.observation[held] @ start, zone[:count, held]]).T
@@ -326,7 +336,7 @@ class ModalRuns:
         step : float
             Time step [s].
         """
-        frame = HeldFrame(self.modes, held)
+        frame = self._frame(held)
         system = frame.capacity + step * (1.0 - SHIFT * frame.capacity)
         inner = -(frame.coupling * (1.0 - step * SHIFT)) / system[:, None]
         return np.asarray(self.modes.states @ (frame.lift + frame.basis @ inner))
@@ -350,7 +360,7 @@ class ModalRuns:
         ndarray, shape (n, m, 1 + n_held)
             All boundaries together, then every held zone [K/K].
         """
-        frame = HeldFrame(self.modes, held)
+        frame = self._frame(held)
         conductance = 1.0 - SHIFT * frame.capacity
         temperatures = self.modes.boundary.shape[1] - self.modes.n_signal
         outside = frame.basis.T @ self.modes.boundary[:, :temperatures].sum(axis=1)

@@ -126,7 +126,8 @@ def krylov_basis(
     values, vectors = np.linalg.eigh(gram / np.outer(norms, norms))
     keep = values > tolerance * values[-1]
     basis = (stacked / norms) @ (vectors[:, keep] / np.sqrt(values[keep]))
-    own = np.eye(basis.shape[0])[:, sensors]
+    own = np.zeros((basis.shape[0], sensors.size))
+    own[sensors, np.arange(sensors.size)] = 1.0
     return np.asarray(np.linalg.qr(np.hstack([1.0 - own.sum(axis=1, keepdims=True), basis, own]))[0])
 
 

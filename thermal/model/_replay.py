@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from thermal.case import Case
 from thermal.errors import SimulationError
+from thermal.model._modal_series import run_along
 from thermal.model._scheme import IMPLICIT_EULER, Scheme
 from thermal.model._stepper import Stepper
 from thermal.model._symbolic import Matrices
@@ -253,9 +254,13 @@ def free_runs(
     """
     keep = np.arange(1, steps + 1) if keep is None else keep
     if matrices.reduced and not network.airflows:
+        start, boundary = states - _REFERENCE * matrices.uniform[:, None], inputs.boundary - _REFERENCE
+        if slopes is None:
+            modes = matrices.modal.modes
+            along = run_along(modes, start, boundary, inputs.heat, starts, keep, inputs.step, scheme)
+            return along + _REFERENCE, None
         row = starts + np.arange(1, int(keep[-1]) + 1)[:, None]
-        boundary, heat = ((v[row]).transpose(0, 2, 1) for v in (inputs.boundary - _REFERENCE, inputs.heat))
-        start = states - _REFERENCE * matrices.uniform[:, None]
+        boundary, heat = ((v[row]).transpose(0, 2, 1) for v in (boundary, inputs.heat))
         means, moved = matrices.modal.run(start, boundary, heat, keep, inputs.step, scheme, slopes)
         return means + _REFERENCE, moved
     stepper = Stepper(matrices, inputs.step, scheme, network.airflows)

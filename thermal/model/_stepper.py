@@ -159,10 +159,13 @@ class Stepper:
         if heat is not None and not held.all():
             rhs += self.step * (m.heating @ np.where(held[:, None], 0.0, heat))
         free = self._solve(rhs)
-        holding = np.linalg.solve(self.response[1][np.ix_(held, held)], (zone - m.observation @ free)[held])
-        new = free + self.response[0][:, held] @ holding
-        watts = np.zeros(held.size)
-        watts[held] = holding[:, 0] / self.step
+        missing = zone - m.observation @ free
+        missing[~held] = 0.0
+        response, gain = self.response
+        holding = np.zeros_like(missing)
+        holding[held] = np.linalg.solve(gain if held.all() else gain[np.ix_(held, held)], missing[held])
+        new = free + response @ holding
+        watts = holding[:, 0] / self.step
         if slopes is None:
             return new, None, watts
         moved = self._solve(m.capacity @ slopes + self._slope_source(new - states, np.vstack([new, boundary])))
