@@ -297,13 +297,16 @@ def test_floors_ground_and_roof(lively_case: CaseOf) -> None:
     ):
         b = bench(case, name, **{parameter: 0.8})
         heat = b.heat()
-        back = {z: np.flatnonzero((b.network.kind == "slab") & (b.network.zone == k))[-1] for k, z in enumerate("ABCD")}
+        rooms = b.network.anatomy.rooms
+        floor, ceiling = ({z: r.floor[-1] for z, r in rooms.items()}, {z: r.ceiling[-1] for z, r in rooms.items()})
         for zone, other in zip("ABCD", "CDAB", strict=True):
+            lower = zone in "AB"
+            back = floor if (name == "ground_exchange") or (name == "interfloor_exchange" and not lower) else ceiling
             mine = b.states[back[zone]]
             expected = {
-                "interfloor_exchange": b.states[back[other]] - mine,
-                "ground_exchange": (287.15 - REFERENCE - mine) * (zone in "AB"),
-                "roof_exchange": (b.outside[0] - mine) * (zone in "CD"),
+                "interfloor_exchange": b.states[(floor if lower else ceiling)[other]] - mine,
+                "ground_exchange": (287.15 - REFERENCE - mine) * lower,
+                "roof_exchange": (b.outside[0] - mine) * (not lower),
             }[name]
             assert heat[back[zone]] == pytest.approx(0.8 * FLOOR[zone] * expected, rel=1e-9, abs=1e-9)
         assert np.count_nonzero(np.abs(heat) > 1e-9) == (4 if name == "interfloor_exchange" else 2)

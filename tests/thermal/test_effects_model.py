@@ -119,7 +119,7 @@ def test_the_modes_follow_the_grid(lively_case: CaseOf, kind: str) -> None:
     for size in (0.0, 0.4, 0.8):
         theta = typical(network, size)
         difference = trajectories(grid, inputs, theta)[0] - trajectories(small, inputs, theta)[0]
-        assert np.abs(difference).max() < 3e-3, size
+        assert np.abs(difference).max() < 8e-3, size
 
 
 @pytest.mark.parametrize("scheme", [IMPLICIT_EULER, TR_BDF2])

@@ -88,7 +88,8 @@ def test_rooms_hold_what_is_in_them(lively_case: CaseOf) -> None:
             assert network.kind[room.radiant] == "radiant"
             assert network.kind[room.mean] == ("mixing" if kind == "plan" else "air")
             assert network.kind[room.furniture] == "furniture" or not BASELINE.furniture
-            assert len(room.slab) == (BASELINE.slab_nodes if kind == "plan" else 0)
+            assert len(room.floor) == len(room.ceiling) == (BASELINE.slab_nodes if kind == "plan" else 0)
+            assert (network.kind[[*room.floor, *room.ceiling]] == "slab").all()
 
 
 def test_a_zone_table_is_what_it_lists(lively_case: CaseOf) -> None:

@@ -81,7 +81,7 @@ def test_the_baseline_is_what_it_was() -> None:
     network = build_network(BUILDINGS["plan"])
     kinds = {str(k): int(n) for k, n in zip(*np.unique(network.kind, return_counts=True), strict=True)}
     assert kinds == {
-        "air": 8, "exterior_wall": 18, "furniture": 2, "interior_wall": 2, "mixing": 2, "radiant": 2, "slab": 4
+        "air": 8, "exterior_wall": 18, "furniture": 2, "interior_wall": 2, "mixing": 2, "radiant": 2, "slab": 8
     }  # fmt: skip
     assert [p.name for p in network.parameters] == [
         "interior_film_coefficient", "radiant_coefficient", "shuffle_probability", "slab_coupling",
@@ -146,19 +146,22 @@ def test_a_parameter_is_there_when_its_part_is(name: str, structure: Structure) 
 
 
 @pytest.mark.parametrize("count", [0, 1, 2, 5])
-def test_slabs_are_a_chain_of_any_length(count: int) -> None:
-    """Resistance from face to back is 1/U_s whatever the number of nodes; so is the heat capacity."""
+def test_slabs_are_two_chains_of_any_length(count: int) -> None:
+    """Resistance of each from face to back is 1/U_s whatever the number of nodes; so is the heat capacity."""
     network = build_network(BUILDINGS["plan"], structure=Structure(slab_nodes=count))
-    slab = (network.kind == "slab") & (network.zone == 0)
-    assert slab.sum() == count
+    room = network.anatomy.rooms["A"]
+    slab = (network.kind == "slab") & (network.zone == room.number)
+    assert sorted(room.floor + room.ceiling) == np.flatnonzero(slab).tolist()
     assert ("slab_coupling" in names(network)) == ("slab_heat_capacity" in names(network)) == (count > 0)
-    if count:
-        m = SymbolicModel(network).matrices(network.start())
-        assert m.capacity.diagonal()[slab].sum() == pytest.approx(1.5e5 * 10.0, rel=1e-12)
-        rows = m.flow[:, : m.n].toarray()[np.ix_(slab, slab)]
-        along = np.diag(rows, 1)
-        np.testing.assert_allclose(along, -count * 10.0 * 10.0, rtol=1e-12)
-        surface = 1.0 / (rows.sum() / 10.0) - 1.0 / 7.5  # film off: half a layer
+    m = SymbolicModel(network).matrices(network.start())
+    for chain in (room.floor, room.ceiling):
+        assert len(chain) == count
+        if not count:
+            continue
+        assert m.capacity.diagonal()[list(chain)].sum() == pytest.approx(1.5e5 * 5.0, rel=1e-12)
+        rows = m.flow[:, : m.n].toarray()[np.ix_(chain, chain)]
+        np.testing.assert_allclose(np.diag(rows, 1), -count * 10.0 * 5.0, rtol=1e-12)
+        surface = 1.0 / (rows.sum() / 5.0) - 1.0 / 7.5  # film off: half a layer
         assert surface + (count - 0.5) / (count * 10.0) == pytest.approx(1.0 / 10.0, rel=1e-9)
 
 
