@@ -34,7 +34,7 @@ LARGEST_GROUP = 4
 TEMPERATURE = 2.0
 
 #: Most gain that an effect is worth that matters to no prediction, or makes those worse that it was not fitted to [-].
-DOUBTFUL = 3.0
+DOUBTFUL = 1.0
 
 #: Probability from which an effect belongs to the 90 % set [-].
 IN_SET = 0.1
