@@ -48,7 +48,24 @@ def answer_all(out: Path, workers: int, most: int | None = None) -> list[str]:
     """
     folder = out / ANSWERS
     folder.mkdir(exist_ok=True)
-    waiting = [p for p in sorted((out / CASES).iterdir()) if not (folder / f"{p.name}.json").exists()][:most]
+    return answer_cases(sorted((out / CASES).iterdir()), folder, workers, most)
+
+
+def answer_cases(cases: Sequence[Path], folder: Path, workers: int, most: int | None = None) -> list[str]:
+    """Diagnose every case that has no answer yet, in a process of its own; returns the names of those that failed.
+
+    Parameters
+    ----------
+    cases : sequence of Path
+        Case folders.
+    folder : Path
+        Where the answers go, one file a case.
+    workers : int
+        Processes at a time, one thread each.
+    most : int, optional
+        Most cases to answer now.
+    """
+    waiting = [p for p in cases if not (folder / f"{p.name}.json").exists()][:most]
     failed, began = [], time.perf_counter()
     with ThreadPoolExecutor(workers) as pool:
         tasks = {pool.submit(_answer, case, folder / f"{case.name}.json"): case.name for case in waiting}
