@@ -2,7 +2,18 @@
 
 from __future__ import annotations
 
-from practice_cases import rows
+from collections.abc import Callable
+from types import ModuleType
+
+import pytest
+
+
+@pytest.fixture(scope="module")
+def practice(script: Callable[[str], ModuleType], package: Callable[[str], ModuleType]) -> ModuleType:
+    package("energyplus_trials.drawing")
+    for name in ("_table", "_code", "_trial_answers"):
+        script(name)
+    return script("practice_cases")
 
 
 def answer(verdict: str, effect: str, probability: float, group: list[str], steps: list[dict]) -> dict:
@@ -12,7 +23,7 @@ def answer(verdict: str, effect: str, probability: float, group: list[str], step
     }  # fmt: skip
 
 
-def test_a_row_says_what_was_held_and_what_was_found() -> None:
+def test_a_row_says_what_was_held_and_what_was_found(practice: ModuleType) -> None:
     steps = [
         {"effects": ["roof_exchange"], "held_out_mae_after": 0.3, "share_closed": 0.33},
         {"effects": ["roof_exchange", "sensor_lag"], "held_out_mae_after": 0.16, "share_closed": 0.8},
@@ -22,7 +33,7 @@ def test_a_row_says_what_was_held_and_what_was_found() -> None:
         "a": answer("no_gap", "wind_film", 0.001, ["wind_film"], []),
         "house": answer("unexplained", "wind_film", 0.3, ["wind_film"], []),
     }
-    assert rows(answers, {"a": [], "b": ["roof_exchange", "sensor_lag"]}) == [
+    assert practice.rows(answers, {"a": [], "b": ["roof_exchange", "sensor_lag"]}) == [
         ["a", "nothing", "no_gap", "-", "-", "-", "0.400 (floor 0.100)", "-", "12"],
         [
             "b", "roof_exchange, sensor_lag", "group", "roof_exchange (97%)", "ground_exchange",
