@@ -30,6 +30,9 @@ _SWEEPS, _TOLERANCE = 200, 1e-6
 #: and change no gain by 0.01.
 _SHIFTS = (1.0 / 86400.0, 1.0 / 14400.0, 1.0 / 2400.0, 1.0 / 400.0)
 
+#: Order of the reduced model of a large building.
+_LARGEST_ORDER = 700
+
 #: Most zones in which effects of single zones are sought.
 _MOST_ZONES = 24
 
@@ -93,7 +96,8 @@ class Screening:
         built = bench.build({**fit.effects, **lacking}, (Chosen(GENERIC, here),))
         self._elsewhere = len(built.network.zones) - len(here) if here else 0
         theta = built.theta(fit.values)
-        model = reduced_model(built.grid, [theta, built.theta(fit.values, TYPICAL)], shifts=_SHIFTS)
+        order = _LARGEST_ORDER if here else None
+        model = reduced_model(built.grid, [theta, built.theta(fit.values, TYPICAL)], shifts=_SHIFTS, order=order)
         problem = bench.problem(built, theta)
         parts = [problem.errors(model, theta, runs, slopes=True) for runs in problem.runs]
         slopes = np.concatenate([m.reshape(-1, m.shape[-1]) for _, m in parts if m is not None])

@@ -26,6 +26,9 @@ FEW_SHIFTS = (1.0 / 86400.0, 1.0 / 14400.0, 1.0 / 2400.0, 1.0 / 400.0)
 #: Inputs from which a building counts as large.
 _MANY_INPUTS = 50
 
+#: Heat capacity below which a direction of a basis counts as massless [J/K].
+_LEAST_CAPACITY = 1e-3
+
 #: Where a basis is probed at another θ [1/s], between its expansion points: six hours and twenty minutes.
 _PROBES = (1.0 / 21600.0, 1.0 / 1200.0)
 
@@ -218,29 +221,42 @@ def reduced_model(
                 f"tolerance: expected at least {errors[1]:.2g} K, the error of all {small.n} states of the basis, "
                 f"came {tolerance:g}; add shifts"
             )
-        turn, errors = _least(small, _ranked(small), tolerance, replay)
+        turn, errors = _least(small, _ranked([small]), tolerance, replay)
         basis = basis @ turn
     elif order is not None and order < small.n:
-        turn = _ranked(small)[:, :order]
+        turn = _ranked([small, *(_turned(m, basis) for m in whole[1:])])[:, :order]
         basis, errors = basis @ turn, differences(_turned(small, turn), replay)
     certificate = Certificate(model.network.n_node, basis.shape[1], replay.hours, replay.step, *errors)
     return ReducedModel(model, basis, np.asarray(thetas[0], dtype=float), certificate)
 
 
-def _ranked(m: Matrices) -> FloatArray:
-    """Directions of a reduced model by what they carry, orthonormal, the uniform temperature first, (r, r)."""
-    modes = modal_model(m)
-    root = np.sqrt(modes.capacity)
-    rate = modes.conductance / modes.capacity
-    gain = np.abs(np.diag(modes.observation @ (modes.heating / modes.conductance[:, None])))
-    drive = np.hstack([modes.boundary / np.sqrt(m.n_boundary), modes.heating / gain])
-    gramian = np.zeros((rate.size, rate.size))
-    for factor in (drive / root[:, None], modes.output.T / root[:, None]):
-        part = (factor @ factor.T) / (rate[:, None] + rate[None, :])
-        gramian += part / np.trace(part)
-    vectors = np.linalg.eigh(gramian)[1][:, ::-1]
-    directions = np.hstack([m.uniform[:, None], modes.states @ (vectors / root[:, None])])
+def _ranked(models: Sequence[Matrices]) -> FloatArray:
+    """Directions of a reduced model by what they carry, orthonormal, the uniform temperature first, (r, r).
+
+    Parameters
+    ----------
+    models : sequence of Matrices
+        The model at one or more θ; what any of them carries counts.
+    """
+    root = np.linalg.cholesky(models[0].capacity + _LEAST_CAPACITY * np.eye(models[0].n))
+    vectors = np.linalg.eigh(np.sum([_gramians(m, root) for m in models], axis=0))[1][:, ::-1]
+    directions = np.hstack([models[0].uniform[:, None], np.linalg.solve(root.T, vectors)])
     return np.asarray(np.linalg.qr(directions)[0])
+
+
+def _gramians(m: Matrices, root: FloatArray) -> FloatArray:
+    """Sum of both Gramians in coordinates in which C is one; inputs count by the warmth that they bring in the end."""
+    modes = modal_model(m)
+    drive = np.hstack([modes.boundary, modes.heating])
+    gain = np.abs(modes.observation @ (drive / modes.conductance[:, None])).max(axis=0)
+    there = gain > 0.0
+    turn = root.T @ modes.states
+    rates = modes.capacity[:, None] * modes.conductance + modes.conductance[:, None] * modes.capacity
+    total = np.zeros_like(root)
+    for factor in (drive[:, there] / gain[there], modes.output.T):
+        whole = turn @ ((factor @ factor.T) / rates) @ turn.T
+        total += whole / np.trace(whole)
+    return total
 
 
 def _turned(m: Matrices, turn: FloatArray) -> Matrices:
