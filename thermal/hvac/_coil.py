@@ -1,0 +1,211 @@
+"""Coils between hot water and air: effectiveness-NTU, sizing, and what a valve does to them.
+
+Symbols after Incropera et al., Fundamentals of Heat and Mass Transfer (7th ed.), ch. 11.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from scipy.optimize import brentq
+
+from thermal.errors import HvacParameterError, describe
+from thermal.hvac._air import WATER_HEAT_CAPACITY
+from thermal.hvac._checks import fields_in_range, in_range
+from thermal.hvac._operations import FloatOperations, Operations, Value
+from thermal.units import AIR_HEAT_CAPACITY
+
+_LEAST = 1e-9  # share: keeps powers and their derivatives finite where no air flows
+
+
+def _effectiveness(ops: Operations, ntu: Value, ratio: Value) -> Value:
+    """Effectiveness of a cross-flow exchanger, both fluids unmixed (Incropera eq. 11.32).
+
+    ``eps = 1 - exp((exp(-Cr NTU^0.78) - 1) NTU^0.22 / Cr)``
+
+    Parameters
+    ----------
+    ops : Operations
+        Arithmetic.
+    ntu : Value
+        Number of transfer units UA/C_min [-].
+    ratio : Value
+        C_min/C_max [-], 0 to 1.
+    """
+    ratio = ratio + _LEAST
+    root = (ntu + _LEAST) ** 0.22
+    return -ops.expm1(ops.expm1(-ratio * (ntu / root)) * root / ratio)
+
+
+@dataclass(frozen=True)
+class WaterCoil:
+    """A coil that heats air with hot water.
+
+    Parameters
+    ----------
+    air_conductance, water_conductance : float
+        Film conductance times area on either side at the design flows [W/K], positive.
+    air_flow : float
+        Design air flow [kg/s], positive.
+    water_flow : float
+        Water flow with the valve fully open at the design differential pressure [kg/s], positive.
+
+    Notes
+    -----
+    ``1/UA = 1/hA_air + 1/hA_water`` with hA in powers 0.8 and 0.85 of the flows (Wetter 1999, LBNL-42354, as
+    EnergyPlus' Coil:Heating:Water; its small dependence on temperatures is left out).
+    """
+
+    air_conductance: float
+    water_conductance: float
+    air_flow: float
+    water_flow: float
+
+    def __post_init__(self) -> None:
+        film, flow = ("W/K", 1e-3, 1e8), ("kg/s", 1e-6, 1e4)
+        fields_in_range(
+            self, {"air_conductance": film, "water_conductance": film, "air_flow": flow, "water_flow": flow}
+        )
+
+    @classmethod
+    def sized(
+        cls,
+        capacity: float,
+        air_flow: float,
+        air_temperature: float = 289.75,
+        water_temperature: float = 355.35,
+        water_difference: float = 11.1,
+        film_ratio: float = 0.5,
+    ) -> WaterCoil:
+        """Size a coil for its capacity at design conditions.
+
+        Parameters
+        ----------
+        capacity : float
+            Heat at design flows and temperatures [W], positive.
+        air_flow : float
+            Design air flow [kg/s], positive.
+        air_temperature, water_temperature : float
+            Of the air and water that enter [K]; the defaults are EnergyPlus' rated 16.6 and 82.2 degC.
+        water_difference : float
+            Fall of the water's temperature at design [K]; the default is EnergyPlus' rated 82.2 to 71.1 degC.
+        film_ratio : float
+            hA of the air over hA of the water [-]; the default is EnergyPlus' (air films govern).
+
+        Returns
+        -------
+        WaterCoil
+            Reaches the capacity within 1e-9.
+
+        Raises
+        ------
+        HvacParameterError
+            No coil of any size reaches the capacity at these flows and temperatures.
+
+        Examples
+        --------
+        >>> coil = WaterCoil.sized(5000.0, 0.3)
+        >>> round(coil.conductance(FloatOperations(), 0.3) * (355.35 - 289.75), 3)
+        5000.0
+        """
+        in_range("WaterCoil.sized: capacity", capacity, "W", 1e-3, 1e8)
+        in_range("WaterCoil.sized: air_flow", air_flow, "kg/s", 1e-6, 1e4)
+        in_range("WaterCoil.sized: water_difference", water_difference, "K", 0.5, 80.0)
+        in_range("WaterCoil.sized: film_ratio", film_ratio, "-", 1e-3, 1e3)
+        ops = FloatOperations()
+        water = capacity / water_difference
+        least, most = sorted((AIR_HEAT_CAPACITY * air_flow, water))
+        wanted = capacity / (least * max(water_temperature - air_temperature, _LEAST))
+        reachable = _effectiveness(ops, 30.0, least / most)
+        if not wanted < reachable:
+            limit = f"an effectiveness below {reachable:.3f}"
+            advice = "more air or a smaller fall of the water's temperature"
+            raise HvacParameterError(describe("WaterCoil.sized: capacity", limit, f"{wanted:.3f}", advice))
+        ntu = brentq(lambda n: _effectiveness(ops, n, least / most) - wanted, 0.0, 30.0, xtol=1e-14)
+        overall = ntu * least
+        return cls(
+            air_conductance=overall * (1.0 + film_ratio),
+            water_conductance=overall * (1.0 + film_ratio) / film_ratio,
+            air_flow=air_flow,
+            water_flow=water / WATER_HEAT_CAPACITY,
+        )
+
+    def conductance(self, ops: Operations, air_flow: Value, water_share: Value = 1.0) -> Value:
+        """Heat per difference between the water and the air that enter [W/K], valve open.
+
+        Parameters
+        ----------
+        ops : Operations
+            Arithmetic.
+        air_flow : Value
+            Air through the coil [kg/s].
+        water_share : Value
+            Water flow over `water_flow` [-].
+        """
+        return coil_conductance(
+            ops, air_flow, self.air_flow, self.air_conductance, self.water_flow * water_share,
+            self.water_conductance * (water_share + _LEAST) ** 0.85,
+        )  # fmt: skip
+
+
+def coil_conductance(
+    ops: Operations, air_flow: Value, design_flow: Value, air_film: Value, water_flow: Value, water_film: Value
+) -> Value:
+    """Heat per difference between the water and the air that enter [W/K], for one coil or many.
+
+    Parameters
+    ----------
+    ops : Operations
+        Arithmetic.
+    air_flow, design_flow : Value
+        Air through the coil, and its design value [kg/s].
+    air_film : Value
+        hA of the air at its design flow [W/K].
+    water_flow : Value
+        Water through the coil [kg/s].
+    water_film : Value
+        hA of the water at that flow [W/K].
+    """
+    air, water = AIR_HEAT_CAPACITY * air_flow, WATER_HEAT_CAPACITY * water_flow
+    film = air_film * (air_flow / design_flow + _LEAST) ** 0.8
+    overall = film * water_film / (film + water_film)
+    least = ops.minimum(air, water, AIR_HEAT_CAPACITY)
+    # C_max as what is left keeps C_min C_max exact under smoothing
+    most = air + water - least
+    return _effectiveness(ops, overall / (least + _LEAST), least / most) * least
+
+
+def water_share(heat_share: Value, thermal_effectiveness: Value) -> Value:
+    """Share of the full water flow [-] at which a coil gives a share of its full heat [-].
+
+    ``phi = Phi r / (1 - r + Phi r)``, the coil's characteristic after Petitjean, Total Hydronic Balancing (1994):
+    exact at full flow, and at little flow, where the water leaves with the temperature of the air that enters.
+
+    Parameters
+    ----------
+    heat_share : Value
+        Heat over the heat with the valve open, r [-].
+    thermal_effectiveness : Value
+        Fall of the water's temperature over the difference at entry, valve open, Phi [-].
+    """
+    part = thermal_effectiveness * heat_share
+    return part / (1.0 - heat_share + part)
+
+
+def heat_share(flow_share: Value, thermal_effectiveness: Value) -> Value:
+    """Inverse of `water_share`: share of the full heat [-] at a share of the full water flow [-]."""
+    return flow_share / (flow_share + thermal_effectiveness * (1.0 - flow_share))
+
+
+def valve_flow(ops: Operations, position: Value, rangeability: float) -> Value:
+    """Share of the full flow [-] of an equal-percentage valve, ``(R^p - 1) / (R - 1)``, closed at position 0.
+
+    ASHRAE Handbook, HVAC Systems and Equipment (2016), ch. 47, taken to zero flow at zero lift.
+    """
+    return ops.expm1(position * math.log(rangeability)) / (rangeability - 1.0)
+
+
+def valve_position(ops: Operations, flow: Value, rangeability: float) -> Value:
+    """Inverse of `valve_flow`: position [-] that lets a share of the full flow through [-]."""
+    return ops.log(1.0 + flow * (rangeability - 1.0)) / math.log(rangeability)

@@ -1,0 +1,144 @@
+"""Cooling coil and what cools it: sensible and latent load, chiller or direct expansion, coefficient of performance."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from thermal.hvac._air import EVAPORATION_HEAT, saturation_humidity, wet_bulb
+from thermal.hvac._checks import fields_in_range
+from thermal.hvac._curves import DX_CAPACITY, DX_INPUT, DX_PART_LOAD, Biquadratic, Polynomial, celsius
+from thermal.hvac._operations import Operations, Value
+from thermal.units import AIR_HEAT_CAPACITY
+
+
+class Cooled(NamedTuple):
+    """Air behind a cooling coil, and what it took.
+
+    Parameters
+    ----------
+    temperature : Value
+        Of the air that leaves [K].
+    humidity : Value
+        Of that air [kg/kg].
+    sensible, latent : Value
+        Heat taken from the air [W], not negative.
+    power : Value
+        Electric power of compressor and auxiliaries [W].
+    """
+
+    temperature: Value
+    humidity: Value
+    sensible: Value
+    latent: Value
+    power: Value
+
+
+@dataclass(frozen=True)
+class CoolingCoil:
+    """A cooling coil with its chiller or condensing unit.
+
+    Parameters
+    ----------
+    capacity : float
+        Rated total cooling [W], positive, at 19.4 degC wet bulb and 35 degC outdoors.
+    cop : float
+        Rated coefficient of performance [-], 1 to 10. The default is the Medium Office's.
+    bypass : float
+        Share of the air that passes without touching the coil [-], 0 to 0.5. The default is that of four to six rows
+        (ASHRAE Handbook, HVAC Systems and Equipment 2016, ch. 23).
+    coldest : float
+        Lowest temperature of the coil's surface [K]. The default is that of chilled water at 6.7 degC.
+    lockout : float
+        Outdoor temperature below which the compressor stays off [K]; none by default.
+    chilled_water : float, optional
+        Temperature of chilled water [K], which the curves then take as x; None for direct expansion, where x is the
+        wet bulb of the air that enters.
+    auxiliaries : float
+        Electric power of chilled-water pumps and tower per cooling [-], 0 to 0.3.
+    capacity_curve, input_curve : Biquadratic
+        Capacity and energy input over the rated ones, of x and the outdoor temperature [degC].
+    part_load : Polynomial
+        Energy input over that at full load, by part-load ratio.
+    pressure : float
+        Of the air [Pa], 50,000 to 110,000.
+
+    Notes
+    -----
+    Sensible heat: ``C (T_in - T_out)``, as far as ``C (1 - bypass) (T_in - coldest)``. Latent heat by the apparatus
+    dew point ``T_adp = (T_out - bypass T_in) / (1 - bypass)``: the air that touches the coil leaves saturated at T_adp
+    or as dry as it came. Power ``Q_available / COP * EIR(x, T_outdoor) * f(part load)``, never below Carnot's between
+    the coil and outdoors.
+    """
+
+    capacity: float
+    cop: float = 3.23372
+    bypass: float = 0.1
+    coldest: float = 279.85
+    lockout: float = 0.0
+    chilled_water: float | None = None
+    auxiliaries: float = 0.0
+    capacity_curve: Biquadratic = DX_CAPACITY
+    input_curve: Biquadratic = DX_INPUT
+    part_load: Polynomial = DX_PART_LOAD
+    pressure: float = 101_325.0
+
+    def __post_init__(self) -> None:
+        fields_in_range(
+            self,
+            {
+                "capacity": ("W", 1e-3, 1e8),
+                "cop": ("-", 1.0, 10.0),
+                "bypass": ("-", 0.0, 0.5),
+                "coldest": ("K", 268.15, 293.15),
+                "lockout": ("K", 0.0, 300.0),
+                "auxiliaries": ("-", 0.0, 0.3),
+                "pressure": ("Pa", 5e4, 1.1e5),
+            },
+        )
+        if self.chilled_water is not None:
+            fields_in_range(
+                self,
+                {
+                    "chilled_water": ("K", 268.15, 293.15),
+                },
+            )
+
+    def cool(
+        self, ops: Operations, flow: Value, temperature: Value, humidity: Value, target: Value, outdoor: Value
+    ) -> Cooled:
+        """Cool air towards a temperature.
+
+        Parameters
+        ----------
+        ops : Operations
+            Arithmetic.
+        flow : Value
+            Air through the coil [kg/s].
+        temperature, humidity : Value
+            Of the air that enters [K], [kg/kg].
+        target : Value
+            Temperature wanted behind the coil [K].
+        outdoor : Value
+            Outdoor temperature [K].
+        """
+        rate = AIR_HEAT_CAPACITY * flow
+        allowed = ops.step(outdoor - self.lockout) if self.lockout else 1.0
+        deepest = (1.0 - self.bypass) * ops.maximum(temperature - self.coldest, 0.0)
+        drop = allowed * ops.clip(temperature - target, 0.0, deepest)
+        surface = temperature - drop / (1.0 - self.bypass)
+        dew = saturation_humidity(ops, surface, self.pressure)
+        loss = (1.0 - self.bypass) * ops.maximum(humidity - dew, 0.0, 1e-3)
+        x = celsius(
+            wet_bulb(ops, temperature, humidity, self.pressure) if self.chilled_water is None else self.chilled_water
+        )
+        available = self.capacity * self.capacity_curve(ops, x, celsius(outdoor))
+        wanted = rate * drop + EVAPORATION_HEAT * flow * loss
+        share = wanted / ops.maximum(wanted, available, 0.1 * self.capacity)
+        sensible, latent = share * rate * drop, share * EVAPORATION_HEAT * flow * loss
+        total = sensible + latent
+        ratio = total / available
+        power = available / self.cop * self.input_curve(ops, x, celsius(outdoor)) * self.part_load(ops, ratio)
+        carnot = total * ops.maximum(outdoor - surface, 0.0) / surface
+        power = ops.maximum(power, carnot, 0.01 * self.capacity) + self.auxiliaries * total
+        return Cooled(temperature - share * drop, humidity - share * loss, sensible, latent, power)
