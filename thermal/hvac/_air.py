@@ -28,6 +28,15 @@ def saturation_humidity(ops: Operations, temperature: Value, pressure: float) ->
     return _MOLAR_RATIO * vapour / (pressure - vapour)
 
 
+def enthalpy(temperature: Value, humidity: Value) -> Value:
+    """Enthalpy of moist air [J/kg] above 0 degC, at a temperature [K] and humidity ratio [kg/kg].
+
+    ASHRAE Fundamentals 2017, ch. 1, eq. 30.
+    """
+    degrees = temperature - _FREEZING
+    return 1006.0 * degrees + humidity * (2.501e6 + 1860.0 * degrees)
+
+
 def wet_bulb(ops: Operations, temperature: Value, humidity: Value, pressure: float) -> Value:
     """Wet-bulb temperature [K] of air at a temperature [K], humidity ratio [kg/kg] and pressure [Pa].
 

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from thermal.errors import HvacParameterError, describe
-from thermal.hvac._air import WATER_HEAT_CAPACITY
+from thermal.hvac._air import enthalpy
 from thermal.hvac._checks import fields_in_range
-from thermal.hvac._coil import WaterCoil, water_share
+from thermal.hvac._coil import WaterCoil, characteristic, water_share
 from thermal.hvac._cooling import CoolingCoil
 from thermal.hvac._fan import Fan
 from thermal.hvac._operations import Operations, Value
@@ -134,6 +134,9 @@ class AirHandler:
     high_limit, low_limit : float
         Outdoor temperatures outside of which the economiser stays at its minimum [K]. The high one is the reference
         buildings' 28 degC.
+    enthalpy_limit : float, optional
+        Enthalpy of the outdoor air above which it stays at its minimum too [J/kg], from 0 degC; none by default, the
+        reference buildings have 64,000.
 
     Notes
     -----
@@ -149,6 +152,7 @@ class AirHandler:
     economizer: bool = True
     high_limit: float = 301.15
     low_limit: float = 173.15
+    enthalpy_limit: float | None = None
 
     def __post_init__(self) -> None:
         fields_in_range(
@@ -160,11 +164,22 @@ class AirHandler:
                 "low_limit": ("K", 173.15, self.high_limit),
             },
         )
+        if self.enthalpy_limit is not None:
+            fields_in_range(self, {"enthalpy_limit": ("J/kg", 0.0, 2e5)})
         if self.heating is not None and not isinstance(self.heating, WaterCoil | Heater):
             found = type(self.heating).__name__
             raise HvacParameterError(describe("AirHandler.heating", "a WaterCoil, a Heater or None", found))
 
-    def outdoor_share(self, ops: Operations, flow: Value, returning: Value, outdoor: Value, target: Value) -> Value:
+    def outdoor_share(
+        self,
+        ops: Operations,
+        flow: Value,
+        returning: Value,
+        outdoor: Value,
+        target: Value,
+        ventilation: Value = 1.0,
+        outdoor_humidity: Value = 0.0,
+    ) -> Value:
         """Share of outdoor air in the supply air [-], 0 to 1.
 
         Parameters
@@ -175,10 +190,15 @@ class AirHandler:
             Supply air [kg/s].
         returning, outdoor, target : Value
             Temperatures of the return air, outdoors, and wanted in front of the coils [K].
+        ventilation : Value
+            Share of the minimum of outdoor air that is asked for [-].
+        outdoor_humidity : Value
+            Of the outdoor air [kg/kg].
         """
         least: Value = self.minimum_outdoor_share
         if self.minimum_outdoor_flow:
             least = ops.minimum(ops.maximum(least, self.minimum_outdoor_flow / (flow + _LEAST)), 1.0)
+        least = ventilation * least
         if not self.economizer:
             return least
         colder = ops.maximum(returning - outdoor, 0.01)
@@ -186,7 +206,10 @@ class AirHandler:
         useful = ops.step(returning - outdoor) * ops.step(self.high_limit - outdoor)
         if self.low_limit > 173.15:
             useful = useful * ops.step(outdoor - self.low_limit)
-        return least + useful * ops.maximum(free - least, 0.0)
+        if self.enthalpy_limit is not None:
+            held = enthalpy(outdoor, outdoor_humidity)
+            useful = useful * ops.step(self.enthalpy_limit - held, 1000.0)
+        return least + useful * ops.positive(free - least)
 
     def mix(
         self,
@@ -200,6 +223,7 @@ class AirHandler:
         setpoint: Value,
         static_pressure: Value,
         opening: Value,
+        ventilation: Value = 1.0,
     ) -> Mixed:
         """Mix return and outdoor air, cool what is too warm, and drive it.
 
@@ -221,12 +245,14 @@ class AirHandler:
             Setpoint in the duct [Pa].
         opening : Value
             Water through the open valve of the heating coil over the design flow [-].
+        ventilation : Value
+            Share of the minimum of outdoor air that is asked for [-].
         """
         rate = AIR_HEAT_CAPACITY * flow + _LEAST
         power = running * self.supply_fan.power(ops, flow, static_pressure)
         rise = self.supply_fan.heat_to_air * power / rate
         target = setpoint - rise
-        share = self.outdoor_share(ops, flow, returning, outdoor, target)
+        share = self.outdoor_share(ops, flow, returning, outdoor, target, ventilation, outdoor_humidity)
         mixed = returning + share * (outdoor - returning)
         humidity = return_humidity + share * (outdoor_humidity - return_humidity)
         exhaust = self.exhaust_fan
@@ -260,14 +286,13 @@ class AirHandler:
         entering = mixed.cooled_temperature
         if self.heating is None:
             return Warmed(entering + mixed.fan_rise, 0.0, 0.0, 0.0, 0.0)
-        wanted = rate * ops.maximum(mixed.target - entering, 0.0)
+        wanted = rate * ops.positive(mixed.target - entering)
         if isinstance(self.heating, Heater):
             direct = ops.minimum(wanted, self.heating.capacity, 0.1 * self.heating.capacity)
             return Warmed(entering + direct / rate + mixed.fan_rise, 0.0, 0.0, 0.0, direct)
         open_ = mixed.coil
-        ready = open_ * ops.maximum(water - entering, 0.0)
-        part = wanted / (ops.maximum(wanted, ready, 1000.0) + _LEAST)
+        ready = open_ * ops.maximum(water - entering, _LEAST)
+        part = wanted / ops.maximum(wanted, ready, 1000.0)
         slope = part * open_ / rate
-        effectiveness = open_ / (self.heating.water_flow * opening * WATER_HEAT_CAPACITY + _LEAST)
-        valve = water_share(part, effectiveness)
+        valve = water_share(part, open_, characteristic(ops, *self.heating.water_side(opening)))
         return Warmed(entering * (1.0 - slope) + mixed.fan_rise, slope, part * open_, valve, 0.0)

@@ -26,7 +26,7 @@ class Pump:
     differential_pressure : float
         Part of it that the drive holds at its sensor [Pa]; the default is usual at the far end of a loop.
     efficiency : float
-        Of pump, motor and drive [-]; the default is the Large Office's, 179,352 Pa over 348,701 W/(m3/s).
+        Of pump, motor and drive [-]; the default is the Large Office's, 179,352 Pa over 262,786 W/(m3/s).
     minimum_share : float
         Least flow over design flow, through a bypass [-], 0.01 to 1.
     heat_to_water : float
@@ -41,7 +41,7 @@ class Pump:
     design_flow: float
     design_pressure: float = 179_352.0
     differential_pressure: float = 80_000.0
-    efficiency: float = 0.5143
+    efficiency: float = 0.6825
     minimum_share: float = 0.1
     heat_to_water: float = 0.9
 
@@ -159,6 +159,22 @@ class BoilerLoop:
         """Of the water [J/K]."""
         return self.water_volume * WATER_DENSITY * WATER_HEAT_CAPACITY
 
+    def goal(self, ops: Operations, before: Value, setpoint: Value, step: Value) -> Value:
+        """Temperature of the supply water that the boiler aims at in a step [K].
+
+        Parameters
+        ----------
+        ops : Operations
+            Arithmetic.
+        before : Value
+            Supply water at the start [K].
+        setpoint : Value
+            Of the supply water [K].
+        step : Value
+            Length of the step [s].
+        """
+        return ops.minimum(setpoint, before + self.fastest_rise * step)
+
     def heat(
         self,
         ops: Operations,
@@ -196,7 +212,7 @@ class BoilerLoop:
         """
         inertia = self.heat_capacity / step
         leak = self.standing_conductance + self.pipe_conductance
-        goal = ops.minimum(setpoint, before + self.fastest_rise * step)
+        goal = self.goal(ops, before, setpoint, step)
         wanted = inertia * (goal - before) + conductance * goal - source + leak * (goal - room) - pump_heat
         boiler = running * ops.clip(wanted, 0.0, self.capacity, self.capacity)
         water = (inertia * before + boiler + source + leak * room + pump_heat) / (inertia + conductance + leak)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from scipy.optimize import brentq
 
@@ -16,7 +17,8 @@ from thermal.hvac._checks import fields_in_range, in_range
 from thermal.hvac._operations import FloatOperations, Operations, Value
 from thermal.units import AIR_HEAT_CAPACITY
 
-_LEAST = 1e-9  # share: keeps powers and their derivatives finite where no air flows
+_LITTLE_NTU = 0.01**-0.15  # NTU of the water at a hundredth of its flow over that at full flow: hA as flow to 0.85
+LEAST_FLOW = 1e-12  # kg/s or share: keeps powers, and temperatures of what does not flow, finite
 
 
 def _effectiveness(ops: Operations, ntu: Value, ratio: Value) -> Value:
@@ -33,8 +35,7 @@ def _effectiveness(ops: Operations, ntu: Value, ratio: Value) -> Value:
     ratio : Value
         C_min/C_max [-], 0 to 1.
     """
-    ratio = ratio + _LEAST
-    root = (ntu + _LEAST) ** 0.22
+    root = ntu**0.22
     return -ops.expm1(ops.expm1(-ratio * (ntu / root)) * root / ratio)
 
 
@@ -116,13 +117,13 @@ class WaterCoil:
         ops = FloatOperations()
         water = capacity / water_difference
         least, most = sorted((AIR_HEAT_CAPACITY * air_flow, water))
-        wanted = capacity / (least * max(water_temperature - air_temperature, _LEAST))
+        wanted = capacity / (least * max(water_temperature - air_temperature, 1e-9))
         reachable = _effectiveness(ops, 30.0, least / most)
         if not wanted < reachable:
             limit = f"an effectiveness below {reachable:.3f}"
             advice = "more air or a smaller fall of the water's temperature"
             raise HvacParameterError(describe("WaterCoil.sized: capacity", limit, f"{wanted:.3f}", advice))
-        ntu = brentq(lambda n: _effectiveness(ops, n, least / most) - wanted, 0.0, 30.0, xtol=1e-14)
+        ntu = brentq(lambda n: _effectiveness(ops, n, least / most) - wanted, 1e-12, 30.0, xtol=1e-14)
         overall = ntu * least
         return cls(
             air_conductance=overall * (1.0 + film_ratio),
@@ -143,59 +144,100 @@ class WaterCoil:
         water_share : Value
             Water flow over `water_flow` [-].
         """
-        return coil_conductance(
-            ops, air_flow, self.air_flow, self.air_conductance, self.water_flow * water_share,
-            self.water_conductance * (water_share + _LEAST) ** 0.85,
-        )  # fmt: skip
+        air = air_flow + LEAST_FLOW
+        film = self.air_conductance * (air / self.air_flow) ** 0.8
+        return coil_conductance(ops, AIR_HEAT_CAPACITY * air, film, *self.water_side(water_share))
+
+    def water_side(self, water_share: Value = 1.0) -> tuple[Value, Value]:
+        """Heat capacity rate and film conductance of the water [W/K].
+
+        Parameters
+        ----------
+        water_share : Value
+            Water flow over `water_flow` [-].
+        """
+        water = water_share + LEAST_FLOW
+        return WATER_HEAT_CAPACITY * self.water_flow * water, self.water_conductance * water**0.85
 
 
-def coil_conductance(
-    ops: Operations, air_flow: Value, design_flow: Value, air_film: Value, water_flow: Value, water_film: Value
-) -> Value:
+def coil_conductance(ops: Operations, air_rate: Value, air_film: Value, water_rate: Value, water_film: Value) -> Value:
     """Heat per difference between the water and the air that enter [W/K], for one coil or many.
 
     Parameters
     ----------
     ops : Operations
         Arithmetic.
-    air_flow, design_flow : Value
-        Air through the coil, and its design value [kg/s].
-    air_film : Value
-        hA of the air at its design flow [W/K].
-    water_flow : Value
-        Water through the coil [kg/s].
-    water_film : Value
-        hA of the water at that flow [W/K].
+    air_rate, water_rate : Value
+        Heat capacity rates of air and water [W/K], above 0.
+    air_film, water_film : Value
+        hA on either side at these flows [W/K].
     """
-    air, water = AIR_HEAT_CAPACITY * air_flow, WATER_HEAT_CAPACITY * water_flow
-    film = air_film * (air_flow / design_flow + _LEAST) ** 0.8
-    overall = film * water_film / (film + water_film)
-    least = ops.minimum(air, water, AIR_HEAT_CAPACITY)
+    overall = air_film * water_film / (air_film + water_film)
+    least = ops.minimum(air_rate, water_rate, AIR_HEAT_CAPACITY)
     # C_max as what is left keeps C_min C_max exact under smoothing
-    most = air + water - least
-    return _effectiveness(ops, overall / (least + _LEAST), least / most) * least
+    most = air_rate + water_rate - least
+    return _effectiveness(ops, overall / least, least / most) * least
 
 
-def water_share(heat_share: Value, thermal_effectiveness: Value) -> Value:
+class Characteristic(NamedTuple):
+    """How a coil's heat goes with its water, per conductance of the open coil.
+
+    Parameters
+    ----------
+    offset, slope : Value
+        Of ``S(r) = G (offset + slope r)`` [K/W].
+    """
+
+    offset: Value
+    slope: Value
+
+
+def characteristic(ops: Operations, water_rate: Value, water_film: Value) -> Characteristic:
+    """Derive how a coil's heat goes with its water from what is known of both ends.
+
+    At full flow S is the relative change of heat by that of water. With mean temperatures of air and water ``1/G =
+    1/UA + 1/(2 C_a) + 1/(2 C_w)``, so it is ``G (1/(2 C_w) + 0.85/hA_w)``; 0.6 in the place of 1/2 fits cross flow
+    better. At little flow the water film governs: water leaves by ``1 - exp(-NTU)`` of the difference, with NTU taken
+    at a hundredth of the flow. Both are at least G/C_w, with which the water leaves no colder than the air enters.
+
+    Parameters
+    ----------
+    ops : Operations
+        Arithmetic.
+    water_rate, water_film : Value
+        Heat capacity rate and film conductance of the water, valve open [W/K].
+    """
+    full = ops.maximum(1.0 / water_rate, 0.6 / water_rate + 0.85 / water_film, 1e-5)
+    little = -1.0 / (water_rate * ops.expm1(-_LITTLE_NTU * water_film / water_rate))
+    return Characteristic(little, full - little)
+
+
+def water_share(heat_share: Value, conductance: Value, curve: Characteristic) -> Value:
     """Share of the full water flow [-] at which a coil gives a share of its full heat [-].
 
-    ``phi = Phi r / (1 - r + Phi r)``, the coil's characteristic after Petitjean, Total Hydronic Balancing (1994):
-    exact at full flow, and at little flow, where the water leaves with the temperature of the air that enters.
+    ``phi = S r / (1 - r + S r)``, the form of Petitjean, Total Hydronic Balancing (1994), with an S that follows the
+    film of the water: within 0.03 of effectiveness-NTU at the reduced flow for coils of usual sizes, 3 % of the flow in
+    the mean.
 
     Parameters
     ----------
     heat_share : Value
         Heat over the heat with the valve open, r [-].
-    thermal_effectiveness : Value
-        Fall of the water's temperature over the difference at entry, valve open, Phi [-].
+    conductance : Value
+        Of the open coil [W/K].
+    curve : Characteristic
+        Of its water side.
     """
-    part = thermal_effectiveness * heat_share
+    part = (curve.offset + curve.slope * heat_share) * conductance * heat_share
     return part / (1.0 - heat_share + part)
 
 
-def heat_share(flow_share: Value, thermal_effectiveness: Value) -> Value:
+def heat_share(ops: Operations, flow_share: Value, conductance: Value, curve: Characteristic) -> Value:
     """Inverse of `water_share`: share of the full heat [-] at a share of the full water flow [-]."""
-    return flow_share / (flow_share + thermal_effectiveness * (1.0 - flow_share))
+    first, second = conductance * curve.offset, conductance * curve.slope
+    linear = first + flow_share * (1.0 - first)
+    root = ops.sqrt(ops.positive(linear * linear + 4.0 * second * (1.0 - flow_share) * flow_share))
+    return 2.0 * flow_share / (linear + root)
 
 
 def valve_flow(ops: Operations, position: Value, rangeability: float) -> Value:

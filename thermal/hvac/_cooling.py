@@ -124,21 +124,21 @@ class CoolingCoil:
         """
         rate = AIR_HEAT_CAPACITY * flow
         allowed = ops.step(outdoor - self.lockout) if self.lockout else 1.0
-        deepest = (1.0 - self.bypass) * ops.maximum(temperature - self.coldest, 0.0)
+        deepest = (1.0 - self.bypass) * ops.positive(temperature - self.coldest)
         drop = allowed * ops.clip(temperature - target, 0.0, deepest)
         surface = temperature - drop / (1.0 - self.bypass)
         dew = saturation_humidity(ops, surface, self.pressure)
-        loss = (1.0 - self.bypass) * ops.maximum(humidity - dew, 0.0, 1e-3)
+        loss = (1.0 - self.bypass) * ops.positive(humidity - dew, 1e-3)
         x = celsius(
             wet_bulb(ops, temperature, humidity, self.pressure) if self.chilled_water is None else self.chilled_water
         )
         available = self.capacity * self.capacity_curve(ops, x, celsius(outdoor))
         wanted = rate * drop + EVAPORATION_HEAT * flow * loss
-        share = wanted / ops.maximum(wanted, available, 0.1 * self.capacity)
+        share = available / ops.maximum(wanted, available, 0.1 * self.capacity)
         sensible, latent = share * rate * drop, share * EVAPORATION_HEAT * flow * loss
         total = sensible + latent
         ratio = total / available
         power = available / self.cop * self.input_curve(ops, x, celsius(outdoor)) * self.part_load(ops, ratio)
-        carnot = total * ops.maximum(outdoor - surface, 0.0) / surface
+        carnot = total * ops.positive(outdoor - surface) / surface
         power = ops.maximum(power, carnot, 0.01 * self.capacity) + self.auxiliaries * total
         return Cooled(temperature - share * drop, humidity - share * loss, sensible, latent, power)

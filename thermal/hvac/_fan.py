@@ -29,6 +29,9 @@ class Fan:
         Share of the power that warms the air [-]; the default has the motor in the air stream.
     part_load : Polynomial
         Power over design power by share of the design flow, at the design static pressure.
+    air_density : float
+        Of the air moved [kg/m3], 0.5 to 1.5; the default is that of standard air, `thermal.units.air_density` gives a
+        site's.
 
     Notes
     -----
@@ -42,6 +45,7 @@ class Fan:
     efficiency: float = 0.5915
     heat_to_air: float = 1.0
     part_load: Polynomial = FAN_PART_LOAD
+    air_density: float = SUPPLY_AIR_DENSITY
 
     def __post_init__(self) -> None:
         fields_in_range(
@@ -52,13 +56,14 @@ class Fan:
                 "static_pressure": ("Pa", 1.0, self.design_pressure),
                 "efficiency": ("-", 0.05, 0.95),
                 "heat_to_air": ("-", 0.0, 1.0),
+                "air_density": ("kg/m3", 0.5, 1.5),
             },
         )
 
     @property
     def design_power(self) -> float:
         """Electric power at the design flow [W]."""
-        return self.design_flow / SUPPLY_AIR_DENSITY * self.design_pressure / self.efficiency
+        return self.design_flow / self.air_density * self.design_pressure / self.efficiency
 
     def power(self, ops: Operations, flow: Value, static_pressure: Value) -> Value:
         """Electric power while running [W].

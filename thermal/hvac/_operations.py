@@ -80,13 +80,17 @@ class Operations:
         low, high = x - lower, x - upper
         return 0.5 * (lower + upper + self.sqrt(low * low + w2) - self.sqrt(high * high + w2))
 
+    def positive(self, x: Value, scale: Value = 1.0) -> Value:
+        """Return the larger of a value and 0."""
+        return self.maximum(x, 0.0, scale)
+
+    def unit(self, x: Value) -> Value:
+        """Hold a share within 0 and 1."""
+        return self.clip(x, 0.0, 1.0)
+
     def step(self, x: Value, scale: Value = 1.0) -> Value:
         """Return 1 where a value is above 0, else 0."""
         return 0.5 * (1.0 + x / self.sqrt(x * x + (self.width * scale) ** 2))
-
-    def equal(self, a: Value, b: Value) -> bool:
-        """Tell whether two values are known to be the same, so that what follows from one follows from the other."""
-        return False
 
     def sums(self, values: Value, members: NDArray[np.float64]) -> Sequence[Value]:
         """Sum the terminals of each group; `members` is (n_terminal, n_group) of 0 and 1."""
@@ -100,8 +104,8 @@ class Operations:
         """Give each terminal its zone's value."""
         raise NotImplementedError
 
-    def total(self, values: Value) -> Value:
-        """Sum over the terminals."""
+    def dot(self, a: Value, b: Value) -> Value:
+        """Sum products over the terminals."""
         raise NotImplementedError
 
     def columns(self, sums: Sequence[Value]) -> Value:
@@ -125,10 +129,7 @@ class FloatOperations(Operations):
             lower if x < lower else upper if x > upper else x
         )
         self.step = lambda x, scale=1.0: 1.0 if x > 0.0 else 0.0  # type: ignore[method-assign]
-
-    def equal(self, a: Value, b: Value) -> bool:
-        """Tell whether two floats differ by round-off at most."""
-        return bool(abs(a - b) <= 1e-12 * abs(a))
+        self.positive = lambda x, scale=1.0: x if x >= 0.0 else 0.0  # type: ignore[method-assign]
 
 
 class NumpyOperations(Operations):
@@ -142,6 +143,9 @@ class NumpyOperations(Operations):
 
     def _make_exact(self) -> None:
         larger, smaller = np.maximum, np.minimum
+        zero, one = np.zeros(()), np.ones(())  # arrays: a float would be made one at each call
+        self.positive = lambda x, scale=1.0: larger(x, zero)  # type: ignore[method-assign]
+        self.unit = lambda x: smaller(larger(x, zero), one)  # type: ignore[method-assign]
         self.maximum = lambda a, b, scale=1.0: larger(a, b)  # type: ignore[method-assign]
         self.minimum = lambda a, b, scale=1.0: smaller(a, b)  # type: ignore[method-assign]
         self.clip = lambda x, lower, upper, scale=1.0: smaller(larger(x, lower), upper)  # type: ignore[method-assign]
@@ -159,9 +163,9 @@ class NumpyOperations(Operations):
         """Give each terminal its zone's value."""
         return values[..., index]
 
-    def total(self, values: Value) -> Value:
-        """Sum over the terminals."""
-        return values.sum(axis=-1)
+    def dot(self, a: Value, b: Value) -> Value:
+        """Sum products over the terminals."""
+        return (a * b).sum(axis=-1)
 
     def columns(self, sums: Sequence[Value]) -> Value:
         """Put groups beside each other."""
@@ -193,9 +197,9 @@ class StepOperations(NumpyOperations):
         """Give each terminal its zone's value."""
         return values[index]
 
-    def total(self, values: Value) -> Value:
-        """Sum over the terminals, to a float."""
-        return float(np.add.reduce(values))
+    def dot(self, a: Value, b: Value) -> Value:
+        """Sum products over the terminals, to a float."""
+        return float(a.dot(b))
 
     def columns(self, sums: Sequence[Value]) -> Value:
         """Put groups beside each other."""
@@ -230,9 +234,9 @@ class CasadiOperations(Operations):
         """Give each terminal its zone's value."""
         return values[index.tolist()]
 
-    def total(self, values: Value) -> Value:
-        """Sum over the terminals."""
-        return casadi.sum1(values)
+    def dot(self, a: Value, b: Value) -> Value:
+        """Sum products over the terminals."""
+        return casadi.sum1(a * b)
 
     def columns(self, sums: Sequence[Value]) -> Value:
         """Put groups below each other."""

@@ -2,22 +2,36 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from thermal.errors import HvacActionError, describe
 from thermal.hvac._checks import action, scalar_action
-from thermal.hvac._operations import StepOperations
+from thermal.hvac._operations import StepOperations, Value
 from thermal.hvac._system import Actions, Calls, Conditions, HvacStep, HvacSystem, advance
 from thermal.hvac._thermostat import Mode, ModeArray
 
 FloatArray = NDArray[np.float64]
 _AIR = (233.15, 353.15)  # K, of rooms: what lies outside is a fault of the caller's
-_OUTDOOR = (193.15, 338.15)  # K
-_SUPPLY_AIR = (273.15, 333.15)  # K, of setpoints
-_SUPPLY_WATER = (278.15, 373.15)  # K, of setpoints: water that is neither frozen nor steam
+_CONDITIONS = (
+    ("outdoor_temperature", "K", 193.15, 338.15),
+    ("outdoor_humidity", "kg/kg", 0.0, 0.05),
+    ("return_humidity", "kg/kg", 0.0, 0.05),
+    ("room_temperature", "K", *_AIR),
+)
+_ACTIONS = (
+    ("supply_air_temperature", "K", 273.15, 333.15),
+    ("supply_water_temperature", "K", 278.15, 373.15),  # water that is neither frozen nor steam
+    ("static_pressure", "Pa", 1.0, 2500.0),
+    ("differential_pressure", "Pa", 1e3, 6e5),
+    ("running", "-", 0.0, 1.0),
+    ("boiler", "-", 0.0, 1.0),
+    ("ventilation", "-", 0.0, 1.0),
+)
+_OPTIONAL = {"static_pressure", "differential_pressure"}
+_EACH = {"return_humidity", "supply_air_temperature", "static_pressure", "running", "ventilation"}
 
 
 class HvacState(NamedTuple):
@@ -113,7 +127,7 @@ class HvacPlant:
         HvacActionError
             Something is not finite, out of its range or of another shape.
         """
-        self._check(conditions, actions, seconds)
+        conditions, actions = self._check(conditions, actions, seconds)
         system, ops, zone = self.system, self._ops, conditions.zone_temperature
         heating, cooling, thermostat = conditions.heating_setpoint, conditions.cooling_setpoint, system.thermostat
         mode, was = state.mode, state.set_back
@@ -143,7 +157,7 @@ class HvacPlant:
         heat: FloatArray = self.system.at_zones(self._ops, step.terminal_heat)
         return heat
 
-    def _check(self, conditions: Conditions, actions: Actions, seconds: float) -> None:
+    def _check(self, conditions: Conditions, actions: Actions, seconds: float) -> tuple[Conditions, Actions]:
         zone, n = conditions.zone_temperature, self.system.zone_count
         if getattr(zone, "shape", None) != (n,):
             found = f"shape {np.shape(zone)}"
@@ -152,19 +166,31 @@ class HvacPlant:
         setpoints = (conditions.heating_setpoint, conditions.cooling_setpoint)
         if setpoints[0] is not self._checked[0] or setpoints[1] is not self._checked[1]:
             self._check_setpoints(*setpoints)
-        scalar_action("outdoor_temperature", conditions.outdoor_temperature, "K", *_OUTDOOR)
-        scalar_action("outdoor_humidity", conditions.outdoor_humidity, "kg/kg", 0.0, 0.05)
-        scalar_action("room_temperature", conditions.room_temperature, "K", *_AIR)
-        self._check_each("return_humidity", conditions.return_humidity, "kg/kg", 0.0, 0.05)
         scalar_action("step", seconds, "s", 1.0, 3600.0)
-        self._check_each("supply_air_temperature", actions.supply_air_temperature, "K", *_SUPPLY_AIR)
-        scalar_action("supply_water_temperature", actions.supply_water_temperature, "K", *_SUPPLY_WATER)
-        if actions.static_pressure is not None:
-            self._check_each("static_pressure", actions.static_pressure, "Pa", 1.0, 2500.0)
-        if actions.differential_pressure is not None:
-            scalar_action("differential_pressure", actions.differential_pressure, "Pa", 1e3, 6e5)
-        self._check_each("running", actions.running, "-", 0.0, 1.0)
-        scalar_action("boiler", actions.boiler, "-", 0.0, 1.0)
+        values = [self._checked_value(*row) for row in zip(_CONDITIONS, conditions[3:], strict=True)]
+        set_ = [self._checked_value(*row) for row in zip(_ACTIONS, actions, strict=True)]
+        return Conditions(zone, *setpoints, *values), Actions(*set_)
+
+    def _checked_value(self, limits: tuple[str, str, float, float], value: object) -> Value:
+        """Check what is one value, or one an air handler, and make Python's floats of NumPy's."""
+        name, unit, lowest, highest = limits
+        if type(value) is float:
+            if not lowest <= value <= highest:
+                scalar_action(name, value, unit, lowest, highest)
+            return value
+        if value is None and name in _OPTIONAL:
+            return None
+        plain: Any = value.tolist() if isinstance(value, np.ndarray | np.generic) else value
+        each, n = name in _EACH and isinstance(plain, tuple | list), len(self.system.air_handlers)
+        if each and len(plain) != n:
+            raise HvacActionError(describe(name, f"one value or {n}, one an air handler", f"{len(plain)} values"))
+        values = plain if each else [plain]
+        for k, one in enumerate(values):
+            where = f"{name}[{k}]" if each else name
+            if not isinstance(one, float | int):
+                raise HvacActionError(describe(where, f"a number of {unit}", repr(one)))
+            scalar_action(where, one, unit, lowest, highest)
+        return tuple(map(float, values)) if each else float(values[0])
 
     def _check_setpoints(self, heating: FloatArray, cooling: FloatArray) -> None:
         """Check setpoints; what has been checked once and is the same object is not looked at again."""
@@ -179,14 +205,3 @@ class HvacPlant:
             raise HvacActionError(describe("setpoints", "heating not above cooling", found))
         frozen = not (heating.flags.writeable or cooling.flags.writeable)
         self._checked = (heating, cooling) if frozen else (None, None)
-
-    def _check_each(self, name: str, values: object, unit: str, lowest: float, highest: float) -> None:
-        """Check what is one value, or one an air handler."""
-        n = len(self.system.air_handlers)
-        if isinstance(values, tuple | list):
-            if len(values) != n:
-                raise HvacActionError(describe(name, f"one value or {n}, one an air handler", f"{len(values)}"))
-            for k, value in enumerate(values):
-                scalar_action(f"{name}[{k}]", value, unit, lowest, highest)
-        else:
-            scalar_action(name, values, unit, lowest, highest)  # type: ignore[arg-type]

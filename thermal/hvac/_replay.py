@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from thermal.hvac._air_handler import AirHandler, Heater, Mixed
 from thermal.hvac._boiler import BoilerLoop
-from thermal.hvac._coil import heat_share, valve_flow, water_share
+from thermal.hvac._coil import LEAST_FLOW, heat_share, valve_flow, water_share
 from thermal.hvac._operations import FloatOperations, NumpyOperations
 from thermal.hvac._terminals import Terminals, heat_rate
 
@@ -119,13 +119,14 @@ def replay_terminals(
         Flows and temperatures that follow.
     """
     ops = NumpyOperations()
-    airflow = damper * terminals.design_flow * np.sqrt(static_pressure_share)
+    airflow = damper * terminals.design_flow * np.sqrt(static_pressure_share) + LEAST_FLOW
     opening = np.broadcast_to(np.sqrt(differential_pressure_share), np.shape(water))[:, np.newaxis]
-    coil = terminals.conductance(ops, airflow, opening)
+    rate, open_water = heat_rate(airflow), terminals.open_water(ops, opening)
+    coil = terminals.conductance(ops, airflow, rate, open_water)
     share = valve_flow(ops, np.asarray(valve), terminals.rangeability)
-    part = heat_share(share, terminals.thermal_effectiveness(coil, opening) + _LEAST)
+    part = heat_share(ops, share, coil, open_water[2])
     reheat = part * coil * (np.asarray(water)[:, np.newaxis] - entering)
-    discharge = entering + reheat / (heat_rate(airflow) + _LEAST)
+    discharge = entering + reheat / rate
     return TerminalReplay(airflow, discharge, reheat, share * opening * terminals.water_flow)
 
 
@@ -151,14 +152,15 @@ def replay_reheat(
         Discharge temperatures reached, heat and water that it takes.
     """
     ops = NumpyOperations()
-    rate = heat_rate(airflow)
-    coil = terminals.conductance(ops, airflow, 1.0)
+    airflow = airflow + LEAST_FLOW
+    rate, open_water = heat_rate(airflow), terminals.open_water(ops, 1.0)
+    coil = terminals.conductance(ops, airflow, rate, open_water)
     ready = coil * np.maximum(np.asarray(water)[:, np.newaxis] - entering, 0.0)
     wanted = rate * np.maximum(discharge - entering, 0.0)
     reheat = np.minimum(wanted, ready)
     part = reheat / (ready + _LEAST)
-    flow = water_share(part, terminals.thermal_effectiveness(coil, 1.0)) * terminals.water_flow
-    return TerminalReplay(airflow, entering + reheat / (rate + _LEAST), reheat, flow)
+    flow = water_share(part, coil, open_water[2]) * terminals.water_flow
+    return TerminalReplay(airflow, entering + reheat / rate, reheat, flow)
 
 
 def replay_air_handler(
@@ -171,6 +173,7 @@ def replay_air_handler(
     outdoor_humidity: FloatArray | float,
     static_pressure: FloatArray | float | None = None,
     water: FloatArray | float = 355.35,
+    ventilation: FloatArray | float = 1.0,
 ) -> AirHandlerReplay:
     """Replay an air handler under measured air and setpoints.
 
@@ -188,6 +191,8 @@ def replay_air_handler(
         In the duct [Pa], shape (n_time,) or one; the design value by default.
     water : numpy.ndarray or float
         Supply water of a water coil [K], shape (n_time,) or one.
+    ventilation : numpy.ndarray or float
+        Share of the minimum of outdoor air that is asked for [-], shape (n_time,) or one.
 
     Returns
     -------
@@ -198,7 +203,7 @@ def replay_air_handler(
     running = np.where(flow > 0.0, 1.0, 0.0)
     pressure = handler.supply_fan.static_pressure if static_pressure is None else static_pressure
     mixed = handler.mix(
-        ops, flow, running, returning, return_humidity, outdoor, outdoor_humidity, setpoint, pressure, 1.0
+        ops, flow, running, returning, return_humidity, outdoor, outdoor_humidity, setpoint, pressure, 1.0, ventilation
     )
     warmed = handler.warm(ops, mixed, water, 1.0)
     supply = warmed.offset + warmed.slope * water

@@ -28,9 +28,10 @@ def hvac_function(system: HvacSystem, width: float = 0.02) -> Any:
         (n_zone,); ``outdoor_temperature`` [K]; ``outdoor_humidity`` [kg/kg]; ``return_humidity`` [kg/kg],
         (n_air_handler,); ``room_temperature`` [K]; ``supply_air_temperature`` [K], (n_air_handler,);
         ``supply_water_temperature`` [K]; ``static_pressure`` [Pa], (n_air_handler,); ``differential_pressure`` [Pa];
-        ``running`` [-], (n_air_handler,); ``boiler`` [-]; ``seconds`` [s]. Outputs: ``water_end`` [K]; ``heat`` [W],
-        (n_zone,); ``electric_power``, ``fuel_power`` [W]; ``airflow`` [kg/s], ``discharge`` [K], ``reheat`` [W],
-        (n_terminal,); ``supply_temperature`` [K], (n_air_handler,); ``return_water`` [K]; ``pump_power`` [W].
+        ``running`` [-], (n_air_handler,); ``boiler`` [-]; ``ventilation`` [-], (n_air_handler,); ``seconds`` [s].
+        Outputs: ``water_end`` [K]; ``heat`` [W], (n_zone,); ``electric_power``, ``fuel_power`` [W]; ``airflow``
+        [kg/s], ``discharge`` [K], ``reheat`` [W], (n_terminal,); ``supply_temperature`` [K], (n_air_handler,);
+        ``return_water`` [K]; ``pump_power`` [W].
 
     Raises
     ------
@@ -49,7 +50,7 @@ def hvac_function(system: HvacSystem, width: float = 0.02) -> Any:
         "water": 1, "zone_temperature": n, "heating_setpoint": n, "cooling_setpoint": n, "outdoor_temperature": 1,
         "outdoor_humidity": 1, "return_humidity": n_air, "room_temperature": 1, "supply_air_temperature": n_air,
         "supply_water_temperature": 1, "static_pressure": n_air, "differential_pressure": 1, "running": n_air,
-        "boiler": 1, "seconds": 1,
+        "boiler": 1, "ventilation": n_air, "seconds": 1,
     }  # fmt: skip
     s = {name: casadi.SX.sym(name, size) for name, size in sizes.items()}
     split = {name: tuple(casadi.vertsplit(v)) for name, v in s.items()}
@@ -66,6 +67,7 @@ def hvac_function(system: HvacSystem, width: float = 0.02) -> Any:
         Actions(
             split["supply_air_temperature"], s["supply_water_temperature"], split["static_pressure"],
             s["differential_pressure"], split["running"], s["boiler"],
+            split["ventilation"],
         ),
         s["seconds"],
     )  # fmt: skip

@@ -11,14 +11,12 @@ from numpy.typing import NDArray
 
 from thermal.errors import HvacParameterError, describe
 from thermal.hvac._air import USUAL_HUMIDITY
-from thermal.hvac._air_handler import AirHandler, Mixed, Warmed
+from thermal.hvac._air_handler import AirHandler, Heater, Mixed, Warmed
 from thermal.hvac._boiler import BoilerLoop, Heated
-from thermal.hvac._coil import WaterCoil, water_share
+from thermal.hvac._coil import Characteristic, WaterCoil, water_share
 from thermal.hvac._operations import Operations, Value
 from thermal.hvac._terminals import Terminals, heat_rate
 from thermal.hvac._thermostat import Thermostat
-
-_LEAST = 1e-12  # kg/s: return air has a temperature even where nothing flows
 
 
 class Conditions(NamedTuple):
@@ -66,6 +64,8 @@ class Actions(NamedTuple):
         1 while the fans of an air handler run, else 0 [-].
     boiler : float
         1 while boiler and pump run, else 0 [-].
+    ventilation : float or tuple of float
+        Share of an air handler's minimum of outdoor air that is asked for [-]: 1 while there are people.
     """
 
     supply_air_temperature: Value
@@ -74,6 +74,7 @@ class Actions(NamedTuple):
     differential_pressure: Value = None
     running: Value = 1.0
     boiler: Value = 1.0
+    ventilation: Value = 1.0
 
 
 class Calls(NamedTuple):
@@ -143,22 +144,23 @@ class HvacStep(NamedTuple):
 
 
 class _Air(NamedTuple):
-    """What both passes over the water side take from the air side."""
+    """What the water side takes from the air side."""
 
-    calls: Calls
     reheat_call: Value
     airflow: Value
     rate: Value
     coil: Value
+    curve: Characteristic
     mixed: tuple[Mixed, ...]
     opening: Value
 
 
 class _Valves(NamedTuple):
-    """Valves of a pass, and the coils' load ``conductance * T - source`` that follows."""
+    """Valves, and the coils' load ``conductance * T - source`` that follows."""
 
     warmed: tuple[Warmed, ...]
     share: Value
+    coil: Value
     offset: Value
     slope: Value
     conductance: Value
@@ -218,6 +220,21 @@ class HvacSystem:
         """Whether the first terminal serves the first zone and so on."""
         return bool(np.array_equal(self.terminals.zone, np.arange(self.zone_count)))
 
+    @cached_property
+    def static_pressures(self) -> tuple[float, ...]:
+        """Design static pressures of the air handlers [Pa]."""
+        return tuple(handler.supply_fan.static_pressure for handler in self.air_handlers)
+
+    @cached_property
+    def water_coils(self) -> tuple[tuple[int, WaterCoil], ...]:
+        """Positions of the air handlers with a water coil, and the coils."""
+        return tuple((k, h.heating) for k, h in enumerate(self.air_handlers) if isinstance(h.heating, WaterCoil))
+
+    @cached_property
+    def heaters(self) -> tuple[tuple[int, Heater], ...]:
+        """Positions of the air handlers with a coil that is no water coil, and the coils."""
+        return tuple((k, h.heating) for k, h in enumerate(self.air_handlers) if isinstance(h.heating, Heater))
+
     def at_terminals(self, ops: Operations, values: Value) -> Value:
         """Give values of the zones, one a terminal.
 
@@ -273,37 +290,35 @@ def advance(
 
     Notes
     -----
-    Valves are set twice: for the water at the start, then for the temperature that it would reach with them. With
-    these the loop's balance is linear in the water's temperature at the end of the step and is solved exactly.
+    Valves are set for the warmest water that the step can bring, so that no discharge temperature passes its limit.
+    With these the loop's balance is linear in the water's temperature at the end of the step and is solved exactly.
+    While the water is colder than that - a boiler at its capacity, a setpoint that falls - coils give a little less
+    than their valves could let them.
     """
-    scalar, loop = ops.scalar, system.loop
+    scalar, loop, pump = ops.scalar, system.loop, system.loop.pump
     zone = system.at_terminals(ops, conditions.zone_temperature)
     air = _air_side(ops, system, zone, calls, conditions, actions)
     room = conditions.room_temperature
     setpoint, running = actions.supply_water_temperature, actions.boiler
-    first = _valves(ops, system, air, water)
-    expected = loop.heat(scalar, water, setpoint, running, first.conductance, first.source, 0.0, room, step).water
-    valves = first if scalar.equal(expected, water) else _valves(ops, system, air, expected)
-    terminals = system.terminals
-    valve_flow = water_share(valves.share, terminals.thermal_effectiveness(air.coil, air.opening))
-    drawn = ops.total(valve_flow * terminals.water_flow)
-    for handler, warmed in zip(system.air_handlers, valves.warmed, strict=True):
-        if isinstance(handler.heating, WaterCoil):
-            drawn = drawn + warmed.flow_share * handler.heating.water_flow
-    pump = loop.pump
+    warmest = scalar.maximum(water, running * loop.goal(scalar, water, setpoint, step))
+    valves = _valves(ops, system, air, warmest)
+    valve_flow = water_share(valves.share, air.coil, air.curve)
+    drawn = ops.dot(valve_flow, system.terminals.water_flow)
+    for k, coil in system.water_coils:
+        drawn = drawn + valves.warmed[k].flow_share * coil.water_flow
     flow = running * scalar.maximum(drawn * air.opening, pump.minimum_share * pump.design_flow, pump.design_flow)
-    pump_power = pump.power(flow, _pressure(actions.differential_pressure, pump.differential_pressure))
+    pump_power = pump.power(flow, _or_design(actions.differential_pressure, pump.differential_pressure))
     heat = pump.heat_to_water * pump_power
     end = loop.heat(scalar, water, setpoint, running, valves.conductance, valves.source, heat, room, step)
     entering = valves.offset + valves.slope * end.water
-    reheat = valves.share * air.coil * (end.water - entering)
-    discharge = entering + reheat / (air.rate + _LEAST)
+    reheat = valves.coil * (end.water - entering)
+    discharge = entering + reheat / air.rate
     back = loop.returning(end, flow)
+    electric, fuel = _powers(system, air.mixed, valves.warmed)
     return HvacStep(
         calls, air.airflow, entering, reheat, discharge, valve_flow, air.rate * (discharge - zone), air.mixed,
-        valves.warmed, tuple(w.offset + w.slope * end.water for w in valves.warmed), end, flow, back, pump_power,
-        _electric(system, air.mixed, valves.warmed) + pump_power,
-        loop.fuel(scalar, end.boiler, back) + _direct(system, valves.warmed, False),
+        valves.warmed, tuple([w.offset + w.slope * end.water for w in valves.warmed]), end, flow, back, pump_power,
+        electric + pump_power, loop.fuel(scalar, end.boiler, back) + fuel,
     )  # fmt: skip
 
 
@@ -312,81 +327,70 @@ def _air_side(
 ) -> _Air:
     """Flows of the terminals, and the air handlers up to their heating coils."""
     scalar, terminals, handlers = ops.scalar, system.terminals, system.air_handlers
-    n = len(handlers)
-    statics = [
-        _pressure(_one(actions.static_pressure, k), h.supply_fan.static_pressure) for k, h in enumerate(handlers)
-    ]
-    runs = [_one(actions.running, k) for k in range(n)]
-    reaches = [
-        run * scalar.sqrt(static / handler.supply_fan.static_pressure)
-        for run, static, handler in zip(runs, statics, handlers, strict=True)
-    ]
-    reach = ops.spread(reaches, terminals.air_handler) if n > 1 else reaches[0]
-    airflow = terminals.airflow(ops, calls.heating, calls.cooling, reach)
-    weights = airflow + _LEAST
-    flows, warmth = ops.sums(weights, system.members), ops.sums(weights * zone, system.members)
-    setpoints, humid = actions.supply_air_temperature, conditions.return_humidity
+    n, designs = len(handlers), system.static_pressures
+    statics = designs if actions.static_pressure is None else _each(actions.static_pressure, n)
+    runs = _each(actions.running, n)
+    reaches = [run * scalar.sqrt(p / design) for run, p, design in zip(runs, statics, designs, strict=True)]
+    airflow = terminals.airflow(ops, calls.heating, calls.cooling, _spread(ops, system, reaches))
     pump = system.loop.pump
-    pressure = _pressure(actions.differential_pressure, pump.differential_pressure)
+    pressure = _or_design(actions.differential_pressure, pump.differential_pressure)
     opening = actions.boiler * scalar.sqrt(pressure / pump.differential_pressure)
-    mixed = tuple(
-        handler.mix(
-            scalar, flows[k], runs[k], warmth[k] / flows[k], _one(humid, k), conditions.outdoor_temperature,
-            conditions.outdoor_humidity, _one(setpoints, k), statics[k], opening,
-        )
-        for k, handler in enumerate(handlers)
+    rows = zip(
+        handlers, ops.sums(airflow, system.members), ops.sums(airflow * zone, system.members), runs, statics,
+        _each(conditions.return_humidity, n), _each(actions.supply_air_temperature, n), _each(actions.ventilation, n),
+        strict=True,
     )  # fmt: skip
+    outdoor, damp = conditions.outdoor_temperature, conditions.outdoor_humidity
+    mixed = tuple([
+        handler.mix(scalar, flow, run, warmth / flow, humid, outdoor, damp, setpoint, static, opening, ventilation)
+        for handler, flow, warmth, run, static, humid, setpoint, ventilation in rows
+    ])  # fmt: skip
     first = terminals.reheat_first
     call = calls.heating if first == 1.0 else ops.minimum(calls.heating * (1.0 / first), 1.0)
-    coil = terminals.conductance(ops, airflow, opening)
-    return _Air(calls, call, airflow, heat_rate(airflow), coil, mixed, opening)
+    rate, water = heat_rate(airflow), terminals.open_water(ops, opening)
+    return _Air(call, airflow, rate, terminals.conductance(ops, airflow, rate, water), water[2], mixed, opening)
 
 
 def _valves(ops: Operations, system: HvacSystem, air: _Air, water: Value) -> _Valves:
     """Set all valves for a water temperature."""
-    terminals = system.terminals
-    warmed = tuple(
-        handler.warm(ops.scalar, mixed, water, air.opening)
+    scalar = ops.scalar
+    warmed = tuple([
+        handler.warm(scalar, mixed, water, air.opening)
         for handler, mixed in zip(system.air_handlers, air.mixed, strict=True)
-    )
-    offsets, slopes = [w.offset for w in warmed], [w.slope for w in warmed]
-    if len(warmed) > 1:
-        offset = ops.spread(offsets, terminals.air_handler)
-        slope = ops.spread(slopes, terminals.air_handler)
-    else:
-        offset, slope = offsets[0], slopes[0]
+    ])  # fmt: skip
+    offset = _spread(ops, system, [w.offset for w in warmed])
+    slope = _spread(ops, system, [w.slope for w in warmed])
     entering = offset + slope * water
-    share = terminals.heat_share(ops, air.reheat_call, air.rate, air.coil, entering, water)
+    share = system.terminals.heat_share(ops, air.reheat_call, air.rate, air.coil, entering, water)
     coil = share * air.coil
-    conductance, source = ops.total(coil * (1.0 - slope)), ops.total(coil * offset)
-    for mixed, w in zip(air.mixed, warmed, strict=True):
-        conductance = conductance + w.conductance
-        source = source + w.conductance * mixed.cooled_temperature
-    return _Valves(warmed, share, offset, slope, conductance, source)
+    conductance, source = ops.dot(coil, 1.0 - slope), ops.dot(coil, offset)
+    for k, _ in system.water_coils:
+        conductance = conductance + warmed[k].conductance
+        source = source + warmed[k].conductance * air.mixed[k].cooled_temperature
+    return _Valves(warmed, share, coil, offset, slope, conductance, source)
 
 
-def _one(values: Value, k: int) -> Value:
-    """Return an air handler's value, where all may have the same or one each."""
-    return values[k] if isinstance(values, tuple | list) else values
+def _each(values: Value, n: int) -> Value:
+    """One value an air handler, where all may have the same."""
+    return values if isinstance(values, tuple | list) else (values,) * n
 
 
-def _pressure(setpoint: Value, design: float) -> Value:
+def _spread(ops: Operations, system: HvacSystem, values: list[Value]) -> Value:
+    """Give each terminal the value of its air handler."""
+    return ops.spread(values, system.terminals.air_handler)
+
+
+def _or_design(setpoint: Value, design: float) -> Value:
     return design if setpoint is None else setpoint
 
 
-def _direct(system: HvacSystem, warmed: tuple[Warmed, ...], electric: bool) -> Value:
-    """Power of heating coils that burn gas, or of those that are electric [W]."""
-    power: Value = 0.0
-    for handler, w in zip(system.air_handlers, warmed, strict=True):
-        heater = handler.heating
-        if heater is not None and not isinstance(heater, WaterCoil) and heater.electric == electric:
-            power = power + w.direct / heater.efficiency
-    return power
-
-
-def _electric(system: HvacSystem, mixed: tuple[Mixed, ...], warmed: tuple[Warmed, ...]) -> Value:
-    """Electric power of the air handlers [W]."""
-    power = _direct(system, warmed, True)
+def _powers(system: HvacSystem, mixed: tuple[Mixed, ...], warmed: tuple[Warmed, ...]) -> tuple[Value, Value]:
+    """Electric power of the air handlers, and fuel of their coils [W]."""
+    electric: Value = 0.0
+    fuel: Value = 0.0
     for m in mixed:
-        power = power + m.cooling_power + m.supply_fan_power + m.exhaust_fan_power
-    return power
+        electric = electric + m.cooling_power + m.supply_fan_power + m.exhaust_fan_power
+    for k, heater in system.heaters:
+        taken = warmed[k].direct / heater.efficiency
+        electric, fuel = (electric + taken, fuel) if heater.electric else (electric, fuel + taken)
+    return electric, fuel

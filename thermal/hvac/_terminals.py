@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -10,12 +11,12 @@ from numpy.typing import ArrayLike, NDArray
 from thermal.errors import HvacParameterError, describe
 from thermal.hvac._air import WATER_HEAT_CAPACITY
 from thermal.hvac._checks import all_in_range, fields_in_range, in_range
-from thermal.hvac._coil import WaterCoil, coil_conductance
-from thermal.hvac._operations import Operations, Value
+from thermal.hvac._coil import LEAST_FLOW, Characteristic, WaterCoil, characteristic, coil_conductance
+from thermal.hvac._operations import NumpyOperations, Operations, Value
 from thermal.units import AIR_HEAT_CAPACITY
 
 FloatArray = NDArray[np.float64]
-_LEAST = 1e-9
+_LEAST = 1e-9  # K, W/K, kg/s: next to nothing
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,6 +169,26 @@ class Terminals:
     def __len__(self) -> int:
         return len(self.zone)
 
+    @cached_property
+    def _spans(self) -> tuple[FloatArray, FloatArray]:
+        """What calls for cooling, and for heating once the reheat is open, add to the flow [kg/s]."""
+        rest = max(1.0 - self.reheat_first, _LEAST)
+        return self.design_flow - self.minimum_flow, (self.heating_flow - self.minimum_flow) / rest
+
+    @cached_property
+    def _film(self) -> FloatArray:
+        """Air film per power 0.8 of the flow."""
+        return self.air_film / self.design_flow**0.8
+
+    @cached_property
+    def _limit(self) -> FloatArray:
+        return np.full(len(self), self.discharge_limit)
+
+    @cached_property
+    def _open_water(self) -> tuple[Value, Value, Characteristic]:
+        rate, film = WATER_HEAT_CAPACITY * self.water_flow, self.water_film
+        return rate, film, characteristic(NumpyOperations(), rate, film)
+
     def airflow(self, ops: Operations, heating: Value, cooling: Value, reach: Value) -> Value:
         """Air that the boxes let through [kg/s].
 
@@ -180,13 +201,31 @@ class Terminals:
         reach : Value
             Most flow that the duct pressure drives through an open damper, over the design flow [-].
         """
-        wanted = self.minimum_flow + (self.design_flow - self.minimum_flow) * cooling
+        by_cooling, by_heating = self._spans
+        wanted = self.minimum_flow + by_cooling * cooling
         if self.reheat_first < 1.0:
-            beyond = ops.maximum(heating - self.reheat_first, 0.0) * (1.0 / (1.0 - self.reheat_first))
-            wanted = wanted + (self.heating_flow - self.minimum_flow) * beyond
-        return ops.minimum(wanted, self.design_flow * reach, self.design_flow)
+            wanted = wanted + by_heating * ops.positive(heating - self.reheat_first)
+        return ops.minimum(wanted, self.design_flow * (reach + LEAST_FLOW), self.design_flow)
 
-    def conductance(self, ops: Operations, airflow: Value, water: Value) -> Value:
+    def open_water(self, ops: Operations, water: Value) -> tuple[Value, Value, Characteristic]:
+        """Heat capacity rate and film conductance of the water [W/K], and characteristic of the coils, valves open.
+
+        Parameters
+        ----------
+        ops : Operations
+            Arithmetic.
+        water : Value
+            Water through open valves over the design flow [-].
+        """
+        if isinstance(water, float) and water == 1.0:
+            return self._open_water
+        water = water + LEAST_FLOW
+        rate, film = self._open_water[0] * water, self._open_water[1] * water**0.85
+        return rate, film, characteristic(ops, rate, film)
+
+    def conductance(
+        self, ops: Operations, airflow: Value, rate: Value, water: tuple[Value, Value, Characteristic]
+    ) -> Value:
         """Heat per difference of water and air at the coils' entry [W/K], valves open.
 
         Parameters
@@ -194,14 +233,13 @@ class Terminals:
         ops : Operations
             Arithmetic.
         airflow : Value
-            Air [kg/s].
-        water : Value
-            Water through open valves over the design flow [-].
+            Air [kg/s], above 0.
+        rate : Value
+            Its heat capacity rate [W/K].
+        water : tuple of Value
+            As `open_water` gives it.
         """
-        return coil_conductance(
-            ops, airflow, self.design_flow, self.air_film, self.water_flow * water,
-            self.water_film * (water + _LEAST) ** 0.85,
-        )  # fmt: skip
+        return coil_conductance(ops, rate, self._film * airflow**0.8, water[0], water[1])
 
     def heat_share(
         self, ops: Operations, call: Value, rate: Value, conductance: Value, entering: Value, water: Value
@@ -223,24 +261,13 @@ class Terminals:
         water : Value
             Water that enters the coils [K].
         """
-        allowed = rate * ops.maximum(self.discharge_limit - entering, 0.0)
-        ready = conductance * ops.maximum(water - entering, 0.0)
+        allowed = rate * ops.positive(self._limit - entering)
+        # a difference of nothing leaves valves open for cold water, and closed where nothing is wanted
+        ready = conductance * ops.maximum(water - entering, _LEAST)
         if self.discharge_control:
             wanted = call * allowed
-            return wanted / (ops.maximum(wanted, ready, 100.0) + _LEAST)
-        return ops.minimum(call, allowed / (ready + _LEAST))
-
-    def thermal_effectiveness(self, conductance: Value, water: Value) -> Value:
-        """Fall of the water's temperature over the difference at entry, valves open [-].
-
-        Parameters
-        ----------
-        conductance : Value
-            Of the open coils [W/K].
-        water : Value
-            Water through open valves over the design flow [-].
-        """
-        return conductance / (self.water_flow * (WATER_HEAT_CAPACITY * water) + _LEAST)
+            return wanted / ops.maximum(wanted, ready, 100.0)
+        return ops.minimum(call, allowed / ready)
 
 
 def heat_rate(airflow: Value) -> Value:

@@ -75,11 +75,14 @@ class Thermostat:
         heating, cooling : Value
             Setpoints [K].
         """
-        rate = 1.0 / self.throttling_range
         if self.release:
             shift = 0.5 * self.release * (cooling - heating)
             heating, cooling = heating + shift, cooling - shift
-        return ops.clip((heating - zone) * rate, 0.0, 1.0), ops.clip((zone - cooling) * rate, 0.0, 1.0)
+        cold, warm = heating - zone, zone - cooling
+        if self.throttling_range != 1.0:
+            rate = 1.0 / self.throttling_range
+            cold, warm = cold * rate, warm * rate
+        return ops.unit(cold), ops.unit(warm)
 
     def calls_in(
         self, mode: ModeArray, zone: FloatArray, heating: FloatArray, cooling: FloatArray
