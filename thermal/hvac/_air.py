@@ -28,6 +28,13 @@ def saturation_humidity(ops: Operations, temperature: Value, pressure: float) ->
     return _MOLAR_RATIO * vapour / (pressure - vapour)
 
 
+def dew_point(ops: Operations, humidity: Value, pressure: float) -> Value:
+    """Dew point [K] of air of a humidity ratio [kg/kg] and pressure [Pa], the inverse of `saturation_humidity`."""
+    vapour = pressure * humidity / (_MOLAR_RATIO + humidity)
+    exponent = ops.log(vapour / 610.94 + 1e-9)
+    return _FREEZING + 243.04 * exponent / (17.625 - exponent)
+
+
 def enthalpy(temperature: Value, humidity: Value) -> Value:
     """Enthalpy of moist air [J/kg] above 0 degC, at a temperature [K] and humidity ratio [kg/kg].
 

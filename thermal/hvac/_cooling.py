@@ -5,11 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from thermal.hvac._air import EVAPORATION_HEAT, saturation_humidity, wet_bulb
+from thermal.hvac._air import EVAPORATION_HEAT, dew_point, saturation_humidity, wet_bulb
 from thermal.hvac._checks import fields_in_range
 from thermal.hvac._curves import DX_CAPACITY, DX_INPUT, DX_PART_LOAD, Biquadratic, Polynomial, celsius
 from thermal.hvac._operations import Operations, Value
 from thermal.units import AIR_HEAT_CAPACITY
+
+_LEAST = 1e-9  # J/kg
 
 
 class Cooled(NamedTuple):
@@ -65,10 +67,10 @@ class CoolingCoil:
 
     Notes
     -----
-    Sensible heat: ``C (T_in - T_out)``, as far as ``C (1 - bypass) (T_in - coldest)``. Latent heat by the apparatus
-    dew point ``T_adp = (T_out - bypass T_in) / (1 - bypass)``: the air that touches the coil leaves saturated at T_adp
-    or as dry as it came. Power ``Q_available / COP * EIR(x, T_outdoor) * f(part load)``, never below Carnot's between
-    the coil and outdoors.
+    Sensible heat: ``C (T_in - T_out)``, as far as ``C (1 - bypass) (T_in - coldest)`` and the capacity go. Latent heat
+    by the apparatus dew point ``T_adp = (T_out - bypass T_in) / (1 - bypass)``: the air that touches the coil leaves
+    saturated at T_adp or as dry as it came. Power ``Q_available / COP * EIR(x, T_outdoor) * f(part load)``, never below
+    Carnot's between the coil and outdoors.
     """
 
     capacity: float
@@ -122,23 +124,43 @@ class CoolingCoil:
         outdoor : Value
             Outdoor temperature [K].
         """
-        rate = AIR_HEAT_CAPACITY * flow
-        allowed = ops.step(outdoor - self.lockout) if self.lockout else 1.0
-        deepest = (1.0 - self.bypass) * ops.positive(temperature - self.coldest)
-        drop = allowed * ops.clip(temperature - target, 0.0, deepest)
-        surface = temperature - drop / (1.0 - self.bypass)
-        dew = saturation_humidity(ops, surface, self.pressure)
-        loss = (1.0 - self.bypass) * ops.positive(humidity - dew, 1e-3)
         x = celsius(
             wet_bulb(ops, temperature, humidity, self.pressure) if self.chilled_water is None else self.chilled_water
         )
         available = self.capacity * self.capacity_curve(ops, x, celsius(outdoor))
-        wanted = rate * drop + EVAPORATION_HEAT * flow * loss
-        share = available / ops.maximum(wanted, available, 0.1 * self.capacity)
-        sensible, latent = share * rate * drop, share * EVAPORATION_HEAT * flow * loss
+        deepest = self._deepest(ops, temperature, humidity, available / flow)
+        allowed = ops.step(outdoor - self.lockout) if self.lockout else 1.0
+        drop = allowed * ops.clip(temperature - target, 0.0, deepest)
+        surface = temperature - drop / (1.0 - self.bypass)
+        loss = self._loss(ops, temperature, humidity, drop)
+        sensible, latent = AIR_HEAT_CAPACITY * flow * drop, EVAPORATION_HEAT * flow * loss
         total = sensible + latent
-        ratio = total / available
-        power = available / self.cop * self.input_curve(ops, x, celsius(outdoor)) * self.part_load(ops, ratio)
+        full = available / self.cop * self.input_curve(ops, x, celsius(outdoor))
+        power = full * self.part_load(ops, total / available)
         carnot = total * ops.positive(outdoor - surface) / surface
         power = ops.maximum(power, carnot, 0.01 * self.capacity) + self.auxiliaries * total
-        return Cooled(temperature - share * drop, humidity - share * loss, sensible, latent, power)
+        return Cooled(temperature - drop, humidity - loss, sensible, latent, power)
+
+    def _loss(self, ops: Operations, temperature: Value, humidity: Value, drop: Value) -> Value:
+        """Fall of the humidity ratio [kg/kg] that goes with a fall of the temperature [K]."""
+        dew = saturation_humidity(ops, temperature - drop / (1.0 - self.bypass), self.pressure)
+        return (1.0 - self.bypass) * ops.positive(humidity - dew, 1e-3)
+
+    def _deepest(self, ops: Operations, temperature: Value, humidity: Value, heat: Value) -> Value:
+        """Fall of the air's temperature [K] that surface and capacity allow; `heat` is the capacity per air [J/kg].
+
+        Heat over fall is a straight line down to the dew point and nearly one below it: two chords of that part, the
+        second from the first's end, find where it reaches the capacity within a hundredth. The wanted temperature has
+        no part in it, so that wanting more never brings less.
+        """
+        share = 1.0 - self.bypass
+        surface = share * ops.positive(temperature - self.coldest)
+        dry = ops.minimum(share * ops.positive(temperature - dew_point(ops, humidity, self.pressure)), surface)
+        spare = ops.positive(heat - AIR_HEAT_CAPACITY * dry, 1000.0)
+        deepest = surface
+        for _ in range(2):
+            latent = EVAPORATION_HEAT * self._loss(ops, temperature, humidity, deepest)
+            wet = ops.positive(deepest - dry)
+            chord = wet / (AIR_HEAT_CAPACITY * wet + latent + _LEAST)
+            deepest = ops.minimum(deepest, dry + spare * chord)
+        return ops.minimum(deepest, heat / AIR_HEAT_CAPACITY)

@@ -201,6 +201,7 @@ def replay_air_handler(
     """
     ops = NumpyOperations()
     running = np.where(flow > 0.0, 1.0, 0.0)
+    flow = flow + LEAST_FLOW
     pressure = handler.supply_fan.static_pressure if static_pressure is None else static_pressure
     mixed = handler.mix(
         ops, flow, running, returning, return_humidity, outdoor, outdoor_humidity, setpoint, pressure, 1.0, ventilation

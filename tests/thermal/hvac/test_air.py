@@ -2,7 +2,7 @@ import numpy as np
 import psychrolib
 import pytest
 
-from thermal.hvac._air import enthalpy, saturation_humidity, wet_bulb
+from thermal.hvac._air import dew_point, enthalpy, saturation_humidity, wet_bulb
 from thermal.hvac._operations import FloatOperations
 
 OPS, PRESSURE = FloatOperations(), 101_325.0
@@ -23,6 +23,10 @@ def test_wet_bulb_is_within_a_kelvin_of_ashrae(degrees, share):
     humidity = psychrolib.GetHumRatioFromRelHum(degrees, share, PRESSURE)
     expected = psychrolib.GetTWetBulbFromHumRatio(degrees, humidity, PRESSURE)
     assert wet_bulb(OPS, degrees + 273.15, humidity, PRESSURE) - 273.15 == pytest.approx(expected, abs=1.0)
+
+
+def test_dew_point_inverts_saturation():
+    assert dew_point(OPS, saturation_humidity(OPS, 287.0, PRESSURE), PRESSURE) == pytest.approx(287.0, abs=1e-6)
 
 
 def test_enthalpy_is_that_of_ashrae():

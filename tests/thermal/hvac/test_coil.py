@@ -38,8 +38,8 @@ def test_effectiveness_where_one_side_does_not_change(ntu):
 @given(ntu=NTU, ratio=RATIO)
 def test_effectiveness_lies_between_parallel_and_counter_flow(ntu, ratio):
     value = _effectiveness(OPS, ntu, ratio)
-    # eq. 11.32 is a fit to a series: some thousandths above counter flow where NTU is small
-    assert parallel(ntu, ratio) - 5e-3 <= value <= counterflow(ntu, ratio) + 5e-3
+    # eq. 11.32 is a fit to a series: some thousandths off where NTU is small
+    assert parallel(ntu, ratio) - 7e-3 <= value <= counterflow(ntu, ratio) + 7e-3
     assert value <= 1.0
 
 
