@@ -169,7 +169,9 @@ def _large_handler(reference: Reference, k: int) -> AirHandler:
     volume = reference.size(f"VAV_{k}_FAN", "Design Size Maximum Flow Rate")
     coil = f"VAV_{k}_HEATC"
     heating = _coil(reference, coil, DENSITY * reference.size(f"VAV_{k}", "Adjusted Heating Design Air Flow Rate"))
-    fan = Fan(DENSITY * volume, 1017.592, efficiency=0.6045, air_density=DENSITY)
+    # the air handlers' fans differ in pressure and efficiency, of which only the quotient matters here
+    power = reference.size(f"VAV_{k}_FAN", "Design Electric Power Consumption")
+    fan = Fan(DENSITY * volume, 1017.592, efficiency=volume * 1017.592 / power, air_density=DENSITY)
     least = DENSITY * reference.size(f"VAV_{k}_OA_CONTROLLER", "Minimum Outdoor")
     return AirHandler(fan, None, None, heating, 0.0, least, enthalpy_limit=64_000.0)
 

@@ -173,7 +173,7 @@ def coil_conductance(ops: Operations, air_rate: Value, air_film: Value, water_ra
         hA on either side at these flows [W/K].
     """
     overall = air_film * water_film / (air_film + water_film)
-    least = ops.minimum(air_rate, water_rate, AIR_HEAT_CAPACITY)
+    least = ops.lesser(air_rate, water_rate)
     # C_max as what is left keeps C_min C_max exact under smoothing
     most = air_rate + water_rate - least
     return _effectiveness(ops, overall / least, least / most) * least

@@ -150,7 +150,7 @@ class CoolingCoil:
         """Fall of the air's temperature [K] that surface and capacity allow; `heat` is the capacity per air [J/kg].
 
         Heat over fall is a straight line down to the dew point and nearly one below it: two chords of that part, the
-        second from the first's end, find where it reaches the capacity within a hundredth. The wanted temperature has
+        second from the first's end, find where it reaches the capacity within some hundredths. The wanted temperature has
         no part in it, so that wanting more never brings less.
         """
         share = 1.0 - self.bypass

@@ -346,7 +346,7 @@ def _air_side(
         for handler, flow, warmth, run, static, humid, setpoint, ventilation in rows
     ])  # fmt: skip
     first = terminals.reheat_first
-    call = calls.heating if first == 1.0 else ops.minimum(calls.heating * (1.0 / first), 1.0)
+    call = calls.heating if first == 1.0 else ops.unit(calls.heating * (1.0 / first))
     rate, water = heat_rate(airflow), terminals.open_water(ops, opening)
     return _Air(call, airflow, rate, terminals.conductance(ops, airflow, rate, water), water[2], mixed, opening)
 

@@ -205,7 +205,7 @@ class Terminals:
         wanted = self.minimum_flow + by_cooling * cooling
         if self.reheat_first < 1.0:
             wanted = wanted + by_heating * ops.positive(heating - self.reheat_first)
-        return ops.minimum(wanted, self.design_flow * (reach + LEAST_FLOW), self.design_flow)
+        return ops.lesser(wanted, self.design_flow * (reach + LEAST_FLOW))
 
     def open_water(self, ops: Operations, water: Value) -> tuple[Value, Value, Characteristic]:
         """Heat capacity rate and film conductance of the water [W/K], and characteristic of the coils, valves open.

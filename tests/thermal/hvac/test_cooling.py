@@ -62,7 +62,7 @@ def test_capacity_bounds_the_load(flow, temperature, share, target, outdoor):
     cooled = coil.cool(OPS, flow, temperature, humidity_of(temperature, share), target, outdoor)
     x = wet_bulb(OPS, temperature, humidity_of(temperature, share), 101_325.0) - 273.15
     available = 5000.0 * DX_CAPACITY(OPS, x, outdoor - 273.15)
-    assert cooled.sensible + cooled.latent <= 1.02 * available
+    assert cooled.sensible + cooled.latent <= 1.04 * available
     assert cooled.power <= 5000.0
 
 

@@ -35,6 +35,13 @@ def test_smoothing_errs_by_no_more_than_half_its_width(x, y, width, scale):
     assert ops.positive(x, scale) == ops.maximum(x, 0.0, scale)
 
 
+@given(a=st.floats(1e-9, 1e4), b=st.floats(1e-9, 1e4), width=WIDTHS)
+def test_the_lesser_of_positive_values_is_positive(a, b, width):
+    assert 0.0 < FloatOperations(width).lesser(a, b) <= min(a, b) * (1.0 + 1e-9)
+    assert FloatOperations(width).lesser(a, b) >= (1.0 - width) * min(a, b) - 1e-9 * max(a, b)
+    assert FloatOperations().lesser(a, b) == min(a, b)
+
+
 @given(x=NUMBERS, low=NUMBERS, span=st.floats(0.0, 100.0), width=WIDTHS)
 def test_a_smooth_clip_keeps_its_limits(x, low, span, width):
     ops, exact = FloatOperations(width), min(max(x, low), low + span)

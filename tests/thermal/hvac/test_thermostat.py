@@ -51,8 +51,8 @@ def test_calls_are_those_of_the_mode():
 def test_calls_without_memory_oppose_the_distance_and_exclude_each_other(t, width):
     heat, cool = Thermostat().calls(FloatOperations(width), t, 293.0, 297.0)
     warmer, cooler = Thermostat().calls(FloatOperations(width), t + 0.1, 293.0, 297.0)
-    assert 0.0 <= heat <= 1.0 and 0.0 <= cool <= 1.0
-    assert warmer <= heat and cooler >= cool
+    assert -1e-12 <= min(heat, cool) and max(heat, cool) <= 1.0 + 1e-12
+    assert warmer <= heat + 1e-12 and cooler >= cool - 1e-12
     assert min(heat, cool) <= 0.5 * width
     exact = Thermostat().calls(FloatOperations(), t, 293.0, 297.0)
     assert abs(heat - exact[0]) <= 0.5 * width + 1e-12 and abs(cool - exact[1]) <= 0.5 * width + 1e-12
