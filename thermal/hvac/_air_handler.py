@@ -8,7 +8,7 @@ from typing import NamedTuple
 from thermal.errors import HvacParameterError, describe
 from thermal.hvac._air import enthalpy
 from thermal.hvac._checks import fields_in_range
-from thermal.hvac._coil import WaterCoil, characteristic, water_share
+from thermal.hvac._coil import WaterCoil, water_share
 from thermal.hvac._cooling import CoolingCoil
 from thermal.hvac._fan import Fan
 from thermal.hvac._operations import Operations, Value
@@ -294,5 +294,5 @@ class AirHandler:
         ready = open_ * ops.maximum(water - entering, _LEAST)
         part = wanted / ops.maximum(wanted, ready, 1000.0)
         slope = part * open_ / rate
-        valve = water_share(part, open_, characteristic(ops, *self.heating.water_side(opening)))
+        valve = water_share(part, open_, self.heating.water_side(ops, opening)[2])
         return Warmed(entering * (1.0 - slope) + mixed.fan_rise, slope, part * open_, valve, 0.0)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 from scipy.optimize import brentq
@@ -146,18 +147,29 @@ class WaterCoil:
         """
         air = air_flow + LEAST_FLOW
         film = self.air_conductance * (air / self.air_flow) ** 0.8
-        return coil_conductance(ops, AIR_HEAT_CAPACITY * air, film, *self.water_side(water_share))
+        rate, water_film, _ = self.water_side(ops, water_share)
+        return coil_conductance(ops, AIR_HEAT_CAPACITY * air, film, rate, water_film)
 
-    def water_side(self, water_share: Value = 1.0) -> tuple[Value, Value]:
-        """Heat capacity rate and film conductance of the water [W/K].
+    @cached_property
+    def _open_water(self) -> tuple[float, float, Characteristic]:
+        rate, film = WATER_HEAT_CAPACITY * self.water_flow, self.water_conductance
+        return rate, film, characteristic(FloatOperations(), rate, film)
+
+    def water_side(self, ops: Operations, water_share: Value) -> tuple[Value, Value, Characteristic]:
+        """Heat capacity rate and film conductance of the water [W/K], and the characteristic that follows.
 
         Parameters
         ----------
+        ops : Operations
+            Arithmetic.
         water_share : Value
             Water flow over `water_flow` [-].
         """
+        if isinstance(water_share, float) and water_share == 1.0:
+            return self._open_water
         water = water_share + LEAST_FLOW
-        return WATER_HEAT_CAPACITY * self.water_flow * water, self.water_conductance * water**0.85
+        rate, film = WATER_HEAT_CAPACITY * self.water_flow * water, self.water_conductance * water**0.85
+        return rate, film, characteristic(ops, rate, film)
 
 
 def coil_conductance(ops: Operations, air_rate: Value, air_film: Value, water_rate: Value, water_film: Value) -> Value:

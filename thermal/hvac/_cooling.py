@@ -128,11 +128,14 @@ class CoolingCoil:
             wet_bulb(ops, temperature, humidity, self.pressure) if self.chilled_water is None else self.chilled_water
         )
         available = self.capacity * self.capacity_curve(ops, x, celsius(outdoor))
-        deepest = self._deepest(ops, temperature, humidity, available / flow)
         allowed = ops.step(outdoor - self.lockout) if self.lockout else 1.0
-        drop = allowed * ops.clip(temperature - target, 0.0, deepest)
-        surface = temperature - drop / (1.0 - self.bypass)
+        surface_drop = (1.0 - self.bypass) * ops.positive(temperature - self.coldest)
+        drop = allowed * ops.clip(temperature - target, 0.0, surface_drop)
         loss = self._loss(ops, temperature, humidity, drop)
+        if not ops.surely_below(flow * (AIR_HEAT_CAPACITY * drop + EVAPORATION_HEAT * loss), available):
+            drop = ops.minimum(drop, self._deepest(ops, temperature, humidity, surface_drop, available / flow))
+            loss = self._loss(ops, temperature, humidity, drop)
+        surface = temperature - drop / (1.0 - self.bypass)
         sensible, latent = AIR_HEAT_CAPACITY * flow * drop, EVAPORATION_HEAT * flow * loss
         total = sensible + latent
         full = available / self.cop * self.input_curve(ops, x, celsius(outdoor))
@@ -146,18 +149,17 @@ class CoolingCoil:
         dew = saturation_humidity(ops, temperature - drop / (1.0 - self.bypass), self.pressure)
         return (1.0 - self.bypass) * ops.positive(humidity - dew, 1e-3)
 
-    def _deepest(self, ops: Operations, temperature: Value, humidity: Value, heat: Value) -> Value:
-        """Fall of the air's temperature [K] that surface and capacity allow; `heat` is the capacity per air [J/kg].
+    def _deepest(self, ops: Operations, temperature: Value, humidity: Value, most: Value, heat: Value) -> Value:
+        """Fall of the air's temperature [K] that the capacity per air, `heat` [J/kg], allows, up to `most` [K].
 
         Heat over fall is a straight line down to the dew point and nearly one below it: two chords of that part, the
-        second from the first's end, find where it reaches the capacity within some hundredths. The wanted temperature has
-        no part in it, so that wanting more never brings less.
+        second from the first's end, find where it reaches the capacity within some hundredths. The wanted temperature
+        has no part in it, so that wanting more never brings less.
         """
-        share = 1.0 - self.bypass
-        surface = share * ops.positive(temperature - self.coldest)
-        dry = ops.minimum(share * ops.positive(temperature - dew_point(ops, humidity, self.pressure)), surface)
+        dew = (1.0 - self.bypass) * ops.positive(temperature - dew_point(ops, humidity, self.pressure))
+        dry = ops.minimum(dew, most)
         spare = ops.positive(heat - AIR_HEAT_CAPACITY * dry, 1000.0)
-        deepest = surface
+        deepest = most
         for _ in range(2):
             latent = EVAPORATION_HEAT * self._loss(ops, temperature, humidity, deepest)
             wet = ops.positive(deepest - dry)

@@ -98,6 +98,10 @@ class Operations:
         """Return 1 where a value is above 0, else 0."""
         return 0.5 * (1.0 + x / self.sqrt(x * x + (self.width * scale) ** 2))
 
+    def surely_below(self, a: Value, b: Value) -> bool:
+        """Tell whether a value is known not to be above another, so that a limit need not be looked for."""
+        return False
+
     def sums(self, values: Value, members: NDArray[np.float64]) -> Sequence[Value]:
         """Sum the terminals of each group; `members` is (n_terminal, n_group) of 0 and 1."""
         raise NotImplementedError
@@ -137,6 +141,7 @@ class FloatOperations(Operations):
         self.step = lambda x, scale=1.0: 1.0 if x > 0.0 else 0.0  # type: ignore[method-assign]
         self.positive = lambda x, scale=1.0: x if x >= 0.0 else 0.0  # type: ignore[method-assign]
         self.lesser = lambda a, b: a if a <= b else b  # type: ignore[method-assign]
+        self.surely_below = lambda a, b: bool(a <= b)  # type: ignore[method-assign]
 
 
 class NumpyOperations(Operations):

@@ -14,6 +14,7 @@ from thermal.hvac._system import Actions, Calls, Conditions, HvacStep, HvacSyste
 from thermal.hvac._thermostat import Mode, ModeArray
 
 FloatArray = NDArray[np.float64]
+_Limits = tuple[str, str, float, float]  # name, unit, lowest, highest
 _AIR = (233.15, 353.15)  # K, of rooms: what lies outside is a fault of the caller's
 _CONDITIONS = (
     ("outdoor_temperature", "K", 193.15, 338.15),
@@ -166,18 +167,34 @@ class HvacPlant:
         setpoints = (conditions.heating_setpoint, conditions.cooling_setpoint)
         if setpoints[0] is not self._checked[0] or setpoints[1] is not self._checked[1]:
             self._check_setpoints(*setpoints)
-        scalar_action("step", seconds, "s", 1.0, 3600.0)
-        values = [self._checked_value(*row) for row in zip(_CONDITIONS, conditions[3:], strict=True)]
-        set_ = [self._checked_value(*row) for row in zip(_ACTIONS, actions, strict=True)]
-        return Conditions(zone, *setpoints, *values), Actions(*set_)
+        if not (type(seconds) is float and 1.0 <= seconds <= 3600.0):
+            scalar_action("step", seconds, "s", 1.0, 3600.0)
+        if not self._is_fine(_CONDITIONS, conditions[3:]):
+            values = [self._checked_value(*row) for row in zip(_CONDITIONS, conditions[3:], strict=True)]
+            conditions = Conditions(*conditions[:3], *values)
+        if not self._is_fine(_ACTIONS, actions):
+            actions = Actions(*[self._checked_value(*row) for row in zip(_ACTIONS, actions, strict=True)])
+        return conditions, actions
 
-    def _checked_value(self, limits: tuple[str, str, float, float], value: object) -> Value:
+    def _is_fine(self, limits: tuple[_Limits, ...], values: tuple[Value, ...]) -> bool:
+        """Tell whether all values are plain floats in range, or as many of them as there are air handlers."""
+        for (name, _, lowest, highest), value in zip(limits, values, strict=True):
+            if type(value) is float:
+                if not lowest <= value <= highest:
+                    return False
+            elif type(value) is tuple:
+                if name not in _EACH or len(value) != len(self.system.air_handlers):
+                    return False
+                for one in value:
+                    if not (type(one) is float and lowest <= one <= highest):
+                        return False
+            elif not (value is None and name in _OPTIONAL):
+                return False
+        return True
+
+    def _checked_value(self, limits: _Limits, value: object) -> Value:
         """Check what is one value, or one an air handler, and make Python's floats of NumPy's."""
         name, unit, lowest, highest = limits
-        if type(value) is float:
-            if not lowest <= value <= highest:
-                scalar_action(name, value, unit, lowest, highest)
-            return value
         if value is None and name in _OPTIONAL:
             return None
         plain: Any = value.tolist() if isinstance(value, np.ndarray | np.generic) else value

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 from scipy.optimize import brentq
 
 from thermal.hvac import HvacParameterError, WaterCoil
-from thermal.hvac._coil import _effectiveness, characteristic, heat_share, valve_flow, valve_position, water_share
+from thermal.hvac._coil import _effectiveness, heat_share, valve_flow, valve_position, water_share
 from thermal.hvac._operations import FloatOperations
 
 OPS = FloatOperations()
@@ -79,7 +79,7 @@ def exact_water_share(coil, air, share):
 @pytest.mark.parametrize("share", [0.1, 0.3, 0.5, 0.7, 0.9])
 def test_the_characteristic_is_near_effectiveness_ntu_at_part_flow(air, share):
     coil = WaterCoil.sized(20_000.0, 1.0)
-    curve = characteristic(OPS, *coil.water_side())
+    curve = coil.water_side(OPS, 1.0)[2]
     found = water_share(share, coil.conductance(OPS, air), curve)
     assert found == pytest.approx(exact_water_share(coil, air, share), rel=0.17, abs=0.03)
 
@@ -87,7 +87,7 @@ def test_the_characteristic_is_near_effectiveness_ntu_at_part_flow(air, share):
 @given(share=st.floats(0.0, 1.0), air=st.floats(0.1, 1.5), size=st.floats(3000.0, 20_000.0))
 def test_the_characteristic_inverts_and_obeys_the_second_law(share, air, size):
     coil = WaterCoil.sized(size, 1.0)
-    full, curve = coil.conductance(OPS, air), characteristic(OPS, *coil.water_side())
+    full, curve = coil.conductance(OPS, air), coil.water_side(OPS, 1.0)[2]
     flow = water_share(share, full, curve)
     assert 0.0 <= flow <= 1.0
     assert heat_share(OPS, flow, full, curve) == pytest.approx(share, abs=1e-9)
