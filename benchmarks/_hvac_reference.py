@@ -26,7 +26,7 @@ _REPLACED = re.compile(r"output:|outputcontrol:|runperiod$|timestep$|simulationc
 _SEVERE = re.compile(r"(\d+) Severe Errors")
 
 
-class ReferenceError(Exception):
+class ReferenceRunError(Exception):
     """EnergyPlus is not there, or did not end well."""
 
 
@@ -49,7 +49,7 @@ class Reference:
         """Return the size of a component whose description begins so."""
         found = [v for (c, d), v in self.sizes.items() if c == component.upper() and d.startswith(description)]
         if not found:
-            raise ReferenceError(f"no size {description!r} of {component!r}")
+            raise ReferenceRunError(f"no size {description!r} of {component!r}")
         return found[0]
 
 
@@ -66,7 +66,7 @@ def reference_weeks(name: str, outputs: Sequence[tuple[str, str]]) -> Reference:
     try:
         import pyenergyplus
     except ImportError as error:
-        raise ReferenceError("EnergyPlus is not installed: pip install -e .[energyplus]") from error
+        raise ReferenceRunError("EnergyPlus is not installed: pip install -e .[energyplus]") from error
     data = Path(str(pyenergyplus.__file__)).parent / "data"
     with tempfile.TemporaryDirectory(prefix="energyplus_") as temporary:
         folder = Path(temporary)
@@ -85,7 +85,7 @@ def reference_weeks(name: str, outputs: Sequence[tuple[str, str]]) -> Reference:
         said = end.read_text(encoding="utf-8") if end.exists() else "no end file"
         severe = _SEVERE.search(said)
         if done.returncode != 0 or severe is None or int(severe[1]):
-            raise ReferenceError(f"{name}: EnergyPlus returned {done.returncode}: {said} {done.stderr[-1000:]}")
+            raise ReferenceRunError(f"{name}: EnergyPlus returned {done.returncode}: {said} {done.stderr[-1000:]}")
         with closing(sqlite3.connect(folder / "out" / "eplusout.sql")) as database:
             return Reference(_weeks(database), _sizes(database))
 
@@ -114,7 +114,7 @@ def _weeks(database: sqlite3.Connection) -> dict[str, pd.DataFrame]:
     weeks = {season: table.loc[season.upper()] for season in WEEKS}
     for season, week in weeks.items():
         if len(week) != 7 * 24 * STEPS_PER_HOUR or week.isna().any(axis=None):
-            raise ReferenceError(f"{season}: expected a week without gaps, found {len(week)} steps")
+            raise ReferenceRunError(f"{season}: expected a week without gaps, found {len(week)} steps")
     return weeks
 
 

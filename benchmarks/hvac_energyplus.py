@@ -17,7 +17,7 @@ import sys
 from pathlib import Path
 
 from _hvac_offices import Compared, air_handler_outputs, compare_large, compare_medium, loop_outputs
-from _hvac_reference import WEATHER, ReferenceError, reference_weeks
+from _hvac_reference import WEATHER, ReferenceRunError, reference_weeks
 from _table import markdown, replace_section, write
 
 LEAST = 1.0  # kWh: energies below this on both sides say nothing
@@ -44,7 +44,7 @@ def main() -> int:
     options = parser.parse_args()
     try:
         rows = compared()
-    except ReferenceError as error:
+    except ReferenceRunError as error:
         print(error, file=sys.stderr)
         return 1
     cells = [

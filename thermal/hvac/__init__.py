@@ -29,8 +29,9 @@ from thermal.hvac._replay import (
     replay_reheat,
     replay_terminals,
 )
+from thermal.hvac._step import Actions, Calls, Conditions, HvacStep
 from thermal.hvac._symbolic import hvac_function
-from thermal.hvac._system import Actions, Calls, Conditions, HvacStep, HvacSystem
+from thermal.hvac._system import HvacSystem
 from thermal.hvac._terminals import Terminals
 from thermal.hvac._thermostat import Mode, Thermostat
 

@@ -7,7 +7,8 @@ from typing import NamedTuple
 from thermal.hvac._air import EVAPORATION_HEAT
 from thermal.hvac._air_handler import Heater
 from thermal.hvac._operations import Value
-from thermal.hvac._system import Conditions, HvacStep, HvacSystem
+from thermal.hvac._step import Conditions, HvacStep
+from thermal.hvac._system import HvacSystem
 from thermal.units import AIR_HEAT_CAPACITY
 
 

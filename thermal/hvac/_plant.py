@@ -8,9 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal.errors import HvacActionError, describe
+from thermal.hvac._advance import advance
 from thermal.hvac._checks import action, scalar_action
 from thermal.hvac._operations import StepOperations, Value
-from thermal.hvac._system import Actions, Calls, Conditions, HvacStep, HvacSystem, advance
+from thermal.hvac._step import Actions, Calls, Conditions, HvacStep
+from thermal.hvac._system import HvacSystem
 from thermal.hvac._thermostat import Mode, ModeArray
 
 FloatArray = NDArray[np.float64]

@@ -11,7 +11,8 @@ from thermal.errors import HvacParameterError, describe
 from thermal.hvac._air_handler import Heater
 from thermal.hvac._coil import valve_position
 from thermal.hvac._operations import StepOperations
-from thermal.hvac._system import Actions, Conditions, HvacStep, HvacSystem
+from thermal.hvac._step import Actions, Conditions, HvacStep
+from thermal.hvac._system import HvacSystem
 
 FloatArray = NDArray[np.float64]
 

@@ -6,8 +6,10 @@ from typing import Any
 
 import casadi
 
+from thermal.hvac._advance import advance
 from thermal.hvac._operations import CasadiOperations
-from thermal.hvac._system import Actions, Calls, Conditions, HvacSystem, advance
+from thermal.hvac._step import Actions, Calls, Conditions
+from thermal.hvac._system import HvacSystem
 
 
 def hvac_function(system: HvacSystem, width: float = 0.02) -> Any:

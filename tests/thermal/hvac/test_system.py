@@ -12,8 +12,9 @@ from thermal.hvac import (
     Terminals,
     energy_balance,
 )
+from thermal.hvac._advance import advance
 from thermal.hvac._operations import StepOperations
-from thermal.hvac._system import Calls, advance
+from thermal.hvac._step import Calls
 
 SITUATIONS = {
     "zones": st.lists(st.floats(283.0, 306.0), min_size=5, max_size=5), "heating": st.floats(287.0, 296.0),
