@@ -288,3 +288,16 @@ def nearest(word: object, options: Iterable[object]) -> str:
 
 class EffectError(ModelError):
     """An effect is unknown, or asked for where it cannot be."""
+
+
+# Heating, ventilation and air conditioning
+class HvacError(ModelError):
+    """Something is wrong with a model of the plant that heats and cools, or with what it is asked for."""
+
+
+class HvacParameterError(HvacError):
+    """A parameter of a device that is no number, or outside its range."""
+
+
+class HvacActionError(HvacError):
+    """An action or a condition of a step that is not finite, outside its range or of another shape."""

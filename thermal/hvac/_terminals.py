@@ -1,0 +1,275 @@
+"""Variable-air-volume terminals: damper, minimum flow and reheat coil, all terminals of a building at once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from thermal.errors import HvacParameterError, describe
+from thermal.hvac._air import WATER_HEAT_CAPACITY
+from thermal.hvac._checks import all_in_range, fields_in_range, in_range
+from thermal.hvac._coil import LEAST_FLOW, Characteristic, WaterCoil, characteristic, coil_conductance
+from thermal.hvac._operations import NumpyOperations, Operations, Value
+from thermal.units import AIR_HEAT_CAPACITY
+
+FloatArray = NDArray[np.float64]
+_LEAST = 1e-9  # K, W/K, kg/s: next to nothing
+
+
+@dataclass(frozen=True, eq=False)
+class Terminals:
+    """The VAV terminals of a building; single-maximum or dual-maximum by their heating flows.
+
+    Parameters
+    ----------
+    design_flow : float or numpy.ndarray, shape (n_terminal,)
+        Largest cooling flow at the design static pressure [kg/s], positive.
+    minimum_flow : float or numpy.ndarray, shape (n_terminal,)
+        Smallest flow while the air handler runs [kg/s], positive, up to `design_flow`.
+    heating_flow : float or numpy.ndarray, shape (n_terminal,)
+        Largest flow when heating [kg/s], `minimum_flow` to `design_flow`; at `minimum_flow` the control has a single
+        maximum, above it two.
+    air_film, water_film : float or numpy.ndarray, shape (n_terminal,)
+        hA of the reheat coil's sides at design flows [W/K], as in `WaterCoil`; a terminal without coil has next to
+        nothing.
+    water_flow : float or numpy.ndarray, shape (n_terminal,)
+        Water through the open valve at the design differential pressure [kg/s], positive.
+    zone : numpy.ndarray of int, shape (n_terminal,)
+        Position of the zone that each serves.
+    air_handler : numpy.ndarray of int, shape (n_terminal,)
+        Position of the air handler that supplies each.
+    discharge_limit : float
+        Warmest discharge air [K]. The default is 11 K above a zone at 21 degC, beyond which air stays under the
+        ceiling (ASHRAE Guideline 36-2021, 5.6).
+    reheat_first : float
+        Share of the call for heating over which the reheat opens before the flow rises [-], 0.1 to 1. The default is
+        Guideline 36's half for two maxima; a single maximum has no flow to raise and wants 1.
+    discharge_control : bool
+        True: the call sets a discharge temperature that the valve holds (Guideline 36). False: the call sets the
+        share of the coil's heat at hand, as a valve without discharge sensor does.
+    rangeability : float
+        Of the equal-percentage valves [-], 2 to 200; the default is usual (ASHRAE HVAC Systems 2016, ch. 47).
+
+    Notes
+    -----
+    The boxes are pressure-independent: a flow loop holds the flow asked for, with damper position ``flow / (design_flow
+    sqrt(p / p_design))``, as long as that is below 1.
+    """
+
+    design_flow: FloatArray
+    minimum_flow: FloatArray
+    heating_flow: FloatArray
+    air_film: FloatArray
+    water_film: FloatArray
+    water_flow: FloatArray
+    zone: NDArray[np.intp]
+    air_handler: NDArray[np.intp]
+    discharge_limit: float = 305.15
+    reheat_first: float = 0.5
+    discharge_control: bool = True
+    rangeability: float = 30.0
+
+    def __post_init__(self) -> None:
+        n = len(np.atleast_1d(self.zone))
+        ranges = {"design_flow": "kg/s", "minimum_flow": "kg/s", "heating_flow": "kg/s", "water_flow": "kg/s",
+                  "air_film": "W/K", "water_film": "W/K"}  # fmt: skip
+        for name, unit in ranges.items():
+            checked = all_in_range(f"Terminals.{name}", getattr(self, name), n, unit, 1e-9, 1e7)
+            object.__setattr__(self, name, checked)
+        for name in ("zone", "air_handler"):
+            index = np.array(np.broadcast_to(np.asarray(getattr(self, name)), (n,)))
+            if not np.issubdtype(index.dtype, np.integer) or (n and index.min() < 0):
+                raise HvacParameterError(describe(f"Terminals.{name}", "positions from 0 on", f"{index.dtype} {index}"))
+            object.__setattr__(self, name, index.astype(np.intp))
+        in_order = (self.minimum_flow <= self.heating_flow) & (self.heating_flow <= self.design_flow)
+        if not in_order.all():
+            k = int(np.argmin(in_order))
+            found = f"{self.minimum_flow[k]:g}, {self.heating_flow[k]:g} and {self.design_flow[k]:g} kg/s"
+            expected = "minimum_flow <= heating_flow <= design_flow"
+            raise HvacParameterError(describe(f"Terminals: terminal {k}", expected, found))
+        fields_in_range(
+            self,
+            {
+                "discharge_limit": ("K", 288.15, 353.15),
+                "reheat_first": ("-", 0.1, 1.0),
+                "rangeability": ("-", 2.0, 200.0),
+            },
+        )
+
+    @classmethod
+    def sized(
+        cls,
+        design_flow: ArrayLike,
+        heating_capacity: ArrayLike,
+        zone: NDArray[np.intp] | None = None,
+        air_handler: ArrayLike = 0,
+        minimum_share: float = 0.3,
+        heating_share: float = 0.5,
+        water_temperature: float = 355.35,
+        supply_temperature: float = 285.95,
+    ) -> Terminals:
+        """Size terminals and their coils from flows and heating capacities.
+
+        Parameters
+        ----------
+        design_flow : array_like, shape (n_terminal,)
+            Largest flows [kg/s], positive.
+        heating_capacity : array_like, shape (n_terminal,)
+            Heat of each reheat coil at design [W]; 0 for a terminal without coil.
+        zone : numpy.ndarray of int, shape (n_terminal,), optional
+            Positions of the zones; by default the first terminal serves the first zone and so on.
+        air_handler : array_like of int, shape (n_terminal,)
+            Positions of the air handlers [-].
+        minimum_share : float
+            Smallest flow over design flow [-]; the default is the reference buildings'.
+        heating_share : float
+            Largest heating flow over design flow [-], at least `minimum_share`; the default is the most that ASHRAE
+            90.1 lets dual-maximum boxes reheat. Equal to `minimum_share` gives single-maximum control.
+        water_temperature, supply_temperature : float
+            Of water and air that enter at design [K].
+
+        Returns
+        -------
+        Terminals
+            With water that falls by 11.1 K at design.
+
+        Examples
+        --------
+        >>> terminals = Terminals.sized([0.3, 0.5], [2000.0, 4000.0])
+        >>> terminals.minimum_flow.round(3).tolist()
+        [0.09, 0.15]
+        """
+        flows = np.atleast_1d(np.asarray(design_flow, dtype=float))
+        n = len(flows)
+        in_range("Terminals.sized: minimum_share", minimum_share, "-", 1e-6, 1.0)
+        in_range("Terminals.sized: heating_share", heating_share, "-", minimum_share, 1.0)
+        heats = all_in_range("Terminals.sized: heating_capacity", heating_capacity, n, "W", 0.0, 1e7)
+        films = np.full((n, 3), _LEAST)
+        for k in np.flatnonzero(heats):
+            coil = WaterCoil.sized(
+                float(heats[k]), float(heating_share * flows[k]), supply_temperature, water_temperature
+            )
+            rise = (heating_share) ** -0.8  # films are stated at the design flow
+            films[k] = coil.air_conductance * rise, coil.water_conductance, coil.water_flow
+        return cls(
+            design_flow=flows,
+            minimum_flow=minimum_share * flows,
+            heating_flow=heating_share * flows,
+            air_film=films[:, 0],
+            water_film=films[:, 1],
+            water_flow=films[:, 2],
+            zone=np.arange(n) if zone is None else zone,
+            air_handler=np.broadcast_to(np.asarray(air_handler), (n,)),
+            reheat_first=0.5 if heating_share > minimum_share else 1.0,
+        )
+
+    def __len__(self) -> int:
+        return len(self.zone)
+
+    @cached_property
+    def _spans(self) -> tuple[FloatArray, FloatArray]:
+        """What calls for cooling, and for heating once the reheat is open, add to the flow [kg/s]."""
+        rest = max(1.0 - self.reheat_first, _LEAST)
+        return self.design_flow - self.minimum_flow, (self.heating_flow - self.minimum_flow) / rest
+
+    @cached_property
+    def _film(self) -> FloatArray:
+        """Air film per power 0.8 of the flow."""
+        return self.air_film / self.design_flow**0.8
+
+    @cached_property
+    def _limit(self) -> FloatArray:
+        return np.full(len(self), self.discharge_limit)
+
+    @cached_property
+    def _open_water(self) -> tuple[Value, Value, Characteristic]:
+        rate, film = WATER_HEAT_CAPACITY * self.water_flow, self.water_film
+        return rate, film, characteristic(NumpyOperations(), rate, film)
+
+    def airflow(self, ops: Operations, heating: Value, cooling: Value, reach: Value) -> Value:
+        """Air that the boxes let through [kg/s].
+
+        Parameters
+        ----------
+        ops : Operations
+            Arithmetic.
+        heating, cooling : Value
+            Calls [-].
+        reach : Value
+            Most flow that the duct pressure drives through an open damper, over the design flow [-].
+        """
+        by_cooling, by_heating = self._spans
+        wanted = self.minimum_flow + by_cooling * cooling
+        if self.reheat_first < 1.0:
+            wanted = wanted + by_heating * ops.positive(heating - self.reheat_first)
+        return ops.lesser(wanted, self.design_flow * (reach + LEAST_FLOW))
+
+    def open_water(self, ops: Operations, water: Value) -> tuple[Value, Value, Characteristic]:
+        """Heat capacity rate and film conductance of the water [W/K], and characteristic of the coils, valves open.
+
+        Parameters
+        ----------
+        ops : Operations
+            Arithmetic.
+        water : Value
+            Water through open valves over the design flow [-].
+        """
+        if isinstance(water, float) and water == 1.0:
+            return self._open_water
+        water = water + LEAST_FLOW
+        rate, film = self._open_water[0] * water, self._open_water[1] * water**0.85
+        return rate, film, characteristic(ops, rate, film)
+
+    def conductance(
+        self, ops: Operations, airflow: Value, rate: Value, water: tuple[Value, Value, Characteristic]
+    ) -> Value:
+        """Heat per difference of water and air at the coils' entry [W/K], valves open.
+
+        Parameters
+        ----------
+        ops : Operations
+            Arithmetic.
+        airflow : Value
+            Air [kg/s], above 0.
+        rate : Value
+            Its heat capacity rate [W/K].
+        water : tuple of Value
+            As `open_water` gives it.
+        """
+        return coil_conductance(ops, rate, self._film * airflow**0.8, water[0], water[1])
+
+    def heat_share(
+        self, ops: Operations, call: Value, rate: Value, conductance: Value, entering: Value, water: Value
+    ) -> Value:
+        """Share of the coils' heat that their valves let through [-], 0 to 1.
+
+        Parameters
+        ----------
+        ops : Operations
+            Arithmetic.
+        call : Value
+            Share of the reheat that is called for [-].
+        rate : Value
+            Heat capacity rate of the air [W/K].
+        conductance : Value
+            Of the open coils [W/K].
+        entering : Value
+            Air that enters the coils [K].
+        water : Value
+            Water that enters the coils [K].
+        """
+        allowed = rate * ops.positive(self._limit - entering)
+        # a difference of nothing leaves valves open for cold water, and closed where nothing is wanted
+        ready = conductance * ops.maximum(water - entering, _LEAST)
+        if self.discharge_control:
+            wanted = call * allowed
+            return wanted / ops.maximum(wanted, ready, 100.0)
+        return ops.minimum(call, allowed / ready)
+
+
+def heat_rate(airflow: Value) -> Value:
+    """Heat capacity rate of an air flow [W/K], from [kg/s]."""
+    return AIR_HEAT_CAPACITY * airflow
