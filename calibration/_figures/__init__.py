@@ -5,6 +5,7 @@ from calibration._figures._drift import drift_boxes, median_run
 from calibration._figures._error import error_growth
 from calibration._figures._field import Field, spatial_field
 from calibration._figures._heat import heat_lines
+from calibration._figures._missing import Course, missing_lines
 from calibration._figures._parameters import paper_values, parameter_ranges
 from calibration._figures._plan import floor_maps, plan_drawings
 from calibration._figures._quality import quality_timeline
@@ -15,6 +16,7 @@ from calibration._figures._whiteness import periodogram_bound, whiteness_panels
 
 __all__ = [
     "Band",
+    "Course",
     "Field",
     "Picture",
     "Series",
@@ -27,6 +29,7 @@ __all__ = [
     "heat_maps",
     "hour_bars",
     "median_run",
+    "missing_lines",
     "paper_values",
     "parameter_ranges",
     "periodogram_bound",

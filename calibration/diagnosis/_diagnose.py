@@ -108,7 +108,13 @@ class Diagnosis:
             "where": {
                 "sentence": w.sentence,
                 "zones": [
-                    {"zone": s.name, "share": s.share, "missing_watts_rms": w.missing_watts[s.name]} for s in w.zones
+                    {
+                        "zone": s.name,
+                        "share": s.share,
+                        "missing_watts_rms": w.missing_watts[s.name],
+                        "missing_watts_rms_at_start": w.missing_watts_at_start[s.name],
+                    }
+                    for s in w.zones
                 ],
                 "hours": w.hours.tolist(),
                 "subsystem": self.subsystem,

@@ -78,7 +78,7 @@ def write_diagnosis(result: Diagnosis, case: Case, out: str | Path, force: bool 
     files: dict[str, Any] = {
         "diagnosis.json": result.to_dict(),
         "calibration.json": final_calibration(result),
-        "missing_watts.parquet": missing_table(before, after),
+        "missing_watts.parquet": missing_table(result, after),
         "predictions.parquet": both_predictions(before, after),
         "report.html": render("diagnosis", _content(result, case, before, after)),
     }
