@@ -164,7 +164,7 @@ def spatial_metrics(error: FloatArray) -> Metrics:
     )
 
 
-def _predict(
+def predict_runs(
     model: SymbolicModel,
     matrices: Matrices,
     inputs: Inputs,
@@ -259,7 +259,7 @@ def evaluate_model(
             raise NotEnoughDataError(
                 f"interval {interval.start} to {interval.end}: all {runs.skipped} runs miss telemetry"
             )
-        return _predict(model, matrices, inputs, interval, runs, n, keep, scheme)
+        return predict_runs(model, matrices, inputs, interval, runs, n, keep, scheme)
 
     main, done = [], 0
     for interval in intervals:

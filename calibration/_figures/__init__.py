@@ -4,6 +4,7 @@ from calibration._figures._diagnosis import change_panels, heat_maps, hour_bars
 from calibration._figures._drift import drift_boxes, median_run
 from calibration._figures._error import error_growth
 from calibration._figures._field import Field, spatial_field
+from calibration._figures._growth import drift_lines
 from calibration._figures._heat import heat_lines
 from calibration._figures._missing import Course, missing_lines
 from calibration._figures._parameters import paper_values, parameter_ranges
@@ -22,6 +23,7 @@ __all__ = [
     "Series",
     "change_panels",
     "drift_boxes",
+    "drift_lines",
     "error_band",
     "error_growth",
     "floor_maps",

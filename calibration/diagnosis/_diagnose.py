@@ -119,6 +119,12 @@ class Diagnosis:
                 "hours": w.hours.tolist(),
                 "subsystem": self.subsystem,
                 "modes": {name: _share(s) for name, s in w.modes.items()},
+                "drift": {
+                    "seconds": w.drift.seconds.tolist(),
+                    "rms": w.drift.rms.tolist(),
+                    "slope": w.drift.slope,
+                    "kind": w.drift.kind,
+                },
                 "groups": {s.name: _share(s) for s in w.groups},
             },
             "which": [s.to_dict() for s in self.verdict.suspects],

@@ -16,6 +16,7 @@ from calibration._report_evaluation import predictions_table
 from calibration._result import ParameterEstimate, SolverReport, effect_entries
 from calibration.diagnosis._bench import Fit
 from calibration.diagnosis._diagnose import Diagnosis
+from calibration.diagnosis._drift import DriftCurve, drift_of
 from calibration.diagnosis._missing import Missing, at_start, missing_heat
 
 
@@ -29,10 +30,13 @@ class Replay:
         Its predictions, with every step.
     missing : Missing
         Heat that it lacks by hour and zone.
+    drift : DriftCurve
+        How the error of its free runs grows.
     """
 
     evaluation: Evaluation
     missing: Missing
+    drift: DriftCurve
 
 
 def replays(result: Diagnosis) -> tuple[Replay, Replay | None]:
@@ -44,12 +48,15 @@ def replays(result: Diagnosis) -> tuple[Replay, Replay | None]:
         From `diagnose`.
     """
     baseline = result.rounds[0].before
-    before = Replay(_evaluated(result, baseline, result.judged, trajectories=True), result.where.missing)
+    before = Replay(
+        _evaluated(result, baseline, result.judged, trajectories=True), result.where.missing, result.where.drift
+    )
     final = result.final
     if not final.effects:
         return before, None
-    missing = missing_heat(final, result.judged, result.settings.stepping, result.settings.spin_up_seconds)
-    return before, Replay(_evaluated(result, final, result.judged, trajectories=True), missing)
+    how = result.judged, result.settings.stepping, result.settings.spin_up_seconds
+    evaluation = _evaluated(result, final, result.judged, trajectories=True)
+    return before, Replay(evaluation, missing_heat(final, *how), drift_of(final, *how))
 
 
 def missing_table(result: Diagnosis, after: Replay | None) -> pd.DataFrame:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from calibration import _figures as figures
 from calibration._page import watts
 from calibration.diagnosis._diagnose import Diagnosis
+from calibration.diagnosis._drift import drift_sentence
 from calibration.diagnosis._final import Replay
 from calibration.diagnosis._missing import Missing
 from calibration.diagnosis._where import Share
@@ -31,7 +32,7 @@ _NOTABLE = 3.0
 
 
 def where_content(result: Diagnosis, case: Case, before: Replay, after: Replay | None, found: str) -> dict[str, Any]:
-    """Entries of the page: ``sentence``, ``maps``, ``missing``, ``zones``, ``parts`` and ``hours``.
+    """Entries of the page: ``sentence``, ``maps``, ``missing``, ``zones``, ``parts``, ``hours`` and ``drift``.
 
     Parameters
     ----------
@@ -68,6 +69,9 @@ def where_content(result: Diagnosis, case: Case, before: Replay, after: Replay |
         }
         for i in worst[:_MOST_ZONES]
     ]
+    curves = {"calibrated": (before.drift.seconds, before.drift.rms)}
+    if after is not None:
+        curves[found] = (after.drift.seconds, after.drift.rms)
     parts = [p for p in (*where.groups, *where.modes.values()) if p.share > p.predictions > 0.0]
     parts = sorted(parts, key=lambda p: p.predictions - p.share)[:_MOST_PARTS]
     return {
@@ -78,6 +82,8 @@ def where_content(result: Diagnosis, case: Case, before: Replay, after: Replay |
         "zone_count": len(zones),
         "parts": [_part(p) for p in parts],
         "hours": figures.hour_bars(where.hours),
+        "drift_sentence": drift_sentence(before.drift, after.drift if after else None, found),
+        "drift": figures.drift_lines(curves),
     }
 
 

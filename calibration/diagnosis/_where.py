@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from calibration._evaluate import Predictions
 from calibration.diagnosis._bench import Bench, Fit
+from calibration.diagnosis._drift import DriftCurve, drift_of
 from calibration.diagnosis._missing import Missing, at_start, missing_heat
 from thermal import ThermalNetwork
 from thermal.case import FloorPlans
@@ -70,6 +71,8 @@ class Where:
         Perimeter by orientation, core, floors.
     missing, missing_at_start : Missing
         Heat that the model lacks by hour and zone, at its estimate and with every parameter at its start.
+    drift : DriftCurve
+        How the error of a free run grows.
     """
 
     sentence: str
@@ -79,6 +82,7 @@ class Where:
     groups: tuple[Share, ...]
     missing: Missing
     missing_at_start: Missing
+    drift: DriftCurve
 
     @property
     def missing_watts(self) -> dict[str, float]:
@@ -118,6 +122,7 @@ def where_it_lies(bench: Bench, fit: Fit) -> Where:
         groups=tuple(parts.share(name, mask) for name, mask in zones.items()),
         missing=missing_heat(fit, bench.judged, stepping, spin_up),
         missing_at_start=missing_heat(at_start(fit), bench.judged, stepping, spin_up, fixed=True),
+        drift=drift_of(fit, bench.judged, stepping, spin_up),
     )
 
 
