@@ -59,7 +59,7 @@ def missing_lines(zones: Mapping[str, Mapping[str, Course]], stamps: pd.Datetime
     broken = np.flatnonzero(np.diff(x) > 1.5 * np.min(np.diff(x), initial=np.inf)) + 1
     pictures = []
     for zone, models in zones.items():
-        figure = Figure(figsize=(7.4, 2.7))
+        figure = Figure(figsize=(5.6, 2.9))
         axes = figure.subplots()
         axes.axhline(0.0, color=INK, linewidth=0.8)
         for (name, course), (colour, dashes) in zip(models.items(), LINES, strict=False):

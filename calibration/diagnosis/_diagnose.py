@@ -87,6 +87,11 @@ class Diagnosis:
         return self.rounds[-1].after
 
     @property
+    def combinations(self) -> dict[tuple[str, ...], float]:
+        """Probability that just these effects are there, by set [-]: what the last round that had them says."""
+        return dict(self.verdict.combinations)
+
+    @property
     def subsystem(self) -> str:
         """Part of the building that the first accepted effect belongs to; ``none`` where nothing is accepted."""
         first = self.rounds[0].accepted
@@ -129,7 +134,7 @@ class Diagnosis:
             },
             "which": [s.to_dict() for s in self.verdict.suspects],
             "set90": list(self.verdict.set90),
-            "combinations": [{"effects": list(e), "probability": p} for e, p in self.verdict.combinations],
+            "combinations": [{"effects": list(e), "probability": p} for e, p in self.combinations.items()],
             "how_far": [_step(s) for s in self.steps],
             "intervals": {
                 "tuning": [i.to_dict() for i in self.tuned],

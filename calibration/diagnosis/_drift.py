@@ -36,6 +36,9 @@ _GROWN, _FEWEST = 0.6, 4
 #: of a persistent heat down, and nothing pulls that of a random one up.
 _HARDLY, _RANDOM = 0.25, 0.62
 
+#: Steepest slope that is sought [-]: no heat makes a temperature run ahead of time.
+_STEEPEST = 1.1
+
 #: Where a wrong mass or lag shows [s], and the least ratio to the smallest error of the six hours after [-].
 _HUMP, _HIGHER, _AFTER = (600.0, 3600.0), 1.1, 21600.0
 
@@ -82,7 +85,7 @@ class DriftCurve:
                 x = np.log(time if np.isinf(settling) else -np.expm1(-time / settling))
                 p, a = np.polyfit(x, grown, 1)
                 misfit = float(np.mean((0.5 * np.log(floor + np.exp(2.0 * (a + p * x))) - target) ** 2))
-                if misfit < best and -0.1 <= p <= 1.3:
+                if misfit < best and -0.1 <= p <= _STEEPEST:
                     best, slope = misfit, float(p)
         return slope
 
@@ -126,14 +129,15 @@ class DriftCurve:
     @property
     def end(self) -> str:
         """Say where the error ends, and how soon it is near that."""
-        last, span = float(self.rms[-1]), duration(float(self.seconds[-1]))
+        last, span = float(self.rms[-1]), f"{self.seconds[-1] / 3600.0:g} hours"
         near = float(self.seconds[int(np.argmax(self.rms >= _LEVEL * last))])
         ends = f"{kelvin(last)} K after {span}"
         if near <= self.seconds[0] or self.kind in ("sensors", "hump"):
             return ends
         if near > 0.5 * self.seconds[-1]:
             return f"{ends}, and still grows there"
-        return f"{ends}, four fifths of which it has after {duration(near)}"
+        about = f"{near / 3600.0:.0f} hours" if near >= 5400.0 else duration(near)
+        return f"{ends}, four fifths of which it has after {about}"
 
     def _growth(self) -> tuple[FloatArray, FloatArray]:
         """Find times and errors while it grows; all of a curve that begins near its top."""
@@ -209,4 +213,6 @@ def drift_sentence(before: DriftCurve, after: DriftCurve | None, found: str) -> 
     text = f"Left to itself, the calibrated model's error {before.words}; it is {before.end}."
     if after is None:
         return text
+    if after.kind == before.kind != "hump":
+        return f"{text} {found.capitalize()} it grows alike (slope {max(0.0, after.slope):.2f}) and is {after.end}."
     return f"{text} {found.capitalize()} it {after.words}; it is {after.end}."

@@ -33,6 +33,7 @@ from calibration.diagnosis._words import (
     diagnosis_verdict,
     in_zones,
     listed,
+    rivals,
     sure,
     suspect,
 )
@@ -141,7 +142,8 @@ def _shown(result: Diagnosis) -> list[Suspect]:
 def _suspect_entry(result: Diagnosis, s: Suspect) -> dict[str, Any]:
     fitted = next((r for r in accepted(result) if r.screened.effect == s.effect), None)
     shown = fitted is not None or result.verdict.name == "unexplained"
-    others = [called(e) for e in alike(result, s.effect)[:LARGEST_GROUP] if e != s.effect] if shown else []
+    group = rivals(result, s.effect) if fitted is not None else alike(result, s.effect)
+    others = [called(e) for e in group[:LARGEST_GROUP] if e != s.effect] if shown else []
     return {
         "name": called(s.effect).capitalize(),
         "probability": sure(s.probability),
@@ -181,7 +183,7 @@ def _measure_next(result: Diagnosis) -> list[tuple[str, str]]:
         return []
     names = [r.screened.effect for r in accepted(result)]
     for name in list(names) or [result.verdict.suspects[0].effect]:
-        names += [e for e in (name, *alike(result, name)[:LARGEST_GROUP]) if e not in names]
+        names += [e for e in (name, *rivals(result, name)[:LARGEST_GROUP]) if e not in names]
     return [(called(e).capitalize(), CATALOGUE[e].separated_by) for e in names if CATALOGUE[e].separated_by]
 
 

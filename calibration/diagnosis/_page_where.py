@@ -108,7 +108,7 @@ def _typical_area(plans: FloorPlans) -> float:
 def _courses(result: Diagnosis, after: Replay | None, found: str) -> list[figures.Picture]:
     """Draw the zones in which the calibrated model lacks the most heat."""
     where = result.where
-    models = {"before calibration": where.missing_at_start, "calibrated": where.missing}
+    models = {"uncalibrated": where.missing_at_start, "calibrated": where.missing}
     if after is not None:
         models[found] = after.missing
     known = {zone: size for zone, size in where.missing_watts.items() if size > 0.0}
