@@ -52,7 +52,11 @@ def drift_lines(curves: Mapping[str, tuple[FloatArray, FloatArray]]) -> list[Pic
     shown = {t: name for t, name in _TIMES.items() if time[0] <= t <= time[-1]}
     axes.set_xticks(list(shown), list(shown.values()), minor=False)
     axes.xaxis.set_minor_formatter(NullFormatter())
-    ticks = [t for t in (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0) if 0.7 * low <= t <= 1.4 * high]
+    ticks = [
+        t
+        for t in (0.01, 0.02, 0.03, 0.05, 0.1, 0.2, 0.3, 0.5, 1.0, 2.0, 3.0, 5.0, 10.0)
+        if 0.7 * low <= t <= 1.4 * high
+    ]
     axes.set_yticks(ticks, [f"{t:g}" for t in ticks], minor=False)
     axes.yaxis.set_minor_formatter(NullFormatter())
     axes.set(xlabel="time since the start of the run", ylabel="root mean square error [K]")

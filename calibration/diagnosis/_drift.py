@@ -121,7 +121,8 @@ class DriftCurve:
                 "where the mass of air and furniture is wrong or a sensor lags"
             )
         if self.kind == "sensors":
-            return f"is there from the first step and hardly grows ({how}), as where sensors read wrong"
+            cause = "as where readings are off, or air has yet to mix after a switch"
+            return f"is there from the first step and hardly grows ({how}), {cause}"
         if self.kind == "random":
             return f"grows with the square root of time at first ({how}), as where heat comes and goes at random"
         return f"grows nearly in proportion to time at first ({how}), as where heat is missing for hours on end"

@@ -24,8 +24,9 @@ from thermal.model import IMPLICIT_EULER, SPIN_UP, ReducedModel, Scheme
 
 FloatArray = NDArray[np.float64]
 
-#: Telemetry that the size and the course of the missing heat are tuned on [s]: the last week that was fitted.
-_TUNED = 7 * 86400.0
+#: Telemetry that the size and the course of the missing heat are tuned on [s]: the last four days that were fitted,
+#: of which at most two are a weekend.
+_TUNED = 4 * 86400.0
 
 #: Zones beyond which gains are steady, the model is of a smaller order, the missing heat is in proportion to the zones'
 #: air, and a day is tuned on: the five hundred states of 123 zones are too many to smooth by.
@@ -80,8 +81,8 @@ def missing_heat(
 
     A Kalman smoother holds the model to the measured temperatures by an autocorrelated heat in every zone
     (`calibration.smooth`). How large that heat is in each zone, how long it lasts, and how noisy the readings are is
-    found by the likelihood of the innovations on the last week of the tuning intervals. The band holds what the noise
-    leaves unknown of the heat, and what the fit leaves unknown of the parameters.
+    found by the likelihood of the innovations on the last four days of the tuning intervals. The band holds what the
+    noise leaves unknown of the heat, and what the fit leaves unknown of the parameters.
 
     Parameters
     ----------

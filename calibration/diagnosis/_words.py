@@ -61,7 +61,9 @@ def accepted(result: Diagnosis) -> list[Refit]:
 
 
 def rivals(result: Diagnosis, effect: str) -> tuple[str, ...]:
-    """Effects that could be there in place of an accepted one, itself first: as `alike`, but for what is unlikely.
+    """Effects that could be there in place of an accepted one, itself first.
+
+    As `alike`, but for what is unlikely, or was accepted as well.
 
     Parameters
     ----------
@@ -70,7 +72,9 @@ def rivals(result: Diagnosis, effect: str) -> tuple[str, ...]:
     effect : str
         Its id.
     """
-    return tuple(e for e in alike(result, effect) if e == effect or suspect(result, e).probability >= _RIVAL)
+    inside = {r.screened.effect for r in accepted(result)}
+    others = (e for e in alike(result, effect) if e not in inside and suspect(result, e).probability >= _RIVAL)
+    return (effect, *others)
 
 
 def suspect(result: Diagnosis, effect: str) -> Suspect:
@@ -209,7 +213,9 @@ def _either(result: Diagnosis, first: Refit) -> str:
         told = CATALOGUE[effect].separated_by
         text = f"The model leaves out {either}{named}: these data cannot tell them apart."
         return f"{text} What would: {told}." if told else text
-    others = [f"{called(e)} ({sure(suspect(result, e).probability)})" for e in alike(result, effect) if e != effect]
+    inside = {r.screened.effect for r in accepted(result)}
+    rest = [suspect(result, e) for e in alike(result, effect) if e not in inside]
+    others = [f"{called(s.effect)} ({sure(s.probability)})" for s in rest]
     text = _named(result, [first], "The model leaves out", "Most likely the model leaves out")
     if not others:
         return text

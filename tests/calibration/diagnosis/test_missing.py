@@ -81,10 +81,9 @@ def test_heat_that_no_meter_knows_of_is_found(seed: int, noise: float) -> None:
 
 
 def test_band_covers_it_at_its_rate() -> None:
-    """Pooled over twins; an hour or two after the jump of a morning it cannot know in time."""
+    """Pooled over twins with fitted parameters, whose covariance is on the wide side; see the next for noise alone."""
     rates = [inside(*estimated(seed, noise)[:2], 0.9) for seed, noise in ((3, 0.05), (5, 0.05), (5, 0.005))]
-    assert np.mean(rates) == pytest.approx(0.93, abs=0.05)
-    assert np.min(rates) > 0.8
+    assert np.mean(rates) > 0.9 and np.min(rates) > 0.85
     half = [inside(*estimated(seed, noise)[:2], 0.5) for seed, noise in ((3, 0.05), (5, 0.05), (5, 0.005))]
     assert 0.4 < np.mean(half) < 0.7
 
