@@ -168,7 +168,8 @@ def _values(result: Diagnosis, effect: str) -> list[str]:
         place = f" ({member.replace('facade:', 'facade at ').replace(' deg', '°')})" if member else ""
         told = significant(p.value - shift) + ("" if of == "–" else f" {of.replace('*', '·')}")
         if p.interval90 is not None:
-            low, high = (significant(end - shift) for end in p.interval90)
+            ends = sorted((*p.interval90, p.value))  # at the end of a range the estimate may lie outside
+            low, high = (significant(end - shift) for end in (ends[0], ends[-1]))
             told += f" (90 %: up to {high})" if p.value == 0.0 else f" (90 %: {low} to {high})"
         if p.at_bound and p.value != 0.0:
             told += ", at the end of its range"
