@@ -303,6 +303,29 @@ def evaluate_model(
     )
 
 
+def predict_runs(
+    model: SymbolicModel, matrices: Matrices, inputs: Inputs, interval: Interval, wanted: Wanted, scheme: Scheme
+) -> Predictions:
+    """Simulate runs of one interval that somebody chose: spin-up with the zones held, then N free steps.
+
+    Parameters
+    ----------
+    model : SymbolicModel
+        For its network.
+    matrices : Matrices
+        The model at one θ.
+    inputs : Inputs
+        The telemetry.
+    interval : Interval
+        Where the targets lie.
+    wanted : Wanted
+        From `select_runs`, with the steps to keep.
+    scheme : Scheme
+        Time stepping of the free runs.
+    """
+    return _predictions(inputs, interval, wanted, _simulate(model.network, matrices, inputs, [wanted], scheme)[0])
+
+
 def _simulate(
     network: ThermalNetwork, matrices: Matrices, inputs: Inputs, wanted: Sequence[Wanted], scheme: Scheme
 ) -> list[FloatArray]:

@@ -168,7 +168,7 @@ def heat_balance(
         # the last value is held through a gap; where the sensor speaks again, the jump is no heat
         known = np.isfinite(inputs.zone[rows]) & np.isfinite(inputs.zone[rows - 1]) & inputs.complete[rows, None]
         metered = np.where(known, inputs.heat[rows], np.nan)
-        parts.append(_averages(inputs.stamps[rows], inputs.step, metered, np.where(known, needed, np.nan)))
+        parts.append(hourly_means(inputs.stamps[rows], inputs.step, metered, np.where(known, needed, np.nan)))
     stamps = parts[0][0].append([p[0] for p in parts[1:]])
     metered, needed = (np.concatenate([p[i] for p in parts]) for i in (1, 2))
     return HeatBalance(pd.DatetimeIndex(stamps), model.network.zones, metered, needed)
@@ -218,10 +218,20 @@ def _needed_heat(
     return np.asarray(heat)
 
 
-def _averages(
+def hourly_means(
     stamps: pd.DatetimeIndex, step: float, *values: FloatArray
 ) -> tuple[pd.DatetimeIndex, *tuple[FloatArray, ...]]:
-    """Average over whole hours; NaN where a step of the hour is missing or NaN."""
+    """Average over whole hours, with the stamps of their beginnings; NaN where a step of the hour is missing or NaN.
+
+    Parameters
+    ----------
+    stamps : DatetimeIndex, length n_time
+        Ends of the steps.
+    step : float
+        Step [s]; where it is an hour or more, each step is an average.
+    *values : ndarray, shape (n_time, ...)
+        What is averaged [any unit].
+    """
     begins = stamps - pd.Timedelta(seconds=step)
     if step >= HOUR:
         return begins, *values

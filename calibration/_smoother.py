@@ -195,15 +195,57 @@ def spreads(filtered: Filtered) -> tuple[list[_Spread], NDArray[np.int64], Float
     return found, index, precision
 
 
+def averaged_deviation(filtered: Filtered, steps: int) -> FloatArray:
+    """Deviation of the unmeasured heat's mean over several steps, over that of a single step, shape (n_zone,) [-].
+
+    Errors of smoothed steps that follow one another are not independent: noise of a sensor that makes one step's heat
+    too large makes the next one's too small. With steady P and N, and ``L = Ā (I - P C̄' F^-1 C̄)``, the covariance of
+    errors l steps apart is ``P L'^l (I - N P)`` (de Jong and Mackinnon 1988, doi:10.1093/biomet/75.3.601).
+
+    Parameters
+    ----------
+    filtered : Filtered
+        From `KalmanFilter.filter`; its steady gain counts, of all sensors that report at all.
+    steps : int
+        Length of the mean, 1 or more.
+
+    Examples
+    --------
+    >>> from calibration import DisturbanceModel, Interval, filter_interval
+    >>> from thermal import build_network, load_bundled_case, reduced_model, replay_inputs, SymbolicModel
+    >>> grid = SymbolicModel(build_network(load_bundled_case().building, dx=1.0))
+    >>> inputs, theta = replay_inputs(load_bundled_case(), grid.network), grid.network.start()
+    >>> small = reduced_model(grid, [theta])
+    >>> week = Interval(inputs.stamps[600], inputs.stamps[900])
+    >>> found = filter_interval(small, theta, inputs, week, DisturbanceModel(100.0, 3600.0, 0.05))
+    >>> bool((averaged_deviation(found, 12) < 1.0).all())
+    True
+    """
+    whole, gain, r = filtered.kalman.whole, filtered.gains[0], filtered.kalman.space.order
+    behind = _steady_precision(filtered) @ gain.heat.T
+    apart, gained = np.ascontiguousarray(gain.heat.T), gain.reach @ gain.weight
+    covariance = np.empty((steps, whole.space.n_zone))
+    for lag in range(steps):
+        covariance[lag] = np.diag(apart[r:]) - _rows(apart.T, behind.T)
+        apart = whole.advance(apart - gained @ (whole.observation @ apart))
+    pairs = np.where(np.arange(steps) > 0, 2.0, 1.0) * (steps - np.arange(steps))
+    return np.asarray(np.sqrt(np.maximum(pairs @ covariance, 0.0) / np.maximum(covariance[0], 1e-30)) / steps)
+
+
+def _steady_precision(filtered: Filtered) -> FloatArray:
+    """N, the variance of the costates, where it is steady, shape (n, n)."""
+    covariance, dual = filtered.kalman.steady(filtered.measured)
+    precision = np.linalg.solve(np.eye(len(dual)) + dual @ covariance, dual)
+    return np.asarray(0.5 * (precision + precision.T))
+
+
 def _steady_variances(filtered: Filtered) -> FloatArray:
     """Variances of smoothed disturbances and zones where N is steady after every step, (n_time, 2, n_zone).
 
     Gains of one covariance share all large products.
     """
     whole, first, r = filtered.kalman.whole, filtered.gains[0], filtered.kalman.space.order
-    covariance, dual = filtered.kalman.steady(filtered.measured)
-    precision = np.linalg.solve(np.eye(len(dual)) + dual @ covariance, dual)
-    precision = 0.5 * (precision + precision.T)
+    precision = _steady_precision(filtered)
     heat, observed = np.ascontiguousarray(first.heat.T), first.reach[r:]
     behind = whole.retreat(np.ascontiguousarray(whole.retreat(precision).T))
     from_heat, from_zone = behind @ heat, behind @ first.reach

@@ -36,7 +36,7 @@ def tune(problem: Problem, model: ReducedModel, theta: FloatArray) -> Disturbanc
         theta,
         problem.inputs,
         problem.stretches,
-        weights=_air_volumes(model.network),
+        weights=air_volumes(model.network),
         start=problem.disturbance,
         scheme=problem.scheme,
         covariance="steady",  # where sensors come and go exact gains take ten times as long
@@ -44,7 +44,7 @@ def tune(problem: Problem, model: ReducedModel, theta: FloatArray) -> Disturbanc
     return tuned.disturbance
 
 
-def _air_volumes(network: ThermalNetwork) -> FloatArray:
+def air_volumes(network: ThermalNetwork) -> FloatArray:
     """Volume of each zone's air, shape (n_zone,) [m3].
 
     Parameters

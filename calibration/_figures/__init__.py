@@ -4,7 +4,9 @@ from calibration._figures._diagnosis import change_panels, heat_maps, hour_bars
 from calibration._figures._drift import drift_boxes, median_run
 from calibration._figures._error import error_growth
 from calibration._figures._field import Field, spatial_field
+from calibration._figures._growth import drift_lines
 from calibration._figures._heat import heat_lines
+from calibration._figures._missing import Course, missing_lines
 from calibration._figures._parameters import paper_values, parameter_ranges
 from calibration._figures._plan import floor_maps, plan_drawings
 from calibration._figures._quality import quality_timeline
@@ -15,11 +17,13 @@ from calibration._figures._whiteness import periodogram_bound, whiteness_panels
 
 __all__ = [
     "Band",
+    "Course",
     "Field",
     "Picture",
     "Series",
     "change_panels",
     "drift_boxes",
+    "drift_lines",
     "error_band",
     "error_growth",
     "floor_maps",
@@ -27,6 +31,7 @@ __all__ = [
     "heat_maps",
     "hour_bars",
     "median_run",
+    "missing_lines",
     "paper_values",
     "parameter_ranges",
     "periodogram_bound",

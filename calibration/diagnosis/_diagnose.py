@@ -108,16 +108,28 @@ class Diagnosis:
             "where": {
                 "sentence": w.sentence,
                 "zones": [
-                    {"zone": s.name, "share": s.share, "missing_watts_rms": w.missing_watts[s.name]} for s in w.zones
+                    {
+                        "zone": s.name,
+                        "share": s.share,
+                        "missing_watts_rms": w.missing_watts[s.name],
+                        "missing_watts_rms_at_start": w.missing_watts_at_start[s.name],
+                    }
+                    for s in w.zones
                 ],
                 "hours": w.hours.tolist(),
                 "subsystem": self.subsystem,
                 "modes": {name: _share(s) for name, s in w.modes.items()},
+                "drift": {
+                    "seconds": w.drift.seconds.tolist(),
+                    "rms": w.drift.rms.tolist(),
+                    "slope": w.drift.slope,
+                    "kind": w.drift.kind,
+                },
                 "groups": {s.name: _share(s) for s in w.groups},
             },
             "which": [s.to_dict() for s in self.verdict.suspects],
             "set90": list(self.verdict.set90),
-            "combinations": [{"effects": list(e), "probability": p} for e, p in self.verdict.combinations],
+            "combinations": [{"effects": list(e), "probability": p} for e, p in self.verdict.combinations.items()],
             "how_far": [_step(s) for s in self.steps],
             "rounds": [r.to_dict() | {"worth": gains_of(r)} for r in self.rounds],
             "intervals": {

@@ -11,13 +11,13 @@ import pandas as pd
 
 from calibration._describe import describe_parameters
 from calibration._evaluate import Evaluation, evaluate_model
-from calibration._heat_balance import heat_balance
 from calibration._intervals import Interval
 from calibration._report_evaluation import predictions_table
 from calibration._result import ParameterEstimate, SolverReport, effect_entries
 from calibration.diagnosis._bench import Fit
 from calibration.diagnosis._diagnose import Diagnosis
-from thermal import reduced_model
+from calibration.diagnosis._drift import DriftCurve, drift_of
+from calibration.diagnosis._missing import Missing, at_start, missing_heat
 
 
 @dataclass(frozen=True)
@@ -28,12 +28,15 @@ class Replay:
     ----------
     evaluation : Evaluation
         Its predictions, with every step.
-    missing : DataFrame
-        Hourly heat that it lacks, shape (n_hour, n_zone) [W]; NaN where telemetry is missing.
+    missing : Missing
+        Heat that it lacks by hour and zone.
+    drift : DriftCurve
+        How the error of its free runs grows.
     """
 
     evaluation: Evaluation
-    missing: pd.DataFrame
+    missing: Missing
+    drift: DriftCurve
 
 
 def replays(result: Diagnosis) -> tuple[Replay, Replay | None]:
@@ -45,33 +48,42 @@ def replays(result: Diagnosis) -> tuple[Replay, Replay | None]:
         From `diagnose`.
     """
     baseline = result.rounds[0].before
-    before = Replay(_evaluated(result, baseline, result.judged, trajectories=True), result.where.missing)
+    before = Replay(
+        _evaluated(result, baseline, result.judged, trajectories=True), result.where.missing, result.where.drift
+    )
     final = result.final
     if not final.effects:
         return before, None
-    balance = heat_balance(final.model, final.theta, final.built.inputs, result.judged)
-    missing = pd.DataFrame(balance.needed - balance.metered, index=balance.stamps, columns=list(balance.zones))
-    return before, Replay(_evaluated(result, final, result.judged, trajectories=True), missing)
+    how = result.judged, result.settings.stepping, result.settings.spin_up_seconds
+    evaluation = _evaluated(result, final, result.judged, trajectories=True)
+    return before, Replay(evaluation, missing_heat(final, *how), drift_of(final, *how))
 
 
-def missing_table(before: Replay, after: Replay | None) -> pd.DataFrame:
-    """Tabulate missing heat, one row an hour and zone.
+def missing_table(result: Diagnosis, after: Replay | None) -> pd.DataFrame:
+    """Tabulate missing heat with its band, one row an hour and zone.
 
     Parameters
     ----------
-    before : Replay
-        Of the baseline.
+    result : Diagnosis
+        From `diagnose`.
     after : Replay or None
         Of the final model.
 
     Returns
     -------
     DataFrame
-        Index ``timestamp``; ``zone``, ``baseline`` and ``with_effects`` [W], heat that the model lacks.
+        Index ``timestamp``, where hours begin; ``zone``; heat that the model lacks, ``uncalibrated`` with parameters at
+        their starts, ``baseline`` calibrated, and ``with_effects``; each also as ``.._low`` and ``.._high``, ends of
+        its 90 % band [W].
     """
-    parts = {"baseline": before.missing.stack(future_stack=True)}
+    models = {"uncalibrated": result.where.missing_at_start, "baseline": result.where.missing}
     if after is not None:
-        parts["with_effects"] = after.missing.stack(future_stack=True)
+        models["with_effects"] = after.missing
+    parts = {}
+    for name, missing in models.items():
+        low, high = missing.band(0.9)
+        for column, values in ((name, missing.watts), (f"{name}_low", low), (f"{name}_high", high)):
+            parts[column] = values.stack(future_stack=True)
     table = pd.DataFrame(parts).rename_axis(["timestamp", "zone"]).reset_index("zone")
     table.attrs["units"] = {name: "W" for name in parts}
     return table
@@ -115,8 +127,6 @@ def final_calibration(result: Diagnosis) -> dict[str, Any]:
     final, network = result.final, result.final.built.network
     described = describe_fit(final)
     baseline = result.rounds[0].before
-    start = np.array([p.start for p in baseline.built.network.parameters])
-    untouched = reduced_model(baseline.built.grid, [start])
     found = final.found
     solver = SolverReport(
         "gauss_newton", "settled" if found.settled else "evaluations used up", found.settled, found.evaluations,
@@ -124,8 +134,7 @@ def final_calibration(result: Diagnosis) -> dict[str, Any]:
     )  # fmt: skip
     intervals = {"tuning": result.tuned, "held_out": result.judged}
     before, after = (
-        {name: _mae(result, fit, part) for name, part in intervals.items()}
-        for fit in (replace(baseline, model=untouched, found=replace(baseline.found, point=_point(baseline))), final)
+        {name: _mae(result, fit, part) for name, part in intervals.items()} for fit in (at_start(baseline), final)
     )
     return {
         "parameters": {p.name: p.to_dict() for p in described},
@@ -157,11 +166,6 @@ def describe_fit(fit: Fit) -> tuple[ParameterEstimate, ...]:
     known = dict(zip(fit.problem.free, deviations.tolist(), strict=True))
     network = fit.built.network
     return describe_parameters(network.parameters, fit.theta, known, network.nominal)
-
-
-def _point(fit: Fit) -> Any:
-    """Where the baseline's parameters begin, on the estimation scale."""
-    return np.array([p.transform(p.start) for p in fit.problem.parameters])
 
 
 def _mae(result: Diagnosis, fit: Fit, intervals: Sequence[Interval]) -> dict[str, float]:

@@ -33,6 +33,7 @@ from calibration.diagnosis._words import (
     diagnosis_verdict,
     in_zones,
     listed,
+    rivals,
     sure,
     suspect,
 )
@@ -78,7 +79,7 @@ def write_diagnosis(result: Diagnosis, case: Case, out: str | Path, force: bool 
     files: dict[str, Any] = {
         "diagnosis.json": result.to_dict(),
         "calibration.json": final_calibration(result),
-        "missing_watts.parquet": missing_table(before, after),
+        "missing_watts.parquet": missing_table(result, after),
         "predictions.parquet": both_predictions(before, after),
         "report.html": render("diagnosis", _content(result, case, before, after)),
     }
@@ -141,7 +142,8 @@ def _shown(result: Diagnosis) -> list[Suspect]:
 def _suspect_entry(result: Diagnosis, s: Suspect) -> dict[str, Any]:
     fitted = next((r for r in accepted(result) if r.screened.effect == s.effect), None)
     shown = fitted is not None or result.verdict.name == "unexplained"
-    others = [called(e) for e in alike(result, s.effect)[:LARGEST_GROUP] if e != s.effect] if shown else []
+    group = rivals(result, s.effect) if fitted is not None else alike(result, s.effect)
+    others = [called(e) for e in group[:LARGEST_GROUP] if e != s.effect] if shown else []
     return {
         "name": called(s.effect).capitalize(),
         "probability": sure(s.probability),
@@ -166,7 +168,8 @@ def _values(result: Diagnosis, effect: str) -> list[str]:
         place = f" ({member.replace('facade:', 'facade at ').replace(' deg', '°')})" if member else ""
         told = significant(p.value - shift) + ("" if of == "–" else f" {of.replace('*', '·')}")
         if p.interval90 is not None:
-            low, high = (significant(end - shift) for end in p.interval90)
+            ends = sorted((*p.interval90, p.value))  # at the end of a range the estimate may lie outside
+            low, high = (significant(end - shift) for end in (ends[0], ends[-1]))
             told += f" (90 %: up to {high})" if p.value == 0.0 else f" (90 %: {low} to {high})"
         if p.at_bound and p.value != 0.0:
             told += ", at the end of its range"
@@ -181,7 +184,7 @@ def _measure_next(result: Diagnosis) -> list[tuple[str, str]]:
         return []
     names = [r.screened.effect for r in accepted(result)]
     for name in list(names) or [result.verdict.suspects[0].effect]:
-        names += [e for e in (name, *alike(result, name)[:LARGEST_GROUP]) if e not in names]
+        names += [e for e in (name, *rivals(result, name)[:LARGEST_GROUP]) if e not in names]
     return [(called(e).capitalize(), CATALOGUE[e].separated_by) for e in names if CATALOGUE[e].separated_by]
 
 

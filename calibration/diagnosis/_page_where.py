@@ -12,7 +12,9 @@ from numpy.typing import NDArray
 from calibration import _figures as figures
 from calibration._page import watts
 from calibration.diagnosis._diagnose import Diagnosis
+from calibration.diagnosis._drift import drift_sentence
 from calibration.diagnosis._final import Replay
+from calibration.diagnosis._missing import Missing
 from calibration.diagnosis._where import Share
 from thermal import Case, FloorPlans
 
@@ -21,13 +23,16 @@ FloatArray = NDArray[np.float64]
 #: Rows of a table of zones, and of parts of the day and the building.
 _MOST_ZONES, _MOST_PARTS = 24, 10
 
+#: Zones whose missing heat is drawn over time.
+_MOST_DRAWN = 4
+
 #: Missing heat that the darkest colour of a plan stands for at least [W/m2]: people, light and equipment of an office
 #: give about 10, and a few tenths are not to look alarming.
 _NOTABLE = 3.0
 
 
 def where_content(result: Diagnosis, case: Case, before: Replay, after: Replay | None, found: str) -> dict[str, Any]:
-    """Entries of the page: ``sentence``, ``maps``, ``zones``, ``parts`` and ``hours``.
+    """Entries of the page: ``sentence``, ``maps``, ``missing``, ``zones``, ``parts``, ``hours`` and ``drift``.
 
     Parameters
     ----------
@@ -43,15 +48,16 @@ def where_content(result: Diagnosis, case: Case, before: Replay, after: Replay |
         What the final model is called.
     """
     where, geometry = result.where, case.building.geometry
-    zones = list(before.missing.columns)
-    sizes = [_rms(r.missing) for r in (before, after) if r is not None]
+    zones = list(before.missing.watts.columns)
+    sizes = [r.missing.rms for r in (before, after) if r is not None]
     maps: list[figures.Picture] = []
     if isinstance(geometry, FloorPlans):
         top = max(float(np.nanmax(sizes[0], initial=1.0)), _NOTABLE * _typical_area(geometry))
         for heat, title in zip(sizes, ("calibrated model", found), strict=False):
             maps += figures.heat_maps(geometry, case.building.orientation, zones, heat, title, top)
     shares = {s.name: s for s in where.zones}
-    means = before.missing.mean()
+    means = before.missing.watts.mean()
+    untouched = where.missing_at_start.rms
     worst = sorted(range(len(zones)), key=lambda i: -shares[zones[i]].share)
     rows = [
         {
@@ -59,19 +65,25 @@ def where_content(result: Diagnosis, case: Case, before: Replay, after: Replay |
             "share": f"{shares[zones[i]].share:.0%}".replace("%", " %"),
             "width": f"{100 * shares[zones[i]].share:.1f}",
             "mean": _signed_watts(float(means.iloc[i])),
-            "sizes": [watts(float(s[i])) for s in sizes],
+            "sizes": [watts(float(s[i])) for s in (untouched, *sizes)],
         }
         for i in worst[:_MOST_ZONES]
     ]
+    curves = {"calibrated": (before.drift.seconds, before.drift.rms)}
+    if after is not None:
+        curves[found] = (after.drift.seconds, after.drift.rms)
     parts = [p for p in (*where.groups, *where.modes.values()) if p.share > p.predictions > 0.0]
     parts = sorted(parts, key=lambda p: p.predictions - p.share)[:_MOST_PARTS]
     return {
         "sentence": re.sub(r"(?<=\d)%", " %", where.sentence),
         "maps": maps,
+        "missing": _courses(result, after, found),
         "zones": rows,
         "zone_count": len(zones),
         "parts": [_part(p) for p in parts],
         "hours": figures.hour_bars(where.hours),
+        "drift_sentence": drift_sentence(before.drift, after.drift if after else None, found),
+        "drift": figures.drift_lines(curves),
     }
 
 
@@ -93,8 +105,21 @@ def _typical_area(plans: FloorPlans) -> float:
     return float(np.median(cells)) * plans.cell_size**2
 
 
-def _rms(missing: pd.DataFrame) -> FloatArray:
-    return np.asarray(np.sqrt((missing**2).mean()))
+def _courses(result: Diagnosis, after: Replay | None, found: str) -> list[figures.Picture]:
+    """Draw the zones in which the calibrated model lacks the most heat."""
+    where = result.where
+    models = {"uncalibrated": where.missing_at_start, "calibrated": where.missing}
+    if after is not None:
+        models[found] = after.missing
+    known = {zone: size for zone, size in where.missing_watts.items() if size > 0.0}
+    worst = sorted(known, key=lambda zone: -known[zone])[:_MOST_DRAWN]
+    zones = {zone: {name: _course(m, zone) for name, m in models.items()} for zone in worst}
+    return figures.missing_lines(zones, pd.DatetimeIndex(where.missing.watts.index)) if zones else []
+
+
+def _course(missing: Missing, zone: str) -> figures.Course:
+    low, high = missing.band(0.9)
+    return figures.Course(*(table[zone].to_numpy() for table in (missing.watts, low, high)))
 
 
 def _signed_watts(value: float) -> str:

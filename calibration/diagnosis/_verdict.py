@@ -103,14 +103,14 @@ class Verdict:
         Every effect of the catalogue, the likeliest first.
     set90 : tuple of str
         Effects that hold all present ones with 90 % probability; empty when the answer may be none.
-    combinations : tuple of (tuple of str, float)
-        Sets of effects with their probability.
+    combinations : mapping of tuple of str to float
+        Probability that the effects up to a round are all there are, in the order of the rounds; sums to 1 [-].
     """
 
     name: VerdictName
     suspects: tuple[Suspect, ...]
     set90: tuple[str, ...]
-    combinations: tuple[tuple[tuple[str, ...], float], ...]
+    combinations: Mapping[tuple[str, ...], float]
 
 
 def judge(rounds: Sequence[Round], untestable: Mapping[str, str]) -> Verdict:
@@ -136,16 +136,16 @@ def judge(rounds: Sequence[Round], untestable: Mapping[str, str]) -> Verdict:
             if gain > score[effect]:
                 score[effect] = gain
                 best[effect] = _source(r, effect)
-        chain.append((tuple(r.before.effects), real * (1.0 - sum(found.values()))))
         if r.accepted is not None:
+            chain.append((tuple(r.before.effects), real * (1.0 - sum(found.values()))))
             real *= sum(found.values())
-            chain.append((tuple(r.accepted.fit.effects), real))
+    chain.append((tuple(rounds[-1].after.effects), real))
     suspects = sorted(
         (_suspect(e, probability[e], score[e], best.get(e), rounds, untestable.get(e)) for e in CATALOGUE),
         key=lambda s: (-s.probability, -s.score),
     )
     name = _name(rounds)
-    return Verdict(name, tuple(suspects), _inside(rounds, suspects) if name in ("named", "group") else (), tuple(chain))
+    return Verdict(name, tuple(suspects), _inside(rounds, suspects) if name in ("named", "group") else (), dict(chain))
 
 
 def _inside(rounds: Sequence[Round], suspects: Sequence[Suspect]) -> tuple[str, ...]:

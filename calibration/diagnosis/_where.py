@@ -10,8 +10,9 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from calibration._evaluate import Predictions
-from calibration._heat_balance import heat_balance
 from calibration.diagnosis._bench import Bench, Fit
+from calibration.diagnosis._drift import DriftCurve, drift_of
+from calibration.diagnosis._missing import Missing, at_start, missing_heat
 from thermal import ThermalNetwork
 from thermal.case import FloorPlans
 from thermal.signals import Drivers
@@ -68,10 +69,10 @@ class Where:
         Heated, cooled or neither; with and without sun; windy or calm; occupied or not.
     groups : tuple of Share
         Perimeter by orientation, core, floors.
-    missing_watts : mapping of str to float
-        Root mean square by zone of the hourly heat that the model lacks [W].
-    missing : DataFrame
-        That heat, shape (n_hour, n_zone) [W].
+    missing, missing_at_start : Missing
+        Heat that the model lacks by hour and zone, at its estimate and with every parameter at its start.
+    drift : DriftCurve
+        How the error of a free run grows.
     """
 
     sentence: str
@@ -79,8 +80,23 @@ class Where:
     hours: FloatArray
     modes: Mapping[str, Share]
     groups: tuple[Share, ...]
-    missing_watts: Mapping[str, float]
-    missing: pd.DataFrame
+    missing: Missing
+    missing_at_start: Missing
+    drift: DriftCurve
+
+    @property
+    def missing_watts(self) -> dict[str, float]:
+        """Root mean square by zone of the hourly heat that the model lacks [W]; 0 where it is not measured."""
+        return _by_zone(self.missing)
+
+    @property
+    def missing_watts_at_start(self) -> dict[str, float]:
+        """As `missing_watts`, with every parameter at its start [W]."""
+        return _by_zone(self.missing_at_start)
+
+
+def _by_zone(missing: Missing) -> dict[str, float]:
+    return dict(zip(missing.watts.columns, np.nan_to_num(missing.rms).tolist(), strict=True))
 
 
 def where_it_lies(bench: Bench, fit: Fit) -> Where:
@@ -97,17 +113,16 @@ def where_it_lies(bench: Bench, fit: Fit) -> Where:
     zones = parts.zone_groups()
     times = parts.times()
     single = {z: parts.zone_mask([z]) for z in parts.zones}
-    balance = heat_balance(fit.model, fit.theta, fit.built.inputs, bench.judged)
-    missing = pd.DataFrame(balance.needed - balance.metered, index=balance.stamps, columns=list(parts.zones))
-    sizes = {z: float(np.sqrt(np.nanmean(missing[z] ** 2))) if missing[z].notna().any() else 0.0 for z in parts.zones}
+    stepping, spin_up = bench.settings.stepping, bench.settings.spin_up_seconds
     return Where(
         sentence=parts.sentence(zones, times),
         zones=tuple(parts.share(z, mask) for z, mask in single.items()),
         hours=parts.by_hour(),
         modes={name: parts.share(name, mask) for name, mask in times.items()},
         groups=tuple(parts.share(name, mask) for name, mask in zones.items()),
-        missing_watts=sizes,
-        missing=missing,
+        missing=missing_heat(fit, bench.judged, stepping, spin_up),
+        missing_at_start=missing_heat(at_start(fit), bench.judged, stepping, spin_up, fixed=True),
+        drift=drift_of(fit, bench.judged, stepping, spin_up),
     )
 
 

@@ -19,8 +19,8 @@ _CALLED = {"hidden_mass": "mass that stores heat"}
 #: Probability from which an effect is said to be left out, rather than perhaps [-].
 _LIKELY = 0.5
 
-#: Sizes that a group may have, spelled.
-_COUNTS = {1: "one", 2: "two", 3: "three", 4: "four"}
+#: Probability from which another effect of a group is worth telling from the likeliest [-].
+_RIVAL = 0.05
 
 #: More zones than this are counted, not named.
 _MOST_NAMED = 4
@@ -41,10 +41,7 @@ def diagnosis_verdict(result: Diagnosis) -> str:
     found = accepted(result)
     if result.verdict.name == "group":
         first, *others = found
-        members = [suspect(result, e) for e in alike(result, first.screened.effect)]
-        named = listed([f"{called(s.effect)} ({sure(s.probability)})" for s in members], "or")
-        count = _COUNTS.get(len(members), str(len(members)))
-        text = f"The model leaves out one of {count} things that these data cannot tell apart: {named}."
+        text = _either(result, first)
         if others:
             text += f" {_named(result, others, 'Besides, it leaves out', 'Perhaps it also leaves out')}"
     else:
@@ -61,6 +58,23 @@ def accepted(result: Diagnosis) -> list[Refit]:
         From `diagnose`.
     """
     return [r.accepted for r in result.rounds if r.accepted is not None]
+
+
+def rivals(result: Diagnosis, effect: str) -> tuple[str, ...]:
+    """Effects that could be there in place of an accepted one, itself first.
+
+    As `alike`, but for what is unlikely, or was accepted as well.
+
+    Parameters
+    ----------
+    result : Diagnosis
+        From `diagnose`.
+    effect : str
+        Its id.
+    """
+    inside = {r.screened.effect for r in accepted(result)}
+    others = (e for e in alike(result, effect) if e not in inside and suspect(result, e).probability >= _RIVAL)
+    return (effect, *others)
 
 
 def suspect(result: Diagnosis, effect: str) -> Suspect:
@@ -189,6 +203,26 @@ def _named(result: Diagnosis, found: Sequence[Refit], begin: str, doubt: str) ->
     return text + (f", and perhaps {listed([_found(result, r) for r in rest])}." if rest else ".")
 
 
+def _either(result: Diagnosis, first: Refit) -> str:
+    """Say what is left out where other effects look alike: a choice only where another is likely enough."""
+    effect = first.screened.effect
+    likely = rivals(result, effect)
+    if len(likely) > 1:
+        named = listed([f"{called(e)} ({sure(suspect(result, e).probability)})" for e in likely], "or")
+        either = "either " if len(likely) == 2 else ""
+        told = CATALOGUE[effect].separated_by
+        text = f"The model leaves out {either}{named}: these data cannot tell them apart."
+        return f"{text} What would: {told}." if told else text
+    inside = {r.screened.effect for r in accepted(result)}
+    rest = [suspect(result, e) for e in alike(result, effect) if e not in inside]
+    others = [f"{called(s.effect)} ({sure(s.probability)})" for s in rest]
+    text = _named(result, [first], "The model leaves out", "Most likely the model leaves out")
+    if not others:
+        return text
+    are = "is" if len(others) == 1 else "are"
+    return f"{text} In these data {listed(others)} would look much the same, but {are} far less likely."
+
+
 def _found(result: Diagnosis, fitted: Refit) -> str:
     gain = fitted.screened
     return f"{called(gain.effect, gain.zones)} ({sure(suspect(result, gain.effect).probability)} sure)"
@@ -200,7 +234,7 @@ def _how_far(result: Diagnosis, found: int) -> str:
         return ""
     step = result.steps[-1]
     them = "With it" if found == 1 else "With them"
-    if result.verdict.name == "group":
+    if result.verdict.name == "group" and len(rivals(result, accepted(result)[0].screened.effect)) > 1:
         them = "With the likeliest" + (" and the others" if found > 1 else "")
     there = f"{them} in the model, its error {ahead(result)}, on days that it was not fitted to,"
     if step.after >= step.before:

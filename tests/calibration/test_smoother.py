@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from statsmodels.tsa.statespace.kalman_smoother import KalmanSmoother as Reference
 
 from calibration import DisturbanceModel, Filtered, KalmanFilter, StateSpace, smooth
+from calibration._smoother import averaged_deviation
 from calibration.errors import FilterError
 from thermal import Inputs
 
@@ -154,6 +155,39 @@ def test_random_walk_is_smoothed(building: StateSpace, simulate: Simulate) -> No
     found = smooth(KalmanFilter(building, walk).filter(inputs, 0, 800, START))
     low, high = found.band(0.9)
     assert ((low < truth) & (truth < high))[100:].mean() > 0.8
+
+
+def posterior(kalman: KalmanFilter, count: int) -> FloatArray:
+    """Covariance of all disturbances given all measurements, as one large normal law: (count, n_zone) twice."""
+    whole, r = kalman.whole, kalman.space.order
+    start = np.linalg.cholesky(kalman.steady(np.ones(3, dtype=bool))[0] + 1e-9 * np.eye(whole.n))
+    sources = np.zeros((whole.n, whole.n + 3 * count))  # z as a sum of independent unit normals
+    sources[:, : whole.n] = start
+    heat, seen = [], []
+    for k in range(count):
+        heat.append(sources[r:])
+        seen.append(whole.observation @ sources)
+        sources = whole.advance(sources)
+        at = whole.n + 3 * k
+        sources[r:, at : at + 3] += np.diag(np.sqrt(whole.heat_variance))
+    d, y = np.concatenate(heat), np.concatenate(seen)
+    noise = np.diag(np.tile(whole.noise_variance, count))
+    left = d @ d.T - d @ y.T @ np.linalg.solve(y @ y.T + noise, y @ d.T)
+    return np.asarray(left.reshape(count, 3, count, 3))
+
+
+@pytest.mark.parametrize("steps", [1, 4, 12])
+def test_mean_of_steps_is_known_as_well_as_one_large_normal_law_says(
+    steps: int, building: StateSpace, simulate: Simulate
+) -> None:
+    kalman = KalmanFilter(building, DISTURBANCE)
+    left = posterior(kalman, 160)
+    middle = slice(70, 70 + steps)
+    found = averaged_deviation(kalman.filter(simulate(200, 0)[0], 0, 200, START), steps)
+    for zone in range(3):
+        block = left[middle, zone, middle, zone]
+        assert found[zone] == pytest.approx(np.sqrt(block.mean() / left[70, zone, 70, zone]), rel=1e-3)
+    assert (found <= 1.0 + 1e-12).all()
 
 
 @pytest.mark.parametrize("level", [0.0, 1.0, 1.5])

@@ -106,13 +106,68 @@ def test_an_error_that_does_not_fall_is_said_to_be_no_help() -> None:
 
 
 def test_other_verdicts_name_nothing() -> None:
-    assert "cannot tell apart" in diagnosis_verdict(named("group"))
     assert "explains" in diagnosis_verdict(named("unexplained"))
     assert "explains too little" in diagnosis_verdict(named("no_gap"))
     nothing = diagnosis_verdict(nothing_found())
     assert nothing.startswith("These data show nothing") and " W on" in nothing
     other = replace(nothing_found(), verdict=replace(nothing_found().verdict, name="unexplained"))
     assert "not enough to name it" in diagnosis_verdict(other)
+
+
+def grouped(*probabilities: float) -> Diagnosis:
+    """A group of solar gain and of effects whose signatures are made the same, with these probabilities."""
+    first = diagnosed().rounds[0]
+    assert first.accepted is not None
+    effect = first.accepted.screened.effect
+    others = [g.effect for g in first.gains if g.effect != effect][: len(probabilities) - 1]
+    given = dict(zip([effect, *others], probabilities, strict=True))
+    found = next(r.gain for r in first.refits if r is first.accepted)
+    gains = tuple(replace(g, gain=found if g.effect in others else -1.0) for g in first.gains)
+    refits = tuple(r for r in first.refits if r is first.accepted)
+    rounds = (replace(first, gains=gains, refits=refits), *diagnosed().rounds[1:])
+    suspects = tuple(
+        replace(s, probability=given.get(s.effect, 0.0)) for s in diagnosed().verdict.suspects
+    )  # fmt: skip
+    return replace(
+        diagnosed(), rounds=rounds, verdict=replace(diagnosed().verdict, name="group", suspects=suspects)
+    )  # fmt: skip
+
+
+def test_a_choice_is_told_only_where_both_are_likely() -> None:
+    text = diagnosis_verdict(grouped(0.6, 0.35))
+    assert "leaves out either sun through the windows (60 %) or" in text and "(35 %): these data cannot tell" in text
+    assert CATALOGUE["solar_gain"].separated_by in text and "With the likeliest" in text
+    alone = diagnosis_verdict(grouped(0.99, 0.005))
+    assert "leaves out sun through the windows (99 % sure)" in alone and "either" not in alone
+    assert "far less likely" in alone and "(under 1 %)" in alone
+    three = diagnosis_verdict(grouped(0.5, 0.3, 0.15))
+    assert "either" not in three and "(30 %) or" in three
+
+
+def test_combinations_are_those_of_the_rounds_and_one_of_them_is_true() -> None:
+    combinations = diagnosed().to_dict()["combinations"]
+    assert [c["effects"] for c in combinations] == [[], ["solar_gain"]]
+    assert sum(c["probability"] for c in combinations) == pytest.approx(1.0)
+    assert combinations[-1]["probability"] > 0.9
+
+
+def test_missing_heat_has_a_band_before_and_after_calibration(written: Path) -> None:
+    heat = pd.read_parquet(written / "missing_watts.parquet")
+    for model in ("uncalibrated", "baseline", "with_effects"):
+        known = heat[model].notna()
+        assert known.any() and (heat[f"{model}_low"] < heat[model])[known].all()
+        assert (heat[model] < heat[f"{model}_high"])[known].all()
+    zones = json.loads((written / "diagnosis.json").read_text(encoding="utf-8"))["where"]["zones"]
+    assert all(z["missing_watts_rms_at_start"] > 0.0 for z in zones)
+    assert heat.attrs["units"]["uncalibrated_low"] == "W"
+
+
+def test_growth_of_the_error_is_told_before_and_after(written: Path) -> None:
+    drift = json.loads((written / "diagnosis.json").read_text(encoding="utf-8"))["where"]["drift"]
+    assert len(drift["seconds"]) == len(drift["rms"]) and drift["seconds"][-1] == 86400.0
+    assert drift["kind"] in ("sensors", "random", "persistent", "hump")
+    page = (written / "report.html").read_text(encoding="utf-8")
+    assert "How the error grows" in page and "Left to itself" in page and "found it" in page
 
 
 def test_a_diagnosis_without_effects_is_written_too(tmp_path: Path) -> None:

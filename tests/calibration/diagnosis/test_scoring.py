@@ -33,7 +33,7 @@ def trial(kind: str, truths: tuple[str, ...], told: dict[str, Any], twin: float 
         {"name": t, "answers": [t], "strength": strength, "zones": [], "unexplained_is_right": kind == "outside"}
         for t in truths
     ]
-    return trial_of("made_up", {"kind": kind, "effects": effects}, told, twin)
+    return trial_of("made_up", {"kind": kind, "effects": effects, "stream": 0}, told, twin)
 
 
 TRIALS = [
