@@ -164,8 +164,8 @@ class CoolingCoil:
         """Fall of the air's temperature [K] that the capacity per air, `heat` [J/kg], allows, up to `most` [K].
 
         Heat over fall is a straight line down to the dew point and nearly one below it: three chords of that part, each
-        from the end of the one before, find where it reaches the capacity within some hundredths. The temperature wanted
-        has no part in it, so that wanting more never brings less.
+        from the end of the one before, find where it reaches the capacity within some hundredths. What is wanted has no
+        part in it, so that wanting more never brings less.
         """
         dew = (1.0 - self.bypass) * ops.positive(temperature - dew_point(ops, humidity, self.pressure))
         dry = ops.minimum(dew, most)
