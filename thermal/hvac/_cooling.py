@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from thermal.errors import HvacParameterError, describe
 from thermal.hvac._air import EVAPORATION_HEAT, dew_point, saturation_humidity, wet_bulb
 from thermal.hvac._checks import fields_in_range
 from thermal.hvac._curves import DX_CAPACITY, DX_INPUT, DX_PART_LOAD, Biquadratic, Polynomial, celsius
@@ -61,7 +62,8 @@ class CoolingCoil:
     capacity_curve, input_curve : Biquadratic
         Capacity and energy input over the rated ones, of x and the outdoor temperature [degC].
     part_load : Polynomial
-        Energy input over that at full load, by part-load ratio.
+        Energy input over that at full load, by part-load ratio. Below the lowest ratio of its range the compressor
+        cycles; a curve that begins at 0 must be 0 there.
     pressure : float
         Of the air [Pa], 50,000 to 110,000.
 
@@ -98,6 +100,10 @@ class CoolingCoil:
                 "pressure": ("Pa", 5e4, 1.1e5),
             },
         )
+        if self.part_load.lowest <= 0.0 and self.part_load.coefficients[0] != 0.0:
+            found = f"{self.part_load.coefficients[0]:g} at no load"
+            expected = "0 at no load, or a range that begins above 0"
+            raise HvacParameterError(describe("CoolingCoil.part_load", expected, found))
         if self.chilled_water is not None:
             fields_in_range(
                 self,
@@ -124,22 +130,27 @@ class CoolingCoil:
         outdoor : Value
             Outdoor temperature [K].
         """
-        x = celsius(
-            wet_bulb(ops, temperature, humidity, self.pressure) if self.chilled_water is None else self.chilled_water
-        )
-        available = self.capacity * self.capacity_curve(ops, x, celsius(outdoor))
         allowed = ops.step(outdoor - self.lockout) if self.lockout else 1.0
-        surface_drop = (1.0 - self.bypass) * ops.positive(temperature - self.coldest)
-        drop = allowed * ops.clip(temperature - target, 0.0, surface_drop)
-        loss = self._loss(ops, temperature, humidity, drop)
+        most = (1.0 - self.bypass) * ops.positive(temperature - self.coldest)
+        drop = allowed * ops.clip(temperature - target, 0.0, most)
+        if ops.surely_below(drop, 0.0):
+            return Cooled(temperature, humidity, 0.0, 0.0, 0.0)
+        # mist does not condense on a coil that is no colder than its air
+        vapour = ops.minimum(humidity, saturation_humidity(ops, temperature, self.pressure), 1e-3)
+        loss = self._loss(ops, temperature, vapour, drop)
+        water = self.chilled_water
+        x = celsius(wet_bulb(ops, temperature, humidity, self.pressure) if water is None else water)
+        available = self.capacity * self.capacity_curve(ops, x, celsius(outdoor))
         if not ops.surely_below(flow * (AIR_HEAT_CAPACITY * drop + EVAPORATION_HEAT * loss), available):
-            drop = ops.minimum(drop, self._deepest(ops, temperature, humidity, surface_drop, available / flow))
-            loss = self._loss(ops, temperature, humidity, drop)
-        surface = temperature - drop / (1.0 - self.bypass)
+            drop = ops.minimum(drop, self._deepest(ops, temperature, vapour, most, available / flow))
+            loss = self._loss(ops, temperature, vapour, drop)
         sensible, latent = AIR_HEAT_CAPACITY * flow * drop, EVAPORATION_HEAT * flow * loss
         total = sensible + latent
-        full = available / self.cop * self.input_curve(ops, x, celsius(outdoor))
-        power = full * self.part_load(ops, total / available)
+        ratio, least = total / available, self.part_load.lowest
+        power = available / self.cop * self.input_curve(ops, x, celsius(outdoor)) * self.part_load(ops, ratio)
+        if least > 0.0:
+            power = power * ops.minimum(ratio / least, 1.0)
+        surface = temperature - drop / (1.0 - self.bypass)
         carnot = total * ops.positive(outdoor - surface) / surface
         power = ops.maximum(power, carnot, 0.01 * self.capacity) + self.auxiliaries * total
         return Cooled(temperature - drop, humidity - loss, sensible, latent, power)
@@ -152,15 +163,15 @@ class CoolingCoil:
     def _deepest(self, ops: Operations, temperature: Value, humidity: Value, most: Value, heat: Value) -> Value:
         """Fall of the air's temperature [K] that the capacity per air, `heat` [J/kg], allows, up to `most` [K].
 
-        Heat over fall is a straight line down to the dew point and nearly one below it: two chords of that part, the
-        second from the first's end, find where it reaches the capacity within some hundredths. The wanted temperature
-        has no part in it, so that wanting more never brings less.
+        Heat over fall is a straight line down to the dew point and nearly one below it: three chords of that part, each
+        from the end of the one before, find where it reaches the capacity within some hundredths. What is wanted has no
+        part in it, so that wanting more never brings less.
         """
         dew = (1.0 - self.bypass) * ops.positive(temperature - dew_point(ops, humidity, self.pressure))
         dry = ops.minimum(dew, most)
         spare = ops.positive(heat - AIR_HEAT_CAPACITY * dry, 1000.0)
         deepest = most
-        for _ in range(2):
+        for _ in range(3):
             latent = EVAPORATION_HEAT * self._loss(ops, temperature, humidity, deepest)
             wet = ops.positive(deepest - dry)
             chord = wet / (AIR_HEAT_CAPACITY * wet + latent + _LEAST)

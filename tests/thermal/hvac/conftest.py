@@ -4,8 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from hypothesis import settings
 
 from thermal.hvac import AirHandler, BoilerLoop, CoolingCoil, Fan, Heater, HvacSystem, Pump, Terminals, WaterCoil
+
+# the same examples at each run, and as long as a busy machine takes for them
+settings.register_profile("repeatable", deadline=None, derandomize=True)
+settings.load_profile("repeatable")
 
 FLOWS = np.array([0.3, 0.5, 0.2, 0.8, 0.4])  # kg/s
 HANDLERS = np.array([0, 1, 0, 1, 1])

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thermal.hvac import DX_CAPACITY, CoolingCoil, HvacParameterError
+from thermal.hvac import DX_CAPACITY, CoolingCoil, HvacParameterError, Polynomial
 from thermal.hvac._air import wet_bulb
 from thermal.hvac._operations import FloatOperations
 
@@ -96,6 +96,16 @@ def test_chilled_water_lockout_and_pumps():
     running = coil.cool(OPS, 1.0, 299.0, 0.004, 287.0, 300.0)
     plain = CoolingCoil(50_000.0, chilled_water=280.15).cool(OPS, 1.0, 299.0, 0.004, 287.0, 300.0)
     assert running.power == pytest.approx(plain.power + 0.05 * plain.sensible)
+
+
+def test_a_compressor_cycles_below_its_least_part_load():
+    curve = Polynomial((0.2, 0.8), 0.25, 1.0, "test")
+    coil = CoolingCoil(40_000.0, part_load=curve)
+    full = [coil.cool(OPS, 1.0, 289.0 + d, 0.003, 289.0, 308.0) for d in (2.0, 1.0, 0.0)]
+    assert full[0].power == pytest.approx(2.0 * full[1].power, rel=0.05)  # wet bulbs differ a little
+    assert full[2].power == 0.0
+    with pytest.raises(HvacParameterError, match="expected 0 at no load, or a range that begins above 0, found 0.2"):
+        CoolingCoil(40_000.0, part_load=Polynomial((0.2, 0.8), 0.0, 1.0, "test"))
 
 
 def test_parameters_out_of_range_are_refused():
