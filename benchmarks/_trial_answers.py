@@ -14,7 +14,7 @@ from typing import Any
 
 from _code import code
 from _table import ROOT, markdown, replace_section, write
-from energyplus_trials.drawing import draw_spec
+from energyplus_trials.drawing import draw_spec, without
 
 from calibration.diagnosis import Trial, score, trial_of
 
@@ -96,12 +96,20 @@ def read_trials(out: Path) -> list[Trial]:
     """
     answers = {p.stem: json.loads(p.read_text(encoding="utf-8")) for p in sorted((out / ANSWERS).glob("*.json"))}
     labels = {name: json.loads((out / SEALED / f"{name}.json").read_text(encoding="utf-8")) for name in answers}
-    found = []
-    for name, label in labels.items():
-        null = draw_spec(label["seed"], "null", confirmation=bool(label["stream"]), days=label["days"]).name
-        twin = answers[null]["gap"]["mae"] if null in answers else float("nan")
-        found.append(trial_of(name, label, answers[name], twin))
-    return found
+    gaps = {name: answer["gap"]["mae"] for name, answer in answers.items()}
+    return [
+        trial_of(name, label, answers[name], [gaps.get(twin, float("nan")) for twin in _twins(label)])
+        for name, label in labels.items()
+        if label["kind"] != "without"
+    ]
+
+
+def _twins(label: Mapping[str, Any]) -> list[str]:
+    """Names of the trials of the same seed without each of a trial's effects."""
+    spec = draw_spec(label["seed"], label["kind"], confirmation=bool(label["stream"]), days=label["days"])
+    if len(spec.effects) > 1:
+        return [twin.name for twin in without(spec)]
+    return [spec.twin().name for _ in spec.effects]
 
 
 def report(out: Path, readme: bool) -> str:

@@ -10,6 +10,8 @@ Run from the repository's root, in an environment with Python 3.11 or newer::
     pip install -e .[energyplus]
     python benchmarks/blind_trials.py make --out results/blind --kind single --seeds 0-9
     python benchmarks/blind_trials.py make --out results/blind --kind null --seeds 0-9      # their twins
+    python benchmarks/blind_trials.py make --out results/blind --kind pair --seeds 0-9
+    python benchmarks/blind_trials.py make --out results/blind --kind without --seeds 0-9   # pairs less one effect
     python benchmarks/blind_trials.py diagnose --out results/blind
     python benchmarks/blind_trials.py score --out results/blind
     python benchmarks/blind_trials.py levels --out results/blind    # null levels, from development seeds only
@@ -28,7 +30,7 @@ from pathlib import Path
 
 from _null_levels import make_levels
 from _trial_answers import CASES, SEALED, answer_all, report
-from energyplus_trials.drawing import DAYS, draw_spec
+from energyplus_trials.drawing import DAYS, draw_spec, without
 from energyplus_trials.errors import EnergyPlusMissingError, TrialError
 from energyplus_trials.specification import KINDS, TrialSpec
 from energyplus_trials.trial import make_trial
@@ -91,11 +93,14 @@ def make(specs: list[TrialSpec], out: Path, workers: int) -> list[str]:
 
 
 def _make(options: argparse.Namespace) -> int:
+    kinds = {"all": KINDS, "without": ("pair",)}.get(options.kind, (options.kind,))
     specs = [
         draw_spec(seed, kind, confirmation=options.confirmation, days=options.days)
         for seed in options.seeds
-        for kind in (KINDS if options.kind == "all" else (options.kind,))
+        for kind in kinds
     ]
+    if options.kind == "without":
+        specs = [twin for spec in specs for twin in without(spec)]
     return 1 if make(specs, options.out, options.workers) else 0
 
 
@@ -105,7 +110,8 @@ def main() -> int:
     commands = parser.add_subparsers(required=True)
     command = commands.add_parser("make", help="make trials and seal their labels")
     command.add_argument("--out", type=Path, required=True, help="folder of cases and sealed labels")
-    command.add_argument("--kind", choices=(*KINDS, "all"), required=True, help="which effects the trials hold")
+    kinds = (*KINDS, "all", "without")
+    command.add_argument("--kind", choices=kinds, required=True, help="which effects the trials hold")
     command.add_argument("--seeds", type=seed_range, required=True, help="first and last, such as 0-19")
     command.add_argument("--confirmation", action="store_true", help="the stream of seeds that nothing is tuned on")
     command.add_argument("--days", type=int, default=DAYS, help="length of the telemetry")

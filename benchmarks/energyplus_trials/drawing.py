@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from datetime import date, timedelta
 
 import numpy as np
@@ -66,6 +67,18 @@ def draw_spec(seed: int, kind: Kind, *, confirmation: bool = False, days: int = 
         effects=(),
     )
     return draw_effects(null, kind, stream_generator(stream, seed, _EFFECTS, KINDS.index(kind)))
+
+
+def without(spec: TrialSpec) -> tuple[TrialSpec, ...]:
+    """Twins of a trial of several effects: the same without each of them in turn.
+
+    Parameters
+    ----------
+    spec : TrialSpec
+        With two effects or more.
+    """
+    left = ([e for e in spec.effects if e is not effect] for effect in spec.effects)
+    return tuple(replace(spec, kind="without", effects=tuple(effects)) for effects in left)
 
 
 def _layout(rng: np.random.Generator) -> Layout:

@@ -10,7 +10,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-Kind = Literal["null", "single", "pair", "outside"]
+Kind = Literal["null", "single", "pair", "outside", "without"]
 KINDS: tuple[Kind, ...] = ("null", "single", "pair", "outside")
 DEVELOPMENT, CONFIRMATION = 0, 1  # first number of every seed: what one stream draws the other never does
 
@@ -231,6 +231,8 @@ class TrialSpec:
     def name(self) -> str:
         """Name of the case folder, which says nothing about the effects."""
         text = f"{self.stream}:{self.seed}:{self.kind}:{self.days}"
+        if self.kind == "without":  # a trial of several effects has as many of them
+            text += f":{','.join(e.name for e in self.effects)}"
         return "trial_" + hashlib.sha256(text.encode()).hexdigest()[:10]
 
     @property

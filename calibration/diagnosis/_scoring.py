@@ -43,8 +43,8 @@ class Trial:
         Where the first effect is; empty for the whole building.
     unexplained_is_right : bool
         Whether ``unexplained`` counts as a right verdict.
-    twin : float
-        Held-out error of the calibrated baseline on the twin without the effects [K]; NaN where there is none.
+    twins : tuple of float
+        Held-out error of the calibrated baseline on the twin without each of the effects [K]; NaN where there is none.
     answer : mapping
         Contents of ``diagnosis.json``.
     confirmation : bool
@@ -58,14 +58,20 @@ class Trial:
     strength: float
     zones: frozenset[str]
     unexplained_is_right: bool
-    twin: float
+    twins: tuple[float, ...]
     answer: Mapping[str, Any]
     confirmation: bool = False
 
     @property
+    def shown(self) -> tuple[frozenset[str], ...]:
+        """Names that are right for each effect that leaves a gap which calibration cannot hide."""
+        mae = self.answer["gap"]["mae"]
+        return tuple(t for t, twin in zip(self.truths, self.twins, strict=True) if not mae - twin <= LEAST_GAP)
+
+    @property
     def counted(self) -> bool:
-        """Whether the effects leave a gap that calibration cannot hide; nulls always count."""
-        return self.kind == "null" or not self.answer["gap"]["mae"] - self.twin <= LEAST_GAP
+        """Whether an effect leaves a gap; nulls always count."""
+        return self.kind == "null" or bool(self.shown)
 
     @property
     def named(self) -> bool:
@@ -109,12 +115,12 @@ class Trial:
 
     @property
     def covered(self) -> bool:
-        """Whether the 90 % set holds all effects."""
+        """Whether the 90 % set holds all effects that leave a gap."""
         inside = self.answer["set90"]
-        return all(any(e in truth for e in inside) for truth in self.truths)
+        return all(any(e in truth for e in inside) for truth in self.shown)
 
 
-def trial_of(name: str, label: Mapping[str, Any], answer: Mapping[str, Any], twin: float) -> Trial:
+def trial_of(name: str, label: Mapping[str, Any], answer: Mapping[str, Any], twins: Sequence[float]) -> Trial:
     """Put a label and an answer together.
 
     Parameters
@@ -125,8 +131,8 @@ def trial_of(name: str, label: Mapping[str, Any], answer: Mapping[str, Any], twi
         Sealed label.
     answer : mapping
         Contents of ``diagnosis.json``.
-    twin : float
-        Held-out error on the twin without the effects [K].
+    twins : sequence of float
+        Held-out error on the twin without each of the effects [K].
     """
     effects = label["effects"]
     return Trial(
@@ -137,7 +143,7 @@ def trial_of(name: str, label: Mapping[str, Any], answer: Mapping[str, Any], twi
         float(effects[0]["strength"]) if effects else 0.0,
         frozenset(effects[0]["zones"]) if effects else frozenset(),
         any(e["unexplained_is_right"] for e in effects),
-        twin,
+        tuple(twins),
         answer,
         bool(label["stream"]),
     )
@@ -210,7 +216,8 @@ def score(trials: Sequence[Trial]) -> dict[str, Any]:
         "abstained": _rate(not t.named for t in singles),
         "wrong name, of all trials": _rate(t.wrong_name for t in trials),
         "outside called unexplained": _rate(_outside_right(t) for t in outside),
-        "both of a pair in the first two": _rate(_both(t) for t in pairs),
+        "both of a pair in the first two": _rate(_both(t) for t in pairs if len(t.shown) > 1),
+        "one of a pair first": _rate(t.right_first for t in pairs),
         "90 % set covers": _rate(t.covered for t in inside if t.named),
         "right zones": _rate(_zones(t) for t in singles if t.named and t.right_first and t.zones),
     }

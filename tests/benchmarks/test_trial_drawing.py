@@ -133,3 +133,13 @@ def test_an_outline_is_closed(drawing, plan):
         for s in plan.segments(layout.zones):
             total[s.zone] += s.length * np.array(normals[s.side])
         assert all(np.abs(rest).max() <= plan.CELL_SIZE + 1e-9 for rest in total.values())
+
+
+def test_twins_of_a_pair_lack_one_effect_each(drawing):
+    for seed in range(6):
+        spec = drawing.draw_spec(seed, "pair")
+        twins = drawing.without(spec)
+        assert len({t.name for t in twins} | {spec.name}) == len(spec.effects) + 1
+        for effect, twin in zip(spec.effects, twins, strict=True):
+            assert [e for e in spec.effects if e is not effect] == list(twin.effects)
+            assert twin.twin() == spec.twin()

@@ -33,7 +33,7 @@ def trial(kind: str, truths: tuple[str, ...], told: dict[str, Any], twin: float 
         {"name": t, "answers": [t], "strength": strength, "zones": [], "unexplained_is_right": kind == "outside"}
         for t in truths
     ]
-    return trial_of("made_up", {"kind": kind, "effects": effects, "stream": 0}, told, twin)
+    return trial_of("made_up", {"kind": kind, "effects": effects, "stream": 0}, told, [twin] * len(truths))
 
 
 TRIALS = [
@@ -93,3 +93,20 @@ def test_intervals_are_those_of_wilson() -> None:
 
 def test_without_a_twin_a_trial_counts() -> None:
     assert trial("single", ("solar_gain",), answer("no_gap", "solar_gain"), twin=float("nan")).counted
+
+
+def test_of_a_pair_only_what_leaves_a_gap_is_asked_for() -> None:
+    told = answer("named", "solar_gain", set90=["solar_gain"], mae=0.4)
+    label = {
+        "kind": "pair", "stream": 0,
+        "effects": [
+            {"name": e, "answers": [e], "strength": 1.0, "zones": [], "unexplained_is_right": False}
+            for e in ("solar_gain", "wind_film")
+        ],
+    }  # fmt: skip
+    hidden, both = (trial_of("made_up", label, told, twins) for twins in ((0.1, 0.39), (0.1, 0.2)))
+    assert hidden.shown == (frozenset({"solar_gain"}),) and hidden.counted and hidden.covered
+    assert len(both.shown) == 2 and not both.covered
+    rates = score([hidden, both])["rates"]
+    assert rates["both of a pair in the first two"].to_dict()["of"] == 1
+    assert rates["one of a pair first"].share == 1.0
