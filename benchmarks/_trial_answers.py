@@ -173,9 +173,12 @@ def _rates(scored: Mapping[str, Any]) -> str:
 
 def _summary(scored: Mapping[str, Any]) -> str:
     hidden = ", ".join(f"{v} {n}" for v, n in scored["uncounted"].items() if n)
+    low, middle, high = scored["strength"] or [float("nan")] * 3
     return (
-        f"Median share of the gap closed: {scored['closed']:.0%}. Effects in a 90 % set: {scored['set_size']:.1f} on "
-        f"average. Trials without a gap: {hidden or 'none'}. Median time of a diagnosis: {scored['seconds']:.0f} s."
+        f"Strength found over the true one, where both are one number: median {middle:.2f}, half of them between "
+        f"{low:.2f} and {high:.2f}. Median share of the gap closed: {scored['closed']:.0%}. Effects in a 90 % set: "
+        f"{scored['set_size']:.1f} on average. Trials without a gap: {hidden or 'none'}. Median time of a diagnosis: "
+        f"{scored['seconds']:.0f} s."
     )
 
 

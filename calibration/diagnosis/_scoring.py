@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any
 
@@ -14,6 +14,23 @@ from statsmodels.stats.proportion import proportion_confint
 LEAST_GAP = 0.05
 
 _VERDICTS = ("no_gap", "named", "group", "unexplained")
+
+#: Where generator and catalogue have one number for how strong an effect is: its name there, the names whose sum it is
+#: here, and how many of the units here are one there [-].
+_STRENGTH = {
+    "interfloor_exchange": ("u_value_W_m2_K", ("interfloor_u_value",), 1.0),
+    "ground_exchange": ("u_value_W_m2_K", ("ground_u_value",), 1.0),
+    "roof_exchange": ("u_value_W_m2_K", ("roof_u_value",), 1.0),
+    "neighbour": ("u_value_W_m2_K", ("neighbour_u_value",), 1.0),
+    "internal_gains": ("power_W_m2", ("internal_gain", "base_load"), 1.0),
+    "latent_load": ("power_W_m2", ("latent_load",), 1.0),
+    "valve_leak": ("power_W_m2", ("valve_leak",), 1.0),
+    "capacity_limit": ("lost_share", ("capacity_lost",), 1.0),
+    "solar_opaque": ("absorptance", ("solar_absorptance",), 1.0),
+    "flow_gain": ("gain", ("flow_gain",), 1.0),
+    "sensor_bias": ("bias_K", ("sensor_bias",), 1.0),
+    "sensor_lag": ("time_constant_s", ("sensor_lag",), 1.0 / 60.0),
+}
 
 #: Confidence of the intervals of shares [-].
 _LEVEL = 0.95
@@ -49,6 +66,8 @@ class Trial:
         Contents of ``diagnosis.json``.
     confirmation : bool
         Whether its seed is one that nothing is tuned on.
+    numbers : mapping
+        Of the first effect, as its generator has them.
     """
 
     name: str
@@ -61,6 +80,7 @@ class Trial:
     twins: tuple[float, ...]
     answer: Mapping[str, Any]
     confirmation: bool = False
+    numbers: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def shown(self) -> tuple[frozenset[str], ...]:
@@ -119,6 +139,24 @@ class Trial:
         inside = self.answer["set90"]
         return all(any(e in truth for e in inside) for truth in self.shown)
 
+    @property
+    def strength_found(self) -> float | None:
+        """Strength of the first effect that was found, over the true one [-]; None where it has not one number."""
+        known = _STRENGTH.get(self.labels[0]) if self.labels else None
+        found = next((w for w in self.answer["which"] if self.labels and w["effect"] == self.labels[0]), None)
+        if known is None or found is None or known[0] not in self.numbers:
+            return None
+        key, names, factor = known
+        total: dict[str, float] = {}
+        for name, told in found["parameters"].items():
+            base, _, member = name.partition("@")
+            if base in names and (not self.zones or member in self.zones or "facade" in member):
+                total[member] = total.get(member, 0.0) + told["value"]
+        true = self.numbers[key]
+        each = true if isinstance(true, Mapping) else dict.fromkeys(total, true)
+        ratios = [total[m] / (factor * each[m]) for m in total if m in each]
+        return float(np.mean(ratios)) if ratios else None
+
 
 def trial_of(name: str, label: Mapping[str, Any], answer: Mapping[str, Any], twins: Sequence[float]) -> Trial:
     """Put a label and an answer together.
@@ -146,6 +184,7 @@ def trial_of(name: str, label: Mapping[str, Any], answer: Mapping[str, Any], twi
         tuple(twins),
         answer,
         bool(label["stream"]),
+        dict(effects[0].get("parameters", {})) if effects else {},
     )
 
 
@@ -197,8 +236,9 @@ def score(trials: Sequence[Trial]) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``rates`` by name, ``closed`` (median share of the gap), ``by_effect``, ``by_strength``, ``reliability`` rows,
-        ``uncounted`` (trials whose effects leave no gap, by verdict).
+        ``rates`` by name, ``strength`` (quartiles of found over true), ``closed`` (median share of the gap),
+        ``by_effect``, ``by_strength``, ``reliability`` rows, ``uncounted`` (trials whose effects leave no gap, by
+        verdict).
     """
     nulls = [t for t in trials if t.kind == "null"]
     singles = [t for t in trials if t.kind == "single" and t.counted]
@@ -224,8 +264,11 @@ def score(trials: Sequence[Trial]) -> dict[str, Any]:
     closed = [t.answer["how_far"][-1]["share_closed"] for t in inside if t.named and t.answer["how_far"]]
     known = [c for c in closed if c is not None]
     effects = sorted({label for t in singles for label in t.labels})
+    strengths = [t.strength_found for t in singles if t.named and t.right_first]
+    ratios = [s for s in strengths if s is not None]
     return {
         "rates": rates,
+        "strength": np.quantile(ratios, [0.25, 0.5, 0.75]).tolist() if ratios else [],
         "closed": float(np.median(known)) if known else float("nan"),
         "set_size": float(np.mean([float(len(t.answer["set90"])) for t in inside if t.named] or [np.nan])),
         "by_effect": {e: _row([t for t in singles if e in t.labels]) for e in effects},

@@ -110,3 +110,14 @@ def test_of_a_pair_only_what_leaves_a_gap_is_asked_for() -> None:
     rates = score([hidden, both])["rates"]
     assert rates["both of a pair in the first two"].to_dict()["of"] == 1
     assert rates["one of a pair first"].share == 1.0
+
+
+def test_a_strength_is_compared_where_both_are_one_number() -> None:
+    told = answer("named", "sensor_bias")
+    told["which"][0]["parameters"] = {"sensor_bias@A": {"value": 0.6}, "sensor_bias@B": {"value": 9.0}}
+    effect = {"name": "sensor_bias", "answers": ["sensor_bias"], "strength": 1.0, "zones": ["A"],
+              "unexplained_is_right": False, "parameters": {"bias_K": {"A": 0.8}}}  # fmt: skip
+    found = trial_of("made_up", {"kind": "single", "stream": 0, "effects": [effect]}, told, [0.05])
+    assert found.strength_found == pytest.approx(0.75)
+    assert score([found])["strength"] == pytest.approx([0.75] * 3)
+    assert trial("single", ("solar_gain",), answer("named", "solar_gain")).strength_found is None
