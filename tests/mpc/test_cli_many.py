@@ -24,7 +24,7 @@ from mpc.cli._app import app
 from thermal.pilot import generate_pilot
 
 OPTIONS = ("--horizon", "1h", "--starts", "1")
-NAMES = ["office 0", "office 1", "office 2"]
+NAMES = [f"office {k}" for k in range(5)]  # enough that some are left when the first is done
 
 
 def run(*arguments: str | Path) -> Any:
@@ -57,7 +57,7 @@ def is_alive(pid: int) -> bool:
 
 @pytest.fixture(scope="module")
 def cases(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Three offices of one zone, and a folder that is no case."""
+    """Offices of one zone, and a folder that is no case."""
     folder = tmp_path_factory.mktemp("many") / "all cases"
     for seed, name in enumerate(NAMES):
         generate_pilot(folder / name, seed=seed, days=2.0, spin_up_days=0.5, step_seconds=1800.0, floor_area=40.0,
@@ -104,7 +104,7 @@ def test_a_run_that_is_killed_or_interrupted_goes_on(cases: Path, tmp_path: Path
     assert f"interrupted: what is finished is in {out}" in stderr and "Traceback" not in stderr
     assert not any(map(is_alive, workers))
     kept = sorted(p.name for p in out.iterdir())
-    assert kept[-1] == "summary.json" and 2 <= len(kept) <= 3
+    assert kept[-1] == "summary.json" and 2 <= len(kept) <= len(NAMES)
     summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))["cases"]
     assert [name for name, entry in summary.items() if entry["status"] == "calibrated"] == kept[:-1]
     assert {entry["status"] for name, entry in summary.items() if name not in kept} == {"interrupted"}
