@@ -1,0 +1,42 @@
+"""Plants that controllers are tested on: our own building and plant in closed loop, and what all plants share."""
+
+from mpc.plants._actuators import ACTION_LIMITS, Actuator
+from mpc.plants._building import (
+    BuildingFlows,
+    BuildingModel,
+    BuildingStep,
+    GridBuilding,
+    ReducedBuilding,
+    reduced_building,
+)
+from mpc.plants._history import SystemBalance
+from mpc.plants._operation import Operation, scheduled_operation
+from mpc.plants._plant import Controller, Measurements, Plant, PointLayout, RestorablePlant
+from mpc.plants._run import ClosedLoopRun, FixedSetpoints, run_closed_loop
+from mpc.plants._sensors import PlantDevices, SensorNoise
+from mpc.plants._simulated import SimulatedPlant
+
+__all__ = [
+    "ACTION_LIMITS",
+    "Actuator",
+    "BuildingFlows",
+    "BuildingModel",
+    "BuildingStep",
+    "ClosedLoopRun",
+    "Controller",
+    "FixedSetpoints",
+    "GridBuilding",
+    "Measurements",
+    "Operation",
+    "Plant",
+    "PlantDevices",
+    "PointLayout",
+    "ReducedBuilding",
+    "RestorablePlant",
+    "SensorNoise",
+    "SimulatedPlant",
+    "SystemBalance",
+    "reduced_building",
+    "run_closed_loop",
+    "scheduled_operation",
+]

@@ -1,0 +1,353 @@
+"""The building of a plant: on the grid, or reduced to its modes, behind the same few methods."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mpc.errors import PlantError
+from thermal import Building, Simulator, SymbolicModel, ThermalNetwork, build_network, reduced_model
+from thermal.effects import Chosen
+from thermal.errors import describe
+from thermal.model import IMPLICIT_EULER, ModalModel, ReducedModel, modal_model
+from thermal.signals import REFERENCE_TEMPERATURE
+
+FloatArray = NDArray[np.float64]
+
+
+class BuildingStep(NamedTuple):
+    """What a step did to a building.
+
+    Parameters
+    ----------
+    mean : ndarray, shape (n_zone,)
+        What the zones' sensors read, mean over the step [K].
+    reading : ndarray, shape (n_zone,)
+        What they read at its end [K].
+    """
+
+    mean: FloatArray
+    reading: FloatArray
+
+
+class BuildingFlows(NamedTuple):
+    """Heat of a building over its last step.
+
+    Parameters
+    ----------
+    envelope : float
+        Through walls and windows to the boundaries [W].
+    effects : float
+        From the sources of effects into the building [W].
+    storage : float
+        Kept in air, walls and furniture [W].
+    """
+
+    envelope: float
+    effects: float
+    storage: float
+
+
+class BuildingModel(Protocol):
+    """A building that steps: what a plant needs of it."""
+
+    @property
+    def network(self) -> ThermalNetwork:
+        """Zones, boundaries, signals and parameters."""
+
+    @property
+    def theta(self) -> FloatArray:
+        """Parameter vector, shape (n_parameter,) [parameter units]."""
+
+    @property
+    def step_seconds(self) -> float:
+        """Length of a step [s]."""
+
+    def reset(self, zone: FloatArray, boundary: FloatArray, signals: FloatArray) -> FloatArray:
+        """Start from the steady state that holds the zones at given temperatures; returns what the sensors read.
+
+        Parameters
+        ----------
+        zone : ndarray, shape (n_zone,)
+            Temperatures [K].
+        boundary : ndarray, shape (n_boundary,)
+            Boundary temperatures [K].
+        signals : ndarray, shape (n_signal,)
+            Of the effects [signal unit].
+        """
+
+    def reseed(self, seed: int) -> None:
+        """Start the random numbers anew, where there are any.
+
+        Parameters
+        ----------
+        seed : int
+            0 or more.
+        """
+
+    def step(self, heat: FloatArray, boundary: FloatArray, signals: FloatArray) -> BuildingStep:
+        """Advance a step.
+
+        Parameters
+        ----------
+        heat : ndarray, shape (n_zone,)
+            Into the zones [W].
+        boundary : ndarray, shape (n_boundary,)
+            Boundary temperatures [K].
+        signals : ndarray, shape (n_signal,)
+            Of the effects [signal unit].
+        """
+
+    def flows(self) -> BuildingFlows:
+        """Add up the heat of the last step."""
+
+    def save_state(self) -> Any:
+        """Everything that the next steps depend on."""
+
+    def restore_state(self, saved: Any) -> None:
+        """Return to a saved state.
+
+        Parameters
+        ----------
+        saved : object
+            Of `save_state`.
+        """
+
+
+class GridBuilding:
+    """A building on its grid, with the mean of the shuffle or the paper's random one.
+
+    Parameters
+    ----------
+    simulator : Simulator
+        Stepping by implicit Euler.
+    """
+
+    def __init__(self, simulator: Simulator) -> None:
+        self.simulator, self.network, self.theta = simulator, simulator.network, simulator.theta
+        self.step_seconds = simulator.step_seconds
+        flow = simulator.matrices.flow
+        self._capacity = np.asarray(simulator.matrices.capacity.diagonal())
+        self._out = np.asarray(flow.sum(axis=0)).ravel()  # heat that leaves everywhere, per kelvin or signal
+        self._before = np.zeros(0)
+        self._outside = np.zeros(0)
+
+    def reset(self, zone: FloatArray, boundary: FloatArray, signals: FloatArray) -> FloatArray:
+        """Start from a steady state; see `BuildingModel`.
+
+        Parameters
+        ----------
+        zone, boundary, signals : ndarray
+            As there [K], [K], [signal unit].
+        """
+        return self.simulator.reset(zone, boundary, signals)
+
+    def reseed(self, seed: int) -> None:
+        """Start the random numbers of the shuffle anew.
+
+        Parameters
+        ----------
+        seed : int
+            0 or more.
+        """
+        saved = self.simulator.save_state()
+        if saved["shuffle"] is not None:
+            saved["shuffle"] = dict(np.random.default_rng(seed).bit_generator.state)
+            self.simulator.restore_state(saved)
+
+    def step(self, heat: FloatArray, boundary: FloatArray, signals: FloatArray) -> BuildingStep:
+        """Advance a step; see `BuildingModel`.
+
+        Parameters
+        ----------
+        heat, boundary, signals : ndarray
+            As there [W], [K], [signal unit].
+        """
+        self._before = self.simulator.states
+        self._outside = np.concatenate([boundary - REFERENCE_TEMPERATURE, signals])
+        mean = self.simulator.step(heat, boundary, signals=signals)
+        return BuildingStep(mean, self.simulator.zone_temperatures)
+
+    def flows(self) -> BuildingFlows:
+        """Add up the heat of the last step, as it was before a random shuffle."""
+        after, n = self.simulator.stepped_states, self._before.size
+        n_boundary = len(self.network.boundaries)
+        heat = self._out[n:] * self._outside
+        envelope = self._out[:n] @ (after - REFERENCE_TEMPERATURE) + heat[:n_boundary].sum()
+        storage = self._capacity @ (after - self._before) / self.step_seconds
+        return BuildingFlows(float(envelope), -float(heat[n_boundary:].sum()), float(storage))
+
+    def save_state(self) -> Any:
+        """Everything that the next steps depend on."""
+        return self.simulator.save_state()
+
+    def restore_state(self, saved: Any) -> None:
+        """Return to a saved state.
+
+        Parameters
+        ----------
+        saved : object
+            Of `save_state`.
+        """
+        self.simulator.restore_state(saved)
+
+
+class ReducedBuilding:
+    """A building reduced to its modes, stepped by implicit Euler as the grid is.
+
+    Parameters
+    ----------
+    model : ReducedModel
+        Such as `thermal.reduced_model` gives it.
+    theta : ndarray, shape (n_parameter,), optional
+        Parameter values [parameter units]; those that the model was made at by default.
+    step_seconds : float
+        Time step [s].
+    """
+
+    def __init__(self, model: ReducedModel, theta: FloatArray | None = None, step_seconds: float = 300.0) -> None:
+        if model.network.airflows:
+            raise PlantError(describe("building", "one without airflows from zone to zone", "some", "use the grid"))
+        self.network, self.step_seconds = model.network, float(step_seconds)
+        self.theta = model.theta if theta is None else np.asarray(theta, dtype=float)
+        self._modes: ModalModel = modal_model(model.matrices(self.theta))
+        modes, propagator = self._modes, self._modes.propagator(self.step_seconds, IMPLICIT_EULER)
+        self._drive = np.hstack([modes.boundary, modes.heating])
+        self._end = propagator.end
+        self._gain = np.ascontiguousarray(propagator.end_gain[:, None] * self._drive)
+        self._output = np.ascontiguousarray(modes.output)
+        self._n_zone = len(self.network.zones)
+        self._input = np.zeros(self._drive.shape[1])
+        self._state = self._before = np.zeros(modes.capacity.size)
+        self._reading = np.zeros(self._n_zone)
+
+    @property
+    def order(self) -> int:
+        """Number of states."""
+        return int(self._end.size)
+
+    def reset(self, zone: FloatArray, boundary: FloatArray, signals: FloatArray) -> FloatArray:
+        """Start from a steady state; see `BuildingModel`.
+
+        Parameters
+        ----------
+        zone, boundary, signals : ndarray
+            As there [K], [K], [signal unit].
+        """
+        modes = self._modes
+        outside = modes.boundary @ np.concatenate([boundary - REFERENCE_TEMPERATURE, signals])
+        at_rest = 1.0 / modes.conductance
+        free = modes.observation @ (at_rest * outside)
+        gain = modes.observation @ (at_rest[:, None] * modes.heating)
+        heat = np.linalg.solve(gain, np.asarray(zone, dtype=float) - REFERENCE_TEMPERATURE - free)
+        self._state = at_rest * (outside + modes.heating @ heat)
+        self._reading = self._output @ self._state
+        return self._reading + REFERENCE_TEMPERATURE
+
+    def reseed(self, seed: int) -> None:
+        """Nothing is random here.
+
+        Parameters
+        ----------
+        seed : int
+            Without effect.
+        """
+
+    def step(self, heat: FloatArray, boundary: FloatArray, signals: FloatArray) -> BuildingStep:
+        """Advance a step; see `BuildingModel`.
+
+        Parameters
+        ----------
+        heat, boundary, signals : ndarray
+            As there [W], [K], [signal unit].
+        """
+        drive, n = self._input, boundary.size
+        drive[:n] = boundary
+        drive[:n] -= REFERENCE_TEMPERATURE
+        drive[n : n + signals.size] = signals
+        drive[n + signals.size :] = heat
+        self._before = self._state
+        self._state = self._end * self._before + self._gain @ drive
+        start, self._reading = self._reading, self._output @ self._state
+        # with constant inputs implicit Euler's mean over a step is the trapezoid's
+        mean = 0.5 * (start + self._reading)
+        return BuildingStep(mean + REFERENCE_TEMPERATURE, self._reading + REFERENCE_TEMPERATURE)
+
+    def flows(self) -> BuildingFlows:
+        """Add up the heat of the last step."""
+        modes, uniform = self._modes, self._modes.uniform
+        outside = uniform @ self._drive[:, : modes.boundary.shape[1]]
+        brought = outside * self._input[: outside.size]
+        n_boundary = len(self.network.boundaries)
+        envelope = uniform @ (modes.conductance * self._state) - brought[:n_boundary].sum()
+        storage = uniform @ (modes.capacity * (self._state - self._before)) / self.step_seconds
+        return BuildingFlows(float(envelope), float(brought[n_boundary:].sum()), float(storage))
+
+    def save_state(self) -> Any:
+        """Everything that the next steps depend on."""
+        return self._state.copy(), self._reading.copy()
+
+    def restore_state(self, saved: Any) -> None:
+        """Return to a saved state.
+
+        Parameters
+        ----------
+        saved : object
+            Of `save_state`.
+        """
+        state, reading = saved
+        if state.shape != self._state.shape:
+            raise PlantError(describe("state", f"one of order {self._state.size}", f"one of order {state.size}"))
+        self._state, self._reading = state.copy(), reading.copy()
+
+
+def reduced_building(
+    building: Building,
+    parameters: Mapping[str, float] | None = None,
+    *,
+    step_seconds: float = 300.0,
+    dx: float | None = None,
+    effects: tuple[Chosen, ...] = (),
+    order: int | None = None,
+    tolerance: float | None = None,
+) -> ReducedBuilding:
+    """Build and reduce a building.
+
+    Parameters
+    ----------
+    building : Building
+        Floor plans or a zone table.
+    parameters : mapping of str to float, optional
+        Values by name [parameter units]; starts for the rest.
+    step_seconds : float
+        Time step [s].
+    dx : float, optional
+        Distance between control volumes of a plan [m].
+    effects : tuple of Chosen
+        What is added to the baseline, `thermal.effects.chosen`; strengths are among the parameters.
+    order : int, optional
+        Largest number of states.
+    tolerance : float, optional
+        Largest error of a zone mean in the certificate's replay [K].
+
+    Returns
+    -------
+    ReducedBuilding
+        Ready to step.
+
+    Examples
+    --------
+    >>> from thermal import load_bundled_case
+    >>> small = reduced_building(load_bundled_case().building, dx=1.0, order=40)
+    >>> none, cold = np.zeros(0), np.array([273.15])
+    >>> start = small.reset(np.full(5, 293.15), cold, none)
+    >>> bool((small.step(np.zeros(5), cold, none).reading < start).all())
+    True
+    """
+    grid = SymbolicModel(build_network(building, dx=dx, effects=effects))
+    theta = grid.network.values(parameters or {})
+    model = reduced_model(grid, [theta], order=order, tolerance=tolerance)
+    return ReducedBuilding(model, theta, step_seconds)
