@@ -10,6 +10,7 @@ from mpc.plants._building import (
     reduced_building,
 )
 from mpc.plants._history import SystemBalance
+from mpc.plants._make import pilot_building, pilot_weather, save_pilot, simulated_plant
 from mpc.plants._operation import Operation, scheduled_operation
 from mpc.plants._plant import Controller, Measurements, Plant, PointLayout, RestorablePlant
 from mpc.plants._run import ClosedLoopRun, FixedSetpoints, run_closed_loop
@@ -36,7 +37,11 @@ __all__ = [
     "SensorNoise",
     "SimulatedPlant",
     "SystemBalance",
+    "pilot_building",
+    "pilot_weather",
     "reduced_building",
     "run_closed_loop",
+    "save_pilot",
     "scheduled_operation",
+    "simulated_plant",
 ]

@@ -215,14 +215,14 @@ class ReducedBuilding:
         self.theta = model.theta if theta is None else np.asarray(theta, dtype=float)
         self._modes: ModalModel = modal_model(model.matrices(self.theta))
         modes, propagator = self._modes, self._modes.propagator(self.step_seconds, IMPLICIT_EULER)
-        self._drive = np.hstack([modes.boundary, modes.heating])
-        self._end = propagator.end
-        self._gain = np.ascontiguousarray(propagator.end_gain[:, None] * self._drive)
+        self._end, self._gain = propagator.end, propagator.end_gain
+        self._heating = np.ascontiguousarray(modes.heating)
         self._output = np.ascontiguousarray(modes.output)
-        self._n_zone = len(self.network.zones)
-        self._input = np.zeros(self._drive.shape[1])
+        if np.allclose(self._output, self._heating.T, rtol=1e-9, atol=1e-12 * float(np.abs(self._output).max())):
+            self._output = self._heating.T  # one matrix in the cache instead of two
+        self._outside = np.zeros(modes.boundary.shape[1])
         self._state = self._before = np.zeros(modes.capacity.size)
-        self._reading = np.zeros(self._n_zone)
+        self._reading = np.zeros(len(self.network.zones))
 
     @property
     def order(self) -> int:
@@ -264,13 +264,14 @@ class ReducedBuilding:
         heat, boundary, signals : ndarray
             As there [W], [K], [signal unit].
         """
-        drive, n = self._input, boundary.size
-        drive[:n] = boundary
-        drive[:n] -= REFERENCE_TEMPERATURE
-        drive[n : n + signals.size] = signals
-        drive[n + signals.size :] = heat
+        outside, n = self._outside, boundary.size
+        np.subtract(boundary, REFERENCE_TEMPERATURE, out=outside[:n])
+        outside[n:] = signals
+        pushed = self._heating @ heat
+        pushed += self._modes.boundary @ outside
+        pushed *= self._gain
         self._before = self._state
-        self._state = self._end * self._before + self._gain @ drive
+        self._state = self._end * self._before + pushed
         start, self._reading = self._reading, self._output @ self._state
         # with constant inputs implicit Euler's mean over a step is the trapezoid's
         mean = 0.5 * (start + self._reading)
@@ -279,8 +280,7 @@ class ReducedBuilding:
     def flows(self) -> BuildingFlows:
         """Add up the heat of the last step."""
         modes, uniform = self._modes, self._modes.uniform
-        outside = uniform @ self._drive[:, : modes.boundary.shape[1]]
-        brought = outside * self._input[: outside.size]
+        brought = (uniform @ modes.boundary) * self._outside
         n_boundary = len(self.network.boundaries)
         envelope = uniform @ (modes.conductance * self._state) - brought[:n_boundary].sum()
         storage = uniform @ (modes.capacity * (self._state - self._before)) / self.step_seconds
