@@ -88,15 +88,26 @@ class BuildingModel(Protocol):
             0 or more.
         """
 
-    def step(self, heat: FloatArray, boundary: FloatArray, signals: FloatArray) -> BuildingStep:
-        """Advance a step.
+    def begin(self, heat: FloatArray, boundary: FloatArray, signals: FloatArray) -> FloatArray:
+        """Begin a step: what the zones' sensors would read at its end without supply air, shape (n_zone,) [K].
 
         Parameters
         ----------
         heat : ndarray, shape (n_zone,)
-            Into the zones [W].
+            Of people, light and equipment into the zones [W].
         boundary : ndarray, shape (n_boundary,)
             Boundary temperatures [K].
+        signals : ndarray, shape (n_signal,)
+            Of the effects, as far as they are known [signal unit].
+        """
+
+    def finish(self, heat: FloatArray, signals: FloatArray) -> BuildingStep:
+        """Take the step that was begun.
+
+        Parameters
+        ----------
+        heat : ndarray, shape (n_zone,)
+            Of the supply air into the zones [W].
         signals : ndarray, shape (n_signal,)
             Of the effects [signal unit].
         """
@@ -132,8 +143,7 @@ class GridBuilding:
         flow = simulator.matrices.flow
         self._capacity = np.asarray(simulator.matrices.capacity.diagonal())
         self._out = np.asarray(flow.sum(axis=0)).ravel()  # heat that leaves everywhere, per kelvin or signal
-        self._before = np.zeros(0)
-        self._outside = np.zeros(0)
+        self._before = self._outside = self._gains = self._boundary = np.zeros(0)
 
     def reset(self, zone: FloatArray, boundary: FloatArray, signals: FloatArray) -> FloatArray:
         """Start from a steady state; see `BuildingModel`.
@@ -158,17 +168,32 @@ class GridBuilding:
             saved["shuffle"] = dict(np.random.default_rng(seed).bit_generator.state)
             self.simulator.restore_state(saved)
 
-    def step(self, heat: FloatArray, boundary: FloatArray, signals: FloatArray) -> BuildingStep:
-        """Advance a step; see `BuildingModel`.
+    def begin(self, heat: FloatArray, boundary: FloatArray, signals: FloatArray) -> FloatArray:
+        """Begin a step; see `BuildingModel`.
 
         Parameters
         ----------
         heat, boundary, signals : ndarray
             As there [W], [K], [signal unit].
         """
-        self._before = self.simulator.states
-        self._outside = np.concatenate([boundary - REFERENCE_TEMPERATURE, signals])
-        mean = self.simulator.step(heat, boundary, signals=signals)
+        self._gains, self._boundary = heat, boundary
+        saved = self.simulator.save_state()
+        self._before = saved["states"]
+        self.simulator.step(heat, boundary, signals=signals)
+        free = self.simulator.zone_temperatures
+        self.simulator.restore_state(saved)
+        return free
+
+    def finish(self, heat: FloatArray, signals: FloatArray) -> BuildingStep:
+        """Take the step that was begun; see `BuildingModel`.
+
+        Parameters
+        ----------
+        heat, signals : ndarray
+            As there [W], [signal unit].
+        """
+        self._outside = np.concatenate([self._boundary - REFERENCE_TEMPERATURE, signals])
+        mean = self.simulator.step(self._gains + heat, self._boundary, signals=signals)
         return BuildingStep(mean, self.simulator.zone_temperatures)
 
     def flows(self) -> BuildingFlows:
@@ -221,8 +246,9 @@ class ReducedBuilding:
         if np.allclose(self._output, self._heating.T, rtol=1e-9, atol=1e-12 * float(np.abs(self._output).max())):
             self._output = self._heating.T  # one matrix in the cache instead of two
         self._outside = np.zeros(modes.boundary.shape[1])
-        self._state = self._before = np.zeros(modes.capacity.size)
-        self._reading = np.zeros(len(self.network.zones))
+        self._state = self._before = self._free_state = self._gained = np.zeros(modes.capacity.size)
+        self._reading = self._free = np.zeros(len(self.network.zones))
+        self._gains = np.zeros(0)
 
     @property
     def order(self) -> int:
@@ -256,22 +282,43 @@ class ReducedBuilding:
             Without effect.
         """
 
-    def step(self, heat: FloatArray, boundary: FloatArray, signals: FloatArray) -> BuildingStep:
-        """Advance a step; see `BuildingModel`.
+    def begin(self, heat: FloatArray, boundary: FloatArray, signals: FloatArray) -> FloatArray:
+        """Begin a step; see `BuildingModel`.
 
         Parameters
         ----------
         heat, boundary, signals : ndarray
             As there [W], [K], [signal unit].
         """
+        if self._gains is not heat:
+            self._gains, self._gained = heat, self._heating @ heat
         outside, n = self._outside, boundary.size
         np.subtract(boundary, REFERENCE_TEMPERATURE, out=outside[:n])
         outside[n:] = signals
-        pushed = self._heating @ heat
-        pushed += self._modes.boundary @ outside
+        pushed = self._modes.boundary @ outside
+        pushed += self._gained
         pushed *= self._gain
-        self._before = self._state
-        self._state = self._end * self._before + pushed
+        self._free_state = self._end * self._state + pushed
+        self._free = self._output @ self._free_state
+        return self._free + REFERENCE_TEMPERATURE
+
+    def finish(self, heat: FloatArray, signals: FloatArray) -> BuildingStep:
+        """Take the step that was begun; see `BuildingModel`.
+
+        Parameters
+        ----------
+        heat, signals : ndarray
+            As there [W], [signal unit].
+        """
+        pushed = self._heating @ heat
+        known = self._outside[self._outside.size - signals.size :]
+        if signals.size and not np.array_equal(known, signals):
+            change = np.zeros_like(self._outside)
+            change[change.size - signals.size :] = signals - known
+            pushed += self._modes.boundary @ change
+            self._outside += change
+        pushed *= self._gain
+        self._before, self._state = self._state, self._free_state + pushed
         start, self._reading = self._reading, self._output @ self._state
         # with constant inputs implicit Euler's mean over a step is the trapezoid's
         mean = 0.5 * (start + self._reading)
@@ -344,10 +391,28 @@ def reduced_building(
     >>> small = reduced_building(load_bundled_case().building, dx=1.0, order=40)
     >>> none, cold = np.zeros(0), np.array([273.15])
     >>> start = small.reset(np.full(5, 293.15), cold, none)
-    >>> bool((small.step(np.zeros(5), cold, none).reading < start).all())
+    >>> bool((small.begin(np.zeros(5), cold, none) < start).all())
     True
     """
     grid = SymbolicModel(build_network(building, dx=dx, effects=effects))
     theta = grid.network.values(parameters or {})
     model = reduced_model(grid, [theta], order=order, tolerance=tolerance)
     return ReducedBuilding(model, theta, step_seconds)
+
+
+def zone_response(model: BuildingModel, heat: FloatArray) -> FloatArray:
+    """Measure how far heat over a step moves the zones, all of them heated together, shape (n_zone,) [K/W].
+
+    Parameters
+    ----------
+    model : BuildingModel
+        Its state is lost.
+    heat : ndarray, shape (n_zone,)
+        In proportion to what the zones may get [W], positive.
+    """
+    network = model.network
+    boundary = np.full(len(network.boundaries), REFERENCE_TEMPERATURE)
+    none, signals = np.zeros(len(heat)), np.zeros(len(network.signals))
+    model.reset(np.full(len(heat), REFERENCE_TEMPERATURE), boundary, signals)
+    free = model.begin(none, boundary, signals)
+    return np.maximum((model.finish(heat, signals).reading - free) / heat, 1e-9)

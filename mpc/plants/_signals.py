@@ -100,6 +100,17 @@ class EffectSignals:
     def _of(self, signal: Signal) -> float:
         return float(signal.of(self._now)[-1])  # type: ignore[arg-type]
 
+    def known(self, k: int) -> FloatArray:
+        """Give the signals of a step as far as they are known before it, shape (n_signal,) [signal unit].
+
+        Parameters
+        ----------
+        k : int
+            Number of the step.
+        """
+        row: FloatArray = self._values[k]
+        return row
+
     def at(self, k: int, airflow: FloatArray, heat: FloatArray) -> FloatArray:
         """Give the signals of a step, shape (n_signal,) [signal unit].
 
@@ -114,6 +125,7 @@ class EffectSignals:
         """
         row: FloatArray = self._values[k]
         if self._live:
+            row = row.copy()
             self._now.put(np.bincount(self._system.terminals.zone, airflow, heat.size), heat)
             for position, signal in self._live:
                 row[position] = self._of(signal)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -23,8 +24,9 @@ from mpc.plants._actuators import (
     actuators_of,
     checked_actions,
 )
-from mpc.plants._building import BuildingModel
+from mpc.plants._building import BuildingModel, zone_response
 from mpc.plants._history import PlantStep, SystemBalance
+from mpc.plants._local import LocalControl
 from mpc.plants._operation import Operation, scheduled_operation, shared_rows
 from mpc.plants._plant import Measurements, need_running
 from mpc.plants._sensors import SensorNoise, Sensors, plant_devices
@@ -50,6 +52,7 @@ class _Saved:
     hvac: HvacState
     cycling: tuple[bool, ...]
     reading: FloatArray
+    missed: FloatArray
     first: FloatArray
     seed: int
     scenario: Scenario
@@ -134,13 +137,17 @@ class SimulatedPlant:
         self.operation = operation or scheduled_operation(scenario, len(system.air_handlers))
         self.operation.fits(scenario.grid.n_steps, len(scenario.zones), len(system.air_handlers))
         self._hvac, self._step = HvacPlant(system), float(scenario.grid.step)
+        self._design = system.static_pressures
         self._sensors = Sensors(system, self.devices, scenario, noise, count_people)
         self._signals = EffectSignals(model.network, scenario, system)
         self._boundary = _boundaries(scenario, model, boundaries or {})
         self._outdoor = [float(v) for v in scenario.outdoor]
         self._schedule()
         self._offset = _sensor_offset(model)
-        self._warm: tuple[Any, HvacState, tuple[bool, ...], FloatArray] | None = None
+        rated = np.bincount(system.terminals.zone, system.terminals.design_flow, len(scenario.zones))
+        self._local = LocalControl(system, zone_response(model, 1e4 * rated))
+        self._gains = shared_rows(scenario.gains)
+        self._warm: Any = None
         self._number, self._steps = -1, list[PlantStep]()
         self._reading = self._first = np.zeros(len(scenario.zones))
         self._state, self._cycling = self._hvac.start(_WATER), (False,) * len(system.air_handlers)
@@ -187,9 +194,10 @@ class SimulatedPlant:
             if seed < 0:
                 raise PlantError(describe("seed", "0 or more", repr(seed)))
             self._seed, self.scenario = seed, self.scenario.redrawn(seed)
+            self._gains = shared_rows(self.scenario.gains)
         if self._warm is None:
             self._warm_up()
-        building, self._state, self._cycling, self._reading, last = self._warm  # type: ignore[misc]
+        building, self._state, self._cycling, self._reading, self._local.missed, last = self._warm
         self.model.restore_state(building)
         self.model.reseed(self._seed)
         self._first, self._number, self._steps = self._reading - self._offset, 0, []
@@ -221,7 +229,7 @@ class SimulatedPlant:
             found = f"{self.scenario.grid.n_steps - self._number} of its {self.scenario.grid.n_steps}"
             raise PlantError(describe("scenario", f"{self.control_steps} more steps", found, "make it longer"))
         supply = self._supply(given)
-        fresh = [self._advance(self._number + i, given, supply, self.scenario.gains) for i in range(self.control_steps)]
+        fresh = [self._advance(self._number + i, given, supply, self._gains) for i in range(self.control_steps)]
         self._steps += fresh
         self._number += self.control_steps
         return self._seen(fresh, int(self.scenario.grid.edges[self._number]))
@@ -242,8 +250,8 @@ class SimulatedPlant:
         """Keep everything that the next steps depend on, and the run so far; for `restore_state`, on this plant."""
         need_running(self._number >= 0)
         return _Saved(
-            self._number, self.model.save_state(), self._state, self._cycling, self._reading, self._first, self._seed,
-            self.scenario, self._steps, len(self._steps),
+            self._number, self.model.save_state(), self._state, self._cycling, self._reading,
+            self._local.missed, self._first, self._seed, self.scenario, self._steps, len(self._steps),
         )  # fmt: skip
 
     def restore_state(self, saved: Any) -> None:
@@ -263,7 +271,10 @@ class SimulatedPlant:
             raise PlantError(describe("state", "what save_state of such a plant gave", type(saved).__name__))
         self.model.restore_state(saved.building)
         self._number, self._state, self._cycling = saved.number, saved.hvac, saved.cycling
-        self._reading, self._first, self._seed, self.scenario = saved.reading, saved.first, saved.seed, saved.scenario
+        self._reading, self._local.missed, self._first = saved.reading, saved.missed, saved.first
+        if saved.scenario is not self.scenario:
+            self._gains = shared_rows(saved.scenario.gains)
+        self._seed, self.scenario = saved.seed, saved.scenario
         self._steps = saved.steps[: saved.count]
 
     def record(self) -> PlantRecord:
@@ -342,18 +353,17 @@ class SimulatedPlant:
         step_count = max(self._warm_up_steps, 1)
         day = min(round(_DAY / self._step), self.scenario.grid.n_steps)
         start = np.clip(_ZONES, self._heating[0], self._cooling[0])
-        none = np.zeros(len(self.system.terminals))
-        signals = self._signals.at(0, none, np.zeros(len(start)))
-        self._reading = self.model.reset(start, self._boundary[0], signals)
+        self._reading = self.model.reset(start, self._boundary[0], self._signals.known(0))
         self.model.reseed(0)
         self._state, self._cycling = self._hvac.start(_WATER), (False,) * len(self._served)
-        supply, gains = self._supply(self.default_actions), self.scenario.expected_gains
-        begin = self.model.save_state(), self._state, self._cycling, self._reading
+        supply, gains = self._supply(self.default_actions), shared_rows(self.scenario.expected_gains)
+        self._local.missed = np.zeros_like(start)
+        begin = self.model.save_state(), self._state, self._cycling, self._reading, self._local.missed
         for k in range(step_count):
             last = self._advance(k % day, self.default_actions, supply, gains)
         if self._warm_up_steps:
-            begin = self.model.save_state(), self._state, self._cycling, self._reading
-        self._warm = (*begin, last)  # type: ignore[assignment]
+            begin = self.model.save_state(), self._state, self._cycling, self._reading, self._local.missed
+        self._warm = (*begin, last)
 
     def _supply(self, given: Mapping[str, float]) -> tuple[Any, ...]:
         """Supply setpoints as the plant takes them: air, water, static and differential pressure."""
@@ -386,16 +396,24 @@ class SimulatedPlant:
         self._cycling = tuple(w > (0.0 if was else limit) for w, was in zip(worst, self._cycling, strict=True))
         return tuple(max(s, float(c)) for s, c in zip(scheduled, self._cycling, strict=True))
 
-    def _advance(self, k: int, given: Mapping[str, float], supply: tuple[Any, ...], gains: FloatArray) -> PlantStep:
+    def _advance(
+        self, k: int, given: Mapping[str, float], supply: tuple[Any, ...], gains: list[FloatArray]
+    ) -> PlantStep:
         """Take a step of the scenario."""
         heating, cooling = self._setpoints(k, given)
         runs = self._runs(k, heating, cooling)
-        conditions = Conditions(self._reading, heating, cooling, self._outdoor[k])
+        signals = self._signals.known(k)
+        free = self.model.begin(gains[k], self._boundary[k], signals)
+        zone = self._reading
+        if self._local.settles:
+            reach = tuple(run * math.sqrt(p / d) for run, p, d in zip(runs, supply[2], self._design, strict=True))
+            zone = self._local.settle(free, heating, cooling, supply[0], reach)
+        conditions = Conditions(zone, heating, cooling, self._outdoor[k])
         actions = Actions(*supply, runs, max(runs), self._ventilation[k])
         self._state, done = self._hvac.step(self._state, conditions, actions, self._step, self._set_back[k])
         heat = self._hvac.heat(done)
-        signals = self._signals.at(k, done.airflow, heat)
-        mean, self._reading = self.model.step(heat + gains[k], self._boundary[k], signals)
+        mean, self._reading = self.model.finish(heat, self._signals.at(k, done.airflow, heat))
+        self._local.learn(self._reading)
         return PlantStep(k, conditions, actions, done, mean, self._reading - self._offset)
 
 
