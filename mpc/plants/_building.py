@@ -245,6 +245,7 @@ class ReducedBuilding:
         self._output = np.ascontiguousarray(modes.output)
         if np.allclose(self._output, self._heating.T, rtol=1e-9, atol=1e-12 * float(np.abs(self._output).max())):
             self._output = self._heating.T  # one matrix in the cache instead of two
+        self._response = self._output @ (self._gain[:, None] * self._heating)
         self._outside = np.zeros(modes.boundary.shape[1])
         self._state = self._before = self._free_state = self._gained = np.zeros(modes.capacity.size)
         self._reading = self._free = np.zeros(len(self.network.zones))
@@ -310,16 +311,17 @@ class ReducedBuilding:
         heat, signals : ndarray
             As there [W], [signal unit].
         """
-        pushed = self._heating @ heat
+        pushed, reached = self._heating @ heat, self._free + self._response @ heat
         known = self._outside[self._outside.size - signals.size :]
         if signals.size and not np.array_equal(known, signals):
             change = np.zeros_like(self._outside)
             change[change.size - signals.size :] = signals - known
-            pushed += self._modes.boundary @ change
+            moved = self._modes.boundary @ change
+            pushed, reached = pushed + moved, reached + self._output @ (self._gain * moved)
             self._outside += change
         pushed *= self._gain
         self._before, self._state = self._state, self._free_state + pushed
-        start, self._reading = self._reading, self._output @ self._state
+        start, self._reading = self._reading, reached
         # with constant inputs implicit Euler's mean over a step is the trapezoid's
         mean = 0.5 * (start + self._reading)
         return BuildingStep(mean + REFERENCE_TEMPERATURE, self._reading + REFERENCE_TEMPERATURE)

@@ -41,7 +41,7 @@ class LocalControl:
         self._rest = np.zeros(len(response))
         self._columns = np.arange(len(response))
         self._known: tuple[Any, ...] = ()
-        self._temperature = self._start = np.zeros((0, 0))
+        self._start = self._slope = self._offset = np.zeros((0, 0))
         self.missed = np.zeros(len(response))
 
     @property
@@ -50,7 +50,12 @@ class LocalControl:
         return not self._system.thermostat.remembers
 
     def settle(
-        self, free: FloatArray, heating: FloatArray, cooling: FloatArray, supply: tuple[float, ...], reach: tuple[float, ...]
+        self,
+        free: FloatArray,
+        heating: FloatArray,
+        cooling: FloatArray,
+        supply: tuple[float, ...],
+        reach: tuple[float, ...],
     ) -> FloatArray:
         """Find the zones' temperatures at the end of a step.
 
@@ -75,11 +80,8 @@ class LocalControl:
             self._lay_out(heating, cooling, supply, reach)
             self._known, self._kept = known, (heating, cooling)  # kept, or others might get their numbers
         free = free + self.missed
-        start, at, columns = self._start, self._temperature, self._columns
-        row = (start[1:-1] < free).sum(axis=0)
-        low, low_t = start[row, columns], at[row, columns]
-        high, high_t = start[row + 1, columns], at[row + 1, columns]
-        self._rest = low_t + (free - low) * ((high_t - low_t) / (high - low))
+        place = np.add.reduce(self._start[1:-1] < free, axis=0) * free.size + self._columns
+        self._rest = self._offset.take(place) + free * self._slope.take(place)
         return self._rest
 
     def learn(self, reached: FloatArray) -> None:
@@ -95,7 +97,7 @@ class LocalControl:
     def _lay_out(
         self, heating: FloatArray, cooling: FloatArray, supply: tuple[float, ...], reach: tuple[float, ...]
     ) -> None:
-        """Tabulate which free temperature belongs to which end temperature, rising by rows: shape (7, n_zone)."""
+        """Tabulate which end temperature belongs to which free temperature: lines between seven rising points."""
         system, terminals, width = self._system, self._system.terminals, self._system.thermostat.throttling_range
         zone, first = terminals.zone, terminals.reheat_first
         air, most = (np.array(v)[terminals.air_handler] for v in (supply, reach))
@@ -111,4 +113,6 @@ class LocalControl:
             np.bincount(zone, AIR_HEAT_CAPACITY * flow * (leaving - end[zone]), system.zone_count)
             for flow, leaving, end in zip(flows, discharge, ends, strict=True)
         ])  # fmt: skip
-        self._temperature, self._start = ends, ends - self._response * heat
+        self._start = ends - self._response * heat
+        self._slope = np.diff(ends, axis=0) / np.diff(self._start, axis=0)
+        self._offset = ends[:-1] - self._slope * self._start[:-1]

@@ -92,11 +92,8 @@ class FixedSetpoints:
         hours = self.by_hour or {}
         begun = [h for h in hours if h <= hour] or list(hours)
         chosen = {**self.setpoints, **(hours[max(begun)] if begun else {})}
-        return {
-            a.name: chosen.get(a.name, chosen.get(kind, float("nan")))
-            for a in self.actuators
-            if a.name in chosen or (kind := a.name.rpartition("/")[2]) in chosen
-        }
+        by_kind = {a.name: chosen[kind] for a in self.actuators if (kind := a.name.rpartition("/")[2]) in chosen}
+        return by_kind | {a.name: chosen[a.name] for a in self.actuators if a.name in chosen}
 
     def step(self, measurements: Measurements, forecast: Forecast | None) -> dict[str, float]:
         """Choose the setpoints of the hour.

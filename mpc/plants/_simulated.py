@@ -55,7 +55,7 @@ class _Saved:
     missed: FloatArray
     first: FloatArray
     seed: int
-    scenario: Scenario
+    drawn: int | None
     steps: list[PlantStep]
     count: int
 
@@ -146,7 +146,8 @@ class SimulatedPlant:
         self._offset = _sensor_offset(model)
         rated = np.bincount(system.terminals.zone, system.terminals.design_flow, len(scenario.zones))
         self._local = LocalControl(system, zone_response(model, 1e4 * rated))
-        self._gains = shared_rows(scenario.gains)
+        self._given, self._gains = scenario, shared_rows(scenario.gains)
+        self._drawn: int | None = None
         self._warm: Any = None
         self._number, self._steps = -1, list[PlantStep]()
         self._reading = self._first = np.zeros(len(scenario.zones))
@@ -193,8 +194,8 @@ class SimulatedPlant:
         if seed is not None:
             if seed < 0:
                 raise PlantError(describe("seed", "0 or more", repr(seed)))
-            self._seed, self.scenario = seed, self.scenario.redrawn(seed)
-            self._gains = shared_rows(self.scenario.gains)
+            self._seed = seed
+            self._draw(seed)
         if self._warm is None:
             self._warm_up()
         building, self._state, self._cycling, self._reading, self._local.missed, last = self._warm
@@ -251,7 +252,7 @@ class SimulatedPlant:
         need_running(self._number >= 0)
         return _Saved(
             self._number, self.model.save_state(), self._state, self._cycling, self._reading,
-            self._local.missed, self._first, self._seed, self.scenario, self._steps, len(self._steps),
+            self._local.missed, self._first, self._seed, self._drawn, self._steps, len(self._steps),
         )  # fmt: skip
 
     def restore_state(self, saved: Any) -> None:
@@ -272,9 +273,8 @@ class SimulatedPlant:
         self.model.restore_state(saved.building)
         self._number, self._state, self._cycling = saved.number, saved.hvac, saved.cycling
         self._reading, self._local.missed, self._first = saved.reading, saved.missed, saved.first
-        if saved.scenario is not self.scenario:
-            self._gains = shared_rows(saved.scenario.gains)
-        self._seed, self.scenario = saved.seed, saved.scenario
+        self._seed = saved.seed
+        self._draw(saved.drawn)
         self._steps = saved.steps[: saved.count]
 
     def record(self) -> PlantRecord:
@@ -318,6 +318,12 @@ class SimulatedPlant:
         last = self._kept()[-1]
         gains = float(self.scenario.gains[last.number].sum())
         return SystemBalance(energy_balance(self.system, last.conditions, last.done), gains, self.model.flows())
+
+    def _draw(self, seed: int | None) -> None:
+        """Let other people come, those of a seed; None are those of the scenario as it was given."""
+        if seed != self._drawn:
+            self.scenario = self._given if seed is None else self._given.redrawn(seed)
+            self._gains, self._drawn = shared_rows(self.scenario.gains), seed
 
     def _kept(self) -> list[PlantStep]:
         if not self._steps:
