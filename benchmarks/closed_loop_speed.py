@@ -61,7 +61,7 @@ def day(plant: SimulatedPlant) -> np.ndarray:
 
 
 def least_of_days(plant: SimulatedPlant, days: int) -> np.ndarray:
-    """Times of the steps of a day, each the least of several equal days [s]: what other processes do not add to."""
+    """Time the steps of a day [s], each the least of several equal days: what other processes do not add to."""
     runs = []
     for _ in range(days):
         plant.reset()

@@ -16,7 +16,7 @@ DIFFERENTIAL_PRESSURE = "differential_pressure_setpoint"
 HEATING_SETPOINT = "zone_air_heating_temperature_setpoint"
 COOLING_SETPOINT = "zone_air_cooling_temperature_setpoint"
 
-#: Lowest and highest value of each kind of action [K, Pa]. Supply air and water: those of the paper's simulator.
+#: Lowest and highest value of each kind of action [K] or [Pa]. Supply air and water: those of the paper's simulator.
 ACTION_LIMITS: Mapping[str, tuple[float, float]] = {
     SUPPLY_AIR: (285.0, 300.0),
     SUPPLY_WATER: (310.0, 355.0),
@@ -65,7 +65,7 @@ def actuators_of(
     zones : sequence of str
         Names of the zones.
     limits : mapping of str to tuple of float, optional
-        In the place of those of `ACTION_LIMITS` [K, Pa].
+        In the place of those of `ACTION_LIMITS` [K] or [Pa].
 
     Raises
     ------
@@ -99,7 +99,7 @@ def checked_actions(actions: Mapping[str, float], actuators: Mapping[str, Actuat
     Parameters
     ----------
     actions : mapping of str to float
-        Setpoints by ``ENTITY/POINT`` [K, Pa].
+        Setpoints by ``ENTITY/POINT`` [K] or [Pa].
     actuators : mapping of str to Actuator
         By name.
 

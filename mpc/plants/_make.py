@@ -9,7 +9,8 @@ from typing import Literal
 import pandas as pd
 
 from mpc.errors import PlantError
-from mpc.plants._building import BuildingModel, GridBuilding, reduced_building
+from mpc.plants._building import BuildingModel, GridBuilding
+from mpc.plants._reduced import reduced_building
 from mpc.plants._run import FixedSetpoints
 from mpc.plants._sensors import SensorNoise
 from mpc.plants._simulated import SimulatedPlant
@@ -228,7 +229,7 @@ def save_pilot(
     noise : SensorNoise, optional
         Errors of sensors; the defaults of `SensorNoise` by default.
     setpoints : mapping of str to float, optional
-        By kind of action [K, Pa]; those of `SimulatedPlant.default_actions` by default.
+        By kind of action [K] or [Pa]; those of `SimulatedPlant.default_actions` by default.
     overwrite : bool
         Whether a case that is there already is replaced.
 

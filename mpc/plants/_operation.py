@@ -125,7 +125,7 @@ def scheduled_operation(
     width = scenario.upper - scenario.lower
     occupied = width <= width.min(axis=0) + 1e-9
     early = occupied.copy()
-    for ahead in range(1, int(round(lead_hours * 3600.0 / scenario.grid.step)) + 1):
+    for ahead in range(1, round(lead_hours * 3600.0 / scenario.grid.step) + 1):
         early[:-ahead] |= occupied[ahead:]
     # setpoints of the band that comes: its first step's values while the plant is ahead of it
     lower, upper = (_ahead(edge, occupied, early) for edge in (scenario.lower, scenario.upper))

@@ -154,7 +154,7 @@ class Plant(Protocol):
         Parameters
         ----------
         actions : mapping of str to float
-            Setpoints by ``ENTITY/POINT`` [K, Pa].
+            Setpoints by ``ENTITY/POINT`` [K] or [Pa].
 
         Returns
         -------
@@ -201,7 +201,7 @@ class Controller(Protocol):
         Returns
         -------
         mapping of str to float
-            Setpoints by ``ENTITY/POINT`` [K, Pa].
+            Setpoints by ``ENTITY/POINT`` [K] or [Pa].
         """
 
 

@@ -7,7 +7,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
+import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from mpc.errors import PlantError
 from mpc.kpi import PlantRecord
@@ -15,6 +17,8 @@ from mpc.plants._actuators import Actuator
 from mpc.plants._plant import Controller, Measurements, Plant
 from mpc.scenario import Forecast
 from thermal.errors import describe, nearest
+
+FloatArray = NDArray[np.float64]
 
 
 class ClosedLoopRun(NamedTuple):
@@ -27,7 +31,7 @@ class ClosedLoopRun(NamedTuple):
     measurements : DataFrame, shape (n_action, n_column)
         What the controller was shown after each action [library's units].
     actions : DataFrame, shape (n_action, n_actuator)
-        What it set, by the end of the control step [K, Pa].
+        What it set, by the end of the control step [K] or [Pa].
     """
 
     record: PlantRecord
@@ -42,7 +46,7 @@ class FixedSetpoints:
     Parameters
     ----------
     setpoints : mapping of str to float
-        By ``ENTITY/POINT``, or by point for all actuators of that kind [K, Pa].
+        By ``ENTITY/POINT``, or by point for all actuators of that kind [K] or [Pa].
     actuators : tuple of Actuator
         Of the plant.
     by_hour : mapping of float to mapping, optional
@@ -87,7 +91,7 @@ class FixedSetpoints:
         Returns
         -------
         dict of str to float
-            By ``ENTITY/POINT`` [K, Pa].
+            By ``ENTITY/POINT`` [K] or [Pa].
         """
         hours = self.by_hour or {}
         begun = [h for h in hours if h <= hour] or list(hours)
@@ -150,7 +154,10 @@ def run_closed_loop(
     >>> run = run_closed_loop(plant, FixedSetpoints(setpoints, plant.actuators))  # doctest: +SKIP
     """
     seen = plant.reset(seed)
-    rows, stamps, chosen, seconds = [], [], [], []
+    rows: list[FloatArray] = []
+    stamps: list[pd.Timestamp] = []
+    chosen: list[dict[str, float]] = []
+    seconds: list[float] = []
     while not plant.finished and (steps is None or len(rows) < steps):
         forecast = plant.forecast() if forecasts else None
         begin = time.perf_counter()
@@ -165,7 +172,7 @@ def run_closed_loop(
     if not rows:
         raise PlantError(describe("closed loop", "a plant with a control step left", "none"))
     index = pd.DatetimeIndex(stamps, name="timestamp")
-    record = replace(plant.record(), controller_seconds=seconds)
+    record = replace(plant.record(), controller_seconds=np.array(seconds))
     return ClosedLoopRun(
         record, pd.DataFrame(rows, index=index, columns=list(plant.columns)), pd.DataFrame(chosen, index=index)
     )

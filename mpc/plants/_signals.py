@@ -22,7 +22,7 @@ FloatArray = NDArray[np.float64]
 _ROOM = 294.15
 
 
-class _NeedsLoop(Exception):  # noqa: N818 - control flow within this module, never seen outside
+class _NeedsLoop(PlantError):  # noqa: N818 - control flow within this module, never seen outside
     """A signal asks for what only the running loop knows."""
 
 
@@ -77,9 +77,9 @@ class EffectSignals:
         self._values = np.zeros((scenario.grid.n_steps, len(network.signals)))
         self._system, terminals = system, system.terminals
         rate = AIR_HEAT_CAPACITY * terminals.heating_flow
-        most = [np.bincount(terminals.zone, v, system.zone_count) for v in (
-            terminals.design_flow, rate * (terminals.discharge_limit - _ROOM))]  # fmt: skip
-        self._now = _Now(network.zones, *most)
+        most = terminals.design_flow, rate * (terminals.discharge_limit - _ROOM)
+        flow, heat = (system.rooms.T @ value for value in most)
+        self._now = _Now(network.zones, flow, heat)
         self._live: list[tuple[int, Signal]] = []
         drivers = _InAdvance(scenario.driving_case()) if network.signals else None
         for k, signal in enumerate(network.signals):
@@ -126,7 +126,7 @@ class EffectSignals:
         row: FloatArray = self._values[k]
         if self._live:
             row = row.copy()
-            self._now.put(np.bincount(self._system.terminals.zone, airflow, heat.size), heat)
+            self._now.put(self._system.rooms.T @ airflow, heat)
             for position, signal in self._live:
                 row[position] = self._of(signal)
         return row

@@ -14,9 +14,7 @@ from numpy.typing import NDArray
 from mpc.errors import PlantError
 from mpc.kpi import PlantRecord
 from mpc.plants._actuators import (
-    COOLING_SETPOINT,
     DIFFERENTIAL_PRESSURE,
-    HEATING_SETPOINT,
     STATIC_PRESSURE,
     SUPPLY_AIR,
     SUPPLY_WATER,
@@ -26,9 +24,11 @@ from mpc.plants._actuators import (
 )
 from mpc.plants._building import BuildingModel, zone_response
 from mpc.plants._history import PlantStep, SystemBalance
+from mpc.plants._inputs import boundary_series, check_parts, sensor_offset
 from mpc.plants._local import LocalControl
 from mpc.plants._operation import Operation, scheduled_operation, shared_rows
 from mpc.plants._plant import Measurements, need_running
+from mpc.plants._schedule import Schedule
 from mpc.plants._sensors import SensorNoise, Sensors, plant_devices
 from mpc.plants._signals import EffectSignals
 from mpc.scenario import Forecast, Forecaster, Scenario
@@ -84,9 +84,9 @@ class SimulatedPlant:
     forecaster : Forecaster, optional
         Forecasts of the scenario; none by default.
     limits : mapping of str to tuple of float, optional
-        Ranges of actions in the place of `ACTION_LIMITS` [K, Pa].
+        Ranges of actions in the place of `ACTION_LIMITS` [K] or [Pa].
     default_actions : mapping of str to float, optional
-        Setpoints by kind of action during the warm-up [K, Pa]; 287.15 K of air and 333.15 K of water by default.
+        Setpoints by kind of action during the warm-up [K] or [Pa]; 287.15 K of air and 333.15 K of water by default.
     warm_up_days : int
         How often the scenario's first day is run before it begins [d], with expected people, so that walls forget
         how they started.
@@ -120,7 +120,7 @@ class SimulatedPlant:
         boundaries: Mapping[str, float | FloatArray] | None = None,
         seed: int = 0,
     ) -> None:
-        _check(scenario, model, control_steps, warm_up_days, seed)
+        check_parts(scenario, model, control_steps, warm_up_days, seed)
         self.scenario, self.system, self.model, self.forecaster = scenario, system, model, forecaster
         self.control_steps, self._seed = control_steps, seed
         self._warm_up_steps = warm_up_days * round(_DAY / scenario.grid.step)
@@ -130,7 +130,7 @@ class SimulatedPlant:
         )
         self._by_name = {a.name: a for a in self.actuators}
         kinds = {SUPPLY_AIR: 287.15, SUPPLY_WATER: 333.15} | dict(default_actions or {})
-        #: Setpoints during the warm-up, of all required actuators and what was given beside [K, Pa].
+        #: Setpoints during the warm-up, of all required actuators and what was given beside [K] or [Pa].
         self.default_actions = checked_actions(
             {a.name: kinds[kind] for a in self.actuators if (kind := a.name.rpartition("/")[2]) in kinds}, self._by_name
         )
@@ -140,18 +140,18 @@ class SimulatedPlant:
         self._design = system.static_pressures
         self._sensors = Sensors(system, self.devices, scenario, noise, count_people)
         self._signals = EffectSignals(model.network, scenario, system)
-        self._boundary = _boundaries(scenario, model, boundaries or {})
+        self._boundary = boundary_series(scenario, model, boundaries or {})
         self._outdoor = [float(v) for v in scenario.outdoor]
-        self._schedule()
-        self._offset = _sensor_offset(model)
-        rated = np.bincount(system.terminals.zone, system.terminals.design_flow, len(scenario.zones))
+        self._schedule = Schedule(self.operation, system, scenario.zones)
+        self._offset = sensor_offset(model)
+        rated = system.rooms.T @ system.terminals.design_flow
         self._local = LocalControl(system, zone_response(model, 1e4 * rated))
         self._given, self._gains = scenario, shared_rows(scenario.gains)
         self._drawn: int | None = None
         self._warm: Any = None
         self._number, self._steps = -1, list[PlantStep]()
         self._reading = self._first = np.zeros(len(scenario.zones))
-        self._state, self._cycling = self._hvac.start(_WATER), (False,) * len(system.air_handlers)
+        self._state, self._cycling = self._hvac.start(_WATER), (False,) * len(self._design)
 
     @property
     def control_step(self) -> float:
@@ -210,7 +210,7 @@ class SimulatedPlant:
         Parameters
         ----------
         actions : mapping of str to float
-            Setpoints by ``ENTITY/POINT`` [K, Pa]: every required one; the others stay as the building has them.
+            Setpoints by ``ENTITY/POINT`` [K] or [Pa]: every required one; the others stay as the building has them.
 
         Returns
         -------
@@ -344,24 +344,14 @@ class SimulatedPlant:
 
         return Measurements(self._sensors.layout, seconds, values)
 
-    def _schedule(self) -> None:
-        """Lay the schedules out as the plant takes them: rows, floats and tuples."""
-        operation = self.operation
-        self._heating, self._cooling = shared_rows(operation.heating), shared_rows(operation.cooling)
-        self._set_back = list(operation.set_back)
-        self._running = [tuple(map(float, row)) for row in operation.running]
-        self._ventilation = [float(v) for v in operation.ventilation]
-        zones = self.system.terminals.zone
-        self._served = [zones[self.system.terminals.air_handler == k] for k in range(len(self.system.air_handlers))]
-
     def _warm_up(self) -> None:
         """Run the first day with expected people from a steady state, once for all seeds."""
         step_count = max(self._warm_up_steps, 1)
         day = min(round(_DAY / self._step), self.scenario.grid.n_steps)
-        start = np.clip(_ZONES, self._heating[0], self._cooling[0])
+        start = np.clip(_ZONES, self.operation.heating[0], self.operation.cooling[0])
         self._reading = self.model.reset(start, self._boundary[0], self._signals.known(0))
         self.model.reseed(0)
-        self._state, self._cycling = self._hvac.start(_WATER), (False,) * len(self._served)
+        self._state, self._cycling = self._hvac.start(_WATER), (False,) * len(self._design)
         supply, gains = self._supply(self.default_actions), shared_rows(self.scenario.expected_gains)
         self._local.missed = np.zeros_like(start)
         begin = self.model.save_state(), self._state, self._cycling, self._reading, self._local.missed
@@ -375,39 +365,15 @@ class SimulatedPlant:
         """Supply setpoints as the plant takes them: air, water, static and differential pressure."""
         names, boiler, fans = self.devices.air_handlers, self.devices.boiler, self.system.static_pressures
         air = tuple(given[f"{name}/{SUPPLY_AIR}"] for name in names)
-        static = tuple(
-            given.get(f"{name}/{STATIC_PRESSURE}", design) for name, design in zip(names, fans, strict=True)
-        )
+        static = tuple(given.get(f"{name}/{STATIC_PRESSURE}", design) for name, design in zip(names, fans, strict=True))
         return air, given[f"{boiler}/{SUPPLY_WATER}"], static, given.get(f"{boiler}/{DIFFERENTIAL_PRESSURE}")
-
-    def _setpoints(self, k: int, given: Mapping[str, float]) -> tuple[FloatArray, FloatArray]:
-        """Setpoints of the thermostats: the schedule's, but for those that were given."""
-        heating, cooling = self._heating[k], self._cooling[k]
-        if len(given) > len(self._served) + 1:
-            heating, cooling = heating.copy(), cooling.copy()
-            for i, zone in enumerate(self.zone_names):
-                heating[i] = given.get(f"{zone}/{HEATING_SETPOINT}", heating[i])
-                cooling[i] = given.get(f"{zone}/{COOLING_SETPOINT}", cooling[i])
-            np.minimum(heating, cooling, out=heating)
-        return heating, cooling
-
-    def _runs(self, k: int, heating: FloatArray, cooling: FloatArray) -> tuple[float, ...]:
-        """Which air handlers run: by schedule, or since a zone has drifted too far."""
-        scheduled, limit = self._running[k], self.operation.night_cycle
-        if limit is None or min(scheduled) == 1.0:
-            self._cycling = (False,) * len(scheduled)
-            return scheduled
-        beyond = np.maximum(heating - self._reading, self._reading - cooling)
-        worst = [float(beyond[zones].max()) for zones in self._served]
-        self._cycling = tuple(w > (0.0 if was else limit) for w, was in zip(worst, self._cycling, strict=True))
-        return tuple(max(s, float(c)) for s, c in zip(scheduled, self._cycling, strict=True))
 
     def _advance(
         self, k: int, given: Mapping[str, float], supply: tuple[Any, ...], gains: list[FloatArray]
     ) -> PlantStep:
         """Take a step of the scenario."""
-        heating, cooling = self._setpoints(k, given)
-        runs = self._runs(k, heating, cooling)
+        heating, cooling = self._schedule.setpoints(k, given)
+        runs, self._cycling = self._schedule.runs(k, self._reading, heating, cooling, self._cycling)
         signals = self._signals.known(k)
         free = self.model.begin(gains[k], self._boundary[k], signals)
         zone = self._reading
@@ -415,47 +381,10 @@ class SimulatedPlant:
             reach = tuple(run * math.sqrt(p / d) for run, p, d in zip(runs, supply[2], self._design, strict=True))
             zone = self._local.settle(free, heating, cooling, supply[0], reach)
         conditions = Conditions(zone, heating, cooling, self._outdoor[k])
-        actions = Actions(*supply, runs, max(runs), self._ventilation[k])
-        self._state, done = self._hvac.step(self._state, conditions, actions, self._step, self._set_back[k])
+        air, water, static, pressure = supply
+        actions = Actions(air, water, static, pressure, runs, max(runs), self._schedule.ventilation[k])
+        self._state, done = self._hvac.step(self._state, conditions, actions, self._step, self._schedule.set_back[k])
         heat = self._hvac.heat(done)
         mean, self._reading = self.model.finish(heat, self._signals.at(k, done.airflow, heat))
         self._local.learn(self._reading)
         return PlantStep(k, conditions, actions, done, mean, self._reading - self._offset)
-
-
-def _check(scenario: Scenario, model: BuildingModel, control_steps: int, warm_up_days: int, seed: int) -> None:
-    if model.network.zones != scenario.zones:
-        found = f"{len(model.network.zones)} others"
-        raise PlantError(describe("building model", f"the scenario's {len(scenario.zones)} zones", found))
-    if model.step_seconds != scenario.grid.step:
-        found = f"{model.step_seconds:g} s"
-        raise PlantError(describe("building model", f"the scenario's step of {scenario.grid.step:g} s", found))
-    if model.network.airflows:
-        raise PlantError(describe("building", "one without airflows from zone to zone", "some"))
-    if not (isinstance(control_steps, int) and control_steps >= 1 and warm_up_days >= 0 and seed >= 0):
-        found = f"{control_steps}, {warm_up_days} and {seed}"
-        raise PlantError(describe("plant", "control_steps from 1, warm_up_days and seed from 0 on", found))
-
-
-def _boundaries(scenario: Scenario, model: BuildingModel, given: Mapping[str, float | FloatArray]) -> FloatArray:
-    """Boundary temperatures, shape (n_steps, n_boundary) [K]."""
-    names, n_steps = model.network.boundaries, scenario.grid.n_steps
-    columns = [scenario.outdoor]
-    for name in names[1:]:
-        if name not in given:
-            raise PlantError(describe(f"boundary {name!r}", "its temperature", "none", "pass it in `boundaries`"))
-        columns.append(np.broadcast_to(np.asarray(given[name], dtype=float), (n_steps,)))
-    strange = sorted(set(given) - set(names[1:]))
-    if strange:
-        raise PlantError(describe("boundaries", f"those of the building, {list(names[1:])}", repr(strange[0])))
-    return np.ascontiguousarray(np.column_stack(columns))
-
-
-def _sensor_offset(model: BuildingModel) -> FloatArray:
-    """What the zones' sensors say too much, where the effect `sensor_bias` is in the model [K]."""
-    zones = model.network.zones
-    offset = np.zeros(len(zones))
-    for parameter, value in zip(model.network.parameters, model.theta, strict=True):
-        if parameter.base == "sensor_bias" and parameter.member in zones:
-            offset[zones.index(parameter.member)] = value
-    return offset

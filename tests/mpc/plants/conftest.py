@@ -23,8 +23,6 @@ from thermal.pilot import size_system
 
 MakePlant = Callable[..., SimulatedPlant]
 
-NO_GAINS = InternalGains(sensible=0.0, latent=0.0, equipment=0.0, lights=0.0)
-
 
 @cache
 def office() -> Building:
@@ -67,6 +65,12 @@ def system() -> HvacSystem:
 def scenario() -> Callable[..., Scenario]:
     """Make a scenario."""
     return scenario_of
+
+
+@pytest.fixture(scope="session")
+def reduced_office() -> ReducedBuilding:
+    """The office reduced to its modes."""
+    return reduced()
 
 
 @pytest.fixture(scope="session")

@@ -37,7 +37,9 @@ def test_what_the_air_drives_is_of_the_step(
     effects = chosen({"flow_gain": (zone,), "sensor_bias": (zone,), "valve_leak": (zone,)})
     network = build_network(building, dx=1.0, effects=effects)
     signals = EffectSignals(network, scenario(), system)
-    by_name = dict(zip([s.name for s in network.signals], signals.at(9, np.full(12, 0.2), np.full(12, 700.0)), strict=True))
+    by_name = dict(
+        zip([s.name for s in network.signals], signals.at(9, np.full(12, 0.2), np.full(12, 700.0)), strict=True)
+    )
     assert by_name[f"heat of {zone}"] == 700.0
     assert by_name[f"supply air of {zone}"] == pytest.approx(0.2 * AIR_HEAT_CAPACITY)
     assert sorted(by_name.values())[0] == 1.0
