@@ -7,10 +7,9 @@ between volumes (100,000 of them) with the mean of the shuffle, and its reductio
 begin where their own warm-up ends. Their difference is that of the zones' temperatures over the day, with thermostats
 in the loop.
 
-Also counted: a year of the reduced model's states and telemetry would be read in the time that "measurements" says.
-The paper's simulator takes 15 s of CPU a step for a grid of this size on the same kind of machine (`15 to 21 s`,
-measured beside ours, of its own code; "about 15 s" in the paper), and needs 288 of them for a day.
+The paper's simulator takes "about 15 s" a step for the pilot building, by the paper, and needs 288 of them for a day.
 
+A step of the grid has two solves: without supply air, for the local controls that settle within a step, and with it.
 Times are CPU times of the process on one thread; the median of a step, and the least in brackets.
 
 Run: ``python benchmarks/closed_loop_speed.py --out results/loop [--readme]``; a minute on one core. Writes
