@@ -8,6 +8,7 @@ from calibration._disturbance import DisturbanceModel, DisturbedSpace
 from calibration._estimate import Estimate, estimate
 from calibration._evaluate import HORIZONS, Evaluation, Metrics, Predictions, evaluate_model, spatial_metrics
 from calibration._gain import Gain
+from calibration._heat_balance import HeatBalance, HeatFit, heat_balance
 from calibration._information import (
     Combination,
     Direction,
@@ -68,6 +69,8 @@ __all__ = [
     "Fold",
     "Gain",
     "GridCheck",
+    "HeatBalance",
+    "HeatFit",
     "HeldOutDifference",
     "Information",
     "Interval",
@@ -110,6 +113,7 @@ __all__ = [
     "evaluation_verdict",
     "filter_interval",
     "fisher_information",
+    "heat_balance",
     "horizon_steps",
     "information_of",
     "load_parameters",

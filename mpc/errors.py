@@ -25,3 +25,15 @@ class ForecastError(ScenarioError):
 
 class KpiError(MpcError):
     """A record of a closed loop that cannot be measured."""
+
+
+class PlantError(MpcError):
+    """Parts of a plant do not fit each other, or it is used out of order."""
+
+
+class PlantActionError(PlantError):
+    """An action that is missing, unknown, no finite number or outside its range."""
+
+
+class ReplayError(MpcError):
+    """Telemetry lacks what the replay of a sub-system needs."""

@@ -19,7 +19,12 @@ def load(name: str) -> ModuleType:
 
 
 def test_every_example_is_tested_here() -> None:
-    assert {p.stem for p in EXAMPLES.glob("*.py")} == {"step_a_building", "calibrate_a_case", "make_the_pilot"}
+    assert {p.stem for p in EXAMPLES.glob("*.py")} == {
+        "step_a_building",
+        "calibrate_a_case",
+        "close_the_loop",
+        "make_the_pilot",
+    }
 
 
 def test_step_a_building() -> None:
@@ -44,3 +49,11 @@ def test_make_the_pilot(tmp_path: Path) -> None:
     case = load("make_the_pilot").small(str(tmp_path / "office"))
     assert len(case.building.zone_names) == 12
     assert case.zone_temperatures().to_numpy().mean() == pytest.approx(294.0, abs=2.0)
+
+
+def test_close_the_loop() -> None:
+    """Water too cold for the coils saves gas and costs comfort."""
+    example = load("close_the_loop")
+    cold, usual = example.run(311.0), example.run()
+    assert cold.tdis_tot > usual.tdis_tot + 0.05
+    assert 0.1 < usual.ener_tot < 1.0

@@ -124,6 +124,7 @@ class Simulator:
             else None
         )
         self._states: FloatArray | None = None
+        self._stepped: FloatArray | None = None
         self._elapsed = 0.0
         # signals that stand for a temperature are counted from the reference; without any, nothing need be
         self._reference = REFERENCE_TEMPERATURE if network.signals else 0.0
@@ -147,6 +148,11 @@ class Simulator:
     def states(self) -> FloatArray:
         """Temperatures of all control volumes, shape (n_node,) [K]; a copy."""
         return self._current()[:, 0].copy()
+
+    @property
+    def stepped_states(self) -> FloatArray:
+        """Temperatures at the end of the last step, before a random shuffle, shape (n_node,) [K]; a copy."""
+        return self.states if self._stepped is None else self._stepped[:, 0].copy()
 
     @property
     def zone_temperatures(self) -> FloatArray:
@@ -182,7 +188,7 @@ class Simulator:
         matrices = self._start_matrices()
         start = (zone.mean() - zero) * matrices.uniform[:, None]
         states, _, _ = Stepper(matrices, _STEADY_STEP).hold(start, outside, zone[:, None] - zero)
-        self._states, self._elapsed = self._without_stars(states) + zero, 0.0
+        self._states, self._stepped, self._elapsed = self._without_stars(states) + zero, None, 0.0
         return self.zone_temperatures
 
     def reset_from(self, case: Case, stamp: int, spin_up_seconds: float = SPIN_UP) -> FloatArray:
@@ -218,7 +224,7 @@ class Simulator:
             )
         begin = max(0, stamp - round(spin_up_seconds / inputs.step))
         states, _ = spin_up(self._start_matrices(), inputs, begin, np.array([stamp]))
-        self._states, self._elapsed = self._without_stars(states), 0.0
+        self._states, self._stepped, self._elapsed = self._without_stars(states), None, 0.0
         return self.zone_temperatures
 
     def _start_matrices(self) -> Matrices:
@@ -272,7 +278,7 @@ class Simulator:
         n_flow = len(network.airflows)
         flow = self._checked("airflow", np.zeros(n_flow) if airflow is None else airflow, n_flow, (0.0, np.inf))
         states, mean, _, _ = self._stepper.advance(self._current() - zero, outside, heat[:, None], flow[:, None])
-        self._states = states + zero
+        self._states = self._stepped = states + zero
         self._shuffle_when_due()
         return np.asarray(mean[:, 0] + zero)
 
@@ -302,6 +308,7 @@ class Simulator:
         self._elapsed += self.step_seconds
         while self._elapsed >= SHUFFLE_STEP:
             self._elapsed -= SHUFFLE_STEP
+            self._states = self._states.copy()
             self._states[self._air, 0] = self._shuffle.apply(self._states[self._air, 0])
 
     def save_state(self) -> dict[str, Any]:
@@ -330,7 +337,7 @@ class Simulator:
             raise ModelError(
                 f"state: expected {self.network.n_node} temperatures of this building, came {states.shape}"
             )
-        self._states = states[:, None]
+        self._states, self._stepped = states[:, None], None
         self._elapsed = float(saved["elapsed"])
         if self._shuffle is not None:
             self._shuffle.restore(saved["shuffle"])

@@ -6,6 +6,7 @@ from thermal.pilot.disturbance import draw_disturbance
 from thermal.pilot.layout import devices, generate_office
 from thermal.pilot.pilot import PlantFactory, generate_pilot
 from thermal.pilot.prbs import PrbsThermostats, draw_prbs_thermostats
+from thermal.pilot.sizing import DesignConditions, size_system
 from thermal.pilot.telemetry import Plant, Progress, generate_telemetry
 from thermal.pilot.thermostat import Terminals, Thermostats, draw_thermostats, size_terminals
 from thermal.pilot.twin import Excitation, Meter, generate_twin
@@ -14,6 +15,7 @@ from thermal.pilot.weather import MOUNTAIN_VIEW, generate_weather
 __all__ = [
     "MOUNTAIN_VIEW",
     "ClosedLoopError",
+    "DesignConditions",
     "Excitation",
     "LayoutError",
     "Meter",
@@ -35,5 +37,6 @@ __all__ = [
     "generate_telemetry",
     "generate_twin",
     "generate_weather",
+    "size_system",
     "size_terminals",
 ]

@@ -1,0 +1,135 @@
+"""What a controller may set, and the check of what it sets."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from mpc.errors import PlantActionError
+from thermal.errors import describe, nearest
+
+SUPPLY_AIR = "supply_air_temperature_setpoint"
+SUPPLY_WATER = "supply_water_temperature_setpoint"
+STATIC_PRESSURE = "supply_air_static_pressure_setpoint"
+DIFFERENTIAL_PRESSURE = "differential_pressure_setpoint"
+HEATING_SETPOINT = "zone_air_heating_temperature_setpoint"
+COOLING_SETPOINT = "zone_air_cooling_temperature_setpoint"
+
+#: Lowest and highest value of each kind of action [K] or [Pa]. Supply air and water: those of the paper's simulator.
+ACTION_LIMITS: Mapping[str, tuple[float, float]] = {
+    SUPPLY_AIR: (285.0, 300.0),
+    SUPPLY_WATER: (310.0, 355.0),
+    STATIC_PRESSURE: (25.0, 1000.0),
+    DIFFERENTIAL_PRESSURE: (5_000.0, 150_000.0),
+    HEATING_SETPOINT: (283.15, 299.15),
+    COOLING_SETPOINT: (291.15, 308.15),
+}
+_UNITS = {STATIC_PRESSURE: "Pa", DIFFERENTIAL_PRESSURE: "Pa"}
+
+
+@dataclass(frozen=True)
+class Actuator:
+    """A setpoint that a controller may set.
+
+    Parameters
+    ----------
+    name : str
+        ``ENTITY/POINT``, as a column of telemetry.
+    unit : str
+        ``K`` or ``Pa``.
+    lowest, highest : float
+        Range that is accepted [unit]; what lies outside is refused, never clipped.
+    required : bool
+        Whether every action must have it; what is left out otherwise stays as the building has it.
+    """
+
+    name: str
+    unit: str
+    lowest: float
+    highest: float
+    required: bool = True
+
+
+def actuators_of(
+    air_handlers: Sequence[str], boiler: str, zones: Sequence[str], limits: Mapping[str, tuple[float, float]] | None
+) -> tuple[Actuator, ...]:
+    """List the actuators of a building: supply setpoints first, which are required.
+
+    Parameters
+    ----------
+    air_handlers : sequence of str
+        Names of the devices.
+    boiler : str
+        Name of the boiler.
+    zones : sequence of str
+        Names of the zones.
+    limits : mapping of str to tuple of float, optional
+        In the place of those of `ACTION_LIMITS` [K] or [Pa].
+
+    Raises
+    ------
+    PlantActionError
+        When a limit is for no kind of action, or the lower is not below the upper.
+    """
+    for kind, pair in (limits or {}).items():
+        if kind not in ACTION_LIMITS:
+            raise PlantActionError(describe("limits", "a kind of action", repr(kind), nearest(kind, ACTION_LIMITS)))
+        if not -math.inf < pair[0] < pair[1] < math.inf:
+            raise PlantActionError(describe(f"limits: {kind}", "a lower and a higher number", repr(pair)))
+    bounds = {**ACTION_LIMITS, **(limits or {})}
+    kinds = (
+        (SUPPLY_AIR, air_handlers, True),
+        (SUPPLY_WATER, [boiler], True),
+        (STATIC_PRESSURE, air_handlers, False),
+        (DIFFERENTIAL_PRESSURE, [boiler], False),
+        (HEATING_SETPOINT, zones, False),
+        (COOLING_SETPOINT, zones, False),
+    )
+    return tuple(
+        Actuator(f"{entity}/{kind}", _UNITS.get(kind, "K"), *bounds[kind], required)
+        for kind, entities, required in kinds
+        for entity in entities
+    )
+
+
+def checked_actions(actions: Mapping[str, float], actuators: Mapping[str, Actuator]) -> dict[str, float]:
+    """Check an action by name.
+
+    Parameters
+    ----------
+    actions : mapping of str to float
+        Setpoints by ``ENTITY/POINT`` [K] or [Pa].
+    actuators : mapping of str to Actuator
+        By name.
+
+    Returns
+    -------
+    dict of str to float
+        The same, as Python's floats.
+
+    Raises
+    ------
+    PlantActionError
+        When a setpoint is missing, unknown, no finite number or outside its range.
+    """
+    given: dict[str, float] = {}
+    for name, value in actions.items():
+        actuator = actuators.get(name)
+        if actuator is None:
+            raise PlantActionError(describe("action", "an actuator of the plant", repr(name), nearest(name, actuators)))
+        try:
+            number = float(value)
+        except (TypeError, ValueError):
+            number = math.nan
+        if not actuator.lowest <= number <= actuator.highest:  # NaN is in no range
+            expected = f"a number from {actuator.lowest:g} to {actuator.highest:g} {actuator.unit}"
+            raise PlantActionError(describe(f"action {name}", expected, repr(value)))
+        given[name] = number
+    for name, actuator in actuators.items():
+        if not actuator.required:
+            break  # those that are required come first
+        if name not in given:
+            expected = f"a number from {actuator.lowest:g} to {actuator.highest:g} {actuator.unit}"
+            raise PlantActionError(describe(f"action {name}", expected, "nothing", "give every required setpoint"))
+    return given

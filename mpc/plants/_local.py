@@ -1,0 +1,118 @@
+"""Local control that settles within a step: the zone temperatures at which thermostats and terminals come to rest.
+
+Thermostats act within a minute or two, on air that a terminal can warm or cool by several kelvin in a step of five: a
+loop closed from step to step would swing. So the temperature that they see is that of the end of the step,
+
+    T = T_free + R q(T),
+
+with T_free what the zone would reach without supply air, R its response to heat over a step, and q the heat of its
+terminals, which falls as T rises. q is taken as lines between the ends of the thermostat's ranges.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermal.hvac import HvacSystem
+from thermal.units import AIR_HEAT_CAPACITY
+
+FloatArray = NDArray[np.float64]
+
+_FAR = 50.0  # K beyond the thermostat's ranges, where terminals are at their limits and q is a line
+_FOLLOW = 0.5  # share of what the last step missed that is made up for in the next
+
+
+class LocalControl:
+    """Finds where the zones of a plant come to rest within a step.
+
+    Parameters
+    ----------
+    system : HvacSystem
+        Thermostat and terminals.
+    response : ndarray, shape (n_zone,)
+        Rise of the zones over a step per heat [K/W].
+    """
+
+    def __init__(self, system: HvacSystem, response: FloatArray) -> None:
+        self._system, self._response = system, response
+        self._rest = np.zeros(len(response))
+        self._columns = np.arange(len(response))
+        self._known: tuple[Any, ...] = ()
+        self._start = self._slope = self._offset = np.zeros((0, 0))
+        self.missed = np.zeros(len(response))
+
+    @property
+    def settles(self) -> bool:
+        """Whether the thermostats have no memory; those with one switch from step to step."""
+        return not self._system.thermostat.remembers
+
+    def settle(
+        self,
+        free: FloatArray,
+        heating: FloatArray,
+        cooling: FloatArray,
+        supply: tuple[float, ...],
+        reach: tuple[float, ...],
+    ) -> FloatArray:
+        """Find the zones' temperatures at the end of a step.
+
+        Parameters
+        ----------
+        free : ndarray, shape (n_zone,)
+            That they would reach without supply air [K].
+        heating, cooling : ndarray, shape (n_zone,)
+            Setpoints [K].
+        supply : tuple of float
+            Setpoints of the supply air, one an air handler [K].
+        reach : tuple of float
+            Most flow over the design flow that each duct's pressure drives; 0 where fans are off [-].
+
+        Returns
+        -------
+        ndarray, shape (n_zone,)
+            Temperatures [K].
+        """
+        known = (id(heating), id(cooling), supply, reach)
+        if known != self._known:
+            self._lay_out(heating, cooling, supply, reach)
+            self._known, self._kept = known, (heating, cooling)  # kept, or others might get their numbers
+        free = free + self.missed
+        place = np.add.reduce(self._start[1:-1] < free, axis=0) * free.size + self._columns
+        self._rest = self._offset.take(place) + free * self._slope.take(place)
+        return self._rest
+
+    def learn(self, reached: FloatArray) -> None:
+        """Take note of where the zones came to, for what the next step is to make up for.
+
+        Parameters
+        ----------
+        reached : ndarray, shape (n_zone,)
+            Temperatures at the end of the step [K].
+        """
+        self.missed = self.missed + _FOLLOW * (reached - self._rest)
+
+    def _lay_out(
+        self, heating: FloatArray, cooling: FloatArray, supply: tuple[float, ...], reach: tuple[float, ...]
+    ) -> None:
+        """Tabulate which end temperature belongs to which free temperature: lines between seven rising points."""
+        system, terminals, width = self._system, self._system.terminals, self._system.thermostat.throttling_range
+        zone, first = terminals.zone, terminals.reheat_first
+        air, most = (np.array(v)[terminals.air_handler] for v in (supply, reach))
+        limit = np.maximum(terminals.discharge_limit, air)
+        low, gap = heating, np.maximum(cooling - heating, 1e-3)
+        full, begun = low - width, low - min(first, 0.999) * width
+        ends = np.stack([full - _FAR, full, begun, low, low + gap, low + gap + width, low + gap + width + _FAR])
+        least, warm, cool = (np.minimum(f, most * terminals.design_flow) for f in (
+            terminals.minimum_flow, terminals.heating_flow, terminals.design_flow))  # fmt: skip
+        flows = (warm, warm, least, least, least, cool, cool)
+        discharge = (limit, limit, limit, air, air, air, air)
+        heat = np.stack([
+            np.bincount(zone, AIR_HEAT_CAPACITY * flow * (leaving - end[zone]), system.zone_count)
+            for flow, leaving, end in zip(flows, discharge, ends, strict=True)
+        ])  # fmt: skip
+        self._start = ends - self._response * heat
+        self._slope = np.diff(ends, axis=0) / np.diff(self._start, axis=0)
+        self._offset = ends[:-1] - self._slope * self._start[:-1]

@@ -1,0 +1,201 @@
+"""A building reduced to its modes, as a plant steps it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mpc.errors import PlantError
+from mpc.plants._building import BuildingFlows, BuildingStep
+from thermal import Building, SymbolicModel, build_network, reduced_model
+from thermal.effects import Chosen
+from thermal.errors import describe
+from thermal.model import IMPLICIT_EULER, ModalModel, ReducedModel, modal_model
+from thermal.signals import REFERENCE_TEMPERATURE
+
+FloatArray = NDArray[np.float64]
+
+
+class ReducedBuilding:
+    """A building reduced to its modes, stepped by implicit Euler as the grid is.
+
+    Parameters
+    ----------
+    model : ReducedModel
+        Such as `thermal.reduced_model` gives it.
+    theta : ndarray, shape (n_parameter,), optional
+        Parameter values [parameter units]; those that the model was made at by default.
+    step_seconds : float
+        Time step [s].
+    """
+
+    def __init__(self, model: ReducedModel, theta: FloatArray | None = None, step_seconds: float = 300.0) -> None:
+        if model.network.airflows:
+            raise PlantError(describe("building", "one without airflows from zone to zone", "some", "use the grid"))
+        self.network, self.step_seconds = model.network, float(step_seconds)
+        self.theta = model.theta if theta is None else np.asarray(theta, dtype=float)
+        self._modes: ModalModel = modal_model(model.matrices(self.theta))
+        modes, propagator = self._modes, self._modes.propagator(self.step_seconds, IMPLICIT_EULER)
+        self._end, self._gain = propagator.end, propagator.end_gain
+        self._heating = np.ascontiguousarray(modes.heating)
+        self._output = np.ascontiguousarray(modes.output)
+        if np.allclose(self._output, self._heating.T, rtol=1e-9, atol=1e-12 * float(np.abs(self._output).max())):
+            self._output = self._heating.T  # one matrix in the cache instead of two
+        self._response = self._output @ (self._gain[:, None] * self._heating)
+        self._outside = np.zeros(modes.boundary.shape[1])
+        self._state = self._before = self._free_state = self._gained = np.zeros(modes.capacity.size)
+        self._reading = self._free = np.zeros(len(self.network.zones))
+        self._gains = np.zeros(0)
+
+    @property
+    def order(self) -> int:
+        """Number of states."""
+        return int(self._end.size)
+
+    def reset(self, zone: FloatArray, boundary: FloatArray, signals: FloatArray) -> FloatArray:
+        """Start from a steady state; see `BuildingModel`.
+
+        Parameters
+        ----------
+        zone, boundary, signals : ndarray
+            As there [K], [K], [signal unit].
+        """
+        modes = self._modes
+        outside = modes.boundary @ np.concatenate([boundary - REFERENCE_TEMPERATURE, signals])
+        at_rest = 1.0 / modes.conductance
+        free = modes.observation @ (at_rest * outside)
+        gain = modes.observation @ (at_rest[:, None] * modes.heating)
+        heat = np.linalg.solve(gain, np.asarray(zone, dtype=float) - REFERENCE_TEMPERATURE - free)
+        self._state = at_rest * (outside + modes.heating @ heat)
+        self._reading = self._output @ self._state
+        return self._reading + REFERENCE_TEMPERATURE
+
+    def reseed(self, seed: int) -> None:
+        """Nothing is random here.
+
+        Parameters
+        ----------
+        seed : int
+            Without effect.
+        """
+
+    def begin(self, heat: FloatArray, boundary: FloatArray, signals: FloatArray) -> FloatArray:
+        """Begin a step; see `BuildingModel`.
+
+        Parameters
+        ----------
+        heat, boundary, signals : ndarray
+            As there [W], [K], [signal unit].
+        """
+        if self._gains is not heat:
+            self._gains, self._gained = heat, self._heating @ heat
+        outside, n = self._outside, boundary.size
+        np.subtract(boundary, REFERENCE_TEMPERATURE, out=outside[:n])
+        outside[n:] = signals
+        pushed = self._modes.boundary @ outside
+        pushed += self._gained
+        pushed *= self._gain
+        self._free_state = self._end * self._state + pushed
+        self._free = self._output @ self._free_state
+        return self._free + REFERENCE_TEMPERATURE
+
+    def finish(self, heat: FloatArray, signals: FloatArray) -> BuildingStep:
+        """Take the step that was begun; see `BuildingModel`.
+
+        Parameters
+        ----------
+        heat, signals : ndarray
+            As there [W], [signal unit].
+        """
+        pushed, reached = self._heating @ heat, self._free + self._response @ heat
+        known = self._outside[self._outside.size - signals.size :]
+        if signals.size and not np.array_equal(known, signals):
+            change = np.zeros_like(self._outside)
+            change[change.size - signals.size :] = signals - known
+            moved = self._modes.boundary @ change
+            pushed, reached = pushed + moved, reached + self._output @ (self._gain * moved)
+            self._outside += change
+        pushed *= self._gain
+        self._before, self._state = self._state, self._free_state + pushed
+        start, self._reading = self._reading, reached
+        # with constant inputs implicit Euler's mean over a step is the trapezoid's
+        mean = 0.5 * (start + self._reading)
+        return BuildingStep(mean + REFERENCE_TEMPERATURE, self._reading + REFERENCE_TEMPERATURE)
+
+    def flows(self) -> BuildingFlows:
+        """Add up the heat of the last step."""
+        modes, uniform = self._modes, self._modes.uniform
+        brought = (uniform @ modes.boundary) * self._outside
+        n_boundary = len(self.network.boundaries)
+        envelope = uniform @ (modes.conductance * self._state) - brought[:n_boundary].sum()
+        storage = uniform @ (modes.capacity * (self._state - self._before)) / self.step_seconds
+        return BuildingFlows(float(envelope), float(brought[n_boundary:].sum()), float(storage))
+
+    def save_state(self) -> Any:
+        """Everything that the next steps depend on."""
+        return self._state.copy(), self._reading.copy()
+
+    def restore_state(self, saved: Any) -> None:
+        """Return to a saved state.
+
+        Parameters
+        ----------
+        saved : object
+            Of `save_state`.
+        """
+        state, reading = saved
+        if state.shape != self._state.shape:
+            raise PlantError(describe("state", f"one of order {self._state.size}", f"one of order {state.size}"))
+        self._state, self._reading = state.copy(), reading.copy()
+
+
+def reduced_building(
+    building: Building,
+    parameters: Mapping[str, float] | None = None,
+    *,
+    step_seconds: float = 300.0,
+    dx: float | None = None,
+    effects: tuple[Chosen, ...] = (),
+    order: int | None = None,
+    tolerance: float | None = None,
+) -> ReducedBuilding:
+    """Build and reduce a building.
+
+    Parameters
+    ----------
+    building : Building
+        Floor plans or a zone table.
+    parameters : mapping of str to float, optional
+        Values by name [parameter units]; starts for the rest.
+    step_seconds : float
+        Time step [s].
+    dx : float, optional
+        Distance between control volumes of a plan [m].
+    effects : tuple of Chosen
+        What is added to the baseline, `thermal.effects.chosen`; strengths are among the parameters.
+    order : int, optional
+        Largest number of states.
+    tolerance : float, optional
+        Largest error of a zone mean in the certificate's replay [K].
+
+    Returns
+    -------
+    ReducedBuilding
+        Ready to step.
+
+    Examples
+    --------
+    >>> from thermal import load_bundled_case
+    >>> small = reduced_building(load_bundled_case().building, dx=1.0, order=40)
+    >>> none, cold = np.zeros(0), np.array([273.15])
+    >>> start = small.reset(np.full(5, 293.15), cold, none)
+    >>> bool((small.begin(np.zeros(5), cold, none) < start).all())
+    True
+    """
+    grid = SymbolicModel(build_network(building, dx=dx, effects=effects))
+    theta = grid.network.values(parameters or {})
+    model = reduced_model(grid, [theta], order=order, tolerance=tolerance)
+    return ReducedBuilding(model, theta, step_seconds)

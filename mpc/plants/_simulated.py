@@ -1,0 +1,390 @@
+"""Our plant: air handlers, hot water and terminals on a building model, driven by a scenario."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from mpc.errors import PlantError
+from mpc.kpi import PlantRecord
+from mpc.plants._actuators import (
+    DIFFERENTIAL_PRESSURE,
+    STATIC_PRESSURE,
+    SUPPLY_AIR,
+    SUPPLY_WATER,
+    Actuator,
+    actuators_of,
+    checked_actions,
+)
+from mpc.plants._building import BuildingModel, zone_response
+from mpc.plants._history import PlantStep, SystemBalance
+from mpc.plants._inputs import boundary_series, check_parts, sensor_offset
+from mpc.plants._local import LocalControl
+from mpc.plants._operation import Operation, scheduled_operation, shared_rows
+from mpc.plants._plant import Measurements, need_running
+from mpc.plants._schedule import Schedule
+from mpc.plants._sensors import SensorNoise, Sensors, plant_devices
+from mpc.plants._signals import EffectSignals
+from mpc.scenario import Forecast, Forecaster, Scenario
+from thermal import Case, Telemetry
+from thermal.errors import describe
+from thermal.hvac import Actions, Conditions, HvacPlant, HvacState, HvacSystem, energy_balance
+
+FloatArray = NDArray[np.float64]
+
+_DAY = 86400.0
+_WATER = 320.0  # K, of the loop before a warm-up
+_ZONES = 293.15  # K, of the zones before a warm-up
+
+
+@dataclass(frozen=True, eq=False)
+class _Saved:
+    """A plant at some time; the steps are those of a list that only grows."""
+
+    number: int
+    building: Any
+    hvac: HvacState
+    cycling: tuple[bool, ...]
+    reading: FloatArray
+    missed: FloatArray
+    first: FloatArray
+    seed: int
+    drawn: int | None
+    steps: list[PlantStep]
+    count: int
+
+
+class SimulatedPlant:
+    """A building of ours in closed loop with its plant: measurements out, setpoints in.
+
+    A control step is one or more steps of the scenario; in each the thermostats see their zones, the plant meets their
+    calls as far as the setpoints let it, and the building takes up the heat, that of people, light and equipment, and
+    the weather.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Weather, people, and the steps of the plant.
+    system : HvacSystem
+        Air handlers, hot water and terminals.
+    model : BuildingModel
+        The building, `GridBuilding` or `ReducedBuilding`; with effects that a controller's model may lack.
+    operation : Operation, optional
+        Schedules; those of `scheduled_operation` by default.
+    control_steps : int
+        Steps of the plant in a control step.
+    noise : SensorNoise, optional
+        Errors of what is measured; none by default. Local controls see no noise.
+    forecaster : Forecaster, optional
+        Forecasts of the scenario; none by default.
+    limits : mapping of str to tuple of float, optional
+        Ranges of actions in the place of `ACTION_LIMITS` [K] or [Pa].
+    default_actions : mapping of str to float, optional
+        Setpoints by kind of action during the warm-up [K] or [Pa]; 287.15 K of air and 333.15 K of water by default.
+    warm_up_days : int
+        How often the scenario's first day is run before it begins [d], with expected people, so that walls forget
+        how they started.
+    count_people : bool
+        Whether people in the zones are measured.
+    boundaries : mapping of str to float or ndarray, optional
+        Temperatures of boundaries beside outdoor, one or one a step [K].
+    seed : int
+        Of sensor noise, the random shuffle and, after `reset(seed)`, the people.
+
+    Raises
+    ------
+    PlantError
+        When the parts do not fit each other.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        system: HvacSystem,
+        model: BuildingModel,
+        operation: Operation | None = None,
+        *,
+        control_steps: int = 1,
+        noise: SensorNoise | None = None,
+        forecaster: Forecaster | None = None,
+        limits: Mapping[str, tuple[float, float]] | None = None,
+        default_actions: Mapping[str, float] | None = None,
+        warm_up_days: int = 1,
+        count_people: bool = False,
+        boundaries: Mapping[str, float | FloatArray] | None = None,
+        seed: int = 0,
+    ) -> None:
+        check_parts(scenario, model, control_steps, warm_up_days, seed)
+        self.scenario, self.system, self.model, self.forecaster = scenario, system, model, forecaster
+        self.control_steps, self._seed = control_steps, seed
+        self._warm_up_steps = warm_up_days * round(_DAY / scenario.grid.step)
+        self.devices = plant_devices(scenario.building, system)
+        self.actuators: tuple[Actuator, ...] = actuators_of(
+            self.devices.air_handlers, self.devices.boiler, scenario.zones, limits
+        )
+        self._by_name = {a.name: a for a in self.actuators}
+        kinds = {SUPPLY_AIR: 287.15, SUPPLY_WATER: 333.15} | dict(default_actions or {})
+        #: Setpoints during the warm-up, of all required actuators and what was given beside [K] or [Pa].
+        self.default_actions = checked_actions(
+            {a.name: kinds[kind] for a in self.actuators if (kind := a.name.rpartition("/")[2]) in kinds}, self._by_name
+        )
+        self.operation = operation or scheduled_operation(scenario, len(system.air_handlers))
+        self.operation.fits(scenario.grid.n_steps, len(scenario.zones), len(system.air_handlers))
+        self._hvac, self._step = HvacPlant(system), float(scenario.grid.step)
+        self._design = system.static_pressures
+        self._sensors = Sensors(system, self.devices, scenario, noise, count_people)
+        self._signals = EffectSignals(model.network, scenario, system)
+        self._boundary = boundary_series(scenario, model, boundaries or {})
+        self._outdoor = [float(v) for v in scenario.outdoor]
+        self._schedule = Schedule(self.operation, system, scenario.zones)
+        self._offset = sensor_offset(model)
+        rated = system.rooms.T @ system.terminals.design_flow
+        self._local = LocalControl(system, zone_response(model, 1e4 * rated))
+        self._given, self._gains = scenario, shared_rows(scenario.gains)
+        self._drawn: int | None = None
+        self._warm: Any = None
+        self._number, self._steps = -1, list[PlantStep]()
+        self._reading = self._first = np.zeros(len(scenario.zones))
+        self._state, self._cycling = self._hvac.start(_WATER), (False,) * len(self._design)
+
+    @property
+    def control_step(self) -> float:
+        """Time between two actions [s]."""
+        return self.control_steps * self._step
+
+    @property
+    def zone_names(self) -> tuple[str, ...]:
+        """Names of the zones, in the order of records."""
+        return self.scenario.zones
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of the measurements."""
+        return self._sensors.layout.columns
+
+    @property
+    def finished(self) -> bool:
+        """Whether less than a control step of the scenario is left."""
+        return self._number + self.control_steps > self.scenario.grid.n_steps
+
+    @property
+    def now(self) -> int:
+        """Number of the scenario's step that comes next."""
+        return max(self._number, 0)
+
+    def reset(self, seed: int | None = None) -> Measurements:
+        """Start anew, after the warm-up.
+
+        Parameters
+        ----------
+        seed : int, optional
+            Of sensor noise, random shuffle and people; as before by default.
+
+        Returns
+        -------
+        Measurements
+            Of the last step of the warm-up, or, without one, of a step of default setpoints that is not kept.
+        """
+        if seed is not None:
+            if seed < 0:
+                raise PlantError(describe("seed", "0 or more", repr(seed)))
+            self._seed = seed
+            self._draw(seed)
+        if self._warm is None:
+            self._warm_up()
+        building, self._state, self._cycling, self._reading, self._local.missed, last = self._warm
+        self.model.restore_state(building)
+        self.model.reseed(self._seed)
+        self._first, self._number, self._steps = self._reading - self._offset, 0, []
+        return self._seen([last], int(self.scenario.grid.edges[0]))
+
+    def step(self, actions: Mapping[str, float]) -> Measurements:
+        """Hold setpoints for a control step.
+
+        Parameters
+        ----------
+        actions : mapping of str to float
+            Setpoints by ``ENTITY/POINT`` [K] or [Pa]: every required one; the others stay as the building has them.
+
+        Returns
+        -------
+        Measurements
+            Means over the control step.
+
+        Raises
+        ------
+        PlantActionError
+            When a setpoint is missing, unknown, no finite number or outside its range.
+        PlantError
+            When the scenario is over, or `reset` was not called.
+        """
+        need_running(self._number >= 0)
+        given = checked_actions(actions, self._by_name)
+        if self.finished:
+            found = f"{self.scenario.grid.n_steps - self._number} of its {self.scenario.grid.n_steps}"
+            raise PlantError(describe("scenario", f"{self.control_steps} more steps", found, "make it longer"))
+        supply = self._supply(given)
+        fresh = [self._advance(self._number + i, given, supply, self._gains) for i in range(self.control_steps)]
+        self._steps += fresh
+        self._number += self.control_steps
+        return self._seen(fresh, int(self.scenario.grid.edges[self._number]))
+
+    def forecast(self) -> Forecast:
+        """Forecast the steps from now on.
+
+        Raises
+        ------
+        PlantError
+            When the plant has no forecaster.
+        """
+        if self.forecaster is None:
+            raise PlantError(describe("forecast", "a plant with a forecaster", "none", "pass `forecaster`"))
+        return self.forecaster.table(self.now)
+
+    def save_state(self) -> Any:
+        """Keep everything that the next steps depend on, and the run so far; for `restore_state`, on this plant."""
+        need_running(self._number >= 0)
+        return _Saved(
+            self._number, self.model.save_state(), self._state, self._cycling, self._reading,
+            self._local.missed, self._first, self._seed, self._drawn, self._steps, len(self._steps),
+        )  # fmt: skip
+
+    def restore_state(self, saved: Any) -> None:
+        """Return to a saved state: what follows is bit for bit what followed then.
+
+        Parameters
+        ----------
+        saved : object
+            Of `save_state`.
+
+        Raises
+        ------
+        PlantError
+            When it is no such state, or that of another building.
+        """
+        if not isinstance(saved, _Saved) or len(saved.reading) != len(self.zone_names):
+            raise PlantError(describe("state", "what save_state of such a plant gave", type(saved).__name__))
+        self.model.restore_state(saved.building)
+        self._number, self._state, self._cycling = saved.number, saved.hvac, saved.cycling
+        self._reading, self._local.missed, self._first = saved.reading, saved.missed, saved.first
+        self._seed = saved.seed
+        self._draw(saved.drawn)
+        self._steps = saved.steps[: saved.count]
+
+    def record(self) -> PlantRecord:
+        """Give the run since the reset on the plant's own steps: true temperatures, for indicators and rewards.
+
+        Raises
+        ------
+        PlantError
+            When there was no step yet.
+        """
+        done = [s.done for s in self._kept()]
+        temperature = np.stack([self._first, *(s.end for s in self._steps)])
+        electricity, gas = (np.array([getattr(d, f"{kind}_power") for d in done]) for kind in ("electric", "fuel"))
+        return PlantRecord(self._step, temperature, electricity, gas)
+
+    def telemetry(self) -> pd.DataFrame:
+        """Give what was measured in the run since the reset, shape (n_steps, n_column) [library's units].
+
+        Raises
+        ------
+        PlantError
+            When there was no step yet.
+        """
+        people, seed = self.scenario.occupancy, self._seed
+        rows = np.stack([self._read(s, people, seed) for s in self._kept()])
+        index = self.scenario.grid.stamps[self._number - len(rows) : self._number]
+        return pd.DataFrame(rows, index=index.rename("timestamp"), columns=list(self.columns))
+
+    def case(self) -> Case:
+        """Give the run as a case, which `thermal.save_case` saves and calibration and diagnosis take."""
+        return Case(self.scenario.building, Telemetry.from_frame(self.telemetry(), where="closed loop"))
+
+    def balance(self) -> SystemBalance:
+        """Add up where the energy of the last step went, over building and plant.
+
+        Raises
+        ------
+        PlantError
+            When there was no step yet.
+        """
+        last = self._kept()[-1]
+        gains = float(self.scenario.gains[last.number].sum())
+        return SystemBalance(energy_balance(self.system, last.conditions, last.done), gains, self.model.flows())
+
+    def _draw(self, seed: int | None) -> None:
+        """Let other people come, those of a seed; None are those of the scenario as it was given."""
+        if seed != self._drawn:
+            self.scenario = self._given if seed is None else self._given.redrawn(seed)
+            self._gains, self._drawn = shared_rows(self.scenario.gains), seed
+
+    def _kept(self) -> list[PlantStep]:
+        if not self._steps:
+            raise PlantError(describe("run", "a step at least", "none since the reset"))
+        return self._steps
+
+    def _read(self, step: PlantStep, people: FloatArray, seed: int) -> FloatArray:
+        k = step.number
+        return self._sensors.read(k, step.conditions, step.actions, step.done, step.mean, people[k], seed)
+
+    def _seen(self, steps: list[PlantStep], seconds: int) -> Measurements:
+        """Measurements of some steps, read when they are asked for."""
+        people, seed = self.scenario.occupancy, self._seed
+
+        def values() -> FloatArray:
+            rows = [self._read(step, people, seed) for step in steps]
+            return rows[0] if len(rows) == 1 else np.mean(rows, axis=0)
+
+        return Measurements(self._sensors.layout, seconds, values)
+
+    def _warm_up(self) -> None:
+        """Run the first day with expected people from a steady state, once for all seeds."""
+        step_count = max(self._warm_up_steps, 1)
+        day = min(round(_DAY / self._step), self.scenario.grid.n_steps)
+        start = np.clip(_ZONES, self.operation.heating[0], self.operation.cooling[0])
+        self._reading = self.model.reset(start, self._boundary[0], self._signals.known(0))
+        self.model.reseed(0)
+        self._state, self._cycling = self._hvac.start(_WATER), (False,) * len(self._design)
+        supply, gains = self._supply(self.default_actions), shared_rows(self.scenario.expected_gains)
+        self._local.missed = np.zeros_like(start)
+        begin = self.model.save_state(), self._state, self._cycling, self._reading, self._local.missed
+        for k in range(step_count):
+            last = self._advance(k % day, self.default_actions, supply, gains)
+        if self._warm_up_steps:
+            begin = self.model.save_state(), self._state, self._cycling, self._reading, self._local.missed
+        self._warm = (*begin, last)
+
+    def _supply(self, given: Mapping[str, float]) -> tuple[Any, ...]:
+        """Supply setpoints as the plant takes them: air, water, static and differential pressure."""
+        names, boiler, fans = self.devices.air_handlers, self.devices.boiler, self.system.static_pressures
+        air = tuple(given[f"{name}/{SUPPLY_AIR}"] for name in names)
+        static = tuple(given.get(f"{name}/{STATIC_PRESSURE}", design) for name, design in zip(names, fans, strict=True))
+        return air, given[f"{boiler}/{SUPPLY_WATER}"], static, given.get(f"{boiler}/{DIFFERENTIAL_PRESSURE}")
+
+    def _advance(
+        self, k: int, given: Mapping[str, float], supply: tuple[Any, ...], gains: list[FloatArray]
+    ) -> PlantStep:
+        """Take a step of the scenario."""
+        heating, cooling = self._schedule.setpoints(k, given)
+        runs, self._cycling = self._schedule.runs(k, self._reading, heating, cooling, self._cycling)
+        signals = self._signals.known(k)
+        free = self.model.begin(gains[k], self._boundary[k], signals)
+        zone = self._reading
+        if self._local.settles:
+            reach = tuple(run * math.sqrt(p / d) for run, p, d in zip(runs, supply[2], self._design, strict=True))
+            zone = self._local.settle(free, heating, cooling, supply[0], reach)
+        conditions = Conditions(zone, heating, cooling, self._outdoor[k])
+        air, water, static, pressure = supply
+        actions = Actions(air, water, static, pressure, runs, max(runs), self._schedule.ventilation[k])
+        self._state, done = self._hvac.step(self._state, conditions, actions, self._step, self._schedule.set_back[k])
+        heat = self._hvac.heat(done)
+        mean, self._reading = self.model.finish(heat, self._signals.at(k, done.airflow, heat))
+        self._local.learn(self._reading)
+        return PlantStep(k, conditions, actions, done, mean, self._reading - self._offset)

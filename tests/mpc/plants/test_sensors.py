@@ -1,0 +1,79 @@
+"""What sensors say is what happened, with noise of the size that was asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mpc.errors import PlantError
+from mpc.plants import SensorNoise, SimulatedPlant
+from mpc.plants._sensors import plant_devices
+from thermal import Building
+from thermal.case.points import POINT_TYPES, split_column
+from thermal.case.schema import Device
+from thermal.hvac import HvacSystem
+
+Drive = Callable[..., SimulatedPlant]
+
+
+def test_metered_heat_is_what_the_zones_received(make_plant: Drive, drive: Drive) -> None:
+    """By the case format's own formula, of the telemetry alone."""
+    plant = drive(make_plant(), 150)
+    metered = plant.case().zone_heat().to_numpy()
+    given = np.array([plant._hvac.heat(step.done) for step in plant._steps])
+    np.testing.assert_allclose(metered, given, atol=1e-6)
+
+
+def test_meters_add_up_to_the_power_taken(make_plant: Drive, drive: Drive) -> None:
+    plant = drive(make_plant(), 150)
+    frame, record = plant.telemetry(), plant.record()
+    power = frame.filter(regex="/(electrical|pump)_power_sensor").sum(axis=1)
+    np.testing.assert_allclose(power, record.electricity, atol=1e-6)
+    assert record.gas is not None
+    np.testing.assert_allclose(frame.filter(regex="/gas_power_sensor").sum(axis=1), record.gas, atol=1e-6)
+    assert frame["CHILLER/electrical_power_sensor"].max() > 0.0
+
+
+def test_noise_is_of_its_size_and_leaves_commands_alone(make_plant: Drive, drive: Drive) -> None:
+    noise = SensorNoise(temperature=0.1, resolution=0.0, flow=0.05, power=0.02)
+    clean, noisy = drive(make_plant()).telemetry(), drive(make_plant(noise=noise)).telemetry()
+    change = noisy - clean
+    assert change.filter(like="zone_air_temperature_sensor").to_numpy().std() == pytest.approx(0.1, rel=0.05)
+    for point, size in (("supply_air_flowrate_sensor", 0.05), ("gas_power_sensor", 0.02)):
+        share = (change.filter(like=point) / clean.filter(like=point)).to_numpy()
+        assert np.nanstd(share) == pytest.approx(size, rel=0.1)
+    for like in ("_setpoint", "_command"):
+        assert not change.filter(like=like).to_numpy().any()
+
+
+def test_temperatures_come_in_steps_of_the_resolution(make_plant: Drive, drive: Drive) -> None:
+    frame = drive(make_plant(noise=SensorNoise(resolution=0.5)), 5).telemetry()
+    degrees = frame.filter(like="temperature_sensor").to_numpy() - 273.15
+    np.testing.assert_allclose(degrees * 2.0, np.round(degrees * 2.0), atol=1e-9)
+
+
+def test_all_values_are_possible_ones(make_plant: Drive, drive: Drive) -> None:
+    """Day and night, by the ranges of the case format."""
+    frame = drive(make_plant(count_people=True)).telemetry()
+    for column in frame:
+        point = POINT_TYPES[split_column(str(column), "test")[1]]
+        assert frame[column].between(point.lowest, point.highest).all(), column
+
+
+def test_a_device_too_few_or_too_many_is_named(building: Building, system: HvacSystem) -> None:
+    devices = building.devices
+    assert plant_devices(building, system).count == len(devices) == 16
+    with pytest.raises(PlantError, match="zone 'F1_.*'vav'"):
+        plant_devices(replace(building, devices=devices[1:]), system)
+    with pytest.raises(PlantError, match="'extra'"):
+        more = Device(name="extra", type="vav", zone=building.zone_names[0])
+        plant_devices(replace(building, devices=(*devices, more)), system)
+    with pytest.raises(PlantError, match="'ahu'"):
+        plant_devices(replace(building, devices=tuple(d for d in devices if d.name != "AHU_F1")), system)
+    with pytest.raises(PlantError, match="'chiller'"):
+        plant_devices(replace(building, devices=(*devices, Device(name="second", type="chiller"))), system)
+    with pytest.raises(PlantError, match="sensor noise: flow"):
+        SensorNoise(flow=-0.1)

@@ -1,0 +1,173 @@
+"""Sizes of a building's plant from its loads: terminals, air handlers, boiler, as a designer takes them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from thermal.case import Building, FloorPlans, ZoneTable, zone_floor_areas
+from thermal.errors import HvacParameterError, describe
+from thermal.hvac import AirHandler, BoilerLoop, CoolingCoil, Fan, HvacSystem, Pump, Terminals, Thermostat, WaterCoil
+from thermal.model import Stepper, SymbolicModel
+from thermal.network import build_network
+from thermal.units import AIR_HEAT_CAPACITY, air_density
+
+Series = npt.NDArray[np.float64]
+
+_LONG_RUN = 1e8  # s: one implicit step to the steady state
+_COARSE = 1.0  # m: loads need no finer grid
+_LEAST_PIPES = 20.0  # W/K
+_LITRES = 0.01  # m3 of water per kW of boiler, usual for loops of steel pipe
+_HEATING_SHARE = 0.5  # largest heating flow over design flow: the most that ASHRAE 90.1 lets boxes reheat
+_DIVERSITY = 0.85  # zones do not peak together: air handlers carry this share of the terminals' flow
+
+
+@dataclass(frozen=True)
+class DesignConditions:
+    """What a plant is sized for.
+
+    Parameters
+    ----------
+    winter_outdoor : float
+        Outdoor temperature [K]; the default is the 99.6 % one of the paper's pilot building's town (ASHRAE Fundamentals
+        2017, ch. 14, Moffett Field 3 degC) less 3 K.
+    heating, cooling : float
+        Temperatures of the zones in winter and summer [K].
+    supply_air, supply_water : float
+        Of air and hot water at design [K].
+    gains : float
+        Of people, light and equipment at the most [W/m2]; the default is a reference office's (Deru et al. 2011).
+    sun : float
+        That enters through glass at the most, per glazed area [W/m2]: 500 W/m2 through a coefficient of 0.4.
+    oversizing : float
+        Of terminals and boiler in heating [-], 1 to 3; the default is ASHRAE 90.1-2019's (appendix G).
+    least_flow : float
+        Of terminals per floor area [kg/s/m2]; the default is half a cubic foot a minute per square foot.
+
+    Raises
+    ------
+    HvacParameterError
+        When temperatures are out of order or a number is out of its range.
+    """
+
+    winter_outdoor: float = 273.15
+    heating: float = 294.15
+    cooling: float = 297.15
+    supply_air: float = 285.95
+    supply_water: float = 355.35
+    gains: float = 26.0
+    sun: float = 200.0
+    oversizing: float = 1.25
+    least_flow: float = 0.003
+
+    def __post_init__(self) -> None:
+        rising = (200.0, self.winter_outdoor, self.supply_air, self.heating, self.cooling, self.supply_water, 373.15)
+        if not (np.diff(rising) > 0.0).all():
+            raise HvacParameterError(describe("design conditions", "temperatures in order", f"{rising[1:-1]} K"))
+        if not (1.0 <= self.oversizing <= 3.0 and min(self.gains, self.sun) >= 0.0 and self.least_flow > 0.0):
+            found = f"{self.oversizing}, {self.gains}, {self.sun} and {self.least_flow}"
+            raise HvacParameterError(describe("design conditions", "positive loads, oversizing from 1 to 3", found))
+
+
+def size_system(
+    building: Building, design: DesignConditions | None = None, thermostat: Thermostat | None = None
+) -> HvacSystem:
+    """Size the plant of a building: a terminal with reheat a zone, an air handler a device of type ``ahu``, one boiler.
+
+    Heating loads are those of the steady state in the winter, from the building's model with its starting parameters;
+    cooling flows are those of gains, sun and warmth outdoors. With as many air handlers as floors each serves its own,
+    else zones go to them in turn.
+
+    Parameters
+    ----------
+    building : Building
+        With floor plans or a zone table, and its devices; without any of type ``ahu`` it gets one.
+    design : DesignConditions, optional
+        What it is sized for.
+    thermostat : Thermostat, optional
+        Of every zone.
+
+    Returns
+    -------
+    HvacSystem
+        One terminal a zone, in the order of the zones.
+
+    Examples
+    --------
+    >>> from thermal import load_bundled_case
+    >>> system = size_system(load_bundled_case().building)
+    >>> len(system.terminals), bool(system.loop.capacity > 0.0)
+    (5, True)
+    """
+    at, areas = design or DesignConditions(), _floor_areas(building)
+    loss = np.maximum(_heat_loss(building, at), 0.0) * at.oversizing
+    summer = at.gains * areas + at.sun * _glass(building) + loss / (at.heating - at.winter_outdoor) * 11.0
+    drop, rise = at.cooling - at.supply_air, 305.15 - at.heating
+    flow = np.maximum(summer / (AIR_HEAT_CAPACITY * drop), at.least_flow * areas)
+    flow = np.maximum(flow, loss / (AIR_HEAT_CAPACITY * rise * _HEATING_SHARE))
+    reheat = loss + AIR_HEAT_CAPACITY * _HEATING_SHARE * flow * (at.heating - at.supply_air)
+    serving = _serving(building)
+    terminals = Terminals.sized(
+        flow, reheat, air_handler=serving, water_temperature=at.supply_water, supply_temperature=at.supply_air
+    )
+    density = air_density(building.location.elevation)
+    handlers = tuple(_air_handler(float(flow[serving == k].sum()), at, density) for k in range(serving.max() + 1))
+    coils = [h.heating for h in handlers if isinstance(h.heating, WaterCoil)]
+    pump = Pump(float(terminals.water_flow.sum() + sum(coil.water_flow for coil in coils)))
+    capacity = float(reheat.sum()) + sum(c.air_flow * AIR_HEAT_CAPACITY * 12.0 for c in coils)
+    pipes = max(_LEAST_PIPES, 1e-3 * capacity / 10.0)
+    loop = BoilerLoop(
+        capacity, pump, pipe_conductance=min(pipes, 0.4 * pump.minimum_share * pump.design_flow * 4186.0),
+        standing_conductance=0.25 * pipes, water_volume=max(0.05, _LITRES * capacity / 1000.0),
+    )  # fmt: skip
+    return HvacSystem(handlers, loop, terminals, thermostat or Thermostat())
+
+
+def _air_handler(flow: float, at: DesignConditions, density: float) -> AirHandler:
+    """Size an air handler for the flow of its terminals: fans, cooling, and heating of the winter's mixed air."""
+    supplied = _DIVERSITY * flow
+    cooling = 1.3 * AIR_HEAT_CAPACITY * supplied * (at.cooling + 1.0 - at.supply_air)  # a quarter is latent
+    heating = WaterCoil.sized(
+        12.0 * AIR_HEAT_CAPACITY * supplied, supplied, at.supply_air - 4.0, water_temperature=at.supply_water
+    )
+    supply, exhaust = (Fan(supplied, 1000.0, 250.0, air_density=density),
+                       Fan(supplied, 300.0, 100.0, air_density=density))  # fmt: skip
+    return AirHandler(supply, exhaust, CoolingCoil(cooling), heating, enthalpy_limit=64_000.0)
+
+
+def _heat_loss(building: Building, at: DesignConditions) -> Series:
+    """Heat that holds the zones at their temperature in the winter, shape (n_zone,) [W]."""
+    network = build_network(building, dx=_COARSE if isinstance(building.geometry, FloorPlans) else None)
+    matrices = SymbolicModel(network).matrices(network.start())
+    outside = np.full((matrices.n_boundary, 1), at.winter_outdoor)
+    zones = np.full((len(network.zones), 1), at.heating)
+    stepper = Stepper(matrices, _LONG_RUN, airflows=network.airflows)
+    return stepper.hold(at.heating * matrices.uniform[:, None], outside, zones)[2]
+
+
+def _floor_areas(building: Building) -> Series:
+    """Floor area of each zone, shape (n_zone,) [m2]."""
+    if isinstance(building.geometry, ZoneTable):
+        return np.array([zone.floor_area for zone in building.geometry.zones])
+    areas = zone_floor_areas(building.geometry)
+    return np.array([areas[zone] for zone in building.zone_names])
+
+
+def _glass(building: Building) -> Series:
+    """Glazed area of each zone, shape (n_zone,) [m2]."""
+    if isinstance(building.geometry, ZoneTable):
+        windows = [s for s in building.geometry.surfaces if s.kind == "window"]
+        return np.array([sum(s.area for s in windows if s.zone == zone) for zone in building.zone_names], dtype=float)
+    glazing = building.geometry.glazing
+    return np.array([sum(glazing.get(zone, {}).values()) for zone in building.zone_names], dtype=float)
+
+
+def _serving(building: Building) -> npt.NDArray[np.intp]:
+    """Position of the air handler of each zone."""
+    count, zones = max(1, sum(d.type == "ahu" for d in building.devices)), building.zone_names
+    if isinstance(building.geometry, FloorPlans) and count == len(building.geometry.floors):
+        of_floor = {zone: k for k, floor in enumerate(building.geometry.floors) for zone in floor.zone_names}
+        return np.array([of_floor[zone] for zone in zones], dtype=np.intp)
+    return np.arange(len(zones), dtype=np.intp) % count
