@@ -25,3 +25,7 @@ class ForecastError(ScenarioError):
 
 class KpiError(MpcError):
     """A record of a closed loop that cannot be measured."""
+
+
+class ControlError(MpcError):
+    """A control problem whose parts do not fit, or data of a horizon that are incomplete."""
