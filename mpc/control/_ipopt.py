@@ -54,7 +54,8 @@ class _Evaluation:
                 raise self.error
             if len(self._rollouts) > 3:
                 self._rollouts.pop(next(iter(self._rollouts)))
-            rollout = self.problem.predictor.rollout(self._given, self.problem.plan(shares))
+            near = next(reversed(self._rollouts.values()), None)
+            rollout = self.problem.predictor.rollout(self._given, self.problem.plan(shares), near)
             self._rollouts[key] = rollout
         return self._rollouts[key]
 

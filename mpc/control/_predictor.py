@@ -19,6 +19,10 @@ from thermal.signals import REFERENCE_TEMPERATURE
 
 FloatArray = NDArray[np.float64]
 
+_SETTLED = 1e-7  # K: what thermostats go by is found to within this
+_NARROW = 0.02  # K: width of a bracket from which on Newton's method is left alone
+_MOST_TRIES = 30  # of Newton's method in a step; two or three are usual
+
 
 @dataclass(frozen=True, eq=False)
 class Rollout:
@@ -30,6 +34,8 @@ class Rollout:
         Setpoints [unit of the channel].
     zone : ndarray, shape (N + 1, n_zone)
         Temperatures at the edges of the steps [K].
+    seen : ndarray, shape (N, n_zone)
+        What the thermostats go by [K].
     electric, fuel : ndarray, shape (N,)
         Powers, means over the steps [W].
     end_state : ndarray, shape (r,)
@@ -44,6 +50,7 @@ class Rollout:
 
     plan: FloatArray
     zone: FloatArray
+    seen: FloatArray
     electric: FloatArray
     fuel: FloatArray
     end_state: FloatArray
@@ -102,9 +109,16 @@ class Predictor:
 
     Notes
     -----
-    At the start of a step the thermostats look at the zones; flows, valves and the heat into the zones follow and are
-    held over it, as `thermal.hvac.HvacPlant` does. Slopes are forward sensitivities of the single shooting: one column
-    a decision, through the modes (diagonal) and the plant (diagonal and low rank, `thermal.hvac.SmoothHvac`).
+    Thermostats are faster than a step. What they and the terminals go by is the zone's temperature at the *end* of the
+    step, as far as the zone's own heat changes it over the step:
+
+    ``T_seen = T_free + g Q(T_seen)``
+
+    with T_free the end of the step without heat from the plant and g the response of a zone to its own heat. Taken at
+    the start of the step instead, proportional thermostats of 1 K swing from step to step at 5 minutes already. The
+    equations are solved by Newton's method with the zones' own slopes, each zone within a bracket. Slopes are forward
+    sensitivities of the single shooting, exact by the implicit function theorem: one column a decision, through the
+    modes (diagonal) and the plant (diagonal and low rank, `thermal.hvac.SmoothHvac`).
     """
 
     def __init__(
@@ -131,6 +145,8 @@ class Predictor:
         self._end = {dt: p.end for dt, p in parts.items()}
         self._push = {dt: np.ascontiguousarray(p.end_gain[:, None] * modes.heating) for dt, p in parts.items()}
         self._drive = {dt: p.end_gain[:, None] * modes.boundary for dt, p in parts.items()}
+        self._response = {dt: np.ascontiguousarray(self._output @ push) for dt, push in self._push.items()}
+        self._own = {dt: np.ascontiguousarray(np.diag(response)) for dt, response in self._response.items()}
         self._fading = np.exp(-horizon.edges[:-1] / disturbance_time)
         self._design = self._design_knobs()
         self._stepper = hvac.stepper()
@@ -140,8 +156,9 @@ class Predictor:
         at, system = self.hvac.knobs, self.hvac.system
         knobs = np.zeros(at.size)
         knobs[at.supply_air], knobs[at.supply_water] = 288.15, 333.15
-        knobs[at.static_pressure] = system.static_pressures
-        knobs[at.differential_pressure] = system.loop.pump.differential_pressure
+        if at.differential_pressure is not None:
+            knobs[at.static_pressure] = system.static_pressures
+            knobs[at.differential_pressure] = system.loop.pump.differential_pressure
         return knobs
 
     def _given(self, data: HorizonData) -> tuple[FloatArray, FloatArray]:
@@ -173,7 +190,7 @@ class Predictor:
             knobs[:, at] = plan[self.horizon.block_of, c][:, None]
         return knobs
 
-    def rollout(self, data: HorizonData, plan: FloatArray) -> Rollout:
+    def rollout(self, data: HorizonData, plan: FloatArray, near: Rollout | None = None) -> Rollout:
         """Follow a plan.
 
         Parameters
@@ -182,23 +199,47 @@ class Predictor:
             Of the horizon.
         plan : ndarray, shape (n_block, n_channel)
             Setpoints [unit of the channel].
+        near : Rollout, optional
+            One that is likely to be like this, to start from.
         """
         n, count, stepper, water_at = self.n_zone, len(self.horizon), self._stepper, self.hvac.knobs.water
         around, drive = self._given(data)
         knobs, x, water = self.knobs(plan), data.state, data.water
-        zone, done = np.empty((count + 1, n)), np.empty((count, stepper.output.size))
+        zone, seen, done = np.empty((count + 1, n)), np.empty((count, n)), np.empty((count, stepper.output.size))
+        zone[0] = self._output @ x + REFERENCE_TEMPERATURE
         for k, dt in enumerate(self.horizon.steps):
-            zone[k] = self._output @ x
-            zone[k] += REFERENCE_TEMPERATURE
             knobs[k, water_at] = water
-            stepper.zone[:], stepper.knobs[:], stepper.around[:] = zone[k], knobs[k], around[k]
-            done[k] = stepper.step()
+            stepper.knobs[:], stepper.around[:] = knobs[k], around[k]
+            left = self._end[dt] * x + drive[k]
+            free = self._output @ left + REFERENCE_TEMPERATURE
+            guess = zone[k] if near is None else near.seen[k] + (zone[k] - near.zone[k])
+            seen[k] = self._settle(free, self._own[dt], guess)
+            done[k] = stepper.output
             water = done[k, n + 2]
-            x = self._end[dt] * x + self._push[dt] @ done[k, :n] + drive[k]
-        zone[count] = self._output @ x + REFERENCE_TEMPERATURE
-        return Rollout(
-            plan, zone, done[:, n], done[:, n + 1], x, knobs, np.ascontiguousarray(done[:, n + 3 :]), done[:, :n]
-        )
+            x = left + self._push[dt] @ done[k, :n]
+            zone[k + 1] = free + self._response[dt] @ done[k, :n]
+        sums = np.ascontiguousarray(done[:, n + 3 : n + 3 + self.hvac.n_sum])
+        return Rollout(plan, zone, seen, done[:, n], done[:, n + 1], x, knobs, sums, done[:, :n])
+
+    def _settle(self, free: FloatArray, own: FloatArray, guess: FloatArray) -> FloatArray:
+        """Solve ``T = T_free + g Q(T)``; the stepper is left with the step at T."""
+        stepper, n = self._stepper, self.n_zone
+        least, most = np.full(n, -np.inf), np.full(n, np.inf)
+        seen = guess.copy()
+        for _ in range(_MOST_TRIES):
+            stepper.zone[:] = seen
+            done = stepper.step()
+            miss = seen - free - own * done[:n]
+            worst = np.abs(miss).max()
+            if not worst > _SETTLED:  # also where it is not a number: the caller looks at what comes out
+                break
+            above = miss > 0.0
+            most, least = np.where(above, seen, most), np.where(above, least, seen)
+            new = seen - miss / (1.0 - own * np.minimum(done[-n:], 0.0))
+            # close to the root the bracket is let go: the other zones have moved it a little
+            inside = ((new > least) & (new < most)) | (most - least < _NARROW)
+            seen = np.where(inside, new, np.where(np.isfinite(least + most), 0.5 * (least + most), new))
+        return seen
 
     def sensitivity(self, data: HorizonData, rollout: Rollout) -> Sensitivity:
         """Differentiate a roll-out by all decisions.
@@ -212,25 +253,32 @@ class Predictor:
         """
         around, _ = self._given(data)
         count, n_channel, water_at = len(self.horizon), len(self.channels), self.hvac.knobs.water
-        slopes = self.hvac.slopes(rollout.zone[:-1], rollout.knobs, around, rollout.sums)
+        slopes = self.hvac.slopes(rollout.seen, rollout.knobs, around, rollout.sums)
         heat_by = np.stack([slopes.heat_by_knobs[:, :, at].sum(axis=2) for at in self.at], axis=2)
         total_by = np.stack([slopes.totals_by_knobs[:, :, at].sum(axis=2) for at in self.at], axis=2)
+        own = np.stack([self._own[dt] for dt in self.horizon.steps])
+        # (I - g (local + reach pull))^-1 by the matrix inversion lemma: diagonal and rank m
+        diagonal = 1.0 - own * slopes.local
+        spread = (own / diagonal)[:, :, None] * slopes.reach
+        core = spread @ np.linalg.inv(np.eye(self.hvac.n_sum) - slopes.pull @ spread)
         zone, totals = np.zeros((count + 1, self.n_zone, self.n_decision)), np.zeros((count, 3, self.n_decision))
         states, water = np.zeros((self._output.shape[1], self.n_decision)), np.zeros(self.n_decision)
         for k, dt in enumerate(self.horizon.steps):
             block = self.horizon.block_of[k]
-            own = slice(block * n_channel, (block + 1) * n_channel)
-            seen = slice(0, own.stop)  # later blocks have had no effect yet
-            moved = self._output @ states[:, seen]
-            heat = slopes.local[k][:, None] * moved
-            heat += slopes.reach[k] @ (slopes.pull[k] @ moved)
-            heat += np.outer(slopes.heat_by_knobs[k, :, water_at], water[seen])
-            heat[:, own] += heat_by[k]
-            total = slopes.totals_by_zone[k] @ moved + np.outer(slopes.totals_by_knobs[k, :, water_at], water[seen])
-            total[:, own] += total_by[k]
-            zone[k, :, seen], totals[k, :, seen], water[seen] = moved, total, total[2]
-            states[:, seen] = self._end[dt][:, None] * states[:, seen] + self._push[dt] @ heat
-        zone[count] = self._output @ states
+            mine = slice(block * n_channel, (block + 1) * n_channel)
+            acted = slice(0, mine.stop)  # later blocks have had no effect yet
+            left = self._end[dt][:, None] * states[:, acted]
+            free = self._output @ left
+            moved = free + np.outer(own[k] * slopes.heat_by_knobs[k, :, water_at], water[acted])
+            moved[:, mine] += own[k][:, None] * heat_by[k]
+            moved /= diagonal[k][:, None]
+            moved += core[k] @ (slopes.pull[k] @ moved)
+            heat = (moved - free) / own[k][:, None]
+            total = slopes.totals_by_zone[k] @ moved + np.outer(slopes.totals_by_knobs[k, :, water_at], water[acted])
+            total[:, mine] += total_by[k]
+            totals[k, :, acted], water[acted] = total, total[2]
+            states[:, acted] = left + self._push[dt] @ heat
+            zone[k + 1, :, acted] = free + self._response[dt] @ heat
         return Sensitivity(zone, totals[:, 0], totals[:, 1], states)
 
     def heat_content(self, state: FloatArray) -> float:

@@ -55,6 +55,9 @@ class SequentialSolver:
         Decrease of the cost that the model still promises, over the cost, at which the solve has converged [-].
     iterations : int
         Most steps.
+    reach : float
+        Longest first step of a decision, as a share of its range [-]; it grows and shrinks with what steps bring.
+        Linearised far away, another valley of the cost would look near.
     quadratic : str
         ``clarabel`` or ``osqp``: who solves the quadratic programmes.
 
@@ -70,6 +73,7 @@ class SequentialSolver:
     problem: ControlProblem
     tolerance: float = 1e-4
     iterations: int = 30
+    reach: float = 0.25
     quadratic: QuadraticSolver = "clarabel"
 
     def __post_init__(self) -> None:
@@ -97,7 +101,7 @@ class SequentialSolver:
         if not np.isfinite(point.cost):
             status, message = Status.FAILED, "the plan to start from has no finite cost"
         last: tuple[FloatArray, FloatArray, Sensitivity] | None = None
-        longest = 0.0
+        longest, reach, fresh = 0.0, self.reach, self._curvature is None
         while status is not Status.FAILED and k < self.iterations:
             lap = time.perf_counter()
             if time_limit is not None and lap - begin + longest > time_limit:
@@ -108,21 +112,29 @@ class SequentialSolver:
             smooth = self.problem.energy_gradient(data, slopes)
             self._learn(data, point, smooth, slopes, last)
             model = self._model(data, point, slopes, smooth)
-            step, promised, solved = self._step(data, point, model)
+            step, promised, solved = self._step(data, point, model, reach)
             scale = max(abs(point.cost), 1e-6)
             if not solved:
                 status, message = Status.STALLED, f"quadratic programme of step {k} failed"
                 break
+            if promised <= self.tolerance * scale and not fresh:
+                # curvature that was learned elsewhere may promise too little: ask again without it
+                self.forget()
+                self._learn(data, point, smooth, slopes, None)
+                model, fresh = self._model(data, point, slopes, smooth), True
+                step, promised, solved = self._step(data, point, model, reach)
             if promised <= self.tolerance * scale:
                 status, message = Status.CONVERGED, f"the next step promises {promised / scale:.1e} of the cost"
                 break
-            new = self._search(data, point, step, promised)
+            new, length = self._search(data, point, step, promised)
             longest = max(longest, time.perf_counter() - lap)
             if new is None:
                 status, message = Status.STALLED, f"no decrease along step {k}"
                 self.forget()
                 break
-            last, point = (point.shares, smooth, slopes), new
+            good = point.cost - new.cost > 0.75 * promised
+            reach = min(2.0 * reach, 1.0) if good else reach if length == 1.0 else max(length * reach, 0.02)
+            last, point, fresh = (point.shares, smooth, slopes), new, False
         return Solution(
             self.problem.plan(point.shares), point.rollout, point.terms, start, status, message, k,
             time.perf_counter() - begin, "sequential",
@@ -139,8 +151,8 @@ class SequentialSolver:
             before = moved[k : k + n]
         return np.clip(moved, 0.0, 1.0)
 
-    def _at(self, data: HorizonData, shares: FloatArray) -> _Point:
-        rollout = self.problem.predictor.rollout(data, self.problem.plan(shares))
+    def _at(self, data: HorizonData, shares: FloatArray, near: Rollout | None = None) -> _Point:
+        rollout = self.problem.predictor.rollout(data, self.problem.plan(shares), near)
         terms = self.problem.terms(data, rollout)
         return _Point(shares, rollout, terms, terms.total if rollout.finite else np.inf)
 
@@ -192,9 +204,11 @@ class SequentialSolver:
         peaks = float(data.peaks.rate @ highest) / _KILOWATT
         return float(model.gradient @ step + 0.5 * step @ model.hessian @ step) + comfort + peaks
 
-    def _step(self, data: HorizonData, point: _Point, model: _Model) -> tuple[FloatArray, float, bool]:
+    def _step(
+        self, data: HorizonData, point: _Point, model: _Model, reach: float
+    ) -> tuple[FloatArray, float, bool]:
         """Minimise the model: step, decrease that it promises, and whether the programmes were solved."""
-        rows, lower, upper = self._limits(data, point, model)
+        rows, lower, upper = self._limits(data, point, model, reach)
         step, value = np.zeros(point.shares.size), self._value(data, model, np.zeros(point.shares.size))
         first, n_peak = value, data.peaks.rate.size
         for _ in range(_INNER):
@@ -224,7 +238,9 @@ class SequentialSolver:
                 break
         return step, first - value, True
 
-    def _limits(self, data: HorizonData, point: _Point, model: _Model) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def _limits(
+        self, data: HorizonData, point: _Point, model: _Model, reach: float
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Ranges, limits on changes, and peaks above the mean powers, as rows of a quadratic programme [- and kW]."""
         n, n_peak, problem = point.shares.size, data.peaks.rate.size, self.problem
         change = problem.differences @ point.shares - problem.standing(data)
@@ -238,18 +254,20 @@ class SequentialSolver:
             np.eye(n_peak, n + n_peak, k=n),
         ])  # fmt: skip
         none = np.full(len(model.means), -np.inf)
-        lower = np.concatenate([-point.shares, -most - change[limited], none, data.peaks.so_far / _KILOWATT])
+        lower = np.concatenate([np.maximum(-point.shares, -reach), -most - change[limited], none, data.peaks.so_far / _KILOWATT])
         upper = np.concatenate(
-            [1.0 - point.shares, most - change[limited], -model.means / _KILOWATT, np.full(n_peak, np.inf)]
+            [np.minimum(1.0 - point.shares, reach), most - change[limited], -model.means / _KILOWATT, np.full(n_peak, np.inf)]
         )
         return rows, np.minimum(lower, upper), upper
 
-    def _search(self, data: HorizonData, point: _Point, step: FloatArray, promised: float) -> _Point | None:
-        """Walk along a step until the cost falls as it should."""
+    def _search(
+        self, data: HorizonData, point: _Point, step: FloatArray, promised: float
+    ) -> tuple[_Point | None, float]:
+        """Walk along a step until the cost falls as it should: the new point, and the share of the step."""
         length = 1.0
         while length >= _SHORTEST:
-            new = self._at(data, np.clip(point.shares + length * step, 0.0, 1.0))
+            new = self._at(data, np.clip(point.shares + length * step, 0.0, 1.0), point.rollout)
             if new.cost <= point.cost - _SUFFICIENT * length * promised:
-                return new
+                return new, length
             length *= 0.5
-        return None
+        return None, 0.0

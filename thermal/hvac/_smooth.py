@@ -55,8 +55,8 @@ class KnobLayout(NamedTuple):
     supply_water : int
         Setpoint of the supply water [K].
     static_pressure : slice
-        Setpoints of the ducts, one an air handler [Pa].
-    differential_pressure : int
+        Setpoints of the ducts, one an air handler [Pa]; empty where pressures stay at their design values.
+    differential_pressure : int or None
         Setpoint of the loop [Pa].
     size : int
         Length of the vector.
@@ -66,7 +66,7 @@ class KnobLayout(NamedTuple):
     supply_air: slice
     supply_water: int
     static_pressure: slice
-    differential_pressure: int
+    differential_pressure: int | None
     size: int
 
 
@@ -110,6 +110,8 @@ class SmoothHvac:
         The plant; its thermostats act without memory.
     width : float
         Smoothing width as in `hvac_function` [-].
+    pressures : bool
+        Whether the pressures of ducts and loop are among the knobs; else they stay at their design values.
 
     Notes
     -----
@@ -123,15 +125,15 @@ class SmoothHvac:
     >>> system = HvacSystem((AirHandler(Fan(1.0)),), BoilerLoop(2e4, Pump(0.5)), Terminals.sized([0.5], 4000.0))
     >>> smooth = SmoothHvac(system)
     >>> smooth.knobs.size, smooth.n_sum
-    (5, 5)
+    (3, 5)
     """
 
-    def __init__(self, system: HvacSystem, width: float = 0.02) -> None:
+    def __init__(self, system: HvacSystem, width: float = 0.02, pressures: bool = False) -> None:
         n_air = len(system.air_handlers)
         self.system, self.width, self.n_zone, self.n_air_handler = system, width, system.zone_count, n_air
-        self.knobs = KnobLayout(
-            0, slice(1, 1 + n_air), 1 + n_air, slice(2 + n_air, 2 + 2 * n_air), 2 + 2 * n_air, 3 + 2 * n_air
-        )
+        size = 2 + n_air + (n_air + 1 if pressures else 0)
+        ducts, loop = (slice(2 + n_air, 2 + 2 * n_air), 2 + 2 * n_air) if pressures else (slice(0, 0), None)
+        self.knobs = KnobLayout(0, slice(1, 1 + n_air), 1 + n_air, ducts, loop, size)
         zone, knobs = casadi.SX.sym("zone", self.n_zone), casadi.SX.sym("knobs", self.knobs.size)
         around = casadi.SX.sym("around", 2 * self.n_zone + 5 + 3 * n_air)
         plain, cut = (_SumOperations(width, system, c) for c in (False, True))
@@ -140,12 +142,12 @@ class SmoothHvac:
         self.n_around = int(around.numel())
         sums = casadi.vertcat(*[casadi.sum1(term) for term in plain.terms])
         heat = system.at_zones(plain, done.terminal_heat)
-        self._step = casadi.Function(
-            "hvac_step", [zone, knobs, around], [casadi.densify(casadi.vertcat(heat, *_totals(done), sums))]
-        )
-        self._slopes = self._slope_function(cut, zone, knobs, around)
+        self._slopes, local = self._slope_functions(cut, zone, knobs, around)
+        # both graphs hold the step itself, which is computed once
+        everything = casadi.cse(casadi.vertcat(heat, *_totals(done), sums, local(zone, knobs, around, sums)))
+        self._step = casadi.Function("hvac_step", [zone, knobs, around], [casadi.densify(everything)])
         self._buffers: dict[int, Any] = {}
-        self._outputs = self.n_zone + 3 + self.n_sum
+        self._outputs = 2 * self.n_zone + 3 + self.n_sum
 
     def around(
         self,
@@ -196,13 +198,15 @@ class SmoothHvac:
         heat, cool = system.thermostat.calls(ops, zone, heating, cooling)
         calls = Calls(system.at_terminals(ops, heat), system.at_terminals(ops, cool))
         conditions = Conditions(zone, heating, cooling, outdoor, damp, _each(humid), room)
+        loop = None if at.differential_pressure is None else knobs[at.differential_pressure]
+        ducts = None if loop is None else _each(knobs[at.static_pressure])
         actions = Actions(
-            _each(knobs[at.supply_air]), knobs[at.supply_water], _each(knobs[at.static_pressure]),
-            knobs[at.differential_pressure], _each(running), boiler, _each(ventilation),
-        )  # fmt: skip
+            _each(knobs[at.supply_air]), knobs[at.supply_water], ducts, loop, _each(running), boiler, _each(ventilation)
+        )
         return advance(ops, system, knobs[at.water], calls, conditions, actions, seconds)
 
-    def _slope_function(self, ops: _SumOperations, zone: Value, knobs: Value, around: Value) -> Any:
+    def _slope_functions(self, ops: _SumOperations, zone: Value, knobs: Value, around: Value) -> tuple[Any, Any]:
+        """All slopes, and those of the heat by each zone's own temperature alone."""
         done = self._advanced(ops, zone, knobs, around)
         heat, symbols = self.system.at_zones(ops, done.terminal_heat), casadi.vertcat(*ops.symbols)
         rooms, every = casadi.sparsify(casadi.DM(self.system.rooms.T)), casadi.DM.ones(self.n_zone)
@@ -210,15 +214,16 @@ class SmoothHvac:
         pulls = [casadi.mtimes(rooms, casadi.jtimes(term, zone, every)) for term in ops.terms]
         sums = casadi.vertcat(*[casadi.sum1(term) for term in ops.terms])
         by = casadi.vertcat(symbols, knobs)
+        local = casadi.jtimes(heat, zone, every)
         outputs = [
-            casadi.jtimes(heat, zone, every),
+            local,
             casadi.horzcat(*pulls),
             casadi.jacobian(sums, by),
             casadi.jacobian(casadi.vertcat(heat, *_totals(done)), by),
         ]
-        return casadi.Function(
-            "hvac_slopes", [zone, knobs, around, symbols], [casadi.densify(output) for output in outputs]
-        )
+        inputs = [zone, knobs, around, symbols]
+        slopes = casadi.Function("hvac_slopes", inputs, [casadi.densify(output) for output in outputs])
+        return slopes, casadi.Function("hvac_local", inputs, [local])
 
     def stepper(self) -> HvacStepper:
         """Make what takes one step at a time, without overhead."""
@@ -289,8 +294,9 @@ class HvacStepper:
 
         Returns
         -------
-        ndarray, shape (n_zone + 3 + m,)
-            Heat [W]; electric and fuel power [W]; water at the end [K]; sums. Overwritten by the next step.
+        ndarray, shape (2 n_zone + 3 + m,)
+            Heat [W]; electric and fuel power [W]; water at the end [K]; sums; slope of each zone's heat by its own
+            temperature, sums held [W/K]. Overwritten by the next step.
         """
         self._run()
         return self.output
