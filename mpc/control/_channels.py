@@ -86,7 +86,9 @@ class Channel:
         }[self.quantity]
         if at is None or at == slice(0, 0):
             advice = "make the plant's functions with SmoothHvac(system, pressures=True)"
-            raise ControlError(describe(f"channel {self.quantity}", "a plant whose pressures can be set", "none", advice))
+            raise ControlError(
+                describe(f"channel {self.quantity}", "a plant whose pressures can be set", "none", advice)
+            )
         if isinstance(at, int):
             return np.array([at], dtype=np.intp)
         chosen = tuple(range(hvac.n_air_handler)) if self.air_handlers is None else self.air_handlers

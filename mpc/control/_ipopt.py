@@ -18,7 +18,12 @@ from mpc.control._solution import Solution, Status
 FloatArray = NDArray[np.float64]
 
 _KILOWATT = 1000.0  # W
-_QUIET = {"print_time": False, "ipopt.print_level": 0, "ipopt.sb": "yes", "ipopt.hessian_approximation": "limited-memory"}
+_QUIET = {
+    "print_time": False,
+    "ipopt.print_level": 0,
+    "ipopt.sb": "yes",
+    "ipopt.hessian_approximation": "limited-memory",
+}
 _TUNED = {
     "ipopt.mu_init": 1e-3, "ipopt.bound_push": 1e-6, "ipopt.bound_frac": 1e-6,
     "ipopt.limited_memory_max_history": 20, "ipopt.nlp_scaling_method": "none",
@@ -144,10 +149,12 @@ class IpoptSolver:
     def __init__(self, problem: ControlProblem, tolerance: float = 1e-5, iterations: int = 200) -> None:
         self.problem, self.tolerance, self.iterations = problem, tolerance, iterations
         self._evaluation = _Evaluation(problem)
+        self.memory: FloatArray | None = None  # nothing is kept between solves
         self._built: dict[tuple[int, int, bool], tuple[Any, Any]] = {}
 
     def forget(self) -> None:
         """Nothing is kept between solves."""
+        self.memory = None
 
     def solve(self, data: HorizonData, plan: FloatArray, time_limit: float | None = None) -> Solution:
         """Solve for one horizon; see `Solver`.

@@ -19,7 +19,7 @@ from thermal.signals import REFERENCE_TEMPERATURE
 
 FloatArray = NDArray[np.float64]
 
-_SETTLED = 1e-7  # K: what thermostats go by is found to within this
+_SETTLED = 1e-6  # K: what thermostats go by is found to within this
 _NARROW = 0.02  # K: width of a bracket from which on Newton's method is left alone
 _MOST_TRIES = 30  # of Newton's method in a step; two or three are usual
 
@@ -173,7 +173,9 @@ class Predictor:
             n_temperature = outside.shape[1] - self.modes.n_signal
             outside[:, :n_temperature] -= REFERENCE_TEMPERATURE
             steps = self.horizon.steps
-            drive = np.stack([self._drive[dt] @ o + self._push[dt] @ f for dt, o, f in zip(steps, outside, free, strict=True)])
+            drive = np.stack(
+                [self._drive[dt] @ o + self._push[dt] @ f for dt, o, f in zip(steps, outside, free, strict=True)]
+            )
             self._known = (data, around, drive)
         return self._known[1], self._known[2]
 

@@ -63,7 +63,9 @@ def solve_quadratic(
     return run(half, gradient / size, rows, lower, upper)
 
 
-def _clarabel(half: Any, gradient: FloatArray, rows: FloatArray, lower: FloatArray, upper: FloatArray) -> QuadraticResult:
+def _clarabel(
+    half: Any, gradient: FloatArray, rows: FloatArray, lower: FloatArray, upper: FloatArray
+) -> QuadraticResult:
     import clarabel  # here: a second for whoever imports the package and solves nothing
 
     top, bottom = np.isfinite(upper), np.isfinite(lower)

@@ -52,7 +52,8 @@ class SequentialSolver:
     problem : ControlProblem
         What is solved.
     tolerance : float
-        Decrease of the cost that the model still promises, over the cost, at which the solve has converged [-].
+        Decrease over the cost at which the solve has converged [-]: promised by the model, or brought by each of the
+        last two steps.
     iterations : int
         Most steps.
     reach : float
@@ -71,17 +72,31 @@ class SequentialSolver:
     """
 
     problem: ControlProblem
-    tolerance: float = 1e-4
+    tolerance: float = 1e-3
     iterations: int = 30
     reach: float = 0.25
     quadratic: QuadraticSolver = "clarabel"
 
     def __post_init__(self) -> None:
         self._curvature: FloatArray | None = None
+        self._reach = self.reach
 
     def forget(self) -> None:
-        """Drop the curvature of earlier solves."""
-        self._curvature = None
+        """Drop the curvature and the length of steps of earlier solves."""
+        self._curvature, self._reach = None, self.reach
+
+    @property
+    def memory(self) -> FloatArray | None:
+        """Curvature and, below it, the length of the next first step, shape (D + 1, D) [currency, -]; None is none."""
+        if self._curvature is None:
+            return None
+        return np.vstack([self._curvature, np.full(self._curvature.shape[0], self._reach)])
+
+    @memory.setter
+    def memory(self, kept: FloatArray | None) -> None:
+        self.forget()
+        if kept is not None:
+            self._curvature, self._reach = np.array(kept[:-1]), float(kept[-1, 0])
 
     def solve(self, data: HorizonData, plan: FloatArray, time_limit: float | None = None) -> Solution:
         """Solve for one horizon; see `Solver`.
@@ -101,7 +116,7 @@ class SequentialSolver:
         if not np.isfinite(point.cost):
             status, message = Status.FAILED, "the plan to start from has no finite cost"
         last: tuple[FloatArray, FloatArray, Sensitivity] | None = None
-        longest, reach, fresh = 0.0, self.reach, self._curvature is None
+        longest, reach, fresh, slow = 0.0, self._reach, self._curvature is None, 0
         while status is not Status.FAILED and k < self.iterations:
             lap = time.perf_counter()
             if time_limit is not None and lap - begin + longest > time_limit:
@@ -119,7 +134,7 @@ class SequentialSolver:
                 break
             if promised <= self.tolerance * scale and not fresh:
                 # curvature that was learned elsewhere may promise too little: ask again without it
-                self.forget()
+                self._curvature = None
                 self._learn(data, point, smooth, slopes, None)
                 model, fresh = self._model(data, point, slopes, smooth), True
                 step, promised, solved = self._step(data, point, model, reach)
@@ -130,11 +145,16 @@ class SequentialSolver:
             longest = max(longest, time.perf_counter() - lap)
             if new is None:
                 status, message = Status.STALLED, f"no decrease along step {k}"
-                self.forget()
+                self._curvature = None
                 break
             good = point.cost - new.cost > 0.75 * promised
             reach = min(2.0 * reach, 1.0) if good else reach if length == 1.0 else max(length * reach, 0.02)
+            slow = slow + 1 if point.cost - new.cost <= self.tolerance * scale else 0
             last, point, fresh = (point.shares, smooth, slopes), new, False
+            if slow == 2:
+                status, message = Status.CONVERGED, f"two steps brought less than {self.tolerance:g} of the cost each"
+                break
+        self._reach = float(np.clip(reach, 0.05, self.reach))
         return Solution(
             self.problem.plan(point.shares), point.rollout, point.terms, start, status, message, k,
             time.perf_counter() - begin, "sequential",
@@ -204,9 +224,7 @@ class SequentialSolver:
         peaks = float(data.peaks.rate @ highest) / _KILOWATT
         return float(model.gradient @ step + 0.5 * step @ model.hessian @ step) + comfort + peaks
 
-    def _step(
-        self, data: HorizonData, point: _Point, model: _Model, reach: float
-    ) -> tuple[FloatArray, float, bool]:
+    def _step(self, data: HorizonData, point: _Point, model: _Model, reach: float) -> tuple[FloatArray, float, bool]:
         """Minimise the model: step, decrease that it promises, and whether the programmes were solved."""
         rows, lower, upper = self._limits(data, point, model, reach)
         step, value = np.zeros(point.shares.size), self._value(data, model, np.zeros(point.shares.size))
@@ -254,9 +272,16 @@ class SequentialSolver:
             np.eye(n_peak, n + n_peak, k=n),
         ])  # fmt: skip
         none = np.full(len(model.means), -np.inf)
-        lower = np.concatenate([np.maximum(-point.shares, -reach), -most - change[limited], none, data.peaks.so_far / _KILOWATT])
+        lower = np.concatenate(
+            [np.maximum(-point.shares, -reach), -most - change[limited], none, data.peaks.so_far / _KILOWATT]
+        )
         upper = np.concatenate(
-            [np.minimum(1.0 - point.shares, reach), most - change[limited], -model.means / _KILOWATT, np.full(n_peak, np.inf)]
+            [
+                np.minimum(1.0 - point.shares, reach),
+                most - change[limited],
+                -model.means / _KILOWATT,
+                np.full(n_peak, np.inf),
+            ]
         )
         return rows, np.minimum(lower, upper), upper
 

@@ -77,6 +77,13 @@ class Solver(Protocol):
     def problem(self) -> ControlProblem:
         """The problem that it was built for."""
 
+    @property
+    def memory(self) -> FloatArray | None:
+        """What it keeps from solve to solve, to be saved with a controller's state [its own]."""
+
+    @memory.setter
+    def memory(self, kept: FloatArray | None) -> None: ...
+
     def solve(self, data: HorizonData, plan: FloatArray, time_limit: float | None = None) -> Solution:
         """Solve for one horizon.
 
