@@ -189,7 +189,7 @@ def peak_data(
     horizon: Horizon,
     now: pd.Timestamp,
     so_far: Mapping[str, float] | None = None,
-    used: float = 0.0,
+    used: Sequence[float] = (),
 ) -> PeakData:
     """Windows of demand charges over a horizon.
 
@@ -203,19 +203,19 @@ def peak_data(
         Start of the horizon, in the building's time zone.
     so_far : mapping of str to float
         Highest mean of each peak until now, by the names of `mpc.scenario.DemandBuckets` [W]; default none.
-    used : float
-        Mean power since the window of now began [W].
+    used : sequence of float
+        Mean power since the window of now began, of each charge [W]; default none.
     """
     parts: list[PeakData] = []
     seconds = horizon.edges
-    for charge in charges:
+    for charge, power in zip(charges, used or [0.0] * len(charges), strict=True):
         begin = now.timestamp()
         first = np.floor(begin / charge.window) * charge.window - begin
         bounds = np.arange(first, seconds[-1], charge.window)
         overlap = np.minimum(seconds[1:], bounds[:, None] + charge.window) - np.maximum(seconds[:-1], bounds[:, None])
         weights = np.maximum(overlap, 0.0)
         offset = np.zeros(len(bounds))
-        offset[0] = used * -first / charge.window
+        offset[0] = power * -first / charge.window
         # windows that the horizon's end cuts count with the mean of their part
         whole = np.where(np.arange(len(bounds)) == 0, charge.window, np.maximum(weights.sum(axis=1), 1e-9))
         grid = StepGrid(now + pd.Timedelta(seconds=float(first)), charge.window, len(bounds))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, get_args
 
@@ -78,12 +77,13 @@ class Channel:
         ControlError
             When an air handler is not one of the plant's.
         """
-        at = {
+        places: dict[str, slice | int | None] = {
             "supply_air_temperature": hvac.knobs.supply_air,
             "supply_water_temperature": hvac.knobs.supply_water,
             "static_pressure": hvac.knobs.static_pressure,
             "differential_pressure": hvac.knobs.differential_pressure,
-        }[self.quantity]
+        }
+        at = places[self.quantity]
         if at is None or at == slice(0, 0):
             advice = "make the plant's functions with SmoothHvac(system, pressures=True)"
             raise ControlError(
@@ -117,14 +117,3 @@ def supply_channels(
         Channel("supply_air_temperature", *air, air_rate),
         Channel("supply_water_temperature", *water, water_rate),
     )
-
-
-def middle(channels: Sequence[Channel]) -> FloatArray:
-    """Middles of the ranges, shape (n_channel,) [unit of the channel].
-
-    Parameters
-    ----------
-    channels : sequence of Channel
-        What is decided.
-    """
-    return np.array([0.5 * (c.lower + c.upper) for c in channels])

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any
 
@@ -20,7 +20,7 @@ from mpc.control._reading import Readings, SitePoints
 from mpc.control._rules import ResetRule
 from mpc.control._solution import Solution, Solver
 from mpc.errors import MpcError
-from mpc.scenario import DemandCharge, Forecast
+from mpc.scenario import DemandCharge, Forecast, StepGrid
 
 FloatArray = NDArray[np.float64]
 
@@ -95,8 +95,8 @@ class ControllerSettings:
     carbon_price: float = 0.0
     heat_value: float = 0.0
     time_limit: float = 60.0
-    operation: ComfortOperation = ComfortOperation()
-    rule: ResetRule = ResetRule()
+    operation: ComfortOperation = field(default_factory=ComfortOperation)
+    rule: ResetRule = field(default_factory=ResetRule)
     demand: tuple[DemandCharge, ...] = ()
 
 
@@ -119,7 +119,7 @@ class MpcController:
 
     Notes
     -----
-    Nothing that happens in a step raises: what is missing is filled in or falls back, and `Action.reasons` says so.
+    What goes wrong in a step does not raise: what is missing is filled in or falls back, and `Action.reasons` says so.
     The order is: optimal plan, the previous plan as far as it reaches, rules.
     """
 
@@ -140,7 +140,10 @@ class MpcController:
         self._forecast: Forecast | None = None
         self._gains: FloatArray | None = None
         self._peaks: dict[str, float] = {}
-        self._window: tuple[float, float] = (0.0, 0.0)  # start of the demand window, energy used in it
+        # of each charge: start of the window that runs [s since 1970], and energy used in it [J]
+        self._windows = [(0.0, 0.0)] * len(self.settings.demand)
+        self._heat: FloatArray | None = None
+        self._water = 293.15
         self._started = False
 
     def step(
@@ -157,6 +160,11 @@ class MpcController:
         now : pandas.Timestamp, optional
             End of the control step, in the building's time zone; by default ``measurements.stamp``, else where the
             forecast begins.
+
+        Raises
+        ------
+        MpcError
+            Only in a first step that nothing tells the time of.
         """
         reasons: list[str] = []
         stamp = self._now(measurements, forecast, now)
@@ -210,8 +218,6 @@ class MpcController:
         schedule = settings.operation.schedule(expected.band, horizon.edges)
         n_steps, n_zone = expected.gains.shape
         n_air = self.problem.predictor.hvac.n_air_handler
-        window, used = self._window
-        spent = max(now.timestamp() - window, 1.0)
         return HorizonData(
             state=self.observer.modal_state.copy(), water=water, disturbance=self.observer.disturbance.copy(),
             previous=self._previous, boundary=boundary, outdoor_temperature=expected.outdoor_temperature,
@@ -221,7 +227,8 @@ class MpcController:
             ventilation=np.repeat(schedule.ventilation[:, None], n_air, axis=1), boiler=schedule.running,
             electricity_price=expected.electricity_price, gas_price=expected.gas_price,
             comfort_price=np.full((n_steps, n_zone), settings.comfort_price),
-            peaks=peak_data(settings.demand, horizon, now, self._peaks, used / spent), heat_value=settings.heat_value,
+            peaks=peak_data(settings.demand, horizon, now, self._peaks, self._used(now)),
+            heat_value=settings.heat_value,
         )  # fmt: skip
 
     def _boundary(self, expected: Expected, forecast: Forecast, stamps: pd.DatetimeIndex) -> FloatArray:
@@ -248,29 +255,34 @@ class MpcController:
             self._started = True
         else:
             gains = np.zeros_like(read.heat) if self._gains is None else self._gains
-            self.observer.update(read.zone, read.heat + gains, before)
+            planned = np.zeros_like(read.heat) if self._heat is None else self._heat
+            self.observer.update(read.zone, np.where(np.isfinite(read.heat), read.heat, planned) + gains, before)
         self._gains = expected.gains[0]
         self._count_demand(read.electricity, now)
-        return read.water if np.isfinite(read.water) else float(self._previous.max())
+        self._water = read.water if np.isfinite(read.water) else self._water
+        return self._water
 
     def _count_demand(self, electricity: float, now: pd.Timestamp) -> None:
-        """Add the power of the step that has ended to its demand window, and close windows that are over."""
-        if not self.settings.demand or not np.isfinite(electricity):
-            return
+        """Add the power of the step that has ended to the window that it began in; a window that is over is a peak."""
         step = self.problem.predictor.horizon.control_step
-        for charge in self.settings.demand:
-            begin = np.floor((now.timestamp() - step) / charge.window) * charge.window
-            start, used = self._window if self._window[0] == begin else (begin, 0.0)
-            used += electricity * step
-            one = pd.Timestamp(begin, unit="s", tz="UTC").tz_convert(now.tz)
-            data = peak_data([charge], self.problem.predictor.horizon, one)
-            from mpc.scenario import StepGrid
-
-            names = charge.on(StepGrid(one, charge.window, 1)).names
-            if now.timestamp() >= begin + charge.window and names and data.rate.size:
-                self._peaks[names[0]] = max(self._peaks.get(names[0], 0.0), used / charge.window)
+        for k, charge in enumerate(self.settings.demand):
+            begin = float(np.floor((now.timestamp() - step) / charge.window) * charge.window)
+            start, used = self._windows[k] if self._windows[k][0] == begin else (begin, 0.0)
+            used += electricity * step if np.isfinite(electricity) else 0.0
+            if now.timestamp() >= begin + charge.window:
+                one = pd.Timestamp(begin, unit="s", tz="UTC").tz_convert(now.tz)
+                for name in charge.on(StepGrid(one, charge.window, 1)).names:
+                    self._peaks[name] = max(self._peaks.get(name, 0.0), used / max(charge.window, step))
                 start, used = begin + charge.window, 0.0
-            self._window = (start, used)
+            self._windows[k] = (start, used)
+
+    def _used(self, now: pd.Timestamp) -> list[float]:
+        """Mean power since the window of now began, of each charge [W]."""
+        means = []
+        for (start, energy), charge in zip(self._windows, self.settings.demand, strict=True):
+            lasted = now.timestamp() - start
+            means.append(energy / lasted if 0.0 < lasted < charge.window else 0.0)
+        return means
 
     def _solve(self, data: HorizonData, now: pd.Timestamp, reasons: list[str]) -> Solution | None:
         reasons.extend(self.problem.explain_limits(data))
@@ -287,6 +299,8 @@ class MpcController:
             reasons.append(f"{solution.solver} solver: {solution.status}, {solution.message}")
             self.solver.forget()
         else:
+            held = self.problem.predictor.horizon.edges[1:] <= self.problem.predictor.horizon.control_step + 1e-6
+            self._heat = solution.rollout.heat[held].mean(axis=0)
             reasons.extend(explain_comfort(self.problem, data, solution, self.points.zones, now))
         return solution
 
@@ -330,7 +344,8 @@ class MpcController:
             "estimate": self.observer.state.copy(), "started": self._started, "previous": self._previous.copy(),
             "plan": None if self._plan is None else (self._plan[0], self._plan[1].copy()), "forecast": self._forecast,
             "gains": None if self._gains is None else self._gains.copy(), "peaks": dict(self._peaks),
-            "window": self._window, "memory": self.solver.memory,
+            "windows": list(self._windows), "memory": self.solver.memory, "heat": self._heat,
+            "water": self._water,
         }  # fmt: skip
 
     def restore_state(self, saved: Mapping[str, Any]) -> None:
@@ -343,5 +358,6 @@ class MpcController:
         """
         self.observer.state, self._started = saved["estimate"].copy(), saved["started"]
         self._previous, self._plan, self._forecast = saved["previous"].copy(), saved["plan"], saved["forecast"]
-        self._gains, self._peaks, self._window = saved["gains"], dict(saved["peaks"]), saved["window"]
+        self._gains, self._peaks, self._windows = saved["gains"], dict(saved["peaks"]), list(saved["windows"])
+        self._heat, self._water = saved["heat"], saved["water"]
         self.solver.memory = saved["memory"]

@@ -159,7 +159,7 @@ class Horizon:
         return np.stack([(late - early) / (ends - self.block_starts) for early, late in at], axis=1)
 
     def stamps(self, now: pd.Timestamp) -> pd.DatetimeIndex:
-        """Ends of the steps.
+        """Give the ends of the steps.
 
         Parameters
         ----------

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mpc.control._data import HorizonData
-from mpc.control._problem import ControlProblem
 from mpc.control._predictor import Rollout
+from mpc.control._problem import ControlProblem
 from mpc.control._solution import Solution, Status
 
 FloatArray = NDArray[np.float64]
@@ -231,12 +231,12 @@ class IpoptSolver:
             owners = [ca.sum1((p[n_peak + j] == ca.DM(range(n_peak))) * x[n:]) for j in range(n_window)]
             above = [values[1 + j] - owner for j, owner in enumerate(owners)]
             limited = np.flatnonzero(np.isfinite(problem.most_change))
-            nlp = {
+            nlp: Any = {
                 "x": x,
                 "p": p,
                 "f": values[0] + ca.dot(p[:n_peak], x[n:]),
                 "g": ca.vertcat(*above, ca.mtimes(ca.DM(problem.differences[limited]), x[:n])),
             }
-            options = {"ipopt.tol": self.tolerance, "ipopt.max_iter": self.iterations, **_QUIET}
+            options: Any = {"ipopt.tol": self.tolerance, "ipopt.max_iter": self.iterations, **_QUIET}
             self._built[key] = (ca.nlpsol("control", "ipopt", nlp, options | (_TUNED if tuned else {})), callback)
         return self._built[key][0]

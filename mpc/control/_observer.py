@@ -110,5 +110,5 @@ class Observer:
             seen = self.kalman.whole.observation[reported]
             reach = self._covariance @ seen.T
             innovation = seen @ reach + np.diag(self.kalman.whole.noise_variance[reported])
-            self._gains[key] = np.linalg.solve(innovation, reach.T).T
+            self._gains[key] = np.asarray(np.linalg.solve(innovation, reach.T).T, dtype=float)
         return self._gains[key]

@@ -162,7 +162,7 @@ class Predictor:
         return knobs
 
     def _given(self, data: HorizonData) -> tuple[FloatArray, FloatArray]:
-        """What does not depend on the plan: surroundings of the plant, and drive of the modes; kept for one horizon."""
+        """Give what no plan changes: surroundings of the plant, and drive of the modes; kept for one horizon."""
         if self._known[0] is not data:
             around = self.hvac.around(
                 data.heating_setpoint, data.cooling_setpoint, data.outdoor_temperature, data.outdoor_humidity,

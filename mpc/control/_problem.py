@@ -140,7 +140,7 @@ class ControlProblem:
         return np.eye(self.span.size) - np.eye(self.span.size, k=-self.shape[1])
 
     def standing(self, data: HorizonData) -> FloatArray:
-        """What the first changes count from, shape (D,): setpoints that stand now, then zeros [-].
+        """Give what the first changes count from, shape (D,): setpoints that stand now, then zeros [-].
 
         Parameters
         ----------

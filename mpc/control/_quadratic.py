@@ -85,5 +85,5 @@ def _osqp(half: Any, gradient: FloatArray, rows: FloatArray, lower: FloatArray, 
 
     solver = osqp.OSQP()
     solver.setup(half, gradient, sp.csc_matrix(rows), lower, upper, **_OSQP)
-    found = solver.solve()
+    found = solver.solve(raise_error=False)
     return QuadraticResult(np.asarray(found.x), found.info.status == "solved", str(found.info.status))

@@ -82,7 +82,7 @@ class Reading(NamedTuple):
     zone : ndarray, shape (n_zone,)
         Temperatures [K]; NaN where missing.
     heat : ndarray, shape (n_zone,)
-        Metered heat of the terminals [W]; 0 where it cannot be known.
+        Metered heat of the terminals [W]; NaN where it cannot be known.
     outdoor, water : float
         Outdoor and supply-water temperature [K]; NaN where missing.
     electricity : float
@@ -142,7 +142,7 @@ class Readings:
         flow = np.array([_value(measurements, f"{name}/supply_air_flowrate_sensor") for name in points.terminals])
         warm = np.array([_value(measurements, f"{name}/discharge_air_temperature_sensor") for name in points.terminals])
         each = AIR_HEAT_CAPACITY * flow * (warm - zone[place])
-        heat = np.bincount(place, np.nan_to_num(each), n_zone)
+        heat = np.asarray(np.bincount(place, each, n_zone), dtype=float)
         outdoor = _value(measurements, f"{points.weather_station}/{OUTDOOR_TEMPERATURE}")
         water = _value(measurements, f"{points.boiler}/supply_water_temperature_sensor")
         power = sum((_value(measurements, column) for column in points.meters), 0.0)
@@ -150,10 +150,10 @@ class Readings:
                    for z, t in zip(points.zones, zone, strict=True) if not np.isfinite(t)]  # fmt: skip
         # where the zone itself did not report, its heat is unknown too and has been said
         lost = np.flatnonzero(~np.isfinite(each) & np.isfinite(zone[place]))
-        missing += [f"flow or discharge temperature of {points.terminals[k]!r} is missing: its heat counts as 0"
-                    for k in lost]  # fmt: skip
+        names = [points.terminals[k] for k in lost]
+        missing += [f"flow or discharge temperature of {name!r} is missing: the plan's heat is taken" for name in names]
         if not np.isfinite(water):
-            missing.append(f"supply water temperature of {points.boiler!r} is missing: its last setpoint is taken")
+            missing.append(f"supply water temperature of {points.boiler!r} is missing: its last value is taken")
         return Reading(zone, heat, outdoor, water, power, tuple(missing))
 
 

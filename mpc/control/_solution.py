@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mpc.control._data import HorizonData
-from mpc.control._problem import ControlProblem, CostTerms
 from mpc.control._predictor import Rollout
+from mpc.control._problem import ControlProblem, CostTerms
 
 FloatArray = NDArray[np.float64]
 

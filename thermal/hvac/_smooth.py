@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import casadi
@@ -193,7 +194,7 @@ class SmoothHvac:
         n, n_air, system, at = self.n_zone, self.n_air_handler, self.system, self.knobs
         ends = np.cumsum([0, n, n, 1, 1, n_air, 1, n_air, 1, n_air, 1]).tolist()
         heating, cooling, outdoor, damp, humid, room, running, boiler, ventilation, seconds = (
-            around[a:b] for a, b in zip(ends[:-1], ends[1:], strict=True)
+            around[a:b] for a, b in pairwise(ends)
         )
         heat, cool = system.thermostat.calls(ops, zone, heating, cooling)
         calls = Calls(system.at_terminals(ops, heat), system.at_terminals(ops, cool))
@@ -250,12 +251,12 @@ class SmoothHvac:
             out = [np.empty((count, size)) for size in sizes]
             buffer, run = mapped.buffer()
             for k, array in enumerate(out):
-                buffer.set_res(k, memoryview(array))
+                buffer.set_res(k, memoryview(array.data))
             self._buffers[count] = (mapped, buffer, run, out)
         _, buffer, run, out = self._buffers[count]
         given = [np.ascontiguousarray(a, dtype=float) for a in (zone, knobs, around, sums)]
         for k, array in enumerate(given):
-            buffer.set_arg(k, memoryview(array))
+            buffer.set_arg(k, memoryview(array.data))
         run()
         local, pulls, of_sums, of_all = out  # columns first, as CasADi stores matrices
         of_sums = of_sums.reshape(count, m + n_knob, m).transpose(0, 2, 1)
@@ -286,8 +287,8 @@ class HvacStepper:
         self._function = function
         self._buffer, self._run = function.buffer()
         for k, array in enumerate((self.zone, self.knobs, self.around)):
-            self._buffer.set_arg(k, memoryview(array))
-        self._buffer.set_res(0, memoryview(self.output))
+            self._buffer.set_arg(k, memoryview(array.data))
+        self._buffer.set_res(0, memoryview(self.output.data))
 
     def step(self) -> FloatArray:
         """Take a step from what stands in `zone`, `knobs` and `around`.
