@@ -20,7 +20,7 @@ FloatArray = NDArray[np.float64]
 _KILOWATT = 1000.0  # W
 _INNER = 12  # most quadratic programmes of one step; three are usual
 _SHORTEST = 1.0 / 256.0  # of a step, when the line search gives up
-_SUFFICIENT = 1e-4  # share of the predicted decrease that a step must bring (Armijo)
+_SUFFICIENT = 0.1  # share of the predicted decrease that a step must bring (Armijo)
 
 
 class _Point(NamedTuple):
@@ -57,8 +57,8 @@ class SequentialSolver:
     iterations : int
         Most steps.
     reach : float
-        Longest first step of a decision, as a share of its range [-]; it grows and shrinks with what steps bring.
-        Linearised far away, another valley of the cost would look near.
+        Longest step of a decision, as a share of its range [-]; it shrinks and recovers with what steps bring. Longer
+        ones leap over valleys of the cost.
     quadratic : str
         ``clarabel`` or ``osqp``: who solves the quadratic programmes.
 
@@ -74,7 +74,7 @@ class SequentialSolver:
     problem: ControlProblem
     tolerance: float = 1e-3
     iterations: int = 30
-    reach: float = 0.25
+    reach: float = 0.2
     quadratic: QuadraticSolver = "clarabel"
 
     def __post_init__(self) -> None:
@@ -148,7 +148,7 @@ class SequentialSolver:
                 self._curvature = None
                 break
             good = point.cost - new.cost > 0.75 * promised
-            reach = min(2.0 * reach, 1.0) if good else reach if length == 1.0 else max(length * reach, 0.02)
+            reach = min(2.0 * reach, self.reach) if good else reach if length == 1.0 else max(length * reach, 0.02)
             slow = slow + 1 if point.cost - new.cost <= self.tolerance * scale else 0
             last, point, fresh = (point.shares, smooth, slopes), new, False
             if slow == 2:

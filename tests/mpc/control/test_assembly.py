@@ -29,7 +29,7 @@ def test_means_and_bands(make_forecast, points) -> None:
 def test_a_missing_column_is_named_with_its_first_time(make_forecast, points) -> None:
     table = make_forecast().table.copy()
     name = f"{points.zones[1]}/internal_gain"
-    table.loc[table.index[4]:, name] = np.nan
+    table.loc[table.index[4] :, name] = np.nan
     with pytest.raises(ForecastError, match=rf"lacks '{name}' for 44 of 48 steps \(first 2023-01-16 06:25\)"):
         expect(Forecast(table), AHEAD, START, points.zones)
     held = expect(Forecast(table), AHEAD, START, points.zones, fill="hold")

@@ -33,12 +33,16 @@ def test_the_gradient_is_that_of_finite_differences(make_problem, make_data) -> 
     found = problem.gradient(data, rollout, problem.predictor.sensitivity(data, rollout))
     for j in range(shares.size):
         step = np.eye(shares.size)[j] * 1e-4
-        sides = [problem.terms(data, problem.predictor.rollout(data, problem.plan(shares + s))).total for s in (step, -step)]
+        sides = [
+            problem.terms(data, problem.predictor.rollout(data, problem.plan(shares + s))).total for s in (step, -step)
+        ]
         assert found[j] == pytest.approx((sides[0] - sides[1]) / 2e-4, rel=2e-3, abs=2e-4)
 
 
 def test_peaks_below_those_of_the_month_are_free() -> None:
-    peaks = PeakData(np.array([[0.5, 0.5, 0.0]]), np.zeros(1), np.zeros(1, dtype=int), np.array([10.0]), np.array([4e3]))
+    peaks = PeakData(
+        np.array([[0.5, 0.5, 0.0]]), np.zeros(1), np.zeros(1, dtype=int), np.array([10.0]), np.array([4e3])
+    )
     assert peaks.peaks(np.array([1e3, 3e3, 9e3])).tolist() == [4000.0]
     assert peaks.peaks(np.array([1e4, 2e3, 0.0])).tolist() == [6000.0]
 
