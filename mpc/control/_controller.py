@@ -42,7 +42,7 @@ class Action(Mapping[str, float]):
     Parameters
     ----------
     setpoints : dict of str to float
-        Finite, within the ranges of their channels [K, Pa].
+        Finite, within the ranges of their channels [K or Pa].
     source : Source
         Optimal plan, previous plan or rules.
     reasons : tuple of str

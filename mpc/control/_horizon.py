@@ -105,7 +105,7 @@ class Horizon:
         Examples
         --------
         >>> day = Horizon.growing([(1.0, 300.0), (23.0, 900.0)], [1.0, 1.0, 2.0, 2.0, 2.0, 4.0, 6.0])
-        >>> len(day), day.n_block, day.edges[-1] / 3600.0
+        >>> len(day), day.n_block, float(day.edges[-1]) / 3600.0
         (104, 7, 24.0)
         """
         steps = np.concatenate([np.full(max(round(hours * 3600.0 / step), 1), float(step)) for hours, step in parts])

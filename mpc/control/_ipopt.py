@@ -14,6 +14,7 @@ from mpc.control._data import HorizonData
 from mpc.control._predictor import Rollout
 from mpc.control._problem import ControlProblem
 from mpc.control._solution import Solution, Status
+from mpc.errors import MpcError
 
 FloatArray = NDArray[np.float64]
 
@@ -30,7 +31,7 @@ _TUNED = {
 }  # fmt: skip
 
 
-class _OutOfTimeError(Exception):
+class _OutOfTimeError(MpcError):
     """Ends a solve from within its callback."""
 
 

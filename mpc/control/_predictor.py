@@ -41,7 +41,7 @@ class Rollout:
     end_state : ndarray, shape (r,)
         Of the modes at the end [(W K)^0.5].
     knobs : ndarray, shape (N, n_knob)
-        Water at the starts, and setpoints [K, Pa].
+        Water at the starts, and setpoints [K or Pa].
     sums : ndarray, shape (N, m)
         Of the plant, where its slopes are taken [as in `thermal.hvac.HvacSlopes`].
     heat : ndarray, shape (N, n_zone)
@@ -180,7 +180,7 @@ class Predictor:
         return self._known[1], self._known[2]
 
     def knobs(self, plan: FloatArray) -> FloatArray:
-        """Spread a plan over the steps, shape (N, n_knob) [K, Pa]; water is left for the roll-out.
+        """Spread a plan over the steps, shape (N, n_knob) [K or Pa]; water is left for the roll-out.
 
         Parameters
         ----------
@@ -208,14 +208,16 @@ class Predictor:
         around, drive = self._given(data)
         knobs, x, water = self.knobs(plan), data.state, data.water
         zone, seen, done = np.empty((count + 1, n)), np.empty((count, n)), np.empty((count, stepper.output.size))
-        zone[0] = self._output @ x + REFERENCE_TEMPERATURE
+        zone[0], ahead = self._output @ x + REFERENCE_TEMPERATURE, np.zeros(n)
         for k, dt in enumerate(self.horizon.steps):
             knobs[k, water_at] = water
             stepper.knobs[:], stepper.around[:] = knobs[k], around[k]
             left = self._end[dt] * x + drive[k]
             free = self._output @ left + REFERENCE_TEMPERATURE
-            guess = zone[k] if near is None else near.seen[k] + (zone[k] - near.zone[k])
-            seen[k] = self._settle(free, self._own[dt], guess)
+            if near is not None:
+                ahead = near.seen[k] - near.zone[k]
+            seen[k] = self._settle(free, self._own[dt], zone[k] + ahead)
+            ahead = seen[k] - zone[k]
             done[k] = stepper.output
             water = done[k, n + 2]
             x = left + self._push[dt] @ done[k, :n]

@@ -89,7 +89,7 @@ class HvacSlopes:
     heat_by_knobs : ndarray, shape (N, n_zone, n_knob)
         Of the heat by the knobs [W per K or Pa].
     totals_by_zone : ndarray, shape (N, 3, n_zone)
-        Of electric power, fuel power and water at the end [W/K, W/K, -].
+        Of electric power, fuel power and water at the end [W/K; the water's: K/K].
     totals_by_knobs : ndarray, shape (N, 3, n_knob)
         The same by the knobs [W or K per K or Pa].
     """
@@ -238,7 +238,7 @@ class SmoothHvac:
         zone : ndarray, shape (N, n_zone)
             Temperatures at the starts [K].
         knobs : ndarray, shape (N, n_knob)
-            Water at the start, and actions [K, Pa].
+            Water at the start, and actions [K or Pa].
         around : ndarray, shape (N, n_around)
             Of `around` [as there].
         sums : ndarray, shape (N, m)

@@ -9,12 +9,27 @@ import pandas as pd
 import pytest
 
 from mpc.control import (
-    Channel, ControlProblem, Horizon, HorizonData, PeakData, Predictor, SitePoints, supply_channels,
+    Channel,
+    ControlProblem,
+    Horizon,
+    HorizonData,
+    PeakData,
+    Predictor,
+    SitePoints,
+    supply_channels,
 )  # fmt: skip
 from mpc.scenario import Forecast, zone_areas
 from thermal import SymbolicModel, build_network, load_bundled_case, reduced_model
 from thermal.hvac import (
-    AirHandler, BoilerLoop, CoolingCoil, Fan, HvacSystem, Pump, SmoothHvac, Terminals, WaterCoil,
+    AirHandler,
+    BoilerLoop,
+    CoolingCoil,
+    Fan,
+    HvacSystem,
+    Pump,
+    SmoothHvac,
+    Terminals,
+    WaterCoil,
 )  # fmt: skip
 from thermal.model import ModalModel, modal_model
 

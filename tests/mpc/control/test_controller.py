@@ -8,7 +8,13 @@ import pytest
 
 from calibration import DisturbanceModel, KalmanFilter, state_space
 from mpc.control import (
-    ControllerSettings, HorizonData, MpcController, Observer, SequentialSolver, SitePoints, Source,
+    ControllerSettings,
+    HorizonData,
+    MpcController,
+    Observer,
+    SequentialSolver,
+    SitePoints,
+    Source,
 )  # fmt: skip
 from mpc.scenario import DemandCharge, Forecast
 from thermal.model import IMPLICIT_EULER
