@@ -19,7 +19,7 @@ from thermal.signals import REFERENCE_TEMPERATURE
 
 FloatArray = NDArray[np.float64]
 
-_SETTLED = 1e-6  # K: what thermostats go by is found to within this
+_SETTLED = 1e-5  # K: what thermostats go by is found to within this
 _NARROW = 0.02  # K: width of a bracket from which on Newton's method is left alone
 _MOST_TRIES = 30  # of Newton's method in a step; two or three are usual
 
