@@ -37,3 +37,7 @@ class PlantActionError(PlantError):
 
 class ReplayError(MpcError):
     """Telemetry lacks what the replay of a sub-system needs."""
+
+
+class ControlError(MpcError):
+    """A control problem whose parts do not fit, or data of a horizon that are incomplete."""

@@ -29,6 +29,7 @@ from thermal.hvac._replay import (
     replay_reheat,
     replay_terminals,
 )
+from thermal.hvac._smooth import HvacSlopes, HvacStepper, KnobLayout, SmoothHvac
 from thermal.hvac._step import Actions, Calls, Conditions, HvacStep
 from thermal.hvac._symbolic import hvac_function
 from thermal.hvac._system import HvacSystem
@@ -61,14 +62,18 @@ __all__ = [
     "HvacParameterError",
     "HvacPlant",
     "HvacPoints",
+    "HvacSlopes",
     "HvacState",
     "HvacStep",
+    "HvacStepper",
     "HvacSystem",
+    "KnobLayout",
     "LoopReplay",
     "Mixed",
     "Mode",
     "Polynomial",
     "Pump",
+    "SmoothHvac",
     "TerminalReplay",
     "Terminals",
     "Thermostat",

@@ -246,7 +246,7 @@ class CasadiOperations(Operations):
 
     def pick(self, values: Value, index: NDArray[np.intp]) -> Value:
         """Give each terminal its zone's value."""
-        return values[index.tolist()]
+        return casadi.vec(values[index.tolist()])  # a single value picked many times comes as a row
 
     def dot(self, a: Value, b: Value) -> Value:
         """Sum products over the terminals."""

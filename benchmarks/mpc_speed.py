@@ -1,0 +1,155 @@
+"""Speed of the controller's solver on a building of the pilot's size, beside Ipopt on the same problem.
+
+The building is the generated pilot (two floors, 6,317 m2, 123 zones, seed 0), volumes 1 m apart, reduced to `ORDER`
+states; a plant with an air handler a floor, and 12 blocks of supply-air and supply-water temperature. A horizon of six
+hours in steps of 5 minutes, and one of 24 hours in steps of 5 minutes for the first hour and a quarter of an hour from
+there on. Each is solved from outdoor reset, then `WARM` times from the plan before, shifted by 5 minutes, with the
+state that the model predicts and a disturbance of it; Ipopt then solves the last of these from the same plan.
+
+Times are CPU times of the process on one thread.
+
+Run: ``python benchmarks/mpc_speed.py --out results/mpc_speed``; two minutes on one core, most of them Ipopt's. Writes
+``mpc_speed.json`` and ``.md``.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from _table import markdown, write
+from simulator_speed import pilot
+
+from mpc.control import (
+    ControlProblem,
+    Horizon,
+    HorizonData,
+    IpoptSolver,
+    PeakData,
+    Predictor,
+    ResetRule,
+    SequentialSolver,
+    supply_channels,
+)
+from mpc.scenario import zone_areas
+from thermal import SymbolicModel, build_network, reduced_model
+from thermal.hvac import AirHandler, BoilerLoop, CoolingCoil, Fan, HvacSystem, Pump, SmoothHvac, Terminals, WaterCoil
+from thermal.model import ModalModel, modal_model
+
+ORDER, WARM, SEED = 201, 12, 0
+HORIZONS = {
+    "6 h": Horizon.regular(6.0, 300.0, 12),
+    "24 h": Horizon.growing([(1.0, 300.0), (23.0, 900.0)], [0.5, 0.5, 1, 1, 1, 2, 2, 2, 2, 4, 4, 4], 300.0),
+}
+COLUMNS = (
+    "horizon", "steps", "cold, s", "warm, median s", "warm, largest s", "iterations", "Ipopt, s", "Ipopt",
+    "cost over Ipopt's, %",
+)  # fmt: skip
+
+
+def plant_of(areas: np.ndarray) -> HvacSystem:
+    """Plant with an air handler for each half of the zones."""
+    flows, handler = 3.5e-3 * areas, (np.arange(len(areas)) >= len(areas) // 2).astype(int)
+    terminals = Terminals.sized(flows, 45.0 * areas, air_handler=handler)
+    parts = []
+    for k in (0, 1):
+        flow = float(flows[handler == k].sum())
+        fans = Fan(0.9 * flow), Fan(0.9 * flow, 300.0, 100.0)
+        coil = WaterCoil.sized(8.0 * 1006.0 * flow, flow)
+        parts.append((AirHandler(*fans, CoolingCoil(15.0 * 1006.0 * flow), coil), coil))
+    pump = Pump(float(terminals.water_flow.sum()) + sum(coil.water_flow for _, coil in parts))
+    return HvacSystem(tuple(handler for handler, _ in parts), BoilerLoop(80.0 * areas.sum(), pump), terminals)
+
+
+def data_at(modes: ModalModel, areas: np.ndarray, horizon: Horizon, hour: float) -> HorizonData:
+    """Make a winter day from an hour on, in the state of a cool night."""
+    n, count, middle = len(areas), len(horizon), hour + (horizon.edges[:-1] + horizon.edges[1:]) / 7200.0
+    occupied = (middle % 24 >= 7) & (middle % 24 < 19)
+    early, zones = (middle % 24 >= 5.5) & (middle % 24 < 19), np.ones((count, n))
+    outdoor = 273.0 + 4.0 * np.sin(2.0 * np.pi * (middle - 9.0) / 24.0)
+
+    def daily(day: float, night: float, when: np.ndarray) -> np.ndarray:
+        return np.where(when, day, night)[:, None] * zones
+
+    return HorizonData(
+        state=modes.uniform * -0.5, water=330.0, disturbance=np.zeros(n), previous=np.array([288.0, 330.0]),
+        boundary=outdoor[:, None], outdoor_temperature=outdoor, outdoor_humidity=np.full(count, 0.003),
+        gains=areas * np.where(occupied, 12.0, 2.0)[:, None], lower=daily(294.15, 288.15, occupied),
+        upper=daily(297.15, 303.15, occupied), heating_setpoint=daily(294.65, 288.65, early),
+        cooling_setpoint=daily(296.65, 302.65, early), running=np.ones((count, 2)),
+        ventilation=np.repeat(occupied[:, None].astype(float), 2, axis=1), boiler=np.ones(count),
+        electricity_price=np.where((middle % 24 > 8) & (middle % 24 < 21), 0.25, 0.12),
+        gas_price=np.full(count, 0.05), comfort_price=0.2 * zones, peaks=PeakData.none(count),
+    )  # fmt: skip
+
+
+def measure(name: str, modes: ModalModel, areas: np.ndarray, hvac: SmoothHvac, warm: int) -> dict[str, Any]:
+    """Solve a sequence of horizons, and the last by Ipopt as well."""
+    horizon, rng = HORIZONS[name], np.random.default_rng(SEED)
+    predictor = Predictor(modes, hvac, horizon, supply_channels())
+    problem = ControlProblem(predictor)
+    solver, seconds, steps = SequentialSolver(problem), [], []
+    data = data_at(modes, areas, horizon, 5.0)
+    plan = ResetRule().plan(predictor, data.outdoor_temperature)
+    for k in range(warm + 1):
+        begin = time.process_time()
+        found = solver.solve(data, plan)
+        seconds.append(time.process_time() - begin)
+        steps.append(found.iterations)
+        if k == warm:
+            break
+        plan = horizon.shifted(found.plan, 300.0)
+        one = Predictor(modes, hvac, Horizon(np.array([300.0]), np.array([0]), 300.0), supply_channels())
+        short = data_at(modes, areas, one.horizon, 5.0 + k / 12.0)
+        gone = one.rollout(replace(short, state=data.state, water=data.water), found.plan[:1])
+        data = replace(
+            data_at(modes, areas, horizon, 5.0 + (k + 1) / 12.0),
+            state=gone.end_state + 0.05 * rng.standard_normal() * modes.uniform,
+            water=float(gone.knobs[0, 0] + 0.5 * rng.standard_normal()),
+            previous=found.plan[0],
+        )
+    begin = time.process_time()
+    reference = IpoptSolver(problem, tolerance=1e-4, iterations=150).solve(data, plan)
+    return {
+        "horizon": name, "steps": len(horizon), "cold": seconds[0], "warm_median": float(np.median(seconds[1:])),
+        "warm_largest": max(seconds[1:]), "iterations": float(np.median(steps[1:])),
+        "ipopt": time.process_time() - begin, "ipopt_status": str(reference.status), "status": str(found.status),
+        "over_ipopt": 100.0 * (found.terms.total / reference.terms.total - 1.0),
+    }  # fmt: skip
+
+
+def main() -> None:
+    """Measure both horizons and write the table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--warm", type=int, default=WARM, help="solves from a shifted plan")
+    parser.add_argument("--horizons", nargs="+", default=list(HORIZONS), choices=list(HORIZONS))
+    arguments = parser.parse_args()
+    building = pilot()
+    grid = SymbolicModel(build_network(building, dx=1.0))
+    small = reduced_model(grid, [grid.network.start()], order=ORDER)
+    modes, areas = modal_model(small.matrices(small.theta)), zone_areas(building)
+    hvac = SmoothHvac(plant_of(areas))
+    rows = [measure(name, modes, areas, hvac, arguments.warm) for name in arguments.horizons]
+    keys = (
+        "horizon",
+        "steps",
+        "cold",
+        "warm_median",
+        "warm_largest",
+        "iterations",
+        "ipopt",
+        "ipopt_status",
+        "over_ipopt",
+    )
+    table = markdown(COLUMNS, [[row[key] for key in keys] for row in rows])
+    write(arguments.out, "mpc_speed", table, {"order": ORDER, "seed": SEED, "rows": rows}, False)
+    print(table)
+
+
+if __name__ == "__main__":
+    main()

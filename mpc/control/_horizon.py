@@ -1,0 +1,169 @@
+"""The time that a controller looks ahead: steps of the model, and blocks over which setpoints stay."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from mpc.errors import ControlError
+from thermal.errors import describe
+
+FloatArray = NDArray[np.float64]
+
+#: Longest step of the predictor [s]: the water of the loop and the air's mixing are lost in longer ones.
+LONGEST_STEP = 1800.0
+
+
+@dataclass(frozen=True, eq=False)
+class Horizon:
+    """Steps of the predictor, blocks of the decisions, and the time between two actions.
+
+    Parameters
+    ----------
+    steps : ndarray, shape (N,)
+        Lengths of the model's steps [s], positive, up to `LONGEST_STEP`; they need not be equal.
+    first_steps : ndarray of int, shape (n_block,)
+        Step with which each block begins: 0, then rising.
+    control_step : float
+        Time after which the next action is due [s]; a number of steps from the start, and no longer than the first
+        block.
+
+    Raises
+    ------
+    ControlError
+        When a number is out of its range, or steps, blocks and control step do not fit.
+
+    Examples
+    --------
+    >>> ahead = Horizon.regular(6.0, 300.0, blocks=12)
+    >>> len(ahead), ahead.n_block, ahead.block_starts[:3].tolist()
+    (72, 12, [0.0, 1800.0, 3600.0])
+    """
+
+    steps: FloatArray
+    first_steps: NDArray[np.int64]
+    control_step: float
+
+    def __post_init__(self) -> None:
+        steps, first = np.atleast_1d(np.asarray(self.steps, dtype=float)), np.atleast_1d(np.asarray(self.first_steps))
+        if steps.ndim != 1 or not (np.isfinite(steps) & (steps > 0) & (steps <= LONGEST_STEP)).all():
+            expected = f"steps above 0 and up to {LONGEST_STEP:g} s"
+            raise ControlError(describe("horizon: steps", expected, repr(self.steps)))
+        rising = first[0] == 0 and (np.diff(first) > 0).all() and first[-1] < len(steps)
+        if not np.issubdtype(first.dtype, np.integer) or not rising:
+            expected = f"numbers of steps that rise from 0, below {len(steps)}"
+            raise ControlError(describe("horizon: first_steps", expected, repr(self.first_steps)))
+        object.__setattr__(self, "steps", steps)
+        object.__setattr__(self, "first_steps", first.astype(np.int64))
+        first_end = self.edges[first[1]] if len(first) > 1 else self.edges[-1]
+        if not np.isclose(self.edges, self.control_step).any() or not 0.0 < self.control_step <= first_end:
+            expected = f"a whole number of steps, up to the first block's {first_end:g} s"
+            raise ControlError(describe("horizon: control_step", expected, f"{self.control_step!r} s"))
+
+    @classmethod
+    def regular(cls, hours: float, step: float, blocks: int, control_step: float | None = None) -> Horizon:
+        """Make equal steps and blocks.
+
+        Parameters
+        ----------
+        hours : float
+            Length [h].
+        step : float
+            Of the model [s].
+        blocks : int
+            Number of blocks, as long as each other up to a step.
+        control_step : float, optional
+            Time between two actions [s]; one step by default.
+        """
+        count = round(hours * 3600.0 / step) if step > 0 else 0
+        if count < 1 or not 1 <= blocks <= count or abs(count * step - hours * 3600.0) > 1e-6:
+            found = f"{hours} h, {step} s and {blocks} blocks"
+            raise ControlError(describe("horizon", "a whole number of steps, and at most as many blocks", found))
+        first = np.floor(np.arange(blocks) * count / blocks).astype(np.int64)
+        return cls(np.full(count, float(step)), first, step if control_step is None else control_step)
+
+    @classmethod
+    def growing(
+        cls, parts: Sequence[tuple[float, float]], block_hours: Sequence[float], control_step: float | None = None
+    ) -> Horizon:
+        """Make fine steps first and coarse ones later.
+
+        Parameters
+        ----------
+        parts : sequence of tuple of float
+            Length [h] and step [s] of each part.
+        block_hours : sequence of float
+            Lengths of the blocks [h]; what is left of the horizon belongs to the last one.
+        control_step : float, optional
+            Time between two actions [s]; the first step by default.
+
+        Examples
+        --------
+        >>> day = Horizon.growing([(1.0, 300.0), (23.0, 900.0)], [1.0, 1.0, 2.0, 2.0, 2.0, 4.0, 6.0])
+        >>> len(day), day.n_block, float(day.edges[-1]) / 3600.0
+        (104, 7, 24.0)
+        """
+        steps = np.concatenate([np.full(max(round(hours * 3600.0 / step), 1), float(step)) for hours, step in parts])
+        starts = np.concatenate([[0.0], np.cumsum(np.asarray(block_hours, dtype=float) * 3600.0)[:-1]])
+        edges = np.concatenate([[0.0], np.cumsum(steps)])
+        first = np.unique(np.searchsorted(edges[:-1], starts[starts < edges[-1]] - 1e-6))
+        return cls(steps, first.astype(np.int64), float(steps[0]) if control_step is None else control_step)
+
+    def __len__(self) -> int:
+        return len(self.steps)
+
+    @property
+    def n_block(self) -> int:
+        """Number of blocks."""
+        return len(self.first_steps)
+
+    @cached_property
+    def edges(self) -> FloatArray:
+        """Starts and ends of the steps, shape (N + 1,), from now [s]."""
+        return np.concatenate([[0.0], np.cumsum(self.steps)])
+
+    @cached_property
+    def block_of(self) -> NDArray[np.int64]:
+        """Block of each step, shape (N,)."""
+        return np.searchsorted(self.first_steps, np.arange(len(self)), side="right") - 1
+
+    @property
+    def block_starts(self) -> FloatArray:
+        """Starts of the blocks, shape (n_block,), from now [s]."""
+        return np.asarray(self.edges[self.first_steps])
+
+    def shifted(self, plan: FloatArray, seconds: float) -> FloatArray:
+        """Carry a plan over to a later start: each block takes the mean of what was planned for its time.
+
+        Parameters
+        ----------
+        plan : ndarray, shape (n_block, n_channel)
+            Setpoints of the blocks [unit of the channel]; the last block's last for ever.
+        seconds : float
+            How much later [s], 0 or more.
+
+        Returns
+        -------
+        ndarray, shape (n_block, n_channel)
+            On the blocks of the new start [unit of the channel].
+        """
+        ends = np.append(self.block_starts[1:], self.edges[-1])
+        knots = np.append(self.block_starts, self.edges[-1] + seconds)
+        summed = np.vstack([np.zeros(plan.shape[1]), np.cumsum(plan * np.diff(knots)[:, None], axis=0)])
+        at = [np.interp(np.array([self.block_starts, ends]) + seconds, knots, column) for column in summed.T]
+        return np.stack([(late - early) / (ends - self.block_starts) for early, late in at], axis=1)
+
+    def stamps(self, now: pd.Timestamp) -> pd.DatetimeIndex:
+        """Give the ends of the steps.
+
+        Parameters
+        ----------
+        now : pandas.Timestamp
+            Start of the horizon, with a time zone.
+        """
+        return pd.DatetimeIndex(now + pd.to_timedelta(self.edges[1:], unit="s"), name="timestamp")
