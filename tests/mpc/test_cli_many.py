@@ -24,7 +24,7 @@ from mpc.cli._app import app
 from thermal.pilot import generate_pilot
 
 OPTIONS = ("--horizon", "1h", "--starts", "1")
-NAMES = [f"office {k}" for k in range(5)]  # enough that some are left when the first is done
+NAMES = [f"office {k}" for k in range(3)]
 
 
 def run(*arguments: str | Path) -> Any:
@@ -81,7 +81,11 @@ def on_threads(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
 
 def start(cases: Path, out: Path) -> subprocess.Popen[str]:
     command = [sys.executable, "-m", "mpc.cli", "calibrate", str(cases), "--out", str(out), "--workers", "2", *OPTIONS]
-    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True)
+    return subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
+        # who runs the tests in the background has them ignore Ctrl-C, and their children would too
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )  # fmt: skip
 
 
 @pytest.mark.skipif(os.name != "posix", reason="sends signals")
