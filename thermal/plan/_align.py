@@ -60,9 +60,7 @@ def align_floors(
     return tuple(moved)
 
 
-def _by_anchor(
-    base: ZonedFloor, floor: ZonedFloor, anchors: Mapping[str, tuple[float, float]]
-) -> tuple[float, float]:
+def _by_anchor(base: ZonedFloor, floor: ZonedFloor, anchors: Mapping[str, tuple[float, float]]) -> tuple[float, float]:
     """Offset at which the anchors fall together."""
     first, second = (
         np.array(f.survey.place(anchors[f.name])) * f.survey.pixel + f.survey.pixel / 2.0 for f in (base, floor)
@@ -85,7 +83,7 @@ def _by_outline(base: ZonedFloor, floor: ZonedFloor) -> tuple[tuple[float, float
 
 
 def _outline(floor: ZonedFloor) -> FloatArray:
-    """What is inside the exterior wall, on a grid of its own."""
+    """Mark what is inside the exterior wall, on a grid of its own."""
     pixel = floor.survey.pixel
     index = [np.floor((np.arange(int(n * pixel / _GRID)) + 0.5) * _GRID / pixel).astype(int) for n in floor.zones.shape]
     inside = floor.zones[np.ix_(*index)] > 0

@@ -140,7 +140,7 @@ def assemble_plans(
 
 
 def _area_errors(floors: Sequence[ZonedFloor], plans: Sequence[FloorPlan], cell_size: float) -> dict[str, float]:
-    errors = {}
+    errors: dict[str, float] = {}
     for floor, plan in zip(floors, plans, strict=True):
         wanted, found = floor.areas, drawn_areas(plan, cell_size)
         errors |= {zone: found.get(zone, 0.0) / wanted[zone] - 1.0 for zone in wanted}

@@ -96,7 +96,7 @@ def find_basins(walls: Mask, pixel: float, settings: PlanSettings) -> Basins:
     saddles = [(int(roots[a]), int(roots[b]), *rest) for a, b, *rest in kept if roots[a] != roots[b]]
     joined: IntArray = roots[cut].astype(np.int32)
     joined[closed] = 0
-    return Basins(joined, outside, saddles)  # type: ignore[arg-type]
+    return Basins(joined, outside, saddles)
 
 
 def _interfaces(cut: IntArray, distance: FloatArray) -> tuple[IntArray, IntArray, FloatArray, NDArray[np.int64]]:
@@ -142,7 +142,8 @@ def _widens(
 
 def _jamb(walls: Mask, nearest: IntArray, place: tuple[int, int], thickest: float) -> NDArray[np.float64] | None:
     """Direction of a neck that ends, on one side at least, at a wall no longer than thick along the way through it."""
-    here = np.array(place, dtype=float)
+    here: NDArray[np.float64] = np.array(place, dtype=float)
+    direction: NDArray[np.float64]
     ends = [nearest[:, place[0], place[1]].astype(float)]
     across = here - ends[0]
     beyond = np.rint(here + 0.5 * across).astype(int)
@@ -161,9 +162,7 @@ def _jamb(walls: Mask, nearest: IntArray, place: tuple[int, int], thickest: floa
     return None
 
 
-def _between_jambs(
-    walls: Mask, place: tuple[int, int], along: NDArray[np.float64], width: float, reach: float
-) -> Mask:
+def _between_jambs(walls: Mask, place: tuple[int, int], along: NDArray[np.float64], width: float, reach: float) -> Mask:
     """Mark what lies between the two jambs of a door, so that its floor counts to the wall as elsewhere."""
     marked = np.zeros_like(walls)
     half = int(np.ceil(max(width, reach))) + 2

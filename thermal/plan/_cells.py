@@ -146,9 +146,7 @@ def drawn_areas(plan: FloorPlan, cell_size: float) -> dict[str, float]:
     return {name: count * cell_size**2 for name, count in counts.items()}
 
 
-def _frame(
-    floors: Sequence[ZonedFloor], cell_size: float, phase: tuple[float, float]
-) -> tuple[float, float, int, int]:
+def _frame(floors: Sequence[ZonedFloor], cell_size: float, phase: tuple[float, float]) -> tuple[float, float, int, int]:
     """Corner of a grid that holds all floors with two cells around them [m], and its rows and columns."""
     left = min(f.offset[0] for f in floors)
     top = min(f.offset[1] for f in floors)
@@ -158,7 +156,9 @@ def _frame(
     return x, y, int((bottom - y) / cell_size) + 4, int((right - x) / cell_size) + 4
 
 
-def _floor_tokens(floor: ZonedFloor, cell_size: float, left: float, top: float, n_row: int, n_col: int) -> NDArray[np.str_]:
+def _floor_tokens(
+    floor: ZonedFloor, cell_size: float, left: float, top: float, n_row: int, n_col: int
+) -> NDArray[np.str_]:
     """Look at points of each cell, take what most of it is, and put one-cell walls between."""
     samples = _sample(floor, cell_size, left, top, n_row, n_col)
     middle = samples[:, _SAMPLES // 2, :, _SAMPLES // 2]

@@ -103,7 +103,7 @@ def _image(file: Path) -> NDArray[np.uint8]:
         warnings.simplefilter("ignore")  # Pillow warns of a bomb at a size of its own; ours is checked below
         try:
             with image_of.open(file, formats=("PNG", "JPEG")) as image:
-                check_pixels(*image.size, file.name)
+                check_pixels(image.width, image.height, file.name)
                 if image.mode in ("RGBA", "LA", "PA") or "transparency" in image.info:
                     image = image.convert("RGBA")
                     white = image_of.new("RGBA", image.size, "white")

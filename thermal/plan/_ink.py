@@ -17,7 +17,7 @@ from thermal.plan._guard import check_pixels
 FloatArray = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-#: Side of a pixel that a drawing is worked on at [m]: a partition of 75 mm is four of them; coarser drawings are refined.
+#: Side of a pixel that a drawing is worked on at [m]: a partition of 75 mm is four; coarser drawings are refined.
 FINE, COARSE = 0.02, 0.04
 _LEAST_CONTRAST = 30  # of 255, between paper and ink: a blank scan has some 10 of noise
 _LEAST_ANGLE = 0.05  # deg: over 60 m that is 5 cm
@@ -79,7 +79,7 @@ def ink_of(drawing: Drawing, scale: float, straighten: bool) -> Ink:
     if abs(angle) >= _LEAST_ANGLE or refine > 1:
         turn = _upright(cover.shape, angle, refine)
         corners = turn @ np.array([[0, cover.shape[1], 0, cover.shape[1]], [0, 0, *[cover.shape[0]] * 2], [1] * 4])
-        shape = tuple(int(math.ceil(x)) + 1 for x in (corners[1].max(), corners[0].max()))
+        shape = tuple(math.ceil(x) + 1 for x in (corners[1].max(), corners[0].max()))
         check_pixels(shape[1], shape[0], drawing.source)
         warp = extra("skimage.transform").warp
         cover = warp(cover, np.linalg.inv(turn), output_shape=shape, order=1, cval=0.0)

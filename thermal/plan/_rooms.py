@@ -91,7 +91,8 @@ def survey_ink(ink: Ink, source: str, settings: PlanSettings) -> FloorSurvey:
                     f"no stroke is as thick as {settings.thinnest_wall:g} m, so all of them count as walls: "
                     "arcs of doors and furniture too"
                 )
-            return finish(labels, ink.pixel, source, doors, ink.turned, shift, tuple(remarks))
+            survey = finish(labels, ink.pixel, source, doors, ink.turned, shift, tuple(remarks))
+            return replace(survey, ink=np.pad(ink.mask, margin))
     advice = "set widest_door to the widest gap in the walls, or crop to one floor's plan"
     raise NoRoomsError(describe(source, "walls that enclose rooms, but for doors", "none", advice))
 
@@ -142,7 +143,7 @@ def finish(
 
 
 def _label(basins: Basins, pixel: float, settings: PlanSettings) -> tuple[IntArray, tuple[Door, ...], int]:
-    """Number the rooms row by row; shafts become wall and columns part of their room."""
+    """Give the rooms numbers, row by row; shafts become wall and columns part of their room."""
     pieces = basins.pieces
     count = int(pieces.max())
     area = np.bincount(pieces.ravel(), minlength=count + 1) * pixel**2

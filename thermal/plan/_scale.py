@@ -8,7 +8,7 @@ from thermal.errors import ScaleError, describe
 
 Point = tuple[float, float]
 
-#: Range of scales that are believed [m/px]: a detail at 1:20 and 600 dots per inch, a site plan with walls of one pixel.
+#: Range of scales that are believed [m/px]: a detail at 1:20 and 600 dots per inch, walls of one pixel.
 FINEST, COARSEST = 5e-4, 0.5
 
 

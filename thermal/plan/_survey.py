@@ -124,6 +124,8 @@ class FloorSurvey:
         Takes (column, row, 1) of the drawing to those of `labels` [px].
     remarks : tuple of str
         What a look at the picture should confirm.
+    ink : ndarray of bool or None, shape (n_row, n_col)
+        What is drawn there, walls or not, for pictures.
     """
 
     source: str
@@ -134,6 +136,7 @@ class FloorSurvey:
     turned: float = 0.0
     placement: FloatArray | None = None
     remarks: tuple[str, ...] = ()
+    ink: NDArray[np.bool_] | None = None
 
     def place(self, point: tuple[float, float]) -> tuple[float, float]:
         """Where a point of the drawing lies.

@@ -145,7 +145,9 @@ def _collect(document: Any, metres: float, walls: str, rooms: str, where: str, w
     if not on_walls and not outlines:
         if wanted is not None or not found:
             layers = ", ".join(sorted({layer for _, layer, _ in found})[:12])
-            raise DrawingFileError(describe(where, f"lines on layers like {walls!r}", f"layers {layers or 'without any'}"))
+            raise DrawingFileError(
+                describe(where, f"lines on layers like {walls!r}", f"layers {layers or 'without any'}")
+            )
         on_walls = found
     content = _Content([], [], [], texts)
     for kind, _, entity in on_walls:
@@ -199,7 +201,7 @@ def _upright(
     pixel = max(FINE, math.sqrt(size[0] * size[1] / 3e7))
     margin = 0.5
     left, top = points[:, 0].min() - margin, points[:, 1].max() + margin
-    shape = tuple(int(math.ceil((extent + 2 * margin) / pixel)) for extent in size[::-1])
+    shape = tuple(math.ceil((extent + 2 * margin) / pixel) for extent in size[::-1])
     check_pixels(shape[1], shape[0], where)
     placement = np.eye(3)
     placement[0, :2], placement[0, 2] = turn[0] / pixel, -left / pixel - 0.5
@@ -261,7 +263,7 @@ def _from_outlines(
 
 
 def _polygon(points: FloatArray) -> Any:
-    """A valid area: an outline that crosses itself is taken apart."""
+    """Make a valid area of an outline; one that crosses itself is taken apart."""
     shapely = extra("shapely")
     return shapely.make_valid(shapely.Polygon(points)).buffer(0)
 

@@ -62,7 +62,8 @@ def fill_narrow(ink: Mask, pixel: float, width: float) -> Mask:
     depth = ndimage.maximum(ndimage.distance_transform_edt(~framed), spaces, np.arange(count + 1))
     narrow = 2.0 * np.asarray(depth) * pixel <= width + 2.0 * pixel
     narrow[[0, spaces[0, 0]]] = False
-    return (framed | narrow[spaces])[1:-1, 1:-1]
+    filled: Mask = framed | narrow[spaces]
+    return filled[1:-1, 1:-1]
 
 
 def _without_specks(ink: Mask, pixel: float) -> Mask:
@@ -70,4 +71,5 @@ def _without_specks(ink: Mask, pixel: float) -> Mask:
     keep = [False]
     for rows, columns in ndimage.find_objects(pieces):
         keep.append(np.hypot(rows.stop - rows.start, columns.stop - columns.start) * pixel >= _SPECK)
-    return np.asarray(keep)[pieces]
+    kept: Mask = np.asarray(keep)[pieces]
+    return kept

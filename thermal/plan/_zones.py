@@ -63,7 +63,7 @@ def propose_zones(
     for position, label in enumerate(zones, start=1):
         number[owner == label] = position
     taken = set(given.values())
-    titles = []
+    titles: list[str] = []
     for label in zones:
         title = given.get(label, "")
         count = len(titles)
