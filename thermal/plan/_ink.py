@@ -18,9 +18,10 @@ FloatArray = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 #: Side of a pixel that a drawing is worked on at [m]: a partition of 75 mm is four; coarser drawings are refined.
-FINE, COARSE = 0.02, 0.04
+FINE, COARSE = 0.02, 0.025
 _LEAST_CONTRAST = 30  # of 255, between paper and ink: a blank scan has some 10 of noise
-_LEAST_ANGLE = 0.05  # deg: over 60 m that is 5 cm
+_EDGE = 0.7  # -, of the contrast of paper and ink: the greys that count as edges
+_LEAST_ANGLE = 0.1  # deg: over 60 m that is 10 cm; coarse drawings seem to stand as askew as that
 _LEAST_AGREEMENT = 0.3  # -, of the directions of edges: below it a drawing has no two main directions
 
 
@@ -38,12 +39,15 @@ class Ink:
         Angle by which the drawing stood clockwise of upright [deg].
     placement : ndarray, shape (3, 3)
         Takes (column, row, 1) of the drawing to those of the mask [px].
+    drawn_pixel : float
+        Side of a pixel of the drawing [m]; 0 for one of vectors.
     """
 
     mask: Mask
     pixel: float
     turned: float
     placement: FloatArray
+    drawn_pixel: float = 0.0
 
 
 def ink_of(drawing: Drawing, scale: float, straighten: bool) -> Ink:
@@ -72,43 +76,39 @@ def ink_of(drawing: Drawing, scale: float, straighten: bool) -> Ink:
     """
     block = max(1, int(FINE / scale))
     cover = _cover(drawing, block)
-    angle = main_angle(cover) if straighten else 0.0
+    angle = _main_angle(cover) if straighten else 0.0
+    if abs(angle) >= _LEAST_ANGLE:
+        # Steps of slanting walls pull the angle towards the grid's; what is left of it after a turn is hardly pulled.
+        angle += _main_angle(_turned(cover, _upright(cover.shape, angle, 1), drawing.source))
     refine = math.ceil(scale * block / COARSE - 1e-9) if scale * block > COARSE else 1
     matrix = np.array([[1, 0, -drawing.corner[0]], [0, 1, -drawing.corner[1]], [0, 0, 1]], dtype=float)
     matrix = np.array([[1 / block, 0, 0.5 / block - 0.5], [0, 1 / block, 0.5 / block - 0.5], [0, 0, 1]]) @ matrix
     if abs(angle) >= _LEAST_ANGLE or refine > 1:
         turn = _upright(cover.shape, angle, refine)
-        corners = turn @ np.array([[0, cover.shape[1], 0, cover.shape[1]], [0, 0, *[cover.shape[0]] * 2], [1] * 4])
-        shape = tuple(math.ceil(x) + 1 for x in (corners[1].max(), corners[0].max()))
-        check_pixels(shape[1], shape[0], drawing.source)
-        warp = extra("skimage.transform").warp
-        cover = warp(cover, np.linalg.inv(turn), output_shape=shape, order=1, cval=0.0)
+        cover = _turned(cover, turn, drawing.source)
         matrix = turn @ matrix
     else:
         angle = 0.0
-    return Ink(cover >= 0.5, scale * block / refine, angle, matrix)
+    return Ink(cover >= 0.5, scale * block / refine, angle, matrix, scale)
 
 
-def main_angle(cover: FloatArray) -> float:
-    """Angle of the walls of a drawing against its edges.
+def _turned(cover: FloatArray, turn: FloatArray, source: str) -> FloatArray:
+    """Apply `turn` to a drawing, on a sheet that holds all of it."""
+    corners = turn @ np.array([[0, cover.shape[1], 0, cover.shape[1]], [0, 0, *[cover.shape[0]] * 2], [1] * 4])
+    shape = tuple(math.ceil(x) + 1 for x in (corners[1].max(), corners[0].max()))
+    check_pixels(shape[1], shape[0], source)
+    warp = extra("skimage.transform").warp
+    return np.asarray(warp(cover, np.linalg.inv(turn), output_shape=shape, order=1, cval=0.0), dtype=float)
 
-    Parameters
-    ----------
-    cover : ndarray, shape (n_row, n_col)
-        Share of ink [-].
 
-    Returns
-    -------
-    float
-        Clockwise, -45 to 45 [deg]; 0 when the drawing has no two main directions.
+def _main_angle(cover: FloatArray) -> float:
+    """Angle of the walls against the edges of the drawing, clockwise [deg]; 0 where it has no two main directions.
 
-    Notes
-    -----
     Gradients g of the smoothed drawing stand across its walls, at angles φ that repeat every 90 degrees:
     ``4 angle = arg Σ |g|² exp(4iφ)``.
     """
-    smooth = ndimage.gaussian_filter(np.asarray(cover, dtype=np.float32), 2.0)
-    across, down = ndimage.sobel(smooth, axis=1), ndimage.sobel(smooth, axis=0)
+    picture = np.asarray(cover, dtype=np.float32)
+    down, across = (ndimage.gaussian_filter(picture, 2.0, order=order) for order in ((1, 0), (0, 1)))
     gradient = across.astype(np.complex64) + 1j * down
     weight = np.abs(gradient) ** 2
     total = float(weight.sum(dtype=float))
@@ -127,14 +127,22 @@ def _cover(drawing: Drawing, block: int) -> FloatArray:
     if contrast < _LEAST_CONTRAST:
         found = f"one shade of grey (contrast {contrast} of 255)"
         raise NoRoomsError(describe(drawing.source, "walls darker than the paper", found, "is the drawing blank?"))
-    ink = grey <= extra("skimage.filters").threshold_otsu(grey)
-    if ink.mean() > 0.5:
-        ink = ~ink
-    rows, columns = (-(-n // block) * block for n in ink.shape)
+    threshold = float(extra("skimage.filters").threshold_otsu(grey))
+    dark = grey <= threshold
+    light, black = float(grey[~dark].mean()), float(grey[dark].mean())
+    if dark.mean() > 0.5:
+        grey, threshold, light, black = 255 - grey, 254.0 - threshold, 255.0 - black, 255.0 - light
+    shades = np.arange(256, dtype=np.float32)
+    # Grey around the threshold is a pixel on the edge of a wall: its share of ink tells where the edge is.
+    edges = np.clip(0.5 + (threshold + 0.5 - shades) / max(_EDGE * (light - black), 1.0), 0.0, 1.0)
+    return _blocks(edges[grey], block)
+
+
+def _blocks(picture: NDArray[np.float32], block: int) -> FloatArray:
+    rows, columns = (-(-n // block) * block for n in picture.shape)
     padded = np.zeros((rows, columns), dtype=np.float32)
-    padded[: ink.shape[0], : ink.shape[1]] = ink
-    blocks = padded.reshape(rows // block, block, columns // block, block)
-    return np.asarray(blocks.mean(axis=(1, 3)), dtype=float)
+    padded[: picture.shape[0], : picture.shape[1]] = picture
+    return np.asarray(padded.reshape(rows // block, block, columns // block, block).mean(axis=(1, 3)), dtype=float)
 
 
 def _upright(shape: tuple[int, ...], angle: float, refine: int) -> FloatArray:

@@ -39,8 +39,8 @@ def draw_floor(floor: ZonedFloor, devices: Sequence[Device] = ()) -> str:
     Returns
     -------
     str
-        SVG: zones in colour with name and area, exterior walls dark, interior walls grey, doors as orange lines, what was
-        drawn but is no wall in light grey.
+        SVG: zones in colour with name and area, exterior walls dark, interior walls grey, doors circled in orange, what
+        is drawn and no wall in light grey.
     """
     rows, columns = _built(floor)
     survey, pixel = floor.survey, floor.survey.pixel
@@ -146,7 +146,7 @@ def _pastel(number: int) -> tuple[int, int, int]:
 
 def _innermost(zones: NDArray[np.int32], number: int) -> tuple[float, float, float]:
     """Column and row of a zone's innermost point, and how far it is from the zone's edge [px]."""
-    rows, columns = ndimage.find_objects(zones == number)[0]
+    rows, columns = ndimage.find_objects((zones == number).astype(np.int8))[0]
     depth = ndimage.distance_transform_edt(np.pad(zones[rows, columns] == number, 1))
     row, column = np.unravel_index(int(depth.argmax()), depth.shape)
     return float(columns.start + column - 1), float(rows.start + row - 1), float(depth.max())

@@ -20,6 +20,8 @@ IntArray = NDArray[np.int32]
 Mask = NDArray[np.bool_]
 
 _COLUMN = 1.0  # m: free-standing pieces of wall up to this size are columns and part of their room
+_COARSE = 0.03  # m/px: a partition of 100 mm is three pixels, and lines of windows are still seen
+_OPEN = 0.03  # -, of the building: a bay between wings may seem to have walls on all sides
 _NARROWEST_DOOR = 0.45  # m: narrower gaps are flaws of the drawing, closed without a word
 
 
@@ -91,6 +93,7 @@ def survey_ink(ink: Ink, source: str, settings: PlanSettings) -> FloorSurvey:
                     f"no stroke is as thick as {settings.thinnest_wall:g} m, so all of them count as walls: "
                     "arcs of doors and furniture too"
                 )
+            remarks += _doubts(labels, ink, settings)
             survey = finish(labels, ink.pixel, source, doors, ink.turned, shift, tuple(remarks))
             return replace(survey, ink=np.pad(ink.mask, margin))
     advice = "set widest_door to the widest gap in the walls, or crop to one floor's plan"
@@ -140,6 +143,31 @@ def finish(
         centre = (float(column - 1 + where[1].start), float(row - 1 + where[0].start))
         rooms.append(Room(label, float(areas[label]), centre))
     return FloorSurvey(source, labels, pixel, tuple(rooms), doors, turned, placement, remarks)
+
+
+def _doubts(labels: IntArray, ink: Ink, settings: PlanSettings) -> list[str]:
+    """Say where a drawing may have been misread: too coarse for its lines, or open where it should be closed."""
+    doubts = []
+    if ink.drawn_pixel > _COARSE:
+        doubts.append(
+            f"a pixel is {100 * ink.drawn_pixel:.1f} cm: thin walls and windows may be lost, export it finer than "
+            f"{100 * _COARSE:g} cm"
+        )
+    walled = labels >= WALL_LABEL
+    around = np.ones_like(walled)
+    for axis in (0, 1):
+        for way in (1, -1):
+            ahead = np.flip(walled, axis) if way < 0 else walled
+            seen = np.logical_or.accumulate(ahead, axis=axis)
+            around &= np.flip(seen, axis) if way < 0 else seen
+    area = float(np.count_nonzero(around & (labels == OUTSIDE_LABEL))) * ink.pixel**2
+    built = float(np.count_nonzero(walled)) * ink.pixel**2
+    if area > max(4.0, _OPEN * built):
+        doubts.append(
+            f"{area:.0f} m2 with walls on all sides are open to the outside: a gap wider than widest_door "
+            f"({settings.widest_door:g} m), or a courtyard"
+        )
+    return doubts
 
 
 def _label(basins: Basins, pixel: float, settings: PlanSettings) -> tuple[IntArray, tuple[Door, ...], int]:
