@@ -112,7 +112,7 @@ def _image(file: Path) -> NDArray[np.uint8]:
                     image = image.point(lambda value: value / 256.0).convert("L")
                 return np.asarray(image.convert("L"), dtype=np.uint8)
         except (image_of.DecompressionBombError, MemoryError) as error:
-            raise OversizedFileError(describe(file.name, "an image of a plan", str(error))) from error
+            raise OversizedFileError(describe(file.name, "an image of a plan", str(error), "export it anew")) from error
         except (OSError, SyntaxError, ValueError, TypeError) as error:  # Pillow has all of them for damaged files
             expected = f"a whole {file.suffix[1:].upper()} image"
             found = " ".join(str(error).replace(str(file), file.name).split())

@@ -20,7 +20,8 @@ Mask = NDArray[np.bool_]
 #: Side of a pixel that a drawing is worked on at [m]: a partition of 75 mm is four; coarser drawings are refined.
 FINE, COARSE = 0.02, 0.025
 _LEAST_CONTRAST = 30  # of 255, between paper and ink: a blank scan has some 10 of noise
-_EDGE = 0.7  # -, of the contrast of paper and ink: the greys that count as edges
+_HAIRLINE = 0.2  # -, of a pixel: fainter lines are noise
+_SHARP = 0.012  # m/px: in finer drawings the lines of windows are two pixels and need no care
 _LEAST_ANGLE = 0.1  # deg: over 60 m that is 10 cm; coarse drawings seem to stand as askew as that
 _LEAST_AGREEMENT = 0.3  # -, of the directions of edges: below it a drawing has no two main directions
 
@@ -89,7 +90,8 @@ def ink_of(drawing: Drawing, scale: float, straighten: bool) -> Ink:
         matrix = turn @ matrix
     else:
         angle = 0.0
-    return Ink(cover >= 0.5, scale * block / refine, angle, matrix, scale)
+    mask = cover >= 0.5 if scale <= _SHARP else _with_hairlines(cover)
+    return Ink(mask, scale * block / refine, angle, matrix, scale)
 
 
 def _turned(cover: FloatArray, turn: FloatArray, source: str) -> FloatArray:
@@ -132,10 +134,9 @@ def _cover(drawing: Drawing, block: int) -> FloatArray:
     light, black = float(grey[~dark].mean()), float(grey[dark].mean())
     if dark.mean() > 0.5:
         grey, threshold, light, black = 255 - grey, 254.0 - threshold, 255.0 - black, 255.0 - light
-    shades = np.arange(256, dtype=np.float32)
-    # Grey around the threshold is a pixel on the edge of a wall: its share of ink tells where the edge is.
-    edges = np.clip(0.5 + (threshold + 0.5 - shades) / max(_EDGE * (light - black), 1.0), 0.0, 1.0)
-    return _blocks(edges[grey], block)
+    # Grey is a pixel on the edge of a wall, or a line thinner than a pixel: half ink at the threshold.
+    shares = np.interp(np.arange(256), [black, threshold + 0.5, light], [1.0, 0.5, 0.0]).astype(np.float32)
+    return _blocks(shares[grey], block)
 
 
 def _blocks(picture: NDArray[np.float32], block: int) -> FloatArray:
@@ -143,6 +144,19 @@ def _blocks(picture: NDArray[np.float32], block: int) -> FloatArray:
     padded = np.zeros((rows, columns), dtype=np.float32)
     padded[: picture.shape[0], : picture.shape[1]] = picture
     return np.asarray(padded.reshape(rows // block, block, columns // block, block).mean(axis=(1, 3)), dtype=float)
+
+
+def _with_hairlines(cover: FloatArray) -> Mask:
+    """Find ink, and lines thinner than a pixel, such as the panes of a window, which close walls too."""
+    dark = cover >= 0.5
+    square = np.ones((3, 3))
+    body = ndimage.binary_opening(dark, square)
+    faint = (cover - ndimage.grey_opening(cover, (5, 5)) > _HAIRLINE) & ~body
+    # The edge of a thin wall looks the same: a line begins apart from all that is solid, and runs on to it.
+    apart = faint & ~ndimage.binary_dilation(body, square)
+    lines = ndimage.binary_dilation(apart, square, iterations=2, mask=faint) if apart.any() else apart
+    thin: Mask = extra("skimage.morphology").skeletonize(dark | lines)
+    return dark | (thin & lines)
 
 
 def _upright(shape: tuple[int, ...], angle: float, refine: int) -> FloatArray:

@@ -183,3 +183,18 @@ def office_dxf(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
         return path
 
     return write
+
+
+@dataclass(frozen=True)
+class Truth:
+    """What the office is, whatever it is drawn with."""
+
+    clear: tuple[float, ...] = CLEAR
+    gross: tuple[float, ...] = GROSS
+    doors: tuple[Box, ...] = DOORS
+
+
+@pytest.fixture(scope="session")
+def truth() -> Truth:
+    """Areas and doors of the office."""
+    return Truth()
