@@ -85,6 +85,9 @@ def _by_outline(base: ZonedFloor, floor: ZonedFloor) -> tuple[tuple[float, float
 def _outline(floor: ZonedFloor) -> FloatArray:
     """Mark what is inside the exterior wall, on a grid of its own."""
     pixel = floor.survey.pixel
-    index = [np.floor((np.arange(int(n * pixel / _GRID)) + 0.5) * _GRID / pixel).astype(int) for n in floor.zones.shape]
+    index = []
+    for count in floor.zones.shape:
+        places = (np.arange(int(np.ceil(count * pixel / _GRID - 1e-6))) + 0.5) * _GRID / pixel
+        index.append(np.minimum(np.floor(places + 1e-6).astype(int), count - 1))
     inside = floor.zones[np.ix_(*index)] > 0
     return np.asarray(inside, dtype=float)

@@ -184,7 +184,8 @@ def _sample(floor: ZonedFloor, cell_size: float, left: float, top: float, n_row:
         (left, floor.offset[0], n_col, floor.zones.shape[1]),
     ):
         metres = start + (np.arange(count)[:, None] + step) * cell_size - offset
-        index = np.floor(metres.ravel() / pixel).astype(int) + 1
+        # A point on the line between two elements is in the second, whatever rounding says.
+        index = np.floor(metres.ravel() / pixel + 1e-6).astype(int) + 1
         found.append(np.clip(index, 0, most + 1))
     framed = np.pad(floor.zones, 1)
     sampled: IntArray = framed[np.ix_(found[0], found[1])]
