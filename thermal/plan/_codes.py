@@ -57,7 +57,7 @@ def survey_codes(codes: ArrayLike, cell_size: float, source: str = "codes") -> F
     Parameters
     ----------
     codes : array_like of int, shape (n_row, n_col)
-        0 inside, 1 wall, 2 outside; the first row is the plan's "up".
+        0 inside, 1 wall, 2 outside [-]; the first row is the plan's "up".
     cell_size : float
         Side of a cell [m], 0.01 to 5.
     source : str

@@ -35,7 +35,7 @@ class Drawing:
     source : str
         File and page, for messages and pictures.
     dots_per_inch : float or None
-        Resolution of a PDF's page; None for images, whose notes on it are seldom right.
+        Resolution of a PDF's page [1/inch]; None for images, whose notes on it are seldom right.
     corner : tuple of float
         Column and row of the whole drawing at which this part of it begins [px].
     """

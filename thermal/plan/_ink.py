@@ -156,7 +156,8 @@ def _with_hairlines(cover: FloatArray) -> Mask:
     apart = faint & ~ndimage.binary_dilation(body, square)
     lines = ndimage.binary_dilation(apart, square, iterations=2, mask=faint) if apart.any() else apart
     thin: Mask = extra("skimage.morphology").skeletonize(dark | lines)
-    return dark | (thin & lines)
+    found: Mask = dark | (thin & lines)
+    return found
 
 
 def _upright(shape: tuple[int, ...], angle: float, refine: int) -> FloatArray:

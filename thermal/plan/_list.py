@@ -124,8 +124,10 @@ class FloorEntry(_Entry):
         A spot that all floors share [px of the drawing].
     names
         A point in a room [px of the drawing] by name of the zone.
-    widest_door, thickest_wall, thinnest_wall, smallest_room, smallest_zone
-        As in `PlanSettings` [m, m, m, m2, m2].
+    widest_door, thickest_wall, thinnest_wall
+        As in `PlanSettings` [m].
+    smallest_room, smallest_zone
+        As in `PlanSettings` [m2].
     """
 
     name: Annotated[str, Field(min_length=1)]

@@ -30,7 +30,7 @@ def walls_of(ink: Mask, pixel: float, settings: PlanSettings) -> Mask:
     ndarray of bool, shape (n_row, n_col)
         Solid walls, with gaps at doors.
     """
-    solid = fill_narrow(ink, pixel, settings.thickest_wall)
+    solid = _fill_narrow(ink, pixel, settings.thickest_wall)
     least = settings.thinnest_wall / pixel
     if least > 2.0:
         # A stroke of n pixels has distances up to (n + 1) / 2 to the nearest pixel beside it, a ragged one half less.
@@ -40,7 +40,7 @@ def walls_of(ink: Mask, pixel: float, settings: PlanSettings) -> Mask:
     return _without_specks(solid, pixel)
 
 
-def fill_narrow(ink: Mask, pixel: float, width: float) -> Mask:
+def _fill_narrow(ink: Mask, pixel: float, width: float) -> Mask:
     """Fill closed spaces that are nowhere wider than a wall: between its faces, between the panes of a window.
 
     Parameters

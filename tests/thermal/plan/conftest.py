@@ -53,7 +53,7 @@ GROSS = (4.05 * 4.95, 4.4 * 4.95, 4.6 * 4.95, 4.95 * 4.95, 18.0 * 1.7, 6.05 * 4.
 
 
 @dataclass(frozen=True)
-class Image_:
+class Sheet:
     """An image of the office, and where two points of it are."""
 
     image: Image.Image
@@ -62,7 +62,7 @@ class Image_:
     distance: float
 
 
-def draw(pixels_per_metre: float, turn: float = 0.0, fine: int = 4) -> Image_:
+def draw(pixels_per_metre: float, turn: float = 0.0, fine: int = 4) -> Sheet:
     """Draw the office as an anti-aliased image, turned counterclockwise."""
     scale = pixels_per_metre * fine
     size = [round(scale * (OUTER[i + 2] - OUTER[i] + 2 * MARGIN) / fine) * fine for i in (0, 1)]
@@ -108,11 +108,11 @@ def draw(pixels_per_metre: float, turn: float = 0.0, fine: int = 4) -> Image_:
             )
             for x, y in points
         ]
-    return Image_(image, 1.0 / pixels_per_metre, (points[0], points[1]), 18.0)  # type: ignore[arg-type]
+    return Sheet(image, 1.0 / pixels_per_metre, (points[0], points[1]), 18.0)  # type: ignore[arg-type]
 
 
 @pytest.fixture(scope="session")
-def office() -> Callable[..., Image_]:
+def office() -> Callable[..., Sheet]:
     """Draw the office as an image."""
     return draw
 
