@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shutil
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -120,6 +121,8 @@ def office() -> Callable[..., Sheet]:
 @pytest.fixture(scope="session")
 def office_pdf(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Draw the office as vectors on the second page of a PDF, at 1:100."""
+    if shutil.which("pdftoppm") is None:
+        pytest.skip("needs pdftoppm (Debian's poppler-utils)")
     from matplotlib.backends.backend_pdf import PdfPages
     from matplotlib.figure import Figure
     from matplotlib.patches import Rectangle
