@@ -12,7 +12,7 @@ from thermal.case import (
     save_case,
 )
 from thermal.data import load_bundled_case
-from thermal.errors import CaseError, ModelError, ThermalError
+from thermal.errors import CaseError, ModelError, PlanError, ThermalError
 from thermal.model import Inputs, Simulator, SymbolicModel, free_runs, reduced_model, replay_inputs, simulate, spin_up
 from thermal.network import Structure, ThermalNetwork, build_network
 from thermal.parameters import PARAMETERS, Parameter
@@ -27,6 +27,7 @@ __all__ = [
     "Inputs",
     "ModelError",
     "Parameter",
+    "PlanError",
     "Simulator",
     "Structure",
     "SymbolicModel",

@@ -301,3 +301,52 @@ class HvacParameterError(HvacError):
 
 class HvacActionError(HvacError):
     """An action or a condition of a step that is not finite, outside its range or of another shape."""
+
+
+# Plans and devices from other files
+class PlanError(ThermalError):
+    """Something is wrong with a drawing or a list of devices, or with what it is asked for."""
+
+
+class MissingExtraError(PlanError):
+    """A package that the import of plans needs is not installed."""
+
+
+class DrawingFileError(PlanError):
+    """A file is not there, or not the kind of drawing or list that its name says."""
+
+
+class OversizedFileError(PlanError):
+    """A file, or what it unpacks to, is larger than any real plan."""
+
+
+class OutsideFolderError(PlanError):
+    """A path in a list of drawings leads out of the folder of the list."""
+
+
+class PlanSettingError(PlanError):
+    """A setting of the import that is no number, or outside its range."""
+
+
+class ScaleError(PlanError):
+    """The scale of a drawing is missing, or makes no building of it."""
+
+
+class DrawingUnitsError(PlanError):
+    """A drawing in units that make no building of it."""
+
+
+class NoRoomsError(PlanError):
+    """A drawing whose walls enclose nothing."""
+
+
+class LostRoomError(PlanError):
+    """A room that the cells of a plan are too coarse for."""
+
+
+class RoomNameError(PlanError):
+    """A name for a room that is reserved, stands twice, or points at no room."""
+
+
+class DeviceListError(PlanError):
+    """A list of devices that cannot be understood."""

@@ -19,6 +19,7 @@ from mpc.cli._demo import demo
 from mpc.cli._diagnose import diagnose
 from mpc.cli._doctor import doctor
 from mpc.cli._evaluate import evaluate
+from mpc.cli._import import import_devices, import_plan
 from mpc.cli._simulate import simulate
 
 P = ParamSpec("P")
@@ -95,6 +96,16 @@ for _command, _help, _example in (
     (demo, "Calibrate the bundled case and evaluate it on held-out days, in under two minutes.", "demo --out demo"),
     (doctor, "Say what is installed and what is missing, and test the solvers.", "doctor"),
     (check, "Validate a case folder: geometry, quality of the telemetry, what each point is.", "check cases/office"),
+    (
+        import_plan,
+        "Make a case folder of floor plans: PNG, JPEG, PDF, DXF, arrays of codes.",
+        "import-plan plans/plans.yaml --devices plans/devices.csv --out cases/office",
+    ),
+    (
+        import_devices,
+        "Give a case its devices from CSV, Brick or Haystack, and match columns of telemetry to them.",
+        "import-devices cases/office devices.ttl --telemetry export.csv --out cases/office-2",
+    ),
     (
         simulate,
         "Replay the inputs of a building through its model.",

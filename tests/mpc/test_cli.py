@@ -14,7 +14,7 @@ from mpc.cli._app import app
 from thermal.data import bundled_case_path
 
 CASE = str(bundled_case_path())
-EPILOGS = ("check", "simulate", "evaluate", "calibrate", "diagnose", "demo", "doctor")
+EPILOGS = ("check", "simulate", "evaluate", "calibrate", "diagnose", "demo", "doctor", "import-plan", "import-devices")
 
 
 def run(*arguments: str | Path) -> Any:
@@ -50,7 +50,7 @@ def test_help_has_an_example(command: str) -> None:
 def test_only_what_exists_is_offered() -> None:
     answer = run("--help")
     assert answer.exit_code == 0
-    assert sorted(c.name or c.callback.__name__ for c in app.registered_commands) == sorted(EPILOGS)
+    assert sorted(c.name or c.callback.__name__.replace("_", "-") for c in app.registered_commands) == sorted(EPILOGS)
 
 
 def test_version() -> None:

@@ -1,0 +1,96 @@
+"""``import-plan`` and ``import-devices``: drawings and a list become a case that ``check`` takes."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from mpc.cli._app import app
+
+pytest.importorskip("skimage", reason="needs the extra [plan]")
+
+LIST = """
+name: two rooms
+location: {latitude: 37.4, longitude: -122.1, elevation: 20.0, timezone: America/Los_Angeles}
+orientation: 10.0
+floors:
+  - {name: F1, file: first.png, height: 2.8, scale: {points: [[50, 50], [450, 50]], distance: 8.0}}
+  - {name: F2, file: second.csv, cell_size: 0.1}
+"""
+
+
+def run(*arguments: str | Path) -> Any:
+    """Run the command in this process."""
+    return CliRunner().invoke(app, [str(a) for a in arguments])
+
+
+@pytest.fixture
+def drawings(tmp_path: Path) -> Path:
+    """Two floors of 8 m x 6 m, one drawn at 2 cm a pixel with a door, one in codes."""
+    from PIL import Image
+
+    pixels = np.full((400, 500), 255, dtype=np.uint8)
+    pixels[40:360, 40:460] = 0
+    pixels[50:350, 50:450] = 255
+    pixels[50:350, 248:253] = 0
+    pixels[100:145, 248:253] = 255
+    Image.fromarray(pixels).save(tmp_path / "first.png")
+    codes = np.full((64, 84), 2)
+    codes[1:63, 1:83] = 1
+    codes[2:62, 2:82] = 0
+    np.savetxt(tmp_path / "second.csv", codes, fmt="%d", delimiter=",")
+    (tmp_path / "plans.yaml").write_text(LIST, encoding="utf-8")
+    (tmp_path / "devices.csv").write_text("name,type,zone\nV1,VAV,F1-R1\nV2,VAV,F1-R2\nV3,VAV,F3\nB,boiler,", "utf-8")
+    return tmp_path / "plans.yaml"
+
+
+def test_drawings_become_a_case(drawings: Path, tmp_path: Path) -> None:
+    case = tmp_path / "case"
+    answer = run("import-plan", drawings, "--devices", tmp_path / "devices.csv", "--out", case)
+    assert (answer.exit_code, answer.stderr) == (0, "")
+    assert "F1_R02" in answer.stdout and "V3" in answer.stdout
+    assert "<svg" in (case / "report.html").read_text(encoding="utf-8")
+    checked = json.loads(run("check", case, "--json").stdout)
+    areas = {zone["name"]: zone["floor_area"] for zone in checked["zones"]}
+    assert areas == pytest.approx({"F1_R01": 24.06, "F1_R02": 23.94, "F2_R01": 48.0}, rel=0.02)
+    assert run("import-plan", drawings, "--out", case).exit_code == 2
+    answer = run("import-plan", drawings, "--out", case, "--force", "--json")
+    assert answer.exit_code == 0 and json.loads(answer.stdout)["largest_area_error"] < 0.02
+
+
+def test_devices_and_columns(drawings: Path, tmp_path: Path) -> None:
+    assert run("import-plan", drawings, "--out", tmp_path / "case").exit_code == 0
+    (tmp_path / "t.csv").write_text("time,V1 zat,V1 airflow,lights\n", encoding="utf-8")
+    arguments = ("import-devices", tmp_path / "case", tmp_path / "devices.csv", "--telemetry", tmp_path / "t.csv")
+    answer = run(*arguments, "--out", tmp_path / "new")
+    assert (answer.exit_code, answer.stderr) == (0, "")
+    assert "2 of 3 columns matched" in answer.stdout and "lights" in answer.stdout
+    assert (tmp_path / "new" / "points.csv").is_file()
+    found = json.loads(run(*arguments, "--out", tmp_path / "json", "--json").stdout)
+    assert found["devices"]["unplaced"] == {"V3": "F3"} and found["points"][0]["entity"] == "V1"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "error"),
+    [
+        ("first.png", "../../etc/passwd.png", "OutsideFolderError"),
+        ("first.png", "none.png", "DrawingFileError"),
+        ("distance: 8.0", "distance: 80000.0", "ScaleError"),
+        ("distance: 8.0", "length: 8.0", "ScaleError"),
+        ("height: 2.8", "heigth: 2.8", "PlanSettingError"),
+        ("height: 2.8", "height: 0.1", "PlanSettingError"),
+        ("name: two rooms", "name: &a [*a]", "DrawingFileError"),
+        ("name: F2", "name: F1", "RoomNameError"),
+    ],
+)
+def test_bad_lists_are_refused_by_name(drawings: Path, tmp_path: Path, old: str, new: str, error: str) -> None:
+    drawings.write_text(LIST.replace(old, new), encoding="utf-8")
+    answer = run("import-plan", drawings, "--out", tmp_path / "case")
+    assert (answer.exit_code, answer.stdout) == (2, "")
+    assert answer.stderr.startswith(f"error: {error}: ")
+    assert not (tmp_path / "case").exists()

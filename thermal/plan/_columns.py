@@ -1,0 +1,69 @@
+"""Columns of a telemetry file, and what they were matched to, as a file that a person can correct."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Sequence
+from os import PathLike
+from pathlib import Path
+
+from thermal.case.telemetry import INDEX
+from thermal.errors import DrawingFileError, describe
+from thermal.plan._guard import checked_file
+from thermal.plan._match import PointMatch
+
+
+def read_columns(path: str | PathLike[str]) -> tuple[str, ...]:
+    """Read the names of the columns of a telemetry file, without its values.
+
+    Parameters
+    ----------
+    path : str or path
+        CSV or Parquet.
+
+    Returns
+    -------
+    tuple of str
+        All but the first of a CSV, and all but ``timestamp``.
+
+    Raises
+    ------
+    DrawingFileError
+        The file is missing or neither.
+    """
+    file = checked_file(Path(path), (".csv", ".parquet"))
+    try:
+        if file.suffix.lower() == ".csv":
+            with file.open(encoding="utf-8-sig", newline="") as stream:
+                names = next(csv.reader(stream, strict=True), [])[1:]
+        else:
+            from pyarrow import parquet
+
+            names = [str(name) for name in parquet.read_schema(file).names]
+    except (OSError, UnicodeDecodeError, ValueError, csv.Error) as error:
+        found = " ".join(str(error).split())[:200]
+        raise DrawingFileError(describe(file.name, "telemetry with one column a point", found)) from error
+    return tuple(name for name in names if name not in (INDEX, "__index_level_0__"))
+
+
+def write_matches(matches: Sequence[PointMatch], path: str | PathLike[str]) -> Path:
+    """Write what columns were matched to as CSV.
+
+    Parameters
+    ----------
+    matches : sequence of PointMatch
+        From `match_points`.
+    path : str or path
+        File to write.
+
+    Returns
+    -------
+    Path
+        The file: column, entity, point, confidence, remark.
+    """
+    file = Path(path)
+    with file.open("w", encoding="utf-8", newline="") as stream:
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerow(["column", "entity", "point", "confidence", "remark"])
+        writer.writerows([m.column, m.entity, m.point, f"{m.confidence:.3f}", m.remark] for m in matches)
+    return file
