@@ -19,6 +19,7 @@ from calibration.diagnosis._bench import TYPICAL, Bench, Fit, is_strength
 from calibration.diagnosis._generic import GENERIC, ZONE_HEAT
 from thermal import Parameter, reduced_model
 from thermal.effects import CATALOGUE, PAIR, Chosen
+from thermal.model import FEW_SHIFTS
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -26,7 +27,6 @@ IntArray = NDArray[np.int64]
 #: Sweeps of the quadratic programme, and the change of an estimate in prior deviations that ends them [-].
 _SWEEPS, _TOLERANCE = 200, 1e-6
 
-#: Expansion points of the reduced model [1/s]: a day, four hours, forty and seven minutes. Two more cost twice the time
 #: and change no gain by 0.01.
 _SHIFTS = (1.0 / 86400.0, 1.0 / 14400.0, 1.0 / 2400.0, 1.0 / 400.0)
 
@@ -97,7 +97,8 @@ class Screening:
         self._elsewhere = len(built.network.zones) - len(here) if here else 0
         theta = built.theta(fit.values)
         order = _LARGEST_ORDER if here else None
-        model = reduced_model(built.grid, [theta, built.theta(fit.values, TYPICAL)], shifts=_SHIFTS, order=order)
+        # the shifts of a large building: two more cost twice the time and change no gain by 0.01
+        model = reduced_model(built.grid, [theta, built.theta(fit.values, TYPICAL)], shifts=FEW_SHIFTS, order=order)
         problem = bench.problem(built, theta)
         parts = [problem.errors(model, theta, runs, slopes=True) for runs in problem.runs]
         slopes = np.concatenate([m.reshape(-1, m.shape[-1]) for _, m in parts if m is not None])

@@ -181,7 +181,7 @@ class ModalRuns:
         from_inputs: list[FloatArray | None] = []
         for j in range(p):
             turn, stiffer = self.slopes.turn(j)
-            pushed = self._pushed(j, stiffer)
+            pushed = self._pushed(j, stiffer, drive)
             by_input = propagator.end_gain[:, None] * pushed
             out[j] = ((observe * propagator.mean_gain) @ pushed) @ seen_inputs
             if turn is not None:
@@ -205,9 +205,9 @@ class ModalRuns:
                 out[:, :, position] += part.reshape(-1, p, m).transpose(1, 0, 2)
         return out.transpose(3, 2, 1, 0)
 
-    def _pushed(self, j: int, stiffer: FloatArray | None) -> FloatArray:
+    def _pushed(self, j: int, stiffer: FloatArray | None, drive: FloatArray) -> FloatArray:
         """Differentiate ``(K + s C)^-1 [B, H]`` with respect to one parameter, (r, n_boundary + n_zone)."""
-        drive, moved = np.hstack([self.modes.boundary, self.modes.heating]), self.slopes.boundary[j]
+        moved = self.slopes.boundary[j]
         pushed = np.zeros_like(drive) if stiffer is None else -stiffer @ drive
         if moved is not None:
             pushed[:, : moved.shape[1]] += moved
