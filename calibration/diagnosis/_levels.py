@@ -33,8 +33,9 @@ LARGEST_GROUP = 4
 #: many small ways are too sure of themselves.
 TEMPERATURE = 2.0
 
-#: Most gain that an effect is worth that matters to no prediction, or makes those worse that it was not fitted to [-].
-DOUBTFUL = 1.0
+#: Most gain that an effect is worth that matters to no prediction, and that one is worth that makes those worse which
+#: it was not fitted to [-].
+SMALL, DOUBTFUL = 4.0, 1.0
 
 #: Probability from which an effect belongs to the 90 % set [-].
 IN_SET = 0.1

@@ -10,7 +10,8 @@ import numpy as np
 
 from calibration._evaluate import Progress
 from calibration.diagnosis._bench import Bench, Fit, is_strength
-from calibration.diagnosis._held_out import HeldOut, held_out
+from calibration.diagnosis._held_out import HeldOut, growth, held_out
+from calibration.diagnosis._pairs import Pair, nominate
 from calibration.diagnosis._screen import Gain, Screening, choice_of, screen
 from calibration.errors import CalibrationError
 from thermal import ModelError
@@ -25,9 +26,16 @@ LEAST_GAIN, LEAST_SHARE = 3.0, 0.4
 #: Evaluations of a fit from one start.
 _EVALUATIONS = 6
 
+#: Most pairs that a round fits.
+MOST_PAIRS = 2
+
 #: Least fall of an error by which an effect matters to predictions, of the root mean square where it is fitted or of
-#: the mean where it is held out, and by how much the latter may grow [K].
-MATTERS, NO_WORSE = 0.03, 0.005
+#: the mean where it is held out [K].
+MATTERS = 0.03
+
+#: By how much the mean of the held-out errors may grow [K], and by how many standard errors of that more [-]: what
+#: differs from day to day by chance disproves nothing.
+NO_WORSE, CHANCE = 0.005, 1.645
 
 #: Gain of the fit from which an effect is accepted [-]; null cases stay below, as with `calibration.diagnosis._levels`.
 ACCEPTED = 6.0
@@ -49,6 +57,8 @@ class Refit:
         How far the root mean square of the tuning errors falls with it [K].
     held_out : HeldOut
         Held-out errors with it.
+    worse : bool
+        Whether held-out errors grow with it by more than chance.
     counts : bool
         Whether it may be accepted: beyond doubt, of some size, and no worse where it was not fitted.
     """
@@ -58,6 +68,7 @@ class Refit:
     gain: float
     fall: float
     held_out: HeldOut
+    worse: bool
     counts: bool
 
 
@@ -81,6 +92,8 @@ class Round:
         Effects fitted anew, the best first.
     accepted : Refit or None
         What the next round starts from.
+    pair : Refit or None
+        The other effect of a pair by which the accepted one was found, fitted with it; its gain is that of both.
     """
 
     before: Fit
@@ -90,6 +103,7 @@ class Round:
     generic: Gain
     refits: tuple[Refit, ...]
     accepted: Refit | None
+    pair: Refit | None = None
 
     @property
     def after(self) -> Fit:
@@ -114,11 +128,13 @@ class Round:
             },
             "refits": {
                 r.screened.effect: {
-                    "gain": r.gain, "fall": r.fall, "held_out_mae": r.held_out.mae, "counts": r.counts,
+                    "gain": r.gain, "fall": r.fall, "held_out_mae": r.held_out.mae, "worse": r.worse,
+                    "counts": r.counts,
                 }
                 for r in self.refits
             },
             "accepted": None if self.accepted is None else self.accepted.screened.effect,
+            "pair": None if self.pair is None else {"with": self.pair.screened.effect, "gain": self.pair.gain},
         }  # fmt: skip
 
 
@@ -139,58 +155,120 @@ def search(
         Called with stage, done, total.
     """
     done: list[Round] = []
-    fit, errors = baseline, held_out(bench, baseline)
+    fit, errors, ahead = baseline, held_out(bench, baseline), None
     for number in range(ROUNDS):
         if progress is not None:
             progress("diagnose", number, ROUNDS)
         open_ = [e for e in candidates if all(r in fit.effects for r in CATALOGUE[e].requires)]
         made, gains, generic = screen(bench, fit, open_)
-        refits = _refits(bench, fit, errors, made, gains)
+        work = _Work(bench, fit, errors, made)
+        refits = _refits(work, gains, ahead)
         best = next((r for r in refits if r.counts), None)
-        done.append(Round(fit, errors, made, tuple(gains), generic, tuple(refits), best))
+        chosen = _pair(work, gains, refits, best) if ahead is None else None
+        pair = None
+        if chosen is not None:
+            best, pair = chosen
+            refits = sorted({id(r): r for r in (*refits, best)}.values(), key=lambda r: -r.gain)
+        done.append(Round(fit, errors, made, tuple(gains), generic, tuple(refits), best, pair))
         if best is None:
             break
-        fit, errors = best.fit, best.held_out
+        fit, errors, ahead = best.fit, best.held_out, pair
     if progress is not None:
         progress("diagnose", ROUNDS, ROUNDS)
     return tuple(done)
 
 
-def _refits(bench: Bench, fit: Fit, before: HeldOut, made: Screening, gains: Sequence[Gain]) -> list[Refit]:
-    """Fit the few best anew, lesser ones too as long as none counts, and what the best is confounded with."""
-    accepted = {p.name: fit.values[p.name] for p in fit.built.network.parameters if p.effect is not None}
+@dataclass(frozen=True)
+class _Work:
+    """What a round's fits start from."""
+
+    bench: Bench
+    fit: Fit
+    held_out: HeldOut
+    made: Screening
+
+    @property
+    def accepted(self) -> dict[str, float]:
+        """Parameters of the effects that are in the model."""
+        parameters = self.fit.built.network.parameters
+        return {p.name: self.fit.values[p.name] for p in parameters if p.effect is not None}
+
+    def refit(self, gains: Sequence[Gain], starts: Sequence[Mapping[str, float]]) -> Refit | None:
+        """Fit with some effects more; None where the fit fails, which costs those effects only."""
+        try:
+            effects = {**self.fit.effects, **{g.effect: g.zones for g in gains}}
+            anew = self.bench.fit(effects, starts, evaluations=_EVALUATIONS)
+        except (ArithmeticError, np.linalg.LinAlgError, CalibrationError, ModelError):
+            return None
+        return self.weighed(gains, anew)
+
+    def weighed(self, gains: Sequence[Gain], anew: Fit) -> Refit:
+        """Compare a model with some effects more with the one without them."""
+        choice = sum(choice_of(_places(anew, g.effect), g.places) for g in gains if g.places)
+        gain = float(anew.evidence - self.fit.evidence - choice)
+        fall = float(np.sqrt(self.fit.found.mean_square) - np.sqrt(anew.found.mean_square))
+        errors = held_out(self.bench, anew)
+        grown, error = growth(self.held_out, errors)
+        worse = grown > NO_WORSE + CHANCE * error
+        counts = gain > ACCEPTED * len(gains) and not worse and max(fall, -grown) > MATTERS
+        return Refit(gains[-1], anew, gain, fall, errors, worse, counts)
+
+
+def _refits(work: _Work, gains: Sequence[Gain], ahead: Refit | None) -> list[Refit]:
+    """Fit the few best anew, lesser ones too as long as none counts, and what the best is confounded with.
+
+    What a pair of the round before was accepted with is there already, and counts.
+    """
     found: list[Refit] = []
+    if ahead is not None:
+        found.append(replace(work.weighed([ahead.screened], ahead.fit), counts=True))
 
     def refit(g: Gain, starts: Sequence[Mapping[str, float]]) -> None:
-        try:
-            anew = bench.fit({**fit.effects, g.effect: g.zones}, starts, evaluations=_EVALUATIONS)
-        except (ArithmeticError, np.linalg.LinAlgError, CalibrationError, ModelError):
-            return  # a fit that fails costs that effect only
-        found.append(_weighed(bench, fit, before, g, anew))
+        fitted = work.refit([g], starts)
+        if fitted is not None:
+            found.append(fitted)
 
     for g in [g for g in gains if g.gain > LEAST_GAIN][:MOST_REFITS]:
         if g.gain < LEAST_SHARE * gains[0].gain and any(r.counts for r in found):
             break
-        refit(g, [made.promised(g), accepted | dict(g.strengths)] if g is gains[0] else [made.promised(g)])
+        if ahead is None or ahead.screened.effect != g.effect:
+            tangents = work.made.promised(g)
+            refit(g, [tangents, work.accepted | dict(g.strengths)] if g is gains[0] else [tangents])
     best = max((r for r in found if r.counts), key=lambda r: r.gain, default=None)
     if best is not None and best.screened.zones:
         fitted = {r.screened.effect for r in found}
         for g in gains:
             alike = g.effect in CATALOGUE[best.screened.effect].confounders and CATALOGUE[g.effect].zonal
             if alike and g.effect not in fitted:  # tangents at no strength may miss where it is, or what it does
-                refit(replace(g, zones=best.screened.zones), [accepted])
+                refit(replace(g, zones=best.screened.zones), [work.accepted])
     return sorted(found, key=lambda r: -r.gain)
 
 
-def _weighed(bench: Bench, fit: Fit, before: HeldOut, screened: Gain, anew: Fit) -> Refit:
-    """Compare a model with one effect more with the one without it."""
-    choice = choice_of(_places(anew, screened.effect), screened.places) if screened.places else 0.0
-    gain = float(anew.evidence - fit.evidence - choice)
-    fall = float(np.sqrt(fit.found.mean_square) - np.sqrt(anew.found.mean_square))
-    errors = held_out(bench, anew)
-    closer = before.mae - errors.mae
-    counts = gain > ACCEPTED and closer > -NO_WORSE and max(fall, closer) > MATTERS
-    return Refit(screened, anew, gain, fall, errors, counts)
+def _pair(
+    work: _Work, gains: Sequence[Gain], refits: Sequence[Refit], best: Refit | None
+) -> tuple[Refit, Refit] | None:
+    """Fit the pairs that promise more than any single effect; the members of one that keeps it, the first one alone.
+
+    A pair that the best single effect is part of needs no search: the next round finds the other.
+    """
+    pairs = nominate(work.made, gains, LEAST_GAIN)
+    if not pairs or (best is not None and _within(best, pairs[0])):
+        return None
+    single = max((r.gain for r in refits), default=0.0)
+    fitted = [work.refit([p.first, p.second], [work.made.promised(p.first, p.second)]) for p in pairs[:MOST_PAIRS]]
+    kept = [(r, p) for r, p in zip(fitted, pairs, strict=False) if r is not None and r.counts]
+    if not kept:
+        return None
+    both, pair = max(kept, key=lambda k: k[0].gain)
+    if both.gain < single + ACCEPTED or (best is not None and _within(best, pair)):
+        return None
+    known = {r.screened.effect: r for r in refits if r.screened.zones == pair.first.zones}
+    first = known.get(pair.first.effect) or work.refit([pair.first], [work.made.promised(pair.first)])
+    return None if first is None else (first, both)
+
+
+def _within(single: Refit, pair: Pair) -> bool:
+    return single.screened.effect in (pair.first.effect, pair.second.effect)
 
 
 def _places(fit: Fit, effect: str) -> int:

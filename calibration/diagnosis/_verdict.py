@@ -21,6 +21,7 @@ from calibration.diagnosis._levels import (
     LEFT_IN_A_ZONE,
     LEFT_OVER,
     RIVAL,
+    SMALL,
     TEMPERATURE,
 )
 from calibration.diagnosis._screen import Gain
@@ -127,22 +128,23 @@ def judge(rounds: Sequence[Round], untestable: Mapping[str, str]) -> Verdict:
     score: dict[str, float] = dict.fromkeys(CATALOGUE, -np.inf)
     best: dict[str, Gain | Refit] = {}
     real = 1.0  # that all rounds before found something that is there
+    last = _raw(rounds[-1])
     chain: list[tuple[tuple[str, ...], float]] = []
     for r in rounds:
         gains = gains_of(r)
-        found = _probabilities(gains)
+        found, none = _probabilities(gains)
         for effect, gain in gains.items():
             probability[effect] = max(probability[effect], real * found[effect])
             if gain > score[effect]:
                 score[effect] = gain
                 best[effect] = _source(r, effect)
         if r.accepted is not None:
-            chain.append((tuple(r.before.effects), real * (1.0 - sum(found.values()))))
-            real *= sum(found.values())
+            chain.append((tuple(r.before.effects), real * none))
+            real *= 1.0 - none
     chain.append((tuple(rounds[-1].after.effects), real))
     suspects = sorted(
         (_suspect(e, probability[e], score[e], best.get(e), rounds, untestable.get(e)) for e in CATALOGUE),
-        key=lambda s: (-s.probability, -s.score),
+        key=lambda s: (-s.probability, -s.score, -last.get(s.effect, -np.inf)),
     )
     name = _name(rounds)
     return Verdict(name, tuple(suspects), _inside(rounds, suspects) if name in ("named", "group") else (), dict(chain))
@@ -164,7 +166,7 @@ def group_of(r: Round, effect: str) -> tuple[str, ...]:
     effect : str
         Its id.
     """
-    gains = {g.effect: g.gain for g in r.gains} | {x.screened.effect: x.gain for x in r.refits}
+    gains = _raw(r)
     own = next((g for g in r.gains if g.effect == effect), None)
     alike = [effect]
     if gains[effect] <= ACCEPTED:  # what hardly gains is not there, whatever else looks like it
@@ -190,8 +192,22 @@ def gains_of(r: Round) -> dict[str, float]:
     r : Round
         Of the search.
     """
-    gains = {g.effect: g.gain for g in r.gains}
-    return gains | {x.screened.effect: x.gain if x.counts else min(x.gain, DOUBTFUL) for x in r.refits}
+    gains = {g.effect: g.gain for g in r.gains} | {x.screened.effect: _worth(x) for x in r.refits}
+    return gains | _led(r)
+
+
+def _raw(r: Round) -> dict[str, float]:
+    """Gain of every effect of a round, whether it counts or not."""
+    return {g.effect: g.gain for g in r.gains} | {x.screened.effect: x.gain for x in r.refits} | _led(r)
+
+
+def _worth(fitted: Refit) -> float:
+    return fitted.gain if fitted.counts else min(fitted.gain, DOUBTFUL if fitted.worse else SMALL)
+
+
+def _led(r: Round) -> dict[str, float]:
+    """Gain of an effect that was found as one of a pair: that of both, less the price of the other."""
+    return {} if r.pair is None or r.accepted is None else {r.accepted.screened.effect: r.pair.gain - ACCEPTED}
 
 
 def _name(rounds: Sequence[Round]) -> VerdictName:
@@ -225,13 +241,13 @@ def _source(r: Round, effect: str) -> Gain | Refit:
     return fitted or next(g for g in r.gains if g.effect == effect)
 
 
-def _probabilities(gains: Mapping[str, float]) -> dict[str, float]:
-    """Share of each effect against all others and none, gains tempered; none has the gain at which effects count."""
-    size = np.array(list(gains.values())) / TEMPERATURE
-    top = max(float(size.max(initial=-np.inf)), ACCEPTED / TEMPERATURE)
-    weight = np.exp(size - top)
-    whole = float(weight.sum()) + float(np.exp(ACCEPTED / TEMPERATURE - top))
-    return {effect: float(w) / whole for effect, w in zip(gains, weight, strict=True)}
+def _probabilities(gains: Mapping[str, float]) -> tuple[dict[str, float], float]:
+    """Share of each effect against all others and none, and that of none, whose gain is that at which effects count."""
+    top = max(*gains.values(), ACCEPTED)
+    weight = {effect: float(np.exp((gain - top) / TEMPERATURE)) for effect, gain in gains.items()}
+    none = float(np.exp((ACCEPTED - top) / TEMPERATURE))
+    whole = sum(weight.values()) + none
+    return {effect: w / whole for effect, w in weight.items()}, none / whole
 
 
 def _suspect(
