@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from importlib.resources import files
+from typing import Any
 
 import numpy as np
 
@@ -40,11 +41,28 @@ SMALL, DOUBTFUL = 4.0, 1.0
 #: Probability from which an effect belongs to the 90 % set [-].
 IN_SET = 0.1
 
+_NULLS: dict[str, Any] = json.loads(
+    (files("calibration") / "diagnosis" / "null_levels.json").read_text(encoding="utf-8")
+)
+
 #: Largest gains of the first round in development cases without any missing effect, in order [-]: made by
 #: ``benchmarks/blind_trials.py levels``.
-NULL_GAINS: tuple[float, ...] = tuple(
-    json.loads((files("calibration") / "diagnosis" / "null_levels.json").read_text(encoding="utf-8"))["largest"]
-)
+NULL_GAINS: tuple[float, ...] = tuple(_NULLS["largest"])
+
+#: Which of the quantiles of null gains is usual for an effect, and by how much it may raise or lower another [-].
+_USUAL, _MOST = 0.9, 3.0
+
+
+def usual(effect: str) -> float:
+    """Gain that an effect reaches in one of ten cases without any missing effect, within 3 of none [-].
+
+    Parameters
+    ----------
+    effect : str
+        Its id; 0 for one that no null case could tell.
+    """
+    levels = _NULLS["gains"].get(effect)
+    return 0.0 if levels is None else float(np.clip(levels[_NULLS["quantiles"].index(_USUAL)], -_MOST, _MOST))
 
 
 def p_value(gain: float) -> float:

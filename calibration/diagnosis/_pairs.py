@@ -10,7 +10,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
-from calibration.diagnosis._screen import Gain, Screening
+from calibration.diagnosis._gain import Gain
+from calibration.diagnosis._screen import Screening
 
 
 @dataclass(frozen=True)

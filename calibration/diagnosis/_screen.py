@@ -9,13 +9,13 @@ all, so that zones, pairs and generic heat are compared without another run of t
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import gammaln
 
 from calibration.diagnosis._bench import TYPICAL, Bench, Fit, is_strength
+from calibration.diagnosis._gain import Gain, choice_of
 from calibration.diagnosis._generic import GENERIC, ZONE_HEAT
 from thermal import Parameter, reduced_model
 from thermal.effects import CATALOGUE, PAIR, Chosen
@@ -27,9 +27,6 @@ IntArray = NDArray[np.int64]
 #: Sweeps of the quadratic programme, and the change of an estimate in prior deviations that ends them [-].
 _SWEEPS, _TOLERANCE = 200, 1e-6
 
-#: and change no gain by 0.01.
-_SHIFTS = (1.0 / 86400.0, 1.0 / 14400.0, 1.0 / 2400.0, 1.0 / 400.0)
-
 #: Order of the reduced model of a large building.
 _LARGEST_ORDER = 700
 
@@ -38,46 +35,6 @@ _MOST_ZONES = 24
 
 #: Sizes that generic heat may have over its prior's [-]; the likeliest counts (empirical Bayes).
 _TIGHTNESS = (0.003, 0.01, 0.03, 0.1, 0.3)
-
-
-@dataclass(frozen=True)
-class Gain:
-    """What an effect could explain.
-
-    Parameters
-    ----------
-    effect : str
-        Its id.
-    zones : tuple of str
-        Where; empty for the whole building.
-    gain : float
-        Logarithm of the Bayes factor against the model without it, by tangents [-].
-    share : float
-        Share of the squared tuning error that it explains [-].
-    strengths : mapping of str to float
-        Its parameters [parameter units].
-    deviations : mapping of str to float
-        Standard errors of them, by tangents [parameter units].
-    retained : float
-        Share of its signature that calibration cannot imitate [-].
-    direction : ndarray, shape (n_strength,)
-        Its strengths among all those screened, for cosines [parameter units].
-    places : int
-        How many zones or pairs of zones it may be in; 0 where it acts on the whole building.
-    choice : float
-        What was paid for having chosen them; part of the gain [-].
-    """
-
-    effect: str
-    zones: tuple[str, ...]
-    gain: float
-    share: float
-    strengths: Mapping[str, float]
-    deviations: Mapping[str, float]
-    retained: float
-    direction: FloatArray
-    places: int = 0
-    choice: float = 0.0
 
 
 class Screening:
@@ -316,20 +273,6 @@ def _worst_zones(fit: Fit) -> tuple[str, ...]:
         return ()
     worst = set(np.argsort(-fit.by_zone, kind="stable")[:_MOST_ZONES].tolist())
     return tuple(z for k, z in enumerate(zones) if k in worst)
-
-
-def choice_of(count: int, places: int) -> float:
-    """Logarithm of the odds against one choice of places before any data [-].
-
-    One place more halves the probability, and all choices of as many are alike; everywhere is as likely as any number.
-
-    Parameters
-    ----------
-    count, places : int
-        Places chosen, and all there are.
-    """
-    number = gammaln(places + 1) - gammaln(count + 1) - gammaln(places - count + 1)
-    return float(np.log(2.0) * (1 if count == places else 1 + count) + number)
 
 
 def screen(bench: Bench, fit: Fit, candidates: Sequence[str]) -> tuple[Screening, list[Gain], Gain]:

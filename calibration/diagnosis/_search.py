@@ -10,9 +10,10 @@ import numpy as np
 
 from calibration._evaluate import Progress
 from calibration.diagnosis._bench import Bench, Fit, is_strength
+from calibration.diagnosis._gain import Gain, choice_of
 from calibration.diagnosis._held_out import HeldOut, growth, held_out
 from calibration.diagnosis._pairs import Pair, nominate
-from calibration.diagnosis._screen import Gain, Screening, choice_of, screen
+from calibration.diagnosis._screen import Screening, screen
 from calibration.errors import CalibrationError
 from thermal import ModelError
 from thermal.effects import CATALOGUE

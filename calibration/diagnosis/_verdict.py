@@ -9,6 +9,7 @@ from typing import Any, Literal
 import numpy as np
 
 from calibration.diagnosis._bench import Fit
+from calibration.diagnosis._gain import Gain
 from calibration.diagnosis._levels import (
     ALIKE,
     APART,
@@ -23,8 +24,8 @@ from calibration.diagnosis._levels import (
     RIVAL,
     SMALL,
     TEMPERATURE,
+    usual,
 )
-from calibration.diagnosis._screen import Gain
 from calibration.diagnosis._search import ACCEPTED, Refit, Round
 from thermal.effects import CATALOGUE
 
@@ -128,11 +129,11 @@ def judge(rounds: Sequence[Round], untestable: Mapping[str, str]) -> Verdict:
     score: dict[str, float] = dict.fromkeys(CATALOGUE, -np.inf)
     best: dict[str, Gain | Refit] = {}
     real = 1.0  # that all rounds before found something that is there
-    last = _raw(rounds[-1])
+    last = {effect: gain - usual(effect) for effect, gain in _raw(rounds[-1]).items()}
     chain: list[tuple[tuple[str, ...], float]] = []
     for r in rounds:
         gains = gains_of(r)
-        found, none = _probabilities(gains)
+        found, none = _probabilities(_levelled(r))
         for effect, gain in gains.items():
             probability[effect] = max(probability[effect], real * found[effect])
             if gain > score[effect]:
@@ -144,7 +145,7 @@ def judge(rounds: Sequence[Round], untestable: Mapping[str, str]) -> Verdict:
     chain.append((tuple(rounds[-1].after.effects), real))
     suspects = sorted(
         (_suspect(e, probability[e], score[e], best.get(e), rounds, untestable.get(e)) for e in CATALOGUE),
-        key=lambda s: (-s.probability, -s.score, -last.get(s.effect, -np.inf)),
+        key=lambda s: (-s.probability, -last.get(s.effect, -np.inf), -s.score),
     )
     name = _name(rounds)
     return Verdict(name, tuple(suspects), _inside(rounds, suspects) if name in ("named", "group") else (), dict(chain))
@@ -194,6 +195,14 @@ def gains_of(r: Round) -> dict[str, float]:
     """
     gains = {g.effect: g.gain for g in r.gains} | {x.screened.effect: _worth(x) for x in r.refits}
     return gains | _led(r)
+
+
+def _levelled(r: Round) -> dict[str, float]:
+    """Gains by which probabilities are told: what does not count is measured against what is usual without a cause."""
+    fitted = {x.screened.effect: x for x in r.refits}
+    sure = {e for e, x in fitted.items() if x.counts} | set(_led(r))
+    worth = {e: gain if e in sure else min(gain - usual(e), SMALL) for e, gain in _raw(r).items()}
+    return worth | {e: min(worth[e], DOUBTFUL) for e, x in fitted.items() if x.worse and e not in sure}
 
 
 def _raw(r: Round) -> dict[str, float]:
