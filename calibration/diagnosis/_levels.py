@@ -49,20 +49,16 @@ _NULLS: dict[str, Any] = json.loads(
 #: ``benchmarks/blind_trials.py levels``.
 NULL_GAINS: tuple[float, ...] = tuple(_NULLS["largest"])
 
-#: Which of the quantiles of null gains is usual for an effect, and by how much it may raise or lower another [-].
-_USUAL, _MOST = 0.9, 3.0
-
 
 def usual(effect: str) -> float:
-    """Gain that an effect reaches in one of ten cases without any missing effect, within 3 of none [-].
+    """Largest gain that an effect reaches in cases without any missing effect, 0 at least [-].
 
     Parameters
     ----------
     effect : str
         Its id; 0 for one that no null case could tell.
     """
-    levels = _NULLS["gains"].get(effect)
-    return 0.0 if levels is None else float(np.clip(levels[_NULLS["quantiles"].index(_USUAL)], -_MOST, _MOST))
+    return max(0.0, *_NULLS["gains"].get(effect, (0.0,)))
 
 
 def p_value(gain: float) -> float:

@@ -198,7 +198,7 @@ def gains_of(r: Round) -> dict[str, float]:
 
 
 def _levelled(r: Round) -> dict[str, float]:
-    """Gains by which probabilities are told: what does not count is measured against what is usual without a cause."""
+    """Gains by which probabilities are told: of what does not count, what it gains beyond any case without a cause."""
     fitted = {x.screened.effect: x for x in r.refits}
     sure = {e for e, x in fitted.items() if x.counts} | set(_led(r))
     worth = {e: gain if e in sure else min(gain - usual(e), SMALL) for e, gain in _raw(r).items()}
