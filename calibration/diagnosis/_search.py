@@ -194,11 +194,11 @@ class _Work:
         parameters = self.fit.built.network.parameters
         return {p.name: self.fit.values[p.name] for p in parameters if p.effect is not None}
 
-    def refit(self, gains: Sequence[Gain], starts: Sequence[Mapping[str, float]]) -> Refit | None:
+    def refit(self, gains: Sequence[Gain], start: Mapping[str, float]) -> Refit | None:
         """Fit with some effects more; None where the fit fails, which costs those effects only."""
         try:
             effects = {**self.fit.effects, **{g.effect: g.zones for g in gains}}
-            anew = self.bench.fit(effects, starts, evaluations=_EVALUATIONS)
+            anew = self.bench.fit(effects, [start], evaluations=_EVALUATIONS)
         except (ArithmeticError, np.linalg.LinAlgError, CalibrationError, ModelError):
             return None
         return self.weighed(gains, anew)
@@ -224,24 +224,22 @@ def _refits(work: _Work, gains: Sequence[Gain], ahead: Refit | None) -> list[Ref
     if ahead is not None:
         found.append(replace(work.weighed([ahead.screened], ahead.fit), counts=True))
 
-    def refit(g: Gain, starts: Sequence[Mapping[str, float]]) -> None:
-        fitted = work.refit([g], starts)
-        if fitted is not None:
-            found.append(fitted)
-
     for g in [g for g in gains if g.gain > LEAST_GAIN][:MOST_REFITS]:
         if g.gain < LEAST_SHARE * gains[0].gain and any(r.counts for r in found):
             break
         if ahead is None or ahead.screened.effect != g.effect:
-            tangents = work.made.promised(g)
-            refit(g, [tangents, work.accepted | dict(g.strengths)] if g is gains[0] else [tangents])
+            tries = [work.refit([g], work.made.promised(g))]
+            if g is gains[0] and (tries[0] is None or tries[0].gain < g.gain):  # a calibrated θ may have hidden it
+                tries.append(work.refit([g], work.accepted | dict(g.strengths)))
+            found.extend(sorted((t for t in tries if t is not None), key=lambda t: -t.gain)[:1])
     best = max((r for r in found if r.counts), key=lambda r: r.gain, default=None)
     if best is not None and best.screened.zones:
         fitted = {r.screened.effect for r in found}
         for g in gains:
             alike = g.effect in CATALOGUE[best.screened.effect].confounders and CATALOGUE[g.effect].zonal
             if alike and g.effect not in fitted:  # tangents at no strength may miss where it is, or what it does
-                refit(replace(g, zones=best.screened.zones), [work.accepted])
+                other = work.refit([replace(g, zones=best.screened.zones)], work.accepted)
+                found.extend([] if other is None else [other])
     return sorted(found, key=lambda r: -r.gain)
 
 
@@ -256,7 +254,7 @@ def _pair(
     if not pairs or (best is not None and _within(best, pairs[0])):
         return None
     single = max((r.gain for r in refits), default=0.0)
-    fitted = [work.refit([p.first, p.second], [work.made.promised(p.first, p.second)]) for p in pairs[:MOST_PAIRS]]
+    fitted = [work.refit([p.first, p.second], work.made.promised(p.first, p.second)) for p in pairs[:MOST_PAIRS]]
     kept = [(r, p) for r, p in zip(fitted, pairs, strict=False) if r is not None and r.counts]
     if not kept:
         return None
@@ -264,7 +262,7 @@ def _pair(
     if both.gain < single + ACCEPTED or (best is not None and _within(best, pair)):
         return None
     known = {r.screened.effect: r for r in refits if r.screened.zones == pair.first.zones}
-    first = known.get(pair.first.effect) or work.refit([pair.first], [work.made.promised(pair.first)])
+    first = known.get(pair.first.effect) or work.refit([pair.first], work.made.promised(pair.first))
     return None if first is None else (first, both)
 
 
