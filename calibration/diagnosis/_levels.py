@@ -58,7 +58,7 @@ def usual(effect: str) -> float:
     effect : str
         Its id; 0 for one that no null case could tell.
     """
-    return max(0.0, *_NULLS["gains"].get(effect, (0.0,)))
+    return float(max(0.0, *_NULLS["gains"].get(effect, (0.0,))))
 
 
 def p_value(gain: float) -> float:

@@ -14,7 +14,6 @@ from calibration.diagnosis._levels import (
     ALIKE,
     APART,
     CONCENTRATED,
-    DOUBTFUL,
     EXPLAINED,
     GENERIC_GAP,
     IN_SET,
@@ -22,11 +21,9 @@ from calibration.diagnosis._levels import (
     LEFT_IN_A_ZONE,
     LEFT_OVER,
     RIVAL,
-    SMALL,
-    TEMPERATURE,
-    usual,
 )
 from calibration.diagnosis._search import ACCEPTED, Refit, Round
+from calibration.diagnosis._worth import beyond, gains_of, levelled, probabilities, raw
 from thermal.effects import CATALOGUE
 
 #: Standard deviations from the estimate to an end of a 90 % interval [-].
@@ -129,11 +126,11 @@ def judge(rounds: Sequence[Round], untestable: Mapping[str, str]) -> Verdict:
     score: dict[str, float] = dict.fromkeys(CATALOGUE, -np.inf)
     best: dict[str, Gain | Refit] = {}
     real = 1.0  # that all rounds before found something that is there
-    last = {effect: gain - usual(effect) for effect, gain in _raw(rounds[-1]).items()}
+    last = beyond(rounds[-1])
     chain: list[tuple[tuple[str, ...], float]] = []
     for r in rounds:
         gains = gains_of(r)
-        found, none = _probabilities(_levelled(r))
+        found, none = probabilities(levelled(r))
         for effect, gain in gains.items():
             probability[effect] = max(probability[effect], real * found[effect])
             if gain > score[effect]:
@@ -167,7 +164,7 @@ def group_of(r: Round, effect: str) -> tuple[str, ...]:
     effect : str
         Its id.
     """
-    gains = _raw(r)
+    gains = raw(r)
     own = next((g for g in r.gains if g.effect == effect), None)
     alike = [effect]
     if gains[effect] <= ACCEPTED:  # what hardly gains is not there, whatever else looks like it
@@ -183,40 +180,6 @@ def group_of(r: Round, effect: str) -> tuple[str, ...]:
         if near or rival:
             alike.append(g.effect)
     return tuple(alike)
-
-
-def gains_of(r: Round) -> dict[str, float]:
-    """Gain of every effect of a round: fitted where it was, by tangents otherwise; little where it does not count.
-
-    Parameters
-    ----------
-    r : Round
-        Of the search.
-    """
-    gains = {g.effect: g.gain for g in r.gains} | {x.screened.effect: _worth(x) for x in r.refits}
-    return gains | _led(r)
-
-
-def _levelled(r: Round) -> dict[str, float]:
-    """Gains by which probabilities are told: of what does not count, what it gains beyond any case without a cause."""
-    fitted = {x.screened.effect: x for x in r.refits}
-    sure = {e for e, x in fitted.items() if x.counts} | set(_led(r))
-    worth = {e: gain if e in sure else min(gain - usual(e), SMALL) for e, gain in _raw(r).items()}
-    return worth | {e: min(worth[e], DOUBTFUL) for e, x in fitted.items() if x.worse and e not in sure}
-
-
-def _raw(r: Round) -> dict[str, float]:
-    """Gain of every effect of a round, whether it counts or not."""
-    return {g.effect: g.gain for g in r.gains} | {x.screened.effect: x.gain for x in r.refits} | _led(r)
-
-
-def _worth(fitted: Refit) -> float:
-    return fitted.gain if fitted.counts else min(fitted.gain, DOUBTFUL if fitted.worse else SMALL)
-
-
-def _led(r: Round) -> dict[str, float]:
-    """Gain of an effect that was found as one of a pair: that of both, less the price of the other."""
-    return {} if r.pair is None or r.accepted is None else {r.accepted.screened.effect: r.pair.gain - ACCEPTED}
 
 
 def _name(rounds: Sequence[Round]) -> VerdictName:
@@ -248,15 +211,6 @@ def _left_over(fit: Fit) -> bool:
 def _source(r: Round, effect: str) -> Gain | Refit:
     fitted = next((x for x in r.refits if x.screened.effect == effect), None)
     return fitted or next(g for g in r.gains if g.effect == effect)
-
-
-def _probabilities(gains: Mapping[str, float]) -> tuple[dict[str, float], float]:
-    """Share of each effect against all others and none, and that of none, whose gain is that at which effects count."""
-    top = max(*gains.values(), ACCEPTED)
-    weight = {effect: float(np.exp((gain - top) / TEMPERATURE)) for effect, gain in gains.items()}
-    none = float(np.exp((ACCEPTED - top) / TEMPERATURE))
-    whole = sum(weight.values()) + none
-    return {effect: w / whole for effect, w in weight.items()}, none / whole
 
 
 def _suspect(
