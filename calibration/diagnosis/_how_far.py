@@ -14,7 +14,8 @@ from calibration.diagnosis._bench import Bench, Built, Fit
 from calibration.diagnosis._fit import descend
 from calibration.diagnosis._generic import GENERIC
 from calibration.diagnosis._held_out import HeldOut, held_out
-from calibration.diagnosis._search import Refit, Round
+from calibration.diagnosis._refit import Refit
+from calibration.diagnosis._search import Round
 from calibration.errors import HorizonError, NotEnoughDataError
 from thermal import Inputs, reduced_model
 from thermal.effects import Chosen

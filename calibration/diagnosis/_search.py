@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from calibration._evaluate import Progress
-from calibration.diagnosis._bench import Bench, Fit, is_strength
-from calibration.diagnosis._gain import Gain, choice_of
-from calibration.diagnosis._held_out import HeldOut, growth, held_out
+from calibration.diagnosis._bench import Bench, Fit
+from calibration.diagnosis._gain import Gain
+from calibration.diagnosis._held_out import HeldOut, held_out
 from calibration.diagnosis._pairs import Pair, nominate
+from calibration.diagnosis._refit import ACCEPTED, Refit, Work
 from calibration.diagnosis._screen import Screening, screen
-from calibration.errors import CalibrationError
-from thermal import ModelError
 from thermal.effects import CATALOGUE
 
 #: Most rounds, and most effects that a round fits anew.
@@ -24,53 +23,8 @@ ROUNDS, MOST_REFITS = 8, 4
 #: Gain by tangents from which an effect is fitted anew [-], and the least share of the best's that it must have.
 LEAST_GAIN, LEAST_SHARE = 3.0, 0.4
 
-#: Evaluations of a fit from one start.
-_EVALUATIONS = 6
-
 #: Most pairs that a round fits.
 MOST_PAIRS = 2
-
-#: Least fall of an error by which an effect matters to predictions, of the root mean square where it is fitted or of
-#: the mean where it is held out [K].
-MATTERS = 0.03
-
-#: By how much the mean of the held-out errors may grow [K], and by how many standard errors of that more [-]: what
-#: differs from day to day by chance disproves nothing.
-NO_WORSE, CHANCE = 0.005, 1.645
-
-#: Gain of the fit from which an effect is accepted [-]; null cases stay below, as with `calibration.diagnosis._levels`.
-ACCEPTED = 6.0
-
-
-@dataclass(frozen=True)
-class Refit:
-    """An effect fitted together with all that was accepted before.
-
-    Parameters
-    ----------
-    screened : Gain
-        What its tangents promised.
-    fit : Fit
-        The model with it.
-    gain : float
-        Logarithm of its Bayes factor against the model without it [-].
-    fall : float
-        How far the root mean square of the tuning errors falls with it [K].
-    held_out : HeldOut
-        Held-out errors with it.
-    worse : bool
-        Whether held-out errors grow with it by more than chance.
-    counts : bool
-        Whether it may be accepted: beyond doubt, of some size, and no worse where it was not fitted.
-    """
-
-    screened: Gain
-    fit: Fit
-    gain: float
-    fall: float
-    held_out: HeldOut
-    worse: bool
-    counts: bool
 
 
 @dataclass(frozen=True)
@@ -162,10 +116,10 @@ def search(
             progress("diagnose", number, ROUNDS)
         open_ = [e for e in candidates if all(r in fit.effects for r in CATALOGUE[e].requires)]
         made, gains, generic = screen(bench, fit, open_)
-        work = _Work(bench, fit, errors, made)
+        work = Work(bench, fit, errors, made)
         refits = _refits(work, gains, ahead)
         best = next((r for r in refits if r.counts), None)
-        chosen = _pair(work, gains, refits, best) if ahead is None else None
+        chosen = _best_pair(work, gains, refits, best) if ahead is None else None
         pair = None
         if chosen is not None:
             best, pair = chosen
@@ -179,43 +133,7 @@ def search(
     return tuple(done)
 
 
-@dataclass(frozen=True)
-class _Work:
-    """What a round's fits start from."""
-
-    bench: Bench
-    fit: Fit
-    held_out: HeldOut
-    made: Screening
-
-    @property
-    def accepted(self) -> dict[str, float]:
-        """Parameters of the effects that are in the model."""
-        parameters = self.fit.built.network.parameters
-        return {p.name: self.fit.values[p.name] for p in parameters if p.effect is not None}
-
-    def refit(self, gains: Sequence[Gain], start: Mapping[str, float]) -> Refit | None:
-        """Fit with some effects more; None where the fit fails, which costs those effects only."""
-        try:
-            effects = {**self.fit.effects, **{g.effect: g.zones for g in gains}}
-            anew = self.bench.fit(effects, [start], evaluations=_EVALUATIONS)
-        except (ArithmeticError, np.linalg.LinAlgError, CalibrationError, ModelError):
-            return None
-        return self.weighed(gains, anew)
-
-    def weighed(self, gains: Sequence[Gain], anew: Fit) -> Refit:
-        """Compare a model with some effects more with the one without them."""
-        choice = sum(choice_of(_places(anew, g.effect), g.places) for g in gains if g.places)
-        gain = float(anew.evidence - self.fit.evidence - choice)
-        fall = float(np.sqrt(self.fit.found.mean_square) - np.sqrt(anew.found.mean_square))
-        errors = held_out(self.bench, anew)
-        grown, error = growth(self.held_out, errors)
-        worse = grown > NO_WORSE + CHANCE * error
-        counts = gain > ACCEPTED * len(gains) and not worse and max(fall, -grown) > MATTERS
-        return Refit(gains[-1], anew, gain, fall, errors, worse, counts)
-
-
-def _refits(work: _Work, gains: Sequence[Gain], ahead: Refit | None) -> list[Refit]:
+def _refits(work: Work, gains: Sequence[Gain], ahead: Refit | None) -> list[Refit]:
     """Fit the few best anew, lesser ones too as long as none counts, and what the best is confounded with.
 
     What a pair of the round before was accepted with is there already, and counts.
@@ -243,12 +161,28 @@ def _refits(work: _Work, gains: Sequence[Gain], ahead: Refit | None) -> list[Ref
     return sorted(found, key=lambda r: -r.gain)
 
 
-def _pair(
-    work: _Work, gains: Sequence[Gain], refits: Sequence[Refit], best: Refit | None
+def _best_pair(
+    work: Work, gains: Sequence[Gain], refits: Sequence[Refit], best: Refit | None
 ) -> tuple[Refit, Refit] | None:
     """Fit the pairs that promise more than any single effect; the members of one that keeps it, the first one alone.
 
     A pair that the best single effect is part of needs no search: the next round finds the other.
+
+    Parameters
+    ----------
+    work : Work
+        Of the round.
+    gains : sequence of Gain
+        Single effects, the best first.
+    refits : sequence of Refit
+        Those fitted.
+    best : Refit or None
+        The one that is accepted if no pair is.
+
+    Returns
+    -------
+    tuple of Refit, or None
+        The member that gains more alone, fitted alone; and the other, fitted with it, with the gain of both.
     """
     pairs = nominate(work.made, gains, LEAST_GAIN)
     if not pairs or (best is not None and _within(best, pairs[0])):
@@ -268,9 +202,3 @@ def _pair(
 
 def _within(single: Refit, pair: Pair) -> bool:
     return single.screened.effect in (pair.first.effect, pair.second.effect)
-
-
-def _places(fit: Fit, effect: str) -> int:
-    """Count the zones, or pairs of zones, in which a fitted model has an effect."""
-    mine = (p for p in fit.problem.parameters if p.effect == effect and is_strength(p.name, effect))
-    return len({p.member for p in mine})

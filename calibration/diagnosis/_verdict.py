@@ -22,7 +22,8 @@ from calibration.diagnosis._levels import (
     LEFT_OVER,
     RIVAL,
 )
-from calibration.diagnosis._search import ACCEPTED, Refit, Round
+from calibration.diagnosis._refit import ACCEPTED, Refit
+from calibration.diagnosis._search import Round
 from calibration.diagnosis._worth import beyond, gains_of, levelled, probabilities, raw
 from thermal.effects import CATALOGUE
 

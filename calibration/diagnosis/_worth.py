@@ -7,7 +7,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from calibration.diagnosis._levels import DOUBTFUL, SMALL, TEMPERATURE, usual
-from calibration.diagnosis._search import ACCEPTED, Refit, Round
+from calibration.diagnosis._refit import ACCEPTED, Refit
+from calibration.diagnosis._search import Round
 
 
 def gains_of(r: Round) -> dict[str, float]:

@@ -10,8 +10,8 @@ import pytest
 
 from calibration.diagnosis import Diagnosis, diagnose
 from calibration.diagnosis._bench import Bench
+from calibration.diagnosis._refit import ACCEPTED, Refit
 from calibration.diagnosis._screen import Screening
-from calibration.diagnosis._search import ACCEPTED, Refit
 from calibration.diagnosis._verdict import judge
 from thermal import Building, Case, Telemetry
 from thermal.effects import CATALOGUE

@@ -6,9 +6,17 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from calibration._settings import ModelSettings
+from calibration.diagnosis._bench import Bench
+from calibration.diagnosis._gain import Gain, choice_of
+from calibration.diagnosis._held_out import held_out
 from calibration.diagnosis._pairs import nominate
+from calibration.diagnosis._refit import ACCEPTED, Work
 from calibration.diagnosis._screen import Screening
+from calibration.diagnosis._search import _best_pair
+from thermal import Building, Case, Telemetry
 from thermal.effects import CATALOGUE
+from thermal.pilot import MOUNTAIN_VIEW, TwinRanges, devices, generate_office, generate_twin
 
 FloatArray = NDArray[np.float64]
 
@@ -78,3 +86,34 @@ def test_a_pair_s_gain_is_the_evidence_of_both() -> None:
     exact += 0.5 * (np.linalg.slogdet(prior)[1] - np.linalg.slogdet(sharper + prior)[1])
     assert gain == pytest.approx(exact, rel=1e-9)
     assert made.reach(first, second) == pytest.approx(gain, abs=0.5)
+
+
+def test_a_pair_is_accepted_where_neither_member_would_be() -> None:
+    """A twin whose meter of one zone reads low and whose sensor of another reads high, each hardly seen alone."""
+    plans = generate_office(3, floor_area=120.0, zones=4, floors=1)
+    building = Building("office", MOUNTAIN_VIEW, 0.0, plans, devices(plans))
+    quiet = TwinRanges(disturbance_deviation=(0.05, 0.1), noise=(0.005, 0.01))
+    case = generate_twin(building, 3, days=15.0, step_seconds=900.0, dx=1.0, meter="exact", ranges=quiet)[0]
+    low, high = building.zone_names[1], building.zone_names[3]
+    frame = case.telemetry.frame.copy()
+    (device,) = building.devices_of(low)
+    frame[f"{device.name}/supply_air_flowrate_sensor"] /= 1.25
+    (device,) = building.devices_of(high)
+    frame[f"{device.name}/zone_air_temperature_sensor"] += 0.8
+    bench = Bench(Case(building, Telemetry.from_frame(frame)), ModelSettings(dx=1.0))
+    baseline = bench.fit({}, [{}])
+    made = Screening(bench, baseline, ("flow_gain", "sensor_bias"))
+
+    def alone(effect: str, zone: str) -> Gain:
+        index = np.array([k for k, p in enumerate(made.parameters) if p.name == f"{effect}@{zone}"])
+        return made._gain(effect, index, (zone,), choice_of(1, 4), 4)
+
+    gains = sorted((alone("flow_gain", low), alone("sensor_bias", high)), key=lambda g: -g.gain)
+    assert all(g.gain < ACCEPTED for g in gains)
+    found = _best_pair(Work(bench, baseline, held_out(bench, baseline), made), gains, (), None)
+    assert found is not None
+    first, both = found
+    assert not first.counts and both.counts
+    assert both.gain > 2.0 * ACCEPTED > first.gain
+    assert both.fit.values[f"flow_gain@{low}"] == pytest.approx(0.25, abs=0.05)
+    assert both.fit.values[f"sensor_bias@{high}"] == pytest.approx(0.8, abs=0.1)
