@@ -191,7 +191,8 @@ def _name(rounds: Sequence[Round]) -> VerdictName:
         if size <= LARGEST_GROUP:
             return "named" if size == 1 else "group"
         return "unexplained"
-    return "unexplained" if first.generic.gain > GENERIC_GAP or left_over else "no_gap"
+    gap = first.accepted is not None or first.generic.gain > GENERIC_GAP or left_over
+    return "unexplained" if gap else "no_gap"
 
 
 def _explained(rounds: Sequence[Round], left_over: bool) -> float:
