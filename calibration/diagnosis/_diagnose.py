@@ -14,9 +14,11 @@ from calibration._settings import ModelSettings
 from calibration.diagnosis._bench import Bench, Fit
 from calibration.diagnosis._how_far import Step, how_far
 from calibration.diagnosis._levels import p_value
-from calibration.diagnosis._search import ACCEPTED, Round, search
-from calibration.diagnosis._verdict import Verdict, gains_of, judge
+from calibration.diagnosis._refit import ACCEPTED
+from calibration.diagnosis._search import Round, search
+from calibration.diagnosis._verdict import Verdict, judge
 from calibration.diagnosis._where import Where, where_it_lies
+from calibration.diagnosis._worth import gains_of
 from thermal import Case
 from thermal.effects import CATALOGUE
 

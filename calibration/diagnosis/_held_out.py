@@ -59,3 +59,24 @@ def held_out(bench: Bench, fit: Fit, horizon: str | None = None) -> HeldOut:
     there, index = np.unique(days[known], return_inverse=True)
     weight = np.bincount(index).astype(float)
     return HeldOut(there, np.bincount(index, sizes[known]) / weight, weight)
+
+
+def growth(before: HeldOut, after: HeldOut) -> tuple[float, float]:
+    """How far a mean absolute error grows from one model to another on the same days, and the standard error of that.
+
+    Parameters
+    ----------
+    before, after : HeldOut
+        Errors of the two models.
+
+    Returns
+    -------
+    tuple of float
+        Growth, and its standard error from the differences of days [K]; 0 where there is one day only.
+    """
+    _, one, other = np.intersect1d(before.days, after.days, return_indices=True)
+    change, share = after.daily[other] - before.daily[one], before.weight[one] / before.weight[one].sum()
+    mean = float(share @ change)
+    if change.size < 2:
+        return mean, 0.0
+    return mean, float(np.sqrt(change.size / (change.size - 1) * share**2 @ (change - mean) ** 2))

@@ -11,9 +11,11 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from calibration.diagnosis._bench import Bench, Built, Fit
+from calibration.diagnosis._fit import descend
 from calibration.diagnosis._generic import GENERIC
 from calibration.diagnosis._held_out import HeldOut, held_out
-from calibration.diagnosis._search import Refit, Round
+from calibration.diagnosis._refit import Refit
+from calibration.diagnosis._search import Round
 from calibration.errors import HorizonError, NotEnoughDataError
 from thermal import Inputs, reduced_model
 from thermal.effects import Chosen
@@ -166,9 +168,9 @@ def _shuffled(bench: Bench, r: Round, accepted: Refit) -> float | None:
     if not varying:
         return None
     permuted = Built(built.network, built.grid, _permuted(built.inputs, varying))
-    start = {**fit.values}
-    found = bench.fit(fit.effects, [start], permuted, _EVALUATIONS)
-    return held_out(bench, found).mae
+    problem = bench.problem(permuted, fit.theta)
+    found = descend(problem, fit.model, fit.found.point, _EVALUATIONS)  # the model is the same, and so is its basis
+    return held_out(bench, replace(fit, built=permuted, problem=problem, found=found)).mae
 
 
 def _permuted(inputs: Inputs, columns: Sequence[int]) -> Inputs:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from importlib.resources import files
+from typing import Any
 
 import numpy as np
 
@@ -33,17 +34,31 @@ LARGEST_GROUP = 4
 #: many small ways are too sure of themselves.
 TEMPERATURE = 2.0
 
-#: Most gain that an effect is worth that matters to no prediction, or makes those worse that it was not fitted to [-].
-DOUBTFUL = 1.0
+#: Most gain that an effect is worth that matters to no prediction, and that one is worth that makes those worse which
+#: it was not fitted to [-].
+SMALL, DOUBTFUL = 4.0, 1.0
 
 #: Probability from which an effect belongs to the 90 % set [-].
 IN_SET = 0.1
 
+_NULLS: dict[str, Any] = json.loads(
+    (files("calibration") / "diagnosis" / "null_levels.json").read_text(encoding="utf-8")
+)
+
 #: Largest gains of the first round in development cases without any missing effect, in order [-]: made by
 #: ``benchmarks/blind_trials.py levels``.
-NULL_GAINS: tuple[float, ...] = tuple(
-    json.loads((files("calibration") / "diagnosis" / "null_levels.json").read_text(encoding="utf-8"))["largest"]
-)
+NULL_GAINS: tuple[float, ...] = tuple(_NULLS["largest"])
+
+
+def usual(effect: str) -> float:
+    """Largest gain that an effect reaches in cases without any missing effect, 0 at least [-].
+
+    Parameters
+    ----------
+    effect : str
+        Its id; 0 for one that no null case could tell.
+    """
+    return float(max(0.0, *_NULLS["gains"].get(effect, (0.0,))))
 
 
 def p_value(gain: float) -> float:

@@ -9,13 +9,13 @@ all, so that zones, pairs and generic heat are compared without another run of t
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import gammaln
 
 from calibration.diagnosis._bench import TYPICAL, Bench, Fit, is_strength
+from calibration.diagnosis._gain import Gain, choice_of
 from calibration.diagnosis._generic import GENERIC, ZONE_HEAT
 from thermal import Parameter, reduced_model
 from thermal.effects import CATALOGUE, PAIR, Chosen
@@ -27,9 +27,6 @@ IntArray = NDArray[np.int64]
 #: Sweeps of the quadratic programme, and the change of an estimate in prior deviations that ends them [-].
 _SWEEPS, _TOLERANCE = 200, 1e-6
 
-#: and change no gain by 0.01.
-_SHIFTS = (1.0 / 86400.0, 1.0 / 14400.0, 1.0 / 2400.0, 1.0 / 400.0)
-
 #: Order of the reduced model of a large building.
 _LARGEST_ORDER = 700
 
@@ -38,43 +35,6 @@ _MOST_ZONES = 24
 
 #: Sizes that generic heat may have over its prior's [-]; the likeliest counts (empirical Bayes).
 _TIGHTNESS = (0.003, 0.01, 0.03, 0.1, 0.3)
-
-
-@dataclass(frozen=True)
-class Gain:
-    """What an effect could explain.
-
-    Parameters
-    ----------
-    effect : str
-        Its id.
-    zones : tuple of str
-        Where; empty for the whole building.
-    gain : float
-        Logarithm of the Bayes factor against the model without it, by tangents [-].
-    share : float
-        Share of the squared tuning error that it explains [-].
-    strengths : mapping of str to float
-        Its parameters [parameter units].
-    deviations : mapping of str to float
-        Standard errors of them, by tangents [parameter units].
-    retained : float
-        Share of its signature that calibration cannot imitate [-].
-    direction : ndarray, shape (n_strength,)
-        Its strengths among all those screened, for cosines [parameter units].
-    places : int
-        How many zones or pairs of zones it may be in; 0 where it acts on the whole building.
-    """
-
-    effect: str
-    zones: tuple[str, ...]
-    gain: float
-    share: float
-    strengths: Mapping[str, float]
-    deviations: Mapping[str, float]
-    retained: float
-    direction: FloatArray
-    places: int = 0
 
 
 class Screening:
@@ -125,6 +85,7 @@ class Screening:
         self.score = score - turn.T @ pull
         self.gram = gram - gram[:, known] @ turn
         self.prior = prior
+        self._position = {p.name: i for i, p in enumerate(self.parameters)}
         self.lower = np.array([p.lower for p in self.parameters])
         self.upper = np.array([p.upper for p in self.parameters])
 
@@ -146,22 +107,52 @@ class Screening:
             members.setdefault(self.parameters[i].member or "", []).append(int(i))
         return self._grow(effect, {name: np.array(found) for name, found in members.items()})
 
-    def promised(self, gain: Gain) -> dict[str, float]:
-        """Parameters where the tangents point: the effect's strengths, and what the fitted ones then would be.
+    def promised(self, *gains: Gain) -> dict[str, float]:
+        """Parameters where the tangents point: the effects' strengths, and what the fitted ones then would be.
 
         Parameters
         ----------
-        gain : Gain
-            Of the effect.
+        *gains : Gain
+            Of the effect, or of several together.
         """
         moved = self._point.copy()
-        moved[self._known] += self._home - self._turn @ gain.direction
+        moved[self._known] += self._home - self._turn @ np.sum([g.direction for g in gains], axis=0)
         known = [p for p, k in zip(self.parameters, self._known, strict=True) if k]
         values = {
             p.name: float(np.clip(p.inverse(v), p.lower, p.upper))
             for p, v in zip(known, moved[self._known], strict=True)
         }
-        return values | dict(gain.strengths)
+        return values | {name: value for g in gains for name, value in g.strengths.items()}
+
+    def reach(self, first: Gain, second: Gain) -> float:
+        """Gain of two effects together were their strengths free of bounds [-].
+
+        Parameters
+        ----------
+        first, second : Gain
+            With their zones.
+        """
+        index = np.concatenate([self._of(first), self._of(second)])
+        hessian = self.gram[np.ix_(index, index)] + np.diag(self.prior[index] ** -2.0)
+        return self._weigh(index, np.linalg.solve(hessian, self.score[index]))[0] - first.choice - second.choice
+
+    def together(self, first: Gain, second: Gain) -> tuple[Gain, Gain, float]:
+        """Two effects with the strengths that they have together, and what both gain.
+
+        Parameters
+        ----------
+        first, second : Gain
+            With their zones.
+        """
+        parts = self._of(first), self._of(second)
+        x, gain, _ = self._solve(np.concatenate(parts))
+        found = []
+        for one, index, strengths in zip((first, second), parts, np.split(x, [parts[0].size]), strict=True):
+            direction = np.zeros(len(self.parameters))
+            direction[index] = strengths
+            named = dict(zip(one.strengths, strengths.tolist(), strict=True))
+            found.append(replace(one, strengths=named, direction=direction))
+        return found[0], found[1], gain - first.choice - second.choice
 
     def cosine(self, first: Gain, second: Gain) -> float:
         """Cosine of the projected signatures of two effects at their estimates [-].
@@ -198,6 +189,10 @@ class Screening:
         families.append(index[np.char.startswith(kinds, "heat_from")])
         sizes = [self._gain(GENERIC.id, f, (), tightness=t) for f in families for t in _TIGHTNESS]
         return max(sizes, key=lambda g: g.gain)
+
+    def _of(self, gain: Gain) -> IntArray:
+        """Positions of the strengths of an effect in its zones, in their order."""
+        return np.array([self._position[name] for name in gain.strengths], dtype=np.int64)
 
     def _strengths(self, effect: str) -> IntArray:
         return np.array(
@@ -242,7 +237,7 @@ class Screening:
         whole = float(along @ self._whole @ along)
         kept = float(along @ self.gram @ along) / whole if whole > 0.0 else 0.0
         strengths, errors = (dict(zip(names, v.tolist(), strict=True)) for v in (x, deviations))
-        return Gain(effect, zones, gain - choice, share, strengths, errors, kept, direction, places)
+        return Gain(effect, zones, gain - choice, share, strengths, errors, kept, direction, places, choice)
 
     def _solve(self, index: IntArray, tightness: float = 1.0) -> tuple[FloatArray, float, float]:
         """Strengths, gain and share of the squared error: coordinate descent within the ranges."""
@@ -257,13 +252,18 @@ class Screening:
                 x[j] = np.clip(x[j] + step, self.lower[index[j]], self.upper[index[j]])
             if np.max(np.abs(x - before) / prior, initial=0.0) < _TOLERANCE:
                 break
+        return (x, *self._weigh(index, x, tightness))
+
+    def _weigh(self, index: IntArray, x: FloatArray, tightness: float = 1.0) -> tuple[float, float]:
+        """Gain of given strengths, and the share of the squared error that they explain."""
+        gram, score, prior = self.gram[np.ix_(index, index)], self.score[index], tightness * self.prior[index]
         share = float(np.clip((2.0 * score @ x - x @ gram @ x) / self.count, 0.0, 0.999))
         pull = float(np.sum((x / prior) ** 2))
         sharper = gram / (1.0 - share) * np.outer(prior, prior)
         occam = np.linalg.slogdet(np.eye(len(index)) + sharper)[1]
         gain = -0.5 * self.count * np.log1p(-share) - 0.5 * pull - 0.5 * occam
         gain += np.log(2.0) * np.count_nonzero((self.lower[index] == 0.0) & (x > 0.0))
-        return x, float(gain), share
+        return float(gain), share
 
 
 def _worst_zones(fit: Fit) -> tuple[str, ...]:
@@ -273,20 +273,6 @@ def _worst_zones(fit: Fit) -> tuple[str, ...]:
         return ()
     worst = set(np.argsort(-fit.by_zone, kind="stable")[:_MOST_ZONES].tolist())
     return tuple(z for k, z in enumerate(zones) if k in worst)
-
-
-def choice_of(count: int, places: int) -> float:
-    """Logarithm of the odds against one choice of places before any data [-].
-
-    One place more halves the probability, and all choices of as many are alike; everywhere is as likely as any number.
-
-    Parameters
-    ----------
-    count, places : int
-        Places chosen, and all there are.
-    """
-    number = gammaln(places + 1) - gammaln(count + 1) - gammaln(places - count + 1)
-    return float(np.log(2.0) * (1 if count == places else 1 + count) + number)
 
 
 def screen(bench: Bench, fit: Fit, candidates: Sequence[str]) -> tuple[Screening, list[Gain], Gain]:

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from calibration._evaluate import Progress
-from calibration.diagnosis._bench import Bench, Fit, is_strength
+from calibration.diagnosis._bench import Bench, Fit
+from calibration.diagnosis._gain import Gain
 from calibration.diagnosis._held_out import HeldOut, held_out
-from calibration.diagnosis._screen import Gain, Screening, choice_of, screen
-from calibration.errors import CalibrationError
-from thermal import ModelError
+from calibration.diagnosis._pairs import Pair, nominate
+from calibration.diagnosis._refit import ACCEPTED, Refit, Work
+from calibration.diagnosis._screen import Screening, screen
 from thermal.effects import CATALOGUE
 
 #: Most rounds, and most effects that a round fits anew.
@@ -22,43 +23,8 @@ ROUNDS, MOST_REFITS = 8, 4
 #: Gain by tangents from which an effect is fitted anew [-], and the least share of the best's that it must have.
 LEAST_GAIN, LEAST_SHARE = 3.0, 0.4
 
-#: Evaluations of a fit from one start.
-_EVALUATIONS = 6
-
-#: Least fall of an error by which an effect matters to predictions, of the root mean square where it is fitted or of
-#: the mean where it is held out, and by how much the latter may grow [K].
-MATTERS, NO_WORSE = 0.03, 0.005
-
-#: Gain of the fit from which an effect is accepted [-]; null cases stay below, as with `calibration.diagnosis._levels`.
-ACCEPTED = 6.0
-
-
-@dataclass(frozen=True)
-class Refit:
-    """An effect fitted together with all that was accepted before.
-
-    Parameters
-    ----------
-    screened : Gain
-        What its tangents promised.
-    fit : Fit
-        The model with it.
-    gain : float
-        Logarithm of its Bayes factor against the model without it [-].
-    fall : float
-        How far the root mean square of the tuning errors falls with it [K].
-    held_out : HeldOut
-        Held-out errors with it.
-    counts : bool
-        Whether it may be accepted: beyond doubt, of some size, and no worse where it was not fitted.
-    """
-
-    screened: Gain
-    fit: Fit
-    gain: float
-    fall: float
-    held_out: HeldOut
-    counts: bool
+#: Most pairs that a round fits.
+MOST_PAIRS = 2
 
 
 @dataclass(frozen=True)
@@ -81,6 +47,8 @@ class Round:
         Effects fitted anew, the best first.
     accepted : Refit or None
         What the next round starts from.
+    pair : Refit or None
+        The other effect of a pair by which the accepted one was found, fitted with it; its gain is that of both.
     """
 
     before: Fit
@@ -90,6 +58,7 @@ class Round:
     generic: Gain
     refits: tuple[Refit, ...]
     accepted: Refit | None
+    pair: Refit | None = None
 
     @property
     def after(self) -> Fit:
@@ -114,11 +83,13 @@ class Round:
             },
             "refits": {
                 r.screened.effect: {
-                    "gain": r.gain, "fall": r.fall, "held_out_mae": r.held_out.mae, "counts": r.counts,
+                    "gain": r.gain, "fall": r.fall, "held_out_mae": r.held_out.mae, "worse": r.worse,
+                    "counts": r.counts,
                 }
                 for r in self.refits
             },
             "accepted": None if self.accepted is None else self.accepted.screened.effect,
+            "pair": None if self.pair is None else {"with": self.pair.screened.effect, "gain": self.pair.gain},
         }  # fmt: skip
 
 
@@ -139,61 +110,95 @@ def search(
         Called with stage, done, total.
     """
     done: list[Round] = []
-    fit, errors = baseline, held_out(bench, baseline)
+    fit, errors, ahead = baseline, held_out(bench, baseline), None
     for number in range(ROUNDS):
         if progress is not None:
             progress("diagnose", number, ROUNDS)
         open_ = [e for e in candidates if all(r in fit.effects for r in CATALOGUE[e].requires)]
         made, gains, generic = screen(bench, fit, open_)
-        refits = _refits(bench, fit, errors, made, gains)
+        work = Work(bench, fit, errors, made)
+        refits = _refits(work, gains, ahead)
         best = next((r for r in refits if r.counts), None)
-        done.append(Round(fit, errors, made, tuple(gains), generic, tuple(refits), best))
+        chosen = _best_pair(work, gains, refits, best) if ahead is None else None
+        pair = None
+        if chosen is not None:
+            best, pair = chosen
+            refits = sorted({id(r): r for r in (*refits, best)}.values(), key=lambda r: -r.gain)
+        done.append(Round(fit, errors, made, tuple(gains), generic, tuple(refits), best, pair))
         if best is None:
             break
-        fit, errors = best.fit, best.held_out
+        fit, errors, ahead = best.fit, best.held_out, pair
     if progress is not None:
         progress("diagnose", ROUNDS, ROUNDS)
     return tuple(done)
 
 
-def _refits(bench: Bench, fit: Fit, before: HeldOut, made: Screening, gains: Sequence[Gain]) -> list[Refit]:
-    """Fit the few best anew, lesser ones too as long as none counts, and what the best is confounded with."""
-    accepted = {p.name: fit.values[p.name] for p in fit.built.network.parameters if p.effect is not None}
-    found: list[Refit] = []
+def _refits(work: Work, gains: Sequence[Gain], ahead: Refit | None) -> list[Refit]:
+    """Fit the few best anew, lesser ones too as long as none counts, and what the best is confounded with.
 
-    def refit(g: Gain, starts: Sequence[Mapping[str, float]]) -> None:
-        try:
-            anew = bench.fit({**fit.effects, g.effect: g.zones}, starts, evaluations=_EVALUATIONS)
-        except (ArithmeticError, np.linalg.LinAlgError, CalibrationError, ModelError):
-            return  # a fit that fails costs that effect only
-        found.append(_weighed(bench, fit, before, g, anew))
+    What a pair of the round before was accepted with is there already, and counts.
+    """
+    found: list[Refit] = []
+    if ahead is not None:
+        found.append(replace(work.weighed([ahead.screened], ahead.fit), counts=True))
 
     for g in [g for g in gains if g.gain > LEAST_GAIN][:MOST_REFITS]:
         if g.gain < LEAST_SHARE * gains[0].gain and any(r.counts for r in found):
             break
-        refit(g, [made.promised(g), accepted | dict(g.strengths)] if g is gains[0] else [made.promised(g)])
+        if ahead is None or ahead.screened.effect != g.effect:
+            tries = [work.refit([g], work.made.promised(g))]
+            if g is gains[0] and (tries[0] is None or tries[0].gain < g.gain):  # a calibrated θ may have hidden it
+                tries.append(work.refit([g], work.accepted | dict(g.strengths)))
+            found.extend(sorted((t for t in tries if t is not None), key=lambda t: -t.gain)[:1])
     best = max((r for r in found if r.counts), key=lambda r: r.gain, default=None)
     if best is not None and best.screened.zones:
         fitted = {r.screened.effect for r in found}
         for g in gains:
             alike = g.effect in CATALOGUE[best.screened.effect].confounders and CATALOGUE[g.effect].zonal
             if alike and g.effect not in fitted:  # tangents at no strength may miss where it is, or what it does
-                refit(replace(g, zones=best.screened.zones), [accepted])
+                other = work.refit([replace(g, zones=best.screened.zones)], work.accepted)
+                found.extend([] if other is None else [other])
     return sorted(found, key=lambda r: -r.gain)
 
 
-def _weighed(bench: Bench, fit: Fit, before: HeldOut, screened: Gain, anew: Fit) -> Refit:
-    """Compare a model with one effect more with the one without it."""
-    choice = choice_of(_places(anew, screened.effect), screened.places) if screened.places else 0.0
-    gain = float(anew.evidence - fit.evidence - choice)
-    fall = float(np.sqrt(fit.found.mean_square) - np.sqrt(anew.found.mean_square))
-    errors = held_out(bench, anew)
-    closer = before.mae - errors.mae
-    counts = gain > ACCEPTED and closer > -NO_WORSE and max(fall, closer) > MATTERS
-    return Refit(screened, anew, gain, fall, errors, counts)
+def _best_pair(
+    work: Work, gains: Sequence[Gain], refits: Sequence[Refit], best: Refit | None
+) -> tuple[Refit, Refit] | None:
+    """Fit the pairs that promise more than any single effect; the members of one that keeps it, the first one alone.
+
+    A pair that the best single effect is part of needs no search: the next round finds the other.
+
+    Parameters
+    ----------
+    work : Work
+        Of the round.
+    gains : sequence of Gain
+        Single effects, the best first.
+    refits : sequence of Refit
+        Those fitted.
+    best : Refit or None
+        The one that is accepted if no pair is.
+
+    Returns
+    -------
+    tuple of Refit, or None
+        The member that gains more alone, fitted alone; and the other, fitted with it, with the gain of both.
+    """
+    pairs = nominate(work.made, gains, LEAST_GAIN)
+    if not pairs or (best is not None and _within(best, pairs[0])):
+        return None
+    single = max((r.gain for r in refits), default=0.0)
+    fitted = [work.refit([p.first, p.second], work.made.promised(p.first, p.second)) for p in pairs[:MOST_PAIRS]]
+    kept = [(r, p) for r, p in zip(fitted, pairs, strict=False) if r is not None and r.counts]
+    if not kept:
+        return None
+    both, pair = max(kept, key=lambda k: k[0].gain)
+    if both.gain < single + ACCEPTED or (best is not None and _within(best, pair)):
+        return None
+    known = {r.screened.effect: r for r in refits if r.screened.zones == pair.first.zones}
+    first = known.get(pair.first.effect) or work.refit([pair.first], work.made.promised(pair.first))
+    return None if first is None else (first, both)
 
 
-def _places(fit: Fit, effect: str) -> int:
-    """Count the zones, or pairs of zones, in which a fitted model has an effect."""
-    mine = (p for p in fit.problem.parameters if p.effect == effect and is_strength(p.name, effect))
-    return len({p.member for p in mine})
+def _within(single: Refit, pair: Pair) -> bool:
+    return single.screened.effect in (pair.first.effect, pair.second.effect)

@@ -11,7 +11,8 @@ from calibration._result import ParameterEstimate
 from calibration.diagnosis._diagnose import Diagnosis
 from calibration.diagnosis._final import describe_fit
 from calibration.diagnosis._levels import GENERIC_GAP
-from calibration.diagnosis._search import ACCEPTED, Round
+from calibration.diagnosis._refit import ACCEPTED
+from calibration.diagnosis._search import Round
 from calibration.diagnosis._words import called, in_zones, listed, sure
 
 #: Effects of a round that are listed, and those whose likeness is.

@@ -9,11 +9,11 @@ from typing import Any, Literal
 import numpy as np
 
 from calibration.diagnosis._bench import Fit
+from calibration.diagnosis._gain import Gain
 from calibration.diagnosis._levels import (
     ALIKE,
     APART,
     CONCENTRATED,
-    DOUBTFUL,
     EXPLAINED,
     GENERIC_GAP,
     IN_SET,
@@ -21,10 +21,10 @@ from calibration.diagnosis._levels import (
     LEFT_IN_A_ZONE,
     LEFT_OVER,
     RIVAL,
-    TEMPERATURE,
 )
-from calibration.diagnosis._screen import Gain
-from calibration.diagnosis._search import ACCEPTED, Refit, Round
+from calibration.diagnosis._refit import ACCEPTED, Refit
+from calibration.diagnosis._search import Round
+from calibration.diagnosis._worth import beyond, gains_of, levelled, probabilities, raw
 from thermal.effects import CATALOGUE
 
 #: Standard deviations from the estimate to an end of a 90 % interval [-].
@@ -127,22 +127,23 @@ def judge(rounds: Sequence[Round], untestable: Mapping[str, str]) -> Verdict:
     score: dict[str, float] = dict.fromkeys(CATALOGUE, -np.inf)
     best: dict[str, Gain | Refit] = {}
     real = 1.0  # that all rounds before found something that is there
+    last = beyond(rounds[-1])
     chain: list[tuple[tuple[str, ...], float]] = []
     for r in rounds:
         gains = gains_of(r)
-        found = _probabilities(gains)
+        found, none = probabilities(levelled(r))
         for effect, gain in gains.items():
             probability[effect] = max(probability[effect], real * found[effect])
             if gain > score[effect]:
                 score[effect] = gain
                 best[effect] = _source(r, effect)
         if r.accepted is not None:
-            chain.append((tuple(r.before.effects), real * (1.0 - sum(found.values()))))
-            real *= sum(found.values())
+            chain.append((tuple(r.before.effects), real * none))
+            real *= 1.0 - none
     chain.append((tuple(rounds[-1].after.effects), real))
     suspects = sorted(
         (_suspect(e, probability[e], score[e], best.get(e), rounds, untestable.get(e)) for e in CATALOGUE),
-        key=lambda s: (-s.probability, -s.score),
+        key=lambda s: (-s.probability, -last.get(s.effect, -np.inf), -s.score),
     )
     name = _name(rounds)
     return Verdict(name, tuple(suspects), _inside(rounds, suspects) if name in ("named", "group") else (), dict(chain))
@@ -164,7 +165,7 @@ def group_of(r: Round, effect: str) -> tuple[str, ...]:
     effect : str
         Its id.
     """
-    gains = {g.effect: g.gain for g in r.gains} | {x.screened.effect: x.gain for x in r.refits}
+    gains = raw(r)
     own = next((g for g in r.gains if g.effect == effect), None)
     alike = [effect]
     if gains[effect] <= ACCEPTED:  # what hardly gains is not there, whatever else looks like it
@@ -182,18 +183,6 @@ def group_of(r: Round, effect: str) -> tuple[str, ...]:
     return tuple(alike)
 
 
-def gains_of(r: Round) -> dict[str, float]:
-    """Gain of every effect of a round: fitted where it was, by tangents otherwise; little where it does not count.
-
-    Parameters
-    ----------
-    r : Round
-        Of the search.
-    """
-    gains = {g.effect: g.gain for g in r.gains}
-    return gains | {x.screened.effect: x.gain if x.counts else min(x.gain, DOUBTFUL) for x in r.refits}
-
-
 def _name(rounds: Sequence[Round]) -> VerdictName:
     first, final = rounds[0], rounds[-1].after
     left_over = _left_over(final)
@@ -202,7 +191,8 @@ def _name(rounds: Sequence[Round]) -> VerdictName:
         if size <= LARGEST_GROUP:
             return "named" if size == 1 else "group"
         return "unexplained"
-    return "unexplained" if first.generic.gain > GENERIC_GAP or left_over else "no_gap"
+    gap = first.accepted is not None or first.generic.gain > GENERIC_GAP or left_over
+    return "unexplained" if gap else "no_gap"
 
 
 def _explained(rounds: Sequence[Round], left_over: bool) -> float:
@@ -223,15 +213,6 @@ def _left_over(fit: Fit) -> bool:
 def _source(r: Round, effect: str) -> Gain | Refit:
     fitted = next((x for x in r.refits if x.screened.effect == effect), None)
     return fitted or next(g for g in r.gains if g.effect == effect)
-
-
-def _probabilities(gains: Mapping[str, float]) -> dict[str, float]:
-    """Share of each effect against all others and none, gains tempered; none has the gain at which effects count."""
-    size = np.array(list(gains.values())) / TEMPERATURE
-    top = max(float(size.max(initial=-np.inf)), ACCEPTED / TEMPERATURE)
-    weight = np.exp(size - top)
-    whole = float(weight.sum()) + float(np.exp(ACCEPTED / TEMPERATURE - top))
-    return {effect: float(w) / whole for effect, w in zip(gains, weight, strict=True)}
 
 
 def _suspect(

@@ -9,7 +9,7 @@ import numpy as np
 from calibration._page import duration, kelvin, watts
 from calibration.diagnosis._diagnose import Diagnosis
 from calibration.diagnosis._levels import LARGEST_GROUP
-from calibration.diagnosis._search import Refit
+from calibration.diagnosis._refit import Refit
 from calibration.diagnosis._verdict import Suspect, group_of
 from thermal.effects import CATALOGUE
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pint
 import pytest
 
-from thermal import Case, Telemetry, ZoneTable, build_network
+from thermal import Case, FloorPlans, Telemetry, ZoneTable, build_network
 from thermal.effects import CATALOGUE, Chosen, catalogue_table, chosen
 from thermal.errors import EffectError
 from thermal.parameters import PARAMETERS
@@ -125,6 +125,22 @@ def test_what_a_building_without_the_part_cannot_have(lively_case: CaseOf) -> No
     single = replace(table, surfaces=tuple(s for s in table.surfaces if s.name in "WG"))
     alone = replace(case, building=replace(case.building, geometry=single, airflows=()), judged=None)
     assert reasons(alone)["zone_mixing"] == "no two zones share a partition"
+
+
+def test_a_side_with_windows_is_no_party_wall(lively_case: CaseOf) -> None:
+    case = lively_case("plan")
+    plans = case.building.geometry
+    assert isinstance(plans, FloorPlans)
+
+    def party(glazing: dict[str, dict[str, float]]) -> tuple[str | None, list[str]]:
+        building = replace(case.building, geometry=replace(plans, glazing=glazing))
+        network = build_network(building, effects=chosen({"neighbour": ()}))
+        told = CATALOGUE["neighbour"].untestable(Drivers(case), network.anatomy)
+        return told, sorted(p.member or "" for p in network.parameters if p.base == "neighbour_u_value")
+
+    assert [len(party(g)[1]) for g in ({}, {"A": {"south": 2.0}}, {"A": {"south": 2.0, "west": 1.0}})] == [4, 3, 2]
+    everywhere = {"A": {"south": 2.0, "west": 1.5}, "D": {"east": 3.0, "north": 1.0}}
+    assert party(everywhere) == ("every side has windows, so that none is a party wall", [])
 
 
 def test_the_page_has_the_catalogue() -> None:

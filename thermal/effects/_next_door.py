@@ -62,13 +62,17 @@ def _build_ground(join: Joining) -> None:
         to_ground(join.key("layers"), in_series, [(np.array([face.node]), np.array([face.area]))])
 
 
+def _party_sides(anatomy: Anatomy) -> set[float]:
+    """Azimuths of the sides that may be party walls: those without windows, all where nothing tells of windows."""
+    sides = {azimuth for _, azimuth in anatomy.facades}
+    return sides - {pane.azimuth for pane in anatomy.panes} if anatomy.windows_told else sides
+
+
 def _build_neighbour(join: Joining) -> None:
     other = join.parameter("neighbour_temperature")
-    glazed = {pane.azimuth for pane in join.anatomy.panes}
-    # a side with windows is no party wall; all sides may be where drawings tell windows of all, or of none
-    bare = {azimuth for _, azimuth in join.anatomy.facades} - glazed
+    party = _party_sides(join.anatomy)
     for (zone, azimuth), area in join.anatomy.facades.items():
-        if bare and azimuth not in bare:
+        if azimuth not in party:
             continue
         room, value = join.anatomy.rooms[zone], join.parameter("neighbour_u_value", facade=f"{azimuth:g} deg")
         join.air_to(room, value, join.graph.signal(_STEADY), area)
@@ -85,6 +89,11 @@ def _build_mass(join: Joining) -> None:
             join.graph.face("hidden_mass", coupling, room.mean, node, room.floor_area)
         else:
             join.air_to(room, coupling, int(node[0]), room.floor_area)
+
+
+def _no_party_side(anatomy: Anatomy) -> str | None:
+    none = None if _party_sides(anatomy) else "every side has windows, so that none is a party wall"
+    return without_facades(anatomy) or none
 
 
 def _no_stack(anatomy: Anatomy) -> str | None:
@@ -154,7 +163,7 @@ NEIGHBOUR = Effect(
         shape("neighbour_temperature", "K", 293.15, 278.15, 300.15, "unheated to warm", "neighbour", "linear"),
     ),
     build=_build_neighbour,
-    applies=without_facades,
+    applies=_no_party_side,
 )
 
 HIDDEN_MASS = Effect(

@@ -166,6 +166,8 @@ class Anatomy:
         Towards outdoor air.
     panes : list of Pane
         Windows to outdoor air.
+    windows_told : bool
+        Whether the case tells its windows; some are assumed on every side of a plan without.
     rooms : dict of str to Room
         By zone.
     partitions : dict
@@ -186,6 +188,7 @@ class Anatomy:
 
     outer: list[OuterFaces] = field(default_factory=list)
     panes: list[Pane] = field(default_factory=list)
+    windows_told: bool = True
     rooms: dict[str, Room] = field(default_factory=dict)
     partitions: dict[tuple[str, str], float] = field(default_factory=dict)
     stacked: dict[tuple[str, str], float] = field(default_factory=dict)

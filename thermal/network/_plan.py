@@ -109,6 +109,7 @@ def _remember(
     for plan in plans.floors:
         for name in plan.zone_names:
             zones[name].room(areas[name], areas[name] * plan.height)
+    anatomy.windows_told = bool(plans.glazing)
     anatomy.stacked, anatomy.under_roof, anatomy.on_ground = stacked_areas(plans, areas)
     for zone, sides in facade_areas(plans).items():
         for side, area in sides.items():

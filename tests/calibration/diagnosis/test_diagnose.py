@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -9,8 +10,9 @@ import pytest
 
 from calibration.diagnosis import Diagnosis, diagnose
 from calibration.diagnosis._bench import Bench
+from calibration.diagnosis._refit import ACCEPTED, Refit
 from calibration.diagnosis._screen import Screening
-from calibration.diagnosis._search import ACCEPTED
+from calibration.diagnosis._verdict import judge
 from thermal import Building, Case, Telemetry
 from thermal.effects import CATALOGUE
 from thermal.pilot import MOUNTAIN_VIEW, TwinRanges, devices, generate_office, generate_twin
@@ -103,6 +105,22 @@ def test_the_file_holds_every_effect_and_what_the_contract_asks() -> None:
     assert sum(content["where"]["hours"]) == pytest.approx(1.0)
     assert sum(z["share"] for z in content["where"]["zones"]) == pytest.approx(1.0)
     assert set(content["gap"]["smallest_detectable_watts"]) == set(twin().building.zone_names)
+
+
+def test_what_counts_for_little_is_ranked_by_what_it_gains_and_what_predicts_worse_is_not() -> None:
+    """Two fits that gain much and are too small to matter, and one that gains more and predicts worse."""
+    r = diagnosed(None).rounds[0]
+    by_name = {g.effect: g for g in r.gains}
+
+    def refit(effect: str, gain: float, worse: bool) -> Refit:
+        return Refit(by_name[effect], r.before, gain, 0.01, r.held_out, worse, counts=False)
+
+    doubtful = (refit("infiltration", 40.0, True), refit("duct_loss", 20.0, False), refit("sensor_bias", 12.0, False))
+    found = judge((replace(r, refits=doubtful, accepted=None),), {})
+    assert [s.effect for s in found.suspects[:2]] == ["duct_loss", "sensor_bias"]
+    worse = next(s for s in found.suspects if s.effect == "infiltration")
+    assert worse.probability < found.suspects[1].probability < 0.3
+    assert found.name == "no_gap"
 
 
 def test_tangents_promise_what_a_fit_keeps() -> None:

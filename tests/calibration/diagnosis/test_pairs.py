@@ -1,0 +1,119 @@
+"""Pairs of effects: two that hide each other are found together where the best single effect is neither."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from calibration._settings import ModelSettings
+from calibration.diagnosis._bench import Bench
+from calibration.diagnosis._gain import Gain, choice_of
+from calibration.diagnosis._held_out import held_out
+from calibration.diagnosis._pairs import nominate
+from calibration.diagnosis._refit import ACCEPTED, Work
+from calibration.diagnosis._screen import Screening
+from calibration.diagnosis._search import _best_pair
+from thermal import Building, Case, Telemetry
+from thermal.effects import CATALOGUE
+from thermal.pilot import MOUNTAIN_VIEW, TwinRanges, devices, generate_office, generate_twin
+
+FloatArray = NDArray[np.float64]
+
+#: Effects with one strength each, of which the third will look like what is left of the first two.
+NAMES = ("roof_exchange", "ground_exchange", "interfloor_exchange", "infiltration")
+
+#: Errors, and their deviation [K].
+COUNT, NOISE = 300, 0.1
+
+
+def screening(signatures: FloatArray, errors: FloatArray) -> Screening:
+    """A screening of a model that is linear in its strengths, and has no other parameters."""
+    made = Screening.__new__(Screening)
+    made.parameters = tuple(CATALOGUE[name].parameters[0] for name in NAMES)
+    made.count, made.scale = float(len(errors)), float(len(errors) / np.sum(errors**2))
+    made.gram = made.scale * signatures.T @ signatures
+    made.score = -made.scale * signatures.T @ errors
+    made.prior = np.array([p.prior_deviation for p in made.parameters])
+    made.lower = np.array([p.lower for p in made.parameters])
+    made.upper = np.array([p.upper for p in made.parameters])
+    made._whole, made._elsewhere = made.gram, 0
+    made._position = {p.name: i for i, p in enumerate(made.parameters)}
+    return made
+
+
+def planted(strengths: tuple[float, float], seed: int = 4) -> Screening:
+    """Errors of the first two effects, which cancel but for an eighth of their size, and of which the third has half."""
+    rng = np.random.default_rng(seed)
+    shared, own, other, third = rng.standard_normal((4, COUNT))
+    signatures = np.column_stack([
+        shared + 0.125 * own, -shared + 0.125 * other, 0.1 * (own + other + 0.5 * third), rng.standard_normal(COUNT),
+    ])  # fmt: skip
+    true = np.array([*strengths, 0.0, 0.0])
+    return screening(signatures, NOISE * rng.standard_normal(COUNT) - signatures @ true)
+
+
+def test_a_pair_that_cancels_is_found_where_two_best_singles_are_not_it() -> None:
+    made = planted((0.8, 0.8))
+    gains = sorted((made.of(name) for name in NAMES), key=lambda g: -g.gain)
+    assert gains[0].effect == "interfloor_exchange"
+    assert {g.effect for g in gains[:2]} != {"roof_exchange", "ground_exchange"}
+    best, *_ = nominate(made, gains, 3.0)
+    assert {best.first.effect, best.second.effect} == {"roof_exchange", "ground_exchange"}
+    for g in (best.first, best.second):
+        assert list(g.strengths.values()) == pytest.approx([0.8], abs=0.2)
+    assert best.gain > gains[0].gain + 6.0
+
+
+def test_what_one_effect_explains_nominates_no_pair() -> None:
+    made = planted((0.8, 0.0))
+    gains = sorted((made.of(name) for name in NAMES), key=lambda g: -g.gain)
+    assert gains[0].effect == "roof_exchange"
+    assert nominate(made, gains, 3.0) == []
+    assert nominate(made, gains[:1], 3.0) == []
+
+
+def test_a_pair_s_gain_is_the_evidence_of_both() -> None:
+    """Against the determinant form for Gaussian errors of known size, with strengths well inside their ranges."""
+    made = planted((0.5, 0.5))
+    first, second = made.of("roof_exchange"), made.of("ground_exchange")
+    one, other, gain = made.together(first, second)
+    x = np.array([*one.strengths.values(), *other.strengths.values()])
+    gram, score, prior = made.gram[:2, :2], made.score[:2], np.diag(made.prior[:2] ** -2.0)
+    share = (2.0 * score @ x - x @ gram @ x) / made.count
+    sharper = gram / (1.0 - share)
+    exact = -0.5 * made.count * np.log1p(-share) - 0.5 * x @ prior @ x + 2.0 * np.log(2.0)
+    exact += 0.5 * (np.linalg.slogdet(prior)[1] - np.linalg.slogdet(sharper + prior)[1])
+    assert gain == pytest.approx(exact, rel=1e-9)
+    assert made.reach(first, second) == pytest.approx(gain, abs=0.5)
+
+
+def test_a_pair_is_accepted_where_neither_member_would_be() -> None:
+    """A twin whose meter of one zone reads low and whose sensor of another reads high, each hardly seen alone."""
+    plans = generate_office(3, floor_area=120.0, zones=4, floors=1)
+    building = Building("office", MOUNTAIN_VIEW, 0.0, plans, devices(plans))
+    quiet = TwinRanges(disturbance_deviation=(0.05, 0.1), noise=(0.005, 0.01))
+    case = generate_twin(building, 3, days=15.0, step_seconds=900.0, dx=1.0, meter="exact", ranges=quiet)[0]
+    low, high = building.zone_names[1], building.zone_names[3]
+    frame = case.telemetry.frame.copy()
+    (device,) = building.devices_of(low)
+    frame[f"{device.name}/supply_air_flowrate_sensor"] /= 1.25
+    (device,) = building.devices_of(high)
+    frame[f"{device.name}/zone_air_temperature_sensor"] += 0.8
+    bench = Bench(Case(building, Telemetry.from_frame(frame)), ModelSettings(dx=1.0))
+    baseline = bench.fit({}, [{}])
+    made = Screening(bench, baseline, ("flow_gain", "sensor_bias"))
+
+    def alone(effect: str, zone: str) -> Gain:
+        index = np.array([k for k, p in enumerate(made.parameters) if p.name == f"{effect}@{zone}"])
+        return made._gain(effect, index, (zone,), choice_of(1, 4), 4)
+
+    gains = sorted((alone("flow_gain", low), alone("sensor_bias", high)), key=lambda g: -g.gain)
+    assert all(g.gain < ACCEPTED for g in gains)
+    found = _best_pair(Work(bench, baseline, held_out(bench, baseline), made), gains, (), None)
+    assert found is not None
+    first, both = found
+    assert not first.counts and both.counts
+    assert both.gain > 2.0 * ACCEPTED > first.gain
+    assert both.fit.values[f"flow_gain@{low}"] == pytest.approx(0.25, abs=0.05)
+    assert both.fit.values[f"sensor_bias@{high}"] == pytest.approx(0.8, abs=0.1)
