@@ -14,6 +14,8 @@ from mpc.control._reading import SitePoints
 from mpc.control._rules import ResetRule
 from mpc.control._sequential import SequentialSolver
 from mpc.control._solution import Solution, Solver, Status
+from mpc.control._stage_solver import StageMethod, StageSolution, StageSolver
+from mpc.control._stages import StageData, StageProblem
 
 __all__ = [
     "LONGEST_STEP",
@@ -42,6 +44,11 @@ __all__ = [
     "Solution",
     "Solver",
     "Source",
+    "StageData",
+    "StageMethod",
+    "StageProblem",
+    "StageSolution",
+    "StageSolver",
     "Status",
     "expect",
     "peak_data",
