@@ -4,8 +4,10 @@ from mpc.control._assembly import ComfortOperation, Expected, Schedule, expect, 
 from mpc.control._channels import Channel, supply_channels
 from mpc.control._controller import Action, ControllerSettings, MpcController, Source
 from mpc.control._data import HorizonData, PeakData
+from mpc.control._heat import HeatChannel, HeatPredictor, HeatQuantity, heat_channels
 from mpc.control._horizon import LONGEST_STEP, Horizon
 from mpc.control._ipopt import IpoptSolver
+from mpc.control._linear import LinearSolver
 from mpc.control._observer import Observer
 from mpc.control._predictor import Predictor, Rollout, Sensitivity
 from mpc.control._problem import ControlProblem, CostTerms, Penalty
@@ -26,9 +28,13 @@ __all__ = [
     "ControllerSettings",
     "CostTerms",
     "Expected",
+    "HeatChannel",
+    "HeatPredictor",
+    "HeatQuantity",
     "Horizon",
     "HorizonData",
     "IpoptSolver",
+    "LinearSolver",
     "MpcController",
     "Observer",
     "PeakData",
@@ -51,6 +57,7 @@ __all__ = [
     "StageSolver",
     "Status",
     "expect",
+    "heat_channels",
     "peak_data",
     "solve_quadratic",
     "supply_channels",
