@@ -1,6 +1,7 @@
 """Optimal control of supply setpoints over a receding horizon."""
 
 from mpc.control._assembly import ComfortOperation, Expected, Schedule, expect, peak_data
+from mpc.control._back_off import BackOff
 from mpc.control._channels import Channel, supply_channels
 from mpc.control._controller import Action, ControllerSettings, MpcController, Source
 from mpc.control._data import HorizonData, PeakData
@@ -8,12 +9,14 @@ from mpc.control._heat import HeatChannel, HeatPredictor, HeatQuantity, heat_cha
 from mpc.control._horizon import LONGEST_STEP, Horizon
 from mpc.control._ipopt import IpoptSolver
 from mpc.control._linear import LinearSolver
+from mpc.control._moving_horizon import MovingHorizonObserver
 from mpc.control._observer import Observer
 from mpc.control._predictor import Predictor, Rollout, Sensitivity
 from mpc.control._problem import ControlProblem, CostTerms, Penalty
 from mpc.control._quadratic import QuadraticResult, solve_quadratic
 from mpc.control._reading import SitePoints
 from mpc.control._rules import ResetRule
+from mpc.control._scenarios import ScenarioSolver, outdoor_scenarios
 from mpc.control._sequential import SequentialSolver
 from mpc.control._solution import Solution, Solver, Status
 from mpc.control._stage_solver import StageMethod, StageSolution, StageSolver
@@ -22,6 +25,7 @@ from mpc.control._stages import StageData, StageProblem
 __all__ = [
     "LONGEST_STEP",
     "Action",
+    "BackOff",
     "Channel",
     "ComfortOperation",
     "ControlProblem",
@@ -35,6 +39,7 @@ __all__ = [
     "HorizonData",
     "IpoptSolver",
     "LinearSolver",
+    "MovingHorizonObserver",
     "MpcController",
     "Observer",
     "PeakData",
@@ -43,6 +48,7 @@ __all__ = [
     "QuadraticResult",
     "ResetRule",
     "Rollout",
+    "ScenarioSolver",
     "Schedule",
     "Sensitivity",
     "SequentialSolver",
@@ -58,6 +64,7 @@ __all__ = [
     "Status",
     "expect",
     "heat_channels",
+    "outdoor_scenarios",
     "peak_data",
     "solve_quadratic",
     "supply_channels",

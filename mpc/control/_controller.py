@@ -341,7 +341,7 @@ class MpcController:
     def save_state(self) -> dict[str, Any]:
         """Everything that the next actions depend on, as plain values and arrays."""
         return {
-            "estimate": self.observer.state.copy(), "started": self._started, "previous": self._previous.copy(),
+            "estimate": self.observer.memory, "started": self._started, "previous": self._previous.copy(),
             "plan": None if self._plan is None else (self._plan[0], self._plan[1].copy()), "forecast": self._forecast,
             "gains": None if self._gains is None else self._gains.copy(), "peaks": dict(self._peaks),
             "windows": list(self._windows), "memory": self.solver.memory, "heat": self._heat,
@@ -356,7 +356,7 @@ class MpcController:
         saved : mapping of str to object
             Of `save_state`.
         """
-        self.observer.state, self._started = saved["estimate"].copy(), saved["started"]
+        self.observer.memory, self._started = saved["estimate"], saved["started"]
         self._previous, self._plan, self._forecast = saved["previous"].copy(), saved["plan"], saved["forecast"]
         self._gains, self._peaks, self._windows = saved["gains"], dict(saved["peaks"]), list(saved["windows"])
         self._heat, self._water = saved["heat"], saved["water"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import time
 import warnings
 from typing import Any
@@ -91,8 +92,8 @@ class _Programme:
     """The compiled programme for a number of demand windows and peaks."""
 
     def __init__(self, problem: ControlProblem, predictor: HeatPredictor, n_window: int, n_peak: int) -> None:
-        import cvxpy as cp  # here: seconds for whoever imports the package and solves nothing
-
+        # here: seconds for whoever imports the package and solves nothing; it is typed in part
+        cp: Any = importlib.import_module("cvxpy")
         self._problem, self._predictor, self._cp = problem, predictor, cp
         count, n, r = len(predictor.horizon), predictor.n_zone, predictor.modes.capacity.size
         m, size = len(predictor.channels), problem.span.size

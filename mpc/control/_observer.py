@@ -90,6 +90,15 @@ class Observer:
         return np.asarray(error)
 
     @property
+    def memory(self) -> FloatArray:
+        """Everything that the next estimates depend on, to be saved with a controller's state [its own]."""
+        return self.state.copy()
+
+    @memory.setter
+    def memory(self, kept: FloatArray) -> None:
+        self.state = np.array(kept)
+
+    @property
     def modal_state(self) -> FloatArray:
         """State of the modes now, shape (r,) [(W K)^0.5]."""
         return self.state[: self.order]

@@ -111,7 +111,7 @@ class SequentialSolver:
             Wall time after which the best plan so far is returned [s].
         """
         begin = time.perf_counter()
-        point = self._at(data, self._admitted(data, self.problem.shares(plan)))
+        point = self._at(data, self.problem.admitted(data, self.problem.shares(plan)))
         start, status, message, k = point.cost, Status.ITERATION_LIMIT, f"after {self.iterations} steps", 0
         if not np.isfinite(point.cost):
             status, message = Status.FAILED, "the plan to start from has no finite cost"
@@ -159,17 +159,6 @@ class SequentialSolver:
             self.problem.plan(point.shares), point.rollout, point.terms, start, status, message, k,
             time.perf_counter() - begin, "sequential",
         )  # fmt: skip
-
-    def _admitted(self, data: HorizonData, shares: FloatArray) -> FloatArray:
-        """Move decisions to where limits on changes allow them."""
-        most, n = self.problem.most_change, self.problem.shape[1]
-        if not np.isfinite(most).any():
-            return shares
-        before, moved = self.problem.standing(data)[:n], shares.copy()
-        for k in range(0, shares.size, n):
-            moved[k : k + n] = np.clip(moved[k : k + n], before - most[k : k + n], before + most[k : k + n])
-            before = moved[k : k + n]
-        return np.clip(moved, 0.0, 1.0)
 
     def _at(self, data: HorizonData, shares: FloatArray, near: Rollout | None = None) -> _Point:
         rollout = self.problem.predictor.rollout(data, self.problem.plan(shares), near)

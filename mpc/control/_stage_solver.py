@@ -127,7 +127,9 @@ class StageSolver:
         slack = [ca.MX.sym(f"s_{k}", b) for k in range(count + 1)]
         start, p = ca.MX.sym("start", n), ca.MX.sym("p", problem.parameter.numel(), count)
         price = ca.MX.sym("price", b, count + 1)
-        cost, variables, rows, equal = ca.MX(0), [], [], []
+        cost, variables = ca.MX(0), []
+        rows: list[ca.MX] = []
+        equal: list[bool] = []
         for k in range(count + 1):
             end_cost, banded = problem.end(x[k])
             variables += [x[k], u[k], slack[k]] if k < count else [x[k], slack[k]]
@@ -142,7 +144,7 @@ class StageSolver:
             rows, equal = [*rows, banded + slack[k], banded - slack[k]], equal + [False] * (2 * b)
         nlp = {"x": ca.vertcat(*variables), "p": ca.vertcat(start, ca.vec(p), ca.vec(price)), "f": cost,
                "g": ca.vertcat(*rows)}  # fmt: skip
-        options: dict[str, object] = {"print_time": False, "expand": True, **_QUIET[self.method]}
+        options: dict[str, Any] = {"print_time": False, "expand": True, **_QUIET[self.method]}
         options |= {f"{self.method}.{name}": value for name, value in _NEAR.items()}
         options |= {f"{self.method}.tol": tolerance, f"{self.method}.max_iter": iterations}
         if self.method == "fatrop":
