@@ -1,9 +1,10 @@
 """Optimal control of supply setpoints over a receding horizon."""
 
+from mpc.control._action import Action, ControllerSettings, Source
 from mpc.control._assembly import ComfortOperation, Expected, Schedule, expect, peak_data
 from mpc.control._back_off import BackOff
 from mpc.control._channels import Channel, supply_channels
-from mpc.control._controller import Action, ControllerSettings, MpcController, Source
+from mpc.control._controller import MpcController
 from mpc.control._data import HorizonData, PeakData
 from mpc.control._heat import HeatChannel, HeatPredictor, HeatQuantity, heat_channels
 from mpc.control._horizon import LONGEST_STEP, Horizon
@@ -21,6 +22,7 @@ from mpc.control._sequential import SequentialSolver
 from mpc.control._solution import Solution, Solver, Status
 from mpc.control._stage_solver import StageMethod, StageSolution, StageSolver
 from mpc.control._stages import StageData, StageProblem
+from mpc.control._watch import FarFromModel, StuckSensors
 
 __all__ = [
     "LONGEST_STEP",
@@ -32,6 +34,7 @@ __all__ = [
     "ControllerSettings",
     "CostTerms",
     "Expected",
+    "FarFromModel",
     "HeatChannel",
     "HeatPredictor",
     "HeatQuantity",
@@ -62,6 +65,7 @@ __all__ = [
     "StageSolution",
     "StageSolver",
     "Status",
+    "StuckSensors",
     "expect",
     "heat_channels",
     "outdoor_scenarios",

@@ -90,6 +90,12 @@ class Observer:
         return np.asarray(error)
 
     @property
+    def innovation_deviation(self) -> FloatArray:
+        """Standard deviation of the innovations according to the filter, all sensors reporting, shape (n_zone,) [K]."""
+        seen = self.kalman.whole.observation
+        return np.sqrt(np.einsum("zi,ij,zj->z", seen, self._covariance, seen) + self.kalman.whole.noise_variance)
+
+    @property
     def memory(self) -> FloatArray:
         """Everything that the next estimates depend on, to be saved with a controller's state [its own]."""
         return self.state.copy()
