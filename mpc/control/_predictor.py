@@ -140,7 +140,7 @@ class Predictor:
             expected = "at least one channel, and one for each setpoint"
             raise ControlError(describe("predictor", expected, f"{[c.name for c in self.channels]}"))
         self._prepare(modes, horizon, disturbance_time, scheme)
-        self._design = self._design_knobs()
+        self._design, self._scheduled = self._design_knobs(), self._undecided_setpoints(used)
         self._stepper = hvac.stepper()
         self._known: tuple[HorizonData | None, FloatArray, FloatArray] = (None, np.zeros(0), np.zeros(0))
 
@@ -166,6 +166,19 @@ class Predictor:
             knobs[at.differential_pressure] = system.loop.pump.differential_pressure
         return knobs
 
+    def _undecided_setpoints(self, used: NDArray[np.intp]) -> NDArray[np.intp]:
+        """Thermostats' setpoints among the knobs that no channel sets: they follow their schedule."""
+        at = self.hvac.knobs
+        heating, cooling = (np.arange(s.start, s.stop) for s in (at.heating_setpoint, at.cooling_setpoint))
+        highest, lowest = np.full(at.size, -np.inf), np.full(at.size, np.inf)
+        for channel, mine in zip(self.channels, self.at, strict=True):
+            highest[mine], lowest[mine] = channel.upper, channel.lower
+        if (highest[heating] > lowest[cooling]).any():
+            found = f"{highest[heating].max():g} and {lowest[cooling].min():g} K"
+            expected = "ranges of heating setpoints below those of cooling setpoints"
+            raise ControlError(describe("predictor", expected, found))
+        return np.setdiff1d(np.concatenate([heating, cooling]), used)
+
     def _given(self, data: HorizonData) -> tuple[FloatArray, FloatArray]:
         """Give what no plan changes: surroundings of the plant, and drive of the modes; kept for one horizon."""
         if self._known[0] is not data:
@@ -185,7 +198,7 @@ class Predictor:
         return np.stack([self._drive[dt] @ o + self._push[dt] @ f for dt, o, f in steps])
 
     def knobs(self, plan: FloatArray) -> FloatArray:
-        """Spread a plan over the steps, shape (N, n_knob) [K or Pa]; water is left for the roll-out.
+        """Spread a plan over the steps, shape (N, n_knob) [K or Pa]; water and schedules are left for the roll-out.
 
         Parameters
         ----------
@@ -212,6 +225,11 @@ class Predictor:
         n, count, stepper, water_at = self.n_zone, len(self.horizon), self._stepper, self.hvac.knobs.water
         around, drive = self._given(data)
         knobs, x, water = self.knobs(plan), data.state, data.water
+        if self._scheduled.size:
+            first = self.hvac.knobs.heating_setpoint.start
+            knobs[:, self._scheduled] = np.hstack([data.heating_setpoint, data.cooling_setpoint])[
+                :, self._scheduled - first
+            ]
         zone, seen, done = np.empty((count + 1, n)), np.empty((count, n)), np.empty((count, stepper.output.size))
         zone[0], ahead = self._output @ x + REFERENCE_TEMPERATURE, np.zeros(n)
         for k, dt in enumerate(self.horizon.steps):
