@@ -94,7 +94,8 @@ class BackOff:
         modes, output, growth = self.modes, self.modes.output, self.outdoor or ErrorGrowth(0.0, 3600.0)
         p = np.zeros((r + zones + 1,) * 2)
         p[:-1, :-1] = self.kalman.steady(measured)[0]
-        found, parts = [], {dt: modes.propagator(float(dt), self.scheme) for dt in np.unique(self.horizon.steps)}
+        found: list[FloatArray] = []
+        parts = {dt: modes.propagator(float(dt), self.scheme) for dt in np.unique(self.horizon.steps)}
         for dt, end in zip(self.horizon.steps, self.horizon.edges[1:], strict=True):
             keep, added = self.kalman.disturbance.discrete(float(dt))
             fading = np.exp(-dt / growth.time_constant)

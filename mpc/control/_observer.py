@@ -93,7 +93,8 @@ class Observer:
     def innovation_deviation(self) -> FloatArray:
         """Standard deviation of the innovations according to the filter, all sensors reporting, shape (n_zone,) [K]."""
         seen = self.kalman.whole.observation
-        return np.sqrt(np.einsum("zi,ij,zj->z", seen, self._covariance, seen) + self.kalman.whole.noise_variance)
+        variance = np.einsum("zi,ij,zj->z", seen, self._covariance, seen) + self.kalman.whole.noise_variance
+        return np.asarray(np.sqrt(variance))
 
     @property
     def memory(self) -> FloatArray:

@@ -77,7 +77,7 @@ class StuckSensors:
         same = np.abs(zone - self._last) <= self.same
         self._count = np.where(same, self._count + 1, np.isfinite(zone).astype(np.int64))
         self._last = np.where(same, self._last, zone)
-        return self._count >= self.needed
+        return np.asarray(self._count >= self.needed)
 
     @property
     def memory(self) -> FloatArray:
