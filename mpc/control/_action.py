@@ -92,4 +92,4 @@ class ControllerSettings:
     demand: tuple[DemandCharge, ...] = ()
     back_off: BackOff | None = None
     false_alarm: float = 1e-5
-    resolution: float = 0.0
+    resolution: float = 0.1

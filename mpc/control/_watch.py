@@ -16,7 +16,7 @@ BoolArray = NDArray[np.bool_]
 
 _SAME = 1e-6  # K: readings that differ by less are one and the same
 _FEWEST = 6  # readings that must be the same, whatever the sensor
-_MOST = 288  # readings that are remembered: a day at 5 minutes
+_MOST = 288  # readings: a sensor that needs more to tell is not watched
 _FAR = 6.0  # deviations of an innovation
 _FAR_KELVIN = 1.0  # K: what is nearer than this is not worth saying
 _RESTART = 3  # steps in which most zones are far, after which the state is started anew
@@ -32,38 +32,38 @@ class StuckSensors:
     deviation : ndarray, shape (n_zone,)
         Standard deviation of the sensors' noise [K], positive.
     false_alarm : float
-        Largest probability with which a healthy sensor is taken for stuck in a step [-], between 0 and 1.
+        Largest probability with which a healthy sensor is taken for stuck in a step [-], below 1; with 0 no sensor is
+        watched.
     resolution : float
-        To which sensors round [K]; 0 where they do not.
+        To which sensors round [K]; 0 where they do not. The default is that of most building automation.
 
     Raises
     ------
     ControlError
-        When a number is out of its range, or the noise is too small against the resolution to tell.
+        When a number is out of its range.
 
     Notes
     -----
     A healthy sensor of noise σ that rounds to h repeats a value at most with probability ``p = 2 Φ(h / 2σ) - 1``, in
     the middle between two steps of its scale and where the zone stands still. m equal readings in a row have a
-    probability of at most ``p^(m-1)``; m is the least for which that is not above the false alarm, and 6.
+    probability of at most ``p^(m-1)``; m is the least for which that is not above the false alarm, and 6. A sensor
+    whose noise shows so little against its resolution that m exceeds 288, a day at 5 minutes, is not watched.
     """
 
     def __init__(
-        self, zones: Sequence[str], deviation: FloatArray, false_alarm: float = 1e-5, resolution: float = 0.0
+        self, zones: Sequence[str], deviation: FloatArray, false_alarm: float = 1e-5, resolution: float = 0.1
     ) -> None:
-        if not (0.0 < false_alarm < 1.0 and resolution >= 0.0 and (deviation > 0.0).all()):
+        if not (0.0 <= false_alarm < 1.0 and resolution >= 0.0 and (deviation > 0.0).all()):
             found = f"{false_alarm!r}, {resolution!r} K, {deviation}"
             raise ControlError(describe("stuck sensors", "a probability, a resolution, positive deviations", found))
-        self.zones, self.same = tuple(zones), max(0.5 * resolution, _SAME)
-        repeat = 2.0 * ndtr(0.5 * max(resolution, _SAME) / deviation) - 1.0
-        needed = np.ceil(1.0 + np.log(false_alarm) / np.log(np.minimum(repeat, 1.0 - 1e-12)))
-        if (needed > _MOST).any():
-            at = int(needed.argmax())
-            advice = f"zone {self.zones[at]!r} would need {needed[at]:g} equal readings; allow more false alarms"
-            expected = f"noise that shows against a resolution of {resolution:g} K"
-            raise ControlError(describe("stuck sensors", expected, f"{deviation.max():g} K", advice))
-        #: Equal readings after which a sensor counts as stuck, shape (n_zone,).
-        self.needed = np.maximum(needed, _FEWEST).astype(np.int64)
+        self.zones = tuple(zones)
+        repeat = 2.0 * ndtr(0.5 * max(resolution, _SAME) / np.asarray(deviation)) - 1.0
+        rare = np.log(false_alarm) if false_alarm > 0.0 else -np.inf
+        needed = np.ceil(1.0 + rare / np.log(np.minimum(repeat, 1.0 - 1e-12)))
+        #: Sensors whose standing still could be told, shape (n_zone,).
+        self.watched = needed <= _MOST
+        #: Equal readings after which a sensor counts as stuck, shape (n_zone,); of no meaning where it is not watched.
+        self.needed = np.clip(needed, _FEWEST, _MOST).astype(np.int64)
         self._last, self._count = np.full(len(self.zones), np.nan), np.zeros(len(self.zones), dtype=np.int64)
 
     def update(self, zone: FloatArray) -> BoolArray:
@@ -74,10 +74,10 @@ class StuckSensors:
         zone : ndarray, shape (n_zone,)
             Temperatures [K]; NaN where missing.
         """
-        same = np.abs(zone - self._last) <= self.same
+        same = np.abs(zone - self._last) <= _SAME
         self._count = np.where(same, self._count + 1, np.isfinite(zone).astype(np.int64))
         self._last = np.where(same, self._last, zone)
-        return np.asarray(self._count >= self.needed)
+        return np.asarray(self.watched & (self._count >= self.needed))
 
     @property
     def memory(self) -> FloatArray:

@@ -12,7 +12,7 @@ ZONES = ("hall", "lab", "loft")
 
 
 def test_a_stuck_sensor_is_found_and_let_go() -> None:
-    watch, rng = StuckSensors(ZONES, np.full(3, 0.05)), np.random.default_rng(0)
+    watch, rng = StuckSensors(ZONES, np.full(3, 0.05), resolution=0.0), np.random.default_rng(0)
     assert watch.needed.tolist() == [6, 6, 6]
     for k in range(12):
         zone = 294.0 + 0.05 * rng.standard_normal(3)
@@ -23,7 +23,7 @@ def test_a_stuck_sensor_is_found_and_let_go() -> None:
 
 
 def test_what_is_missing_is_not_stuck() -> None:
-    watch = StuckSensors(ZONES, np.full(3, 0.05))
+    watch = StuckSensors(ZONES, np.full(3, 0.05), resolution=0.0)
     for _ in range(10):
         assert not watch.update(np.full(3, np.nan)).any()
 
@@ -41,7 +41,7 @@ def test_false_alarms_are_as_rare_as_was_asked_for(offset) -> None:
 
 
 def test_memory_is_all_there_is() -> None:
-    one, other = (StuckSensors(ZONES, np.full(3, 0.05)) for _ in range(2))
+    one, other = (StuckSensors(ZONES, np.full(3, 0.05), resolution=0.0) for _ in range(2))
     for _ in range(4):
         one.update(np.full(3, 294.0))
     other.memory = one.memory
@@ -58,8 +58,12 @@ def test_far_zones_are_named_and_most_of_them_start_the_state_anew() -> None:
     assert "started anew" in said[-3]
 
 
-def test_noise_that_does_not_show_is_refused() -> None:
-    with pytest.raises(ControlError, match="zone 'loft' would need"):
-        StuckSensors(ZONES, np.array([0.2, 0.2, 0.05]), 1e-5, resolution=0.5)
+def test_noise_that_does_not_show_is_not_watched() -> None:
+    watch = StuckSensors(ZONES, np.array([0.05, 0.05, 0.01]))
+    assert watch.watched.tolist() == [True, True, False] and watch.needed[:2].tolist() == [32, 32]
+    for _ in range(300):
+        stuck = watch.update(np.full(3, 294.0))
+    assert stuck.tolist() == [True, True, False]
+    assert not StuckSensors(ZONES, np.full(3, 0.05), 0.0).watched.any()
     with pytest.raises(ControlError, match="probability"):
-        StuckSensors(ZONES, np.full(3, 0.1), 0.0)
+        StuckSensors(ZONES, np.full(3, 0.1), 1.0)
