@@ -6,10 +6,16 @@ hours in steps of 5 minutes, and one of 24 hours in steps of 5 minutes for the f
 there on. Each is solved from outdoor reset, then `WARM` times from the plan before, shifted by 5 minutes, with the
 state that the model predicts and a disturbance of it; Ipopt then solves the last of these from the same plan.
 
+A second table is of what any library can solve (`_common_control.py`: ten zones of three states, twelve decisions, 72
+steps): do-mpc as it comes and tuned twice, Ipopt and fatrop in stages of ours, each along the same sequence of states,
+each from its own plan before. What a plan costs is counted for all of them by the same roll-out; the reference is Ipopt
+at its default tolerance.
+
 Times are CPU times of the process on one thread.
 
-Run: ``python benchmarks/mpc_speed.py --out results/mpc_speed``; two minutes on one core, most of them Ipopt's. Writes
-``mpc_speed.json`` and ``.md``.
+Run: ``python benchmarks/mpc_speed.py --out results/mpc_speed``; three minutes on one core, most of them Ipopt's. The
+peer needs the extra ``[benchmarks]``. Writes ``mpc_speed.json`` and ``.md``, ``mpc_peers.json`` and ``.md``;
+``--readme`` replaces the tables in README and documentation.
 """
 
 from __future__ import annotations
@@ -21,7 +27,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from _table import markdown, write
+from _common_control import STEPS, common_data, common_problem
+from _do_mpc_peer import SETTINGS, DoMpc
+from _table import markdown, publish, write
 from simulator_speed import pilot
 
 from mpc.control import (
@@ -33,6 +41,11 @@ from mpc.control import (
     Predictor,
     ResetRule,
     SequentialSolver,
+    StageData,
+    StageMethod,
+    StageSolution,
+    StageSolver,
+    Status,
     supply_channels,
 )
 from mpc.scenario import zone_areas
@@ -49,6 +62,11 @@ COLUMNS = (
     "horizon", "steps", "cold, s", "warm, median s", "warm, largest s", "iterations", "Ipopt, s", "Ipopt",
     "cost over Ipopt's, %",
 )  # fmt: skip
+PEERS = ("solver", "warm, median s", "warm, largest s", "iterations", "cost over the reference's, largest %", "solved")
+STAGES: dict[str, tuple[StageMethod, float]] = {
+    "reference: Ipopt in stages, tolerance 1e-8": ("ipopt", 1e-8), "ours: Ipopt in stages": ("ipopt", 1e-4),
+    "ours: fatrop in stages": ("fatrop", 1e-4),
+}  # fmt: skip
 
 
 def plant_of(areas: np.ndarray) -> HvacSystem:
@@ -122,13 +140,82 @@ def measure(name: str, modes: ModalModel, areas: np.ndarray, hvac: SmoothHvac, w
     }  # fmt: skip
 
 
+def instances(warm: int) -> tuple[list[StageData], list[StageSolution]]:
+    """Follow the reference in closed loop: horizons of the common problem, and its solutions."""
+    problem, rng = common_problem(), np.random.default_rng(SEED)
+    solver, start = StageSolver(problem, STEPS, "ipopt", 1e-8), np.full(problem.state.numel(), -3.0)
+    data = common_data(0, start)
+    decisions = np.tile(0.5 * (problem.lower + problem.upper), (STEPS, 1))
+    guess, horizons, solutions = (problem.follow(data, decisions), decisions), [], []
+    for k in range(warm + 1):
+        horizons.append(common_data(k, start))
+        solutions.append(solver.solve(horizons[-1], *guess))
+        guess = solutions[-1].shifted()
+        start = solutions[-1].states[1] + 0.05 * rng.standard_normal(start.size)
+    return horizons, solutions
+
+
+class Stages:
+    """Ours on the common problem, each solve from the plan before, shifted by a step."""
+
+    def __init__(self, name: str, states: np.ndarray, decisions: np.ndarray) -> None:
+        self._solver, self._guess = StageSolver(common_problem(), STEPS, *STAGES[name]), (states, decisions)
+
+    def solve(self, data: StageData) -> tuple[np.ndarray, float, bool, int]:
+        """Solve for one horizon: decisions, CPU time [s], success, iterations."""
+        begin = time.process_time()
+        found = self._solver.solve(data, *self._guess)
+        seconds, self._guess = time.process_time() - begin, found.shifted()
+        return found.decisions, seconds, found.status is Status.CONVERGED, found.iterations
+
+
+def compare(name: str, horizons: list[StageData], reference: list[StageSolution]) -> dict[str, Any]:
+    """Solve all horizons of the common problem with one solver, the first from the same middling plan."""
+    problem, seconds, steps, over, solved = common_problem(), [], [], [], 0
+    decisions = np.tile(0.5 * (problem.lower + problem.upper), (STEPS, 1))
+    states = problem.follow(horizons[0], decisions)
+    solver = DoMpc(problem, name, states, decisions) if name in SETTINGS else Stages(name, states, decisions)
+    for data, best in zip(horizons, reference, strict=True):
+        plan, spent, success, count = solver.solve(data)
+        plan = np.clip(plan, problem.lower, problem.upper)
+        cost = problem.cost_along(data, problem.follow(data, plan), plan)
+        seconds, steps = [*seconds, spent], [*steps, count]
+        over, solved = [*over, 100.0 * float(cost / best.cost - 1.0)], solved + success
+    return {
+        "solver": name, "warm_median": float(np.median(seconds[1:])), "warm_largest": max(seconds[1:]),
+        "iterations": float(np.median(steps[1:])), "over": max(over), "solved": f"{solved} of {len(horizons)}",
+    }  # fmt: skip
+
+
+def peer_tables(peers: list[dict[str, Any]]) -> tuple[str, str]:
+    """Lay out all peers, and the fastest of theirs and ours beside theirs as it comes."""
+    theirs = [row for row in peers if row["solver"] in SETTINGS]
+    chosen = [theirs[0], min(theirs[1:], key=lambda row: row["warm_median"]), peers[-1]]
+    short = [
+        [row["solver"], row["warm_median"], chosen[0]["warm_median"] / row["warm_median"], row["over"]]
+        for row in chosen
+    ]
+    columns = ("solver", "median [s]", "times as fast", "cost over the optimum, largest [%]")
+    return markdown(PEERS, [list(row.values()) for row in peers]), markdown(columns, short)
+
+
 def main() -> None:
     """Measure both horizons and write the table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--warm", type=int, default=WARM, help="solves from a shifted plan")
-    parser.add_argument("--horizons", nargs="+", default=list(HORIZONS), choices=list(HORIZONS))
+    parser.add_argument("--horizons", nargs="*", default=list(HORIZONS), choices=list(HORIZONS))
+    parser.add_argument("--readme", action="store_true", help="replace the tables in README and documentation")
     arguments = parser.parse_args()
+    horizons, reference = instances(arguments.warm)
+    peers = [compare(name, horizons, reference) for name in (*SETTINGS, *STAGES)]
+    table, short = peer_tables(peers)
+    write(arguments.out, "mpc_peers", table, {"seed": SEED, "rows": peers}, arguments.readme)
+    if arguments.readme:
+        publish("mpc_peers_short", short)
+    print(table)
+    if not arguments.horizons:
+        return
     building = pilot()
     grid = SymbolicModel(build_network(building, dx=1.0))
     small = reduced_model(grid, [grid.network.start()], order=ORDER)
@@ -147,7 +234,7 @@ def main() -> None:
         "over_ipopt",
     )
     table = markdown(COLUMNS, [[row[key] for key in keys] for row in rows])
-    write(arguments.out, "mpc_speed", table, {"order": ORDER, "seed": SEED, "rows": rows}, False)
+    write(arguments.out, "mpc_speed", table, {"order": ORDER, "seed": SEED, "rows": rows}, arguments.readme)
     print(table)
 
 

@@ -15,23 +15,29 @@ from thermal.hvac import SmoothHvac
 FloatArray = NDArray[np.float64]
 
 #: What a channel can set.
-Quantity = Literal["supply_air_temperature", "supply_water_temperature", "static_pressure", "differential_pressure"]
+Quantity = Literal[
+    "supply_air_temperature", "supply_water_temperature", "static_pressure", "differential_pressure",
+    "heating_setpoint", "cooling_setpoint",
+]  # fmt: skip
 
 
 @dataclass(frozen=True)
 class Channel:
-    """A setpoint that is decided, of one device or common to several air handlers.
+    """A setpoint that is decided, of one device or common to several air handlers or zones.
 
     Parameters
     ----------
     quantity : str
-        ``supply_air_temperature``, ``supply_water_temperature``, ``static_pressure`` or ``differential_pressure``.
+        ``supply_air_temperature``, ``supply_water_temperature``, ``static_pressure``, ``differential_pressure``, or
+        ``heating_setpoint`` or ``cooling_setpoint`` of thermostats.
     lower, upper : float
         Range [K or Pa].
     rate : float
         Most change in an hour, either way [K/h or Pa/h]; infinite by default.
     air_handlers : tuple of int, optional
         Which air handlers it belongs to; by default all of them. Of no meaning for water and its pressure.
+    zones : tuple of int, optional
+        Which zones a thermostat's setpoint belongs to; by default all of them.
 
     Raises
     ------
@@ -44,6 +50,7 @@ class Channel:
     upper: float
     rate: float = np.inf
     air_handlers: tuple[int, ...] | None = None
+    zones: tuple[int, ...] | None = None
 
     def __post_init__(self) -> None:
         if self.quantity not in get_args(Quantity):
@@ -56,13 +63,14 @@ class Channel:
     @property
     def unit(self) -> str:
         """``K`` or ``Pa``."""
-        return "K" if self.quantity.endswith("temperature") else "Pa"
+        return "Pa" if self.quantity.endswith("pressure") else "K"
 
     @property
     def name(self) -> str:
         """In words, for reports."""
         which = "" if self.air_handlers is None else f" of air handlers {', '.join(map(str, self.air_handlers))}"
-        return self.quantity.replace("_", " ") + which
+        where = "" if self.zones is None else f" of zones {', '.join(map(str, self.zones))}"
+        return self.quantity.replace("_", " ") + which + where
 
     def knobs(self, hvac: SmoothHvac) -> NDArray[np.intp]:
         """Tell where the setpoint stands among the knobs of a plant.
@@ -75,26 +83,29 @@ class Channel:
         Raises
         ------
         ControlError
-            When an air handler is not one of the plant's.
+            When an air handler or zone is not one of the plant's, or the plant's functions do not have the setpoint.
         """
         places: dict[str, slice | int | None] = {
             "supply_air_temperature": hvac.knobs.supply_air,
             "supply_water_temperature": hvac.knobs.supply_water,
             "static_pressure": hvac.knobs.static_pressure,
             "differential_pressure": hvac.knobs.differential_pressure,
+            "heating_setpoint": hvac.knobs.heating_setpoint,
+            "cooling_setpoint": hvac.knobs.cooling_setpoint,
         }
         at = places[self.quantity]
         if at is None or at == slice(0, 0):
-            advice = "make the plant's functions with SmoothHvac(system, pressures=True)"
-            raise ControlError(
-                describe(f"channel {self.quantity}", "a plant whose pressures can be set", "none", advice)
-            )
+            kind = "pressures" if self.unit == "Pa" else "setpoints"
+            advice = f"make the plant's functions with SmoothHvac(system, {kind}=True)"
+            raise ControlError(describe(f"channel {self.quantity}", f"a plant whose {kind} can be set", "none", advice))
         if isinstance(at, int):
             return np.array([at], dtype=np.intp)
-        chosen = tuple(range(hvac.n_air_handler)) if self.air_handlers is None else self.air_handlers
-        if not chosen or not set(chosen) <= set(range(hvac.n_air_handler)):
-            expected = f"air handlers from 0 to {hvac.n_air_handler - 1}"
-            raise ControlError(describe(f"channel {self.quantity}", expected, repr(self.air_handlers)))
+        of_zones = self.quantity in ("heating_setpoint", "cooling_setpoint")
+        count, given = (hvac.n_zone, self.zones) if of_zones else (hvac.n_air_handler, self.air_handlers)
+        chosen = tuple(range(count)) if given is None else given
+        if not chosen or not set(chosen) <= set(range(count)):
+            expected = f"{'zones' if of_zones else 'air handlers'} from 0 to {count - 1}"
+            raise ControlError(describe(f"channel {self.quantity}", expected, repr(given)))
         return np.arange(at.start, at.stop, dtype=np.intp)[list(chosen)]
 
 

@@ -2,102 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
-from enum import StrEnum
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from mpc.control._assembly import ComfortOperation, Expected, expect, peak_data
+from mpc.control._action import Action, ControllerSettings, Source
+from mpc.control._assembly import Expected, expect, peak_data
 from mpc.control._data import HorizonData
+from mpc.control._demand_count import DemandCount
 from mpc.control._explain import explain_comfort
 from mpc.control._observer import Observer
 from mpc.control._problem import ControlProblem
 from mpc.control._reading import Readings, SitePoints
-from mpc.control._rules import ResetRule
-from mpc.control._solution import Solution, Solver
+from mpc.control._solution import Solution, Solver, Status
+from mpc.control._watch import FarFromModel, StuckSensors
 from mpc.errors import MpcError
-from mpc.scenario import DemandCharge, Forecast, StepGrid
+from mpc.scenario import Forecast
 
 FloatArray = NDArray[np.float64]
 
 _USUAL_HUMIDITY = 0.006  # kg/kg, as `thermal.hvac` has it where none is measured
-
-
-class Source(StrEnum):
-    """Where an action comes from."""
-
-    OPTIMAL = "optimal plan"
-    PREVIOUS = "previous plan"
-    RULES = "rules"
-
-
-@dataclass(frozen=True, eq=False)
-class Action(Mapping[str, float]):
-    """Setpoints for the next control step, by ``ENTITY/POINT``, and why.
-
-    Parameters
-    ----------
-    setpoints : dict of str to float
-        Finite, within the ranges of their channels [K or Pa].
-    source : Source
-        Optimal plan, previous plan or rules.
-    reasons : tuple of str
-        In words: what failed, what was missing, where comfort is not met and what stands in its way.
-    solution : Solution or None
-        Of the solver; None where it did not run or broke.
-    stamp : pandas.Timestamp
-        When the action begins.
-    """
-
-    setpoints: dict[str, float]
-    source: Source
-    reasons: tuple[str, ...]
-    solution: Solution | None
-    stamp: pd.Timestamp
-
-    def __getitem__(self, name: str) -> float:
-        return self.setpoints[name]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self.setpoints)
-
-    def __len__(self) -> int:
-        return len(self.setpoints)
-
-
-@dataclass(frozen=True)
-class ControllerSettings:
-    """What a controller pays for, and how long it may think.
-
-    Parameters
-    ----------
-    comfort_price : float
-        Of a zone's kelvin outside of its band for an hour [currency/K/h].
-    carbon_price : float
-        Of emissions [currency/kg].
-    heat_value : float
-        Of heat that the building holds at the end [currency/kWh].
-    time_limit : float
-        Wall time of a solve [s].
-    operation : ComfortOperation
-        Schedules of the building's automation.
-    rule : ResetRule
-        First guess, and what is done when there is no plan.
-    demand : tuple of DemandCharge
-        Of the tariff.
-    """
-
-    comfort_price: float = 0.2
-    carbon_price: float = 0.0
-    heat_value: float = 0.0
-    time_limit: float = 60.0
-    operation: ComfortOperation = field(default_factory=ComfortOperation)
-    rule: ResetRule = field(default_factory=ResetRule)
-    demand: tuple[DemandCharge, ...] = ()
 
 
 class MpcController:
@@ -139,9 +66,12 @@ class MpcController:
         self._plan: tuple[pd.Timestamp, FloatArray] | None = None
         self._forecast: Forecast | None = None
         self._gains: FloatArray | None = None
-        self._peaks: dict[str, float] = {}
-        # of each charge: start of the window that runs [s since 1970], and energy used in it [J]
-        self._windows = [(0.0, 0.0)] * len(self.settings.demand)
+        self._demand = DemandCount(self.settings.demand)
+        self._stuck = StuckSensors(
+            points.zones, np.sqrt(observer.kalman.whole.noise_variance), self.settings.false_alarm,
+            self.settings.resolution,
+        )  # fmt: skip
+        self._far = FarFromModel(points.zones, observer.innovation_deviation)
         self._heat: FloatArray | None = None
         self._water = 293.15
         self._started = False
@@ -218,7 +148,7 @@ class MpcController:
         schedule = settings.operation.schedule(expected.band, horizon.edges)
         n_steps, n_zone = expected.gains.shape
         n_air = self.problem.predictor.hvac.n_air_handler
-        return HorizonData(
+        data = HorizonData(
             state=self.observer.modal_state.copy(), water=water, disturbance=self.observer.disturbance.copy(),
             previous=self._previous, boundary=boundary, outdoor_temperature=expected.outdoor_temperature,
             outdoor_humidity=np.full(n_steps, _USUAL_HUMIDITY), gains=expected.gains, lower=expected.lower,
@@ -227,9 +157,10 @@ class MpcController:
             ventilation=np.repeat(schedule.ventilation[:, None], n_air, axis=1), boiler=schedule.running,
             electricity_price=expected.electricity_price, gas_price=expected.gas_price,
             comfort_price=np.full((n_steps, n_zone), settings.comfort_price),
-            peaks=peak_data(settings.demand, horizon, now, self._peaks, self._used(now)),
+            peaks=peak_data(settings.demand, horizon, now, self._demand.peaks, self._demand.used(now)),
             heat_value=settings.heat_value,
         )  # fmt: skip
+        return data if settings.back_off is None else settings.back_off.narrow(data)
 
     def _boundary(self, expected: Expected, forecast: Forecast, stamps: pd.DatetimeIndex) -> FloatArray:
         outdoor = expected.outdoor_temperature[:, None]
@@ -246,43 +177,31 @@ class MpcController:
         """Bring the state up to now; returns the supply water's temperature [K]."""
         read = self._readings.read(measurements)
         reasons.extend(read.missing)
+        stuck = self._stuck.update(read.zone)
+        zone, heat = np.where(stuck, np.nan, read.zone), np.where(stuck, np.nan, read.heat)
+        reasons.extend(
+            f"zone temperature of {self.points.zones[k]!r} has been {read.zone[k] - 273.15:.2f} degC for "
+            f"{self._stuck.needed[k]} steps or more: taken for stuck, its model goes on alone"
+            for k in np.flatnonzero(stuck)
+        )
         before = boundary[0].copy()
         if np.isfinite(read.outdoor):
             before[0] = read.outdoor
+        middle = 0.5 * (expected.band[0][0] + expected.band[1][0])
+        known = np.where(np.isfinite(zone), zone, middle)
         if not self._started:
-            middle = 0.5 * (expected.band[0][0] + expected.band[1][0])
-            self.observer.start(np.where(np.isfinite(read.zone), read.zone, middle), before)
+            self.observer.start(known, before)
             self._started = True
         else:
-            gains = np.zeros_like(read.heat) if self._gains is None else self._gains
-            planned = np.zeros_like(read.heat) if self._heat is None else self._heat
-            self.observer.update(read.zone, np.where(np.isfinite(read.heat), read.heat, planned) + gains, before)
+            gains = np.zeros_like(heat) if self._gains is None else self._gains
+            planned = np.zeros_like(heat) if self._heat is None else self._heat
+            innovation = self.observer.update(zone, np.where(np.isfinite(heat), heat, planned) + gains, before)
+            if self._far.update(innovation, reasons):
+                self.observer.start(known, before)
         self._gains = expected.gains[0]
-        self._count_demand(read.electricity, now)
+        self._demand.add(read.electricity, now, self.problem.predictor.horizon.control_step)
         self._water = read.water if np.isfinite(read.water) else self._water
         return self._water
-
-    def _count_demand(self, electricity: float, now: pd.Timestamp) -> None:
-        """Add the power of the step that has ended to the window that it began in; a window that is over is a peak."""
-        step = self.problem.predictor.horizon.control_step
-        for k, charge in enumerate(self.settings.demand):
-            begin = float(np.floor((now.timestamp() - step) / charge.window) * charge.window)
-            start, used = self._windows[k] if self._windows[k][0] == begin else (begin, 0.0)
-            used += electricity * step if np.isfinite(electricity) else 0.0
-            if now.timestamp() >= begin + charge.window:
-                one = pd.Timestamp(begin, unit="s", tz="UTC").tz_convert(now.tz)
-                for name in charge.on(StepGrid(one, charge.window, 1)).names:
-                    self._peaks[name] = max(self._peaks.get(name, 0.0), used / max(charge.window, step))
-                start, used = begin + charge.window, 0.0
-            self._windows[k] = (start, used)
-
-    def _used(self, now: pd.Timestamp) -> list[float]:
-        """Mean power since the window of now began, of each charge [W]."""
-        means = []
-        for (start, energy), charge in zip(self._windows, self.settings.demand, strict=True):
-            lasted = now.timestamp() - start
-            means.append(energy / lasted if 0.0 < lasted < charge.window else 0.0)
-        return means
 
     def _solve(self, data: HorizonData, now: pd.Timestamp, reasons: list[str]) -> Solution | None:
         reasons.extend(self.problem.explain_limits(data))
@@ -301,6 +220,10 @@ class MpcController:
         else:
             held = self.problem.predictor.horizon.edges[1:] <= self.problem.predictor.horizon.control_step + 1e-6
             self._heat = solution.rollout.heat[held].mean(axis=0)
+            if solution.status is not Status.CONVERGED:
+                reasons.append(
+                    f"{solution.solver} solver: {solution.status}, {solution.message}; its best plan is used"
+                )
             reasons.extend(explain_comfort(self.problem, data, solution, self.points.zones, now))
         return solution
 
@@ -341,11 +264,11 @@ class MpcController:
     def save_state(self) -> dict[str, Any]:
         """Everything that the next actions depend on, as plain values and arrays."""
         return {
-            "estimate": self.observer.state.copy(), "started": self._started, "previous": self._previous.copy(),
+            "estimate": self.observer.memory, "started": self._started, "previous": self._previous.copy(),
             "plan": None if self._plan is None else (self._plan[0], self._plan[1].copy()), "forecast": self._forecast,
-            "gains": None if self._gains is None else self._gains.copy(), "peaks": dict(self._peaks),
-            "windows": list(self._windows), "memory": self.solver.memory, "heat": self._heat,
-            "water": self._water,
+            "gains": None if self._gains is None else self._gains.copy(), "peaks": dict(self._demand.peaks),
+            "windows": list(self._demand.windows), "stuck": self._stuck.memory, "far": self._far.count,
+            "memory": self.solver.memory, "heat": self._heat, "water": self._water,
         }  # fmt: skip
 
     def restore_state(self, saved: Mapping[str, Any]) -> None:
@@ -356,8 +279,9 @@ class MpcController:
         saved : mapping of str to object
             Of `save_state`.
         """
-        self.observer.state, self._started = saved["estimate"].copy(), saved["started"]
+        self.observer.memory, self._started = saved["estimate"], saved["started"]
         self._previous, self._plan, self._forecast = saved["previous"].copy(), saved["plan"], saved["forecast"]
-        self._gains, self._peaks, self._windows = saved["gains"], dict(saved["peaks"]), list(saved["windows"])
+        self._gains, self._stuck.memory, self._far.count = saved["gains"], saved["stuck"], saved["far"]
+        self._demand.peaks, self._demand.windows = dict(saved["peaks"]), list(saved["windows"])
         self._heat, self._water = saved["heat"], saved["water"]
         self.solver.memory = saved["memory"]

@@ -90,6 +90,22 @@ class Observer:
         return np.asarray(error)
 
     @property
+    def innovation_deviation(self) -> FloatArray:
+        """Standard deviation of the innovations according to the filter, all sensors reporting, shape (n_zone,) [K]."""
+        seen = self.kalman.whole.observation
+        variance = np.einsum("zi,ij,zj->z", seen, self._covariance, seen) + self.kalman.whole.noise_variance
+        return np.asarray(np.sqrt(variance))
+
+    @property
+    def memory(self) -> FloatArray:
+        """Everything that the next estimates depend on, to be saved with a controller's state [its own]."""
+        return self.state.copy()
+
+    @memory.setter
+    def memory(self, kept: FloatArray) -> None:
+        self.state = np.array(kept)
+
+    @property
     def modal_state(self) -> FloatArray:
         """State of the modes now, shape (r,) [(W K)^0.5]."""
         return self.state[: self.order]

@@ -133,13 +133,21 @@ class Predictor:
         n_zone = modes.output.shape[0]
         if hvac.n_zone != n_zone:
             raise ControlError(describe("predictor", f"a plant of {n_zone} zones", f"one of {hvac.n_zone}"))
-        self.modes, self.hvac, self.horizon, self.channels = modes, hvac, horizon, tuple(channels)
+        self.hvac, self.channels = hvac, tuple(channels)
         self.at = [channel.knobs(hvac) for channel in self.channels]
         used = np.concatenate(self.at) if self.at else np.zeros(0, dtype=np.intp)
         if not used.size or len(np.unique(used)) != used.size:
             expected = "at least one channel, and one for each setpoint"
             raise ControlError(describe("predictor", expected, f"{[c.name for c in self.channels]}"))
-        self.n_zone, self.n_decision = n_zone, horizon.n_block * len(self.channels)
+        self._prepare(modes, horizon, disturbance_time, scheme)
+        self._design, self._scheduled = self._design_knobs(), self._undecided_setpoints(used)
+        self._stepper = hvac.stepper()
+        self._known: tuple[HorizonData | None, FloatArray, FloatArray] = (None, np.zeros(0), np.zeros(0))
+
+    def _prepare(self, modes: ModalModel, horizon: Horizon, disturbance_time: float, scheme: Scheme) -> None:
+        """Discretise the building on the horizon's steps."""
+        self.modes, self.horizon, self.n_zone = modes, horizon, modes.output.shape[0]
+        self.n_decision = horizon.n_block * len(self.channels)
         self._output = np.ascontiguousarray(modes.output)
         parts = {dt: modes.propagator(float(dt), scheme) for dt in np.unique(horizon.steps)}
         self._end = {dt: p.end for dt, p in parts.items()}
@@ -148,9 +156,6 @@ class Predictor:
         self._response = {dt: np.ascontiguousarray(self._output @ push) for dt, push in self._push.items()}
         self._own = {dt: np.ascontiguousarray(np.diag(response)) for dt, response in self._response.items()}
         self._fading = np.exp(-horizon.edges[:-1] / disturbance_time)
-        self._design = self._design_knobs()
-        self._stepper = hvac.stepper()
-        self._known: tuple[HorizonData | None, FloatArray, FloatArray] = (None, np.zeros(0), np.zeros(0))
 
     def _design_knobs(self) -> FloatArray:
         at, system = self.hvac.knobs, self.hvac.system
@@ -161,6 +166,19 @@ class Predictor:
             knobs[at.differential_pressure] = system.loop.pump.differential_pressure
         return knobs
 
+    def _undecided_setpoints(self, used: NDArray[np.intp]) -> NDArray[np.intp]:
+        """Thermostats' setpoints among the knobs that no channel sets: they follow their schedule."""
+        at = self.hvac.knobs
+        heating, cooling = (np.arange(s.start, s.stop) for s in (at.heating_setpoint, at.cooling_setpoint))
+        highest, lowest = np.full(at.size, -np.inf), np.full(at.size, np.inf)
+        for channel, mine in zip(self.channels, self.at, strict=True):
+            highest[mine], lowest[mine] = channel.upper, channel.lower
+        if (highest[heating] > lowest[cooling]).any():
+            found = f"{highest[heating].max():g} and {lowest[cooling].min():g} K"
+            expected = "ranges of heating setpoints below those of cooling setpoints"
+            raise ControlError(describe("predictor", expected, found))
+        return np.setdiff1d(np.concatenate([heating, cooling]), used)
+
     def _given(self, data: HorizonData) -> tuple[FloatArray, FloatArray]:
         """Give what no plan changes: surroundings of the plant, and drive of the modes; kept for one horizon."""
         if self._known[0] is not data:
@@ -168,19 +186,19 @@ class Predictor:
                 data.heating_setpoint, data.cooling_setpoint, data.outdoor_temperature, data.outdoor_humidity,
                 data.running, data.boiler, data.ventilation, self.horizon.steps,
             )  # fmt: skip
-            free = data.gains + self._fading[:, None] * data.disturbance
-            outside = data.boundary.copy()
-            n_temperature = outside.shape[1] - self.modes.n_signal
-            outside[:, :n_temperature] -= REFERENCE_TEMPERATURE
-            steps = self.horizon.steps
-            drive = np.stack(
-                [self._drive[dt] @ o + self._push[dt] @ f for dt, o, f in zip(steps, outside, free, strict=True)]
-            )
-            self._known = (data, around, drive)
+            self._known = (data, around, self._undecided(data))
         return self._known[1], self._known[2]
 
+    def _undecided(self, data: HorizonData) -> FloatArray:
+        """Give the drive of the modes by boundaries, gains and unmeasured heat, shape (N, r) [(W K)^0.5]."""
+        free = data.gains + self._fading[:, None] * data.disturbance
+        outside = data.boundary.copy()
+        outside[:, : outside.shape[1] - self.modes.n_signal] -= REFERENCE_TEMPERATURE
+        steps = zip(self.horizon.steps, outside, free, strict=True)
+        return np.stack([self._drive[dt] @ o + self._push[dt] @ f for dt, o, f in steps])
+
     def knobs(self, plan: FloatArray) -> FloatArray:
-        """Spread a plan over the steps, shape (N, n_knob) [K or Pa]; water is left for the roll-out.
+        """Spread a plan over the steps, shape (N, n_knob) [K or Pa]; water and schedules are left for the roll-out.
 
         Parameters
         ----------
@@ -207,6 +225,11 @@ class Predictor:
         n, count, stepper, water_at = self.n_zone, len(self.horizon), self._stepper, self.hvac.knobs.water
         around, drive = self._given(data)
         knobs, x, water = self.knobs(plan), data.state, data.water
+        if self._scheduled.size:
+            first = self.hvac.knobs.heating_setpoint.start
+            knobs[:, self._scheduled] = np.hstack([data.heating_setpoint, data.cooling_setpoint])[
+                :, self._scheduled - first
+            ]
         zone, seen, done = np.empty((count + 1, n)), np.empty((count, n)), np.empty((count, stepper.output.size))
         zone[0], ahead = self._output @ x + REFERENCE_TEMPERATURE, np.zeros(n)
         for k, dt in enumerate(self.horizon.steps):

@@ -137,7 +137,8 @@ class ControlProblem:
     @cached_property
     def differences(self) -> FloatArray:
         """From decisions to their changes between blocks, first that against what stands now, shape (D, D) [-]."""
-        return np.eye(self.span.size) - np.eye(self.span.size, k=-self.shape[1])
+        follows = self.predecessors[:, None] == np.arange(self.shape[0])
+        return np.eye(self.span.size) - np.kron(follows, np.eye(self.shape[1]))
 
     def standing(self, data: HorizonData) -> FloatArray:
         """Give what the first changes count from, shape (D,): setpoints that stand now, then zeros [-].
@@ -157,6 +158,30 @@ class ControlProblem:
         horizon = self.predictor.horizon
         hours = np.concatenate([[horizon.control_step], np.diff(horizon.block_starts)]) / _HOUR
         return np.outer(hours, [c.rate for c in self.predictor.channels]).ravel() / self.span
+
+    @property
+    def predecessors(self) -> NDArray[np.int64]:
+        """Block that each block follows, shape (n_block,); -1 is what stands now."""
+        return np.arange(self.shape[0], dtype=np.int64) - 1
+
+    def admitted(self, data: HorizonData, shares: FloatArray) -> FloatArray:
+        """Move decisions to where limits on changes allow them, shape (D,) [-].
+
+        Parameters
+        ----------
+        data : HorizonData
+            Of the horizon.
+        shares : ndarray, shape (D,)
+            Decisions [-].
+        """
+        if not np.isfinite(self.most_change).any():
+            return shares
+        n = self.shape[1]
+        moved, most = shares.reshape(-1, n).copy(), self.most_change.reshape(-1, n)
+        for k, last in enumerate(self.predecessors):
+            before = moved[last] if last >= 0 else self.standing(data)[:n]
+            moved[k] = np.clip(moved[k], before - most[k], before + most[k])
+        return np.clip(moved.ravel(), 0.0, 1.0)
 
     @cached_property
     def hours(self) -> FloatArray:

@@ -23,6 +23,8 @@ _POINTS = {
     "supply_water_temperature": "supply_water_temperature_setpoint",
     "static_pressure": "supply_air_static_pressure_setpoint",
     "differential_pressure": "differential_pressure_setpoint",
+    "heating_setpoint": "zone_air_heating_temperature_setpoint",
+    "cooling_setpoint": "zone_air_cooling_temperature_setpoint",
 }
 
 
@@ -70,6 +72,10 @@ class SitePoints:
             of_air = channel.quantity in ("supply_air_temperature", "static_pressure")
             chosen = range(hvac.n_air_handler) if channel.air_handlers is None else channel.air_handlers
             entities = [self.air_handlers[k] for k in chosen] if of_air else [self.boiler]
+            if channel.quantity in ("heating_setpoint", "cooling_setpoint"):
+                zones = set(range(hvac.n_zone) if channel.zones is None else channel.zones)
+                place = hvac.system.terminals.zone
+                entities = [name for name, zone in zip(self.terminals, place, strict=True) if int(zone) in zones]
             named |= {f"{entity}/{_POINTS[channel.quantity]}": float(value) for entity in entities}
         return named
 

@@ -38,7 +38,7 @@ class ResetRule:
         Parameters
         ----------
         channels : sequence of Channel
-            What is decided; pressures get the middle of their range.
+            What is decided; pressures and zones get the middle of their range.
         outdoor : float
             Outdoor temperature [K]; what is not finite counts as half-way.
         """

@@ -80,6 +80,8 @@ class SequentialSolver:
     def __post_init__(self) -> None:
         self._curvature: FloatArray | None = None
         self._reach = self.reach
+        self._longest = 0.0  # s, that a step took: what is left of the time limit must hold another one
+        self._deadline = np.inf
 
     def forget(self) -> None:
         """Drop the curvature and the length of steps of earlier solves."""
@@ -111,15 +113,16 @@ class SequentialSolver:
             Wall time after which the best plan so far is returned [s].
         """
         begin = time.perf_counter()
-        point = self._at(data, self._admitted(data, self.problem.shares(plan)))
+        self._deadline = np.inf if time_limit is None else begin + time_limit
+        point = self._at(data, self.problem.admitted(data, self.problem.shares(plan)))
         start, status, message, k = point.cost, Status.ITERATION_LIMIT, f"after {self.iterations} steps", 0
         if not np.isfinite(point.cost):
             status, message = Status.FAILED, "the plan to start from has no finite cost"
         last: tuple[FloatArray, FloatArray, Sensitivity] | None = None
-        longest, reach, fresh, slow = 0.0, self._reach, self._curvature is None, 0
+        reach, fresh, slow = self._reach, self._curvature is None, 0
         while status is not Status.FAILED and k < self.iterations:
             lap = time.perf_counter()
-            if time_limit is not None and lap - begin + longest > time_limit:
+            if lap + self._longest > self._deadline:
                 status, message = Status.TIME_LIMIT, f"after {k} steps, {time_limit:g} s allowed"
                 break
             k += 1
@@ -138,11 +141,17 @@ class SequentialSolver:
                 self._learn(data, point, smooth, slopes, None)
                 model, fresh = self._model(data, point, slopes, smooth), True
                 step, promised, solved = self._step(data, point, model, reach)
+            if time.perf_counter() > self._deadline:  # what was promised so far need not be all
+                status, message = Status.TIME_LIMIT, f"within step {k}, {time_limit:g} s allowed"
+                break
             if promised <= self.tolerance * scale:
                 status, message = Status.CONVERGED, f"the next step promises {promised / scale:.1e} of the cost"
                 break
             new, length = self._search(data, point, step, promised)
-            longest = max(longest, time.perf_counter() - lap)
+            self._longest = max(0.9 * self._longest, time.perf_counter() - lap)
+            if new is None and time.perf_counter() > self._deadline:
+                status, message = Status.TIME_LIMIT, f"within step {k}, {time_limit:g} s allowed"
+                break
             if new is None:
                 status, message = Status.STALLED, f"no decrease along step {k}"
                 self._curvature = None
@@ -159,17 +168,6 @@ class SequentialSolver:
             self.problem.plan(point.shares), point.rollout, point.terms, start, status, message, k,
             time.perf_counter() - begin, "sequential",
         )  # fmt: skip
-
-    def _admitted(self, data: HorizonData, shares: FloatArray) -> FloatArray:
-        """Move decisions to where limits on changes allow them."""
-        most, n = self.problem.most_change, self.problem.shape[1]
-        if not np.isfinite(most).any():
-            return shares
-        before, moved = self.problem.standing(data)[:n], shares.copy()
-        for k in range(0, shares.size, n):
-            moved[k : k + n] = np.clip(moved[k : k + n], before - most[k : k + n], before + most[k : k + n])
-            before = moved[k : k + n]
-        return np.clip(moved, 0.0, 1.0)
 
     def _at(self, data: HorizonData, shares: FloatArray, near: Rollout | None = None) -> _Point:
         rollout = self.problem.predictor.rollout(data, self.problem.plan(shares), near)
@@ -230,6 +228,8 @@ class SequentialSolver:
         step, value = np.zeros(point.shares.size), self._value(data, model, np.zeros(point.shares.size))
         first, n_peak = value, data.peaks.rate.size
         for _ in range(_INNER):
+            if time.perf_counter() > self._deadline:
+                break
             zone = model.zone + (model.zone_slope @ step).reshape(model.zone.shape)
             penalty = self.problem.penalty(data, zone)
             curved = np.flatnonzero(penalty.curvature)
@@ -290,7 +290,7 @@ class SequentialSolver:
     ) -> tuple[_Point | None, float]:
         """Walk along a step until the cost falls as it should: the new point, and the share of the step."""
         length = 1.0
-        while length >= _SHORTEST:
+        while length >= _SHORTEST and time.perf_counter() <= self._deadline:
             new = self._at(data, np.clip(point.shares + length * step, 0.0, 1.0), point.rollout)
             if new.cost <= point.cost - _SUFFICIENT * length * promised:
                 return new, length

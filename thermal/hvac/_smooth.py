@@ -59,6 +59,8 @@ class KnobLayout(NamedTuple):
         Setpoints of the ducts, one an air handler [Pa]; empty where pressures stay at their design values.
     differential_pressure : int or None
         Setpoint of the loop [Pa].
+    heating_setpoint, cooling_setpoint : slice
+        Of the thermostats, one a zone [K]; empty where they are among what surrounds the plant.
     size : int
         Length of the vector.
     """
@@ -68,6 +70,8 @@ class KnobLayout(NamedTuple):
     supply_water: int
     static_pressure: slice
     differential_pressure: int | None
+    heating_setpoint: slice
+    cooling_setpoint: slice
     size: int
 
 
@@ -113,6 +117,8 @@ class SmoothHvac:
         Smoothing width as in `hvac_function` [-].
     pressures : bool
         Whether the pressures of ducts and loop are among the knobs; else they stay at their design values.
+    setpoints : bool
+        Whether the thermostats' setpoints are among the knobs; else they are those of `around`.
 
     Notes
     -----
@@ -129,12 +135,17 @@ class SmoothHvac:
     (3, 5)
     """
 
-    def __init__(self, system: HvacSystem, width: float = 0.02, pressures: bool = False) -> None:
+    def __init__(
+        self, system: HvacSystem, width: float = 0.02, pressures: bool = False, setpoints: bool = False
+    ) -> None:
         n_air = len(system.air_handlers)
         self.system, self.width, self.n_zone, self.n_air_handler = system, width, system.zone_count, n_air
         size = 2 + n_air + (n_air + 1 if pressures else 0)
         ducts, loop = (slice(2 + n_air, 2 + 2 * n_air), 2 + 2 * n_air) if pressures else (slice(0, 0), None)
-        self.knobs = KnobLayout(0, slice(1, 1 + n_air), 1 + n_air, ducts, loop, size)
+        first, last = (size, size + self.n_zone) if setpoints else (0, 0)
+        rooms = slice(first, last), slice(last, last + last - first)
+        size += 2 * (last - first)
+        self.knobs = KnobLayout(0, slice(1, 1 + n_air), 1 + n_air, ducts, loop, *rooms, size)
         zone, knobs = casadi.SX.sym("zone", self.n_zone), casadi.SX.sym("knobs", self.knobs.size)
         around = casadi.SX.sym("around", 2 * self.n_zone + 5 + 3 * n_air)
         plain, cut = (_SumOperations(width, system, c) for c in (False, True))
@@ -196,6 +207,8 @@ class SmoothHvac:
         heating, cooling, outdoor, damp, humid, room, running, boiler, ventilation, seconds = (
             around[a:b] for a, b in pairwise(ends)
         )
+        if at.heating_setpoint != slice(0, 0):
+            heating, cooling = knobs[at.heating_setpoint], knobs[at.cooling_setpoint]
         heat, cool = system.thermostat.calls(ops, zone, heating, cooling)
         calls = Calls(system.at_terminals(ops, heat), system.at_terminals(ops, cool))
         conditions = Conditions(zone, heating, cooling, outdoor, damp, _each(humid), room)

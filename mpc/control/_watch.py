@@ -1,0 +1,129 @@
+"""Faults that measurements show: sensors that stand still, and a plant that is far from its model."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtr
+
+from mpc.errors import ControlError
+from thermal.errors import describe
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+_SAME = 1e-6  # K: readings that differ by less are one and the same
+_FEWEST = 6  # readings that must be the same, whatever the sensor
+_MOST = 288  # readings: a sensor that needs more to tell is not watched
+_FAR = 6.0  # deviations of an innovation
+_FAR_KELVIN = 1.0  # K: what is nearer than this is not worth saying
+_RESTART = 3  # steps in which most zones are far, after which the state is started anew
+
+
+class StuckSensors:
+    """Recognises zone sensors that repeat one value.
+
+    Parameters
+    ----------
+    zones : sequence of str
+        Names.
+    deviation : ndarray, shape (n_zone,)
+        Standard deviation of the sensors' noise [K], positive.
+    false_alarm : float
+        Largest probability with which a healthy sensor is taken for stuck in a step [-], below 1; with 0 no sensor is
+        watched.
+    resolution : float
+        To which sensors round [K]; 0 where they do not. The default is that of most building automation.
+
+    Raises
+    ------
+    ControlError
+        When a number is out of its range.
+
+    Notes
+    -----
+    A healthy sensor of noise σ that rounds to h repeats a value at most with probability ``p = 2 Φ(h / 2σ) - 1``, in
+    the middle between two steps of its scale and where the zone stands still. m equal readings in a row have a
+    probability of at most ``p^(m-1)``; m is the least for which that is not above the false alarm, and 6. A sensor
+    whose noise shows so little against its resolution that m exceeds 288, a day at 5 minutes, is not watched.
+    """
+
+    def __init__(
+        self, zones: Sequence[str], deviation: FloatArray, false_alarm: float = 1e-5, resolution: float = 0.1
+    ) -> None:
+        if not (0.0 <= false_alarm < 1.0 and resolution >= 0.0 and (deviation > 0.0).all()):
+            found = f"{false_alarm!r}, {resolution!r} K, {deviation}"
+            raise ControlError(describe("stuck sensors", "a probability, a resolution, positive deviations", found))
+        self.zones = tuple(zones)
+        repeat = 2.0 * ndtr(0.5 * max(resolution, _SAME) / np.asarray(deviation)) - 1.0
+        rare = np.log(false_alarm) if false_alarm > 0.0 else -np.inf
+        needed = np.ceil(1.0 + rare / np.log(np.minimum(repeat, 1.0 - 1e-12)))
+        #: Sensors whose standing still could be told, shape (n_zone,).
+        self.watched = needed <= _MOST
+        #: Equal readings after which a sensor counts as stuck, shape (n_zone,); of no meaning where it is not watched.
+        self.needed = np.clip(needed, _FEWEST, _MOST).astype(np.int64)
+        self._last, self._count = np.full(len(self.zones), np.nan), np.zeros(len(self.zones), dtype=np.int64)
+
+    def update(self, zone: FloatArray) -> BoolArray:
+        """Take in a step's readings; tell which sensors are stuck, shape (n_zone,).
+
+        Parameters
+        ----------
+        zone : ndarray, shape (n_zone,)
+            Temperatures [K]; NaN where missing.
+        """
+        same = np.abs(zone - self._last) <= _SAME
+        self._count = np.where(same, self._count + 1, np.isfinite(zone).astype(np.int64))
+        self._last = np.where(same, self._last, zone)
+        return np.asarray(self.watched & (self._count >= self.needed))
+
+    @property
+    def memory(self) -> FloatArray:
+        """Last values and how often they came, shape (2, n_zone), to be saved [K, -]."""
+        return np.vstack([self._last, self._count])
+
+    @memory.setter
+    def memory(self, kept: FloatArray) -> None:
+        self._last, self._count = kept[0].copy(), kept[1].astype(np.int64)
+
+
+class FarFromModel:
+    """Notices that zones are far from what the model predicted.
+
+    Parameters
+    ----------
+    zones : sequence of str
+        Names.
+    deviation : ndarray, shape (n_zone,)
+        Of the innovations according to the filter [K].
+    """
+
+    def __init__(self, zones: Sequence[str], deviation: FloatArray) -> None:
+        self.zones, self.limit = tuple(zones), np.maximum(_FAR * deviation, _FAR_KELVIN)
+        self.count = 0
+
+    def update(self, innovation: FloatArray, reasons: list[str]) -> bool:
+        """Name the zones that are far; tell whether the state should be started anew.
+
+        Parameters
+        ----------
+        innovation : ndarray, shape (n_zone,)
+            Measured minus predicted [K]; NaN where missing.
+        reasons : list of str
+            Where it is said.
+        """
+        reported, size = np.isfinite(innovation), np.abs(np.nan_to_num(innovation))
+        far = size > self.limit
+        for k in np.argsort(-size)[: min(3, int(far.sum()))]:
+            reasons.append(
+                f"zone {self.zones[k]!r} is {innovation[k]:+.1f} K from what its model predicted, more than the "
+                f"{self.limit[k]:.1f} K of its sensor and unmeasured heat"
+            )
+        self.count = self.count + 1 if far.sum() > 0.5 * max(int(reported.sum()), 1) else 0
+        if self.count < _RESTART:
+            return False
+        self.count = 0
+        reasons.append(f"most zones were far from the model for {_RESTART} steps: its state is started anew")
+        return True

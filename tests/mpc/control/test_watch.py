@@ -1,0 +1,69 @@
+"""Stuck sensors and a plant far from its model: rates of false alarms, what is named, when it ends."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mpc.control import FarFromModel, StuckSensors
+from mpc.errors import ControlError
+
+ZONES = ("hall", "lab", "loft")
+
+
+def test_a_stuck_sensor_is_found_and_let_go() -> None:
+    watch, rng = StuckSensors(ZONES, np.full(3, 0.05), resolution=0.0), np.random.default_rng(0)
+    assert watch.needed.tolist() == [6, 6, 6]
+    for k in range(12):
+        zone = 294.0 + 0.05 * rng.standard_normal(3)
+        if k >= 4:
+            zone[1] = 295.0
+        assert watch.update(zone).tolist() == [False, k >= 9, False]
+    assert not watch.update(np.full(3, 293.0)).any()
+
+
+def test_what_is_missing_is_not_stuck() -> None:
+    watch = StuckSensors(ZONES, np.full(3, 0.05), resolution=0.0)
+    for _ in range(10):
+        assert not watch.update(np.full(3, np.nan)).any()
+
+
+@pytest.mark.parametrize("offset", [0.0, 0.03, 0.05])
+def test_false_alarms_are_as_rare_as_was_asked_for(offset) -> None:
+    """Sensors that round, in zones that stand still: of 40,000 readings a share below the stated one is an alarm."""
+    rng, rate, count = np.random.default_rng(1), 0.01, 40_000
+    watch = StuckSensors(("hall",), np.array([0.05]), rate, resolution=0.1)
+    seen = np.round((294.0 + offset + 0.05 * rng.standard_normal(count)) / 0.1) * 0.1
+    alarms = sum(bool(watch.update(np.array([value]))[0]) for value in seen)
+    assert alarms / count < rate
+    if offset == 0.0:  # where the zone stands in the middle of a step of the scale, the bound is nearly met
+        assert alarms / count > 0.2 * rate
+
+
+def test_memory_is_all_there_is() -> None:
+    one, other = (StuckSensors(ZONES, np.full(3, 0.05), resolution=0.0) for _ in range(2))
+    for _ in range(4):
+        one.update(np.full(3, 294.0))
+    other.memory = one.memory
+    for _ in range(2):
+        np.testing.assert_array_equal(one.update(np.full(3, 294.0)), other.update(np.full(3, 294.0)))
+
+
+def test_far_zones_are_named_and_most_of_them_start_the_state_anew() -> None:
+    watch, said = FarFromModel(ZONES, np.full(3, 0.1)), []
+    assert not watch.update(np.array([0.9, np.nan, -0.2]), said) and not said
+    assert not watch.update(np.array([0.1, 3.0, np.nan]), said)
+    assert len(said) == 1 and said[0].startswith("zone 'lab' is +3.0 K from what its model predicted")
+    assert [watch.update(np.array([-5.0, 4.0, 0.0]), said) for _ in range(4)] == [False, False, True, False]
+    assert "started anew" in said[-3]
+
+
+def test_noise_that_does_not_show_is_not_watched() -> None:
+    watch = StuckSensors(ZONES, np.array([0.05, 0.05, 0.01]))
+    assert watch.watched.tolist() == [True, True, False] and watch.needed[:2].tolist() == [32, 32]
+    for _ in range(300):
+        stuck = watch.update(np.full(3, 294.0))
+    assert stuck.tolist() == [True, True, False]
+    assert not StuckSensors(ZONES, np.full(3, 0.05), 0.0).watched.any()
+    with pytest.raises(ControlError, match="probability"):
+        StuckSensors(ZONES, np.full(3, 0.1), 1.0)
