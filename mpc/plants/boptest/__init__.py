@@ -7,13 +7,18 @@ first used.
 from mpc.plants.boptest._case import BegunPlant, BoptestCase
 from mpc.plants.boptest._clock import YearClock
 from mpc.plants.boptest._make import case_to_serve, pilot_to_serve
+from mpc.plants.boptest._mapping import BoptestSignals
 from mpc.plants.boptest._periods import Period
+from mpc.plants.boptest._plant import BoptestPlant, BoptestTime
 from mpc.plants.boptest._server import BoptestServer
 
 __all__ = [
     "BegunPlant",
     "BoptestCase",
+    "BoptestPlant",
     "BoptestServer",
+    "BoptestSignals",
+    "BoptestTime",
     "Period",
     "YearClock",
     "case_to_serve",

@@ -17,7 +17,7 @@ from starlette.responses import Response
 
 from mpc.errors import BoptestRequestError, MpcError
 from mpc.plants.boptest._body import read_body
-from mpc.plants.boptest._registry import DEFAULT_TEST, HeldTest, TestCases
+from mpc.plants.boptest._registry import DEFAULT_TEST, HeldTest, HeldTests
 from mpc.plants.boptest._test import Answer, BoptestTest
 
 #: Version of BOPTEST whose API this is.
@@ -52,12 +52,12 @@ _COMMANDS: dict[tuple[str, str], Command] = {
 }
 
 
-def create_app(tests: TestCases) -> FastAPI:
+def create_app(tests: HeldTests) -> FastAPI:
     """Make the web application that answers BOPTEST's requests.
 
     Parameters
     ----------
-    tests : TestCases
+    tests : HeldTests
         What is served.
 
     Returns
@@ -114,7 +114,7 @@ def create_app(tests: TestCases) -> FastAPI:
     return app
 
 
-def _sweeping(tests: TestCases) -> Callable[[FastAPI], Any]:
+def _sweeping(tests: HeldTests) -> Callable[[FastAPI], Any]:
     """Free idle tests as long as the application lives."""
 
     @asynccontextmanager
@@ -133,7 +133,7 @@ def _sweeping(tests: TestCases) -> Callable[[FastAPI], Any]:
     return lifespan
 
 
-def _asking(tests: TestCases, workers: anyio.CapacityLimiter, question: Question) -> Handler:
+def _asking(tests: HeldTests, workers: anyio.CapacityLimiter, question: Question) -> Handler:
     """Answer requests that have no arguments."""
 
     async def handle(request: Request) -> Response:
@@ -144,7 +144,7 @@ def _asking(tests: TestCases, workers: anyio.CapacityLimiter, question: Question
     return handle
 
 
-def _telling(tests: TestCases, workers: anyio.CapacityLimiter, command: Command) -> Handler:
+def _telling(tests: HeldTests, workers: anyio.CapacityLimiter, command: Command) -> Handler:
     """Answer requests that have arguments."""
 
     async def handle(request: Request) -> Response:
@@ -163,7 +163,7 @@ def _telling(tests: TestCases, workers: anyio.CapacityLimiter, command: Command)
     return handle
 
 
-async def _in_turn(tests: TestCases, held: HeldTest, workers: anyio.CapacityLimiter, ask: Question) -> Response:
+async def _in_turn(tests: HeldTests, held: HeldTest, workers: anyio.CapacityLimiter, ask: Question) -> Response:
     """Do what is asked of a test once those before are done: its requests never overlap."""
     if held.waiting >= MOST_WAITING:
         return _status(503, f"{MOST_WAITING} requests wait for this test already.")

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections import OrderedDict
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from threading import Lock
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -19,7 +17,9 @@ from mpc.plants._sensors import SensorNoise
 from mpc.plants.boptest._clock import DAY, YearClock
 from mpc.plants.boptest._periods import Period, find_periods
 from mpc.plants.boptest._prices import scenario_prices
+from mpc.plants.boptest._recent import Recent
 from mpc.plants.boptest._signals import ObservedPlant, PlantSignals
+from mpc.plants.boptest._trajectory import Trajectory
 from mpc.scenario import (
     CarbonIntensity,
     ComfortBand,
@@ -41,7 +41,7 @@ from thermal.hvac import HvacSystem
 FloatArray = NDArray[np.float64]
 
 _MINUTE = 60.0
-_KEPT = 8  # scenarios that are kept, so that parallel tests of one period share theirs
+_KEPT, _WARM = 8, 4  # scenarios and warm-ups that are kept, so that tests of one period share theirs
 
 
 class BegunPlant(NamedTuple):
@@ -117,8 +117,9 @@ class BoptestCase:
     noise: SensorNoise | None = None
     boundaries: Mapping[str, pd.Series] = field(default_factory=dict)
     longest_days: float = 31.0
-    _scenarios: OrderedDict[tuple[float, float], Scenario] = field(default_factory=OrderedDict, init=False, repr=False)
-    _lock: Lock = field(default_factory=Lock, init=False, repr=False)
+    _scenarios: Recent[tuple[float, float], Scenario] = field(default_factory=lambda: Recent(_KEPT), init=False)
+    #: Plants after a warm-up, with what was noted down of it, by its end and its steps.
+    warmed: Recent[tuple[float, int], tuple[Any, Trajectory]] = field(default_factory=lambda: Recent(_WARM), init=False)
 
     def __post_init__(self) -> None:
         if not (self.step >= _MINUTE and (self.step / _MINUTE).is_integer()):
@@ -174,6 +175,12 @@ class BoptestCase:
         first, _ = self.covered
         return PlantSignals(self._plant(self.scenario(first, first + DAY)))
 
+    @cached_property
+    def weather_points(self) -> frozenset[str]:
+        """Points of the weather station that are known at any time."""
+        frame = self.weather.frame
+        return frozenset(str(point) for point in frame if frame[point].notna().any())
+
     @property
     def _first_day(self) -> float:
         return float(np.ceil(self.covered[0] / DAY) * DAY)
@@ -221,21 +228,15 @@ class BoptestCase:
         begin, end : float
             BOPTEST's times [s], whole steps apart.
         """
-        key = (begin, end)
-        with self._lock:
-            if key not in self._scenarios:
-                self._scenarios[key] = self._scenario(begin, min(end + DAY, self.covered[1]))
-            self._scenarios.move_to_end(key)
-            while len(self._scenarios) > _KEPT:
-                self._scenarios.popitem(last=False)
-            return self._scenarios[key]
-
-    def _scenario(self, begin: float, end: float) -> Scenario:
-        grid = StepGrid(self.clock.stamp(begin), self.step, int((end - begin) // self.step))
-        return build_scenario(
-            self.building, grid, self.weather, self.tariff, carbon=self.carbon, occupancy=self.occupancy,
-            comfort=self.comfort,
-        )  # fmt: skip
+        found = self._scenarios.get((begin, end))
+        if found is None:
+            steps = int((min(end + DAY, self.covered[1]) - begin) // self.step)
+            found = build_scenario(
+                self.building, StepGrid(self.clock.stamp(begin), self.step, steps), self.weather, self.tariff,
+                carbon=self.carbon, occupancy=self.occupancy, comfort=self.comfort,
+            )  # fmt: skip
+            self._scenarios.put((begin, end), found)
+        return found
 
     def _plant(self, scenario: Scenario) -> ObservedPlant:
         middles = scenario.grid.edges[:-1] + 0.5 * self.step

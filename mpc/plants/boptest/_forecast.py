@@ -58,8 +58,7 @@ def forecast_metadata(case: BoptestCase) -> Metadata:
         What is served.
     """
     per_kwh = f"{case.tariff.currency}/kWh"
-    frame = case.weather.frame
-    known = {str(point) for point in frame if frame[point].notna().any()}
+    known = set(case.weather_points)
     if "global_horizontal_irradiance_sensor" in known or known >= {*_SUN} - {"global_horizontal_irradiance_sensor"}:
         known |= {*_SUN}  # any two give the third, and the global one alone is split
     rows: dict[str, tuple[str, str]] = {

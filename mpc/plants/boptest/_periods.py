@@ -40,8 +40,8 @@ def find_periods(first: float, daily: FloatArray) -> dict[str, Period]:
 
     BOPTEST takes the days of the largest and of the median load. Here the outdoor temperature stands for the load: the
     coldest day and the median of all days of heating, the warmest day and the median of all days of cooling, and the
-    day nearest to the middle of both bases. A period has a week on both sides of the beginning of its day, moved to where
-    there is weather for it, for a day of warm-up before it and for a day of forecast after it.
+    day nearest to the middle of both bases. A period has a week on both sides of the beginning of its day, moved to
+    where there is weather for it, for a day of warm-up before it and for a day of forecast after it.
 
     Parameters
     ----------

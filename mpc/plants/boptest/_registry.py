@@ -32,7 +32,7 @@ class HeldTest:
         self.turn = asyncio.Lock()
 
 
-class TestCases:
+class HeldTests:
     """Test cases that are served, and the tests of them that run.
 
     Parameters
@@ -51,8 +51,6 @@ class TestCases:
     BoptestError
         When there is no case, two have one name, or a number is out of range.
     """
-
-    __test__ = False  # for pytest, which would take the name for that of a test
 
     def __init__(
         self,

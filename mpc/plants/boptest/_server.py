@@ -11,7 +11,7 @@ from types import TracebackType
 from mpc.errors import BoptestError
 from mpc.plants.boptest._case import BoptestCase
 from mpc.plants.boptest._guard import Guard, check_host
-from mpc.plants.boptest._registry import TestCases
+from mpc.plants.boptest._registry import HeldTests
 from thermal.errors import describe
 
 _KEEP_ALIVE = 75  # s: a controller that thinks for a while finds its connection open
@@ -68,7 +68,7 @@ class BoptestServer:
             from mpc.plants.boptest._app import create_app
         except ModuleNotFoundError as error:
             raise BoptestError(f'a server needs {error.name}: pip install "buildingmpc[pages]"') from error
-        self.tests = TestCases(cases, most, idle_seconds)
+        self.tests = HeldTests(cases, most, idle_seconds)
         app = Guard(create_app(self.tests), allow_remote, names)
         config = uvicorn.Config(
             app, log_config=None, log_level=logging.WARNING, access_log=False, lifespan="on", server_header=False,

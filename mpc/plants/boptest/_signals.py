@@ -27,7 +27,8 @@ Metadata = dict[str, dict[str, Any]]
 #: Outputs beside the sensors': true power of the whole plant, means over the plant's step that ends at their time [W].
 ELECTRICITY_OUTPUT, GAS_OUTPUT = "reaPEle_y", "reaPGas_y"
 
-_UNITS = {
+#: Unit of each quantity in signals.
+SIGNAL_UNITS = {
     "temperature": "K",
     "air_flow": "kg/s",
     "power": "W",
@@ -100,6 +101,8 @@ class PlantSignals:
 
     Attributes
     ----------
+    columns : tuple of str
+        Of the plant's measurements.
     outputs : tuple of str
         Names of the measurements, ``<name>_y``.
     inputs : dict of str to Actuator
@@ -107,7 +110,7 @@ class PlantSignals:
     """
 
     def __init__(self, plant: SimulatedPlant) -> None:
-        self._plant_columns = plant.columns
+        self.columns = plant.columns
         sensors = signal_names(plant.columns)
         zones = signal_names(plant.zone_names)
         self._zones = {f"reaTZon_{signal}_y": zone for zone, signal in zones.items()}
@@ -124,7 +127,7 @@ class PlantSignals:
         found: Metadata = {}
         for name, column in self._sensors.items():
             kind = POINT_TYPES[split_column(column, "plant")[1]]
-            found[name] = _entry(f"{column}: {kind.meaning}, mean over the last step", _UNITS[kind.quantity])
+            found[name] = _entry(f"{column}: {kind.meaning}, mean over the last step", SIGNAL_UNITS[kind.quantity])
         for name, zone in self._zones.items():
             found[name] = _entry(f"Air temperature of zone {zone} at this time, without errors of sensors", "K")
         found[ELECTRICITY_OUTPUT] = _entry("Electric power of the whole plant, mean over the last step", "W")

@@ -46,6 +46,12 @@ class Trajectory:
         self._rows[self._count, 1:] = values
         self._count += 1
 
+    def copy(self) -> Trajectory:
+        """Give the same rows, to go on from."""
+        other = Trajectory(self.names)
+        other._rows, other._count = self._rows.copy(), self._count
+        return other
+
     def last(self) -> dict[str, float]:
         """Give the last row, by name, with its time."""
         row = self._rows[self._count - 1].tolist()
