@@ -15,8 +15,8 @@ DAY = 86_400.0
 
 @pytest.fixture(scope="session")
 def served() -> BoptestCase:
-    """Six zones on a floor, with weather of January and February."""
-    return pilot_to_serve(1, floor_area=300.0, zones=6, floors=1, dx=1.0, days=45.0, name="small")
+    """Six zones on a floor, with twelve days of winter."""
+    return pilot_to_serve(1, floor_area=300.0, zones=6, floors=1, dx=1.0, days=12.0, name="small")
 
 
 @pytest.fixture(scope="session")

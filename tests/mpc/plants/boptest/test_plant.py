@@ -43,13 +43,13 @@ def local_plant(served: BoptestCase, begin: float, warm_up: float, end: float) -
     return begun.plant, begun.warm_up_steps
 
 
-@pytest.mark.parametrize("per_control_step", [1, 3])
+@pytest.mark.parametrize(("per_control_step", "hours"), [(1, 10), (3, 24)])
 def test_closed_loop_by_http_is_the_same_plant_run_locally(
-    served: BoptestCase, connect: Connect, per_control_step: int
+    served: BoptestCase, connect: Connect, per_control_step: int, hours: int
 ) -> None:
-    remote = connect(BoptestTime(9 * DAY, DAY, DAY), 300.0 * per_control_step, horizon=12)
+    remote = connect(BoptestTime(9 * DAY, hours * 3600.0, DAY), 300.0 * per_control_step, horizon=12)
     run = run_closed_loop(remote, Answering(remote), forecasts=True)
-    assert len(run.actions) == 288 // per_control_step and remote.finished
+    assert len(run.actions) == 12 * hours // per_control_step and remote.finished
 
     plant, warm = local_plant(served, 9 * DAY, DAY, 10 * DAY)
     controller = Answering(remote)
@@ -110,9 +110,9 @@ def test_the_three_prices_differ_and_have_one_mean(served: BoptestCase, connect:
             plant.step({})
         costs.append(plant.kpis()["cost_tot"])
     assert len(set(costs)) == 3
-    grid = StepGrid(served.clock.stamp(0.0), 3600.0, 24 * 45)
+    grid = StepGrid(served.clock.stamp(0.0), 3600.0, 24 * 12)
     means = [float(served.prices[price].on(grid).mean()) for price in prices]
-    assert means[1] == pytest.approx(means[0], rel=1e-3) and means[2] == pytest.approx(means[0], rel=0.2)
+    assert means[1] == pytest.approx(means[0], rel=1e-3) and means[2] == pytest.approx(means[0], rel=0.4)
 
 
 def test_a_second_reset_repeats_the_first_from_the_kept_warm_up(connect: Connect) -> None:
