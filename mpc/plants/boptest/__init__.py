@@ -6,6 +6,7 @@ first used.
 
 from mpc.plants.boptest._case import BegunPlant, BoptestCase
 from mpc.plants.boptest._clock import YearClock
+from mpc.plants.boptest._guard import check_host
 from mpc.plants.boptest._make import case_to_serve, pilot_to_serve
 from mpc.plants.boptest._mapping import BoptestSignals
 from mpc.plants.boptest._periods import Period
@@ -22,5 +23,6 @@ __all__ = [
     "Period",
     "YearClock",
     "case_to_serve",
+    "check_host",
     "pilot_to_serve",
 ]

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from mpc.errors import BoptestRequestError, PlantError
 from mpc.plants._building import BuildingModel
+from mpc.plants._operation import Operation, scheduled_operation
 from mpc.plants._sensors import SensorNoise
 from mpc.plants.boptest._clock import DAY, YearClock
 from mpc.plants.boptest._periods import Period, find_periods
@@ -42,6 +43,13 @@ FloatArray = NDArray[np.float64]
 
 _MINUTE = 60.0
 _KEPT, _WARM = 8, 4  # scenarios and warm-ups that are kept, so that tests of one period share theirs
+
+
+class _Driven(NamedTuple):
+    """What drives a plant: its scenario, and the schedules that follow from it."""
+
+    scenario: Scenario
+    operation: Operation
 
 
 class BegunPlant(NamedTuple):
@@ -117,7 +125,7 @@ class BoptestCase:
     noise: SensorNoise | None = None
     boundaries: Mapping[str, pd.Series] = field(default_factory=dict)
     longest_days: float = 31.0
-    _scenarios: Recent[tuple[float, float], Scenario] = field(default_factory=lambda: Recent(_KEPT), init=False)
+    _driven: Recent[tuple[float, float], _Driven] = field(default_factory=lambda: Recent(_KEPT), init=False)
     #: Plants after a warm-up, with what was noted down of it, by its end and its steps.
     warmed: Recent[tuple[float, int], tuple[Any, Trajectory]] = field(default_factory=lambda: Recent(_WARM), init=False)
 
@@ -173,7 +181,7 @@ class BoptestCase:
     def signals(self) -> PlantSignals:
         """What of its plants is seen and set."""
         first, _ = self.covered
-        return PlantSignals(self._plant(self.scenario(first, first + DAY)))
+        return PlantSignals(self._plant(self._driven_by(first, first + DAY)))
 
     @cached_property
     def weather_points(self) -> frozenset[str]:
@@ -217,34 +225,30 @@ class BoptestCase:
         steps = int(min(warm_up, begin - first) // self.step)
         latest = min(begin + self.longest_days * DAY if end is None else end, last)
         whole = int((latest - begin) // self.step)
-        scenario = self.scenario(begin - steps * self.step, begin + whole * self.step)
-        return BegunPlant(self._plant(scenario), begin, begin + whole * self.step, steps)
+        driven = self._driven_by(begin - steps * self.step, begin + whole * self.step)
+        return BegunPlant(self._plant(driven), begin, begin + whole * self.step, steps)
 
-    def scenario(self, begin: float, end: float) -> Scenario:
-        """Make what drives the plant over a time, and a day longer for forecasts where there is weather.
-
-        Parameters
-        ----------
-        begin, end : float
-            BOPTEST's times [s], whole steps apart.
-        """
-        found = self._scenarios.get((begin, end))
+    def _driven_by(self, begin: float, end: float) -> _Driven:
+        """Make what drives the plant over a time, and a day longer for forecasts where there is weather."""
+        found = self._driven.get((begin, end))
         if found is None:
             steps = int((min(end + DAY, self.covered[1]) - begin) // self.step)
-            found = build_scenario(
+            scenario = build_scenario(
                 self.building, StepGrid(self.clock.stamp(begin), self.step, steps), self.weather, self.tariff,
                 carbon=self.carbon, occupancy=self.occupancy, comfort=self.comfort,
             )  # fmt: skip
-            self._scenarios.put((begin, end), found)
+            found = _Driven(scenario, scheduled_operation(scenario, len(self.system.air_handlers)))
+            self._driven.put((begin, end), found)
         return found
 
-    def _plant(self, scenario: Scenario) -> ObservedPlant:
-        middles = scenario.grid.edges[:-1] + 0.5 * self.step
+    def _plant(self, driven: _Driven) -> ObservedPlant:
+        middles = driven.scenario.grid.edges[:-1] + 0.5 * self.step
         beside: dict[str, float | FloatArray] = {}
         for name, series in self.boundaries.items():
             known = series.dropna()
             seconds = np.array([stamp.timestamp() for stamp in known.index])
             beside[name] = np.interp(middles, seconds, known.to_numpy(dtype=float))
         return ObservedPlant(
-            scenario, self.system, self.make_model(), noise=self.noise, warm_up_days=0, boundaries=beside
-        )
+            driven.scenario, self.system, self.make_model(), driven.operation, noise=self.noise, warm_up_days=0,
+            boundaries=beside,
+        )  # fmt: skip

@@ -67,10 +67,10 @@ class BoptestSignals:
         if not self.zones:
             raise BoptestError(describe("signals", "an output for the temperature of a zone at least", "none"))
         for column in self.measurements:
-            point = split_column(column, "signals")[1]
-            if point not in POINT_TYPES:
-                advice = nearest(point, POINT_TYPES)
-                raise BoptestError(describe("signals: measurements", "a point of the case format", repr(point), advice))
+            try:
+                split_column(column, "signals")
+            except CaseError as error:
+                raise BoptestError(str(error)) from error
 
     @property
     def powers(self) -> Mapping[str, tuple[str, ...]]:

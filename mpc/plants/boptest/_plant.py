@@ -278,8 +278,10 @@ class BoptestPlant:
             When one is neither a number nor null.
         """
         payload = self._ask("GET", "kpi").payload
-        found = {name: payload.get(name) for name in KPI_NAMES} if isinstance(payload, dict) else {}
-        for name, value in found.items() or {"kpi": payload}.items():
+        if not isinstance(payload, dict):
+            raise BoptestAnswerError(describe("indicators", "a number or null each", repr(payload)[:100]))
+        found = {name: payload.get(name) for name in KPI_NAMES}
+        for name, value in found.items():
             if value is not None and (isinstance(value, bool) or not isinstance(value, int | float)):
                 raise BoptestAnswerError(describe(f"indicator {name}", "a number or null", repr(value)[:100]))
         return {name: None if value is None else float(value) for name, value in found.items()}

@@ -54,10 +54,10 @@ def test_closed_loop_by_http_is_the_same_plant_run_locally(
     plant, warm = local_plant(served, 9 * DAY, DAY, 10 * DAY)
     controller = Answering(remote)
     forecaster = Forecaster(plant.scenario, 12 * per_control_step)
-    rows = []
+    rows, seen = [], None
     for k in range(len(run.actions)):
         given = dict(run.actions.iloc[k].dropna())
-        if per_control_step == 1 and k:  # the controller, too, comes to the same setpoints
+        if per_control_step == 1 and seen is not None:  # the controller, too, comes to the same setpoints
             assert dict(controller.step(seen, forecaster.table(warm + k))) == given
         for _ in range(per_control_step):
             seen = plant.step({**plant.default_actions, **given})
