@@ -57,3 +57,7 @@ class BoptestAnswerError(BoptestError):
 
 class BoptestTimeoutError(BoptestError):
     """A BOPTEST server does not answer; whether it did what was asked is not known."""
+
+
+class FmuError(PlantError):
+    """A functional mock-up unit that cannot be run, or fails to."""

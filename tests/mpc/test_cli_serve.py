@@ -9,21 +9,17 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import httpx
 import pytest
 
+from mpc.cli._serve import serve
+from mpc.errors import BoptestError
 from thermal.data import bundled_case_path
 
 COMMAND = [sys.executable, "-m", "mpc.cli", "serve"]
-
-
-def refused(*arguments: str) -> str:
-    """What the command says as it leaves with the code of bad input."""
-    answer = subprocess.run([*COMMAND, *arguments], capture_output=True, text=True, timeout=60, check=False)
-    assert (answer.returncode, answer.stdout) == (2, "")
-    return answer.stderr
 
 
 @contextmanager
@@ -68,6 +64,9 @@ def test_the_bundled_case_is_served_until_it_is_interrupted() -> None:
 
 
 def test_what_is_refused() -> None:
-    assert "say --boptest" in refused()
-    assert "--allow-remote" in refused("--boptest", "--host", "0.0.0.0")
-    assert "MissingFileError" in refused("--boptest", "no/such/case")
+    with pytest.raises(BoptestError, match="say --boptest"):
+        serve()
+    with pytest.raises(BoptestError, match="--allow-remote"):
+        serve(boptest=True, host="0.0.0.0")
+    with pytest.raises(BoptestError, match="serve it alone"):
+        serve([Path("a"), Path("b")], boptest=True, parameters=Path("calibration.json"))

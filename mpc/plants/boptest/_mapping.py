@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-import numpy as np
-
-from mpc.errors import BoptestAnswerError, BoptestError
-from mpc.plants.boptest._signals import ELECTRICITY_OUTPUT, GAS_OUTPUT, SIGNAL_UNITS, Metadata
-from thermal.case.points import POINT_TYPES, split_column
+from mpc.errors import BoptestError
+from mpc.plants.boptest._signals import ELECTRICITY_OUTPUT, GAS_OUTPUT, Metadata
+from thermal.case.points import split_column
 from thermal.errors import CaseError, describe, nearest
-from thermal.units import to_si
 
 _COLUMN = re.compile(r"([^/:]+/[a-z0-9_]+): ")
 _ZONE = re.compile(r"Air temperature of zone (.+) at this time, ")
@@ -126,31 +123,3 @@ def own_signals(inputs: Metadata, outputs: Metadata) -> BoptestSignals:
 def _described(signals: Metadata, pattern: re.Pattern[str]) -> dict[str, str]:
     matches = ((pattern.match(str(entry.get("Description"))), name) for name, entry in signals.items())
     return {match[1]: name for match, name in matches if match is not None}
-
-
-def converter(column: str, name: str, unit: str | None) -> Callable[[float], float]:
-    """Make what brings the values of an output into the library's unit.
-
-    Parameters
-    ----------
-    column : str
-        ``ENTITY/POINT``.
-    name : str
-        Of the output, for the message.
-    unit : str or None
-        As the server states it.
-
-    Raises
-    ------
-    BoptestAnswerError
-        When it is a unit of something else.
-    """
-    quantity = POINT_TYPES[split_column(column, "signals")[1]].quantity
-    if unit is None or unit == SIGNAL_UNITS[quantity]:
-        return float
-    text = re.sub(r"(?<=[a-z])([23])\b", r"^\1", unit)
-    try:
-        zero, one = (float(v) for v in to_si(np.array([0.0, 1.0]), text, quantity, where=name))
-    except CaseError as error:
-        raise BoptestAnswerError(f"output {name}: {error}") from error
-    return lambda value: zero + (one - zero) * value

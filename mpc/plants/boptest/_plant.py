@@ -16,11 +16,12 @@ from numpy.typing import NDArray
 from mpc.errors import BoptestAnswerError, BoptestError, PlantError
 from mpc.kpi import PlantRecord
 from mpc.plants._actuators import checked_actions
+from mpc.plants._conversion import conversion
 from mpc.plants._plant import Measurements, PointLayout, need_running
 from mpc.plants.boptest._answers import actuator_of, check_step, regular, time_of
 from mpc.plants.boptest._clock import DAY, YearClock
 from mpc.plants.boptest._http import BoptestClient
-from mpc.plants.boptest._mapping import BoptestSignals, converter, own_signals
+from mpc.plants.boptest._mapping import BoptestSignals, own_signals
 from mpc.plants.boptest._outlook import as_forecast, forecast_sources
 from mpc.plants.boptest._periods import PERIOD_DAYS
 from mpc.plants.boptest._prices import PRICE_POINTS
@@ -310,7 +311,7 @@ class BoptestPlant:
         self._clock = YearClock(year or int(about.get("year", 2023)), timezone or str(about.get("timezone", "UTC")))
         self._layout = PointLayout(tuple(self.signals.measurements), self._clock.timezone)
         named = self.signals.measurements.items()
-        self._read = [(name, converter(column, name, outputs[name].get("Unit"))) for column, name in named]
+        self._read = [(n, conversion(column.rpartition("/")[2], n, outputs[n].get("Unit"))) for column, n in named]
         self.actuators = tuple(actuator_of(name, inputs[u]) for name, u in self.signals.actuators.items())
         self._by_name = {a.name: a for a in self.actuators}
         self._sources = forecast_sources(points, self.signals, self._price)
@@ -331,8 +332,8 @@ class BoptestPlant:
 
     def _seen(self, values: Mapping[str, Any]) -> Measurements:
         numbers = np.full(len(self._read), np.nan)
-        for k, (name, convert) in enumerate(self._read):
+        for k, (name, line) in enumerate(self._read):
             value = values.get(name)
             if isinstance(value, int | float) and not isinstance(value, bool):
-                numbers[k] = convert(value)
+                numbers[k] = line.into(value)
         return Measurements(self._layout, self._clock.zero + round(self._time), numbers)

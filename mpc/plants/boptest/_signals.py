@@ -16,6 +16,7 @@ from mpc.plants._actuators import (
     SUPPLY_AIR,
     SUPPLY_WATER,
 )
+from mpc.plants._conversion import SIGNAL_UNITS
 from mpc.plants._history import PlantStep
 from mpc.plants._simulated import SimulatedPlant
 from thermal.case.points import POINT_TYPES, split_column
@@ -27,18 +28,6 @@ Metadata = dict[str, dict[str, Any]]
 #: Outputs beside the sensors': true power of the whole plant, means over the plant's step that ends at their time [W].
 ELECTRICITY_OUTPUT, GAS_OUTPUT = "reaPEle_y", "reaPGas_y"
 
-#: Unit of each quantity in signals.
-SIGNAL_UNITS = {
-    "temperature": "K",
-    "air_flow": "kg/s",
-    "power": "W",
-    "share": "1",
-    "concentration": "1",
-    "count": "1",
-    "speed": "m/s",
-    "angle": "deg",
-    "irradiance": "W/m2",
-}
 _MEANINGS = {
     STATIC_PRESSURE: "setpoint of the supply air's static pressure",
     DIFFERENTIAL_PRESSURE: "setpoint of the heating water's differential pressure",
