@@ -7,10 +7,11 @@ first used.
 from mpc.plants.boptest._case import BegunPlant, BoptestCase
 from mpc.plants.boptest._clock import YearClock
 from mpc.plants.boptest._guard import check_host
-from mpc.plants.boptest._make import case_to_serve, pilot_to_serve
+from mpc.plants.boptest._make import case_to_serve, pilot_to_serve, with_plant
 from mpc.plants.boptest._mapping import BoptestSignals
 from mpc.plants.boptest._periods import Period
 from mpc.plants.boptest._plant import BoptestPlant, BoptestTime
+from mpc.plants.boptest._prices import MarketRate
 from mpc.plants.boptest._server import BoptestServer
 
 __all__ = [
@@ -20,9 +21,11 @@ __all__ = [
     "BoptestServer",
     "BoptestSignals",
     "BoptestTime",
+    "MarketRate",
     "Period",
     "YearClock",
     "case_to_serve",
     "check_host",
     "pilot_to_serve",
+    "with_plant",
 ]

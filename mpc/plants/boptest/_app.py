@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import logging
 import math
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
@@ -25,6 +26,8 @@ API_VERSION = "1.0.0"
 
 #: Most requests that wait for one test.
 MOST_WAITING = 64
+
+_log = logging.getLogger(__name__)
 
 _WORKERS = 4  # threads that simulate; Python lets one of them compute at a time
 _SWEEP = 5.0  # s between looks for idle tests
@@ -170,12 +173,21 @@ async def _in_turn(tests: HeldTests, held: HeldTest, workers: anyio.CapacityLimi
     held.waiting += 1
     try:
         async with held.turn:
-            answer = await anyio.to_thread.run_sync(ask, held.test, limiter=workers)
-    except MpcError as error:
-        return _status(400, str(error))
+            return await anyio.to_thread.run_sync(_answered, ask, held.test, limiter=workers)
     finally:
         held.waiting -= 1
         tests.touch(held)
+
+
+def _answered(ask: Question, test: BoptestTest) -> Response:
+    """Ask, and write the answer down: both may take a while, and so belong in a thread."""
+    try:
+        answer = ask(test)
+    except MpcError as error:
+        return _status(400, str(error))
+    except Exception as error:
+        _log.exception("a request failed")
+        return _status(500, f"Internal error: {type(error).__name__}; the server's log says more.")
     return _status(200, answer.message, answer.payload)
 
 
@@ -185,6 +197,8 @@ def _status(status: int, message: str, payload: Any = None) -> Response:
 
 def _unknown(testid: str) -> Response:
     """Refuse a test that is not there, in the form of BOPTEST's web server and in that of its other answers."""
+    if testid == DEFAULT_TEST:
+        return _status(503, "All tests are in use, and none is the common one of requests without a number.")
     message = f"Invalid testid: {testid[:200]}"
     errors = [{"value": testid[:200], "msg": message, "param": "testid", "location": "params"}]
     return _respond(400, {"errors": errors, "status": 400, "message": message, "payload": None})

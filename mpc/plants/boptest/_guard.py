@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 _NAMES = ("localhost",)
 
 
-def is_loopback(host: str) -> bool:
+def _is_loopback(host: str) -> bool:
     """Whether a host to listen on is reached from this machine alone.
 
     Parameters
@@ -47,7 +47,7 @@ def check_host(host: str, allow_remote: bool) -> None:
     BoptestError
         When they could, and may not.
     """
-    if not (allow_remote or is_loopback(host)):
+    if not (allow_remote or _is_loopback(host)):
         advice = "whoever reaches the server may use it: to let other machines in, say --allow-remote"
         raise BoptestError(describe("host", "an address of this machine's own, such as 127.0.0.1", repr(host), advice))
 
@@ -84,12 +84,12 @@ class Guard:
             await self._app(scope, receive, send)
             return
         headers = {key.decode("latin-1").lower(): value.decode("latin-1") for key, value in scope["headers"]}
-        origin = headers.get("origin")
+        origin, length = headers.get("origin"), headers.get("content-length", "0")
         if not self.knows(headers.get("host", "")):
             await _refuse(send, 403, "The Host header names no address of this server; serve with --name to allow it.")
         elif origin is not None and not self.knows(urlsplit(origin).netloc):
             await _refuse(send, 403, "Pages of other sites may not use this server.")
-        elif not headers.get("content-length", "0").isdigit() or int(headers.get("content-length", "0")) > LONGEST_BODY:
+        elif not length.isdecimal() or int(length) > LONGEST_BODY:
             await _refuse(send, 413, f"The body is longer than {LONGEST_BODY} bytes.")
         else:
             await self._app(scope, _counted(receive), send)

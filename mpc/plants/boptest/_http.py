@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import re
 import time
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from mpc.errors import BoptestAnswerError, BoptestError, BoptestTimeoutError
+from mpc.plants.boptest._test import Answer
 from thermal.errors import describe
 
 if TYPE_CHECKING:
@@ -18,21 +19,6 @@ OLDEST_VERSION, NEXT_VERSION = (0, 4), (2, 0)
 _CONNECT = 10.0  # s
 _FIRST_WAIT = 0.2  # s before the first repetition, doubled each time
 _KEEP = 2.0  # s: below the 5 s after which servers such as Node's close an idle connection
-
-
-class Reply(NamedTuple):
-    """What a server answered.
-
-    Parameters
-    ----------
-    message : str
-        For people; holds BOPTEST's warnings.
-    payload : object
-        What was asked for.
-    """
-
-    message: str
-    payload: Any
 
 
 class BoptestClient:
@@ -76,7 +62,7 @@ class BoptestClient:
         """Close its connections."""
         self._http.close()
 
-    def ask(self, method: str, path: str, body: dict[str, Any] | None = None, *, repeat: bool = True) -> Reply:
+    def ask(self, method: str, path: str, body: dict[str, Any] | None = None, *, repeat: bool = True) -> Answer:
         """Send a request and take its wrapped answer apart.
 
         Parameters
@@ -102,7 +88,7 @@ class BoptestClient:
         message, status = str(content.get("message", "")), content.get("status", 200)
         if status != 200:
             raise BoptestAnswerError(f"{method} /{path}: the server refuses with status {status}: {message[:500]}")
-        return Reply(message, content["payload"])
+        return Answer(message, content["payload"])
 
     def plain(self, method: str, path: str, body: dict[str, Any] | None = None, *, repeat: bool = True) -> Any:
         """Send a request whose answer is JSON without a wrapper.

@@ -69,7 +69,7 @@ def case_to_serve(
     boundaries = case.boundary_temperatures()
     beside = {name: boundaries[name] for name in settled.grid.network.boundaries[1:]}
     return BoptestCase(
-        plain_name(name or building.name),
+        _plain_name(name or building.name),
         building,
         weather_of_case(case) if weather is None else _weather(Path(weather), building),
         _maker(settled.grid, settled.theta, step_seconds),
@@ -126,7 +126,7 @@ def pilot_to_serve(
     building = pilot_building(seed, floor_area=floor_area, zones=zones, floors=floors)
     network = build_network(building, dx=dx)
     return BoptestCase(
-        plain_name(name),
+        _plain_name(name),
         building,
         pilot_weather(seed, f"{year}-01-01", days, _PILOT_STEP),
         _maker(SymbolicModel(network), network.start(), step_seconds),
@@ -158,7 +158,7 @@ def with_plant(building: Building) -> Building:
     return replace(building, devices=(*terminals, *central, *others))
 
 
-def plain_name(name: str) -> str:
+def _plain_name(name: str) -> str:
     """Make the name of a test case, which stands in addresses.
 
     Parameters
@@ -168,7 +168,7 @@ def plain_name(name: str) -> str:
 
     Examples
     --------
-    >>> plain_name("Town hall, 2nd floor")
+    >>> _plain_name("Town hall, 2nd floor")
     'Town_hall_2nd_floor'
     """
     return re.sub(r"[^A-Za-z0-9_.-]+", "_", name).strip("_") or "building"

@@ -31,7 +31,7 @@ _SINGLE = {
 }
 
 
-class Source(NamedTuple):
+class _Source(NamedTuple):
     """Where a column of a forecast comes from.
 
     Parameters
@@ -49,7 +49,7 @@ class Source(NamedTuple):
     weather: bool
 
 
-def forecast_sources(known: Mapping[str, object], signals: BoptestSignals, price: str) -> dict[str, Source]:
+def forecast_sources(known: Mapping[str, object], signals: BoptestSignals, price: str) -> dict[str, _Source]:
     """Choose the forecast points of each column.
 
     Parameters
@@ -61,23 +61,23 @@ def forecast_sources(known: Mapping[str, object], signals: BoptestSignals, price
     price : str
         Which electricity price holds.
     """
-    found = {point: Source(name, factor, True) for name, (_, point, factor, _) in WEATHER_NAMES.items()}
-    found["electricity_price"] = Source(PRICE_POINTS[price], 1.0, False)
-    found |= {column: Source(name, 1.0, False) for name, column in _SINGLE.items()}
+    found = {point: _Source(name, factor, True) for name, (_, point, factor, _) in WEATHER_NAMES.items()}
+    found["electricity_price"] = _Source(PRICE_POINTS[price], 1.0, False)
+    found |= {column: _Source(name, 1.0, False) for name, column in _SINGLE.items()}
     for zone in signals.zones:
         index = signals.forecast_zones.get(zone, zone)
-        found |= {f"{zone}/{column}": Source(f"{n}[{index}]", 1.0, False) for n, column in _ZONE_COLUMNS.items()}
+        found |= {f"{zone}/{column}": _Source(f"{n}[{index}]", 1.0, False) for n, column in _ZONE_COLUMNS.items()}
     return {column: source for column, source in found.items() if source.point in known}
 
 
-def as_forecast(payload: object, sources: Mapping[str, Source], stamps: pd.DatetimeIndex, *, means: bool) -> Forecast:
+def as_forecast(payload: object, sources: Mapping[str, _Source], stamps: pd.DatetimeIndex, *, means: bool) -> Forecast:
     """Make a forecast of what a server answered.
 
     Parameters
     ----------
     payload : object
         Lists of numbers by point, one more than there are stamps.
-    sources : mapping of str to Source
+    sources : mapping of str to _Source
         By column.
     stamps : DatetimeIndex
         Ends of the steps.

@@ -132,7 +132,9 @@ class HeldTests:
     def free_idle(self) -> int:
         """Free the tests that nobody has come back to, and tell how many."""
         limit = self._clock() - self.idle_seconds
-        lost = [testid for testid, held in self._held.items() if held.last_used < limit and not held.waiting]
+        # who has no number would not learn that the common test begins anew: it stays
+        held = ((testid, held) for testid, held in self._held.items() if testid != DEFAULT_TEST)
+        lost = [testid for testid, test in held if test.last_used < limit and not test.waiting]
         for testid in lost:
             del self._held[testid]
         return len(lost)

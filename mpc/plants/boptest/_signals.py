@@ -48,7 +48,7 @@ class ObservedPlant(SimulatedPlant):
         return self._reading - self._offset
 
 
-def signal_names(names: Iterable[str]) -> dict[str, str]:
+def _signal_names(names: Iterable[str]) -> dict[str, str]:
     """Make names of signals of names of points: letters, digits and underscores, each once.
 
     Parameters
@@ -63,9 +63,8 @@ def signal_names(names: Iterable[str]) -> dict[str, str]:
 
     Examples
     --------
-    >>> signal_names(["AHU 1/supply_air_temperature_setpoint", "AHU-1/supply_air_temperature_setpoint"])["AHU-1/supply_\
-air_temperature_setpoint"]
-    'AHU_1_supply_air_temperature_setpoint_2'
+    >>> _signal_names(["AHU 1/gas_power_sensor", "AHU-1/gas_power_sensor"])["AHU-1/gas_power_sensor"]
+    'AHU_1_gas_power_sensor_2'
     """
     found: dict[str, str] = {}
     taken: set[str] = set()
@@ -100,12 +99,12 @@ class PlantSignals:
 
     def __init__(self, plant: SimulatedPlant) -> None:
         self.columns = plant.columns
-        sensors = signal_names(plant.columns)
-        zones = signal_names(plant.zone_names)
+        sensors = _signal_names(plant.columns)
+        zones = _signal_names(plant.zone_names)
         self._zones = {f"reaTZon_{signal}_y": zone for zone, signal in zones.items()}
         self._sensors = {f"{signal}_y": column for column, signal in sensors.items()}
         self.outputs = (*self._sensors, *self._zones, ELECTRICITY_OUTPUT, GAS_OUTPUT)
-        setters = signal_names(actuator.name for actuator in plant.actuators)
+        setters = _signal_names(actuator.name for actuator in plant.actuators)
         self.inputs = {f"{setters[actuator.name]}_u": actuator for actuator in plant.actuators}
         self.input_names = tuple(name for u in self.inputs for name in (u, activation(u)))
         self._reads = [_reader(a.name, plant.system, plant.devices.air_handlers, plant.zone_names)

@@ -6,6 +6,7 @@ import math
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,7 +17,7 @@ from mpc.plants._actuators import Actuator
 from mpc.plants.boptest._case import BegunPlant, BoptestCase
 from mpc.plants.boptest._forecast import UNCERTAINTY, BoundaryConditions, forecast_metadata, uncertain
 from mpc.plants.boptest._periods import Period
-from mpc.plants.boptest._signals import activation
+from mpc.plants.boptest._signals import Metadata, activation
 from mpc.plants.boptest._trajectory import Trajectory
 from mpc.plants.boptest._values import MOST_VALUES, allowed, flag, names, number, required
 
@@ -64,8 +65,14 @@ class BoptestTest:
         self._ratios: list[float] = []
         self._answered: float | None = None
         self._rows = Trajectory(())
-        self._forecast_points = forecast_metadata(case)
-        self._input_names = frozenset(case.signals.input_names)
+
+    @cached_property
+    def _forecast_points(self) -> Metadata:
+        return forecast_metadata(self.case)
+
+    @cached_property
+    def _input_names(self) -> frozenset[str]:
+        return frozenset(self.case.signals.input_names)
 
     @property
     def time(self) -> float:

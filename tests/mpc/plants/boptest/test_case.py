@@ -10,10 +10,10 @@ import pytest
 
 from mpc.errors import BoptestError, BoptestRequestError, PlantError
 from mpc.plants.boptest import BoptestCase, YearClock, case_to_serve
-from mpc.plants.boptest._make import plain_name, with_plant
+from mpc.plants.boptest._make import _plain_name, with_plant
 from mpc.plants.boptest._periods import find_periods
 from mpc.plants.boptest._prices import MarketRate, scenario_prices
-from mpc.plants.boptest._signals import signal_names
+from mpc.plants.boptest._signals import _signal_names
 from mpc.plants.boptest._trajectory import Trajectory
 from mpc.scenario import HourlyRate, StepGrid
 from thermal import load_bundled_case, load_case
@@ -71,9 +71,9 @@ def test_the_constant_price_is_the_mean_of_the_dynamic_one() -> None:
 
 
 def test_names_of_signals_are_plain_and_differ() -> None:
-    found = signal_names(["AHU 1/p", "AHU-1/p", "Raum ä/p"])
+    found = _signal_names(["AHU 1/p", "AHU-1/p", "Raum ä/p"])
     assert list(found.values()) == ["AHU_1_p", "AHU_1_p_2", "Raum_ä_p"]
-    assert plain_name(" Town hall/2 ") == "Town_hall_2" and plain_name("///") == "building"
+    assert _plain_name(" Town hall/2 ") == "Town_hall_2" and _plain_name("///") == "building"
 
 
 def test_a_trajectory_gives_what_lies_between_two_times() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import os
 import socket
@@ -257,6 +258,35 @@ def test_nothing_is_written_or_executed(http: httpx.Client, tmp_path: Path, monk
     (tmp_path / "seen").write_text("by the audit")
     watching[0] = False
     assert done == [f"open {tmp_path / 'seen'}"] and [path.name for path in tmp_path.iterdir()] == ["seen"]
+
+
+def test_what_breaks_inside_is_an_answer_of_500(served: BoptestCase, caplog: pytest.LogCaptureFixture) -> None:
+    def broken() -> Any:
+        raise ZeroDivisionError("secret")
+
+    case = dataclasses.replace(served, name="broken", make_model=broken)
+    with BoptestServer([served, case]) as server, httpx.Client(base_url=server.url, trust_env=False) as http:
+        testid = http.post("/testcases/broken/select")
+        assert testid.status_code == 200
+        answer = http.get(f"/inputs/{testid.json()['testid']}")
+        assert answer.status_code == 500 and answer.json()["status"] == 500
+        assert "ZeroDivisionError" in answer.json()["message"] and "secret" not in answer.text
+        assert http.get("/inputs").status_code == 200  # of the common test, of the first case
+    assert "secret" in caplog.text
+
+
+def test_the_common_test_is_never_freed_by_time(served: BoptestCase) -> None:
+    with (
+        BoptestServer([served], most=1, idle_seconds=0.2) as server,
+        httpx.Client(base_url=server.url, trust_env=False) as http,
+    ):
+        http.put("/step", json={"step": 900})
+        time.sleep(0.5)
+        assert http.get("/step").json()["payload"] == 900
+        assert http.post("/testcases/small/select").status_code == 503
+        http.put("/stop")
+        assert "testid" in http.post("/testcases/small/select").json()
+        assert http.get("/step").status_code == 503
 
 
 def test_a_server_ends_cleanly_and_its_port_is_free(served: BoptestCase) -> None:
