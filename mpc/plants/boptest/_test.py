@@ -13,13 +13,13 @@ import numpy as np
 
 from mpc.errors import BoptestRequestError
 from mpc.kpi import PlantRecord, measure_kpis
-from mpc.plants._actuators import Actuator
 from mpc.plants.boptest._case import BegunPlant, BoptestCase
 from mpc.plants.boptest._forecast import UNCERTAINTY, BoundaryConditions, forecast_metadata, uncertain
+from mpc.plants.boptest._overwrites import read_overwrites
 from mpc.plants.boptest._periods import Period
-from mpc.plants.boptest._signals import Metadata, activation
+from mpc.plants.boptest._signals import Metadata
 from mpc.plants.boptest._trajectory import Trajectory
-from mpc.plants.boptest._values import MOST_VALUES, allowed, flag, names, number, required
+from mpc.plants.boptest._values import MOST_VALUES, allowed, choice, names, number, required, time_or_infinite
 
 #: Names of the indicators that `GET /kpi` gives.
 KPI_NAMES = ("cost_tot", "emis_tot", "ener_tot", "idis_tot", "pdih_tot", "pele_tot", "pgas_tot", "tdis_tot", "time_rat")
@@ -69,10 +69,6 @@ class BoptestTest:
     @cached_property
     def _forecast_points(self) -> Metadata:
         return forecast_metadata(self.case)
-
-    @cached_property
-    def _input_names(self) -> frozenset[str]:
-        return frozenset(self.case.signals.input_names)
 
     @property
     def time(self) -> float:
@@ -137,11 +133,11 @@ class BoptestTest:
         allowed(body, _SCENARIO)
         price, period = body.get("electricity_price"), body.get("time_period")
         levels = {name: body.get(name) for name in _UNCERTAINTIES.values()}
-        changed: dict[str, Any] = {name: _choice(name, level, UNCERTAINTY, none=True) for name, level in levels.items()}
+        changed: dict[str, Any] = {name: choice(name, level, UNCERTAINTY, none=True) for name, level in levels.items()}
         if price is not None:
-            changed["electricity_price"] = _choice("electricity_price", price, self.case.prices)
+            changed["electricity_price"] = choice("electricity_price", price, self.case.prices)
         if period is not None:
-            changed["time_period"] = _choice("time_period", period, self.case.periods)
+            changed["time_period"] = choice("time_period", period, self.case.periods)
         seed = body.get("seed")
         changed["seed"] = None if seed is None else int(number("scenario parameter seed", seed, 0, 2**63 - 1))
         payload: dict[str, Any] = dict.fromkeys(_SCENARIO) | changed
@@ -177,7 +173,7 @@ class BoptestTest:
         body : mapping
             Values of inputs and activations, by name.
         """
-        given, active, warnings = self._overwritten(body)
+        given, active, warnings = read_overwrites(body, self.case.signals.inputs)
         begun = self._running()
         if self._answered is not None:
             self._ratios.append((self._clock() - self._answered) / self._step)
@@ -201,7 +197,9 @@ class BoptestTest:
         """
         given = required(body, "point_names", "start_time", "final_time")
         points = names("point_names", given[0], (*self.case.signals.outputs, *self.case.signals.input_names))
-        start, final = (_time(name, value) for name, value in zip(("start_time", "final_time"), given[1:], strict=True))
+        start, final = (
+            time_or_infinite(name, value) for name, value in zip(("start_time", "final_time"), given[1:], strict=True)
+        )
         self._running()
         payload = self._rows.between(points, start, final) if points else {}
         return Answer("Queried results data successfully.", payload)
@@ -297,52 +295,3 @@ class BoptestTest:
         used = zip(self.case.signals.inputs, inputs, strict=True)
         both = [v for name, value in used for v in (value, float(name in active))]
         self._rows.append(self.time, [*outputs, *both])
-
-    def _overwritten(self, body: Mapping[str, Any]) -> tuple[dict[str, float], tuple[str, ...], str]:
-        """Read inputs: setpoints by actuator, the inputs that are active, and what was clipped."""
-        inputs = self.case.signals.inputs
-        for name in body:
-            if name not in self._input_names:
-                raise BoptestRequestError(f"Unexpected input variable: {name[:200]}.")
-        given: dict[str, float] = {}
-        active: list[str] = []
-        warnings: list[str] = []
-        for name, actuator in inputs.items():
-            value, switch = body.get(name), body.get(activation(name))
-            clipped = None if value is None else _clipped(name, value, actuator, warnings)
-            if switch is not None and flag(activation(name), switch):
-                if clipped is None:
-                    raise BoptestRequestError(f"Input {activation(name)} is 1, but {name} has no value.")
-                given[actuator.name] = clipped
-                active.append(name)
-        return given, tuple(active), ";".join(warnings)
-
-
-def _clipped(name: str, value: Any, actuator: Actuator, warnings: list[str]) -> float:
-    """Move a value into the range of its input, with a warning where it was not there."""
-    found = number(f"input {name}", value)
-    for side, limit, beyond in (
-        ("above maximum", actuator.highest, found > actuator.highest),
-        ("below minimum", actuator.lowest, found < actuator.lowest),
-    ):
-        if beyond:
-            warnings.append(f"WARNING: value of {found} for {name} is {side} of {limit}.  Using {limit}. ")
-            return limit
-    return found
-
-
-def _choice(name: str, value: Any, known: Mapping[str, Any], none: bool = False) -> str | None:
-    """Read a setting that is one of some names."""
-    if none and (value is None or value == "none"):
-        return None
-    if not isinstance(value, str) or value not in known:
-        shown = repr(value)[:100]
-        raise BoptestRequestError(f"Scenario parameter {name} is {shown}, but should be one of {', '.join(known)}.")
-    return value
-
-
-def _time(name: str, value: Any) -> float:
-    """Read a time that may be infinite, as clients ask for all that there is."""
-    if isinstance(value, int | float | str) and str(value).strip().lower().lstrip("+-") in ("inf", "infinity"):
-        return -math.inf if str(value).strip().startswith("-") else math.inf
-    return number(f"parameter {name}", value)

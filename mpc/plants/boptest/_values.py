@@ -97,6 +97,54 @@ def names(argument: str, value: Any, known: Iterable[str]) -> list[str]:
     return list(dict.fromkeys(listed))
 
 
+def choice(name: str, value: Any, known: Mapping[str, Any], none: bool = False) -> str | None:
+    """Read a setting that is one of some names.
+
+    Parameters
+    ----------
+    name : str
+        Of the setting, for the message.
+    value : object
+        As it was sent.
+    known : mapping
+        What it may be.
+    none : bool
+        Whether ``none`` and null are settings, too.
+
+    Raises
+    ------
+    BoptestRequestError
+        When it is none of them.
+    """
+    if none and (value is None or value == "none"):
+        return None
+    if not isinstance(value, str) or value not in known:
+        raise BoptestRequestError(
+            f"Scenario parameter {name} is {_short(value)}, but should be one of {', '.join(known)}."
+        )
+    return value
+
+
+def time_or_infinite(name: str, value: Any) -> float:
+    """Read a time that may be infinite, as clients ask for all that there is [s].
+
+    Parameters
+    ----------
+    name : str
+        Of the argument, for the message.
+    value : object
+        As it was sent.
+
+    Raises
+    ------
+    BoptestRequestError
+        When it is no number.
+    """
+    if isinstance(value, int | float | str) and str(value).strip().lower().lstrip("+-") in ("inf", "infinity"):
+        return -math.inf if str(value).strip().startswith("-") else math.inf
+    return number(f"parameter {name}", value)
+
+
 def required(body: Mapping[str, Any], *arguments: str) -> list[Any]:
     """Take arguments that a request must have, and no others.
 

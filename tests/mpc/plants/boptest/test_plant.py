@@ -15,6 +15,7 @@ from mpc.plants.boptest import BoptestCase, BoptestPlant, BoptestTime
 from mpc.scenario import Forecast, Forecaster, StepGrid
 
 DAY = 86_400.0
+MORNING = 9 * DAY + 6 * 3600.0  # of a Tuesday
 Connect = Callable[..., BoptestPlant]
 TOTALS = ("cost_tot", "emis_tot", "ener_tot", "pele_tot", "pgas_tot", "tdis_tot")
 
@@ -43,15 +44,15 @@ def local_plant(served: BoptestCase, begin: float, warm_up: float, end: float) -
     return begun.plant, begun.warm_up_steps
 
 
-@pytest.mark.parametrize(("per_control_step", "hours"), [(1, 10), (3, 24)])
+@pytest.mark.parametrize(("per_control_step", "hours"), [(1, 6), (3, 12)])
 def test_closed_loop_by_http_is_the_same_plant_run_locally(
     served: BoptestCase, connect: Connect, per_control_step: int, hours: int
 ) -> None:
-    remote = connect(BoptestTime(9 * DAY, hours * 3600.0, DAY), 300.0 * per_control_step, horizon=12)
+    remote = connect(BoptestTime(MORNING, hours * 3600.0, DAY), 300.0 * per_control_step, horizon=12)
     run = run_closed_loop(remote, Answering(remote), forecasts=True)
     assert len(run.actions) == 12 * hours // per_control_step and remote.finished
 
-    plant, warm = local_plant(served, 9 * DAY, DAY, 10 * DAY)
+    plant, warm = local_plant(served, MORNING, DAY, MORNING + DAY)
     controller = Answering(remote)
     forecaster = Forecaster(plant.scenario, 12 * per_control_step)
     rows, seen = [], None
