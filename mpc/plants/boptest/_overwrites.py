@@ -11,7 +11,7 @@ from mpc.plants.boptest._signals import activation
 from mpc.plants.boptest._values import flag, number
 
 
-class Overwrites(NamedTuple):
+class _Overwrites(NamedTuple):
     """Inputs that a step overwrites.
 
     Parameters
@@ -29,7 +29,7 @@ class Overwrites(NamedTuple):
     warnings: str
 
 
-def read_overwrites(body: Mapping[str, Any], inputs: Mapping[str, Actuator]) -> Overwrites:
+def read_overwrites(body: Mapping[str, Any], inputs: Mapping[str, Actuator]) -> _Overwrites:
     """Read the arguments of an advance; values out of range are clipped, as BOPTEST does.
 
     Parameters
@@ -59,7 +59,7 @@ def read_overwrites(body: Mapping[str, Any], inputs: Mapping[str, Actuator]) -> 
                 raise BoptestRequestError(f"Input {switch} is 1, but {name} has no value.")
             given[inputs[name].name] = used[name]
             active.append(name)
-    return Overwrites(given, tuple(active), ";".join(warnings))
+    return _Overwrites(given, tuple(active), ";".join(warnings))
 
 
 def _clipped(name: str, value: Any, actuator: Actuator, warnings: list[str]) -> float:
