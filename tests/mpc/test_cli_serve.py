@@ -51,15 +51,17 @@ def test_the_bundled_case_is_served_until_it_is_interrupted() -> None:
         assert "peak_heat_day" in said["testcases"]["bundled_case"]["periods"]
         url = said["url"]
         assert url.startswith("http://127.0.0.1:")
-        testid = httpx.post(f"{url}/testcases/bundled_case/select", trust_env=False).json()["testid"]
+        testid = httpx.post(f"{url}/testcases/bundled_case/select", timeout=120.0, trust_env=False).json()["testid"]
         begun = httpx.put(f"{url}/initialize/{testid}", json={"start_time": 61 * 86_400, "warmup_period": 3600},
-                          timeout=60.0, trust_env=False).json()  # fmt: skip
+                          timeout=120.0, trust_env=False).json()  # fmt: skip
         assert begun["payload"]["time"] == 61 * 86_400
         assert 280.0 < begun["payload"]["reaTZon_F1_N_y"] < 305.0
-        late = httpx.put(f"{url}/initialize/{testid}", json={"start_time": 0, "warmup_period": 0}, trust_env=False)
+        late = httpx.put(
+            f"{url}/initialize/{testid}", json={"start_time": 0, "warmup_period": 0}, timeout=120.0, trust_env=False
+        )
         assert late.status_code == 400 and "weather" in late.json()["message"]
         process.send_signal(signal.SIGINT)
-        _, errors = process.communicate(timeout=20)
+        _, errors = process.communicate(timeout=120)
         assert (process.returncode, errors) == (0, "")
 
 

@@ -18,6 +18,7 @@ import pytest
 
 from mpc.errors import BoptestError
 from mpc.plants.boptest import BoptestCase, BoptestServer
+from mpc.plants.boptest._registry import HeldTests
 
 DAY = 86_400.0
 MORNING = 4 * DAY + 7 * 3600.0  # of a Thursday
@@ -153,7 +154,9 @@ def test_only_the_own_machine_unless_told_otherwise(served: BoptestCase) -> None
         url = server.url.replace("0.0.0.0", "127.0.0.1")
         hosts = {"192.168.1.9": 200, "lab.example": 200, "evil.example": 403}
         for host, status in hosts.items():
-            assert httpx.get(f"{url}/version", headers={"host": host}, trust_env=False).status_code == status
+            assert (
+                httpx.get(f"{url}/version", headers={"host": host}, timeout=60.0, trust_env=False).status_code == status
+            )
 
 
 def test_a_taken_port_is_named(served: BoptestCase, server: BoptestServer) -> None:
@@ -213,23 +216,35 @@ def test_a_client_that_hangs_up_in_the_middle_harms_nobody(
     assert seconds == 300.0 * (own + 1)
 
 
-def test_a_test_that_nobody_comes_back_to_is_freed(served: BoptestCase) -> None:
-    with (
-        BoptestServer([served], most=2, idle_seconds=0.6) as server,
-        httpx.Client(base_url=server.url, trust_env=False) as http,
-    ):
-        lost, kept = (http.post("/testcases/small/select").json()["testid"] for _ in range(2))
-        full = http.post("/testcases/small/select")
-        assert full.status_code == 503 and "All 2 tests are in use" in full.json()["message"]
-        for _ in range(6):
-            time.sleep(0.2)
-            assert http.get(f"/status/{kept}").status_code == 200
-        assert http.get(f"/status/{lost}").status_code == 400
-        assert "testid" in http.post("/testcases/small/select").json()
-        deadline = time.monotonic() + 5.0
-        while len(server.tests) and time.monotonic() < deadline:
-            time.sleep(0.05)
-        assert len(server.tests) == 0  # without any request
+def test_a_test_that_nobody_comes_back_to_makes_room(served: BoptestCase) -> None:
+    now = [0.0]
+    tests = HeldTests([served], most=2, idle_seconds=900.0, clock=lambda: now[0])
+    lost, kept = tests.select("small"), tests.select("small")
+    assert lost and kept and tests.select("small") is None
+    for now[0] in (500.0, 899.0):
+        assert tests.find(kept) is not None
+    now[0] = 901.0
+    assert tests.free_idle() == 1 and tests.find(lost) is None and tests.find(kept) is not None
+    busy = tests.find(kept)
+    assert busy is not None
+    busy.waiting, now[0] = 1, 5000.0  # a warm-up that takes long is no idleness
+    assert tests.free_idle() == 0
+    busy.waiting = 0
+    assert tests.select("small") is not None and len(tests) == 1
+
+
+def test_a_client_that_disappears_is_forgotten_without_any_request(served: BoptestCase) -> None:
+    with BoptestServer([served], most=1, idle_seconds=0.4) as server:
+        with httpx.Client(base_url=server.url, timeout=60.0, trust_env=False) as http:
+            lost = http.post("/testcases/small/select").json()["testid"]
+            full = http.post("/testcases/small/select")
+            assert "testid" in full.json() or "All 1 tests are in use" in full.json()["message"]
+            deadline = time.monotonic() + 30.0
+            while len(server.tests) and time.monotonic() < deadline:
+                time.sleep(0.05)
+            assert len(server.tests) == 0
+            assert http.get(f"/status/{lost}").status_code == 400
+            assert "testid" in http.post("/testcases/small/select").json()
 
 
 def test_nothing_is_written_or_executed(http: httpx.Client, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -265,7 +280,10 @@ def test_what_breaks_inside_is_an_answer_of_500(served: BoptestCase, caplog: pyt
         raise ZeroDivisionError("secret")
 
     case = dataclasses.replace(served, name="broken", make_model=broken)
-    with BoptestServer([served, case]) as server, httpx.Client(base_url=server.url, trust_env=False) as http:
+    with (
+        BoptestServer([served, case]) as server,
+        httpx.Client(base_url=server.url, timeout=60.0, trust_env=False) as http,
+    ):
         testid = http.post("/testcases/broken/select")
         assert testid.status_code == 200
         answer = http.get(f"/inputs/{testid.json()['testid']}")
@@ -278,7 +296,7 @@ def test_what_breaks_inside_is_an_answer_of_500(served: BoptestCase, caplog: pyt
 def test_the_common_test_is_never_freed_by_time(served: BoptestCase) -> None:
     with (
         BoptestServer([served], most=1, idle_seconds=0.2) as server,
-        httpx.Client(base_url=server.url, trust_env=False) as http,
+        httpx.Client(base_url=server.url, timeout=60.0, trust_env=False) as http,
     ):
         http.put("/step", json={"step": 900})
         time.sleep(0.5)
@@ -292,7 +310,7 @@ def test_the_common_test_is_never_freed_by_time(served: BoptestCase) -> None:
 def test_a_server_ends_cleanly_and_its_port_is_free(served: BoptestCase) -> None:
     with BoptestServer([served]) as server:
         port = int(server.url.rpartition(":")[2])
-        assert httpx.get(f"{server.url}/testcases", trust_env=False).json() == [{"testcaseid": "small"}]
+        assert httpx.get(f"{server.url}/testcases", timeout=60.0, trust_env=False).json() == [{"testcaseid": "small"}]
     assert not [t for t in threading.enumerate() if t.name == "boptest" and not t.daemon]
     with BoptestServer([served], port=port) as again:
         assert again.url.endswith(f":{port}")
