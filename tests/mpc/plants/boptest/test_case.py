@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import dataclasses
+import json
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 
+from calibration import ModelSettings
 from mpc.errors import BoptestError, BoptestRequestError, PlantError
 from mpc.plants.boptest import BoptestCase, YearClock, case_to_serve
 from mpc.plants.boptest._make import _plain_name, with_plant
@@ -94,15 +97,11 @@ def test_a_building_without_a_plant_gets_one() -> None:
     assert [d.type for d in made.devices] == ["vav"] * 5 + ["ahu", "boiler"]
     twice = with_plant(made)
     assert twice.devices == made.devices
-    import dataclasses
-
     more = dataclasses.replace(made, devices=(*made.devices, Device(name="x", type="vav", zone=made.zone_names[0])))
     assert with_plant(more).devices == made.devices
 
 
 def test_what_cannot_be_served_is_refused(served: BoptestCase, tmp_path: Path) -> None:
-    import dataclasses
-
     with pytest.raises(PlantError, match="whole number of minutes"):
         dataclasses.replace(served, step=90.0)
     short = dataclasses.replace(served.weather, frame=served.weather.frame.iloc[:60])
@@ -127,3 +126,22 @@ def test_a_users_case_is_served() -> None:
     begun.plant.reset()
     begun.plant.step(begun.plant.default_actions)
     assert (250.0 < begun.plant.zone_temperature).all() and len(made.signals.inputs) >= 2
+
+
+def test_a_case_is_served_as_calibrated_with_what_was_found(tmp_path: Path) -> None:
+    case = load_bundled_case()
+    settings = ModelSettings(dx=1.0, effects={"infiltration": []})
+    network = settings.network(case.building)
+    values = {p.name: {"value": float(v)} for p, v in zip(network.parameters, network.start(), strict=True)}
+    file = tmp_path / "calibration.json"
+    warmth = []
+    for rate in (0.0, 1.0):
+        changed = values | {"infiltration_rate": {"value": rate}}
+        file.write_text(json.dumps({"parameters": changed, "settings": settings.to_dict()}))
+        made = case_to_serve(case, file, name="leaky")
+        begun = made.begin(made.covered[0], 0.0)
+        begun.plant.reset()
+        for _ in range(72):  # a night in March without heating
+            begun.plant.step(begun.plant.default_actions)
+        warmth.append(float(begun.plant.zone_temperature.mean()))
+    assert warmth[1] < warmth[0] - 0.05
