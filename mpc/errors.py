@@ -41,3 +41,23 @@ class ReplayError(MpcError):
 
 class ControlError(MpcError):
     """A control problem whose parts do not fit, or data of a horizon that are incomplete."""
+
+
+class BoptestError(PlantError):
+    """A BOPTEST server or client is used wrongly, or cannot be started."""
+
+
+class BoptestRequestError(BoptestError):
+    """A request that a BOPTEST server cannot take: its status is 400."""
+
+
+class BoptestAnswerError(BoptestError):
+    """A BOPTEST server refuses, or answers what is no answer of its API."""
+
+
+class BoptestTimeoutError(BoptestError):
+    """A BOPTEST server does not answer; whether it did what was asked is not known."""
+
+
+class FmuError(PlantError):
+    """A functional mock-up unit that cannot be run, or fails to."""

@@ -20,6 +20,7 @@ from mpc.cli._diagnose import diagnose
 from mpc.cli._doctor import doctor
 from mpc.cli._evaluate import evaluate
 from mpc.cli._import import import_devices, import_plan
+from mpc.cli._serve import serve
 from mpc.cli._simulate import simulate
 
 P = ParamSpec("P")
@@ -125,6 +126,11 @@ for _command, _help, _example in (
         diagnose,
         "Say where model and building disagree, which missing effect causes it, and how far the error falls with it.",
         "diagnose cases/office --out diagnosis",
+    ),
+    (
+        serve,
+        "Put buildings behind BOPTEST's REST API, so that its controllers run on them; ends with Ctrl-C.",
+        "serve cases/office --boptest --parameters results/calibration.json --weather town.epw --port 8000",
     ),
 ):
     app.command(help=_help, epilog=f"Example: buildingmpc {_example}")(_guarded(_command))
