@@ -41,3 +41,7 @@ class ReplayError(MpcError):
 
 class ControlError(MpcError):
     """A control problem whose parts do not fit, or data of a horizon that are incomplete."""
+
+
+class ReportProcessError(MpcError):
+    """A report that is made in a process of its own could not be made."""
