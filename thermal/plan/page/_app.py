@@ -162,7 +162,7 @@ def parse_json(body: bytes) -> Any:
         raise MalformedRequestError(describe("body", "JSON", f"{type(error).__name__}: {error}"[:200])) from error
 
 
-def plain(value: Any) -> Any:
+def plain(value: Any) -> dict[str, Any]:
     """Give a dataclass as plain types.
 
     Parameters

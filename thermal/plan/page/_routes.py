@@ -136,7 +136,7 @@ def _add_drawings(app: FastAPI, desk: LabelDesk) -> None:
         with Upload(own / "drawings", name, DRAWING_KINDS) as upload:
             async for chunk in request.stream():
                 upload.write(chunk)
-            return plain(await run_in_threadpool(upload.keep_drawing))  # type: ignore[no-any-return]
+            return plain(await run_in_threadpool(upload.keep_drawing))
 
     @app.get("/api/drawings/{name}")
     def show_drawing(name: str, page: int = 1, dots_per_inch: float = DOTS_PER_INCH) -> Response:

@@ -45,15 +45,8 @@ export function zoneAt(floor, row, column) {
 // The zone at a point, or the nearest one within so many cells.
 export function snapZone(floor, x, y, reach = 3) {
   const row = Math.floor(y), column = Math.floor(x);
-  let best = zoneAt(floor, row, column), distance = best ? 0 : Infinity;
-  for (let r = row - reach; !best && r <= row + reach; r++) {
-    for (let c = column - reach; c <= column + reach; c++) {
-      const zone = zoneAt(floor, r, c), d = Math.hypot(r + 0.5 - y, c + 0.5 - x);
-      if (zone && d < distance && d <= reach) [best, distance] = [zone, d];
-    }
-    if (r === row + reach && best) break;
-  }
-  if (!best || distance === 0) return best;
+  let best = zoneAt(floor, row, column), distance = Infinity;
+  if (best) return best;
   for (let r = row - reach; r <= row + reach; r++) {
     for (let c = column - reach; c <= column + reach; c++) {
       const zone = zoneAt(floor, r, c), d = Math.hypot(r + 0.5 - y, c + 0.5 - x);
@@ -123,7 +116,12 @@ export function measure(floor) {
     while (b < columns - 1 && cells[zone.row * columns + b + 1] === zone.number) b++;
     zone.x = (a + b + 1) / 2;
     zone.span = b - a + 1;
-    zone.y = zone.row + 0.5;
+    let top = zone.row, bottom = zone.row;
+    while (top > 0 && cells[(top - 1) * columns + zone.column] === zone.number) top--;
+    while (bottom < rows - 1 && cells[(bottom + 1) * columns + zone.column] === zone.number) bottom++;
+    zone.upright = bottom - top + 1 > 2 * zone.span; // a corridor along the page: its name is written upwards
+    zone.y = zone.upright ? (top + bottom + 1) / 2 : zone.row + 0.5;
+    if (zone.upright) [zone.x, zone.span] = [zone.column + 0.5, bottom - top + 1];
   }
   return zones;
 }

@@ -129,7 +129,7 @@ function devicesPanel() {
   return [
     el("div", { class: "row" },
       el("button", { type: "button", id: "import-devices", disabled: off, onclick: () => file.click() }, "Import list…"), file,
-      el("button", { type: "button", id: "match-names", disabled: off || !left, title: "Assign what is left to zones whose name is in the device's", onclick: edits.matchNames }, "Match by name"),
+      el("button", { type: "button", id: "match-names", disabled: off || !left, title: "Assign what is left to zones whose name is in the device's", onclick: edits.matchNames }, "Match names"),
       el("button", { type: "button", id: "add-device", disabled: off, title: "New device (N)", onclick: edits.addDevice }, "New")),
     el("button", { type: "button", id: "place-next", class: "primary wide", disabled: off || !left || !page.draft.floors.length, onclick: () => { choose(tool.name === "place" ? "select" : "place"); view.plan.focus(); } },
       tool.name === "place" ? "Stop placing (Esc)" : next ? `Place next: ${next.name} (P)` : devices.length ? "All devices are placed" : "Place next"),

@@ -127,13 +127,16 @@ function drawZones(floor) {
     const [fill, edge, title, area] = group.children;
     fill.setAttribute("d", paths.fills.get(place.number) || "");
     edge.setAttribute("d", paths.lines.get(place.number) || "");
-    const room = Math.min(place.span * 0.9, place.depth * 6), size = Math.max(0.35, Math.min(1.9, room / (0.62 * name.length), place.depth * 0.75));
+    const size = Math.max(0.35, Math.min(1.9, (place.span * 0.9) / (0.62 * name.length), place.depth * 1.1));
     place.size = size;
+    place.narrow = place.depth < 1.5 * size; // the name alone, and devices beside it
     title.textContent = name;
-    for (const [text, down, share] of [[title, -0.35, 1], [area, 0.5, 0.72]]) {
+    area.toggleAttribute("hidden", place.narrow);
+    for (const [text, down, share] of [[title, place.narrow ? 0.35 : -0.35, 1], [area, 0.5, 0.72]]) {
       text.setAttribute("x", place.x);
       text.setAttribute("y", place.y + down * size);
       text.setAttribute("font-size", size * share);
+      if (place.upright) text.setAttribute("transform", `rotate(-90 ${place.x} ${place.y})`); else text.removeAttribute("transform");
     }
   }
   for (const group of old.values()) group.remove();
@@ -154,7 +157,11 @@ function placeDevices(floor) {
   }
   for (const [name, devices] of rows) {
     const zone = shown.measured.get(name), size = Math.min(zone.size, 1.4), step = size * 1.7;
-    devices.forEach((device, k) => shown.places.set(device, [zone.x + (k - (devices.length - 1) / 2) * step, zone.y + 1.15 * zone.size + 0.75 * size, size]));
+    const beside = 0.31 * name.length * zone.size + 1.1 * size; // in a corridor: behind its name
+    devices.forEach((device, k) => {
+      const along = zone.narrow ? beside + k * step : (k - (devices.length - 1) / 2) * step, down = zone.narrow ? 0 : 1.15 * zone.size + 0.75 * size;
+      shown.places.set(device, zone.upright ? [zone.x + down, zone.y + along, size] : [zone.x + along, zone.y + down, size]);
+    });
   }
 }
 

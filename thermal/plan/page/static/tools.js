@@ -8,13 +8,13 @@ import * as view from "./plan.js";
 
 const svg = view.plan;
 export const TOOLS = [
-  ["select", "V", "Select", "⬚", "Click a zone or a device; Shift+click for several; drag devices into rooms."],
-  ["place", "P", "Place next", "⊕", "Click the room of the device that is next."],
-  ["wall", "W", "Wall", "▬", "Drag a wall; Shift for any direction. A zone that it parts becomes two."],
-  ["split", "X", "Split zone", "◫", "Drag a line across a zone: it is split from wall to wall."],
-  ["erase", "E", "Erase wall", "⌫", "Drag over walls to take them away."],
-  ["room", "R", "Room", "▢", "Drag a rectangle: walls around a new zone."],
-  ["fill", "F", "New zone", "◪", "Click an enclosed white place to make it a zone."],
+  ["select", "V", "Select", "M5 3l12 9-6 1-3 6z", "Click a zone or a device; Shift+click for several; drag devices into rooms."],
+  ["place", "P", "Place next", "M12 21s6-6 6-11a6 6 0 1 0-12 0c0 5 6 11 6 11zM12 7v6M9 10h6", "Click the room of the device that is next."],
+  ["wall", "W", "Wall", "M3 8h18v8H3zM9 8v8M15 8v8", "Drag a wall; Shift for any direction. A zone that it parts becomes two."],
+  ["split", "X", "Split zone", "M4 5h16v14H4zM12 2v20", "Drag a line across a zone: it is split from wall to wall."],
+  ["erase", "E", "Erase wall", "M14 4l6 6-9 9H6l-3-3zM9 9l6 6M11 19h10", "Drag over walls to take them away."],
+  ["room", "R", "Room", "M4 6h16v12H4zM4 12h0", "Drag a rectangle: walls around a new zone."],
+  ["fill", "F", "New zone", "M5 5h14v14H5zM9 12h6M12 9v6", "Click an enclosed white place to make it a zone."],
 ];
 const DRAWN = new Set(["wall", "split", "erase", "room"]);
 
@@ -220,15 +220,19 @@ export function holdSpace(held) {
   svg.classList.toggle("grab", held);
 }
 
+function icon(path) {
+  return view.make("svg", { viewBox: "0 0 24 24" }, view.make("path", { d: path }));
+}
+
 export function drawToolbar() {
   const bar = byId("tools"), actions = [
-    ["merge", "M", "Merge zones", "⧉", () => edits.merge(), () => page.selection.zones.length > 1],
-    ["delete", "Delete", "Remove", "🗑", removeSelected, () => page.selection.zones.length + page.selection.devices.length > 0],
+    ["merge", "M", "Merge zones", "M3 6h8v12H3M21 6h-8v12h8M8 12h8M10 10l-2 2 2 2M14 10l2 2-2 2", () => edits.merge(), () => page.selection.zones.length > 1],
+    ["delete", "Delete", "Remove", "M4 7h16M9 7V4h6v3M6 7l1 13h10l1-13", removeSelected, () => page.selection.zones.length + page.selection.devices.length > 0],
   ];
   const focused = bar.contains(document.activeElement) ? document.activeElement.id : "";
   const button = (id, keys, name, sign, act, pressed, disabled) => el("button", {
     type: "button", id, title: `${name} (${keys})`, "aria-keyshortcuts": keys, "aria-pressed": pressed, disabled, onclick: act, tabindex: "-1",
-  }, el("span", { class: "sign", "aria-hidden": "true" }, sign), el("span", { class: "word" }, name), el("kbd", { "aria-hidden": "true" }, keys === "Delete" ? "Del" : keys));
+  }, el("span", { class: "sign", "aria-hidden": "true" }, icon(sign)), el("span", { class: "word" }, name), el("kbd", { "aria-hidden": "true" }, keys === "Delete" ? "Del" : keys));
   bar.replaceChildren(
     ...TOOLS.map(([id, keys, name, sign]) => button(`tool-${id}`, keys, name, sign, () => choose(id), String(tool.name === id), page.mode !== "edit" && id !== "select")),
     el("hr"),
