@@ -54,6 +54,7 @@ class LabelDesk:
         self.jobs = Jobs()
         self.reports = Reports(self.store.folder, reports, makers or {})
         self._lock = RLock()
+        self._saver, self._since = "", 0
 
     def state(self) -> dict[str, Any]:
         """Give all that the page shows, as plain types.
@@ -61,11 +62,14 @@ class LabelDesk:
         Returns
         -------
         dict
-            Draft, findings, areas, reports that can be made.
+            Draft, findings, areas, reports that can be made; which window saved last, and the revision from which on
+            it was the only one. A page that was loaded anew tells by them whether what it kept is later.
         """
         with self._lock:
             draft = self.store.draft
-            return {"draft": draft.model_dump(by_alias=True), "reports": self.reports.kinds, **self._verdict(draft)}
+            saver = {"saved_by": self._saver, "saved_since": self._since}
+            shown = {"draft": draft.model_dump(by_alias=True), "reports": self.reports.kinds}
+            return {**shown, **saver, **self._verdict(draft)}
 
     def save(self, window: str, content: Any) -> dict[str, Any]:
         """Save what a window sends.
@@ -96,6 +100,8 @@ class LabelDesk:
             if draft.revision != revision:
                 found = f"a change of revision {draft.revision}"
                 raise SessionHeldError(describe("draft", f"one of revision {revision}", found, "load the page anew"))
+            if window != self._saver:
+                self._saver, self._since = window, revision
             saved = draft.model_copy(update={"revision": revision + 1})
             written = self.store.save(saved)
             return {"revision": saved.revision, "written": written, **self._verdict(saved)}

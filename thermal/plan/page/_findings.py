@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -20,6 +21,8 @@ from thermal.case.schema import DEVICE_TYPES
 from thermal.case.validation import GLAZING_TOLERANCE, RESERVED, check_building, check_columns
 from thermal.errors import CaseError, nearest
 from thermal.plan.page._draft import BASIC, Draft, DraftFloor, building_of_draft, zones_of
+
+_PLACE = re.compile(r"(?<!')\b(row|column) (\d+)")  # of a cell, not in the name of a zone
 
 
 @dataclass(frozen=True)
@@ -192,12 +195,8 @@ def _faulty_zones(floor: DraftFloor) -> Iterator[tuple[str, str]]:
 
 def _shifted(message: str, part: tuple[slice, ...]) -> str:
     """Count rows and columns from the plan's first cell, not the part's."""
-    words = message.replace(",", " ,").replace(":", " :").split(" ")
-    for number, word in enumerate(words[:-1]):
-        offset = {"row": part[0].start, "column": part[1].start}.get(word)
-        if offset and words[number + 1].isdigit():
-            words[number + 1] = str(int(words[number + 1]) + offset)
-    return " ".join(words).replace(" ,", ",").replace(" :", ":")
+    offsets = {"row": part[0].start, "column": part[1].start}
+    return _PLACE.sub(lambda match: f"{match[1]} {int(match[2]) + offsets[match[1]]}", message)
 
 
 def _on_devices(draft: Draft) -> Iterator[DraftFinding]:

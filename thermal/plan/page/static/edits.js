@@ -95,6 +95,7 @@ export function rename(from, to) {
   const other = page.draft.floors.find((floor) => floor.legend.indexOf(name) >= 3 && floor.cells.includes(floor.legend.indexOf(name)));
   if (other) { toast(`Floor ${other.name} has a zone ${name} already.`, "error"); return false; }
   const floors = page.draft.floors.map((floor) => (floor.legend.includes(from) ? grid.renameZone(floor, from, name) || floor : floor));
+  page.zones = { ...page.zones, [name]: page.zones[from] };
   change(`rename ${from}`, { floors, ...mapZones((zone) => (zone === from ? name : zone)) });
   select({ zones: [name] });
   return true;
@@ -136,6 +137,7 @@ export function placeInto(name, zone, takeName) {
   if (wanted !== zone && !taken) {
     floors = floors.map((floor) => (floor.legend.includes(zone) ? grid.renameZone(floor, zone, wanted) : floor));
     rest = mapZones((z) => (z === zone ? wanted : z));
+    page.zones = { ...page.zones, [wanted]: page.zones[zone] };
     target = wanted;
   }
   const devices = (rest.devices || page.draft.devices).map((d) => (d.name === name ? { ...d, zone: target, room: "", ...placed } : d));

@@ -119,7 +119,8 @@ export function measure(floor) {
     let top = zone.row, bottom = zone.row;
     while (top > 0 && cells[(top - 1) * columns + zone.column] === zone.number) top--;
     while (bottom < rows - 1 && cells[(bottom + 1) * columns + zone.column] === zone.number) bottom++;
-    zone.upright = bottom - top + 1 > 2 * zone.span; // a corridor along the page: its name is written upwards
+    const letters = 0.62 * legend[zone.number].length;
+    zone.upright = bottom - top + 1 > 2 * zone.span && zone.span < 1.3 * letters; // too slim for its name: written upwards
     zone.y = zone.upright ? (top + bottom + 1) / 2 : zone.row + 0.5;
     if (zone.upright) [zone.x, zone.span] = [zone.column + 0.5, bottom - top + 1];
   }

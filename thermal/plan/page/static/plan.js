@@ -79,10 +79,11 @@ export function fit() {
     (b, z) => [Math.min(b[0], z.left), Math.min(b[1], z.top), Math.max(b[2], z.right + 1), Math.max(b[3], z.bottom + 1)],
     [Infinity, Infinity, -Infinity, -Infinity],
   );
-  const [left, top, right, bottom] = bounds[0] < Infinity ? bounds.map((b, k) => b + (k < 2 ? -3 : 3)) : [0, 0, floor.columns, floor.rows];
-  view.scale = Math.min(box.width / (right - left), box.height / (bottom - top));
+  const [left, top, right, bottom] = bounds[0] < Infinity ? bounds.map((b, k) => b + (k < 2 ? -2 : 2)) : [0, 0, floor.columns, floor.rows];
+  const above = 54, below = 60; // px that the line of the next device and the view's buttons need
+  view.scale = Math.max(0.5, Math.min(box.width / (right - left), (box.height - above - below) / (bottom - top)));
   view.x = (left + right) / 2 - box.width / 2 / view.scale;
-  view.y = (top + bottom) / 2 - box.height / 2 / view.scale;
+  view.y = (top + bottom) / 2 - (above + (box.height - above - below) / 2) / view.scale;
   applyView();
 }
 

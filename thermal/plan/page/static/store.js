@@ -51,17 +51,20 @@ export async function load() {
   page.reports = content.reports;
   takeVerdict(content);
   page.written = !page.findings.some((finding) => finding.level === "error");
-  const left = restore(content.draft.revision);
+  const left = restore(content);
   page.floor = Math.min(page.floor, Math.max(0, page.draft.floors.length - 1));
   if (left && page.mode === "edit") { page.draft = decode(left); schedule(); }
   tell("all");
 }
 
-// What a reload overtook on its way to the server.
-function restore(revision) {
+// What a reload overtook on its way to the server. It is later than what the server has when nobody but the window that
+// kept it has saved since.
+function restore({ draft, saved_by: saver, saved_since: since }) {
   try {
-    const left = JSON.parse(localStorage.getItem(KEPT) || "null");
-    return left && left.revision === revision ? left : null;
+    const kept = JSON.parse(localStorage.getItem(KEPT) || "null");
+    if (!kept) return null;
+    const later = kept.draft.revision === draft.revision || (kept.window === saver && kept.draft.revision >= since);
+    return later ? { ...kept.draft, revision: draft.revision } : null;
   } catch {
     return null;
   }
@@ -69,7 +72,7 @@ function restore(revision) {
 
 function keep() {
   try {
-    localStorage.setItem(KEPT, JSON.stringify(encode(page.draft)));
+    localStorage.setItem(KEPT, JSON.stringify({ window: api.windowName, draft: encode(page.draft) }));
   } catch { /* no room: the server has all but the last change */ }
 }
 
