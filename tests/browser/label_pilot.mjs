@@ -31,7 +31,7 @@ async function importDrawings() {
   await picture("scale");
   await page.getByText("Same for the others").click();
   await page.click("#find-rooms");
-  await page.waitForSelector(".zone", { timeout: 300000 });
+  await page.waitForSelector(".zone", { timeout: 900000 });
   await saved();
   await picture("zones");
 }

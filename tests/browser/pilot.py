@@ -18,7 +18,9 @@ from thermal.pilot import devices, generate_office
 MARGIN = 40  # px of paper around the building
 
 
-def draw_pilot(folder: Path, *, seed: int = 0, zones: int = 123, floor_area: float = 6317.0, pixel: float = 0.04) -> dict[str, Any]:
+def draw_pilot(
+    folder: Path, *, seed: int = 0, zones: int = 123, floor_area: float = 6317.0, pixel: float = 0.05
+) -> dict[str, Any]:
     """Draw each floor as a PNG, write the devices as CSV, and say what is true of them.
 
     The list names the room of each terminal; on the drawings the rooms have no names.

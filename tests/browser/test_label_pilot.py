@@ -38,7 +38,9 @@ def bomb() -> bytes:
         return struct.pack(">I", len(content)) + kind + content + struct.pack(">I", zlib.crc32(kind + content))
 
     header = struct.pack(">IIBBBBB", 90_000, 90_000, 8, 0, 0, 0, 0)
-    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(bytes(1000))) + chunk(b"IEND", b"")
+    return (
+        b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(bytes(1000))) + chunk(b"IEND", b"")
+    )
 
 
 @pytest.fixture
@@ -61,7 +63,9 @@ def server(tmp_path: Path) -> Iterator[tuple[str, subprocess.Popen[str]]]:
     """A server of a new case, and its address."""
     command = [sys.executable, "-m", "mpc.cli", "label", str(tmp_path / "case"), "--no-browser"]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment) as process:
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment
+    ) as process:
         try:
             assert process.stdout is not None
             lines = [process.stdout.readline(), process.stdout.readline()]
@@ -75,7 +79,9 @@ def server(tmp_path: Path) -> Iterator[tuple[str, subprocess.Popen[str]]]:
 def test_a_browser_labels_a_building(truth: dict[str, Any], server: tuple[str, Any], tmp_path: Path) -> None:
     pictures = Path(os.environ["BUILDINGMPC_PICTURES"]) if "BUILDINGMPC_PICTURES" in os.environ else None
     command = ["node", str(HERE / "label_pilot.mjs"), server[0], str(tmp_path / "drawings"), str(CHROMIUM)]
-    done = subprocess.run([*command, *([str(pictures)] if pictures else [])], capture_output=True, text=True, timeout=900)
+    done = subprocess.run(
+        [*command, *([str(pictures)] if pictures else [])], capture_output=True, text=True, timeout=1800
+    )
     assert done.returncode == 0, done.stderr
     numbers = json.loads(done.stdout)
     if pictures is not None:

@@ -100,7 +100,9 @@ def test_bad_input_is_refused_by_name(tmp_path: Path, drawings: Path) -> None:
 def test_it_serves_the_page_until_it_is_interrupted(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "mpc.cli", "label", str(tmp_path / "case"), "--no-browser"]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment) as process:
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment
+    ) as process:
         try:
             assert process.stdout is not None
             lines = process.stdout.readline() + process.stdout.readline()

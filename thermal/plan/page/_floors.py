@@ -9,8 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal.case import FloorPlan
-from thermal.case.building import EXTERIOR_WALL, INTERIOR_WALL, OUTSIDE
+from thermal.case.building import OUTSIDE
 from thermal.errors import PlanSettingError, describe
 from thermal.plan._align import align_floors
 from thermal.plan._assemble import assemble_plans

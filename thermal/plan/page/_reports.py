@@ -129,6 +129,8 @@ class Reports:
             It is not one of `kinds`.
         """
         out = self._case / OWN_FOLDER / "reports" / self.checked_kind(kind)
+        if out.is_symlink():
+            raise ReportError(describe(str(out), "a folder of the page's own", "a link", "remove it"))
         self._makers[kind](self._case, out, progress)
         return self._report(out / _PAGE).to_dict()
 

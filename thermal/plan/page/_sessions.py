@@ -82,12 +82,10 @@ class Sessions:
         """
         now = time.monotonic()
         holder = self._holder
-        free = holder is None or now - holder.seen > PATIENCE or holder.window in (window, previous)
-        if free or take_over:
+        if holder is None or take_over or now - holder.seen > PATIENCE or holder.window in (window, previous):
             self._holder = _Holder(window, now, now)
             return {"mine": True}
-        assert_held = holder if holder is not None else _Holder("", now, now)
-        return {"mine": False, "since": now - assert_held.since, "seen": now - assert_held.seen}
+        return {"mine": False, "since": now - holder.since, "seen": now - holder.seen}
 
     def close(self, window: str) -> None:
         """Give the case back, when it is that window's.

@@ -13,6 +13,7 @@ import yaml
 
 from thermal.case.building_file import NAME, read_building_file
 from thermal.case.load import load_case
+from thermal.case.telemetry_file import check_units, read_telemetry
 from thermal.errors import CaseError, LabelledCaseError, ThermalError, describe
 from thermal.plan._columns import read_columns
 from thermal.plan._folder import save_plan_case
@@ -82,28 +83,46 @@ class CaseStore:
         if own.is_symlink() or (own.exists() and not own.is_dir()):
             raise LabelledCaseError(describe(f"{path}: {OWN_FOLDER}", "a folder of the page's own", "something else"))
         for name in ("drawings", "pictures", "reports"):
+            if (own / name).is_symlink():
+                raise LabelledCaseError(describe(f"{path}: {OWN_FOLDER}/{name}", "a folder of the page's own", "a link"))
             (own / name).mkdir(parents=True, exist_ok=True)
-        self.columns, self.telemetry = self._measured()
-        self.findings: tuple[DraftFinding, ...] = find_faults(self.draft, self.columns, self.telemetry or "telemetry")
+        self.columns: tuple[str, ...] = ()
+        self.telemetry, self._trouble = "", ""
+        self._seen: tuple[str, int, str] | None = None
+        self.findings: tuple[DraftFinding, ...] = ()
+        self._find_faults()
 
     @property
     def own(self) -> Path:
         """Folder of the page's own files."""
         return self.folder / OWN_FOLDER
 
-    def _measured(self) -> tuple[tuple[str, ...], str]:
-        """Columns and name of the telemetry that the case has already; none for a new case."""
+    def _look_at_telemetry(self) -> None:
+        """Read the telemetry when it has changed: somebody may put it there while the page is open."""
         content = self._content()
         if "telemetry" not in content:
-            return (), ""
-        name = str(content["telemetry"])
+            return
         try:
-            return read_columns(inside_folder(self.folder, name, "telemetry")), name
-        except ThermalError:
-            return (), ""
+            file = inside_folder(self.folder, str(content["telemetry"]), "telemetry")
+            state = (str(file), file.stat().st_mtime_ns, repr(content.get("units")))
+            if state == self._seen:
+                return
+            self._seen, self._trouble = state, ""
+            self.telemetry, self.columns = file.name, read_columns(file)
+            parsed = read_building_file(self.folder)
+            check_units(parsed.units)
+            read_telemetry(file, parsed.units, parsed.location)
+        except (ThermalError, OSError) as error:
+            self._trouble = str(error)
+
+    def _find_faults(self) -> None:
+        self._look_at_telemetry()
+        found = find_faults(self.draft, self.columns, self.telemetry or "telemetry")
+        trouble = (DraftFinding("error", "case", self.telemetry, self._trouble),) if self._trouble else ()
+        self.findings = (*trouble, *found)
 
     def _content(self) -> dict[str, Any]:
-        """What `building.yaml` holds; nothing where there is none."""
+        """Read what `building.yaml` holds; nothing where there is none."""
         file = self.folder / NAME
         return yaml.safe_load(file.read_text(encoding="utf-8-sig")) if file.is_file() else {}
 
@@ -122,7 +141,7 @@ class CaseStore:
         """
         write_whole(self.own / _DRAFT, draft.model_dump_json(by_alias=True).encode("utf-8"))
         self.draft = draft
-        self.findings = find_faults(draft, self.columns, self.telemetry or "telemetry")
+        self._find_faults()
         if any(finding.level == "error" for finding in self.findings):
             return False
         try:
@@ -138,19 +157,32 @@ class CaseStore:
         with tempfile.TemporaryDirectory(prefix=".case-", dir=self.own) as work:
             new = save_plan_case(building_of_draft(draft), Path(work) / "case")
             content = yaml.safe_load((new / NAME).read_text(encoding="utf-8"))
-            if self.telemetry:
+            if "telemetry" in before:
                 content |= {key: before[key] for key in ("telemetry", "units")}
-            else:
+            elif not (self.folder / content["telemetry"]).exists():
                 write_whole(self.folder / content["telemetry"], (new / content["telemetry"]).read_bytes())
-            plans = [floor["plan"] for floor in content["floors"]]
-            for plan in plans:
-                _replace_if_other(self.folder / plan, (new / plan).read_bytes())
+            files = {floor["name"]: floor["plan"] for floor in before.get("floors") or ()}
+            for floor in content["floors"]:
+                drawn = (new / floor["plan"]).read_bytes()
+                if files.keys() >= {f["name"] for f in content["floors"]}:
+                    floor["plan"] = files[floor["name"]]
+                _replace_if_other(inside_folder(self.folder, floor["plan"], "plan"), drawn)
+        if _filled(before) == _filled(content) and not self._is_ours():
+            return  # nothing new to say: the file stays with the comments of its author
         text = yaml.safe_dump(content, sort_keys=False, allow_unicode=True, width=120)
         note = _NOTE.format(minutes=draft.seconds / 60.0)
         _replace_if_other(self.folder / NAME, (note + text).encode("utf-8"))
-        for floor in before.get("floors") or ():
-            if floor["plan"] not in plans:
-                inside_folder(self.folder, floor["plan"], "plan").unlink(missing_ok=True)
+        for plan in {*files.values()} - {floor["plan"] for floor in content["floors"]}:
+            inside_folder(self.folder, plan, "plan").unlink(missing_ok=True)
+
+    def _is_ours(self) -> bool:
+        """Whether the page wrote `building.yaml`."""
+        return (self.folder / NAME).read_text(encoding="utf-8-sig").startswith(_NOTE.partition("{")[0])
+
+
+def _filled(content: dict[str, Any]) -> dict[str, Any]:
+    """Leave out what is empty: a key without an entry says the same as no key."""
+    return {key: value for key, value in content.items() if value or value == 0}
 
 
 def _replace_if_other(path: Path, content: bytes) -> None:

@@ -18,7 +18,11 @@ from thermal.plan.page import Draft, building_of_draft, draft_of
 from thermal.plan.page._draft import encode_floor, parse_draft, zones_of
 
 
-@given(st.lists(st.lists(st.sampled_from([".", "#", "+", "A", "B 1", "ä"]), min_size=4, max_size=4), min_size=1, max_size=6))
+@given(
+    st.lists(
+        st.lists(st.sampled_from([".", "#", "+", "A", "B 1", "ä"]), min_size=4, max_size=4), min_size=1, max_size=6
+    )
+)
 def test_any_plan_survives_its_runs(rows: list[list[str]]) -> None:
     tokens = np.array(rows, dtype=np.str_)
     floor = encode_floor("F1", 3.0, tokens)

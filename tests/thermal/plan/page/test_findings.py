@@ -32,7 +32,9 @@ def test_each_faulty_zone_is_told_apart_with_its_place(draft_with: Make) -> None
 
 
 def test_places_are_counted_from_the_first_cell_of_the_plan(draft_with: Make) -> None:
-    draft = draft_with(*("." * 9,) * 5, "....###..", "....#A#..", "....###..", "....#A#..", "....###..", "." * 9, devices=())
+    draft = draft_with(
+        *("." * 9,) * 5, "....###..", "....#A#..", "....###..", "....#A#..", "....###..", "." * 9, devices=()
+    )
     (message,) = [f.message for f in find_faults(draft) if f.level == "error"]
     assert "row 7, column 6 and row 9, column 6" in message
 

@@ -37,7 +37,9 @@ def run_on(case: Path, out: Path, progress: Progress) -> None:
 @pytest.fixture
 def busy_desk(tmp_path: Path) -> Any:
     """A desk that can make reports."""
-    desk = LabelDesk(tmp_path / "case", reports=[tmp_path / "results"], makers={"check": write_report, "fail": fail, "long": run_on})
+    desk = LabelDesk(
+        tmp_path / "case", reports=[tmp_path / "results"], makers={"check": write_report, "fail": fail, "long": run_on}
+    )
     yield desk
     desk.end()
 
@@ -45,7 +47,9 @@ def busy_desk(tmp_path: Path) -> Any:
 @pytest.fixture
 def reader(busy_desk: LabelDesk, browser: Any) -> Any:
     """A browser of that desk."""
-    return type(browser)(create_app(busy_desk, "t0ken"), base_url="http://127.0.0.1:8000", raise_server_exceptions=False)
+    return type(browser)(
+        create_app(busy_desk, "t0ken"), base_url="http://127.0.0.1:8000", raise_server_exceptions=False
+    )
 
 
 def wait(reader: Any, number: int) -> Any:

@@ -53,15 +53,20 @@ def zipped(name: str, size: int) -> bytes:
 
 def test_the_page_is_there_with_its_token_only(browser: Any) -> None:
     page = browser.get(browser.at(""))
-    assert page.status_code == 200 and "<svg id=\"plan\"" in page.text
-    assert "script-src 'self'" in page.headers["content-security-policy"] and "unsafe" not in page.headers["content-security-policy"]
+    assert page.status_code == 200 and '<svg id="plan"' in page.text
+    assert (
+        "script-src 'self'" in page.headers["content-security-policy"]
+        and "unsafe" not in page.headers["content-security-policy"]
+    )
     assert page.headers["referrer-policy"] == "no-referrer"
     for path in ("/", "/api/state", "/T0KEN/", "/t0ken2/api/state", "//api/state", "/%74oken/"):
         assert browser.get(path).status_code == 404, path
     assert browser.get("/spam/").json()["error"] == "AccessError"
 
 
-@pytest.mark.parametrize("host", ["evil.example", "evil.example:8000", "127.0.0.1.evil.example", "192.168.1.2:8000", ""])
+@pytest.mark.parametrize(
+    "host", ["evil.example", "evil.example:8000", "127.0.0.1.evil.example", "192.168.1.2:8000", ""]
+)
 def test_another_host_is_refused(browser: Any, host: str) -> None:
     answer = browser.get(browser.at("api/state"), headers={"host": host})
     assert (answer.status_code, answer.json()["error"]) == (403, "AccessError")
@@ -192,7 +197,9 @@ def test_a_hostile_drawing_is_refused_by_name(browser: Any, desk: LabelDesk, tmp
     assert {p for p in tmp_path.rglob("*")} == before
 
 
-def test_an_oversized_upload_is_stopped_on_its_way(browser: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_oversized_upload_is_stopped_on_its_way(
+    browser: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(uploads, "MOST_BYTES", 1000)
     for path, name in (("api/drawings", "a.png"), ("api/devices", "a.csv")):
         answer = browser.post(browser.at(path, name=name), content=bytes(5000))
@@ -202,7 +209,14 @@ def test_an_oversized_upload_is_stopped_on_its_way(browser: Any, tmp_path: Path,
 
 @pytest.mark.parametrize(
     ("name", "body"),
-    [("a.csv", b""), ("a.csv", b"\xff\xfe"), ("a.csv", b"name\nV\nV"), ("a.json", b"[" * 100_000), ("a.ttl", b"spam"), ("a.zinc", b"{")],
+    [
+        ("a.csv", b""),
+        ("a.csv", b"\xff\xfe"),
+        ("a.csv", b"name\nV\nV"),
+        ("a.json", b"[" * 100_000),
+        ("a.ttl", b"spam"),
+        ("a.zinc", b"{"),
+    ],
 )
 def test_a_list_that_is_none_is_refused_by_name(browser: Any, name: str, body: bytes) -> None:
     answer = browser.post(browser.at("api/devices", name=name), content=body)
@@ -220,7 +234,10 @@ def test_a_drawing_that_leads_elsewhere_is_not_read(browser: Any, desk: LabelDes
     Image.new("L", (30, 30), 255).save(tmp_path / "secret.png")
     (desk.store.own / "drawings" / "a.png").symlink_to(tmp_path / "secret.png")
     assert browser.get(browser.at("api/drawings/a.png")).json()["error"] == "OutsideFolderError"
-    answer = browser.post(browser.at("api/floors"), json={"floors": [{"name": "F1", "file": "../../../secret.png", "scale": {"metres_per_pixel": 0.1}}]})
+    answer = browser.post(
+        browser.at("api/floors"),
+        json={"floors": [{"name": "F1", "file": "../../../secret.png", "scale": {"metres_per_pixel": 0.1}}]},
+    )
     job = wait(browser, answer.json())
     assert job["state"] == "failed" and job["error"]["error"] == "OutsideFolderError"
 
@@ -258,10 +275,19 @@ def test_drawings_and_a_list_become_a_case(browser: Any, desk: LabelDesk) -> Non
     assert picture.headers["content-type"] == "image/png" and picture.headers["x-width"] == "250"
     codes = "\n".join(",".join("1" if r in (0, 15) or c in (0, 20) else "0" for c in range(21)) for r in range(16))
     assert browser.post(browser.at("api/drawings", name="roof.csv"), content=codes.encode()).json()["kind"] == "codes"
-    assert {d["file"] for d in browser.get(browser.at("api/drawings")).json()["drawings"]} == {"first floor.png", "roof.csv"}
+    assert {d["file"] for d in browser.get(browser.at("api/drawings")).json()["drawings"]} == {
+        "first floor.png",
+        "roof.csv",
+    }
 
     scale = {"points": [[25, 100], [225, 100]], "distance": 8.0}
-    job = wait(browser, browser.post(browser.at("api/floors"), json={"floors": [{"name": "F1", "file": "first floor.png", "scale": scale}], "cell_size": 0.2}).json())
+    job = wait(
+        browser,
+        browser.post(
+            browser.at("api/floors"),
+            json={"floors": [{"name": "F1", "file": "first floor.png", "scale": scale}], "cell_size": 0.2},
+        ).json(),
+    )
     assert job["state"] == "done", job
     draft = desk.store.draft.model_dump() | {"floors": job["result"]["floors"], "cell_size": job["result"]["cell_size"]}
     draft |= {"site": {"latitude": 1.0, "longitude": 2.0, "elevation": 3.0, "timezone": "UTC"}}
@@ -273,14 +299,22 @@ def test_drawings_and_a_list_become_a_case(browser: Any, desk: LabelDesk) -> Non
     zone = np.argwhere(rows == "F1_R01").min(axis=0)
     assert (a * 25 + c * 25 + e, b * 25 + d * 25 + f) == pytest.approx((zone[1], zone[0]), abs=0.5)
 
-    job = wait(browser, browser.post(browser.at("api/floors"), json={"floors": [{"name": "roof", "file": "roof.csv", "cell_size": 0.4}]}).json())
+    job = wait(
+        browser,
+        browser.post(
+            browser.at("api/floors"), json={"floors": [{"name": "roof", "file": "roof.csv", "cell_size": 0.4}]}
+        ).json(),
+    )
     assert job["state"] == "done", job
     assert [floor["name"] for floor in job["result"]["floors"]] == ["F1", "roof"]
     assert len({(floor["rows"], floor["columns"]) for floor in job["result"]["floors"]}) == 1
     shift, first = job["result"]["shift"], job["result"]["floors"][0]["picture"]["matrix"]
     assert first[4:] == pytest.approx([e + shift[0], f + shift[1]])
 
-    found = browser.post(browser.at("api/devices", name="list.csv"), content=b"Name,Type,Room\nV1,VAV w/ reheat,f1-r1\nV2,vav,lobby\nB,boiler,\n").json()
+    found = browser.post(
+        browser.at("api/devices", name="list.csv"),
+        content=b"Name,Type,Room\nV1,VAV w/ reheat,f1-r1\nV2,vav,lobby\nB,boiler,\n",
+    ).json()
     assert [(d["name"], d["type"], d["zone"], d["room"]) for d in found["devices"]] == [
         ("V1", "vav", "F1_R01", ""), ("V2", "vav", None, "lobby"), ("B", "boiler", None, ""),
     ]  # fmt: skip

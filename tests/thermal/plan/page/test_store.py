@@ -32,7 +32,12 @@ def test_a_new_case_is_written_as_soon_as_it_is_one(tmp_path: Path, draft_with: 
     assert "2 minutes of work" in (store.folder / "building.yaml").read_text(encoding="utf-8")
     assert not store.save(half)  # the case stays as it was valid last
     assert [d.name for d in load_case(store.folder).building.devices] == ["VAV_A", "VAV_B"]
-    assert {p.name for p in store.folder.iterdir()} == {"building.yaml", "plan_F1.csv", "telemetry.parquet", "labelling"}
+    assert {p.name for p in store.folder.iterdir()} == {
+        "building.yaml",
+        "plan_F1.csv",
+        "telemetry.parquet",
+        "labelling",
+    }
     assert {p.name for p in store.own.iterdir()} == {"labelling.json", "drawings", "pictures", "reports"}
 
 
@@ -53,7 +58,39 @@ def test_telemetry_and_its_units_stay_as_they_are(plan_draft: Any) -> None:
     assert case.building.airflows[0].fraction == 0.4
     assert case.building.geometry.glazing == {"A": {"south": 2.0, "west": 1.5}}  # type: ignore[union-attr]
     assert (folder / "telemetry.parquet").read_bytes() == before
-    assert yaml.safe_load((folder / "building.yaml").read_text(encoding="utf-8"))["units"] == plan_draft.content["units"]
+    assert (
+        yaml.safe_load((folder / "building.yaml").read_text(encoding="utf-8"))["units"] == plan_draft.content["units"]
+    )
+
+
+def test_a_file_that_says_the_same_keeps_the_comments_of_its_author(plan_draft: Any) -> None:
+    plan_draft.content["floors"][0]["plan"] = "ground.csv"
+    plan_draft.plans["ground.csv"] = plan_draft.plans.pop("plan_F1.csv")
+    file = plan_draft.write() / "building.yaml"
+    file.write_text("# by hand\n" + file.read_text(encoding="utf-8"), encoding="utf-8")
+    store = CaseStore(file.parent)
+    assert store.save(store.draft.model_copy(update={"seconds": 5.0}))
+    assert file.read_text(encoding="utf-8").startswith("# by hand")
+    wider = store.draft.floors[0].model_copy(update={"height": 2.5})
+    assert store.save(store.draft.model_copy(update={"floors": (wider,)}))
+    assert load_case(store.folder).building.geometry.floors[0].height == 2.5  # type: ignore[union-attr]
+    assert [p.name for p in store.folder.glob("*.csv")] == ["ground.csv"]
+
+
+def test_telemetry_that_comes_while_the_page_is_open_stays(tmp_path: Path, draft_with: Make) -> None:
+    store = CaseStore(tmp_path / "case")
+    store.save(draft_with())
+    frame = pd.read_parquet(store.folder / "telemetry.parquet")
+    frame["VAV_A/zone_air_temperature_sensor"] = [20.0, 21.0]
+    frame.to_parquet(store.folder / "telemetry.parquet")
+    before = (store.folder / "telemetry.parquet").read_bytes()
+    assert not store.save(draft_with(name="renamed"))  # its unit is to be written by hand
+    assert store.findings[0].kind == "case" and "zone_air_temperature_sensor" in store.findings[0].message
+    assert (store.folder / "telemetry.parquet").read_bytes() == before
+    file = store.folder / "building.yaml"
+    file.write_text(file.read_text("utf-8") + "  zone_air_temperature_sensor: degC\n", encoding="utf-8")
+    assert store.save(draft_with(name="renamed"))
+    assert check_case(store.folder).name == "renamed"
 
 
 def test_a_device_that_telemetry_needs_cannot_go_unnoticed(plan_draft: Any) -> None:
