@@ -2,6 +2,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import * as grid from "../../thermal/plan/page/static/grid.js";
+import { measure, trace } from "../../thermal/plan/page/static/shapes.js";
 
 // A floor from rows of letters.
 function floor(...rows) {
@@ -105,13 +106,13 @@ test("a point snaps to the zone there, or the nearest one in reach", () => {
 });
 
 test("the innermost point of a zone lies in it", () => {
-  const f = floor("########", "#AAAAAA#", "#A#####+", "#A#BBBB#", "#A#BBBB#", "########"), zones = grid.measure(f);
+  const f = floor("########", "#AAAAAA#", "#A#####+", "#A#BBBB#", "#A#BBBB#", "########"), zones = measure(f);
   for (const [name, zone] of zones) assert.equal(grid.zoneAt(f, zone.row, zone.column), name);
   assert.equal(zones.get("A").cells, 9);
 });
 
 test("paths cover each cell once", () => {
-  const { fills } = grid.trace(TWO());
+  const { fills } = trace(TWO());
   const count = [...fills.values()].join("").matchAll(/h(\d+)v1/g);
   assert.equal([...count].reduce((sum, [, n]) => sum + Number(n), 0), 25);
 });

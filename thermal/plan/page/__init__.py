@@ -4,7 +4,8 @@ Needs the extra ``[pages]`` (``pip install "buildingmpc[pages]"``) beside ``[pla
 """
 
 from thermal.plan.page._app import LabelDesk, create_app
-from thermal.plan.page._draft import Draft, DraftDevice, DraftFloor, Picture, Site, building_of_draft, draft_of
+from thermal.plan.page._convert import building_of_draft, draft_of
+from thermal.plan.page._draft import Draft, DraftDevice, DraftFloor, Picture, Site
 from thermal.plan.page._findings import DraftFinding, find_faults
 from thermal.plan.page._reports import ReportMaker
 from thermal.plan.page._serve import serve_page

@@ -11,7 +11,8 @@ from typing import Any
 
 from thermal.errors import MalformedRequestError, MissingExtraError, SessionHeldError, describe
 from thermal.plan.page._access import Application, Gate
-from thermal.plan.page._draft import Draft, parse_draft
+from thermal.plan.page._convert import parse_draft
+from thermal.plan.page._draft import Draft
 from thermal.plan.page._findings import zone_facts
 from thermal.plan.page._jobs import Jobs
 from thermal.plan.page._reports import ReportMaker, Reports

@@ -20,7 +20,8 @@ from thermal.case.remarks import TERMINAL_TYPES
 from thermal.case.schema import DEVICE_TYPES
 from thermal.case.validation import GLAZING_TOLERANCE, RESERVED, check_building, check_columns
 from thermal.errors import CaseError, nearest
-from thermal.plan.page._draft import BASIC, Draft, DraftFloor, building_of_draft, zones_of
+from thermal.plan.page._convert import building_of_draft, zones_of
+from thermal.plan.page._draft import BASIC, Draft, DraftFloor
 
 _PLACE = re.compile(r"(?<!')\b(row|column) (\d+)")  # of a cell, not in the name of a zone
 

@@ -17,7 +17,8 @@ from thermal.plan._cells import ZonedFloor, draw_cells
 from thermal.plan._drawing import RASTER_KINDS, read_drawing
 from thermal.plan._list import FloorEntry, read_floor
 from thermal.plan._survey import OUTSIDE_LABEL, WALL_LABEL, FloorSurvey
-from thermal.plan.page._draft import BASIC, Draft, DraftFloor, Picture, encode_floor
+from thermal.plan.page._convert import encode_floor
+from thermal.plan.page._draft import BASIC, Draft, DraftFloor, Picture
 from thermal.plan.page._store import write_whole
 from thermal.plan.page._uploads import picture_of
 

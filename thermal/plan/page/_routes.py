@@ -26,7 +26,7 @@ from thermal.plan._guard import inside_folder
 from thermal.plan._list import FloorEntry
 from thermal.plan.page._access import REPORT_POLICY
 from thermal.plan.page._app import LabelDesk, parse_json, plain
-from thermal.plan.page._draft import zones_of
+from thermal.plan.page._convert import zones_of
 from thermal.plan.page._floors import add_floors
 from thermal.plan.page._jobs import Progress
 from thermal.plan.page._uploads import DEVICE_KINDS, DRAWING_KINDS, Upload, look_at, picture_of

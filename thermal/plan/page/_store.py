@@ -18,7 +18,8 @@ from thermal.errors import CaseError, LabelledCaseError, ThermalError, describe
 from thermal.plan._columns import read_columns
 from thermal.plan._folder import save_plan_case
 from thermal.plan._guard import inside_folder
-from thermal.plan.page._draft import Draft, building_of_draft, draft_of, parse_draft
+from thermal.plan.page._convert import building_of_draft, draft_of, parse_draft
+from thermal.plan.page._draft import Draft
 from thermal.plan.page._findings import DraftFinding, find_faults
 
 #: Folder inside the case that holds what is the page's own: draft, drawings, pictures, reports.
@@ -84,7 +85,9 @@ class CaseStore:
             raise LabelledCaseError(describe(f"{path}: {OWN_FOLDER}", "a folder of the page's own", "something else"))
         for name in ("drawings", "pictures", "reports"):
             if (own / name).is_symlink():
-                raise LabelledCaseError(describe(f"{path}: {OWN_FOLDER}/{name}", "a folder of the page's own", "a link"))
+                raise LabelledCaseError(
+                    describe(f"{path}: {OWN_FOLDER}/{name}", "a folder of the page's own", "a link")
+                )
             (own / name).mkdir(parents=True, exist_ok=True)
         self.columns: tuple[str, ...] = ()
         self.telemetry, self._trouble = "", ""

@@ -49,7 +49,8 @@ function renderFloors() {
   const tabs = page.draft.floors.map((floor, k) => el("button", {
     role: "tab", id: `floor-${k}`, type: "button", "aria-selected": String(k === page.floor), tabindex: k === page.floor ? "0" : "-1", onclick: () => goFloor(k),
   }, floor.name || "unnamed"));
-  list.replaceChildren(...tabs, el("button", { type: "button", class: "quiet", title: "Add an empty floor", disabled: page.mode !== "edit", onclick: () => { edits.addFloor(); renderAll(); } }, "+ Floor"));
+  list.replaceChildren(...tabs);
+  byId("add-floor").disabled = page.mode !== "edit";
   byId("empty").hidden = page.draft.floors.length > 0;
 }
 
@@ -79,10 +80,10 @@ function renderAll() {
   renderSaved();
   renderClock();
   renderFloors();
-  view.render();
   drawToolbar();
-  renderPlacing();
   renderPanels();
+  view.render();
+  renderPlacing();
 }
 
 store.listen((what) => {
@@ -159,6 +160,7 @@ function wire() {
   byId("undo").onclick = store.undo;
   byId("redo").onclick = store.redo;
   byId("import").onclick = byId("empty-import").onclick = () => openImport();
+  byId("add-floor").onclick = () => { edits.addFloor(); renderAll(); };
   byId("empty-draw").onclick = () => { edits.addFloor(); choose("room"); };
   byId("reports").onclick = openReports;
   byId("help").onclick = openHelp;

@@ -131,10 +131,22 @@ function refresh() {
   drawMarks();
 }
 
+async function forget(sheet) {
+  try {
+    await api.remove(`api/drawings/${encodeURIComponent(sheet.file)}`);
+    sheets.splice(sheets.indexOf(sheet), 1);
+    chosen = sheets[0] || null;
+    draw();
+  } catch (error) {
+    status(`${error.refusal || error.name}: ${error.message}`, true);
+  }
+}
+
 const input = (sheet, key, type = "text", more = {}) => el("input", { type, id: `sheet-${key}`, value: sheet[key], step: "any", oninput: set(sheet, key), autocomplete: "off", ...more });
 
 function sheetPanel(sheet) {
-  if (sheet.kind === "unreadable") return el("p", { class: "message pad" }, sheet.message);
+  const away = el("button", { type: "button", onclick: () => forget(sheet) }, "Remove this file");
+  if (sheet.kind === "unreadable") return el("div", {}, el("p", { class: "message pad" }, sheet.message), away);
   const scale = sheet.kind === "raster" ? rasterScale(sheet) : sheet.kind === "codes" ? field("Side of a cell [m]", input(sheet, "cell", "number"))
     : field("Metres in a unit of the drawing (empty: what the drawing says)", input(sheet, "unit", "number"));
   return el("div", {},
@@ -143,7 +155,7 @@ function sheetPanel(sheet) {
       el("label", { class: "check" }, el("input", { type: "checkbox", checked: sheet.include, onchange: set(sheet, "include") }), " use this drawing")),
     scale,
     el("details", {}, el("summary", {}, "More settings"), el("div", { class: "grid four" },
-      field("Widest door [m]", input(sheet, "wide", "number")), field("Smaller rooms join their neighbour [m²]", input(sheet, "small", "number")))));
+      field("Widest door [m]", input(sheet, "wide", "number")), field("Smaller rooms join their neighbour [m²]", input(sheet, "small", "number")), away)));
 }
 
 function rasterScale(sheet) {

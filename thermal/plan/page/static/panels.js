@@ -122,7 +122,7 @@ function deviceKey(event, device, shownDevices) {
 
 function devicesPanel() {
   const devices = listed(), left = edits.left().length, picked = page.selection.devices, off = reading();
-  const file = el("input", { type: "file", accept: ".csv,.ttl,.json,.zinc", class: "sr", id: "device-file", tabindex: "-1", onchange: (e) => e.target.files[0] && takeList(e.target.files[0]) });
+  const file = el("input", { type: "file", accept: ".csv,.ttl,.json,.zinc", class: "sr", id: "device-file", tabindex: "-1", "aria-label": "List of devices", onchange: (e) => e.target.files[0] && takeList(e.target.files[0]) });
   const next = tool.name === "place" ? null : nextDevice();
   const zone = choice(zoneOptions(), page.selection.zones[0] || "", { id: "bulk-zone", "aria-label": "Zone for the selected devices" });
   const type = choice([["", "type…"], ...TYPES], "", { id: "bulk-type", "aria-label": "Type for the selected devices", onchange: (e) => e.target.value && edits.retype(picked, e.target.value) });

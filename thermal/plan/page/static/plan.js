@@ -1,7 +1,8 @@
 // The plan on the screen: drawing, zones, walls, labels, devices, as SVG whose unit is a cell.
 
-import { FIRST_ZONE, EXTERIOR, INTERIOR, measure, trace } from "./grid.js";
 import { address } from "./api.js";
+import { EXTERIOR, INTERIOR } from "./grid.js";
+import { measure, trace } from "./shapes.js";
 import { floorOf, page } from "./store.js";
 
 const NS = "http://www.w3.org/2000/svg";
@@ -9,8 +10,7 @@ const LETTERS = { vav: "V", fan_coil: "F", electric_heater: "E", radiator: "R", 
 const svg = document.getElementById("plan");
 const layers = {};
 const shown = { floor: null, measured: new Map(), places: new Map() };
-const view = { x: 0, y: 0, scale: 8 }; // left, top [cells], pixels a cell
-let fitted = false;
+const view = { x: 0, y: 0, scale: 8, touched: false }; // left, top [cells], pixels a cell, whether somebody has chosen it
 
 export const plan = svg;
 export const zonesShown = () => shown.measured;
@@ -58,6 +58,7 @@ export function zoomAt(x, y, factor) {
   view.x = x - ((x - view.x) * view.scale) / scale;
   view.y = y - ((y - view.y) * view.scale) / scale;
   view.scale = scale;
+  view.touched = true;
   applyView();
 }
 
@@ -69,6 +70,7 @@ export function zoom(factor) {
 export function pan(dx, dy) {
   view.x -= dx / view.scale;
   view.y -= dy / view.scale;
+  view.touched = true;
   applyView();
 }
 
@@ -84,6 +86,7 @@ export function fit() {
   view.scale = Math.max(0.5, Math.min(box.width / (right - left), (box.height - above - below) / (bottom - top)));
   view.x = (left + right) / 2 - box.width / 2 / view.scale;
   view.y = (top + bottom) / 2 - (above + (box.height - above - below) / 2) / view.scale;
+  view.touched = false;
   applyView();
 }
 
@@ -121,19 +124,20 @@ function drawZones(floor) {
     if (!group) {
       group = make("g", { class: "zone", role: "button", tabindex: "-1", "data-zone": name });
       group.style.setProperty("--hue", hue(name));
-      group.append(make("path", { class: "fill" }), make("path", { class: "edge" }), make("text", { class: "name" }), make("text", { class: "area" }));
+      group.append(make("path", { class: "fill" }), make("path", { class: "edge" }), make("text", { class: "name" }), " ", make("text", { class: "area" }));
       layers.zones.append(group);
     }
     old.delete(name);
     const [fill, edge, title, area] = group.children;
     fill.setAttribute("d", paths.fills.get(place.number) || "");
     edge.setAttribute("d", paths.lines.get(place.number) || "");
-    const size = Math.max(0.35, Math.min(1.9, (place.span * 0.9) / (0.62 * name.length), place.depth * 1.1));
-    place.size = size;
-    place.narrow = place.depth < 1.5 * size; // the name alone, and devices beside it
+    const wide = (place.span * 0.9) / (0.62 * name.length);
+    const inRows = Math.min(1.9, wide, place.depth * 0.62), inLine = Math.min(1.9, wide * 0.85, place.depth * 1.1);
+    place.narrow = inRows < 0.7 * inLine; // the name alone, and devices beside it
+    const size = place.size = Math.max(0.35, place.narrow ? inLine : inRows);
     title.textContent = name;
     area.toggleAttribute("hidden", place.narrow);
-    for (const [text, down, share] of [[title, place.narrow ? 0.35 : -0.35, 1], [area, 0.5, 0.72]]) {
+    for (const [text, down, share] of [[title, place.narrow ? 0.35 : -0.55, 1], [area, 0.25, 0.72]]) {
       text.setAttribute("x", place.x);
       text.setAttribute("y", place.y + down * size);
       text.setAttribute("font-size", size * share);
@@ -160,7 +164,7 @@ function placeDevices(floor) {
     const zone = shown.measured.get(name), size = Math.min(zone.size, 1.4), step = size * 1.7;
     const beside = 0.31 * name.length * zone.size + 1.1 * size; // in a corridor: behind its name
     devices.forEach((device, k) => {
-      const along = zone.narrow ? beside + k * step : (k - (devices.length - 1) / 2) * step, down = zone.narrow ? 0 : 1.15 * zone.size + 0.75 * size;
+      const along = zone.narrow ? beside + k * step : (k - (devices.length - 1) / 2) * step, down = zone.narrow ? 0 : 0.45 * zone.size + 0.75 * size;
       shown.places.set(device, zone.upright ? [zone.x + down, zone.y + along, size] : [zone.x + along, zone.y + down, size]);
     });
   }
@@ -203,7 +207,7 @@ export function mark() {
     group.classList.toggle("wrong", Boolean(trouble));
     group.children[3].textContent = `${area.toFixed(1)} m²`;
     const count = served.get(name) || 0;
-    group.setAttribute("aria-label", `Zone ${name}, ${area.toFixed(1)} square metres, ${count || "no"} device${count === 1 ? "" : "s"}${trouble ? `. Error: ${trouble}` : ""}`);
+    group.setAttribute("aria-label", `${name} ${area.toFixed(1)} m², zone with ${count || "no"} device${count === 1 ? "" : "s"}${trouble ? `. Error: ${trouble}` : ""}`);
     group.setAttribute("aria-pressed", page.selection.zones.includes(name));
   }
   for (const group of layers.devices.children) {
@@ -222,12 +226,13 @@ export function render() {
   }
   if (floor !== shown.floor) {
     const other = shown.floor?.picture?.file !== floor.picture?.file || shown.floor?.picture?.matrix?.join() !== floor.picture?.matrix?.join();
-    const fresh = !shown.floor || shown.floor.name !== floor.name || shown.floor.rows !== floor.rows;
+    const fresh = !shown.floor || shown.floor.rows !== floor.rows || shown.floor.columns !== floor.columns;
     shown.measured = measure(floor);
     if (other || !shown.floor) drawPicture(floor);
     drawZones(floor);
     shown.floor = floor;
-    if (!fitted || (fresh && !shown.kept)) { fit(); fitted = true; }
+    if (fresh) fit();
+    svg.classList.toggle("plain", !floor.picture);
   }
   drawDevices(floor);
   mark();
@@ -270,5 +275,4 @@ export function neighbour(name, [dx, dy]) {
   return best;
 }
 
-export { FIRST_ZONE };
-new ResizeObserver(() => applyView()).observe(svg);
+new ResizeObserver(() => (view.touched ? applyView() : fit())).observe(svg);

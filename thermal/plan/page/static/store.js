@@ -28,7 +28,7 @@ export const listen = (listener) => listeners.push(listener);
 export const tell = (what) => listeners.forEach((listener) => listener(what));
 export const canUndo = () => (past.length ? past[past.length - 1].label : "");
 export const canRedo = () => (future.length ? future[future.length - 1].label : "");
-export const floorOf = () => page.draft.floors[page.floor] || null;
+export const floorOf = () => page.draft?.floors[page.floor] || null;
 export const workSeconds = () => page.draft.seconds + seconds;
 
 function decode(draft) {
