@@ -1,7 +1,7 @@
 #!/bin/sh
-# What the browser tests need: Debian's chromium and node, playwright-core from npm (which brings no browser of its own).
+# What the browser tests need: Debian's chromium and node, playwright-core from npm (which brings no browser of its own) in
+# a folder of the user's cache, outside of the project.
 set -eu
-here=$(cd "$(dirname "$0")" && pwd)
 need=""
 for program in chromium node npm; do
     command -v "$program" >/dev/null 2>&1 || need="$need $program"
@@ -14,5 +14,6 @@ if [ -n "$need" ]; then
     # shellcheck disable=SC2086
     $sudo apt-get install --yes --no-install-recommends $need
 fi
-cd "$here"
-npm install --no-save --no-audit --no-fund --no-package-lock --prefix "$here" playwright-core@1.65.1
+modules="${XDG_CACHE_HOME:-$HOME/.cache}/buildingmpc-browser"
+mkdir -p "$modules"
+npm install --no-save --no-audit --no-fund --no-package-lock --prefix "$modules" playwright-core@1.65.1

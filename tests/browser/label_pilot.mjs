@@ -1,10 +1,12 @@
 // Labels a building from its drawings and its list of devices, as a technician does: by mouse and keyboard, through the page.
-// node label_pilot.mjs ADDRESS FOLDER CHROMIUM [PICTURES]; writes numbers to stdout as JSON. FOLDER is made by pilot.py.
+// node label_pilot.mjs ADDRESS FOLDER MODULES CHROMIUM [PICTURES]; writes numbers to stdout as JSON. FOLDER is made by
+// pilot.py, MODULES is where install.sh put playwright-core.
 import { readFileSync } from "node:fs";
+import { createRequire } from "node:module";
 import { join } from "node:path";
-import { chromium } from "playwright-core";
 
-const [, , address, folder, executablePath, pictures] = process.argv;
+const [, , address, folder, modules, executablePath, pictures] = process.argv;
+const { chromium } = createRequire(join(modules, "index.js"))("playwright-core");
 const truth = JSON.parse(readFileSync(join(folder, "truth.json"), "utf8"));
 const drawings = truth.floors.map((name) => join(folder, `${name}.png`));
 const began = Date.now(), faults = [];
@@ -17,6 +19,7 @@ for (const p of [page]) {
   p.on("pageerror", (error) => faults.push(error.message));
   p.on("console", (message) => { if (message.type() === "error" && !/status of 4\d\d/.test(message.text())) faults.push(message.text()); });
 }
+const settled = (of = page) => of.evaluate(() => document.querySelectorAll(".toast button").forEach((button) => button.click()));
 const picture = async (name, of = page) => { if (pictures) await of.screenshot({ path: join(pictures, `${name}.png`) }); };
 const saved = (of = page) => of.waitForFunction(() => /Saved|Draft saved/.test(document.getElementById("saved").textContent), null, { timeout: 30000 });
 
@@ -70,6 +73,31 @@ async function placeDevices(times, most = Infinity) {
   }
 }
 
+// A device is placed, a zone is renamed and a wall is drawn without the mouse, and all of it is taken back.
+async function byKeyboard() {
+  const before = await left();
+  await page.focus("#plan");
+  await page.keyboard.press("p");
+  await page.keyboard.press("ArrowRight");
+  await page.keyboard.press("ArrowDown");
+  await page.keyboard.press("Enter");
+  expect((await left()) !== before, "a device placed with the Enter key");
+  await page.keyboard.press("Escape");
+  await page.keyboard.press("Control+z");
+  expect((await left()) === before, "the device taken back");
+  const zones = await page.locator(".zone").count();
+  await page.keyboard.press("w");
+  await page.keyboard.press("ArrowRight"); // the cursor in the middle of the plan
+  await page.keyboard.press("Enter");
+  for (let k = 0; k < 20; k++) await page.keyboard.press("Shift+ArrowLeft");
+  await page.keyboard.press("Enter");
+  expect((await page.locator(".zone").count()) > zones, "a wall across rooms to part them");
+  await page.keyboard.press("Control+z");
+  expect((await page.locator(".zone").count()) === zones, "the wall taken back");
+  await page.keyboard.press("Escape");
+  await page.keyboard.press("Escape");
+}
+
 // The page is loaded anew right after a click: nothing may be lost.
 async function reload() {
   const before = await left();
@@ -92,9 +120,9 @@ async function correct() {
   await page.mouse.up();
   expect((await count()) === zones + 1, "one zone more after the split");
   await page.keyboard.press("v");
-  await page.mouse.click(x - 30, y);
+  await page.mouse.click(x - 18, y);
   await page.keyboard.down("Shift");
-  await page.mouse.click(x + 30, y);
+  await page.mouse.click(x + 18, y);
   await page.keyboard.up("Shift");
   await picture("merge");
   await page.keyboard.press("m");
@@ -159,12 +187,13 @@ await page.setInputFiles("#device-file", join(folder, "devices.csv"));
 await page.waitForFunction((n) => document.querySelectorAll(".list [role=option]").length === n, Object.keys(truth.devices).length);
 await picture("devices");
 
+await byKeyboard();
 const times = [];
-await page.keyboard.press("Escape");
 await page.click("#place-next");
 await page.check("#placing input");
 await placeDevices(times, Math.floor(Object.keys(truth.rooms).length / 3));
-await picture("placing");
+await settled();
+await picture("labelling");
 await reload();
 await page.click("#place-next");
 await page.check("#placing input");

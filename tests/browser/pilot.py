@@ -19,7 +19,7 @@ MARGIN = 40  # px of paper around the building
 
 
 def draw_pilot(
-    folder: Path, *, seed: int = 0, zones: int = 123, floor_area: float = 6317.0, pixel: float = 0.05
+    folder: Path, *, seed: int = 0, zones: int = 123, floor_area: float = 6317.0, pixel: float = 0.025
 ) -> dict[str, Any]:
     """Draw each floor as a PNG, write the devices as CSV, and say what is true of them.
 

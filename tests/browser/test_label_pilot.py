@@ -1,7 +1,11 @@
 """A browser labels the pilot building from PNGs and a CSV; run ``tests/browser/install.sh`` first.
 
-The pilot with its 127 devices takes a minute or two and runs with ``BUILDINGMPC_BROWSER=full``; otherwise a building of 12
-zones is labelled.
+The pilot with its 127 devices takes a minute or two of one core and runs with ``BUILDINGMPC_BROWSER=full``; otherwise a
+building of 12 zones is labelled. ``BUILDINGMPC_PICTURES=DIR`` writes pictures and numbers; the picture of the
+documentation is made by::
+
+    BUILDINGMPC_BROWSER=full BUILDINGMPC_PICTURES=pictures pytest tests/browser
+    cp pictures/labelling.png docs/images
 """
 
 from __future__ import annotations
@@ -27,7 +31,8 @@ pytest.importorskip("skimage", reason="needs the extra [plan]")
 HERE = Path(__file__).parent
 FULL = os.environ.get("BUILDINGMPC_BROWSER") == "full"
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
-if CHROMIUM is None or shutil.which("node") is None or not (HERE / "node_modules" / "playwright-core").is_dir():
+MODULES = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "buildingmpc-browser" / "node_modules"
+if CHROMIUM is None or shutil.which("node") is None or not (MODULES / "playwright-core").is_dir():
     pytest.skip("needs chromium and playwright-core: run tests/browser/install.sh", allow_module_level=True)
 
 
@@ -41,6 +46,14 @@ def bomb() -> bytes:
     return (
         b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(bytes(1000))) + chunk(b"IEND", b"")
     )
+
+
+def shrink(picture: Path) -> None:
+    """Make a picture small enough for the documentation."""
+    from PIL import Image
+
+    with Image.open(picture) as image:
+        image.convert("RGB").resize((1152, 720), Image.Resampling.LANCZOS).quantize(64).save(picture, optimize=True)
 
 
 @pytest.fixture
@@ -78,7 +91,7 @@ def server(tmp_path: Path) -> Iterator[tuple[str, subprocess.Popen[str]]]:
 
 def test_a_browser_labels_a_building(truth: dict[str, Any], server: tuple[str, Any], tmp_path: Path) -> None:
     pictures = Path(os.environ["BUILDINGMPC_PICTURES"]) if "BUILDINGMPC_PICTURES" in os.environ else None
-    command = ["node", str(HERE / "label_pilot.mjs"), server[0], str(tmp_path / "drawings"), str(CHROMIUM)]
+    command = ["node", str(HERE / "label_pilot.mjs"), server[0], str(tmp_path / "drawings"), str(MODULES), str(CHROMIUM)]
     done = subprocess.run(
         [*command, *([str(pictures)] if pictures else [])], capture_output=True, text=True, timeout=1800
     )
@@ -86,6 +99,7 @@ def test_a_browser_labels_a_building(truth: dict[str, Any], server: tuple[str, A
     numbers = json.loads(done.stdout)
     if pictures is not None:
         (pictures / "numbers.json").write_text(json.dumps(numbers, indent=2), encoding="utf-8")
+        shrink(pictures / "labelling.png")
     assert numbers["slowest_placement"] < 15.0 and numbers["seconds_per_device"] < 15.0
     assert numbers["told"].startswith("This case is open in another window")
     assert "bomb.png" in numbers["refusal"]

@@ -27,7 +27,7 @@ _TRIAL_CELL = 0.5  # m: codes are read once at any size to see that they are cod
 
 
 @dataclass(frozen=True)
-class Sheet:
+class _Sheet:
     """A drawing that was taken in.
 
     Parameters
@@ -140,12 +140,12 @@ class Upload:
         self._stream.close()
         return self.path
 
-    def keep_drawing(self) -> Sheet:
+    def keep_drawing(self) -> _Sheet:
         """Look at it, and keep it; it replaces one of the same name.
 
         Returns
         -------
-        Sheet
+        _Sheet
             The drawing.
 
         Raises
@@ -164,7 +164,7 @@ class Upload:
         self._place.cleanup()
 
 
-def look_at(path: Path, page: int = 1, dots_per_inch: float = 150.0) -> Sheet:
+def look_at(path: Path, page: int = 1, dots_per_inch: float = 150.0) -> _Sheet:
     """Look at a drawing: all of an image, the first bytes of others.
 
     Parameters
@@ -178,7 +178,7 @@ def look_at(path: Path, page: int = 1, dots_per_inch: float = 150.0) -> Sheet:
 
     Returns
     -------
-    Sheet
+    _Sheet
         What it is.
 
     Raises
@@ -190,11 +190,11 @@ def look_at(path: Path, page: int = 1, dots_per_inch: float = 150.0) -> Sheet:
     kind = file.suffix.lower()
     if kind in RASTER_KINDS:
         drawing = read_drawing(file, page=page, dots_per_inch=dots_per_inch)
-        return Sheet(file.name, "raster", drawing.grey.shape[1], drawing.grey.shape[0], drawing.dots_per_inch)
+        return _Sheet(file.name, "raster", drawing.grey.shape[1], drawing.grey.shape[0], drawing.dots_per_inch)
     if kind in CODE_KINDS:
         read_codes(file, _TRIAL_CELL)
-        return Sheet(file.name, "codes")
-    return Sheet(file.name, "vector")
+        return _Sheet(file.name, "codes")
+    return _Sheet(file.name, "vector")
 
 
 def picture_of(grey: NDArray[np.uint8]) -> bytes:
