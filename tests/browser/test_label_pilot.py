@@ -91,7 +91,14 @@ def server(tmp_path: Path) -> Iterator[tuple[str, subprocess.Popen[str]]]:
 
 def test_a_browser_labels_a_building(truth: dict[str, Any], server: tuple[str, Any], tmp_path: Path) -> None:
     pictures = Path(os.environ["BUILDINGMPC_PICTURES"]) if "BUILDINGMPC_PICTURES" in os.environ else None
-    command = ["node", str(HERE / "label_pilot.mjs"), server[0], str(tmp_path / "drawings"), str(MODULES), str(CHROMIUM)]
+    command = [
+        "node",
+        str(HERE / "label_pilot.mjs"),
+        server[0],
+        str(tmp_path / "drawings"),
+        str(MODULES),
+        str(CHROMIUM),
+    ]
     done = subprocess.run(
         [*command, *([str(pictures)] if pictures else [])], capture_output=True, text=True, timeout=1800
     )

@@ -131,8 +131,8 @@ function drawZones(floor) {
     const [fill, edge, title, area] = group.children;
     fill.setAttribute("d", paths.fills.get(place.number) || "");
     edge.setAttribute("d", paths.lines.get(place.number) || "");
-    const wide = (place.span * 0.9) / (0.62 * name.length);
-    const inRows = Math.min(1.9, wide, place.depth * 0.62), inLine = Math.min(1.9, wide * 0.85, place.depth * 1.1);
+    const wide = (place.span * 0.9) / (0.62 * name.length), half = Math.max(0.5, place.depth - 0.5);
+    const inRows = Math.min(1.9, wide, half * 0.62), inLine = Math.min(1.9, wide * 0.85, half * 1.1);
     place.narrow = inRows < 0.7 * inLine; // the name alone, and devices beside it
     const size = place.size = Math.max(0.35, place.narrow ? inLine : inRows);
     title.textContent = name;
