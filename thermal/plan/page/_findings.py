@@ -112,8 +112,8 @@ def _on_site(draft: Draft) -> Iterator[DraftFinding]:
     except ValidationError as error:
         for detail in error.errors(include_url=False):
             key = str(detail["loc"][0])
-            expected = detail["msg"].removeprefix("Input should be ")
-            if detail["input"] is None or detail["input"] == "":
+            expected = f"expected {detail['msg'].removeprefix('Input should be ')}, found {detail['input']!r}"
+            if detail["input"] in (None, ""):
                 expected = "fill it in"
             yield DraftFinding("error", "site", key, f"{key}: {expected}")
     if draft.site.timezone:
