@@ -28,7 +28,7 @@ _INK, _WALL, _PAPER = 90, 150, 255  # greys of the picture of a drawing that is 
 
 
 @dataclass(frozen=True)
-class NewFloors:
+class _NewFloors:
     """Floors with those that were made of drawings.
 
     Parameters
@@ -54,7 +54,7 @@ class NewFloors:
 
 def add_floors(
     draft: Draft, entries: Sequence[FloorEntry], own: Path, cell_size: float | None, progress: Progress
-) -> NewFloors:
+) -> _NewFloors:
     """Make floors of drawings, beside those that a draft has.
 
     Parameters
@@ -72,7 +72,7 @@ def add_floors(
 
     Returns
     -------
-    NewFloors
+    _NewFloors
         All floors.
 
     Raises
@@ -100,10 +100,10 @@ def add_floors(
         for plan, entry, floor in zip(found.plans.floors, entries, found.floors, strict=True)
     ]
     turned = found.floors[0].survey.turned
-    return NewFloors(tuple(floors), found.plans.cell_size, orientation=turned, remarks=found.remarks)
+    return _NewFloors(tuple(floors), found.plans.cell_size, orientation=turned, remarks=found.remarks)
 
 
-def _beside(draft: Draft, entries: Sequence[FloorEntry], zoned: Sequence[ZonedFloor], own: Path) -> NewFloors:
+def _beside(draft: Draft, entries: Sequence[FloorEntry], zoned: Sequence[ZonedFloor], own: Path) -> _NewFloors:
     """Draw new floors on the grid of those that are there; these are moved at most, never drawn again."""
     size = draft.cell_size
     base = _as_surveyed(draft.floors[0], size)
@@ -128,7 +128,7 @@ def _beside(draft: Draft, entries: Sequence[FloorEntry], zoned: Sequence[ZonedFl
         for plan, entry, floor in zip(plans, entries, placed, strict=True)
     ]
     remarks = tuple(f"floor {f.name!r}: {remark}" for f in placed for remark in f.survey.remarks)
-    return NewFloors((*kept, *new), size, shift, remarks=remarks)
+    return _NewFloors((*kept, *new), size, shift, remarks=remarks)
 
 
 def _as_surveyed(floor: DraftFloor, cell_size: float) -> ZonedFloor:

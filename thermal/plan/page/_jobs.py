@@ -22,7 +22,7 @@ class _StoppedError(LabelError):
 
 
 @dataclass
-class Job:
+class _Job:
     """A piece of work.
 
     Parameters
@@ -55,11 +55,11 @@ class Jobs:
 
     def __init__(self) -> None:
         self._pool = ThreadPoolExecutor(max_workers=1, thread_name_prefix="label")
-        self._jobs: dict[int, Job] = {}
+        self._jobs: dict[int, _Job] = {}
         self._lock = Lock()
         self._count = 0
 
-    def start(self, kind: str, work: Work) -> Job:
+    def start(self, kind: str, work: Work) -> _Job:
         """Begin a piece of work.
 
         Parameters
@@ -71,18 +71,18 @@ class Jobs:
 
         Returns
         -------
-        Job
+        _Job
             To be asked for by its number.
         """
         with self._lock:
             self._count += 1
-            job = self._jobs[self._count] = Job(self._count, kind)
+            job = self._jobs[self._count] = _Job(self._count, kind)
             for number in [n for n in self._jobs if n <= self._count - _KEPT]:
                 del self._jobs[number]
         self._pool.submit(self._run, job, work)
         return job
 
-    def get(self, number: int) -> Job | None:
+    def get(self, number: int) -> _Job | None:
         """Look a job up.
 
         Parameters
@@ -92,12 +92,12 @@ class Jobs:
 
         Returns
         -------
-        Job or None
+        _Job or None
             None when there is none of that number.
         """
         return self._jobs.get(number)
 
-    def busy(self, kind: str) -> Job | None:
+    def busy(self, kind: str) -> _Job | None:
         """Find a job of a kind that is not done.
 
         Parameters
@@ -107,7 +107,7 @@ class Jobs:
 
         Returns
         -------
-        Job or None
+        _Job or None
             The first.
         """
         return next((job for job in self._jobs.values() if job.kind == kind and job.state in ("waiting", "runs")), None)
@@ -118,7 +118,7 @@ class Jobs:
             job.stop.set()
         self._pool.shutdown(wait=False, cancel_futures=True)
 
-    def _run(self, job: Job, work: Work) -> None:
+    def _run(self, job: _Job, work: Work) -> None:
         def progress(stage: str, done: int, total: int) -> None:
             if job.stop.is_set():
                 raise _StoppedError("stopped")

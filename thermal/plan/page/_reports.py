@@ -23,7 +23,7 @@ _MOST = 200
 
 
 @dataclass(frozen=True)
-class Report:
+class _Report:
     """A report that is there.
 
     Parameters
@@ -74,12 +74,12 @@ class Reports:
         """Reports that can be made."""
         return tuple(self._makers)
 
-    def found(self) -> tuple[Report, ...]:
+    def found(self) -> tuple[_Report, ...]:
         """Look for reports in the case and in the folders of results.
 
         Returns
         -------
-        tuple of Report
+        tuple of _Report
             Newest first.
         """
         pages = {page for root in (self._case, *self._folders) for page in _pages(root)}
@@ -121,7 +121,7 @@ class Reports:
         Returns
         -------
         dict
-            The report, as in `Report.to_dict`.
+            The report, as in the list.
 
         Raises
         ------
@@ -156,13 +156,13 @@ class Reports:
             raise ReportError(describe("report", "one that can be made", repr(kind[:40]), nearest(kind, self._makers)))
         return kind
 
-    def _report(self, page: Path) -> Report:
+    def _report(self, page: Path) -> _Report:
         folder = page.parent
         kind = next((kind for name, kind in _KINDS.items() if (folder / name).is_file()), "other")
         inside = folder.is_relative_to(self._case)
         title = folder.relative_to(self._case).as_posix() if inside else folder.name
         key = hashlib.sha256(str(page).encode("utf-8", "surrogateescape")).hexdigest()[:16]
-        return Report(key, kind, "imported plans" if title == "." else title, page.stat().st_mtime, page)
+        return _Report(key, kind, "imported plans" if title == "." else title, page.stat().st_mtime, page)
 
 
 def _pages(root: Path) -> list[Path]:
