@@ -61,3 +61,7 @@ class BoptestTimeoutError(BoptestError):
 
 class FmuError(PlantError):
     """A functional mock-up unit that cannot be run, or fails to."""
+
+
+class ReportProcessError(MpcError):
+    """A report that is made in a process of its own could not be made."""

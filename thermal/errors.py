@@ -350,3 +350,28 @@ class RoomNameError(PlanError):
 
 class DeviceListError(PlanError):
     """A list of devices that cannot be understood."""
+
+
+# The labelling page
+class LabelError(ThermalError):
+    """Something is wrong with what the labelling page is asked for."""
+
+
+class AccessError(LabelError):
+    """A request that does not come from the page: a wrong token, host or origin."""
+
+
+class MalformedRequestError(LabelError):
+    """A request whose body is not what the page would send."""
+
+
+class SessionHeldError(LabelError):
+    """The case is being labelled elsewhere, or somebody else has taken over."""
+
+
+class LabelledCaseError(LabelError):
+    """A case that cannot be labelled: it has a zone table, or its labelling file is damaged."""
+
+
+class ReportError(LabelError):
+    """A report that is not there, or could not be made."""

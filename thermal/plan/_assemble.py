@@ -37,11 +37,14 @@ class PlanImport:
         Drawings with their zones, lowest first, above each other.
     area_errors : mapping
         Area of the zone in the plans against that on its drawing, minus one [-], by zone.
+    corner : tuple of float
+        Rightwards and downwards, from the common origin of the drawings to the plans' first corner [m].
     """
 
     plans: FloorPlans
     floors: tuple[ZonedFloor, ...]
     area_errors: Mapping[str, float]
+    corner: tuple[float, float] = (0.0, 0.0)
 
     @property
     def largest_error(self) -> float:
@@ -108,7 +111,7 @@ def assemble_plans(
     _check_names(floors)
     placed = align_floors(floors, anchors)
     sizes = CELL_SIZES if cell_size is None else (checked_number(cell_size, "cell_size", 0.02, 5.0, "m"),)
-    best: tuple[float, float, tuple[FloorPlan, ...], dict[str, float]] | None = None
+    best: tuple[float, PlanImport] | None = None
     lost: LostRoomError | None = None
     for number, size in enumerate(sizes):
         if progress is not None:
@@ -121,22 +124,21 @@ def assemble_plans(
             raise PlanSettingError(describe("cell_size", f"at most {_MOST_CELLS / 1e6:.0f} million cells", found))
         for phase in np.ndindex(_PHASES, _PHASES):
             try:
-                drawn = draw_cells(placed, size, (phase[0] / _PHASES, phase[1] / _PHASES))
+                drawn, corner = draw_cells(placed, size, (phase[0] / _PHASES, phase[1] / _PHASES))
             except LostRoomError as error:
                 lost = error
                 break
             errors = _area_errors(placed, drawn, size)
             worst = max(map(abs, errors.values()))
             if best is None or worst < best[0]:
-                best = (worst, size, drawn, errors)
+                best = (worst, PlanImport(FloorPlans(size, drawn), placed, errors, corner))
         if best is not None and best[0] <= AREA_TOLERANCE:
             break
     if best is None:
         raise lost or LostRoomError("no cell size fits")
-    _, size, drawn, errors = best
-    for plan in drawn:
+    for plan in best[1].plans.floors:
         check_plan(plan.tokens, f"floor {plan.name!r}")
-    return PlanImport(FloorPlans(size, drawn), placed, errors)
+    return best[1]
 
 
 def _area_errors(floors: Sequence[ZonedFloor], plans: Sequence[FloorPlan], cell_size: float) -> dict[str, float]:

@@ -91,7 +91,9 @@ def split_walls(survey: FloorSurvey) -> tuple[IntArray, Mask]:
     return rooms, exterior
 
 
-def draw_cells(floors: Sequence[ZonedFloor], cell_size: float, phase: tuple[float, float]) -> tuple[FloorPlan, ...]:
+def draw_cells(
+    floors: Sequence[ZonedFloor], cell_size: float, phase: tuple[float, float]
+) -> tuple[tuple[FloorPlan, ...], tuple[float, float]]:
     """Draw floors as plans of tokens on one grid.
 
     Parameters
@@ -105,8 +107,9 @@ def draw_cells(floors: Sequence[ZonedFloor], cell_size: float, phase: tuple[floa
 
     Returns
     -------
-    tuple of FloorPlan
-        All of one shape, cropped to what is built.
+    tuple
+        Plans of all floors, of one shape, cropped to what is built; and rightwards and downwards, from the common
+        origin to their first corner [m].
 
     Raises
     ------
@@ -118,7 +121,8 @@ def draw_cells(floors: Sequence[ZonedFloor], cell_size: float, phase: tuple[floa
     built = np.any([tokens != OUTSIDE for tokens in drawn], axis=0)
     rows, columns = (np.flatnonzero(built.any(axis=axis)) for axis in (1, 0))
     part = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
-    return tuple(FloorPlan(f.name, f.height, tokens[part]) for f, tokens in zip(floors, drawn, strict=True))
+    corner = (frame[0] + float(columns[0]) * cell_size, frame[1] + float(rows[0]) * cell_size)
+    return tuple(FloorPlan(f.name, f.height, tokens[part]) for f, tokens in zip(floors, drawn, strict=True)), corner
 
 
 def drawn_areas(plan: FloorPlan, cell_size: float) -> dict[str, float]:

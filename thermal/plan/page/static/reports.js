@@ -1,0 +1,82 @@
+// The page after: reports of the case that are there, and those that are made when asked for.
+
+import * as api from "./api.js";
+import { byId, el, openDialog, toast } from "./dom.js";
+import { page, save } from "./store.js";
+
+const WORDS = {
+  check: ["Check", "Geometry drawn, quality of the telemetry, what each point is. Seconds."],
+  calibrate: ["Calibrate", "Fit the physical parameters to the telemetry. Minutes."],
+  diagnose: ["Diagnose", "Where, which and how far model and building disagree. Minutes."],
+};
+const jobs = new Map(); // kind -> {state, stop}
+
+export async function openReports() {
+  openDialog("Reports", el("div", { id: "reports-body", class: "reports" }, "Loading…"), { wide: true });
+  await refresh();
+}
+
+async function refresh() {
+  if (!byId("reports-body")) return;
+  try {
+    await save();
+    const { reports, running } = await api.get("api/reports");
+    for (const state of running) if (!jobs.has(state.kind)) watch(state.kind, state);
+    draw(reports);
+  } catch (error) {
+    byId("reports-body").textContent = `${error.refusal || error.name}: ${error.message}`;
+  }
+}
+
+function draw(reports) {
+  const body = byId("reports-body"), errors = page.findings.some((f) => f.level === "error");
+  if (!body) return;
+  const cards = page.reports.map((kind) => {
+    const [title, text] = WORDS[kind] || [kind, ""], job = jobs.get(kind);
+    return el("section", { class: "card" }, el("h3", {}, title), el("p", { class: "soft" }, text),
+      job ? el("div", { class: "working", id: `job-${kind}` }, el("p", { role: "status", "aria-live": "polite" }, words(job.state)), el("progress", job.state.total ? { max: job.state.total, value: job.state.done } : {}), el("button", { type: "button", onclick: () => job.stop.abort() }, "Stop"))
+        : el("button", { type: "button", class: "primary", id: `make-${kind}`, disabled: errors || !page.written, onclick: () => make(kind) }, `${title} now`));
+  });
+  const rows = reports.map((report) => el("tr", {},
+    el("td", {}, el("a", { href: api.address(`reports/${report.key}`), target: "_blank", rel: "noopener" }, report.title)), el("td", {}, report.kind), el("td", {}, new Date(report.time * 1000).toLocaleString())));
+  body.replaceChildren(
+    errors ? el("p", { class: "message" }, "Reports can be made as soon as the case is valid.") : !page.telemetry ? el("p", { class: "soft" }, "The case has no telemetry yet: check works, calibrate and diagnose need it.") : "",
+    el("div", { class: "cards" }, cards),
+    reports.length ? el("table", {}, el("caption", {}, "Reports of this case"), el("thead", {}, el("tr", {}, ["Report", "Kind", "Written"].map((h) => el("th", { scope: "col" }, h)))), el("tbody", {}, rows))
+      : el("p", { class: "soft" }, "No reports yet. Those of results folders inside the case, or given with --results, are listed here."),
+  );
+}
+
+const words = (state) => `${state.stage || "working"} · ${Math.round(state.seconds)} s`;
+
+async function make(kind) {
+  try {
+    await save();
+    watch(kind, await api.send(`api/reports/${kind}`));
+    await refresh();
+  } catch (error) {
+    toast(`${error.refusal || error.name}: ${error.message}`, "error");
+  }
+}
+
+async function watch(kind, started) {
+  const stop = new AbortController();
+  jobs.set(kind, { state: started, stop });
+  try {
+    const report = await api.job(started, (state) => {
+      jobs.set(kind, { state, stop });
+      const box = byId(`job-${kind}`);
+      if (!box) return;
+      box.firstChild.textContent = words(state);
+      if (state.total) Object.assign(box.children[1], { max: state.total, value: state.done });
+    }, stop.signal);
+    toast(`${WORDS[kind]?.[0] || kind}: the report is there.`);
+    return report;
+  } catch (error) {
+    toast(`${error.refusal || error.name}: ${error.message}`, "error");
+    return null;
+  } finally {
+    jobs.delete(kind);
+    refresh();
+  }
+}
