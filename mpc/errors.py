@@ -41,3 +41,11 @@ class ReplayError(MpcError):
 
 class ControlError(MpcError):
     """A control problem whose parts do not fit, or data of a horizon that are incomplete."""
+
+
+class EnergyPlusError(PlantError):
+    """EnergyPlus is missing, has no such building, or a run of it failed."""
+
+
+class EnergyPlusTimeoutError(EnergyPlusError):
+    """EnergyPlus did not answer in time; its process was ended."""
