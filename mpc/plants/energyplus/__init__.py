@@ -5,6 +5,7 @@ from mpc.plants.energyplus._install import CHICAGO, reference_buildings, weather
 from mpc.plants.energyplus._layout import AirLoop, PlantLayout, Terminal, WaterLoop
 from mpc.plants.energyplus._make import OFFICE_COMFORT, energyplus_plant, energyplus_scenario
 from mpc.plants.energyplus._plant import EnergyPlusPlant
+from mpc.plants.energyplus._system import controller_system
 
 __all__ = [
     "CHICAGO",
@@ -15,6 +16,7 @@ __all__ = [
     "PlantLayout",
     "Terminal",
     "WaterLoop",
+    "controller_system",
     "energyplus_building",
     "energyplus_plant",
     "energyplus_scenario",

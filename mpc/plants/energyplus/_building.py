@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from mpc.errors import EnergyPlusError
+from mpc.plants._sensors import PlantDevices
 from mpc.plants.energyplus._geometry import building_of
 from mpc.plants.energyplus._input import InputFile, read_input, with_period
 from mpc.plants.energyplus._install import CHICAGO, building_path, weather_path
@@ -71,11 +72,22 @@ class EnergyPlusBuilding:
         EnergyPlusError
             When there is none.
         """
-        found = [v for (c, d), v in self.sizes.items() if c == component.upper() and d.startswith(description)]
+        begin, whose = _plain(description), component.upper()
+        found = [v for (c, d), v in self.sizes.items() if c == whose and _plain(d).startswith(begin)]
         if not found:
-            known = sorted(d for c, d in self.sizes if c == component.upper())
+            known = sorted(d for c, d in self.sizes if c == whose)
             raise EnergyPlusError(describe(f"sizes of {component!r}", repr(description), ", ".join(known) or "none"))
         return found[0]
+
+    @property
+    def devices(self) -> PlantDevices:
+        """Names of the devices; a building without boilers has an empty one, several chillers count as the first."""
+        names = {
+            kind: [d.name for d in self.building.devices if d.type == kind]
+            for kind in ("vav", "ahu", "boiler", "chiller")
+        }
+        boiler, chiller = names["boiler"] or [""], names["chiller"] or [None]
+        return PlantDevices(tuple(names["vav"]), tuple(names["ahu"]), boiler[0], chiller[0])
 
     @property
     def full_water_flow(self) -> dict[str, float]:
@@ -127,3 +139,8 @@ def _described(path: Path, weather: Path) -> EnergyPlusBuilding:
     sizes = {(str(name).upper(), str(what)): float(value) for name, what, value in rows}
     meters = tuple(_METER.findall(files["eplusout.mdd"].decode("latin-1")))
     return EnergyPlusBuilding(source, weather, layout, building, sizes, meters)
+
+
+def _plain(description: str) -> str:
+    """Description as some runs write it and others do not: without capitals and underscores."""
+    return description.lower().replace("_", " ")

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pandas as pd
 
+from mpc.plants._noise import SensorNoise
 from mpc.plants.energyplus._building import EnergyPlusBuilding, energyplus_building
 from mpc.plants.energyplus._install import CHICAGO
 from mpc.plants.energyplus._plant import EnergyPlusPlant
@@ -91,6 +92,7 @@ def energyplus_plant(
     tariff: Tariff | None = None,
     carbon: CarbonIntensity | None = None,
     comfort: ComfortBand | None = None,
+    noise: SensorNoise | None = None,
     lead_days: int = 1,
 ) -> EnergyPlusPlant:
     """Make a plant of one of EnergyPlus' buildings; `EnergyPlusPlant` has every choice.
@@ -119,6 +121,8 @@ def energyplus_plant(
         Emissions; not counted by default.
     comfort : ComfortBand, optional
         Of all zones; `OFFICE_COMFORT` by default.
+    noise : SensorNoise, optional
+        Errors of what is measured; none by default.
     lead_days : int
         Days under the building's own control before the run [d].
 
@@ -145,5 +149,5 @@ def energyplus_plant(
     )  # fmt: skip
     forecaster = None if horizon is None else Forecaster(scenario, horizon, errors)
     return EnergyPlusPlant(
-        source, scenario, days, control_steps=control_steps, forecaster=forecaster, lead_days=lead_days
+        source, scenario, days, control_steps=control_steps, forecaster=forecaster, lead_days=lead_days, noise=noise
     )

@@ -22,6 +22,7 @@ from mpc.plants._actuators import (
     Actuator,
     checked_actions,
 )
+from mpc.plants._noise import NoiseSource, SensorNoise
 from mpc.plants._plant import Measurements, PointLayout, need_running
 from mpc.plants.energyplus._building import EnergyPlusBuilding
 from mpc.plants.energyplus._input import InputFile, with_period
@@ -63,6 +64,10 @@ class EnergyPlusPlant:
         Days under the building's own control before the run [d], at least 1, after EnergyPlus' warm-up.
     limits : mapping of str to tuple of float, optional
         Ranges by kind of action in the place of the default ones [K].
+    noise : SensorNoise, optional
+        Errors of what is measured; none by default.
+    seed : int
+        Of the noise.
     patience : float
         Longest time for an answer of EnergyPlus [s]; then its process is ended.
 
@@ -84,6 +89,8 @@ class EnergyPlusPlant:
         forecaster: Forecaster | None = None,
         lead_days: int = 1,
         limits: Mapping[str, tuple[float, float]] | None = None,
+        noise: SensorNoise | None = None,
+        seed: int = 0,
         patience: float = 600.0,
     ) -> None:
         self.source, self.scenario, self.forecaster, self.control_steps = source, scenario, forecaster, control_steps
@@ -95,6 +102,7 @@ class EnergyPlusPlant:
         columns = columns_of(source.layout, source.building.weather_station, source.full_water_flow)
         self._reader = Reader(columns, source.layout)
         self._layout = PointLayout(self._reader.names, source.building.location.timezone)
+        self._noise, self._seed = None if noise is None else NoiseSource(self._layout, noise), seed
         self._meters = tuple(meters(source.meters, kind) for kind in ("Electricity", "NaturalGas"))
         self._process: EnergyPlusProcess | None = None
         self._number = -1
@@ -145,7 +153,7 @@ class EnergyPlusPlant:
         Parameters
         ----------
         seed : int, optional
-            Without effect: nothing is random.
+            Of the sensors' noise, all that is random; as before by default.
 
         Returns
         -------
@@ -153,12 +161,13 @@ class EnergyPlusPlant:
             Of the last control step before the run.
         """
         self.close()
+        self._seed = self._seed if seed is None else seed
         self._process, self._number = EnergyPlusProcess(self.job(), self._patience), 0
         self._clear()
         steps = self._lead * self._per_day
         rows, ends, _ = self._ask(steps, {})
         self._first = self._reader.rooms(ends[-1])
-        return self._seen(self._reader.read(rows[-min(self.control_steps, len(rows)) :]))
+        return self._seen(self._read(rows[-self.control_steps :], 0))
 
     def step(self, actions: Mapping[str, float]) -> Measurements:
         """Hold setpoints for a control step.
@@ -190,7 +199,7 @@ class EnergyPlusPlant:
             found = f"{self.steps - self._number} of its {self.steps}"
             raise PlantError(describe("run", f"{self.control_steps} more steps", found, "make it longer"))
         rows, ends, energy = self._ask(self.control_steps, given)
-        fresh = self._reader.read(rows)
+        fresh = self._read(rows, self._number)
         self._rows.append(fresh)
         self._rooms += [self._reader.rooms(end) for end in ends]
         self._energy.append(energy)
@@ -282,6 +291,12 @@ class EnergyPlusPlant:
             raise
         rows, ends, energy = (np.array(answer[kind], dtype=float) for kind in ("rows", "ends", "energy"))
         return rows, ends, energy
+
+    def _read(self, rows: FloatArray, first: int) -> FloatArray:
+        values = self._reader.read(rows)
+        if self._noise is None:
+            return values
+        return np.stack([self._noise.disturb(first + k, row, self._seed) for k, row in enumerate(values)])
 
     def _seen(self, rows: FloatArray) -> Measurements:
         return Measurements(self._layout, int(self.scenario.grid.edges[self.now]), rows.mean(axis=0))
