@@ -14,15 +14,15 @@ from mpc.plants.energyplus import EnergyPlusPlant, energyplus_plant
 from mpc.scenario import ConstantRate, Forecast, Tariff
 from thermal import Case, load_case, save_case
 
-STEP, CONTROL_STEPS = 300.0, 3  # s; an action a quarter of an hour
+STEP, CONTROL_STEPS = 300.0, 6  # s; an action every half hour
 TELEMETRY_DAYS, CONTROL_DAYS = 14, 7
 HORIZON = 12 * 12 + 12  # steps of a forecast: the controller's half day, and an hour
-#: Prices that stay the same: commercial averages of Illinois, 2022 (EIA, Electric Power Monthly and Natural Gas Monthly).
+#: Prices that stay the same, of the size of commercial averages in Illinois (assumed).
 ELECTRICITY, GAS = 0.112, 0.038  # USD/kWh
 HEATING, COOLING = 294.15, 297.15  # K, thermostats of the reference offices while they run
 FIRST_HOUR, LAST_HOUR = 6, {5: 18, 6: 0}  # of these on weekdays, Saturdays and Sundays end earlier
 DAY_ENDS = 22
-OFFSETS, HOLD = (-1.0, -0.5, 0.0, 0.5, 1.0), 12  # K, and control steps: three hours
+OFFSETS, HOLD = (-1.0, -0.5, 0.0, 0.5, 1.0), 6  # K, and control steps: three hours
 SUPPLY, SUPPLY_OFFSETS = 285.95, (0.0, 1.5, 3.0)  # K
 
 

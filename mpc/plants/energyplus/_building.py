@@ -86,8 +86,8 @@ class EnergyPlusBuilding:
             kind: [d.name for d in self.building.devices if d.type == kind]
             for kind in ("vav", "ahu", "boiler", "chiller")
         }
-        boiler, chiller = names["boiler"] or [""], names["chiller"] or [None]
-        return PlantDevices(tuple(names["vav"]), tuple(names["ahu"]), boiler[0], chiller[0])
+        chiller = names["chiller"][0] if names["chiller"] else None
+        return PlantDevices(tuple(names["vav"]), tuple(names["ahu"]), (names["boiler"] or [""])[0], chiller)
 
     @property
     def full_water_flow(self) -> dict[str, float]:
@@ -142,5 +142,5 @@ def _described(path: Path, weather: Path) -> EnergyPlusBuilding:
 
 
 def _plain(description: str) -> str:
-    """Description as some runs write it and others do not: without capitals and underscores."""
+    """Write a description without capitals and underscores, which some runs have and others have not."""
     return description.lower().replace("_", " ")

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import sqlite3
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 from mpc.plants.energyplus._input import InputFile
 from mpc.plants.energyplus._layout import PlantLayout
@@ -13,8 +14,15 @@ from mpc.scenario import read_epw
 from thermal import Building, ZoneTable
 from thermal.case import Device, Layer, Surface, ZoneEntry
 
-_KINDS = {"Wall": "wall", "Door": "wall", "Internal Mass": "wall", "Floor": "floor", "Roof": "ceiling"}
-_OPPOSITE = {"wall": "wall", "floor": "ceiling", "ceiling": "floor"}
+Kind = Literal["wall", "floor", "ceiling"]
+
+_KINDS: Mapping[str, Kind] = {
+    "Wall": "wall",
+    "Door": "wall",
+    "Internal Mass": "wall",
+    "Floor": "floor",
+    "Roof": "ceiling",
+}
 _OUTDOOR, _GROUND = "outdoor", "ground"
 _THIN = 0.01  # m, of a layer that has a resistance only
 _LIGHT = 10.0  # kg/m3, of such a layer
@@ -27,7 +35,7 @@ _QUERY = """
 class _Face(NamedTuple):
     """A surface as EnergyPlus has it; `behind` is a surface, 0 outdoors, negative the ground."""
 
-    index: int
+    number: int
     name: str
     kind: str
     area: float
@@ -92,7 +100,7 @@ def _surface(
     source: InputFile,
     served: set[str],
 ) -> Surface | None:
-    """A surface of the zone table; None for what is not a zone's, or has been counted from the other side."""
+    """Make a surface of the zone table; None for what is not a zone's, or has been counted from the other side."""
     zone, _, _, many = zones[face.zone]
     if zone not in served:
         return None
@@ -110,7 +118,7 @@ def _surface(
         other = entity(zones[faces[face.behind].zone][0])
         if other == entity(zone):  # its own back, or the same storey again: nothing leaves there
             kind = "wall"
-        elif zones[faces[face.behind].zone][0] in served and face.behind < face.index:
+        elif zones[faces[face.behind].zone][0] in served and face.behind < face.number:
             return None
     azimuth = face.azimuth if other == _OUTDOOR and kind == "wall" else None
     return Surface(name=name, kind=kind, zone=entity(zone), other=other, area=area, azimuth=azimuth,

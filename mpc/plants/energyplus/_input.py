@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from mpc.errors import EnergyPlusError
-from mpc.plants.energyplus._install import weather_path
+from mpc.plants.energyplus._install import CHICAGO, weather_path
 from mpc.plants.energyplus._process import Job, run_energyplus
 from thermal.errors import describe, nearest
 
@@ -108,24 +108,17 @@ def read_input(path: Path) -> InputFile:
         When EnergyPlus cannot read it.
     """
     job = Job(
-        path.read_text(encoding="latin-1"), "in.idf", weather_path_any(), options=("--convert-only",), stepped=False
+        path.read_text(encoding="latin-1"), "in.idf", weather_path(CHICAGO), options=("--convert-only",), stepped=False
     )
     text = run_energyplus(job, ["in.epJSON"])["in.epJSON"]
     return InputFile(json.loads(text), path.stem)
 
 
-def weather_path_any() -> Path:
-    """Some weather file: a conversion reads none, but the command line has one."""
-    from mpc.plants.energyplus._install import CHICAGO
-
-    return weather_path(CHICAGO)
-
-
 def with_period(source: InputFile, start: date, days: int, steps_per_hour: int) -> dict[str, Any]:
     """Copy an input file with its clock and reports replaced.
 
-    Reports of its own are left out, daylight saving time too: the building's clock is that of its weather file. Holidays
-    stay.
+    Reports of its own are left out, daylight saving time too: the building's clock is that of its weather file.
+    Holidays stay.
 
     Parameters
     ----------
@@ -146,7 +139,7 @@ def with_period(source: InputFile, start: date, days: int, steps_per_hour: int) 
     last = start + timedelta(days=days - 1)
     content = {k: copy.deepcopy(dict(v)) for k, v in source.content.items() if k not in (*_REPORTS, *_CLOCK)}
     content["Timestep"] = {"Timestep 1": {"number_of_timesteps_per_hour": steps_per_hour}}
-    control = next(iter(content.get("SimulationControl", {"SimulationControl 1": {}}).values()))
+    control: dict[str, Any] = dict(next(iter(content.get("SimulationControl", {"": {}}).values())))
     control |= {
         "run_simulation_for_sizing_periods": "No",
         "run_simulation_for_weather_file_run_periods": "Yes",

@@ -43,8 +43,8 @@ _LIMITS = {SUPPLY_AIR: (283.15, 303.15), SUPPLY_WATER: (310.0, 361.15)}
 class EnergyPlusPlant:
     """A building of EnergyPlus in closed loop.
 
-    Every run has a process of its own, which waits at each control step. What an action leaves out stays as the building
-    has it, so that ``step({})`` is the building's own control.
+    Every run has a process of its own, which waits at each control step. What an action leaves out stays as the
+    building has it, so that ``step({})`` is the building's own control.
 
     Parameters
     ----------
@@ -350,8 +350,8 @@ def prepared(source: EnergyPlusBuilding, start: date, days: int, steps_per_hour:
 
 def _managers(source: EnergyPlusBuilding) -> dict[str, tuple[str, ...]]:
     """Setpoint managers by device."""
-    loops = (*source.layout.air_loops, *source.layout.water_loops)
-    return {loop.name: loop.managers for loop in loops}
+    managers = {loop.name: loop.managers for loop in source.layout.air_loops}
+    return managers | {loop.name: loop.managers for loop in source.layout.water_loops}
 
 
 def _schedule(source: InputFile, name: str) -> tuple[str, str]:
@@ -376,12 +376,13 @@ def _actuators(
     bounds = {**ACTION_LIMITS, **limits}
     found: list[Actuator] = []
     handles: list[tuple[str, str, str]] = []
-    for point, loops in ((SUPPLY_AIR, source.layout.air_loops), (SUPPLY_WATER, source.layout.water_loops)):
-        for loop in loops:
-            named = {str(source.source.find("SetpointManager:Scheduled", m)["schedule_name"]) for m in loop.managers}
-            kind, schedule = _schedule(source.source, sorted(named)[0])
-            found.append(Actuator(f"{entity(loop.name)}/{point}", "K", *bounds[point], required=False))
-            handles.append((kind, "Schedule Value", _own(loop.name, schedule)))
+    devices = [(SUPPLY_AIR, loop.name, loop.managers) for loop in source.layout.air_loops]
+    devices += [(SUPPLY_WATER, water.name, water.managers) for water in source.layout.water_loops]
+    for point, name, managers in devices:
+        named = {str(source.source.find("SetpointManager:Scheduled", m)["schedule_name"]) for m in managers}
+        kind, schedule = _schedule(source.source, sorted(named)[0])
+        found.append(Actuator(f"{entity(name)}/{point}", "K", *bounds[point], required=False))
+        handles.append((kind, "Schedule Value", _own(name, schedule)))
     for point, control in ((HEATING_SETPOINT, "Heating Setpoint"), (COOLING_SETPOINT, "Cooling Setpoint")):
         for zone in source.layout.zones:
             found.append(Actuator(f"{entity(zone)}/{point}", "K", *bounds[point], required=False))

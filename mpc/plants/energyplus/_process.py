@@ -84,10 +84,12 @@ class EnergyPlusProcess:
         self.folder = Path(tempfile.mkdtemp(prefix="buildingmpc-energyplus-"))
         (self.folder / job.name).write_text(job.model, encoding="latin-1")
         content = {
-            "input": str(self.folder / job.name), "weather": str(job.weather), "out": str(self.output),
-            "variables": list(job.variables), "products": list(job.products), "meters": list(job.meters), "actuators": list(job.actuators),
-            "options": list(job.options), "stepped": job.stepped,
-        }  # fmt: skip
+            "input": str(self.folder / job.name),
+            "weather": str(job.weather),
+            "out": str(self.output),
+            **{kind: list(getattr(job, kind)) for kind in ("variables", "products", "meters", "actuators", "options")},
+            "stepped": job.stepped,
+        }
         path = self.folder / "job.json"
         path.write_text(json.dumps(content), encoding="utf-8")
         environment = os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}

@@ -1,7 +1,7 @@
 """The plant as a controller may believe it to be: devices of `thermal.hvac` at the sizes that EnergyPlus found.
 
 Cooling coils of chilled water have a constant coefficient of performance. Electric reheat is a hot-water loop that
-loses nothing, with coils that give whatever the discharge temperature asks for: its "fuel" is electricity.
+loses nothing, with coils that give whatever the discharge temperature asks for: its "fuel" stands for electricity.
 """
 
 from __future__ import annotations
@@ -37,18 +37,22 @@ _PLENTY = 5.0  # NTU of a coil that stands for electric resistance
 _CONSTANT = Biquadratic((1.0, 0.0, 0.0, 0.0, 0.0, 0.0), (-50.0, 50.0), (-50.0, 60.0), "no dependence")
 
 
-def controller_system(source: EnergyPlusBuilding) -> HvacSystem:
+def controller_system(source: EnergyPlusBuilding, price_ratio: float = 1.0) -> HvacSystem:
     """Make a building's plant at EnergyPlus' sizes.
 
     Parameters
     ----------
     source : EnergyPlusBuilding
         The building.
+    price_ratio : float
+        Price of fuel over that of electricity [-], 0.1 to 1. It counts with electric reheat only, which is then as
+        dear as it is: so much "fuel" as costs what its electricity does.
 
     Returns
     -------
     HvacSystem
-        For a predictor. With electric reheat its fuel is the reheat's electricity, beside the gas of heating coils.
+        For a predictor. With electric reheat its fuel is the reheat's electricity over `price_ratio`, and the gas of
+        heating coils.
 
     Raises
     ------
@@ -59,7 +63,7 @@ def controller_system(source: EnergyPlusBuilding) -> HvacSystem:
     """
     density = air_density(source.building.location.elevation)
     handlers = tuple(_air_handler(source, loop, density) for loop in source.layout.air_loops)
-    return HvacSystem(handlers, _loop(source, handlers), _terminals(source, density), Thermostat(_TIGHT))
+    return HvacSystem(handlers, _loop(source, price_ratio), _terminals(source, density), Thermostat(_TIGHT))
 
 
 def _terminals(source: EnergyPlusBuilding, density: float) -> Terminals:
@@ -134,11 +138,14 @@ def _cooling(source: EnergyPlusBuilding, loop: AirLoop) -> CoolingCoil | None:
     return None
 
 
-def _loop(source: EnergyPlusBuilding, handlers: tuple[AirHandler, ...]) -> BoilerLoop:
+def _loop(source: EnergyPlusBuilding, price_ratio: float) -> BoilerLoop:
     if not source.layout.water_loops:
         flow = float(_terminals(source, 1.0).water_flow.sum())
         pump = Pump(flow, 5_000.0, 1_000.0, 0.95, 0.01, 0.0)
-        return BoilerLoop(1e7, pump, 1.0, CONSTANT_EFFICIENCY, 0.0, 0.0, 1e-3, 1.0)
+        # heat per "fuel" is the ratio, which is below what a boiler's efficiency may be: its curve has the rest
+        efficiency = max(price_ratio, 0.5)
+        curve = Biquadratic((price_ratio / efficiency, 0.0, 0.0, 0.0, 0.0, 0.0), (0.0, 1.0), (0.0, 100.0), "price")
+        return BoilerLoop(1e7, pump, efficiency, curve, 0.0, 0.0, 1e-3, 1.0)
     loop = source.layout.water_loops[0]
     boilers = [source.source.find(kind, name) for kind, name in loop.boilers]
     capacity = sum(source.size(name, "Design Size Nominal Capacity") for _, name in loop.boilers)
