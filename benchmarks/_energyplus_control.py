@@ -11,15 +11,17 @@ import numpy as np
 import pandas as pd
 from _energyplus_offices import CONTROL_STEPS, ELECTRICITY, GAS, STEP
 
-from mpc.control import Action, Channel, ComfortOperation, ControllerSettings, MpcController
+from mpc.control import Action, Channel, ComfortOperation, ControllerSettings, Horizon, MpcController
 from mpc.plants import Measurements
 from mpc.plants.energyplus import EnergyPlusPlant, controller_system
 from mpc.scenario import Forecast
-from mpc.studies import control_model, default_horizon, make_controller, site_points
+from mpc.studies import control_model, make_controller, site_points
 
 #: Schedules as the building has them: setpoints half a kelvin inside of the band, an hour before people count.
 OPERATION = ComfortOperation(margin=0.5, lead_hours=1.0, widest_occupied=8.0)
 COMFORT_PRICE = 0.5  # USD/K/h of a zone
+#: Half a day ahead: quarters of an hour for two hours, then halves; 8 blocks that grow.
+AHEAD = Horizon.growing([(2.0, 900.0), (10.0, 1800.0)], [0.5, 0.5, 1.0, 1.0, 2.0, 2.0, 2.0, 3.0], CONTROL_STEPS * STEP)
 WATER = (323.15, 355.35)  # K: no warmer than the building's own
 
 
@@ -114,7 +116,7 @@ def optimal(plant: EnergyPlusPlant, calibration: Path) -> Optimal:
         model, plant, system=controller_system(source, GAS / ELECTRICITY),
         points=site_points(source.building, source.devices), building=source.building,
         settings=ControllerSettings(comfort_price=COMFORT_PRICE, operation=OPERATION),
-        horizon=default_horizon(CONTROL_STEPS * STEP), channels=channels, boundaries=dict.fromkeys(others, 293.15),
+        horizon=AHEAD, channels=channels, boundaries=dict.fromkeys(others, 293.15),
     )  # fmt: skip
     boundaries = MeasuredBoundaries(controller.signals, others)
     controller.signals = boundaries

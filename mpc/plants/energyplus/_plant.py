@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from datetime import date, timedelta
-from typing import Any
+from datetime import timedelta
 
 import numpy as np
 import pandas as pd
@@ -13,31 +12,21 @@ from numpy.typing import NDArray
 
 from mpc.errors import PlantError
 from mpc.kpi import PlantRecord
-from mpc.plants._actuators import (
-    ACTION_LIMITS,
-    COOLING_SETPOINT,
-    HEATING_SETPOINT,
-    SUPPLY_AIR,
-    SUPPLY_WATER,
-    Actuator,
-    checked_actions,
-)
+from mpc.plants._actuators import checked_actions
 from mpc.plants._noise import NoiseSource, SensorNoise
 from mpc.plants._plant import Measurements, PointLayout, need_running
 from mpc.plants.energyplus._building import EnergyPlusBuilding
-from mpc.plants.energyplus._input import InputFile, with_period
-from mpc.plants.energyplus._points import Reader, columns_of, entity, meters
+from mpc.plants.energyplus._points import Reader, columns_of, meters
 from mpc.plants.energyplus._process import EnergyPlusProcess, Job
+from mpc.plants.energyplus._setpoints import actuators_of, prepared
 from mpc.scenario import Forecast, Forecaster, Scenario
 from thermal import Case, Telemetry
-from thermal.errors import describe, nearest
+from thermal.errors import describe
 
 FloatArray = NDArray[np.float64]
 
 _FREEZING = 273.15  # K
 _DAY, _HOUR = 86_400, 3_600  # s
-#: Ranges of the supply setpoints [K]; water as hot as the reference buildings' own, 82.2 degC, must be in.
-_LIMITS = {SUPPLY_AIR: (283.15, 303.15), SUPPLY_WATER: (310.0, 361.15)}
 
 
 class EnergyPlusPlant:
@@ -97,7 +86,7 @@ class EnergyPlusPlant:
         self._days, self._lead, self._patience = days, lead_days, patience
         self._check()
         self._per_day = round(_DAY / scenario.grid.step)
-        self.actuators, self._handles = _actuators(source, {**_LIMITS, **(limits or {})})
+        self.actuators, self._handles = actuators_of(source, limits or {})
         self._by_name = {a.name: a for a in self.actuators}
         columns = columns_of(source.layout, source.building.weather_station, source.full_water_flow)
         self._reader = Reader(columns, source.layout)
@@ -316,75 +305,3 @@ class EnergyPlusPlant:
         if self.control_steps < 1 or round(self._days * _DAY / step) % self.control_steps:
             expected = "control steps of which the run has a whole number"
             raise PlantError(describe("control_steps", expected, repr(self.control_steps)))
-
-
-def prepared(source: EnergyPlusBuilding, start: date, days: int, steps_per_hour: int) -> dict[str, Any]:
-    """Write a building's input for a run: clock, and schedules of supply setpoints that are each device's own.
-
-    Parameters
-    ----------
-    source : EnergyPlusBuilding
-        The building.
-    start : date
-        First day.
-    days : int
-        Number of days.
-    steps_per_hour : int
-        Of zones and weather.
-
-    Returns
-    -------
-    dict
-        Content of an input file.
-    """
-    content = with_period(source.source, start, days, steps_per_hour)
-    for name, managers in _managers(source).items():
-        for manager in managers:
-            fields = content["SetpointManager:Scheduled"][manager]
-            kind, schedule = _schedule(source.source, str(fields["schedule_name"]))
-            own = _own(name, schedule)
-            content[kind][own] = dict(content[kind][schedule])
-            fields["schedule_name"] = own
-    return content
-
-
-def _managers(source: EnergyPlusBuilding) -> dict[str, tuple[str, ...]]:
-    """Setpoint managers by device."""
-    managers = {loop.name: loop.managers for loop in source.layout.air_loops}
-    return managers | {loop.name: loop.managers for loop in source.layout.water_loops}
-
-
-def _schedule(source: InputFile, name: str) -> tuple[str, str]:
-    """Type and name of a schedule as the file writes it."""
-    for kind, title, _ in source.begins("Schedule:"):
-        if title.lower() == name.lower():
-            return kind, title
-    raise PlantError(describe(source.name, f"a schedule {name!r}", "none"))
-
-
-def _own(device: str, schedule: str) -> str:
-    return f"{schedule} of {device}"
-
-
-def _actuators(
-    source: EnergyPlusBuilding, limits: Mapping[str, tuple[float, float]]
-) -> tuple[tuple[Actuator, ...], list[tuple[str, str, str]]]:
-    """Actuators, and what each is called in EnergyPlus: schedules of supply setpoints, thermostats of zones."""
-    for kind in limits:
-        if kind not in ACTION_LIMITS:
-            raise PlantError(describe("limits", "a kind of action", repr(kind), nearest(kind, ACTION_LIMITS)))
-    bounds = {**ACTION_LIMITS, **limits}
-    found: list[Actuator] = []
-    handles: list[tuple[str, str, str]] = []
-    devices = [(SUPPLY_AIR, loop.name, loop.managers) for loop in source.layout.air_loops]
-    devices += [(SUPPLY_WATER, water.name, water.managers) for water in source.layout.water_loops]
-    for point, name, managers in devices:
-        named = {str(source.source.find("SetpointManager:Scheduled", m)["schedule_name"]) for m in managers}
-        kind, schedule = _schedule(source.source, sorted(named)[0])
-        found.append(Actuator(f"{entity(name)}/{point}", "K", *bounds[point], required=False))
-        handles.append((kind, "Schedule Value", _own(name, schedule)))
-    for point, control in ((HEATING_SETPOINT, "Heating Setpoint"), (COOLING_SETPOINT, "Cooling Setpoint")):
-        for zone in source.layout.zones:
-            found.append(Actuator(f"{entity(zone)}/{point}", "K", *bounds[point], required=False))
-            handles.append(("Zone Temperature Control", control, zone))
-    return tuple(found), handles

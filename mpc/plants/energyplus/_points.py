@@ -32,7 +32,7 @@ _SITE = {
 _END_USES = ("Fans", "Cooling", "Heating", "Pumps", "HeatRejection", "HeatRecovery", "Humidifier")
 
 
-class Column(NamedTuple):
+class _Column(NamedTuple):
     """A column of telemetry.
 
     Parameters
@@ -77,7 +77,7 @@ def meters(names: Sequence[str], resource: str) -> tuple[str, ...]:
     return tuple(f"{use}:{resource}" for use in _END_USES if f"{use}:{resource}" in set(names))
 
 
-def columns_of(layout: PlantLayout, station: str, full_flow: dict[str, float]) -> tuple[Column, ...]:
+def columns_of(layout: PlantLayout, station: str, full_flow: dict[str, float]) -> tuple[_Column, ...]:
     """List the columns of a building.
 
     Parameters
@@ -95,40 +95,40 @@ def columns_of(layout: PlantLayout, station: str, full_flow: dict[str, float]) -
         columns += _air_columns(loop)
     for water in layout.water_loops:
         columns += _water_columns(water)
-    columns += [Column(f"{entity(name)}/electrical_power_sensor", (("Chiller Electricity Rate", name),))
+    columns += [_Column(f"{entity(name)}/electrical_power_sensor", (("Chiller Electricity Rate", name),))
                 for name in layout.chillers]  # fmt: skip
     columns += [
-        Column(f"{station}/{point}", ((output, "Environment"),), _FREEZING if "temperature" in point else 0.0)
+        _Column(f"{station}/{point}", ((output, "Environment"),), _FREEZING if "temperature" in point else 0.0)
         for point, output in _SITE.items()
     ]
     return tuple(columns)
 
 
-def _at(name: str, output: str, key: str) -> Column:
-    return Column(name, ((output, key),), _FREEZING)
+def _at(name: str, output: str, key: str) -> _Column:
+    return _Column(name, ((output, key),), _FREEZING)
 
 
-def _terminal_columns(layout: PlantLayout, full_flow: dict[str, float]) -> list[Column]:
-    columns: list[Column] = []
+def _terminal_columns(layout: PlantLayout, full_flow: dict[str, float]) -> list[_Column]:
+    columns: list[_Column] = []
     for t in layout.terminals:
         name = entity(t.name)
         columns += [
             _at(f"{name}/zone_air_temperature_sensor", _ZONE, t.zone),
             _at(f"{name}/{HEATING_SETPOINT}", "Zone Thermostat Heating Setpoint Temperature", t.zone),
             _at(f"{name}/{COOLING_SETPOINT}", "Zone Thermostat Cooling Setpoint Temperature", t.zone),
-            Column(f"{name}/supply_air_flowrate_sensor", ((_FLOW, t.outlet),)),
+            _Column(f"{name}/supply_air_flowrate_sensor", ((_FLOW, t.outlet),)),
             _at(f"{name}/discharge_air_temperature_sensor", _TEMPERATURE, t.outlet),
-            Column(
+            _Column(
                 f"{name}/supply_air_damper_percentage_command", (("Zone Air Terminal VAV Damper Position", t.name),)
             ),
         ]
         if t.water_node and full_flow.get(t.coil, 0.0) > 0.0:
-            share = Column(f"{name}/heating_water_valve_percentage_command", ((_FLOW, t.water_node),))
+            share = _Column(f"{name}/heating_water_valve_percentage_command", ((_FLOW, t.water_node),))
             columns.append(share._replace(scale=1.0 / full_flow[t.coil]))
     return columns
 
 
-def _air_columns(loop: AirLoop) -> list[Column]:
+def _air_columns(loop: AirLoop) -> list[_Column]:
     name = entity(loop.name)
     fans = tuple(("Fan Electricity Rate", fan) for _, fan in loop.of_kind("Fan:"))
     compressors = tuple(("Cooling Coil Electricity Rate", coil) for _, coil in loop.of_kind("Coil:Cooling:DX"))
@@ -138,20 +138,20 @@ def _air_columns(loop: AirLoop) -> list[Column]:
         _at(f"{name}/{SUPPLY_AIR}", _SETPOINT, loop.outlet),
         _at(f"{name}/supply_air_temperature_sensor", _TEMPERATURE, loop.outlet),
         _at(f"{name}/return_air_temperature_sensor", _TEMPERATURE, loop.inlet),
-        Column(f"{name}/supply_air_flowrate_sensor", ((_FLOW, loop.outlet),)),
+        _Column(f"{name}/supply_air_flowrate_sensor", ((_FLOW, loop.outlet),)),
     ]
     if loop.mixed:
         columns.append(_at(f"{name}/mixed_air_temperature_sensor", _TEMPERATURE, loop.mixed))
     if fans:
-        columns.append(Column(f"{name}/supply_fan_power_sensor", fans))
+        columns.append(_Column(f"{name}/supply_fan_power_sensor", fans))
     if fans or compressors or electric:
-        columns.append(Column(f"{name}/electrical_power_sensor", (*fans, *compressors, *electric)))
+        columns.append(_Column(f"{name}/electrical_power_sensor", (*fans, *compressors, *electric)))
     if gas:
-        columns.append(Column(f"{name}/gas_power_sensor", gas))
+        columns.append(_Column(f"{name}/gas_power_sensor", gas))
     return columns
 
 
-def _water_columns(loop: WaterLoop) -> list[Column]:
+def _water_columns(loop: WaterLoop) -> list[_Column]:
     name = entity(loop.name)
     gas = tuple(("Boiler NaturalGas Rate", boiler) for _, boiler in loop.boilers)
     pumps = tuple(("Pump Electricity Rate", pump) for _, pump in loop.pumps)
@@ -159,8 +159,8 @@ def _water_columns(loop: WaterLoop) -> list[Column]:
         _at(f"{name}/{SUPPLY_WATER}", _SETPOINT, loop.outlet),
         _at(f"{name}/supply_water_temperature_sensor", _TEMPERATURE, loop.outlet),
         _at(f"{name}/return_water_temperature_sensor", _TEMPERATURE, loop.inlet),
-        Column(f"{name}/gas_power_sensor", gas),
-        Column(f"{name}/pump_power_sensor", pumps),
+        _Column(f"{name}/gas_power_sensor", gas),
+        _Column(f"{name}/pump_power_sensor", pumps),
     ]
 
 
@@ -169,7 +169,7 @@ class Reader:
 
     Parameters
     ----------
-    columns : tuple of Column
+    columns : tuple of _Column
         Which.
     layout : PlantLayout
         Plant of the building.
@@ -182,7 +182,7 @@ class Reader:
         Of the columns.
     """
 
-    def __init__(self, columns: tuple[Column, ...], layout: PlantLayout) -> None:
+    def __init__(self, columns: tuple[_Column, ...], layout: PlantLayout) -> None:
         self.outputs: tuple[Output, ...] = tuple(dict.fromkeys(o for c in columns for o in c.outputs))
         self.names = tuple(c.name for c in columns)
         place = {output: k for k, output in enumerate(self.outputs)}

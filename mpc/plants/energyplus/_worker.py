@@ -22,7 +22,7 @@ _RUN_PERIOD = 3  # kind of simulation: a run period of a weather file
 _NO_HANDLES, _BROKEN = 3, 4  # exit codes
 
 
-class Run:
+class _Run:
     """A run: actions before each step, means over it after.
 
     Parameters
@@ -160,12 +160,12 @@ class Run:
         self.sums, self.hours = [0.0] * (len(self.variables) + len(self.job["products"])), 0.0
 
 
-def main() -> None:
+def _main() -> None:
     """Run the job of the command line until it ends, or the parent does."""
     channel = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)  # whatever EnergyPlus prints goes to the log
     path = Path(sys.argv[1])
-    run = Run(json.loads(path.read_text(encoding="utf-8")), channel)
+    run = _Run(json.loads(path.read_text(encoding="utf-8")), channel)
     threading.stack_size(_STACK)
     thread = threading.Thread(target=run.run, daemon=True)
     thread.start()
@@ -178,4 +178,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    _main()
