@@ -92,15 +92,15 @@ class Optimal:
         return action
 
 
-def optimal(plant: EnergyPlusPlant, calibration: Path) -> Optimal:
+def optimal(plant: EnergyPlusPlant, calibration: Path | Mapping[str, float]) -> Optimal:
     """Make the controller of a plant.
 
     Parameters
     ----------
     plant : EnergyPlusPlant
         Which.
-    calibration : Path
-        ``calibration.json`` of its model.
+    calibration : Path or mapping of str to float
+        ``calibration.json`` of its model, or parameters by name [parameter units].
     """
     source = plant.source
     model = control_model(source.building, calibration)

@@ -103,10 +103,3 @@ def test_a_building_without_vav_is_refused_with_what_it_has():
 def test_a_size_that_is_not_there_is_refused_with_those_that_are(office):
     with pytest.raises(EnergyPlusError, match="Design Electric Power Consumption"):
         office.size("VAV_1_Fan", "Colour")
-
-
-def test_a_broken_input_is_a_named_error_with_energyplus_own_words(office):
-    from mpc.plants.energyplus._process import Job, run_energyplus
-
-    with pytest.raises(EnergyPlusError, match="Severe"):
-        run_energyplus(Job("Version,25.2;\nZone,;\nNothing,1;\n", "in.idf", office.weather, stepped=False), [])
