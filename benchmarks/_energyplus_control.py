@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,10 +15,11 @@ from mpc.plants import Measurements
 from mpc.plants.energyplus import EnergyPlusPlant, controller_system
 from mpc.scenario import Forecast
 from mpc.studies import control_model, make_controller, site_points
+from thermal.effects import chosen
 
 #: Schedules as the building has them: setpoints half a kelvin inside of the band, an hour before people count.
 OPERATION = ComfortOperation(margin=0.5, lead_hours=1.0, widest_occupied=8.0)
-COMFORT_PRICE = 0.5  # USD/K/h of a zone
+COMFORT_PRICE = 1.5e-3  # USD/K/h of a square metre; zones are counted as equally large
 #: Half a day ahead: quarters of an hour for two hours, then halves; 8 blocks that grow.
 AHEAD = Horizon.growing([(2.0, 900.0), (10.0, 1800.0)], [0.5, 0.5, 1.0, 1.0, 2.0, 2.0, 2.0, 3.0], CONTROL_STEPS * STEP)
 WATER = (323.15, 355.35)  # K: no warmer than the building's own
@@ -92,18 +92,22 @@ class Optimal:
         return action
 
 
-def optimal(plant: EnergyPlusPlant, calibration: Path | Mapping[str, float]) -> Optimal:
+def optimal(
+    plant: EnergyPlusPlant, parameters: Mapping[str, float], effects: Mapping[str, Sequence[str]] | None = None
+) -> Optimal:
     """Make the controller of a plant.
 
     Parameters
     ----------
     plant : EnergyPlusPlant
         Which.
-    calibration : Path or mapping of str to float
-        ``calibration.json`` of its model, or parameters by name [parameter units].
+    parameters : mapping of str to float
+        Of its model, by name; starts for the rest [parameter units].
+    effects : mapping of str to sequence of str, optional
+        Effects of its model with their zones; none by default.
     """
     source = plant.source
-    model = control_model(source.building, calibration)
+    model = control_model(source.building, parameters, effects=chosen(effects or {}))
     limits = {a.name: (a.lowest, a.highest) for a in plant.actuators}
     channels = [
         Channel("supply_air_temperature", *limits[f"{name}/supply_air_temperature_setpoint"], air_handlers=(k,))
@@ -112,10 +116,11 @@ def optimal(plant: EnergyPlusPlant, calibration: Path | Mapping[str, float]) -> 
     if source.layout.water_loops:
         channels.append(Channel("supply_water_temperature", *WATER))
     others = model.network.boundaries[1:]
+    price = COMFORT_PRICE * float(plant.scenario.areas.mean())
     controller = make_controller(
         model, plant, system=controller_system(source, GAS / ELECTRICITY),
         points=site_points(source.building, source.devices), building=source.building,
-        settings=ControllerSettings(comfort_price=COMFORT_PRICE, operation=OPERATION),
+        settings=ControllerSettings(comfort_price=price, operation=OPERATION),
         horizon=AHEAD, channels=channels, boundaries=dict.fromkeys(others, 293.15),
     )  # fmt: skip
     boundaries = MeasuredBoundaries(controller.signals, others)

@@ -34,7 +34,6 @@ from _energyplus_control import optimal
 from _energyplus_offices import CONTROL_DAYS, HORIZON, OFFICES, Office, telemetry_case
 from _table import markdown, replace_section, write
 
-from calibration import calibrate, write_calibration
 from calibration.diagnosis import diagnose, write_diagnosis
 from mpc.baselines import OutdoorReset
 from mpc.errors import EnergyPlusError
@@ -57,42 +56,47 @@ class Own:
 
 
 def prepared(office: Office, folder: Path) -> dict[str, Any]:
-    """Make telemetry, calibrate, diagnose, and calibrate with what was found; what is there is kept."""
+    """Make telemetry and diagnose it, which calibrates the baseline; what is there is kept.
+
+    The models of both controllers are those of the diagnosis: the calibrated baseline, and that with all effects that
+    it accepted.
+    """
     done = folder / "models.json"
     if done.exists():
         return json.loads(done.read_text(encoding="utf-8"))
     case = telemetry_case(office, folder / "case")
-    before = calibrate(case, starts=1)
-    write_calibration(before, case, folder / "before", force=True)
     found = diagnose(case)
     write_diagnosis(found, case, folder / "diagnosis", force=True)
-    effects = {
-        r.accepted.screened.effect: list(r.accepted.screened.zones) for r in found.rounds if r.accepted is not None
+    fits = {"before": found.rounds[0].before, "after": found.final}
+    models = {
+        name: {
+            "effects": {effect: list(zones) for effect, zones in fit.effects.items()},
+            "values": {p.name: float(v) for p, v in zip(fit.built.network.parameters, fit.theta, strict=True)},
+        }
+        for name, fit in fits.items()
     }
-    after = calibrate(case, starts=1, effects=effects)
-    write_calibration(after, case, folder / "after", force=True)
-    errors = {name: r.calibrated["held_out"].metrics.mae for name, r in (("before", before), ("after", after))}
-    data = {"effects": effects, "held_out_mae": errors, "gap": found.gap, "floor": found.floor}
+    errors = {"before": found.gap, "after": found.steps[-1].after if found.steps else found.gap, "floor": found.floor}
+    data = {**models, "held_out_mae": errors}
     done.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
     return data
 
 
-def controller_of(name: str, plant: EnergyPlusPlant, folder: Path) -> Any:
+def controller_of(name: str, plant: EnergyPlusPlant, models: dict[str, Any]) -> Any:
     """Make a controller by name."""
     if name == "own":
         return Own()
     if name == "reset":
         return OutdoorReset(plant.actuators, plant.source.building.weather_station)
-    return optimal(plant, folder / name / "calibration.json")
+    return optimal(plant, models[name]["values"], models[name]["effects"])
 
 
-def measured(office: Office, name: str, folder: Path, days: int) -> dict[str, Any]:
+def measured(office: Office, name: str, folder: Path, days: int, models: dict[str, Any]) -> dict[str, Any]:
     """Run a controller for the week after the telemetry, or read what it did."""
     path = folder / f"run_{name}.json"
     if path.exists():
         return json.loads(path.read_text(encoding="utf-8"))
     plant = office.plant(office.controlled, days, HORIZON)
-    controller = controller_of(name, plant, folder)
+    controller = controller_of(name, plant, models)
     begin = time.process_time()
     run = run_closed_loop(plant, controller, seed=2, forecasts=name in ("before", "after"))
     kpis = measure_kpis(run.record, plant.scenario)
@@ -118,10 +122,11 @@ def study(out: Path, keys: list[str], days: int, say: Callable[[str], None]) -> 
     for key in keys:
         office, folder = OFFICES[key], out / key
         folder.mkdir(parents=True, exist_ok=True)
-        results[key] = {"models": prepared(office, folder), "runs": {}}
-        say(f"{key}: {results[key]['models']}")
+        models = prepared(office, folder)
+        results[key] = {"models": models, "runs": {}}
+        say(f"{key}: {', '.join(models['after']['effects'])}; {models['held_out_mae']}")
         for name in CONTROLLERS:
-            results[key]["runs"][name] = measured(office, name, folder, days)
+            results[key]["runs"][name] = measured(office, name, folder, days, models)
             run = results[key]["runs"][name]
             say(f"{key} {name}: {run['cost']:.1f} USD, {run['discomfort']:.2f} K h, {run['cpu_seconds']:.0f} s")
     return results

@@ -64,7 +64,7 @@ def test_what_is_finished_is_not_run_again(benchmark, offices, tmp_path):
     (tmp_path / "run_own.json").write_text(json.dumps(done))
     (tmp_path / "models.json").write_text(json.dumps({"effects": {}}))
     office = offices.OFFICES["large_winter"]
-    assert benchmark.measured(office, "own", tmp_path, 7) == done
+    assert benchmark.measured(office, "own", tmp_path, 7, {}) == done
     assert benchmark.prepared(office, tmp_path) == {"effects": {}}
 
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from datetime import date
 from typing import Any
 
-from mpc.errors import PlantError
+from mpc.errors import EnergyPlusError, PlantError
 from mpc.plants._actuators import ACTION_LIMITS, COOLING_SETPOINT, HEATING_SETPOINT, SUPPLY_AIR, SUPPLY_WATER, Actuator
 from mpc.plants.energyplus._building import EnergyPlusBuilding
 from mpc.plants.energyplus._input import InputFile, with_period
@@ -58,7 +58,7 @@ def _schedule(source: InputFile, name: str) -> tuple[str, str]:
     for kind, title, _ in source.begins("Schedule:"):
         if title.lower() == name.lower():
             return kind, title
-    raise PlantError(describe(source.name, f"a schedule {name!r}", "none"))
+    raise EnergyPlusError(describe(source.name, f"a schedule {name!r}", "none"))
 
 
 def _own(device: str, schedule: str) -> str:
@@ -81,6 +81,8 @@ def actuators_of(
     ------
     PlantError
         When a limit is for no kind of action.
+    EnergyPlusError
+        When a device's setpoint managers follow several schedules.
     """
     for kind in limits:
         if kind not in ACTION_LIMITS:
@@ -91,8 +93,11 @@ def actuators_of(
     devices = [(SUPPLY_AIR, loop.name, loop.managers) for loop in source.layout.air_loops]
     devices += [(SUPPLY_WATER, water.name, water.managers) for water in source.layout.water_loops]
     for point, name, managers in devices:
-        named = {str(source.source.find("SetpointManager:Scheduled", m)["schedule_name"]) for m in managers}
-        kind, schedule = _schedule(source.source, sorted(named)[0])
+        named = {str(source.source.find("SetpointManager:Scheduled", m)["schedule_name"]).lower() for m in managers}
+        if len(named) > 1:
+            expected = f"one schedule for the setpoint managers of {name!r}"
+            raise EnergyPlusError(describe(source.source.name, expected, ", ".join(sorted(named))))
+        kind, schedule = _schedule(source.source, named.pop())
         found.append(Actuator(f"{entity(name)}/{point}", "K", *bounds[point], required=False))
         handles.append((kind, "Schedule Value", _own(name, schedule)))
     for point, control in ((HEATING_SETPOINT, "Heating Setpoint"), (COOLING_SETPOINT, "Cooling Setpoint")):
