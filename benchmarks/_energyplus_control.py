@@ -19,7 +19,9 @@ from thermal.effects import chosen
 
 #: Schedules as the building has them: setpoints half a kelvin inside of the band, an hour before people count.
 OPERATION = ComfortOperation(margin=0.5, lead_hours=1.0, widest_occupied=8.0)
-COMFORT_PRICE = 1.5e-3  # USD/K/h of a square metre; zones are counted as equally large
+#: Of a square metre that is a kelvin outside of its band for an hour [USD/K/h], assumed: a fifth of a dollar a person.
+#: Zones count as equally large.
+COMFORT_PRICE = 1e-2
 #: Half a day ahead: quarters of an hour for two hours, then halves; 8 blocks that grow.
 AHEAD = Horizon.growing([(2.0, 900.0), (10.0, 1800.0)], [0.5, 0.5, 1.0, 1.0, 2.0, 2.0, 2.0, 3.0], CONTROL_STEPS * STEP)
 WATER = (323.15, 355.35)  # K: no warmer than the building's own

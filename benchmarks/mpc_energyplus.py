@@ -29,6 +29,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from _code import code
 from _energyplus_control import optimal
 from _energyplus_offices import CONTROL_DAYS, HORIZON, OFFICES, Office, telemetry_case
@@ -113,6 +114,10 @@ def measured(office: Office, name: str, folder: Path, days: int, models: dict[st
     }  # fmt: skip
     path.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
     run.actions.to_csv(folder / f"actions_{name}.csv")
+    record = run.record
+    np.savez_compressed(
+        folder / f"record_{name}.npz", zone=record.zone_temperature, electricity=record.electricity, gas=record.gas
+    )
     return data
 
 
