@@ -65,3 +65,9 @@ class FmuError(PlantError):
 
 class ReportProcessError(MpcError):
     """A report that is made in a process of its own could not be made."""
+
+
+class EnergyPlusError(PlantError):
+    """EnergyPlus is missing, has no such building, or a run of it failed."""
+class EnergyPlusTimeoutError(EnergyPlusError):
+    """EnergyPlus did not answer in time; its process was ended."""

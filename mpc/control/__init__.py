@@ -19,6 +19,7 @@ from mpc.control._reading import SitePoints
 from mpc.control._rules import ResetRule
 from mpc.control._scenarios import ScenarioSolver, outdoor_scenarios
 from mpc.control._sequential import SequentialSolver
+from mpc.control._signals import ForecastSignals
 from mpc.control._solution import Solution, Solver, Status
 from mpc.control._stage_solver import StageMethod, StageSolution, StageSolver
 from mpc.control._stages import StageData, StageProblem
@@ -35,6 +36,7 @@ __all__ = [
     "CostTerms",
     "Expected",
     "FarFromModel",
+    "ForecastSignals",
     "HeatChannel",
     "HeatPredictor",
     "HeatQuantity",

@@ -164,7 +164,9 @@ class Readings:
 
 
 def _value(measurements: Mapping[str, float], column: str) -> float:
+    if column not in measurements:
+        return float("nan")
     try:
         return float(measurements[column])
-    except (KeyError, TypeError, ValueError):
+    except (TypeError, ValueError):
         return float("nan")

@@ -4,12 +4,13 @@ from mpc.plants._actuators import ACTION_LIMITS, Actuator
 from mpc.plants._building import BuildingFlows, BuildingModel, BuildingStep, GridBuilding
 from mpc.plants._history import SystemBalance
 from mpc.plants._make import pilot_building, pilot_weather, save_pilot, simulated_plant
+from mpc.plants._noise import SensorNoise
 from mpc.plants._operation import Operation, scheduled_operation
 from mpc.plants._plant import Controller, Measurements, Plant, PointLayout, RestorablePlant
 from mpc.plants._reduced import ReducedBuilding, reduced_building
 from mpc.plants._replay import SubsystemGap, SubsystemReplay, replay_subsystems
 from mpc.plants._run import ClosedLoopRun, FixedSetpoints, run_closed_loop
-from mpc.plants._sensors import PlantDevices, SensorNoise
+from mpc.plants._sensors import PlantDevices
 from mpc.plants._simulated import SimulatedPlant
 
 __all__ = [

@@ -10,9 +10,9 @@ import pandas as pd
 
 from mpc.errors import PlantError
 from mpc.plants._building import BuildingModel, GridBuilding
+from mpc.plants._noise import SensorNoise
 from mpc.plants._reduced import reduced_building
 from mpc.plants._run import FixedSetpoints
-from mpc.plants._sensors import SensorNoise
 from mpc.plants._simulated import SimulatedPlant
 from mpc.scenario import (
     CarbonIntensity,

@@ -96,6 +96,9 @@ class Measurements(Mapping[str, float]):
             raise KeyError(describe("measurements", "a column", repr(column), nearest(column, self.columns)))
         return float(self.values_array[at])
 
+    def __contains__(self, column: object) -> bool:
+        return column in self.layout.position  # without the search for the nearest name that a lookup ends in
+
     def __iter__(self) -> Iterator[str]:
         return iter(self.columns)
 

@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 
 from calibration import Interval, heat_balance
 from mpc.errors import ReplayError
+from mpc.plants._noise import SensorNoise
 from mpc.plants._replay_plant import Gap, Measured, Replayed, replay_plant
-from mpc.plants._sensors import SensorNoise, plant_devices
+from mpc.plants._sensors import plant_devices
 from thermal import Case, SymbolicModel, Telemetry, replay_inputs
 from thermal.case.points import POINT_TYPES, split_column
 from thermal.errors import describe

@@ -3,60 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
-from functools import cached_property
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mpc.errors import PlantError
+from mpc.plants._noise import NoiseSource, SensorNoise
 from mpc.plants._plant import PointLayout
 from mpc.scenario import Scenario
 from thermal import Building
-from thermal.case.points import POINT_TYPES, split_column
 from thermal.errors import describe
 from thermal.hvac import Actions, Conditions, HvacPoints, HvacStep, HvacSystem
 
 FloatArray = NDArray[np.float64]
 
-_STREAM = 7  # of random numbers of a seed, apart from those of people, forecasts and the shuffle
-_BLOCK = 64  # steps whose noise is drawn together
-_FREEZING = 273.15  # K: sensors count their resolution from here
 _LEAST_FLOW = 1e-6  # kg/s: less is none
-
-
-@dataclass(frozen=True)
-class SensorNoise:
-    """Errors of sensors and meters, independent from step to step.
-
-    Parameters
-    ----------
-    temperature : float
-        Standard deviation of temperature sensors [K]; the default is that of the shared practice cases.
-    resolution : float
-        Steps of temperature sensors [K]; 0 reports every digit.
-    flow : float
-        Standard deviation of air flow stations as a share of the flow [-]; the default is that of new ones (ASHRAE
-        Handbook, Fundamentals 2017, ch. 37).
-    power : float
-        Standard deviation of meters as a share of the power [-]; the default is a class 1 meter's (IEC 62053-21).
-
-    Raises
-    ------
-    PlantError
-        When one is negative or no number.
-    """
-
-    temperature: float = 0.03
-    resolution: float = 0.02
-    flow: float = 0.02
-    power: float = 0.01
-
-    def __post_init__(self) -> None:
-        for field in fields(self):
-            value = getattr(self, field.name)
-            if not 0.0 <= value < np.inf:
-                raise PlantError(describe(f"sensor noise: {field.name}", "0 or more", repr(value)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,7 +104,7 @@ class Sensors:
         self, system: HvacSystem, devices: PlantDevices, scenario: Scenario, noise: SensorNoise | None, counted: bool
     ) -> None:
         self._points = HvacPoints(system, devices.terminals, devices.air_handlers, devices.boiler)
-        self._system, self._noise, self._counted = system, noise, counted
+        self._system, self._counted = system, counted
         building = scenario.building
         chiller = [] if devices.chiller is None else [f"{devices.chiller}/electrical_power_sensor"]
         weather = [f"{building.weather_station}/{p}" for p in scenario.weather.frame]
@@ -153,21 +115,7 @@ class Sensors:
         meters = [f"{name}/electrical_power_sensor" for name in devices.air_handlers]
         self._meters = np.array([self.layout.position[name] for name in meters])
         self._weather = scenario.weather.frame.to_numpy(dtype=float)
-        self._block: tuple[tuple[int, int], FloatArray] = ((-1, -1), np.zeros((0, 0)))
-
-    @cached_property
-    def _scales(self) -> tuple[NDArray[np.intp], FloatArray, FloatArray, NDArray[np.bool_]]:
-        """Columns with noise, their absolute and relative deviations, and which count in steps."""
-        noise = self._noise or SensorNoise()
-        rows = []
-        for k, column in enumerate(self.layout.columns):
-            point = split_column(column, "plant")[1]
-            quantity = POINT_TYPES[point].quantity
-            by = {"temperature": (noise.temperature, 0.0), "air_flow": (0.0, noise.flow), "power": (0.0, noise.power)}
-            if point.endswith("_sensor") and quantity in by:
-                rows.append((k, *by[quantity], quantity == "temperature"))
-        index, absolute, relative, stepped = (np.array(v) for v in zip(*rows, strict=True))
-        return index.astype(np.intp), absolute.astype(float), relative.astype(float), stepped.astype(bool)
+        self._noise = None if noise is None else NoiseSource(self.layout, noise)
 
     def read(
         self,
@@ -220,20 +168,4 @@ class Sensors:
         if self._counted:
             parts.append(people)
         whole = np.concatenate(parts)
-        return whole if self._noise is None else self._disturbed(k, whole, seed)
-
-    def _disturbed(self, k: int, values: FloatArray, seed: int) -> FloatArray:
-        """Add the noise of a step, which depends on seed and step only."""
-        index, absolute, relative, stepped = self._scales
-        number, row = divmod(k, _BLOCK)
-        if self._block[0] != (seed, number):
-            rng = np.random.default_rng([seed, _STREAM, number])
-            self._block = ((seed, number), rng.standard_normal((_BLOCK, index.size)))
-        exact = values[index]
-        seen = exact + (absolute + relative * np.abs(exact)) * self._block[1][row]
-        size = 0.0 if self._noise is None else self._noise.resolution
-        if size > 0.0:
-            counted = _FREEZING + size * np.round((seen - _FREEZING) / size)
-            seen = np.where(stepped, counted, seen)
-        values[index] = seen
-        return values
+        return whole if self._noise is None else self._noise.disturb(k, whole, seed)

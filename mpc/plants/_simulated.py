@@ -26,10 +26,11 @@ from mpc.plants._building import BuildingModel, zone_response
 from mpc.plants._history import PlantStep, SystemBalance
 from mpc.plants._inputs import boundary_series, check_parts, sensor_offset
 from mpc.plants._local import LocalControl
+from mpc.plants._noise import SensorNoise
 from mpc.plants._operation import Operation, scheduled_operation, shared_rows
 from mpc.plants._plant import Measurements, need_running
 from mpc.plants._schedule import Schedule
-from mpc.plants._sensors import SensorNoise, Sensors, plant_devices
+from mpc.plants._sensors import Sensors, plant_devices
 from mpc.plants._signals import EffectSignals
 from mpc.scenario import Forecast, Forecaster, Scenario
 from thermal import Case, Telemetry

@@ -1,0 +1,41 @@
+"""The process of a run: it leaves with its parent, and says what went wrong."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from mpc.errors import EnergyPlusError
+
+pytestmark = pytest.mark.energyplus
+ABANDON = """
+import os
+from mpc.plants.energyplus._install import CHICAGO, weather_path
+from mpc.plants.energyplus._process import EnergyPlusProcess, Job
+process = EnergyPlusProcess(Job("Version,25.2;", "in.idf", weather_path(CHICAGO)))
+print(process.folder, flush=True)
+os._exit(9)  # as a parent that is killed: nothing is tidied up
+"""
+
+
+def test_a_parent_that_dies_leaves_neither_process_nor_folder():
+    done = subprocess.run([sys.executable, "-c", ABANDON], capture_output=True, text=True)
+    assert done.returncode == 9, done.stderr
+    folder = Path(done.stdout.strip())
+    deadline = time.monotonic() + 120.0
+    while folder.exists() and time.monotonic() < deadline:
+        time.sleep(0.1)
+    assert not folder.exists()
+
+
+def test_a_broken_input_is_a_named_error_with_energyplus_own_words():
+    from mpc.plants.energyplus._install import CHICAGO, weather_path
+    from mpc.plants.energyplus._process import Job, run_energyplus
+
+    job = Job("Version,25.2;\nZone,;\nNothing,1;\n", "in.idf", weather_path(CHICAGO), stepped=False)
+    with pytest.raises(EnergyPlusError, match="Severe"):
+        run_energyplus(job, [])
