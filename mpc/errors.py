@@ -69,5 +69,7 @@ class ReportProcessError(MpcError):
 
 class EnergyPlusError(PlantError):
     """EnergyPlus is missing, has no such building, or a run of it failed."""
+
+
 class EnergyPlusTimeoutError(EnergyPlusError):
     """EnergyPlus did not answer in time; its process was ended."""
