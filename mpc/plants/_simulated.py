@@ -144,9 +144,12 @@ class SimulatedPlant:
         self._outdoor = [float(v) for v in scenario.outdoor]
         self._schedule = Schedule(self.operation, system, scenario.zones)
         self._offset = sensor_offset(model)
+        self._biased = bool(self._offset.any())
         rated = system.rooms.T @ system.terminals.design_flow
         self._local = LocalControl(system, zone_response(model, 1e4 * rated))
         self._given, self._gains = scenario, shared_rows(scenario.gains)
+        self._held: tuple[Any, ...] = (None, ())
+        self._asked: tuple[Any, ...] = (None, None, ())
         self._drawn: int | None = None
         self._warm: Any = None
         self._number, self._steps = -1, list[PlantStep]()
@@ -363,6 +366,11 @@ class SimulatedPlant:
 
     def _supply(self, given: Mapping[str, float]) -> tuple[Any, ...]:
         """Supply setpoints as the plant takes them: air, water, static and differential pressure."""
+        if given != self._held[0]:
+            self._held = given, self._laid_out(given)
+        return self._held[1]
+
+    def _laid_out(self, given: Mapping[str, float]) -> tuple[Any, ...]:
         names, boiler, fans = self.devices.air_handlers, self.devices.boiler, self.system.static_pressures
         air = tuple(given[f"{name}/{SUPPLY_AIR}"] for name in names)
         static = tuple(given.get(f"{name}/{STATIC_PRESSURE}", design) for name, design in zip(names, fans, strict=True))
@@ -376,15 +384,25 @@ class SimulatedPlant:
         runs, self._cycling = self._schedule.runs(k, self._reading, heating, cooling, self._cycling)
         signals = self._signals.known(k)
         free = self.model.begin(gains[k], self._boundary[k], signals)
+        asked = supply, runs, self._schedule.ventilation[k]
+        if asked != self._asked[0]:
+            self._asked = asked, *self._acting(*asked)
+        _, actions, reach = self._asked
         zone = self._reading
         if self._local.settles:
-            reach = tuple(run * math.sqrt(p / d) for run, p, d in zip(runs, supply[2], self._design, strict=True))
-            zone = self._local.settle(free, heating, cooling, supply[0], reach)
+            zone = self._local.settle(free, heating, cooling, actions.supply_air_temperature, reach)
         conditions = Conditions(zone, heating, cooling, self._outdoor[k])
-        air, water, static, pressure = supply
-        actions = Actions(air, water, static, pressure, runs, max(runs), self._schedule.ventilation[k])
         self._state, done = self._hvac.step(self._state, conditions, actions, self._step, self._schedule.set_back[k])
         heat = self._hvac.heat(done)
         mean, self._reading = self.model.finish(heat, self._signals.at(k, done.airflow, heat))
         self._local.learn(self._reading)
-        return PlantStep(k, conditions, actions, done, mean, self._reading - self._offset)
+        end = self._reading - self._offset if self._biased else self._reading
+        return PlantStep(k, conditions, actions, done, mean, end)
+
+    def _acting(
+        self, supply: tuple[Any, ...], runs: tuple[float, ...], ventilation: float
+    ) -> tuple[Actions, tuple[float, ...]]:
+        """Actions as the plant takes them, and how much of its design flow each duct's pressure drives [-]."""
+        air, water, static, pressure = supply
+        actions = Actions(air, water, static, pressure, runs, max(runs), ventilation)
+        return actions, tuple(run * math.sqrt(p / d) for run, p, d in zip(runs, static, self._design, strict=True))
