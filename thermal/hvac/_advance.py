@@ -86,13 +86,11 @@ def advance(
     supply = tuple([w.offset + w.slope * end.water for w in valves.warmed])
     entering = ops.spread(supply, terminals.air_handler)
     reheat = valves.coil * (end.water - entering)
-    discharge = entering + reheat / air.rate
     back = loop.returning(end, flow)
     electric, fuel = _powers(system, air.mixed, valves.warmed)
     return HvacStep(
-        calls, air.airflow, entering, reheat, discharge, valve_flow, air.rate * (discharge - zone), air.mixed,
-        valves.warmed, supply, end, flow, back, pump_power, electric + pump_power,
-        loop.fuel(scalar, end.boiler, back) + fuel,
+        air.airflow, entering, reheat, valve_flow, air.rate * (entering - zone) + reheat, air.mixed, valves.warmed,
+        supply, end, flow, back, pump_power, electric + pump_power, loop.fuel(scalar, end.boiler, back) + fuel,
     )  # fmt: skip
 
 
