@@ -130,9 +130,10 @@ def report(found: dict[str, Any]) -> str:
     note = (
         f"{found['zones']} zones, {found['devices']} devices, CPU time of one thread; steps of the reduced model are "
         f"the least of {DAYS} equal days. Zone temperatures of the two differ by {1e3 * found['mean_difference']:.1f} "
-        f"mK in the mean, {1e3 * found['max_difference']:.0f} mK at most. An office of {small['zones']} zones, reduced, "
-        f"takes {1e6 * small['step']:.0f} µs a step with noise, its {small['points']} points read and recorded: "
-        f"{small['per_second']:,.0f} steps a second. {platform.machine()}, {os.cpu_count()} cores, load average {os.getloadavg()[0]:.1f}.\n"
+        f"mK in the mean, {1e3 * found['max_difference']:.0f} mK at most. An office of {small['zones']} zones, "
+        f"reduced, takes {1e6 * small['step']:.0f} µs a step with noise, its {small['points']} points read and "
+        f"recorded: {small['per_second']:,.0f} steps a second. {platform.machine()}, {os.cpu_count()} cores, load "
+        f"average {os.getloadavg()[0]:.1f}.\n"
     )
     columns = ["", f"grid, {grid['dx']:g} m", f"reduced, from {reduced['dx']:g} m", "the paper's simulator"]
     return markdown(columns, rows) + "\n" + note

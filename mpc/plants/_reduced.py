@@ -99,11 +99,10 @@ class ReducedBuilding:
         """
         if self._gains is not heat:
             self._gains, self._rise = heat, self._response.dot(heat) + REFERENCE_TEMPERATURE
-        outside, n = self._outside, boundary.size
-        outside[:n] = boundary
-        outside[:n] -= REFERENCE_TEMPERATURE
+        outside = boundary - REFERENCE_TEMPERATURE
         if signals.size:
-            outside[n:] = signals
+            outside = np.concatenate([outside, signals])
+        self._outside = outside
         self._free_state = self._end * self._state + outside.dot(self._driving)
         self._free = self._output.dot(self._free_state) + self._rise
         return self._free

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -13,15 +12,7 @@ from numpy.typing import NDArray
 
 from mpc.errors import PlantError
 from mpc.kpi import PlantRecord
-from mpc.plants._actuators import (
-    DIFFERENTIAL_PRESSURE,
-    STATIC_PRESSURE,
-    SUPPLY_AIR,
-    SUPPLY_WATER,
-    Actuator,
-    actuators_of,
-    checked_actions,
-)
+from mpc.plants._actuators import SUPPLY_AIR, SUPPLY_WATER, Actuator, actuators_of, checked_actions
 from mpc.plants._building import BuildingModel, zone_response
 from mpc.plants._history import PlantStep, SystemBalance
 from mpc.plants._inputs import boundary_series, check_parts, sensor_offset
@@ -31,10 +22,11 @@ from mpc.plants._plant import Measurements, need_running
 from mpc.plants._schedule import Schedule
 from mpc.plants._sensors import SensorNoise, Sensors, plant_devices
 from mpc.plants._signals import EffectSignals
+from mpc.plants._supply import SupplySetpoints
 from mpc.scenario import Forecast, Forecaster, Scenario
 from thermal import Case, Telemetry
 from thermal.errors import describe
-from thermal.hvac import Actions, Conditions, HvacPlant, HvacState, HvacSystem, energy_balance
+from thermal.hvac import Conditions, HvacPlant, HvacState, HvacSystem, energy_balance
 
 FloatArray = NDArray[np.float64]
 
@@ -137,7 +129,7 @@ class SimulatedPlant:
         self.operation = operation or scheduled_operation(scenario, len(system.air_handlers))
         self.operation.fits(scenario.grid.n_steps, len(scenario.zones), len(system.air_handlers))
         self._hvac, self._step = HvacPlant(system), float(scenario.grid.step)
-        self._design = system.static_pressures
+        self._supply = SupplySetpoints(self.devices, system)
         self._sensors = Sensors(system, self.devices, scenario, noise, count_people)
         self._signals = EffectSignals(model.network, scenario, system)
         self._boundary = boundary_series(scenario, model, boundaries or {})
@@ -148,13 +140,11 @@ class SimulatedPlant:
         rated = system.rooms.T @ system.terminals.design_flow
         self._local = LocalControl(system, zone_response(model, 1e4 * rated))
         self._given, self._gains = scenario, shared_rows(scenario.gains)
-        self._held: tuple[Any, ...] = (None, ())
-        self._asked: tuple[Any, ...] = (None, None, ())
         self._drawn: int | None = None
         self._warm: Any = None
         self._number, self._steps = -1, list[PlantStep]()
         self._reading = self._first = np.zeros(len(scenario.zones))
-        self._state, self._cycling = self._hvac.start(_WATER), (False,) * len(self._design)
+        self._state, self._cycling = self._hvac.start(_WATER), (False,) * len(self.system.air_handlers)
 
     @property
     def control_step(self) -> float:
@@ -232,8 +222,7 @@ class SimulatedPlant:
         if self.finished:
             found = f"{self.scenario.grid.n_steps - self._number} of its {self.scenario.grid.n_steps}"
             raise PlantError(describe("scenario", f"{self.control_steps} more steps", found, "make it longer"))
-        supply = self._supply(given)
-        fresh = [self._advance(self._number + i, given, supply, self._gains) for i in range(self.control_steps)]
+        fresh = [self._advance(self._number + i, given, self._gains) for i in range(self.control_steps)]
         self._steps += fresh
         self._number += self.control_steps
         return self._seen(fresh, int(self.scenario.grid.edges[self._number]))
@@ -354,40 +343,23 @@ class SimulatedPlant:
         start = np.clip(_ZONES, self.operation.heating[0], self.operation.cooling[0])
         self._reading = self.model.reset(start, self._boundary[0], self._signals.known(0))
         self.model.reseed(0)
-        self._state, self._cycling = self._hvac.start(_WATER), (False,) * len(self._design)
-        supply, gains = self._supply(self.default_actions), shared_rows(self.scenario.expected_gains)
+        self._state, self._cycling = self._hvac.start(_WATER), (False,) * len(self.system.air_handlers)
+        gains = shared_rows(self.scenario.expected_gains)
         self._local.missed = np.zeros_like(start)
         begin = self.model.save_state(), self._state, self._cycling, self._reading, self._local.missed
         for k in range(step_count):
-            last = self._advance(k % day, self.default_actions, supply, gains)
+            last = self._advance(k % day, self.default_actions, gains)
         if self._warm_up_steps:
             begin = self.model.save_state(), self._state, self._cycling, self._reading, self._local.missed
         self._warm = (*begin, last)
 
-    def _supply(self, given: Mapping[str, float]) -> tuple[Any, ...]:
-        """Supply setpoints as the plant takes them: air, water, static and differential pressure."""
-        if given != self._held[0]:
-            self._held = given, self._laid_out(given)
-        return self._held[1]
-
-    def _laid_out(self, given: Mapping[str, float]) -> tuple[Any, ...]:
-        names, boiler, fans = self.devices.air_handlers, self.devices.boiler, self.system.static_pressures
-        air = tuple(given[f"{name}/{SUPPLY_AIR}"] for name in names)
-        static = tuple(given.get(f"{name}/{STATIC_PRESSURE}", design) for name, design in zip(names, fans, strict=True))
-        return air, given[f"{boiler}/{SUPPLY_WATER}"], static, given.get(f"{boiler}/{DIFFERENTIAL_PRESSURE}")
-
-    def _advance(
-        self, k: int, given: Mapping[str, float], supply: tuple[Any, ...], gains: list[FloatArray]
-    ) -> PlantStep:
+    def _advance(self, k: int, given: Mapping[str, float], gains: list[FloatArray]) -> PlantStep:
         """Take a step of the scenario."""
         heating, cooling = self._schedule.setpoints(k, given)
         runs, self._cycling = self._schedule.runs(k, self._reading, heating, cooling, self._cycling)
         signals = self._signals.known(k)
         free = self.model.begin(gains[k], self._boundary[k], signals)
-        asked = supply, runs, self._schedule.ventilation[k]
-        if asked != self._asked[0]:
-            self._asked = asked, *self._acting(*asked)
-        _, actions, reach = self._asked
+        actions, reach = self._supply.actions(given, runs, self._schedule.ventilation[k])
         zone = self._reading
         if self._local.settles:
             zone = self._local.settle(free, heating, cooling, actions.supply_air_temperature, reach)
@@ -398,11 +370,3 @@ class SimulatedPlant:
         self._local.learn(self._reading)
         end = self._reading - self._offset if self._biased else self._reading
         return PlantStep(k, conditions, actions, done, mean, end)
-
-    def _acting(
-        self, supply: tuple[Any, ...], runs: tuple[float, ...], ventilation: float
-    ) -> tuple[Actions, tuple[float, ...]]:
-        """Actions as the plant takes them, and how much of its design flow each duct's pressure drives [-]."""
-        air, water, static, pressure = supply
-        actions = Actions(air, water, static, pressure, runs, max(runs), ventilation)
-        return actions, tuple(run * math.sqrt(p / d) for run, p, d in zip(runs, static, self._design, strict=True))

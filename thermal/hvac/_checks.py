@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from thermal.errors import HvacActionError, HvacParameterError, describe
 
+
 def in_range(where: str, value: float, unit: str, lowest: float, highest: float, advice: str = "") -> None:
     """Refuse a parameter [its unit] that is no number within its range."""
     if not (isinstance(value, int | float | np.floating | np.integer) and lowest <= value <= highest):

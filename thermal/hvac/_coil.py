@@ -158,7 +158,7 @@ class WaterCoil:
         return self._water_side(FloatOperations(), water_share)
 
     def water_side(self, ops: Operations, water_share: Value) -> WaterSide:
-        """The water's side of the coil, valve open.
+        """Give the water's side of the coil, valve open.
 
         Parameters
         ----------
@@ -208,7 +208,7 @@ def water_side(ops: Operations, rate: Value, film: Value, share: Value) -> Water
     """
     share = share + LEAST_FLOW
     rate, resistance = rate * share, share**-0.85 / film
-    return WaterSide(rate, resistance, characteristic(ops, rate, resistance))
+    return WaterSide(rate, resistance, _characteristic(ops, rate, resistance))
 
 
 def coil_conductance(ops: Operations, air_rate: Value, air_resistance: Value, water: WaterSide) -> Value:
@@ -243,7 +243,7 @@ class Characteristic(NamedTuple):
     slope: Value
 
 
-def characteristic(ops: Operations, water_rate: Value, water_resistance: Value) -> Characteristic:
+def _characteristic(ops: Operations, water_rate: Value, water_resistance: Value) -> Characteristic:
     """Derive how a coil's heat goes with its water from what is known of both ends.
 
     At full flow S is the relative change of heat by that of water. With mean temperatures of air and water ``1/G =
@@ -268,9 +268,9 @@ def characteristic(ops: Operations, water_rate: Value, water_resistance: Value) 
 def water_share(throttled: Value, conductance: Value, curve: Characteristic) -> Value:
     """Share of the full water flow [-] at which a coil has a conductance below that of the open valve.
 
-    With ``r`` the one over the other: ``phi = S r / (1 - r + S r)``, the form of Petitjean, Total Hydronic Balancing (1994), with an S that follows the
-    film of the water: within 0.03 of effectiveness-NTU at the reduced flow for coils of usual sizes, 3 % of the flow in
-    the mean.
+    With r the one over the other: ``phi = S r / (1 - r + S r)``, the form of Petitjean, Total Hydronic Balancing
+    (1994), with an S that follows the film of the water: within 0.03 of effectiveness-NTU at the reduced flow for coils
+    of usual sizes, 3 % of the flow in the mean.
 
     Parameters
     ----------

@@ -170,7 +170,7 @@ class NumpyOperations(Operations):
         zero, one = np.zeros(()), np.ones(())  # arrays: a float would be made one at each call
         self.positive = lambda x, scale=1.0: larger(x, zero)  # type: ignore[method-assign]
         self.unit = lambda x: smaller(larger(x, zero), one)  # type: ignore[method-assign]
-        self.lesser = smaller  # type: ignore[method-assign]
+        self.lesser = lambda a, b: smaller(a, b)  # type: ignore[method-assign]
         self.ordered = lambda a, b: (smaller(a, b), larger(a, b))  # type: ignore[method-assign]
         self.capped = lambda a, b, scale=1.0: smaller(a, b)  # type: ignore[method-assign]
         self.maximum = lambda a, b, scale=1.0: larger(a, b)  # type: ignore[method-assign]

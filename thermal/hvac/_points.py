@@ -91,7 +91,8 @@ class HvacPoints:
         zone, outdoor = terminals.zone, conditions.outdoor_temperature
         most = settings.most_airflow
         damper = np.minimum(step.airflow / most, 1.0) * (most > _LEAST)
-        direct = [0.0 if h is None else w.direct / h.efficiency for h, w in zip(self._heaters, step.warmed, strict=True)]
+        coils = zip(self._heaters, step.warmed, strict=True)
+        direct = [0.0 if coil is None else done.direct / coil.efficiency for coil, done in coils]
         gas = [0.0 if electric else taken for electric, taken in zip(self._electric, direct, strict=True)]
         meters = [
             m.cooling_power + m.supply_fan_power + m.exhaust_fan_power + taken - burned

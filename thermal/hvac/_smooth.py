@@ -118,8 +118,8 @@ class SmoothHvac:
     Notes
     -----
     Return air couples all zones of an air handler, so that the Jacobian of a plant is full. It is a diagonal and a
-    product of rank m, with m the number of sums over terminals: flow, warmth and coils' conductance of each air handler,
-    and drawn water. Slopes cost one sweep for all zones together, and one for each sum and knob.
+    product of rank m, with m the number of sums over terminals: flow, warmth and coils of each air handler, and drawn
+    water. Slopes cost one sweep for all zones together, and one for each sum and knob.
 
     Examples
     --------

@@ -240,7 +240,7 @@ class Terminals:
         return heating if self.reheat_first == 1.0 else ops.unit(heating * self._first[1])
 
     def open_water(self, ops: Operations, water: Value) -> WaterSide:
-        """The water's side of the coils, valves open.
+        """Give the water's side of the coils, valves open.
 
         Parameters
         ----------

@@ -57,7 +57,9 @@ def test_a_zone_that_moves_along_its_line_rests_where_a_fresh_look_finds_it(syst
         free = free + rng.normal(0.0, 3.0 if k % 20 == 0 else 0.01, n)
         free = np.full(n, 400.0) if k == 100 else np.full(n, 150.0) if k == 150 else free
         fresh = LocalControl(system, np.full(n, 1e-3))
-        assert np.array_equal(control.settle(free, low, high, SUPPLY, REACH), fresh.settle(free, low, high, SUPPLY, REACH))
+        assert np.array_equal(
+            control.settle(free, low, high, SUPPLY, REACH), fresh.settle(free, low, high, SUPPLY, REACH)
+        )
 
 
 def test_without_fans_nothing_moves(system: HvacSystem) -> None:
