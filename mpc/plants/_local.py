@@ -22,6 +22,7 @@ from thermal.units import AIR_HEAT_CAPACITY
 FloatArray = NDArray[np.float64]
 
 _FAR = 50.0  # K beyond the thermostat's ranges, where terminals are at their limits and q is a line
+_ENDLESS = 1e9  # K
 _FOLLOW = 0.5  # share of what the last step missed that is made up for in the next
 
 
@@ -41,7 +42,8 @@ class LocalControl:
         self._rest = np.zeros(len(response))
         self._columns = np.arange(len(response))
         self._known: tuple[Any, ...] = ()
-        self._start = self._slope = self._offset = np.zeros((0, 0))
+        self._line: tuple[FloatArray, ...] = ()
+        self._start = self._begin = self._end = self._slope = self._offset = np.zeros((0, 0))
         self.missed = np.zeros(len(response))
 
     @property
@@ -79,10 +81,20 @@ class LocalControl:
         if known != self._known:
             self._lay_out(heating, cooling, supply, reach)
             self._known, self._kept = known, (heating, cooling)  # kept, or others might get their numbers
+            self._line = self._lines(free + self.missed)
         free = free + self.missed
-        place = np.add.reduce(self._start[1:-1] < free, axis=0) * free.size + self._columns
-        self._rest = self._offset.take(place) + free * self._slope.take(place)
+        low, high, offset, slope = self._line
+        within = (free - low) * (high - free)  # above 0 between the ends of a zone's line
+        if not within[within.argmin()] > 0.0:
+            *_, offset, slope = self._line = self._lines(free)
+        self._rest = offset + free * slope
         return self._rest
+
+    def _lines(self, free: FloatArray) -> tuple[FloatArray, ...]:
+        """On which line each zone is: where it begins and ends, and its offset and slope."""
+        place = np.add.reduce(self._start[1:-1] < free, axis=0) * free.size + self._columns
+        tables = self._begin, self._end, self._offset, self._slope
+        return tuple(table.take(place) for table in tables)
 
     def learn(self, reached: FloatArray) -> None:
         """Take note of where the zones came to, for what the next step is to make up for.
@@ -116,3 +128,6 @@ class LocalControl:
         self._start = ends - self._response * heat
         self._slope = np.diff(ends, axis=0) / np.diff(self._start, axis=0)
         self._offset = ends[:-1] - self._slope * self._start[:-1]
+        # the outer lines go on for ever
+        self._begin, self._end = self._start[:-1].copy(), self._start[1:].copy()
+        self._begin[0], self._end[-1] = -_ENDLESS, _ENDLESS

@@ -30,6 +30,12 @@ class ReducedBuilding:
         Parameter values [parameter units]; those that the model was made at by default.
     step_seconds : float
         Time step [s].
+
+    Notes
+    -----
+    A step takes modes ξ to ``E ξ + g (B u + H q)`` and reads the zones by ``O ξ``, with O the transpose of H where
+    sensors do not lag. The states here are ``ξ / √g``: then both products have one matrix, √g H, which stays in the
+    processor's cache.
     """
 
     def __init__(self, model: ReducedModel, theta: FloatArray | None = None, step_seconds: float = 300.0) -> None:
@@ -39,15 +45,16 @@ class ReducedBuilding:
         self.theta = model.theta if theta is None else np.asarray(theta, dtype=float)
         self._modes: ModalModel = modal_model(model.matrices(self.theta))
         modes, propagator = self._modes, self._modes.propagator(self.step_seconds, IMPLICIT_EULER)
-        self._end, self._gain = propagator.end, propagator.end_gain
-        self._heating = np.ascontiguousarray(modes.heating)
-        self._output = np.ascontiguousarray(modes.output)
+        self._end, self._scale = propagator.end, np.sqrt(propagator.end_gain)
+        self._heating = np.ascontiguousarray(self._scale[:, None] * modes.heating)
+        self._output = np.ascontiguousarray(modes.output * self._scale)
         if np.allclose(self._output, self._heating.T, rtol=1e-9, atol=1e-12 * float(np.abs(self._output).max())):
-            self._output = self._heating.T  # one matrix in the cache instead of two
-        self._response = self._output @ (self._gain[:, None] * self._heating)
+            self._output = self._heating.T
+        self._driving = np.ascontiguousarray((self._scale[:, None] * modes.boundary).T)
+        self._response = self._output @ self._heating
         self._outside = np.zeros(modes.boundary.shape[1])
-        self._state = self._before = self._free_state = self._gained = np.zeros(modes.capacity.size)
-        self._reading = self._free = np.zeros(len(self.network.zones))
+        self._state = self._before = self._free_state = np.zeros(modes.capacity.size)
+        self._reading = self._free = self._rise = np.zeros(len(self.network.zones))
         self._gains = np.zeros(0)
 
     @property
@@ -69,9 +76,9 @@ class ReducedBuilding:
         free = modes.observation @ (at_rest * outside)
         gain = modes.observation @ (at_rest[:, None] * modes.heating)
         heat = np.linalg.solve(gain, np.asarray(zone, dtype=float) - REFERENCE_TEMPERATURE - free)
-        self._state = at_rest * (outside + modes.heating @ heat)
-        self._reading = self._output @ self._state
-        return self._reading + REFERENCE_TEMPERATURE
+        self._state = at_rest * (outside + modes.heating @ heat) / self._scale
+        self._reading = self._output @ self._state + REFERENCE_TEMPERATURE
+        return self._reading
 
     def reseed(self, seed: int) -> None:
         """Nothing is random here.
@@ -91,16 +98,14 @@ class ReducedBuilding:
             As there [W], [K], [signal unit].
         """
         if self._gains is not heat:
-            self._gains, self._gained = heat, self._heating @ heat
-        outside, n = self._outside, boundary.size
-        np.subtract(boundary, REFERENCE_TEMPERATURE, out=outside[:n])
-        outside[n:] = signals
-        pushed = self._modes.boundary @ outside
-        pushed += self._gained
-        pushed *= self._gain
-        self._free_state = self._end * self._state + pushed
-        self._free = self._output @ self._free_state
-        return self._free + REFERENCE_TEMPERATURE
+            self._gains, self._rise = heat, self._response.dot(heat) + REFERENCE_TEMPERATURE
+        outside = boundary - REFERENCE_TEMPERATURE
+        if signals.size:
+            outside = np.concatenate([outside, signals])
+        self._outside = outside
+        self._free_state = self._end * self._state + outside.dot(self._driving)
+        self._free = self._output.dot(self._free_state) + self._rise
+        return self._free
 
     def finish(self, heat: FloatArray, signals: FloatArray) -> BuildingStep:
         """Take the step that was begun; see `BuildingModel`.
@@ -110,28 +115,24 @@ class ReducedBuilding:
         heat, signals : ndarray
             As there [W], [signal unit].
         """
-        pushed, reached = self._heating @ heat, self._free + self._response @ heat
-        known = self._outside[self._outside.size - signals.size :]
-        if signals.size and not np.array_equal(known, signals):
-            change = np.zeros_like(self._outside)
-            change[change.size - signals.size :] = signals - known
-            moved = self._modes.boundary @ change
-            pushed, reached = pushed + moved, reached + self._output @ (self._gain * moved)
-            self._outside += change
-        pushed *= self._gain
-        self._before, self._state = self._state, self._free_state + pushed
-        start, self._reading = self._reading, reached
+        state = self._free_state + self._heating.dot(self._gains + heat)
+        reached = self._free + self._response.dot(heat)
+        if signals.size and not np.array_equal(known := self._outside[-signals.size :], signals):
+            moved = (signals - known).dot(self._driving[-signals.size :])
+            state, reached = state + moved, reached + self._output.dot(moved)
+            known[:] = signals
+        start, self._before, self._state, self._reading = self._reading, self._state, state, reached
         # with constant inputs implicit Euler's mean over a step is the trapezoid's
-        mean = 0.5 * (start + self._reading)
-        return BuildingStep(mean + REFERENCE_TEMPERATURE, self._reading + REFERENCE_TEMPERATURE)
+        return BuildingStep(0.5 * (start + reached), reached)
 
     def flows(self) -> BuildingFlows:
         """Add up the heat of the last step."""
         modes, uniform = self._modes, self._modes.uniform
         brought = (uniform @ modes.boundary) * self._outside
         n_boundary = len(self.network.boundaries)
-        envelope = uniform @ (modes.conductance * self._state) - brought[:n_boundary].sum()
-        storage = uniform @ (modes.capacity * (self._state - self._before)) / self.step_seconds
+        carried = uniform * self._scale
+        envelope = carried @ (modes.conductance * self._state) - brought[:n_boundary].sum()
+        storage = carried @ (modes.capacity * (self._state - self._before)) / self.step_seconds
         return BuildingFlows(float(envelope), float(brought[n_boundary:].sum()), float(storage))
 
     def save_state(self) -> Any:

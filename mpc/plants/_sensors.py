@@ -157,8 +157,8 @@ class Sensors:
         place = self._system.terminals.zone
         flowing = step.airflow > _LEAST_FLOW
         discharge = np.where(flowing, step.discharge + (zone - conditions.zone_temperature)[place], zone[place])
-        seen = step._replace(airflow=np.where(flowing, step.airflow, 0.0), discharge=discharge)
-        values = self._points.read(conditions._replace(zone_temperature=zone), actions, seen)
+        seen = step._replace(airflow=np.where(flowing, step.airflow, 0.0))
+        values = self._points.read(conditions._replace(zone_temperature=zone), actions, seen, discharge)
         parts: list[Sequence[float] | FloatArray] = [values]
         if self._chiller:
             cooling = np.array([m.cooling_power for m in step.mixed], dtype=float)

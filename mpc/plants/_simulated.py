@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -13,15 +12,7 @@ from numpy.typing import NDArray
 
 from mpc.errors import PlantError
 from mpc.kpi import PlantRecord
-from mpc.plants._actuators import (
-    DIFFERENTIAL_PRESSURE,
-    STATIC_PRESSURE,
-    SUPPLY_AIR,
-    SUPPLY_WATER,
-    Actuator,
-    actuators_of,
-    checked_actions,
-)
+from mpc.plants._actuators import SUPPLY_AIR, SUPPLY_WATER, Actuator, actuators_of, checked_actions
 from mpc.plants._building import BuildingModel, zone_response
 from mpc.plants._history import PlantStep, SystemBalance
 from mpc.plants._inputs import boundary_series, check_parts, sensor_offset
@@ -32,10 +23,11 @@ from mpc.plants._plant import Measurements, need_running
 from mpc.plants._schedule import Schedule
 from mpc.plants._sensors import Sensors, plant_devices
 from mpc.plants._signals import EffectSignals
+from mpc.plants._supply import SupplySetpoints
 from mpc.scenario import Forecast, Forecaster, Scenario
 from thermal import Case, Telemetry
 from thermal.errors import describe
-from thermal.hvac import Actions, Conditions, HvacPlant, HvacState, HvacSystem, energy_balance
+from thermal.hvac import Conditions, HvacPlant, HvacState, HvacSystem, energy_balance
 
 FloatArray = NDArray[np.float64]
 
@@ -138,13 +130,14 @@ class SimulatedPlant:
         self.operation = operation or scheduled_operation(scenario, len(system.air_handlers))
         self.operation.fits(scenario.grid.n_steps, len(scenario.zones), len(system.air_handlers))
         self._hvac, self._step = HvacPlant(system), float(scenario.grid.step)
-        self._design = system.static_pressures
+        self._supply = SupplySetpoints(self.devices, system)
         self._sensors = Sensors(system, self.devices, scenario, noise, count_people)
         self._signals = EffectSignals(model.network, scenario, system)
         self._boundary = boundary_series(scenario, model, boundaries or {})
         self._outdoor = [float(v) for v in scenario.outdoor]
         self._schedule = Schedule(self.operation, system, scenario.zones)
         self._offset = sensor_offset(model)
+        self._biased = bool(self._offset.any())
         rated = system.rooms.T @ system.terminals.design_flow
         self._local = LocalControl(system, zone_response(model, 1e4 * rated))
         self._given, self._gains = scenario, shared_rows(scenario.gains)
@@ -152,7 +145,7 @@ class SimulatedPlant:
         self._warm: Any = None
         self._number, self._steps = -1, list[PlantStep]()
         self._reading = self._first = np.zeros(len(scenario.zones))
-        self._state, self._cycling = self._hvac.start(_WATER), (False,) * len(self._design)
+        self._state, self._cycling = self._hvac.start(_WATER), (False,) * len(self.system.air_handlers)
 
     @property
     def control_step(self) -> float:
@@ -230,8 +223,7 @@ class SimulatedPlant:
         if self.finished:
             found = f"{self.scenario.grid.n_steps - self._number} of its {self.scenario.grid.n_steps}"
             raise PlantError(describe("scenario", f"{self.control_steps} more steps", found, "make it longer"))
-        supply = self._supply(given)
-        fresh = [self._advance(self._number + i, given, supply, self._gains) for i in range(self.control_steps)]
+        fresh = [self._advance(self._number + i, given, self._gains) for i in range(self.control_steps)]
         self._steps += fresh
         self._number += self.control_steps
         return self._seen(fresh, int(self.scenario.grid.edges[self._number]))
@@ -352,40 +344,30 @@ class SimulatedPlant:
         start = np.clip(_ZONES, self.operation.heating[0], self.operation.cooling[0])
         self._reading = self.model.reset(start, self._boundary[0], self._signals.known(0))
         self.model.reseed(0)
-        self._state, self._cycling = self._hvac.start(_WATER), (False,) * len(self._design)
-        supply, gains = self._supply(self.default_actions), shared_rows(self.scenario.expected_gains)
+        self._state, self._cycling = self._hvac.start(_WATER), (False,) * len(self.system.air_handlers)
+        gains = shared_rows(self.scenario.expected_gains)
         self._local.missed = np.zeros_like(start)
         begin = self.model.save_state(), self._state, self._cycling, self._reading, self._local.missed
         for k in range(step_count):
-            last = self._advance(k % day, self.default_actions, supply, gains)
+            last = self._advance(k % day, self.default_actions, gains)
         if self._warm_up_steps:
             begin = self.model.save_state(), self._state, self._cycling, self._reading, self._local.missed
         self._warm = (*begin, last)
 
-    def _supply(self, given: Mapping[str, float]) -> tuple[Any, ...]:
-        """Supply setpoints as the plant takes them: air, water, static and differential pressure."""
-        names, boiler, fans = self.devices.air_handlers, self.devices.boiler, self.system.static_pressures
-        air = tuple(given[f"{name}/{SUPPLY_AIR}"] for name in names)
-        static = tuple(given.get(f"{name}/{STATIC_PRESSURE}", design) for name, design in zip(names, fans, strict=True))
-        return air, given[f"{boiler}/{SUPPLY_WATER}"], static, given.get(f"{boiler}/{DIFFERENTIAL_PRESSURE}")
-
-    def _advance(
-        self, k: int, given: Mapping[str, float], supply: tuple[Any, ...], gains: list[FloatArray]
-    ) -> PlantStep:
+    def _advance(self, k: int, given: Mapping[str, float], gains: list[FloatArray]) -> PlantStep:
         """Take a step of the scenario."""
         heating, cooling = self._schedule.setpoints(k, given)
         runs, self._cycling = self._schedule.runs(k, self._reading, heating, cooling, self._cycling)
         signals = self._signals.known(k)
         free = self.model.begin(gains[k], self._boundary[k], signals)
+        actions, reach = self._supply.actions(given, runs, self._schedule.ventilation[k])
         zone = self._reading
         if self._local.settles:
-            reach = tuple(run * math.sqrt(p / d) for run, p, d in zip(runs, supply[2], self._design, strict=True))
-            zone = self._local.settle(free, heating, cooling, supply[0], reach)
+            zone = self._local.settle(free, heating, cooling, actions.supply_air_temperature, reach)
         conditions = Conditions(zone, heating, cooling, self._outdoor[k])
-        air, water, static, pressure = supply
-        actions = Actions(air, water, static, pressure, runs, max(runs), self._schedule.ventilation[k])
         self._state, done = self._hvac.step(self._state, conditions, actions, self._step, self._schedule.set_back[k])
         heat = self._hvac.heat(done)
         mean, self._reading = self.model.finish(heat, self._signals.at(k, done.airflow, heat))
         self._local.learn(self._reading)
-        return PlantStep(k, conditions, actions, done, mean, self._reading - self._offset)
+        end = self._reading - self._offset if self._biased else self._reading
+        return PlantStep(k, conditions, actions, done, mean, end)

@@ -7,7 +7,8 @@ from typing import NamedTuple
 from thermal.hvac._air_handler import Mixed, Warmed
 from thermal.hvac._coil import Characteristic, water_share
 from thermal.hvac._operations import Operations, Value
-from thermal.hvac._step import Actions, Calls, Conditions, HvacStep
+from thermal.hvac._settings import Settings
+from thermal.hvac._step import Calls, Conditions, HvacStep
 from thermal.hvac._system import HvacSystem
 from thermal.hvac._terminals import heat_rate
 
@@ -21,17 +22,13 @@ class _Air(NamedTuple):
     coil: Value
     curve: Characteristic
     mixed: tuple[Mixed, ...]
-    opening: Value
 
 
 class _Valves(NamedTuple):
     """Valves, and the coils' load ``conductance * T - source`` that follows."""
 
     warmed: tuple[Warmed, ...]
-    share: Value
     coil: Value
-    offset: Value
-    slope: Value
     conductance: Value
     source: Value
 
@@ -42,7 +39,7 @@ def advance(
     water: Value,
     calls: Calls,
     conditions: Conditions,
-    actions: Actions,
+    settings: Settings,
     step: Value,
 ) -> HvacStep:
     """Take the plant through a step.
@@ -59,8 +56,8 @@ def advance(
         Of the thermostats.
     conditions : Conditions
         Of the step.
-    actions : Actions
-        For the step.
+    settings : Settings
+        Actions for the step, as `settings_of` lays them out.
     step : Value
         Its length [s].
 
@@ -71,93 +68,72 @@ def advance(
     While the water is colder than that - a boiler at its capacity, a setpoint that falls - coils give a little less
     than their valves could let them.
     """
-    scalar, loop, pump = ops.scalar, system.loop, system.loop.pump
+    scalar, loop, pump, terminals = ops.scalar, system.loop, system.loop.pump, system.terminals
     zone = system.at_terminals(ops, conditions.zone_temperature)
-    air = _air_side(ops, system, zone, calls, conditions, actions)
-    room = conditions.room_temperature
-    setpoint, running = actions.supply_water_temperature, actions.boiler
+    air = _air_side(ops, system, zone, calls, conditions, settings)
+    setpoint, running, room = settings.supply_water, settings.boiler, conditions.room_temperature
     warmest = scalar.maximum(water, running * loop.goal(scalar, water, setpoint, step))
-    valves = _valves(ops, system, air, warmest)
-    valve_flow = water_share(valves.share, air.coil, air.curve)
-    drawn = ops.dot(valve_flow, system.terminals.water_flow)
+    valves = _valves(ops, system, air, settings.opening, warmest)
+    valve_flow = water_share(valves.coil, air.coil, air.curve)
+    drawn = ops.dot(valve_flow, terminals.water_flow)
     for k, coil in system.water_coils:
         drawn = drawn + valves.warmed[k].flow_share * coil.water_flow
-    flow = running * scalar.maximum(drawn * air.opening, pump.minimum_share * pump.design_flow, pump.design_flow)
-    pump_power = pump.power(flow, _or_design(actions.differential_pressure, pump.differential_pressure))
+    least = pump.minimum_share * pump.design_flow
+    flow = running * scalar.maximum(drawn * settings.opening, least, pump.design_flow)
+    pump_power = pump.power(flow, settings.differential_pressure)
     heat = pump.heat_to_water * pump_power
     end = loop.heat(scalar, water, setpoint, running, valves.conductance, valves.source, heat, room, step)
-    entering = valves.offset + valves.slope * end.water
+    supply = tuple([w.offset + w.slope * end.water for w in valves.warmed])
+    entering = ops.spread(supply, terminals.air_handler)
     reheat = valves.coil * (end.water - entering)
-    discharge = entering + reheat / air.rate
     back = loop.returning(end, flow)
     electric, fuel = _powers(system, air.mixed, valves.warmed)
     return HvacStep(
-        calls, air.airflow, entering, reheat, discharge, valve_flow, air.rate * (discharge - zone), air.mixed,
-        valves.warmed, tuple([w.offset + w.slope * end.water for w in valves.warmed]), end, flow, back, pump_power,
-        electric + pump_power, loop.fuel(scalar, end.boiler, back) + fuel,
+        air.airflow, entering, reheat, valve_flow, air.rate * (entering - zone) + reheat, air.mixed, valves.warmed,
+        supply, end, flow, back, pump_power, electric + pump_power, loop.fuel(scalar, end.boiler, back) + fuel,
     )  # fmt: skip
 
 
 def _air_side(
-    ops: Operations, system: HvacSystem, zone: Value, calls: Calls, conditions: Conditions, actions: Actions
+    ops: Operations, system: HvacSystem, zone: Value, calls: Calls, conditions: Conditions, settings: Settings
 ) -> _Air:
     """Flows of the terminals, and the air handlers up to their heating coils."""
-    scalar, terminals, handlers = ops.scalar, system.terminals, system.air_handlers
-    n, designs = len(handlers), system.static_pressures
-    statics = designs if actions.static_pressure is None else _each(actions.static_pressure, n)
-    runs = _each(actions.running, n)
-    reaches = [run * scalar.sqrt(p / design) for run, p, design in zip(runs, statics, designs, strict=True)]
-    airflow = terminals.airflow(ops, calls.heating, calls.cooling, _spread(ops, system, reaches))
-    pump = system.loop.pump
-    pressure = _or_design(actions.differential_pressure, pump.differential_pressure)
-    opening = actions.boiler * scalar.sqrt(pressure / pump.differential_pressure)
+    scalar, terminals, members, opening = ops.scalar, system.terminals, system.members, settings.opening
+    airflow = terminals.airflow(ops, calls.heating, calls.cooling, settings.most_airflow)
+    outdoor, damp, humid = conditions.outdoor_temperature, conditions.outdoor_humidity, conditions.return_humidity
+    humidities = humid if isinstance(humid, tuple | list) else (humid,) * len(system.air_handlers)
     rows = zip(
-        handlers, ops.sums(airflow, system.members), ops.sums(airflow * zone, system.members), runs, statics,
-        _each(conditions.return_humidity, n), _each(actions.supply_air_temperature, n), _each(actions.ventilation, n),
-        strict=True,
+        system.air_handlers, ops.sums(airflow, members), ops.sums(airflow * zone, members), settings.running,
+        humidities, settings.supply_air, settings.static_pressure, settings.ventilation, strict=True,
     )  # fmt: skip
-    outdoor, damp = conditions.outdoor_temperature, conditions.outdoor_humidity
     mixed = tuple([
-        handler.mix(scalar, flow, run, warmth / flow, humid, outdoor, damp, setpoint, static, opening, ventilation)
-        for handler, flow, warmth, run, static, humid, setpoint, ventilation in rows
+        handler.mix(scalar, flow, run, warmth / flow, humidity, outdoor, damp, setpoint, static, opening, ventilation)
+        for handler, flow, warmth, run, humidity, setpoint, static, ventilation in rows
     ])  # fmt: skip
-    first = terminals.reheat_first
-    call = calls.heating if first == 1.0 else ops.unit(calls.heating * (1.0 / first))
     rate, water = heat_rate(airflow), terminals.open_water(ops, opening)
-    return _Air(call, airflow, rate, terminals.conductance(ops, airflow, rate, water), water[2], mixed, opening)
+    coil = terminals.conductance(ops, airflow, rate, water)
+    return _Air(terminals.reheat_call(ops, calls.heating), airflow, rate, coil, water.curve, mixed)
 
 
-def _valves(ops: Operations, system: HvacSystem, air: _Air, water: Value) -> _Valves:
+def _valves(ops: Operations, system: HvacSystem, air: _Air, opening: Value, water: Value) -> _Valves:
     """Set all valves for a water temperature."""
-    scalar = ops.scalar
+    scalar, terminals = ops.scalar, system.terminals
     warmed = tuple([
-        handler.warm(scalar, mixed, water, air.opening)
+        handler.warm(scalar, mixed, water, opening)
         for handler, mixed in zip(system.air_handlers, air.mixed, strict=True)
     ])  # fmt: skip
-    offset = _spread(ops, system, [w.offset for w in warmed])
-    slope = _spread(ops, system, [w.slope for w in warmed])
-    entering = offset + slope * water
-    share = system.terminals.heat_share(ops, air.reheat_call, air.rate, air.coil, entering, water)
-    coil = share * air.coil
-    conductance, source = ops.dot(coil, 1.0 - slope), ops.dot(coil, offset)
+    allowances = [terminals.allowance(scalar, w.offset + w.slope * water, water) for w in warmed]
+    allowance = ops.spread(allowances, terminals.air_handler)
+    coil = terminals.throttled(ops, air.reheat_call, air.rate, air.coil, allowance)
+    conductance: Value = 0.0
+    source: Value = 0.0
+    for total, w in zip(ops.sums(coil, system.members), warmed, strict=True):
+        conductance = conductance + total * (1.0 - w.slope)
+        source = source + total * w.offset
     for k, _ in system.water_coils:
         conductance = conductance + warmed[k].conductance
         source = source + warmed[k].conductance * air.mixed[k].cooled_temperature
-    return _Valves(warmed, share, coil, offset, slope, conductance, source)
-
-
-def _each(values: Value, n: int) -> Value:
-    """One value an air handler, where all may have the same."""
-    return values if isinstance(values, tuple | list) else (values,) * n
-
-
-def _spread(ops: Operations, system: HvacSystem, values: list[Value]) -> Value:
-    """Give each terminal the value of its air handler."""
-    return ops.spread(values, system.terminals.air_handler)
-
-
-def _or_design(setpoint: Value, design: float) -> Value:
-    return design if setpoint is None else setpoint
+    return _Valves(warmed, coil, conductance, source)
 
 
 def _powers(system: HvacSystem, mixed: tuple[Mixed, ...], warmed: tuple[Warmed, ...]) -> tuple[Value, Value]:

@@ -291,8 +291,7 @@ class AirHandler:
             direct = ops.minimum(wanted, self.heating.capacity, 0.1 * self.heating.capacity)
             return Warmed(entering + direct / rate + mixed.fan_rise, 0.0, 0.0, 0.0, direct)
         open_ = mixed.coil
-        ready = open_ * ops.maximum(water - entering, _LEAST)
-        part = wanted / ops.maximum(wanted, ready, 1000.0)
-        slope = part * open_ / rate
-        valve = water_share(part, open_, self.heating.water_side(ops, opening)[2])
-        return Warmed(entering * (1.0 - slope) + mixed.fan_rise, slope, part * open_, valve, 0.0)
+        throttled = ops.capped(wanted / ops.maximum(water - entering, _LEAST), open_, 25.0)
+        slope = throttled / rate
+        valve = water_share(throttled, open_, self.heating.water_side(ops, opening).curve)
+        return Warmed(entering * (1.0 - slope) + mixed.fan_rise, slope, throttled, valve, 0.0)

@@ -10,8 +10,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from thermal.errors import HvacActionError, HvacParameterError, describe
 
-_least, _most = np.minimum.reduce, np.maximum.reduce  # faster than the methods
-
 
 def in_range(where: str, value: float, unit: str, lowest: float, highest: float, advice: str = "") -> None:
     """Refuse a parameter [its unit] that is no number within its range."""
@@ -52,7 +50,8 @@ def all_in_range(
 
 def action(name: str, values: NDArray[np.float64], unit: str, lowest: float, highest: float) -> None:
     """Refuse actions or conditions that are not finite or out of range, the first bad one by its place."""
-    if not (_least(values) >= lowest and _most(values) <= highest):  # also where a value is not a number
+    # arg-extrema are several times faster than extrema, and both find what is not a number
+    if not (values.item(values.argmin()) >= lowest and values.item(values.argmax()) <= highest):
         place = int(np.argmax(~((values >= lowest) & (values <= highest))))
         _refuse(f"{name}[{place}]", float(values.flat[place]), unit, lowest, highest)
 

@@ -15,6 +15,7 @@ from scipy.optimize import brentq
 from thermal.errors import HvacParameterError, describe
 from thermal.hvac._air import WATER_HEAT_CAPACITY
 from thermal.hvac._checks import fields_in_range, in_range
+from thermal.hvac._kept import LastValue
 from thermal.hvac._operations import FloatOperations, Operations, Value
 from thermal.units import AIR_HEAT_CAPACITY
 
@@ -36,8 +37,8 @@ def _effectiveness(ops: Operations, ntu: Value, ratio: Value) -> Value:
     ratio : Value
         C_min/C_max [-], 0 to 1.
     """
-    root = ntu**0.22
-    return -ops.expm1(ops.expm1(-ratio * (ntu / root)) * root / ratio)
+    stretch = ntu**0.22 / ratio
+    return -ops.expm1(ops.expm1(-ntu / stretch) * stretch)
 
 
 @dataclass(frozen=True)
@@ -146,17 +147,18 @@ class WaterCoil:
             Water flow over `water_flow` [-].
         """
         air = air_flow + LEAST_FLOW
-        film = self.air_conductance * (air / self.air_flow) ** 0.8
-        rate, water_film, _ = self.water_side(ops, water_share)
-        return coil_conductance(ops, AIR_HEAT_CAPACITY * air, film, rate, water_film)
+        resistance = (air / self.air_flow) ** -0.8 / self.air_conductance
+        return coil_conductance(ops, AIR_HEAT_CAPACITY * air, resistance, self.water_side(ops, water_share))
 
     @cached_property
-    def _open_water(self) -> tuple[float, float, Characteristic]:
-        rate, film = WATER_HEAT_CAPACITY * self.water_flow, self.water_conductance
-        return rate, film, characteristic(FloatOperations(), rate, film)
+    def _at_share(self) -> LastValue:
+        return LastValue(self._float_side)
 
-    def water_side(self, ops: Operations, water_share: Value) -> tuple[Value, Value, Characteristic]:
-        """Heat capacity rate and film conductance of the water [W/K], and the characteristic that follows.
+    def _float_side(self, water_share: float) -> WaterSide:
+        return self._water_side(FloatOperations(), water_share)
+
+    def water_side(self, ops: Operations, water_share: Value) -> WaterSide:
+        """Give the water's side of the coil, valve open.
 
         Parameters
         ----------
@@ -165,30 +167,67 @@ class WaterCoil:
         water_share : Value
             Water flow over `water_flow` [-].
         """
-        if isinstance(water_share, float) and water_share == 1.0:
-            return self._open_water
-        water = water_share + LEAST_FLOW
-        rate, film = WATER_HEAT_CAPACITY * self.water_flow * water, self.water_conductance * water**0.85
-        return rate, film, characteristic(ops, rate, film)
+        if type(water_share) is float:
+            side: WaterSide = self._at_share(water_share)
+            return side
+        return self._water_side(ops, water_share)
+
+    def _water_side(self, ops: Operations, water_share: Value) -> WaterSide:
+        return water_side(ops, WATER_HEAT_CAPACITY * self.water_flow, self.water_conductance, water_share)
 
 
-def coil_conductance(ops: Operations, air_rate: Value, air_film: Value, water_rate: Value, water_film: Value) -> Value:
+class WaterSide(NamedTuple):
+    """The water's side of a coil with its valve open.
+
+    Parameters
+    ----------
+    rate : Value
+        Heat capacity rate [W/K].
+    resistance : Value
+        1/hA of the film [K/W].
+    curve : Characteristic
+        That follows from both.
+    """
+
+    rate: Value
+    resistance: Value
+    curve: Characteristic
+
+
+def water_side(ops: Operations, rate: Value, film: Value, share: Value) -> WaterSide:
+    """Derive the water's side of a coil from that at its design flow.
+
+    Parameters
+    ----------
+    ops : Operations
+        Arithmetic.
+    rate, film : Value
+        Heat capacity rate, and hA of the film [W/K].
+    share : Value
+        Flow over the design flow [-].
+    """
+    share = share + LEAST_FLOW
+    rate, resistance = rate * share, share**-0.85 / film
+    return WaterSide(rate, resistance, _characteristic(ops, rate, resistance))
+
+
+def coil_conductance(ops: Operations, air_rate: Value, air_resistance: Value, water: WaterSide) -> Value:
     """Heat per difference between the water and the air that enter [W/K], for one coil or many.
 
     Parameters
     ----------
     ops : Operations
         Arithmetic.
-    air_rate, water_rate : Value
-        Heat capacity rates of air and water [W/K], above 0.
-    air_film, water_film : Value
-        hA on either side at these flows [W/K].
+    air_rate : Value
+        Heat capacity rate of the air [W/K], above 0.
+    air_resistance : Value
+        1/hA of the air's film at this flow [K/W].
+    water : WaterSide
+        The other side.
     """
-    overall = air_film * water_film / (air_film + water_film)
-    least = ops.lesser(air_rate, water_rate)
-    # C_max as what is left keeps C_min C_max exact under smoothing
-    most = air_rate + water_rate - least
-    return _effectiveness(ops, overall / least, least / most) * least
+    least, most = ops.ordered(air_rate, water.rate)
+    transfer_units = 1.0 / ((air_resistance + water.resistance) * least)
+    return _effectiveness(ops, transfer_units, least / most) * least
 
 
 class Characteristic(NamedTuple):
@@ -204,7 +243,7 @@ class Characteristic(NamedTuple):
     slope: Value
 
 
-def characteristic(ops: Operations, water_rate: Value, water_film: Value) -> Characteristic:
+def _characteristic(ops: Operations, water_rate: Value, water_resistance: Value) -> Characteristic:
     """Derive how a coil's heat goes with its water from what is known of both ends.
 
     At full flow S is the relative change of heat by that of water. With mean temperatures of air and water ``1/G =
@@ -216,32 +255,32 @@ def characteristic(ops: Operations, water_rate: Value, water_film: Value) -> Cha
     ----------
     ops : Operations
         Arithmetic.
-    water_rate, water_film : Value
-        Heat capacity rate and film conductance of the water, valve open [W/K].
+    water_rate : Value
+        Heat capacity rate of the water, valve open [W/K].
+    water_resistance : Value
+        1/hA of its film at that flow [K/W].
     """
-    full = ops.maximum(1.0 / water_rate, 0.6 / water_rate + 0.85 / water_film, 1e-5)
-    little = -1.0 / (water_rate * ops.expm1(-_LITTLE_NTU * water_film / water_rate))
+    full = ops.maximum(1.0 / water_rate, 0.6 / water_rate + 0.85 * water_resistance, 1e-5)
+    little = -1.0 / (water_rate * ops.expm1(-_LITTLE_NTU / (water_resistance * water_rate)))
     return Characteristic(little, full - little)
 
 
-def water_share(heat_share: Value, conductance: Value, curve: Characteristic) -> Value:
-    """Share of the full water flow [-] at which a coil gives a share of its full heat [-].
+def water_share(throttled: Value, conductance: Value, curve: Characteristic) -> Value:
+    """Share of the full water flow [-] at which a coil has a conductance below that of the open valve.
 
-    ``phi = S r / (1 - r + S r)``, the form of Petitjean, Total Hydronic Balancing (1994), with an S that follows the
-    film of the water: within 0.03 of effectiveness-NTU at the reduced flow for coils of usual sizes, 3 % of the flow in
-    the mean.
+    With r the one over the other: ``phi = S r / (1 - r + S r)``, the form of Petitjean, Total Hydronic Balancing
+    (1994), with an S that follows the film of the water: within 0.03 of effectiveness-NTU at the reduced flow for coils
+    of usual sizes, 3 % of the flow in the mean.
 
     Parameters
     ----------
-    heat_share : Value
-        Heat over the heat with the valve open, r [-].
-    conductance : Value
-        Of the open coil [W/K].
+    throttled, conductance : Value
+        Of the coil with its valve as it stands, and open [W/K].
     curve : Characteristic
         Of its water side.
     """
-    part = (curve.offset + curve.slope * heat_share) * conductance * heat_share
-    return part / (1.0 - heat_share + part)
+    part = (curve.offset * conductance + curve.slope * throttled) * throttled  # G S r
+    return part / (conductance - throttled + part)
 
 
 def heat_share(ops: Operations, flow_share: Value, conductance: Value, curve: Characteristic) -> Value:

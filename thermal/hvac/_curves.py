@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 from thermal.errors import HvacParameterError, describe
 from thermal.hvac._operations import Operations, Value
@@ -37,10 +38,15 @@ class Polynomial:
     def __call__(self, ops: Operations, x: Value) -> Value:
         """Evaluate the polynomial at a share [-]."""
         x = ops.clip(x, self.lowest, self.highest)
-        value = self.coefficients[-1]
-        for coefficient in self.coefficients[-2::-1]:
+        value, rest = self._falling
+        for coefficient in rest:
             value = value * x + coefficient
         return value
+
+    @cached_property
+    def _falling(self) -> tuple[float, tuple[float, ...]]:
+        """Coefficient of the highest power, and the others."""
+        return self.coefficients[-1], self.coefficients[-2::-1]
 
 
 @dataclass(frozen=True)

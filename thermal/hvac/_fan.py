@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 from thermal.hvac._air import SUPPLY_AIR_DENSITY
 from thermal.hvac._checks import fields_in_range
@@ -60,7 +61,7 @@ class Fan:
             },
         )
 
-    @property
+    @cached_property
     def design_power(self) -> float:
         """Electric power at the design flow [W]."""
         return self.design_flow / self.air_density * self.design_pressure / self.efficiency

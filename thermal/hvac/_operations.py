@@ -35,6 +35,7 @@ class Operations:
 
     - ``maximum = (a + b + sqrt((a - b)^2 + w^2)) / 2``, above the exact one by at most w/2, where a = b;
     - ``minimum`` the same from below; ``lesser``, of positive values, has ``w^2 = 4 width^2 a b`` and stays positive;
+      ``capped`` is ``a b / maximum(a, b)``;
     - ``clip = (lower + upper + sqrt((x - lower)^2 + w^2) - sqrt((x - upper)^2 + w^2)) / 2``, within its limits, off
       by at most w/2;
     - ``step = (1 + x / sqrt(x^2 + w^2)) / 2``, within 0 and 1, off by at most w^2 / (4 x^2).
@@ -90,6 +91,15 @@ class Operations:
         # the other way round of the hyperbola's root: no cancellation where one is far larger
         return 2.0 * (1.0 - w2) * a * b / (a + b + self.sqrt((a - b) * (a - b) + 4.0 * w2 * a * b))
 
+    def ordered(self, a: Value, b: Value) -> tuple[Value, Value]:
+        """Return the smaller and the larger of two positive values; their sum is exact however smooth."""
+        least = self.lesser(a, b)
+        return least, a + b - least
+
+    def capped(self, a: Value, b: Value, scale: Value = 1.0) -> Value:
+        """Return the smaller of two values that are not negative, 0 where one is, however smooth."""
+        return a * b / self.maximum(a, b, scale)
+
     def unit(self, x: Value) -> Value:
         """Hold a share within 0 and 1."""
         return self.clip(x, 0.0, 1.0)
@@ -141,6 +151,8 @@ class FloatOperations(Operations):
         self.step = lambda x, scale=1.0: 1.0 if x > 0.0 else 0.0  # type: ignore[method-assign]
         self.positive = lambda x, scale=1.0: x if x >= 0.0 else 0.0  # type: ignore[method-assign]
         self.lesser = lambda a, b: a if a <= b else b  # type: ignore[method-assign]
+        self.ordered = lambda a, b: (a, b) if a <= b else (b, a)  # type: ignore[method-assign]
+        self.capped = lambda a, b, scale=1.0: a if a <= b else b  # type: ignore[method-assign]
         self.surely_below = lambda a, b: bool(a <= b)  # type: ignore[method-assign]
 
 
@@ -159,6 +171,8 @@ class NumpyOperations(Operations):
         self.positive = lambda x, scale=1.0: larger(x, zero)  # type: ignore[method-assign]
         self.unit = lambda x: smaller(larger(x, zero), one)  # type: ignore[method-assign]
         self.lesser = lambda a, b: smaller(a, b)  # type: ignore[method-assign]
+        self.ordered = lambda a, b: (smaller(a, b), larger(a, b))  # type: ignore[method-assign]
+        self.capped = lambda a, b, scale=1.0: smaller(a, b)  # type: ignore[method-assign]
         self.maximum = lambda a, b, scale=1.0: larger(a, b)  # type: ignore[method-assign]
         self.minimum = lambda a, b, scale=1.0: smaller(a, b)  # type: ignore[method-assign]
         self.clip = lambda x, lower, upper, scale=1.0: smaller(larger(x, lower), upper)  # type: ignore[method-assign]
@@ -231,6 +245,7 @@ class CasadiOperations(Operations):
     def _make_exact(self) -> None:
         larger, smaller = casadi.fmax, casadi.fmin
         self.lesser = lambda a, b: smaller(a, b)  # type: ignore[method-assign]
+        self.capped = lambda a, b, scale=1.0: smaller(a, b)  # type: ignore[method-assign]
         self.maximum = lambda a, b, scale=1.0: larger(a, b)  # type: ignore[method-assign]
         self.minimum = lambda a, b, scale=1.0: smaller(a, b)  # type: ignore[method-assign]
         self.clip = lambda x, lower, upper, scale=1.0: smaller(larger(x, lower), upper)  # type: ignore[method-assign]

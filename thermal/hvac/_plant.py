@@ -11,6 +11,7 @@ from thermal.errors import HvacActionError, describe
 from thermal.hvac._advance import advance
 from thermal.hvac._checks import action, scalar_action
 from thermal.hvac._operations import StepOperations, Value
+from thermal.hvac._settings import Settings, settings_of
 from thermal.hvac._step import Actions, Calls, Conditions, HvacStep
 from thermal.hvac._system import HvacSystem
 from thermal.hvac._thermostat import Mode, ModeArray
@@ -79,6 +80,7 @@ class HvacPlant:
         self.system = system
         self._ops = StepOperations()
         self._checked: tuple[object, object] = (None, None)
+        self._asked: tuple[Actions | None, Any] = (None, None)
 
     def start(self, water: float = 293.15) -> HvacState:
         """State with thermostats off.
@@ -130,7 +132,7 @@ class HvacPlant:
         HvacActionError
             Something is not finite, out of its range or of another shape.
         """
-        conditions, actions = self._check(conditions, actions, seconds)
+        conditions, settings = self._check(conditions, actions, seconds)
         system, ops, zone = self.system, self._ops, conditions.zone_temperature
         heating, cooling, thermostat = conditions.heating_setpoint, conditions.cooling_setpoint, system.thermostat
         mode, was = state.mode, state.set_back
@@ -141,7 +143,7 @@ class HvacPlant:
         else:
             heat, cool = thermostat.calls(ops, zone, heating, cooling)
         calls = Calls(system.at_terminals(ops, heat), system.at_terminals(ops, cool))
-        done = advance(ops, system, state.water, calls, conditions, actions, seconds)
+        done = advance(ops, system, state.water, calls, conditions, settings, seconds)
         return HvacState(done.loop.water, mode, was), done
 
     def heat(self, step: HvacStep) -> FloatArray:
@@ -160,7 +162,7 @@ class HvacPlant:
         heat: FloatArray = self.system.at_zones(self._ops, step.terminal_heat)
         return heat
 
-    def _check(self, conditions: Conditions, actions: Actions, seconds: float) -> tuple[Conditions, Actions]:
+    def _check(self, conditions: Conditions, actions: Actions, seconds: float) -> tuple[Conditions, Settings]:
         zone, n = conditions.zone_temperature, self.system.zone_count
         if getattr(zone, "shape", None) != (n,):
             found = f"shape {np.shape(zone)}"
@@ -174,9 +176,17 @@ class HvacPlant:
         if not self._is_fine(_CONDITIONS, conditions[3:]):
             values = [self._checked_value(*row) for row in zip(_CONDITIONS, conditions[3:], strict=True)]
             conditions = Conditions(*conditions[:3], *values)
-        if not self._is_fine(_ACTIONS, actions):
+        return conditions, self._asked[1] if actions is self._asked[0] else self._settings(actions)
+
+    def _settings(self, actions: Actions) -> Settings:
+        """Check actions and lay them out; the same object, of nothing but floats, is not looked at again."""
+        fine = self._is_fine(_ACTIONS, actions)
+        if not fine:
             actions = Actions(*[self._checked_value(*row) for row in zip(_ACTIONS, actions, strict=True)])
-        return conditions, actions
+        settings = settings_of(self._ops, self.system, actions)
+        if fine:
+            self._asked = (actions, settings)
+        return settings
 
     def _is_fine(self, limits: tuple[_Limits, ...], values: tuple[Value, ...]) -> bool:
         """Tell whether all values are plain floats in range, or as many of them as there are air handlers."""

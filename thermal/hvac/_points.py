@@ -11,11 +11,13 @@ from thermal.errors import HvacParameterError, describe
 from thermal.hvac._air_handler import Heater
 from thermal.hvac._coil import valve_position
 from thermal.hvac._operations import StepOperations
+from thermal.hvac._settings import settings_of
 from thermal.hvac._step import Actions, Conditions, HvacStep
 from thermal.hvac._system import HvacSystem
 
 FloatArray = NDArray[np.float64]
 
+_LEAST = 1e-6  # kg/s: less air is none, and the dampers of an air handler that is off are shut
 _TERMINAL = (
     "zone_air_temperature_sensor", "zone_air_heating_temperature_setpoint", "zone_air_cooling_temperature_setpoint",
     "supply_air_flowrate_sensor", "discharge_air_temperature_sensor", "supply_air_damper_percentage_command",
@@ -57,12 +59,16 @@ class HvacPoints:
             found = f"{len(terminals)} and {len(air_handlers)}, {len(set(names))} of {len(names)} different"
             expected = f"{wanted[0]} terminals and {wanted[1]} air handlers, all named differently"
             raise HvacParameterError(describe("HvacPoints", expected, found))
-        self.system = system
+        self.system, self._ops = system, StepOperations()
+        self._heaters = [h.heating if isinstance(h.heating, Heater) else None for h in system.air_handlers]
+        self._electric = [h is not None and h.electric for h in self._heaters]
         entities = [(terminals, _TERMINAL), (air_handlers, _AIR_HANDLER), ([boiler], _LOOP)]
         #: Columns ``ENTITY/POINT`` in the order of `read`, point by point.
         self.columns = tuple(f"{e}/{p}" for devices, points in entities for p in points for e in devices)
 
-    def read(self, conditions: Conditions, actions: Actions, step: HvacStep) -> FloatArray:
+    def read(
+        self, conditions: Conditions, actions: Actions, step: HvacStep, discharge: FloatArray | None = None
+    ) -> FloatArray:
         """Read all points after a step.
 
         Parameters
@@ -73,40 +79,33 @@ class HvacPoints:
             For the step.
         step : HvacStep
             What happened.
+        discharge : numpy.ndarray, shape (n_terminal,), optional
+            What the sensors in the discharge air say [K]; the step's own by default.
 
         Returns
         -------
         numpy.ndarray, shape (n_column,)
             In the library's units: kelvin, kg/s, W, shares.
         """
-        system, terminals, ops = self.system, self.system.terminals, StepOperations()
-        zone, handlers = terminals.zone, range(len(system.air_handlers))
-
-        def each(values: object, designs: list[float] | None = None) -> list[float]:
-            if values is None:
-                return designs or []
-            return list(values) if isinstance(values, tuple | list) else [values] * len(handlers)  # type: ignore[list-item]
-
-        designs = [h.supply_fan.static_pressure for h in system.air_handlers]
-        pressure = np.array(each(actions.static_pressure, designs)) / designs
-        reach = np.sqrt(pressure)[terminals.air_handler] * np.array(each(actions.running))[terminals.air_handler]
-        damper = np.divide(step.airflow, terminals.design_flow * reach, out=np.zeros(len(zone)), where=reach > 0.0)
-        gas = [
-            w.direct / h.heating.efficiency if isinstance(h.heating, Heater) and not h.heating.electric else 0.0
-            for h, w in zip(system.air_handlers, step.warmed, strict=True)
+        terminals, settings = self.system.terminals, settings_of(self._ops, self.system, actions)
+        zone, outdoor = terminals.zone, conditions.outdoor_temperature
+        most = settings.most_airflow
+        damper = np.minimum(step.airflow / most, 1.0) * (most > _LEAST)
+        coils = zip(self._heaters, step.warmed, strict=True)
+        direct = [0.0 if coil is None else done.direct / coil.efficiency for coil, done in coils]
+        gas = [0.0 if electric else taken for electric, taken in zip(self._electric, direct, strict=True)]
+        meters = [
+            m.cooling_power + m.supply_fan_power + m.exhaust_fan_power + taken - burned
+            for m, taken, burned in zip(step.mixed, direct, gas, strict=True)
         ]
-        electric = [
-            m.cooling_power + m.supply_fan_power + m.exhaust_fan_power
-            + (w.direct / h.heating.efficiency if isinstance(h.heating, Heater) and h.heating.electric else 0.0)
-            for h, m, w in zip(system.air_handlers, step.mixed, step.warmed, strict=True)
-        ]  # fmt: skip
         return np.concatenate([
             conditions.zone_temperature[zone], conditions.heating_setpoint[zone], conditions.cooling_setpoint[zone],
-            step.airflow, step.discharge, np.minimum(damper, 1.0),
-            valve_position(ops, step.valve_flow, terminals.rangeability),
-            each(actions.supply_air_temperature), list(step.supply_temperature),
-            [m.mixed_temperature for m in step.mixed], [m.return_temperature for m in step.mixed],
-            [conditions.outdoor_temperature] * len(handlers), [m.supply_fan_power for m in step.mixed], electric, gas,
-            [actions.supply_water_temperature, step.loop.water, step.return_water, step.fuel_power - sum(gas),
-             step.pump_power],
+            step.airflow, step.discharge if discharge is None else discharge, damper,
+            valve_position(self._ops, step.valve_flow, terminals.rangeability),
+            [
+                *settings.supply_air, *step.supply_temperature, *[m.mixed_temperature for m in step.mixed],
+                *[m.return_temperature for m in step.mixed], *[outdoor] * len(step.mixed),
+                *[m.supply_fan_power for m in step.mixed], *meters, *gas,
+                settings.supply_water, step.loop.water, step.return_water, step.fuel_power - sum(gas), step.pump_power,
+            ],
         ])  # fmt: skip

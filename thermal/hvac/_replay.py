@@ -124,7 +124,7 @@ def replay_terminals(
     rate, open_water = heat_rate(airflow), terminals.open_water(ops, opening)
     coil = terminals.conductance(ops, airflow, rate, open_water)
     share = valve_flow(ops, np.asarray(valve), terminals.rangeability)
-    part = heat_share(ops, share, coil, open_water[2])
+    part = heat_share(ops, share, coil, open_water.curve)
     reheat = part * coil * (np.asarray(water)[:, np.newaxis] - entering)
     discharge = entering + reheat / rate
     return TerminalReplay(airflow, discharge, reheat, share * opening * terminals.water_flow)
@@ -159,7 +159,7 @@ def replay_reheat(
     wanted = rate * np.maximum(discharge - entering, 0.0)
     reheat = np.minimum(wanted, ready)
     part = reheat / (ready + _LEAST)
-    flow = water_share(part, coil, open_water[2]) * terminals.water_flow
+    flow = water_share(part * coil, coil, open_water.curve) * terminals.water_flow
     return TerminalReplay(airflow, entering + reheat / rate, reheat, flow)
 
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from thermal.hvac._advance import advance
 from thermal.hvac._operations import CasadiOperations, Value
+from thermal.hvac._settings import settings_of
 from thermal.hvac._step import Actions, Calls, Conditions, HvacStep
 from thermal.hvac._system import HvacSystem
 
@@ -123,8 +124,8 @@ class SmoothHvac:
     Notes
     -----
     Return air couples all zones of an air handler, so that the Jacobian of a plant is full. It is a diagonal and a
-    product of rank m, with m the number of sums over terminals: flow and warmth of each air handler, drawn water, and
-    conductance and source of the coils. Slopes cost one sweep for all zones together, and one for each sum and knob.
+    product of rank m, with m the number of sums over terminals: flow, warmth and coils of each air handler, and drawn
+    water. Slopes cost one sweep for all zones together, and one for each sum and knob.
 
     Examples
     --------
@@ -132,7 +133,7 @@ class SmoothHvac:
     >>> system = HvacSystem((AirHandler(Fan(1.0)),), BoilerLoop(2e4, Pump(0.5)), Terminals.sized([0.5], 4000.0))
     >>> smooth = SmoothHvac(system)
     >>> smooth.knobs.size, smooth.n_sum
-    (3, 5)
+    (3, 4)
     """
 
     def __init__(
@@ -217,7 +218,8 @@ class SmoothHvac:
         actions = Actions(
             _each(knobs[at.supply_air]), knobs[at.supply_water], ducts, loop, _each(running), boiler, _each(ventilation)
         )
-        return advance(ops, system, knobs[at.water], calls, conditions, actions, seconds)
+        settings = settings_of(ops, system, actions)
+        return advance(ops, system, knobs[at.water], calls, conditions, settings, seconds)
 
     def _slope_functions(self, ops: _SumOperations, zone: Value, knobs: Value, around: Value) -> tuple[Any, Any]:
         """All slopes, and those of the heat by each zone's own temperature alone."""

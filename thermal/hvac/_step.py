@@ -8,6 +8,7 @@ from thermal.hvac._air import USUAL_HUMIDITY
 from thermal.hvac._air_handler import Mixed, Warmed
 from thermal.hvac._boiler import Heated
 from thermal.hvac._operations import Value
+from thermal.units import AIR_HEAT_CAPACITY
 
 
 class Conditions(NamedTuple):
@@ -86,20 +87,16 @@ class HvacStep(NamedTuple):
 
     Parameters
     ----------
-    calls : Calls
-        Of the thermostats.
     airflow : Value
         Of the terminals [kg/s].
     entering : Value
         Supply air at the terminals [K].
     reheat : Value
         Heat from the water in the terminals [W].
-    discharge : Value
-        Discharge temperatures [K].
     valve_flow : Value
         Water through the terminals over that of an open valve [-].
     terminal_heat : Value
-        Heat into the zone, one a terminal [W]: flow x 1006 J/kg/K x (discharge - zone temperature).
+        Heat into the zone, one a terminal [W]: flow x 1006 J/kg/K x (`discharge` - zone temperature).
     mixed : tuple of Mixed
         Air side of the air handlers.
     warmed : tuple of Warmed
@@ -116,11 +113,9 @@ class HvacStep(NamedTuple):
         Of the pump; of everything; fuel of everything, on the higher heating value [W].
     """
 
-    calls: Calls
     airflow: Value
     entering: Value
     reheat: Value
-    discharge: Value
     valve_flow: Value
     terminal_heat: Value
     mixed: tuple[Mixed, ...]
@@ -132,3 +127,8 @@ class HvacStep(NamedTuple):
     pump_power: Value
     electric_power: Value
     fuel_power: Value
+
+    @property
+    def discharge(self) -> Value:
+        """Discharge temperatures of the terminals [K]."""
+        return self.entering + self.reheat / (AIR_HEAT_CAPACITY * self.airflow)

@@ -8,6 +8,7 @@ import casadi
 
 from thermal.hvac._advance import advance
 from thermal.hvac._operations import CasadiOperations
+from thermal.hvac._settings import settings_of
 from thermal.hvac._step import Actions, Calls, Conditions
 from thermal.hvac._system import HvacSystem
 
@@ -57,6 +58,10 @@ def hvac_function(system: HvacSystem, width: float = 0.02) -> Any:
     s = {name: casadi.SX.sym(name, size) for name, size in sizes.items()}
     split = {name: tuple(casadi.vertsplit(v)) for name, v in s.items()}
     heat, cool = system.thermostat.calls(ops, s["zone_temperature"], s["heating_setpoint"], s["cooling_setpoint"])
+    actions = Actions(
+        split["supply_air_temperature"], s["supply_water_temperature"], split["static_pressure"],
+        s["differential_pressure"], split["running"], s["boiler"], split["ventilation"],
+    )  # fmt: skip
     done = advance(
         ops,
         system,
@@ -66,11 +71,7 @@ def hvac_function(system: HvacSystem, width: float = 0.02) -> Any:
             s["zone_temperature"], s["heating_setpoint"], s["cooling_setpoint"], s["outdoor_temperature"],
             s["outdoor_humidity"], split["return_humidity"], s["room_temperature"],
         ),
-        Actions(
-            split["supply_air_temperature"], s["supply_water_temperature"], split["static_pressure"],
-            s["differential_pressure"], split["running"], s["boiler"],
-            split["ventilation"],
-        ),
+        settings_of(ops, system, actions),
         s["seconds"],
     )  # fmt: skip
     outputs = {

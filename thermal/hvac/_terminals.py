@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -11,7 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 from thermal.errors import HvacParameterError, describe
 from thermal.hvac._air import WATER_HEAT_CAPACITY
 from thermal.hvac._checks import all_in_range, fields_in_range, in_range
-from thermal.hvac._coil import LEAST_FLOW, Characteristic, WaterCoil, characteristic, coil_conductance
+from thermal.hvac._coil import LEAST_FLOW, WaterCoil, WaterSide, coil_conductance, water_side
+from thermal.hvac._kept import LastValue
 from thermal.hvac._operations import NumpyOperations, Operations, Value
 from thermal.units import AIR_HEAT_CAPACITY
 
@@ -169,6 +171,8 @@ class Terminals:
     def __len__(self) -> int:
         return len(self.zone)
 
+    # constants of each terminal as arrays: NumPy takes half as long for an array as for a float
+
     @cached_property
     def _spans(self) -> tuple[FloatArray, FloatArray]:
         """What calls for cooling, and for heating once the reheat is open, add to the flow [kg/s]."""
@@ -176,20 +180,36 @@ class Terminals:
         return self.design_flow - self.minimum_flow, (self.heating_flow - self.minimum_flow) / rest
 
     @cached_property
-    def _film(self) -> FloatArray:
-        """Air film per power 0.8 of the flow."""
-        return self.air_film / self.design_flow**0.8
+    def _first(self) -> tuple[FloatArray, FloatArray]:
+        """Share of the call over which the reheat opens, and one over it."""
+        first = np.full(len(self), self.reheat_first)
+        return first, 1.0 / first
 
     @cached_property
-    def _limit(self) -> FloatArray:
-        return np.full(len(self), self.discharge_limit)
+    def _resistance(self) -> FloatArray:
+        """Of the air film, per power -0.8 of the flow."""
+        return self.design_flow**0.8 / self.air_film
 
     @cached_property
-    def _open_water(self) -> tuple[Value, Value, Characteristic]:
-        rate, film = WATER_HEAT_CAPACITY * self.water_flow, self.water_film
-        return rate, film, characteristic(NumpyOperations(), rate, film)
+    def _at_opening(self) -> LastValue:
+        return LastValue(self._array_side)
 
-    def airflow(self, ops: Operations, heating: Value, cooling: Value, reach: Value) -> Value:
+    def _array_side(self, water: float) -> WaterSide:
+        return self._water_side(NumpyOperations(), water)
+
+    def most_airflow(self, ops: Operations, reaches: Sequence[Value]) -> Value:
+        """Most air that the ducts' pressures drive through open dampers [kg/s].
+
+        Parameters
+        ----------
+        ops : Operations
+            Arithmetic.
+        reaches : sequence of Value
+            That over the design flow, one an air handler [-].
+        """
+        return self.design_flow * (ops.spread(reaches, self.air_handler) + LEAST_FLOW)
+
+    def airflow(self, ops: Operations, heating: Value, cooling: Value, most: Value) -> Value:
         """Air that the boxes let through [kg/s].
 
         Parameters
@@ -198,17 +218,29 @@ class Terminals:
             Arithmetic.
         heating, cooling : Value
             Calls [-].
-        reach : Value
-            Most flow that the duct pressure drives through an open damper, over the design flow [-].
+        most : Value
+            That the ducts' pressures drive through open dampers [kg/s].
         """
         by_cooling, by_heating = self._spans
         wanted = self.minimum_flow + by_cooling * cooling
         if self.reheat_first < 1.0:
-            wanted = wanted + by_heating * ops.positive(heating - self.reheat_first)
-        return ops.lesser(wanted, self.design_flow * (reach + LEAST_FLOW))
+            wanted = wanted + by_heating * ops.positive(heating - self._first[0])
+        return ops.lesser(wanted, most)
 
-    def open_water(self, ops: Operations, water: Value) -> tuple[Value, Value, Characteristic]:
-        """Heat capacity rate and film conductance of the water [W/K], and characteristic of the coils, valves open.
+    def reheat_call(self, ops: Operations, heating: Value) -> Value:
+        """Share of the reheat that is called for [-].
+
+        Parameters
+        ----------
+        ops : Operations
+            Arithmetic.
+        heating : Value
+            Calls [-].
+        """
+        return heating if self.reheat_first == 1.0 else ops.unit(heating * self._first[1])
+
+    def open_water(self, ops: Operations, water: Value) -> WaterSide:
+        """Give the water's side of the coils, valves open.
 
         Parameters
         ----------
@@ -217,15 +249,15 @@ class Terminals:
         water : Value
             Water through open valves over the design flow [-].
         """
-        if isinstance(water, float) and water == 1.0:
-            return self._open_water
-        water = water + LEAST_FLOW
-        rate, film = self._open_water[0] * water, self._open_water[1] * water**0.85
-        return rate, film, characteristic(ops, rate, film)
+        if type(water) is float:
+            side: WaterSide = self._at_opening(water)
+            return side
+        return self._water_side(ops, water)
 
-    def conductance(
-        self, ops: Operations, airflow: Value, rate: Value, water: tuple[Value, Value, Characteristic]
-    ) -> Value:
+    def _water_side(self, ops: Operations, water: Value) -> WaterSide:
+        return water_side(ops, WATER_HEAT_CAPACITY * self.water_flow, self.water_film, water)
+
+    def conductance(self, ops: Operations, airflow: Value, rate: Value, water: WaterSide) -> Value:
         """Heat per difference of water and air at the coils' entry [W/K], valves open.
 
         Parameters
@@ -236,15 +268,28 @@ class Terminals:
             Air [kg/s], above 0.
         rate : Value
             Its heat capacity rate [W/K].
-        water : tuple of Value
+        water : WaterSide
             As `open_water` gives it.
         """
-        return coil_conductance(ops, rate, self._film * airflow**0.8, water[0], water[1])
+        return coil_conductance(ops, rate, self._resistance * airflow**-0.8, water)
 
-    def heat_share(
-        self, ops: Operations, call: Value, rate: Value, conductance: Value, entering: Value, water: Value
-    ) -> Value:
-        """Share of the coils' heat that their valves let through [-], 0 to 1.
+    def allowance(self, ops: Operations, entering: Value, water: Value) -> Value:
+        """Rise up to the discharge limit over that up to the water's temperature [-], for the air of an air handler.
+
+        Parameters
+        ----------
+        ops : Operations
+            Arithmetic.
+        entering : Value
+            Air that enters the coils [K].
+        water : Value
+            Water that enters the coils [K].
+        """
+        # a difference of nothing leaves valves open for cold water, and closed where nothing is wanted
+        return ops.positive(self.discharge_limit - entering) / ops.maximum(water - entering, _LEAST)
+
+    def throttled(self, ops: Operations, call: Value, rate: Value, conductance: Value, allowance: Value) -> Value:
+        """Conductance of the coils with their valves as the calls want them [W/K].
 
         Parameters
         ----------
@@ -256,18 +301,13 @@ class Terminals:
             Heat capacity rate of the air [W/K].
         conductance : Value
             Of the open coils [W/K].
-        entering : Value
-            Air that enters the coils [K].
-        water : Value
-            Water that enters the coils [K].
+        allowance : Value
+            As `allowance` gives it [-].
         """
-        allowed = rate * ops.positive(self._limit - entering)
-        # a difference of nothing leaves valves open for cold water, and closed where nothing is wanted
-        ready = conductance * ops.maximum(water - entering, _LEAST)
+        to_limit = rate * allowance
         if self.discharge_control:
-            wanted = call * allowed
-            return wanted / ops.maximum(wanted, ready, 100.0)
-        return ops.minimum(call, allowed / ready)
+            return ops.capped(call * to_limit, conductance, 2.5)
+        return ops.capped(to_limit, call * conductance, 2.5)
 
 
 def heat_rate(airflow: Value) -> Value:

@@ -47,6 +47,21 @@ def test_warmer_supply_air_never_cools_a_zone(system: HvacSystem) -> None:
     assert (np.diff(rests, axis=0) >= -1e-9).all()
 
 
+def test_a_zone_that_moves_along_its_line_rests_where_a_fresh_look_finds_it(system: HvacSystem) -> None:
+    """Lines are kept from step to step: bit for bit what looking them up anew gives, knots and far ends too."""
+    n, rng = system.zone_count, np.random.default_rng(1)
+    low, high = np.full(n, 294.0), np.full(n, 297.0)
+    control = LocalControl(system, np.full(n, 1e-3))
+    free = np.full(n, 293.0)
+    for k in range(200):
+        free = free + rng.normal(0.0, 3.0 if k % 20 == 0 else 0.01, n)
+        free = np.full(n, 400.0) if k == 100 else np.full(n, 150.0) if k == 150 else free
+        fresh = LocalControl(system, np.full(n, 1e-3))
+        assert np.array_equal(
+            control.settle(free, low, high, SUPPLY, REACH), fresh.settle(free, low, high, SUPPLY, REACH)
+        )
+
+
 def test_without_fans_nothing_moves(system: HvacSystem) -> None:
     n = system.zone_count
     control = LocalControl(system, np.full(n, 1e-3))

@@ -32,10 +32,10 @@ Change = Callable[[pd.DataFrame], None]
 class Leaky(Terminals):
     """Terminals of which one's valve never closes; on its command the building still sees it close."""
 
-    def heat_share(self, ops, call, rate, conductance, entering, water):  # type: ignore[no-untyped-def]
+    def throttled(self, ops, call, rate, conductance, allowance):  # type: ignore[no-untyped-def]
         """Let 15 % of the heat through at least."""
-        share = super().heat_share(ops, call, rate, conductance, entering, water)
-        return np.where(np.arange(len(share)) == SICK, np.maximum(share, 0.15), share)
+        wanted = super().throttled(ops, call, rate, conductance, allowance)
+        return np.where(np.arange(len(wanted)) == SICK, np.maximum(wanted, 0.15 * conductance), wanted)
 
 
 class Lab:

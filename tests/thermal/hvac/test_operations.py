@@ -42,6 +42,25 @@ def test_the_lesser_of_positive_values_is_positive(a, b, width):
     assert FloatOperations().lesser(a, b) == min(a, b)
 
 
+@given(a=st.floats(1e-6, 1e4), b=st.floats(1e-6, 1e4), width=WIDTHS)
+def test_values_in_order_keep_their_sum(a, b, width):
+    for kind in KINDS:
+        x, y = (casadi.DM(a), casadi.DM(b)) if kind is CasadiOperations else (a, b)
+        assert tuple(map(number, kind().ordered(x, y))) == pytest.approx((min(a, b), max(a, b)), rel=1e-9, abs=1e-12)
+        least, most = map(number, kind(width).ordered(x, y))
+        assert 0.0 < least <= most * (1.0 + 1e-9)
+        assert least + most == pytest.approx(a + b, rel=1e-12)
+
+
+@given(a=st.floats(0.0, 1e4), b=st.floats(1e-6, 1e4), width=WIDTHS, scale=st.floats(0.1, 100.0))
+def test_what_is_capped_is_never_negative_and_never_above(a, b, width, scale):
+    ops = FloatOperations(width)
+    assert 0.0 <= ops.capped(a, b, scale) <= min(a, b) * (1.0 + 1e-12)
+    assert ops.capped(0.0, b, scale) == 0.0
+    assert min(a, b) - ops.capped(a, b, scale) <= 0.5 * width * scale * (1.0 + 1e-9) + 1e-9
+    assert FloatOperations().capped(a, b) == float(NumpyOperations().capped(a, b)) == min(a, b)
+
+
 @given(x=NUMBERS, low=NUMBERS, span=st.floats(0.0, 100.0), width=WIDTHS)
 def test_a_smooth_clip_keeps_its_limits(x, low, span, width):
     ops, exact = FloatOperations(width), min(max(x, low), low + span)

@@ -14,6 +14,7 @@ from thermal.hvac import (
 )
 from thermal.hvac._advance import advance
 from thermal.hvac._operations import StepOperations
+from thermal.hvac._settings import settings_of
 from thermal.hvac._step import Calls
 
 SITUATIONS = {
@@ -106,9 +107,8 @@ def test_hotter_water_is_never_less_heat(plant_system, s, more):
         loop = plant_system.loop
         steady = type(loop)(1e8, loop.pump, water_volume=1e4)
         system = HvacSystem(plant_system.air_handlers, steady, plant_system.terminals)
-        return advance(
-            ops, system, water, Calls(heat, cool), conditions, actions._replace(supply_water_temperature=water), 10.0
-        )
+        settings = settings_of(ops, system, actions._replace(supply_water_temperature=water))
+        return advance(ops, system, water, Calls(heat, cool), conditions, settings, 10.0)
 
     low = reheat(s["water"])
     high = reheat(s["water"] + more)

@@ -5,6 +5,7 @@ from thermal.hvac import HvacParameterError, Terminals
 from thermal.hvac._operations import StepOperations
 
 OPS = StepOperations()
+FLOATS = OPS.scalar
 
 
 def one(**changes):
@@ -16,7 +17,8 @@ def one(**changes):
 
 
 def flow(terminals, heating, cooling, reach=1.0):
-    return float(terminals.airflow(OPS, np.array([heating]), np.array([cooling]), reach)[0])
+    most = terminals.most_airflow(OPS, [reach])
+    return float(terminals.airflow(OPS, np.array([heating]), np.array([cooling]), most)[0])
 
 
 def test_two_maxima_by_hand():
@@ -46,9 +48,9 @@ def test_discharge_air_keeps_its_limit_and_its_water(discharge_control):
     for water in (285.0, 300.0, 340.0, 370.0):
         last = -1.0
         for call in (0.0, 0.3, 0.7, 1.0):
-            share = terminals.heat_share(OPS, np.array([call]), rate, coil, 286.0, water)
-            discharge = float((286.0 + share * coil * max(water - 286.0, 0.0) / rate)[0])
-            assert 0.0 <= share[0] <= 1.0
+            part = terminals.throttled(OPS, np.array([call]), rate, coil, terminals.allowance(FLOATS, 286.0, water))
+            discharge = float((286.0 + part * max(water - 286.0, 0.0) / rate)[0])
+            assert 0.0 <= part[0] <= coil[0]
             assert discharge <= max(286.0, min(water, terminals.discharge_limit)) + 1e-9
             assert discharge >= last - 1e-12
             last = discharge
@@ -57,8 +59,8 @@ def test_discharge_air_keeps_its_limit_and_its_water(discharge_control):
 def test_a_call_sets_the_discharge_temperature():
     terminals, rate = one(), np.array([300.0])
     coil = terminals.conductance(OPS, rate / 1006.0, rate, terminals.open_water(OPS, 1.0))
-    share = terminals.heat_share(OPS, np.array([0.5]), rate, coil, 287.15, 350.0)
-    assert (287.15 + share * coil * (350.0 - 287.15) / rate)[0] == pytest.approx(0.5 * (287.15 + 305.15))
+    part = terminals.throttled(OPS, np.array([0.5]), rate, coil, terminals.allowance(FLOATS, 287.15, 350.0))
+    assert (287.15 + part * (350.0 - 287.15) / rate)[0] == pytest.approx(0.5 * (287.15 + 305.15))
 
 
 def test_less_differential_pressure_is_less_heat():
