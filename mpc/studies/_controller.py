@@ -42,6 +42,9 @@ UNMEASURED, LASTING, SENSOR_NOISE = 5.0, 6 * 3600.0, 0.05
 #: a tenth longer.
 SMOOTHING = 0.005
 
+#: Excess of a band at which discomfort has its full price [K]: small, so that what is optimised is what is measured.
+SOFTNESS = 0.05
+
 _KINDS = {"supply_air_temperature": "supply_air_temperature_setpoint",
           "supply_water_temperature": "supply_water_temperature_setpoint"}  # fmt: skip
 
@@ -168,7 +171,7 @@ def make_controller(
         observer = Observer(KalmanFilter(held_space(modes, ahead.control_step), unmeasured), modes)
     pressures = any(c.quantity.endswith("pressure") for c in decided)
     predictor = Predictor(modes, SmoothHvac(system, SMOOTHING, pressures), ahead, decided, unmeasured.time_constant)
-    solver = SequentialSolver(ControlProblem(predictor), iterations=iterations)
+    solver = SequentialSolver(ControlProblem(predictor, SOFTNESS), iterations=iterations)
     signals = None
     if model.network.signals or len(model.network.boundaries) > 1:
         if building is None:

@@ -78,6 +78,8 @@ class ControlRun:
         Indicators.
     decisions : tuple of Decision
         Of optimal control; () for rules.
+    plant : SimulatedPlant
+        As the run left it, with its telemetry.
     """
 
     controller: str
@@ -85,11 +87,17 @@ class ControlRun:
     loop: ClosedLoopRun
     kpis: Kpis
     decisions: tuple[Decision, ...]
+    plant: SimulatedPlant
 
     @property
     def cost(self) -> float:
         """Of energy, and demand charges where the tariff has any [currency]."""
         return (self.kpis.cost_tot + self.kpis.demand_cost) * self.kpis.floor_area
+
+    @property
+    def objective(self) -> float:
+        """Cost with discomfort at the price that optimal control has for it [currency]."""
+        return self.cost + self.study.settings.comfort_price * len(self.study.scenario.zones) * self.kpis.tdis_tot
 
     @property
     def sources(self) -> Mapping[str, int]:
@@ -151,7 +159,7 @@ def run_controller(study: Study, name: str, progress: Progress | None = None) ->
     report = None if progress is None else (lambda done, _: progress(known, done, count))
     loop = run_closed_loop(plant, watched, steps=count, seed=study.seed, forecasts=optimal, progress=report)
     kpis = measure_kpis(loop.record, plant.scenario, control_step=step)
-    return ControlRun(known, study, loop, kpis, tuple(log.decisions))
+    return ControlRun(known, study, loop, kpis, tuple(log.decisions), plant)
 
 
 def controller_of(study: Study, plant: SimulatedPlant, name: ControllerName) -> Controller:
@@ -227,7 +235,7 @@ def prediction_errors(run: ControlRun) -> dict[str, Any]:
         ``zone_mae`` and ``zone_bias`` [K], ``cost_error`` (expected over realised energy cost, less 1) [-], ``count``;
         empty for rules and runs shorter than an hour.
     """
-    rows = _compared(run)
+    rows = compared_decisions(run)
     if not rows:
         return {}
     record, scenario = run.loop.record, run.study.scenario
@@ -246,8 +254,14 @@ def prediction_errors(run: ControlRun) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _compared(run: ControlRun) -> list[tuple[int, Decision]]:
-    """Decisions with a plan whose hour ends within the run, with the step that they began at."""
+def compared_decisions(run: ControlRun) -> list[tuple[int, Decision]]:
+    """Give the decisions with a plan whose hour ends within the run, with the step that they began at.
+
+    Parameters
+    ----------
+    run : ControlRun
+        Of a study.
+    """
     step, start = run.loop.record.step, run.study.scenario.grid.start
     rows = ((round((d.stamp - start).total_seconds() / step), d) for d in run.decisions)
     last = run.loop.record.n_steps - round(AHEAD / step)

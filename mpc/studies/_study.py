@@ -263,8 +263,8 @@ def make_study(
         model = reduced(model_settings(controller_parameters, dx=dx), ready, controller_parameters, order)
     return Study(
         building.name, scenario, grid.n_steps, system or size_system(ready), truth, model, built, kind, noise,
-        dict(errors or {}), ControllerSettings(comfort_price=comfort_price, demand=tuple(prices.demand)), control_step, seed,
-        notes,
+        dict(errors or {}), ControllerSettings(comfort_price=comfort_price, demand=tuple(prices.demand)), control_step,
+        seed, notes,
     )  # fmt: skip
 
 
