@@ -25,6 +25,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import os
 import time
 from functools import cache
@@ -59,12 +60,12 @@ def building(floor_area: float, zones: int) -> Building:
 
 
 @cache
-def study(season: str, days: int, floor_area: float, zones: int, dx: float, price: float) -> Study:
+def study(season: str, days: float, floor_area: float, zones: int, dx: float, price: float) -> Study:
     """Put a stretch of a season together."""
     start = SEASONS[season]
-    end = (pd.Timestamp(start) + pd.Timedelta(days=days)).date().isoformat()
+    end = (pd.Timestamp(start) + pd.Timedelta(days=days)).isoformat()
     return make_study(
-        building(floor_area, zones), pilot_weather(SEED, start, days + 1.0), start, end, dx=dx, kind="random",
+        building(floor_area, zones), pilot_weather(SEED, start, math.ceil(days) + 1.0), start, end, dx=dx, kind="random",
         noise=SensorNoise(), errors=DAY_AHEAD_ERRORS, comfort_price=price, seed=SEED,
     )  # fmt: skip
 
@@ -93,7 +94,7 @@ def gather(options: argparse.Namespace) -> list[dict[str, Any]]:
     rows = []
     for season in options.seasons:
         for controller in options.controllers:
-            file = folder / f"{season}_{controller}_{options.days}d_{options.zones}z_{options.price:g}.json"
+            file = folder / f"{season}_{controller}_{options.days:g}d_{options.zones}z_{options.price:g}.json"
             if not file.exists() and not options.no_run:
                 text = json.dumps(run(season, controller, options), indent=1) + "\n"
                 part = file.with_suffix(".part")
@@ -132,7 +133,7 @@ def table(rows: list[dict[str, Any]]) -> str:
         for row in rows
     ]  # fmt: skip
     first = rows[0]
-    days = "a week" if first["days"] == 7 else f"{first['days']} days"
+    days = "a week" if first["days"] == 7 else f"{first['days']:g} days"
     note = (
         f"{first['zones']} zones, {first['floor_area']:,.0f} m2, {days} a season from a Monday; discomfort at "
         f"{first['price']:g} USD a kelvin hour.\n"
@@ -159,7 +160,7 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     """Read the command line."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=Path, required=True, help="folder of the results")
-    parser.add_argument("--days", type=int, default=7, help="length of each season's run")
+    parser.add_argument("--days", type=float, default=7.0, help="length of each season's run, in quarters of a day")
     parser.add_argument("--seasons", nargs="+", choices=SEASONS, default=list(SEASONS))
     parser.add_argument("--controllers", nargs="+", choices=CONTROLLERS, default=list(CONTROLLERS))
     parser.add_argument("--zones", type=int, default=123)

@@ -15,8 +15,16 @@ from mpc.studies._report import (
     write_comparison,
     write_control,
 )
-from mpc.studies._run import ControllerName, ControlRun, Decision, controller_of, prediction_errors, run_controller
-from mpc.studies._study import CONTROL_STEP, HORIZON_HOURS, PlantKind, Study, make_study
+from mpc.studies._run import (
+    ControllerName,
+    ControlRun,
+    Decision,
+    check_controller,
+    controller_of,
+    prediction_errors,
+    run_controller,
+)
+from mpc.studies._study import CONTROL_STEP, HORIZON_HOURS, PlantKind, Study, check_kind, make_study
 
 __all__ = [
     "CONTROL_STEP",
@@ -29,6 +37,8 @@ __all__ = [
     "KnownState",
     "PlantKind",
     "Study",
+    "check_controller",
+    "check_kind",
     "compare_controllers",
     "comparison_rows",
     "comparison_summary",

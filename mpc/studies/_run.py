@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple, get_args
+from typing import Any, Literal, NamedTuple, cast, get_args
 
 import numpy as np
 import pandas as pd
@@ -118,13 +118,10 @@ def check_controller(name: str) -> ControllerName:
     ControlError
         With the nearest one.
     """
-    for known in get_args(ControllerName):
-        if name == known:
-            return known  # type: ignore[no-any-return]
-    known_names = get_args(ControllerName)
-    raise ControlError(
-        describe("controller", f"one of {', '.join(known_names)}", repr(name), nearest(name, known_names))
-    )
+    known = get_args(ControllerName)
+    if name not in known:
+        raise ControlError(describe("controller", f"one of {', '.join(known)}", repr(name), nearest(name, known)))
+    return cast(ControllerName, name)
 
 
 def run_controller(study: Study, name: str, progress: Progress | None = None) -> ControlRun:

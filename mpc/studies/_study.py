@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Literal
+from typing import Literal, cast, get_args
 
 import numpy as np
 import pandas as pd
@@ -34,7 +34,7 @@ from mpc.studies._equip import equip
 from mpc.studies._model import ORDER, model_settings, reduced
 from thermal import Building, Simulator, reduced_model
 from thermal.effects import chosen
-from thermal.errors import describe
+from thermal.errors import describe, nearest
 from thermal.hvac import HvacSystem
 from thermal.model import ReducedModel
 from thermal.pilot import size_system
@@ -166,6 +166,25 @@ class Study:
                 effects=chosen(self.built.effects),
             )
         )
+
+
+def check_kind(kind: str) -> PlantKind:
+    """Refuse a kind of plant that is not known.
+
+    Parameters
+    ----------
+    kind : str
+        ``reduced``, ``grid`` or ``random``.
+
+    Raises
+    ------
+    PlantError
+        With the nearest one.
+    """
+    known = get_args(PlantKind)
+    if kind not in known:
+        raise PlantError(describe("plant", f"one of {', '.join(known)}", repr(kind), nearest(kind, known)))
+    return cast(PlantKind, kind)
 
 
 def make_study(

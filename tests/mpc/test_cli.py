@@ -14,7 +14,19 @@ from mpc.cli._app import app
 from thermal.data import bundled_case_path
 
 CASE = str(bundled_case_path())
-EPILOGS = ("check", "simulate", "evaluate", "calibrate", "diagnose", "demo", "doctor", "import-plan", "import-devices")
+EPILOGS = (
+    "check",
+    "simulate",
+    "evaluate",
+    "calibrate",
+    "diagnose",
+    "demo",
+    "doctor",
+    "import-plan",
+    "import-devices",
+    "control",
+    "compare",
+)
 
 
 def run(*arguments: str | Path) -> Any:
