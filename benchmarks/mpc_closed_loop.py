@@ -65,8 +65,8 @@ def study(season: str, days: float, floor_area: float, zones: int, dx: float, pr
     start = SEASONS[season]
     end = (pd.Timestamp(start) + pd.Timedelta(days=days)).isoformat()
     return make_study(
-        building(floor_area, zones), pilot_weather(SEED, start, math.ceil(days) + 1.0), start, end, dx=dx, kind="random",
-        noise=SensorNoise(), errors=DAY_AHEAD_ERRORS, comfort_price=price, seed=SEED,
+        building(floor_area, zones), pilot_weather(SEED, start, math.ceil(days) + 1.0), start, end, dx=dx,
+        kind="random", noise=SensorNoise(), errors=DAY_AHEAD_ERRORS, comfort_price=price, seed=SEED,
     )  # fmt: skip
 
 
@@ -132,13 +132,16 @@ def table(rows: list[dict[str, Any]]) -> str:
         ]
         for row in rows
     ]  # fmt: skip
-    first = rows[0]
-    days = "a week" if first["days"] == 7 else f"{first['days']:g} days"
-    note = (
-        f"{first['zones']} zones, {first['floor_area']:,.0f} m2, {days} a season from a Monday; discomfort at "
-        f"{first['price']:g} USD a kelvin hour.\n"
+    return markdown(COLUMNS, lines) + "\n" + note(rows[0])
+
+
+def note(row: dict[str, Any]) -> str:
+    """Say what was run."""
+    days = "a week" if row["days"] == 7 else "a day" if row["days"] == 1 else f"{row['days']:g} days"
+    return (
+        f"{row['zones']} zones, {row['floor_area']:,.0f} m2, {days} a season from a Monday; discomfort at "
+        f"{row['price']:g} USD a zone's kelvin hour.\n"
     )
-    return markdown(COLUMNS, lines) + "\n" + note
 
 
 def short(rows: list[dict[str, Any]]) -> str:
@@ -153,7 +156,7 @@ def short(rows: list[dict[str, Any]]) -> str:
         way = shares(rows).get((season, "mpc"))
         lines.append([season, *cells, "" if way is None else f"{way:.0%}"])
     head = ("cost, USD (discomfort, K h)", *(NAMES[name] for name in CONTROLLERS), "way to the bound")
-    return markdown(head, lines)
+    return markdown(head, lines) + "\n" + note(rows[0])
 
 
 def parse(arguments: list[str] | None = None) -> argparse.Namespace:
