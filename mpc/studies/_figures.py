@@ -136,7 +136,7 @@ def expectations(run: ControlRun) -> list[Picture]:
         With decisions; without any there is nothing to draw.
     """
     rows = compared_decisions(run)
-    if not rows:
+    if len(rows) < 2:  # a point is no course
         return []
     record, ahead = run.loop.record, round(AHEAD / run.loop.record.step)
     stamps = run.study.stamps[[first + ahead - 1 for first, _ in rows]]
