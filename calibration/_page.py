@@ -14,9 +14,10 @@ _NO_NUMBER = "–"
 
 
 @cache
-def _environment() -> jinja2.Environment:
+def _environment(package: str) -> jinja2.Environment:
+    homes = dict.fromkeys([package, "calibration"])  # whose base page and macros all pages share
     return jinja2.Environment(
-        loader=jinja2.PackageLoader("calibration", "templates"),
+        loader=jinja2.ChoiceLoader([jinja2.PackageLoader(home, "templates") for home in homes]),
         autoescape=True,
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
@@ -24,8 +25,8 @@ def _environment() -> jinja2.Environment:
     )
 
 
-def render(template: str, content: dict[str, Any]) -> str:
-    """Fill a template of the package; the page loads nothing from elsewhere.
+def render(template: str, content: dict[str, Any], package: str = "calibration") -> str:
+    """Fill a template of a package; the page loads nothing from elsewhere.
 
     Parameters
     ----------
@@ -33,8 +34,10 @@ def render(template: str, content: dict[str, Any]) -> str:
         Name without its ending, such as ``calibration``.
     content : dict
         What it shows; every text is escaped.
+    package : str
+        Whose folder ``templates`` it is in.
     """
-    return _environment().get_template(f"{template}.html.j2").render(version=version("buildingmpc"), **content)
+    return _environment(package).get_template(f"{template}.html.j2").render(version=version("buildingmpc"), **content)
 
 
 def kelvin(value: float) -> str:
@@ -68,6 +71,13 @@ def watts(value: float) -> str:
 
 def significant(value: float | None, digits: int = 3) -> str:
     """Spell a number with a few significant digits.
+
+    Parameters
+    ----------
+    value : float or None
+        Number [any].
+    digits : int
+        How many.
 
     Examples
     --------
@@ -105,6 +115,11 @@ def unit(text: str) -> str:
 def duration(seconds: float) -> str:
     """Spell a length of time.
 
+    Parameters
+    ----------
+    seconds : float
+        Length [s].
+
     Examples
     --------
     >>> duration(21600.0), duration(5400.0), duration(864000.0)
@@ -119,12 +134,25 @@ def duration(seconds: float) -> str:
 
 
 def clock(stamp: pd.Timestamp) -> str:
-    """Spell a local time to the minute."""
+    """Spell a local time to the minute.
+
+    Parameters
+    ----------
+    stamp : pandas.Timestamp
+        Local.
+    """
     return f"{stamp:%Y-%m-%d %H:%M}"
 
 
 def counted(number: int, noun: str, plural: str = "") -> str:
     """Spell a count.
+
+    Parameters
+    ----------
+    number : int
+        How many.
+    noun, plural : str
+        Of what; by default the plural has an s.
 
     Examples
     --------

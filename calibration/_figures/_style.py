@@ -73,7 +73,13 @@ class Picture:
 
 
 def styled(function: Callable[P, T]) -> Callable[P, T]:
-    """Draw in the house's style, whatever the user's own settings."""
+    """Draw in the house's style, whatever the user's own settings.
+
+    Parameters
+    ----------
+    function : callable
+        That draws.
+    """
 
     @wraps(function)
     def drawn(*args: P.args, **kwargs: P.kwargs) -> T:
@@ -93,7 +99,15 @@ def styled(function: Callable[P, T]) -> Callable[P, T]:
 
 
 def picture(figure: Figure, alt: str) -> Picture:
-    """Turn a figure into an SVG that a page holds itself."""
+    """Turn a figure into an SVG that a page holds itself.
+
+    Parameters
+    ----------
+    figure : Figure
+        Of Matplotlib.
+    alt : str
+        What it shows, for those who cannot see it.
+    """
     buffer = io.BytesIO()
     figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
     drawn = buffer.getvalue()
@@ -102,12 +116,28 @@ def picture(figure: Figure, alt: str) -> Picture:
 
 
 def day_numbers(stamps: pd.DatetimeIndex) -> FloatArray:
-    """Stamps as Matplotlib's days, shape (n_time,)."""
+    """Stamps as Matplotlib's days, shape (n_time,).
+
+    Parameters
+    ----------
+    stamps : DatetimeIndex
+        With a time zone.
+    """
     return np.asarray(stamps.tz_convert("UTC").tz_localize(None).as_unit("us").asi8 / 86400e6, dtype=float)
 
 
 def time_axis(axes: Axes, zone: tzinfo | None, ticks: int = 7) -> None:
-    """Local time along x."""
+    """Local time along x.
+
+    Parameters
+    ----------
+    axes : Axes
+        Of Matplotlib.
+    zone : tzinfo or None
+        Whose clock.
+    ticks : int
+        Most of them.
+    """
     locator = dates.AutoDateLocator(tz=zone, minticks=3, maxticks=ticks)  # type: ignore[no-untyped-call]
     axes.xaxis.set_major_locator(locator)
     formatter = dates.ConciseDateFormatter(locator, tz=zone)  # type: ignore[no-untyped-call]

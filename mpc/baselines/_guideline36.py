@@ -48,7 +48,10 @@ class Guideline36Settings:
     water_lasting : float
         How long that must last [s] (5.6.8.3).
     throttling_range : float
-        Of the zones' loops, as the building's thermostats have it [K].
+        Distance from the setpoint at which a zone's loop counts as at its end [K]. The guideline's loops are integral
+        and hold a zone at its setpoint until then; a proportional one lets it drift. The default is half of the
+        thermostats' range, by which setpoints lie inside of the comfort band (`mpc.plants.scheduled_operation`): zones
+        ask when they reach the band's edge, and not half a kelvin beyond it.
     discharge_rise : float
         Warmest discharge air above the zone's heating setpoint [K] (5.6.5); the reheat reaches it at half of the
         heating loop.
@@ -66,7 +69,7 @@ class Guideline36Settings:
     two_water: float = 8.0
     three_water: float = 17.0
     water_lasting: float = 300.0
-    throttling_range: float = 1.0
+    throttling_range: float = 0.5
     discharge_rise: float = 11.0
 
     def __post_init__(self) -> None:
@@ -93,8 +96,7 @@ class Guideline36:
     Fans and pumps count as proven on while their power is above zero, or not measured; off, setpoints return to SP0.
     Between two calls requests stay, and the loops take as many of their time steps as fit. Modes are those of occupied
     hours whenever a fan runs: the warm-up's 35 degC (5.16.2.2) are left out. Zones have one importance (5.1.14.2).
-    A zone's loops are proportional, as the thermostats of `thermal.hvac` are: their outputs follow from temperature
-    and setpoints.
+    Outputs of the zones' loops follow from temperature and setpoints.
     """
 
     def __init__(

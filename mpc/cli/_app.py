@@ -15,6 +15,7 @@ import typer
 
 from mpc.cli._calibrate import calibrate
 from mpc.cli._check import check
+from mpc.cli._control import compare, control
 from mpc.cli._demo import demo
 from mpc.cli._diagnose import diagnose
 from mpc.cli._doctor import doctor
@@ -132,6 +133,16 @@ for _command, _help, _example in (
         diagnose,
         "Say where model and building disagree, which missing effect causes it, and how far the error falls with it.",
         "diagnose cases/office --out diagnosis",
+    ),
+    (
+        control,
+        "Run a building in closed loop with optimal control, or with a rule.",
+        "control cases/office --parameters results/calibration.json --start 2023-10-16 --end 2023-10-18 --out control",
+    ),
+    (
+        compare,
+        "Run a building with several controllers on the same weather, people and prices, and compare them.",
+        "compare cases/office --controllers guideline36,mpc,bound --start 2023-10-16 --end 2023-10-18 --out compared",
     ),
     (
         serve,

@@ -1,13 +1,61 @@
 """Controllers put together, run on plants and compared: what the commands ``control`` and ``compare`` do."""
 
+from mpc.studies._bound import KnownState
+from mpc.studies._compare import Comparison, compare_controllers
 from mpc.studies._controller import default_horizon, held_space, make_controller, site_points
+from mpc.studies._equip import equip
 from mpc.studies._model import ORDER, control_model
+from mpc.studies._report import (
+    comparison_rows,
+    comparison_summary,
+    comparison_verdict,
+    control_summary,
+    control_verdict,
+    trajectory,
+    write_comparison,
+    write_control,
+)
+from mpc.studies._run import (
+    ControllerName,
+    ControlRun,
+    Decision,
+    check_controller,
+    controller_of,
+    prediction_errors,
+    run_controller,
+)
+from mpc.studies._study import CONTROL_STEP, HORIZON_HOURS, PlantKind, Study, check_kind, make_study
 
 __all__ = [
+    "CONTROL_STEP",
+    "HORIZON_HOURS",
     "ORDER",
+    "Comparison",
+    "ControlRun",
+    "ControllerName",
+    "Decision",
+    "KnownState",
+    "PlantKind",
+    "Study",
+    "check_controller",
+    "check_kind",
+    "compare_controllers",
+    "comparison_rows",
+    "comparison_summary",
+    "comparison_verdict",
     "control_model",
+    "control_summary",
+    "control_verdict",
+    "controller_of",
     "default_horizon",
+    "equip",
     "held_space",
     "make_controller",
+    "make_study",
+    "prediction_errors",
+    "run_controller",
     "site_points",
+    "trajectory",
+    "write_comparison",
+    "write_control",
 ]

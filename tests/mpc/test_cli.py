@@ -17,6 +17,7 @@ CASE = str(bundled_case_path())
 EPILOGS = (
     *("check", "simulate", "evaluate", "calibrate", "diagnose", "demo", "doctor", "import-plan", "import-devices"),
     "serve",
+    *("control", "compare"),
 )
 
 
