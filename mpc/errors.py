@@ -41,3 +41,11 @@ class ReplayError(MpcError):
 
 class ControlError(MpcError):
     """A control problem whose parts do not fit, or data of a horizon that are incomplete."""
+
+
+class EnvironmentSetupError(MpcError):
+    """Parts of a learning environment that do not fit each other, or a policy of another one."""
+
+
+class MissingExtraError(MpcError, ImportError):
+    """A package that an extra brings is not installed."""
