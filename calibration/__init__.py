@@ -41,7 +41,7 @@ from calibration._result import CalibrationResult, GridCheck, ParameterEstimate,
 from calibration._results import check_results_folder, to_json, write_results
 from calibration._selection import select_structure
 from calibration._selection_verdict import Candidate, HeldOutDifference, LikelihoodRatio, Selection
-from calibration._settings import ModelSettings
+from calibration._settings import ModelSettings, read_settings
 from calibration._smoother import Smoothed, smooth
 from calibration._state_space import StateSpace, state_space
 from calibration._whiteness import Whiteness, ZoneWhiteness, whiteness
@@ -122,6 +122,7 @@ __all__ = [
     "predictions_table",
     "profile_likelihood",
     "quality_rows",
+    "read_settings",
     "select_runs",
     "select_structure",
     "simulation_summary",

@@ -13,6 +13,7 @@ from mpc.control._quadratic import QuadraticResult, solve_quadratic
 from mpc.control._reading import SitePoints
 from mpc.control._rules import ResetRule
 from mpc.control._sequential import SequentialSolver
+from mpc.control._signals import ForecastSignals
 from mpc.control._solution import Solution, Solver, Status
 
 __all__ = [
@@ -24,6 +25,7 @@ __all__ = [
     "ControllerSettings",
     "CostTerms",
     "Expected",
+    "ForecastSignals",
     "Horizon",
     "HorizonData",
     "IpoptSolver",
