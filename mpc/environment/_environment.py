@@ -76,8 +76,8 @@ class ControlEnvironment(gymnasium.Env[Observation, NDArray[np.float32]]):
     Parameters
     ----------
     plants : Plant or sequence of Plant
-        With a scenario; several with the same measurements, actuators and control step. An environment steps them, so
-        no two environments may share one, nor two plants a building model.
+        With a scenario; several with the same measurements, actuators and control step. They are stepped one at a
+        time, each from its reset on, so they may share a building model; two environments may share neither.
     reward : str or Reward
         ``economic`` (default), ``paper``, or one's own.
     actions : sequence of str
@@ -213,11 +213,13 @@ def _checked(plants: Plant | Sequence[Plant]) -> tuple[ScenarioPlant, ...]:
     several = tuple(plants) if isinstance(plants, Sequence) else (plants,)
     if not several:
         raise EnvironmentSetupError(describe("environment", "a plant or more", "none"))
+    checked: list[ScenarioPlant] = []
     for plant in several:
         if not isinstance(plant, ScenarioPlant):
             raise EnvironmentSetupError(describe("environment", "plants with a scenario", type(plant).__name__))
-    first = several[0]
-    for k, plant in enumerate(several):
+        checked.append(plant)
+    first = checked[0]
+    for k, plant in enumerate(checked):
         for what in ("columns", "actuators", "control_step"):
             if getattr(plant, what) != getattr(first, what):
                 expected = f"the same {what.replace('_', ' ')} as plant 0"
@@ -225,7 +227,7 @@ def _checked(plants: Plant | Sequence[Plant]) -> tuple[ScenarioPlant, ...]:
         if plant.control_step % plant.scenario.grid.step:
             expected = f"a control step of whole steps of {plant.scenario.grid.step:g} s"
             raise EnvironmentSetupError(describe(f"environment: plant {k}", expected, f"{plant.control_step:g} s"))
-    return several
+    return tuple(checked)
 
 
 def _reward_of(reward: str | Reward) -> Reward:
@@ -237,7 +239,7 @@ def _reward_of(reward: str | Reward) -> Reward:
 
 
 def _last_steps(plant: Plant, each: int) -> PlantRecord:
-    """What a plant did in its last control step of some steps of the scenario."""
+    """Read what a plant did in its last control step, of some steps of the scenario."""
     if isinstance(plant, SimulatedPlant):
         return plant.recent(each)
     whole = plant.record()

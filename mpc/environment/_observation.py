@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -80,7 +81,7 @@ class ObservationLayout:
                 if at.size:
                     self._histograms.append((at, np.asarray(edges[1:-1])))
                     counted += [Feature(f"share of {point} in {a:g} to {b:g}", "-", -1.0, 1.0)
-                                for a, b in zip(edges[:-1], edges[1:], strict=True)]  # fmt: skip
+                                for a, b in pairwise(edges)]  # fmt: skip
             pairs = [(k, f) for k, f in zip(kept, features, strict=True) if points[k] not in HISTOGRAM_EDGES]
             kept, features = tuple(k for k, _ in pairs), tuple(f for _, f in pairs)
         self._kept = np.array(kept, dtype=np.intp)

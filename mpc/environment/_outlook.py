@@ -67,7 +67,9 @@ class Outlook:
             raise EnvironmentSetupError(describe("outlook: block_ends", expected, repr(tuple(block_ends))))
         lacking = [f"{zone}/{name}" for name in _OF_ZONES for zone in zones if f"{zone}/{name}" not in columns]
         if lacking:
-            raise EnvironmentSetupError(describe("outlook", f"forecasts with {lacking[0]!r}", "none", "use a Forecaster"))
+            raise EnvironmentSetupError(
+                describe("outlook", f"forecasts with {lacking[0]!r}", "none", "use a Forecaster")
+            )
         weather = [c for c in columns if "/" not in c and c.endswith("_sensor") and "direction" not in c]
         single = [*weather, *(c for c in _OF_ALL if c in columns)]
         self.columns = (*single, *(f"{zone}/{name}" for name in _OF_ZONES for zone in zones))
@@ -183,4 +185,3 @@ def clock(seconds: int, timezone: str) -> FloatArray:
     day = (now.hour + now.minute / 60.0 + now.second / 3600.0) / 24.0
     shares = day, (now.weekday() + day) / 7.0, (now.timetuple().tm_yday - 1 + day) / 365.25
     return np.array([f(2.0 * math.pi * share) for share in shares for f in (math.sin, math.cos)])
-

@@ -104,7 +104,7 @@ REWARDS: dict[str, Reward] = {"economic": EconomicReward(), "paper": PaperStepRe
 
 
 def _steps_each(record: PlantRecord, scenario: Scenario) -> int:
-    """Steps of the plant in a step of the scenario."""
+    """Count the steps of the plant in a step of the scenario."""
     each = round(scenario.grid.step / record.step)
     if abs(each * record.step - scenario.grid.step) > 1e-6 or record.district_heating is not None:
         expected = f"steps that divide the scenario's {scenario.grid.step:g} s, no district heating"
