@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from datetime import datetime
+from itertools import pairwise
 from zoneinfo import ZoneInfo
 
 import numpy as np
@@ -75,7 +76,7 @@ class Outlook:
         self.columns = (*single, *(f"{zone}/{name}" for name in _OF_ZONES for zone in zones))
         self._position = {column: k for k, column in enumerate(self.columns)}
         self._weights = np.zeros((len(ends), int(edges[-1])))
-        for k, (first, last) in enumerate(zip(edges[:-1], edges[1:], strict=True)):
+        for k, (first, last) in enumerate(pairwise(edges.tolist())):
             self._weights[k, first:last] = 1.0 / (last - first)
         self._zones = np.zeros((len(self.columns), len(single) + len(_OF_ZONES)))
         self._zones[: len(single), : len(single)] = np.eye(len(single))

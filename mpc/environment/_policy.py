@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from itertools import pairwise
 from os import PathLike
 from pathlib import Path
 from typing import Any, Literal, get_args
@@ -70,7 +71,7 @@ class ActorNetwork:
             object.__setattr__(self, name, tuple(np.asarray(v, dtype=np.float32) for v in getattr(self, name)))
         shapes = [(w.shape, b.shape) for w, b in zip(self.weights, self.biases, strict=False)]
         fit = len(self.weights) == len(self.biases) > 0 and all(len(w) == 2 and b == (w[0],) for w, b in shapes)
-        chained = fit and all(a[0][0] == b[0][1] for a, b in zip(shapes, shapes[1:], strict=False))
+        chained = fit and all(a[0][0] == b[0][1] for a, b in pairwise(shapes))
         if not chained or not all(np.isfinite(v).all() for v in (*self.weights, *self.biases)):
             raise EnvironmentSetupError(describe("network", "finite layers that fit each other", repr(shapes)))
 

@@ -285,10 +285,7 @@ class SimulatedPlant:
         PlantError
             When there was no step yet.
         """
-        done = [s.done for s in self._kept()]
-        temperature = np.stack([self._first, *(s.end for s in self._steps)])
-        electricity, gas = (np.array([getattr(d, f"{kind}_power") for d in done]) for kind in ("electric", "fuel"))
-        return PlantRecord(self._step, temperature, electricity, gas)
+        return self.recent(len(self._kept()))
 
     def recent(self, steps: int) -> PlantRecord:
         """Give the last steps of `record`, at a cost that does not grow with the run.
