@@ -37,6 +37,11 @@ MODEL_STEP = 300.0
 #: office's lights come and go, over a morning.
 UNMEASURED, LASTING, SENSOR_NOISE = 5.0, 6 * 3600.0, 0.05
 
+#: Smoothing width of the plant in the predictor [-]: at 0.02, the plant's default, coils and fans that stand still take
+#: a seventh of a small building's electricity; at 0.005 costs fall by 0.6 %, below that by nothing, and solves take
+#: a tenth longer.
+SMOOTHING = 0.005
+
 _KINDS = {"supply_air_temperature": "supply_air_temperature_setpoint",
           "supply_water_temperature": "supply_water_temperature_setpoint"}  # fmt: skip
 
@@ -95,6 +100,7 @@ def make_controller(
     horizon: Horizon | None = None,
     channels: Sequence[Channel] | None = None,
     disturbance: DisturbanceModel | None = None,
+    observer: Observer | None = None,
     boundaries: Mapping[str, float] | None = None,
     iterations: int = 25,
 ) -> MpcController:
@@ -122,6 +128,8 @@ def make_controller(
         has an actuator for them, in its ranges.
     disturbance : DisturbanceModel, optional
         Unmeasured heat and noise of the sensors; by default 5 W/m2 that last for six hours and 0.05 K.
+    observer : Observer, optional
+        In the place of the filter that is made here.
     boundaries : mapping of str to float, optional
         Temperatures of boundaries beside outdoor, taken to stay [K].
     iterations : int
@@ -156,9 +164,10 @@ def make_controller(
     modes = modal_model(model.matrices(model.theta))
     decided = tuple(channels) if channels is not None else _channels(plant.actuators, points)
     unmeasured = disturbance or _disturbance(building, len(points.zones))
-    observer = Observer(KalmanFilter(held_space(modes, ahead.control_step), unmeasured), modes)
+    if observer is None:
+        observer = Observer(KalmanFilter(held_space(modes, ahead.control_step), unmeasured), modes)
     pressures = any(c.quantity.endswith("pressure") for c in decided)
-    predictor = Predictor(modes, SmoothHvac(system, pressures=pressures), ahead, decided, unmeasured.time_constant)
+    predictor = Predictor(modes, SmoothHvac(system, SMOOTHING, pressures), ahead, decided, unmeasured.time_constant)
     solver = SequentialSolver(ControlProblem(predictor), iterations=iterations)
     signals = None
     if model.network.signals or len(model.network.boundaries) > 1:

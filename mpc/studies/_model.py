@@ -7,7 +7,7 @@ from pathlib import Path
 
 from calibration import ModelSettings, load_parameters, read_settings
 from mpc.errors import ControlError
-from thermal import Building, SymbolicModel, build_network, reduced_model
+from thermal import Building, SymbolicModel, reduced_model
 from thermal.effects import Chosen
 from thermal.errors import describe
 from thermal.model import ReducedModel
@@ -58,13 +58,55 @@ def control_model(
     >>> control_model(load_bundled_case().building, dx=1.0, order=30).order
     30
     """
+    return reduced(model_settings(parameters, dx=dx, effects=effects), building, parameters, order)
+
+
+def model_settings(
+    parameters: str | Path | Mapping[str, float] | None = None,
+    *,
+    dx: float | None = None,
+    effects: tuple[Chosen, ...] = (),
+) -> ModelSettings:
+    """Tell how a model is built: as its file of parameters says, or as given; arguments as those of `control_model`.
+
+    Parameters
+    ----------
+    parameters : str, Path or mapping of str to float, optional
+        A ``calibration.json``, or values by name [parameter units].
+    dx : float, optional
+        Distance between control volumes of a plan [m].
+    effects : tuple of Chosen
+        What is added to the baseline.
+    """
+    if not isinstance(parameters, str | Path):
+        return ModelSettings(dx=dx, effects={c.effect.id: c.zones for c in effects})
+    if effects:
+        raise ControlError(describe("effects", "none beside a file of parameters", f"{len(effects)} of them"))
+    return ModelSettings(**read_settings(parameters) | ({} if dx is None else {"dx": dx}))
+
+
+def reduced(
+    settings: ModelSettings,
+    building: Building,
+    parameters: str | Path | Mapping[str, float] | None = None,
+    order: int | None = ORDER,
+) -> ReducedModel:
+    """Build and reduce a model; arguments as those of `control_model`.
+
+    Parameters
+    ----------
+    settings : ModelSettings
+        How it is built.
+    building : Building
+        Floor plans or a zone table.
+    parameters : str, Path or mapping of str to float, optional
+        A file, or values by name [parameter units].
+    order : int, optional
+        Largest number of states.
+    """
+    network = settings.network(building)
     if isinstance(parameters, str | Path):
-        if effects:
-            raise ControlError(describe("effects", "none beside a file of parameters", f"{len(effects)} of them"))
-        settings = read_settings(parameters) | ({} if dx is None else {"dx": dx})
-        network = ModelSettings(**settings).network(building)
         theta = load_parameters(parameters, network)
     else:
-        network = build_network(building, dx=dx, effects=effects)
         theta = network.values(parameters or {})
     return reduced_model(SymbolicModel(network), [theta], order=order)

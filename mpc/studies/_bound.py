@@ -1,0 +1,60 @@
+"""The perfect bound: optimal control that knows model, state, weather and people."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibration import DisturbanceModel, KalmanFilter
+from mpc.control import Observer
+from mpc.plants import ReducedBuilding, SimulatedPlant
+from mpc.studies._controller import LASTING, SENSOR_NOISE, UNMEASURED, held_space
+from thermal.model import ReducedModel, modal_model
+
+FloatArray = NDArray[np.float64]
+
+
+class KnownState(Observer):
+    """Reads the state off the plant's building in the place of estimating it; there is no unmeasured heat.
+
+    Parameters
+    ----------
+    model : ReducedModel
+        That the plant's building was made of.
+    plant : SimulatedPlant
+        Whose building is a `ReducedBuilding` of that model.
+    """
+
+    def __init__(self, model: ReducedModel, plant: SimulatedPlant) -> None:
+        modes = modal_model(model.matrices(model.theta))
+        usual = DisturbanceModel(UNMEASURED * plant.scenario.areas, LASTING, SENSOR_NOISE)
+        super().__init__(KalmanFilter(held_space(modes, plant.control_step), usual), modes)
+        self._plant = plant
+
+    def start(self, zone: FloatArray, boundary: FloatArray) -> None:
+        """Take the state.
+
+        Parameters
+        ----------
+        zone, boundary : ndarray
+            Without effect [K].
+        """
+        building = self._plant.model
+        if isinstance(building, ReducedBuilding):
+            self.state[: self.order] = building.save_state()[0]
+
+    def update(self, zone: FloatArray, heat: FloatArray, boundary: FloatArray) -> FloatArray:
+        """Take the state.
+
+        Parameters
+        ----------
+        zone, heat, boundary : ndarray
+            Without effect [K], [W], [K].
+
+        Returns
+        -------
+        ndarray, shape (n_zone,)
+            Innovations: none [K].
+        """
+        self.start(zone, boundary)
+        return np.zeros(len(zone))
