@@ -66,7 +66,7 @@ TRUTH = {
 STEP, CONTROL_STEPS, DX = 300.0, 3, 1.0
 HORIZON_HOURS = 12.0
 BLOCK_ENDS = (0.5, 1.0, 2.0, 3.0, 4.5, 6.0, 9.0, 12.0)  # h, of what a policy sees of the forecast
-DISCOMFORT_PRICE = 0.2  # currency/K/h of a zone, of training and of the comparison's stage cost
+DISCOMFORT_PRICE = 1.0  # currency/K/h of a zone, of training and of the stage cost that all are judged by
 WARM_UP_DAYS = 3
 
 #: Weeks that policies and controllers are judged on, with weather of seeds that nothing else has.

@@ -16,7 +16,7 @@ FloatArray = NDArray[np.float64]
 #: What the paper's agent sets: supply water, and supply air common to the air handlers.
 SUPPLY_SETPOINTS = ("supply_water_temperature_setpoint", "supply_air_temperature_setpoint")
 
-_ROUNDING = 1e-6  # of single precision, in which agents compute
+_LARGEST = 1.0 + 1e-6  # agents compute in single precision
 
 
 class ActionLayout:
@@ -58,9 +58,13 @@ class ActionLayout:
             found = f"none for {missing[0]}" if missing else "one twice"
             raise EnvironmentSetupError(describe("actions", expected, found))
         self.chosen = tuple(chosen)
-        self._groups = [[a.name for a in group] for group in groups]
         self.lowest = np.array([max(a.lowest for a in group) for group in groups])
         self.highest = np.array([min(a.highest for a in group) for group in groups])
+        spans = (self.highest - self.lowest).tolist()
+        self._groups = [
+            ([a.name for a in group], low, span)
+            for group, low, span in zip(groups, self.lowest.tolist(), spans, strict=True)
+        ]
 
     def __len__(self) -> int:
         return len(self.chosen)
@@ -84,12 +88,16 @@ class ActionLayout:
             When a number is not finite or out of range.
         """
         values = np.asarray(action, dtype=float)
-        if values.shape != self.lowest.shape or not np.abs(values).max() <= 1.0 + _ROUNDING:  # NaN is in no range
+        given = values.tolist() if values.shape == self.lowest.shape else []
+        if not given or not all(-_LARGEST <= value <= _LARGEST for value in given):  # NaN is in no range
             expected = f"{len(self)} numbers from -1 to 1, for {', '.join(self.chosen)}"
             raise PlantActionError(describe("action", expected, repr(action)))
-        share = np.minimum(np.maximum(0.5 * (values + 1.0), 0.0), 1.0)
-        reached = (self.lowest + share * (self.highest - self.lowest)).tolist()
-        return {name: value for names, value in zip(self._groups, reached, strict=True) for name in names}
+        setpoints = {}
+        for (names, lowest, span), value in zip(self._groups, given, strict=True):
+            reached = lowest + span * min(max(0.5 * (value + 1.0), 0.0), 1.0)
+            for name in names:
+                setpoints[name] = reached
+        return setpoints
 
     def action(self, setpoints: Mapping[str, float]) -> FloatArray:
         """Give the action of setpoints, shape (n_action,) [-]: the inverse of `setpoints`.
@@ -99,5 +107,5 @@ class ActionLayout:
         setpoints : mapping of str to float
             By ``ENTITY/POINT`` [K or Pa]; of devices in common the first one counts.
         """
-        values = np.array([setpoints[names[0]] for names in self._groups])
+        values = np.array([setpoints[names[0]] for names, _, _ in self._groups])
         return np.asarray(2.0 * (values - self.lowest) / (self.highest - self.lowest) - 1.0)

@@ -16,8 +16,8 @@ from mpc.environment._observation import Observation, ObservationLayout
 from mpc.environment._outlook import BLOCK_ENDS, Outlook, clock
 from mpc.environment._reward import REWARDS, Reward
 from mpc.errors import EnvironmentSetupError
-from mpc.kpi import PlantRecord, measure_kpis
-from mpc.plants import Measurements, Plant, SimulatedPlant
+from mpc.kpi import measure_kpis
+from mpc.plants import Measurements, Plant, RecentSteps, SimulatedPlant
 from mpc.scenario import Forecaster, Scenario
 from thermal.errors import describe, nearest
 
@@ -238,11 +238,15 @@ def _reward_of(reward: str | Reward) -> Reward:
     return REWARDS[reward]
 
 
-def _last_steps(plant: Plant, each: int) -> PlantRecord:
+def _last_steps(plant: Plant, each: int) -> RecentSteps:
     """Read what a plant did in its last control step, of some steps of the scenario."""
     if isinstance(plant, SimulatedPlant):
         return plant.recent(each)
     whole = plant.record()
+    if whole.district_heating is not None:
+        raise EnvironmentSetupError(describe("reward: plant", "electricity and gas", "district heating too"))
     n = round(plant.control_step / whole.step)
-    gas, heat = (None if p is None else p[-n:] for p in (whole.gas, whole.district_heating))
-    return PlantRecord(whole.step, whole.zone_temperature[-n - 1 :], whole.electricity[-n:], gas, heat)
+    gas = np.zeros(n) if whole.gas is None else whole.gas[-n:]
+    return RecentSteps(
+        whole.step, list(whole.zone_temperature[-n - 1 :]), whole.electricity[-n:].tolist(), gas.tolist()
+    )

@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Protocol
 
-import numpy as np
-
 from mpc.errors import EnvironmentSetupError
-from mpc.kpi import PaperReward, PlantRecord, StageCost
+from mpc.kpi import PaperReward, StageCost
+from mpc.plants import RecentSteps
 from mpc.scenario import Scenario
 from thermal.errors import describe
 
@@ -16,13 +15,13 @@ from thermal.errors import describe
 class Reward(Protocol):
     """What an agent is rewarded for."""
 
-    def of_steps(self, record: PlantRecord, scenario: Scenario, first_step: int) -> float:
+    def of_steps(self, done: RecentSteps, scenario: Scenario, first_step: int) -> float:
         """Reward a control step.
 
         Parameters
         ----------
-        record : PlantRecord
-            Of the plant's steps in it.
+        done : RecentSteps
+            What the plant did in its steps.
         scenario : Scenario
             Bands, people, prices and emissions.
         first_step : int
@@ -44,25 +43,23 @@ class EconomicReward:
 
     stage: StageCost = field(default_factory=lambda: StageCost(0.2))
 
-    def of_steps(self, record: PlantRecord, scenario: Scenario, first_step: int) -> float:
+    def of_steps(self, done: RecentSteps, scenario: Scenario, first_step: int) -> float:
         """Reward a control step [currency].
 
         Parameters
         ----------
-        record : PlantRecord
-            Of the plant's steps in it.
+        done : RecentSteps
+            What the plant did in its steps.
         scenario : Scenario
             Bands, prices and emissions.
         first_step : int
             Step of the scenario in which it began.
         """
-        each, temperature = _steps_each(record, scenario), record.zone_temperature
-        gas = _gas(record)
+        each, temperature = _steps_each(done, scenario), done.zone_temperature
         costs = [
-            float(self.stage.of_step(scenario, first_step + k // each, temperature[k], temperature[k + 1],
-                                     record.electricity[k], gas[k]))
-            for k in range(record.n_steps)
-        ]  # fmt: skip
+            float(self.stage.of_step(scenario, first_step + k // each, temperature[k], temperature[k + 1], *powers))
+            for k, powers in enumerate(zip(done.electricity, done.gas, strict=True))
+        ]
         return -sum(costs) / each
 
 
@@ -78,24 +75,23 @@ class PaperStepReward:
 
     terms: PaperReward = field(default_factory=PaperReward)
 
-    def of_steps(self, record: PlantRecord, scenario: Scenario, first_step: int) -> float:
+    def of_steps(self, done: RecentSteps, scenario: Scenario, first_step: int) -> float:
         """Reward a control step, -1 to 0 [-].
 
         Parameters
         ----------
-        record : PlantRecord
-            Of the plant's steps in it.
+        done : RecentSteps
+            What the plant did in its steps.
         scenario : Scenario
             Bands, people, prices and emissions.
         first_step : int
             Step of the scenario in which it began.
         """
-        each, gas = _steps_each(record, scenario), _gas(record)
+        each, ends = _steps_each(done, scenario), done.zone_temperature[1:]
         rewards = [
-            float(self.terms.of_step(scenario, first_step + k // each, record.zone_temperature[k + 1],
-                                     record.electricity[k], gas[k]).reward)
-            for k in range(record.n_steps)
-        ]  # fmt: skip
+            float(self.terms.of_step(scenario, first_step + k // each, ends[k], *powers).reward)
+            for k, powers in enumerate(zip(done.electricity, done.gas, strict=True))
+        ]
         return sum(rewards) / len(rewards)
 
 
@@ -103,14 +99,10 @@ class PaperStepReward:
 REWARDS: dict[str, Reward] = {"economic": EconomicReward(), "paper": PaperStepReward()}
 
 
-def _steps_each(record: PlantRecord, scenario: Scenario) -> int:
+def _steps_each(done: RecentSteps, scenario: Scenario) -> int:
     """Count the steps of the plant in a step of the scenario."""
-    each = round(scenario.grid.step / record.step)
-    if abs(each * record.step - scenario.grid.step) > 1e-6 or record.district_heating is not None:
-        expected = f"steps that divide the scenario's {scenario.grid.step:g} s, no district heating"
-        raise EnvironmentSetupError(describe("reward: record", expected, f"{record.step:g} s"))
+    each = round(scenario.grid.step / done.step)
+    if abs(each * done.step - scenario.grid.step) > 1e-6:
+        expected = f"steps that divide the scenario's {scenario.grid.step:g} s"
+        raise EnvironmentSetupError(describe("reward: plant", expected, f"{done.step:g} s"))
     return each
-
-
-def _gas(record: PlantRecord) -> np.ndarray:
-    return np.zeros(record.n_steps) if record.gas is None else record.gas

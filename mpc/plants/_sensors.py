@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
 
@@ -156,8 +155,8 @@ class Sensors:
         self._block: tuple[tuple[int, int], FloatArray] = ((-1, -1), np.zeros((0, 0)))
 
     @cached_property
-    def _scales(self) -> tuple[NDArray[np.intp], FloatArray, FloatArray, NDArray[np.bool_]]:
-        """Columns with noise, their absolute and relative deviations, and which count in steps."""
+    def _scales(self) -> tuple[NDArray[np.intp], FloatArray, FloatArray, NDArray[np.intp]]:
+        """Columns with noise, absolute and relative deviations of all, and columns that count in steps."""
         noise = self._noise or SensorNoise()
         rows = []
         for k, column in enumerate(self.layout.columns):
@@ -166,8 +165,10 @@ class Sensors:
             by = {"temperature": (noise.temperature, 0.0), "air_flow": (0.0, noise.flow), "power": (0.0, noise.power)}
             if point.endswith("_sensor") and quantity in by:
                 rows.append((k, *by[quantity], quantity == "temperature"))
-        index, absolute, relative, stepped = (np.array(v) for v in zip(*rows, strict=True))
-        return index.astype(np.intp), absolute.astype(float), relative.astype(float), stepped.astype(bool)
+        index = np.array([row[0] for row in rows], dtype=np.intp)
+        absolute, relative = np.zeros(len(self.layout.columns)), np.zeros(len(self.layout.columns))
+        absolute[index], relative[index] = [row[1] for row in rows], [row[2] for row in rows]
+        return index, absolute, relative, index[[row[3] for row in rows]]
 
     def read(
         self,
@@ -206,20 +207,23 @@ class Sensors:
         ndarray, shape (n_column,)
             In the library's units.
         """
-        place = self._system.terminals.zone
-        flowing = step.airflow > _LEAST_FLOW
-        discharge = np.where(flowing, step.discharge + (zone - conditions.zone_temperature)[place], zone[place])
-        seen = step._replace(airflow=np.where(flowing, step.airflow, 0.0), discharge=discharge)
+        place = self._points.zone
+        discharge, airflow = step.discharge + (zone - conditions.zone_temperature)[place], step.airflow
+        if not airflow.min() > _LEAST_FLOW:
+            flowing = airflow > _LEAST_FLOW
+            discharge, airflow = np.where(flowing, discharge, zone[place]), np.where(flowing, airflow, 0.0)
+        seen = step._replace(airflow=airflow, discharge=discharge)
         values = self._points.read(conditions._replace(zone_temperature=zone), actions, seen)
-        parts: list[Sequence[float] | FloatArray] = [values]
+        whole = np.empty(len(self.layout.columns))
+        whole[: values.size], at = values, values.size
         if self._chiller:
-            cooling = np.array([m.cooling_power for m in step.mixed], dtype=float)
-            values[self._meters] -= cooling
-            parts.append([float(cooling.sum())])
-        parts.append(self._weather[k])
+            cooling = [m.cooling_power for m in step.mixed]
+            whole[self._meters] -= cooling
+            whole[at], at = sum(cooling), at + 1
+        weather = self._weather[k]
+        whole[at : at + weather.size] = weather
         if self._counted:
-            parts.append(people)
-        whole = np.concatenate(parts)
+            whole[at + weather.size :] = people
         return whole if self._noise is None else self._disturbed(k, whole, seed)
 
     def _disturbed(self, k: int, values: FloatArray, seed: int) -> FloatArray:
@@ -228,12 +232,21 @@ class Sensors:
         number, row = divmod(k, _BLOCK)
         if self._block[0] != (seed, number):
             rng = np.random.default_rng([seed, _STREAM, number])
-            self._block = ((seed, number), rng.standard_normal((_BLOCK, index.size)))
-        exact = values[index]
-        seen = exact + (absolute + relative * np.abs(exact)) * self._block[1][row]
+            drawn = np.zeros((_BLOCK, values.size))
+            drawn[:, index] = rng.standard_normal((_BLOCK, index.size))
+            self._block = ((seed, number), drawn)
+        error = np.abs(values)
+        error *= relative
+        error += absolute
+        error *= self._block[1][row]
+        values += error
         size = 0.0 if self._noise is None else self._noise.resolution
         if size > 0.0:
-            counted = _FREEZING + size * np.round((seen - _FREEZING) / size)
-            seen = np.where(stepped, counted, seen)
-        values[index] = seen
+            seen = values[stepped]
+            seen -= _FREEZING
+            seen /= size
+            np.rint(seen, out=seen)
+            seen *= size
+            seen += _FREEZING
+            values[stepped] = seen
         return values

@@ -23,7 +23,7 @@ from mpc.plants._actuators import (
     checked_actions,
 )
 from mpc.plants._building import BuildingModel, zone_response
-from mpc.plants._history import PlantStep, SystemBalance
+from mpc.plants._history import PlantStep, RecentSteps, SystemBalance
 from mpc.plants._inputs import boundary_series, check_parts, sensor_offset
 from mpc.plants._local import LocalControl
 from mpc.plants._operation import Operation, scheduled_operation, shared_rows
@@ -285,9 +285,10 @@ class SimulatedPlant:
         PlantError
             When there was no step yet.
         """
-        return self.recent(len(self._kept()))
+        step, temperature, electricity, gas = self.recent(len(self._kept()))
+        return PlantRecord(step, np.array(temperature), np.array(electricity), np.array(gas))
 
-    def recent(self, steps: int) -> PlantRecord:
+    def recent(self, steps: int) -> RecentSteps:
         """Give the last steps of `record`, at a cost that does not grow with the run.
 
         Parameters
@@ -296,9 +297,9 @@ class SimulatedPlant:
             How many of the plant's own steps, 1 or more.
         """
         last, before = self._kept()[-steps:], len(self._steps) - steps
-        temperature = np.array([self._steps[before - 1].end if before > 0 else self._first, *(s.end for s in last)])
-        electricity, gas = np.array([(s.done.electric_power, s.done.fuel_power) for s in last], dtype=float).T
-        return PlantRecord(self._step, temperature, electricity, gas)
+        temperature = [self._steps[before - 1].end if before > 0 else self._first, *(s.end for s in last)]
+        powers = [s.done.electric_power for s in last], [s.done.fuel_power for s in last]
+        return RecentSteps(self._step, temperature, *powers)
 
     def telemetry(self) -> pd.DataFrame:
         """Give what was measured in the run since the reset, shape (n_steps, n_column) [library's units].

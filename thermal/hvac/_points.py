@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from thermal.errors import HvacParameterError, describe
-from thermal.hvac._air_handler import Heater
+from thermal.hvac._air_handler import AirHandler, Heater, Warmed
 from thermal.hvac._coil import valve_position
 from thermal.hvac._operations import StepOperations
 from thermal.hvac._step import Actions, Conditions, HvacStep
@@ -57,7 +59,10 @@ class HvacPoints:
             found = f"{len(terminals)} and {len(air_handlers)}, {len(set(names))} of {len(names)} different"
             expected = f"{wanted[0]} terminals and {wanted[1]} air handlers, all named differently"
             raise HvacParameterError(describe("HvacPoints", expected, found))
-        self.system = system
+        self.system, self._operations, zone = system, StepOperations(), system.terminals.zone
+        #: Zone of each terminal; all of them where each zone has one, in order.
+        self.zone: Any = slice(None) if np.array_equal(zone, np.arange(system.zone_count)) else zone
+        self._designs = [h.supply_fan.static_pressure for h in system.air_handlers]
         entities = [(terminals, _TERMINAL), (air_handlers, _AIR_HANDLER), ([boiler], _LOOP)]
         #: Columns ``ENTITY/POINT`` in the order of `read`, point by point.
         self.columns = tuple(f"{e}/{p}" for devices, points in entities for p in points for e in devices)
@@ -79,34 +84,46 @@ class HvacPoints:
         numpy.ndarray, shape (n_column,)
             In the library's units: kelvin, kg/s, W, shares.
         """
-        system, terminals, ops = self.system, self.system.terminals, StepOperations()
-        zone, handlers = terminals.zone, range(len(system.air_handlers))
-
-        def each(values: object, designs: list[float] | None = None) -> list[float]:
-            if values is None:
-                return designs or []
-            return list(values) if isinstance(values, tuple | list) else [values] * len(handlers)  # type: ignore[list-item]
-
-        designs = [h.supply_fan.static_pressure for h in system.air_handlers]
-        pressure = np.array(each(actions.static_pressure, designs)) / designs
-        reach = np.sqrt(pressure)[terminals.air_handler] * np.array(each(actions.running))[terminals.air_handler]
-        damper = np.divide(step.airflow, terminals.design_flow * reach, out=np.zeros(len(zone)), where=reach > 0.0)
-        gas = [
-            w.direct / h.heating.efficiency if isinstance(h.heating, Heater) and not h.heating.electric else 0.0
-            for h, w in zip(system.air_handlers, step.warmed, strict=True)
-        ]
+        terminals, zone, n = self.system.terminals, self.zone, len(self.system.terminals)
+        reach = [run * math.sqrt(pressure / design) for run, pressure, design in zip(
+            self._each(actions.running), self._each(actions.static_pressure), self._designs, strict=True)]  # fmt: skip
+        full = terminals.design_flow * np.array(reach)[terminals.air_handler]
+        values = np.empty(len(self.columns))
+        own = values[: len(_TERMINAL) * n].reshape(len(_TERMINAL), n)
+        own[0], own[1] = conditions.zone_temperature[zone], conditions.heating_setpoint[zone]
+        own[2], own[3], own[4] = conditions.cooling_setpoint[zone], step.airflow, step.discharge
+        open_share = step.airflow / full if min(reach) > 0.0 else _divided(step.airflow, full)
+        np.minimum(open_share, 1.0, out=own[5])
+        own[6] = valve_position(self._operations, step.valve_flow, terminals.rangeability)
+        gas, heating = zip(*map(_heater_powers, self.system.air_handlers, step.warmed), strict=True)
+        mixed = step.mixed
         electric = [
-            m.cooling_power + m.supply_fan_power + m.exhaust_fan_power
-            + (w.direct / h.heating.efficiency if isinstance(h.heating, Heater) and h.heating.electric else 0.0)
-            for h, m, w in zip(system.air_handlers, step.mixed, step.warmed, strict=True)
+            m.cooling_power + m.supply_fan_power + m.exhaust_fan_power + h for m, h in zip(mixed, heating, strict=True)
+        ]
+        values[len(_TERMINAL) * n :] = [
+            *self._each(actions.supply_air_temperature), *step.supply_temperature, *(m.mixed_temperature for m in mixed),
+            *(m.return_temperature for m in mixed), *([conditions.outdoor_temperature] * len(mixed)),
+            *(m.supply_fan_power for m in mixed), *electric, *gas, actions.supply_water_temperature, step.loop.water,
+            step.return_water, step.fuel_power - sum(gas), step.pump_power,
         ]  # fmt: skip
-        return np.concatenate([
-            conditions.zone_temperature[zone], conditions.heating_setpoint[zone], conditions.cooling_setpoint[zone],
-            step.airflow, step.discharge, np.minimum(damper, 1.0),
-            valve_position(ops, step.valve_flow, terminals.rangeability),
-            each(actions.supply_air_temperature), list(step.supply_temperature),
-            [m.mixed_temperature for m in step.mixed], [m.return_temperature for m in step.mixed],
-            [conditions.outdoor_temperature] * len(handlers), [m.supply_fan_power for m in step.mixed], electric, gas,
-            [actions.supply_water_temperature, step.loop.water, step.return_water, step.fuel_power - sum(gas),
-             step.pump_power],
-        ])  # fmt: skip
+        return values
+
+    def _each(self, values: Any) -> Sequence[float]:
+        """Give a value of each air handler; design pressures where there is none."""
+        if values is None:
+            return self._designs
+        return values if isinstance(values, tuple | list) else [values] * len(self._designs)
+
+
+def _divided(flow: FloatArray, full: FloatArray) -> FloatArray:
+    """Divide flows by those of open dampers, 0 where the fans are off."""
+    return np.divide(flow, full, out=np.zeros(len(full)), where=full > 0.0)
+
+
+def _heater_powers(handler: AirHandler, warmed: Warmed) -> tuple[float, float]:
+    """Gas and electricity that an air handler's own heater takes [W]."""
+    heater = handler.heating
+    if not isinstance(heater, Heater):
+        return 0.0, 0.0
+    power = warmed.direct / heater.efficiency
+    return (0.0, power) if heater.electric else (power, 0.0)
