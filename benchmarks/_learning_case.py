@@ -22,7 +22,7 @@ from typing import Any, Literal
 
 import pandas as pd
 
-from calibration import ModelSettings, calibrate, load_parameters, read_settings
+from calibration import calibrate
 from calibration.diagnosis import diagnose, write_diagnosis
 from mpc.environment import ControlEnvironment, EconomicReward
 from mpc.kpi import StageCost
@@ -33,7 +33,6 @@ from mpc.plants import (
     SimulatedPlant,
     pilot_building,
     pilot_weather,
-    reduced_building,
 )
 from mpc.scenario import (
     DAY_AHEAD_ERRORS,
@@ -45,9 +44,11 @@ from mpc.scenario import (
     paper_carbon,
     paper_tariff,
 )
+from mpc.studies import control_model
 from thermal import Building, Case
 from thermal.effects import chosen
 from thermal.hvac import HvacSystem
+from thermal.model import ReducedModel
 from thermal.pilot import size_system
 
 POLICIES = Path(__file__).parent / "policies"
@@ -122,18 +123,19 @@ def scenario_of(start: str, seed: int, days: float, gains: InternalGains | None 
     return build_scenario(office(size), grid, weather, paper_tariff(), carbon=paper_carbon(), gains=gains, seed=seed)
 
 
-def building_model(world: World, size: Size = FULL, folder: Path = POLICIES) -> ReducedBuilding:
-    """Make the building as it is, or a model of it; a new one each time, as a plant steps it."""
+@cache
+def known_model(world: World, size: Size = FULL, folder: Path = POLICIES) -> ReducedModel:
+    """Make the reduced model of the building as it is, or as a model has it."""
     if world == "plant":
-        return reduced_building(office(size), TRUTH, dx=DX, effects=chosen(EFFECTS))
+        return control_model(office(size), TRUTH, dx=DX, effects=chosen(EFFECTS))
     if size != FULL:  # tests have no telemetry: a model that is wrong in the same ways
-        return reduced_building(office(size), dx=DX)
-    path = model_file(world, folder)
-    settings = ModelSettings(**read_settings(path))
-    theta = load_parameters(path, settings.network(office()))
-    names = [p.name for p in settings.network(office()).parameters]
-    values = dict(zip(names, map(float, theta), strict=True))
-    return reduced_building(office(), values, dx=DX, effects=settings.effects)
+        return control_model(office(size), dx=DX)
+    return control_model(office(), model_file(world, folder))
+
+
+def building_model(world: World, size: Size = FULL) -> ReducedBuilding:
+    """Make the building as it is, or as a model has it; a new one each time, as a plant steps it."""
+    return ReducedBuilding(known_model(world, size), step_seconds=STEP)
 
 
 def model_file(world: World, folder: Path = POLICIES) -> Path:
@@ -144,7 +146,7 @@ def model_file(world: World, folder: Path = POLICIES) -> Path:
 def make_plant(
     week: tuple[str, int], model: ReducedBuilding, *, bound: bool = False, size: Size = FULL
 ) -> SimulatedPlant:
-    """Make the plant of a week; a bound knows the weather and the people that come."""
+    """Make the plant of a week; that of the bound has exact sensors and knows the weather and the people that come."""
     scenario = scenario_of(*week, size.days + HORIZON_HOURS / 24.0, size=size)
     errors = None if bound else DAY_AHEAD_ERRORS
     forecaster = Forecaster(
@@ -152,8 +154,8 @@ def make_plant(
         seed=week[1],
     )  # fmt: skip
     return SimulatedPlant(
-        scenario, sized(size), model, control_steps=CONTROL_STEPS, noise=SensorNoise(), forecaster=forecaster,
-        warm_up_days=WARM_UP_DAYS, seed=week[1],
+        scenario, sized(size), model, control_steps=CONTROL_STEPS, noise=None if bound else SensorNoise(),
+        forecaster=forecaster, warm_up_days=WARM_UP_DAYS, seed=week[1],
     )  # fmt: skip
 
 

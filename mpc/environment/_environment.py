@@ -247,6 +247,5 @@ def _last_steps(plant: Plant, each: int) -> RecentSteps:
         raise EnvironmentSetupError(describe("reward: plant", "electricity and gas", "district heating too"))
     n = round(plant.control_step / whole.step)
     gas = np.zeros(n) if whole.gas is None else whole.gas[-n:]
-    return RecentSteps(
-        whole.step, list(whole.zone_temperature[-n - 1 :]), whole.electricity[-n:].tolist(), gas.tolist()
-    )
+    temperature, electricity = list(whole.zone_temperature[-n - 1 :]), whole.electricity[-n:].tolist()
+    return RecentSteps(whole.step, temperature, electricity, gas.tolist())

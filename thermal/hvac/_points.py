@@ -101,8 +101,8 @@ class HvacPoints:
             m.cooling_power + m.supply_fan_power + m.exhaust_fan_power + h for m, h in zip(mixed, heating, strict=True)
         ]
         values[len(_TERMINAL) * n :] = [
-            *self._each(actions.supply_air_temperature), *step.supply_temperature, *(m.mixed_temperature for m in mixed),
-            *(m.return_temperature for m in mixed), *([conditions.outdoor_temperature] * len(mixed)),
+            *self._each(actions.supply_air_temperature), *step.supply_temperature,
+            *(m.mixed_temperature for m in mixed), *(m.return_temperature for m in mixed), *([conditions.outdoor_temperature] * len(mixed)),
             *(m.supply_fan_power for m in mixed), *electric, *gas, actions.supply_water_temperature, step.loop.water,
             step.return_water, step.fuel_power - sum(gas), step.pump_power,
         ]  # fmt: skip
