@@ -18,7 +18,7 @@ from _table import markdown
 NAMES = {
     "floor": "least action: 27 degC air, 37 degC water", "schedule": "schedule", "reset": "outdoor reset",
     "guideline36": "Guideline 36", "mpc_before": "MPC, model before diagnosis",
-    "mpc_after": "MPC, model after diagnosis", "bound": "MPC that knows everything", "do_mpc": "do-mpc",
+    "mpc_after": "MPC, model after diagnosis", "bound": "MPC that knows everything",
     "ppo_before": "PPO, trained in the model, moved to the plant", "ppo_plant": "PPO, trained on the plant",
     "sac_before": "SAC, trained in the model, moved to the plant", "sac_plant": "SAC, trained on the plant",
     "ppo_after": "PPO, trained in the diagnosed model, moved to the plant",
@@ -126,13 +126,10 @@ def budgets(found: dict[str, list[dict[str, Any]]]) -> str:
         trained = [of_week["about"] for of_week in of if of_week["about"]]
         if trained:
             steps = sorted({a["steps"] for a in trained})
-            hours = [a["steps"] * a["hours_a_step"] / 8766.0 for a in trained]
+            years = np.mean([a["steps"] * a["hours_a_step"] / 8766.0 for a in trained])
             cpu = np.mean([a["cpu_seconds"] for a in trained])
-            said.append(
-                f"{NAMES[name]}: {len({a['seed'] for a in trained})} seeds, "
-                f"{' or '.join(f'{s:,}' for s in steps)} steps ({np.mean(hours):.1f} years), {cpu / 60.0:.0f} CPU minutes "
-                "a seed."
-            )  # fmt: skip
+            count = f"{len({a['seed'] for a in trained})} seeds, {' or '.join(f'{s:,}' for s in steps)} steps"
+            said.append(f"{NAMES[name]}: {count} ({years:.1f} years), {cpu / 60.0:.0f} CPU minutes a seed.")
     return " ".join(said) + ("\n" if said else "")
 
 

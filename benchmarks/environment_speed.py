@@ -27,7 +27,7 @@ EPISODES, STEPS = 5, 1728
 
 
 def measure(world: ControlEnvironment, episodes: int = EPISODES, steps: int = STEPS) -> dict[str, float]:
-    """Steps a second of the environment and of its parts."""
+    """Count the steps a second of the environment and of its parts."""
     rng = np.random.default_rng(0)
     actions = rng.uniform(-1.0, 1.0, (steps, len(world.actions))).astype(np.float32)
     setpoints = [world.actions.setpoints(action) for action in actions]

@@ -50,7 +50,7 @@ def gather(jobs: dict[Path, Job], size: Size, policies: Path, processes: int) ->
     due = {file: job for file, job in jobs.items() if not file.exists()}
     begin = time.time()
     if processes > 1 and len(due) > 1:
-        with ProcessPoolExecutor(processes, get_context("spawn"), initializer=use_one_thread) as pool:
+        with ProcessPoolExecutor(processes, get_context("spawn")) as pool:
             asked = {pool.submit(perform, job, size, policies, file): file for file, job in due.items()}
             for number, future in enumerate(as_completed(asked), 1):
                 future.result()

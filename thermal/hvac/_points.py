@@ -102,9 +102,10 @@ class HvacPoints:
         ]
         values[len(_TERMINAL) * n :] = [
             *self._each(actions.supply_air_temperature), *step.supply_temperature,
-            *(m.mixed_temperature for m in mixed), *(m.return_temperature for m in mixed), *([conditions.outdoor_temperature] * len(mixed)),
-            *(m.supply_fan_power for m in mixed), *electric, *gas, actions.supply_water_temperature, step.loop.water,
-            step.return_water, step.fuel_power - sum(gas), step.pump_power,
+            *(m.mixed_temperature for m in mixed), *(m.return_temperature for m in mixed),
+            *([conditions.outdoor_temperature] * len(mixed)), *(m.supply_fan_power for m in mixed), *electric, *gas,
+            actions.supply_water_temperature, step.loop.water, step.return_water, step.fuel_power - sum(gas),
+            step.pump_power,
         ]  # fmt: skip
         return values
 
