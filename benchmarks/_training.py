@@ -158,8 +158,7 @@ def train(
     whole = {**best.about, "steps": state["steps"], "cpu_seconds": round(state["cpu_seconds"], 1),
              "curve": state["curve"]}  # fmt: skip
     ActorNetwork(best.weights, best.biases, best.activation, best.squashed, whole).save(folder / "policy.npz")
-    for spent in ("model.zip", "buffer.pkl"):
-        (folder / spent).unlink(missing_ok=True)
+    (folder / "buffer.pkl").unlink(missing_ok=True)  # a hundred times as large as all the rest
     return True
 
 
