@@ -17,7 +17,7 @@ from typing import Any
 from _calibration_study import Study, measure
 from _calibration_tables import first_version, report
 from _paper_search import EVALUATIONS
-from _table import ROOT, replace_section, write
+from _table import ROOT, publish, write
 
 from thermal import load_case
 from thermal.case import FloorPlans
@@ -95,7 +95,7 @@ def main(description: str) -> None:
     parser.add_argument("--evaluations", type=int, default=EVALUATIONS, help="of the paper's search")
     parser.add_argument("--seed", type=int, default=0, help="of the searches")
     parser.add_argument("--workers", type=int, default=1, help="processes, one thread each")
-    parser.add_argument("--readme", action="store_true", help="replace the table in the README")
+    parser.add_argument("--readme", action="store_true", help="replace the table in README or docs")
     parser.add_argument("--first-version", metavar="COMMIT", help="write first_accuracy.json from this commit and stop")
     options = parser.parse_args()
     if options.first_version:
@@ -109,8 +109,9 @@ def main(description: str) -> None:
     failed = run(missing, study, options.workers, folder) if missing else {}
     lines = read_lines(folder, study)
     measured = [lines[name] for name in cases if name in lines]
-    short, page = report(measured, failed, first)
+    short, by_case, page = report(measured, failed, first)
     write(options.out, NAME, page, {"first_version": first, "cases": measured, "failed": failed}, readme=False)
     if options.readme:
-        replace_section(ROOT / "README.md", NAME, short)
+        publish(NAME, short)
+        publish(f"{NAME}_cases", by_case)
     print(page)

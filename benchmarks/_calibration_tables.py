@@ -37,22 +37,23 @@ def accuracy_table(page: str) -> dict[str, dict[str, float]]:
     return {row["case"]: {kind: float(row[f"{kind} [K]"]) for kind in kinds} for row in named}
 
 
-def report(lines: Sequence[dict[str, Any]], failed: dict[str, str], first: dict[str, Any]) -> tuple[str, str]:
-    """Make the short table for the README and the whole page of the cases measured."""
+def report(lines: Sequence[dict[str, Any]], failed: dict[str, str], first: dict[str, Any]) -> tuple[str, str, str]:
+    """Make the table of medians, that of cases, and the whole page of the cases measured."""
     if not lines:
         raise SystemExit(f"calibration: expected at least one case that was measured, found {failed or 'none'}")
     methods = [row["method"] for row in lines[0]["rows"]]
+    columns = ["case", *methods[:-1], "first version", methods[-1]]
+    by_case = f"Held-out MAE [K] by case:\n\n{markdown(columns, list(_held_out(lines, methods, first)))}"
     short = "\n".join(
         [
-            "Held-out MAE [K] by case:\n",
-            markdown(["case", *methods[:-1], "first version", methods[-1]], list(_held_out(lines, methods, first))),
             f"Medians over {len(lines)} cases:\n",
             markdown(["method", *DETAILS], list(_medians(lines, methods))),
             f"{remarks(lines, failed, first)}\n",
         ]
     )
     rows = [[line["case"], row["method"], *_details([row])] for line in lines for row in line["rows"]]
-    return short, f"{short}\nBy case and method:\n\n{markdown(['case', 'method', *DETAILS], rows)}"
+    page = f"{by_case}\n{short}\nBy case and method:\n\n{markdown(['case', 'method', *DETAILS], rows)}"
+    return short, by_case, page
 
 
 def _held_out(lines: Sequence[dict[str, Any]], methods: Sequence[str], first: dict[str, Any]) -> Iterator[list[str]]:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from _table import ROOT, markdown, replace_section
+from _table import ROOT, markdown, publish
 from _trial_answers import read_trials
 
 #: The file that the installed diagnosis reads.
@@ -50,7 +50,7 @@ def make_levels(out: Path) -> str:
     }
     SHIPPED.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
     table = _table(levels, len(nulls), content)
-    replace_section(ROOT / "docs" / "diagnosis.md", "null_levels", table)
+    publish("null_levels", table)
     return table
 
 

@@ -34,19 +34,20 @@ BY_PARAMETER = (
 BY_CONDITION = ("twins with", "twins", "90 %", "identifiable only", "RMS z", "held-out MAE [K]", "at the truth [K]")
 
 
-def report(lines: Sequence[dict[str, Any]]) -> tuple[str, str, dict[str, Any]]:
-    """Make the short table, the whole page and the data of the lines of all seeds."""
+def report(lines: Sequence[dict[str, Any]]) -> tuple[str, str, str, dict[str, Any]]:
+    """Make the verdict, the table of coverage, the whole page and the data of the lines of all seeds."""
     done = [line for line in lines if "failure" not in line]
     failed = {line["seed"]: line["failure"] for line in lines if "failure" in line}
     if not done:
         raise SystemExit(f"parameter recovery: expected at least one calibrated twin, found {failed or 'no seeds'}")
     frame = intervals(done)
     pooled = {name: [asdict(c) | {"inside": c.inside} for c in found] for name, found in _pooled(frame)}
-    short = f"{verdict(frame, len(done), failed)}\n\n{markdown(POOLED, list(_pooled_rows(frame)))}"
+    short, coverage = verdict(frame, len(done), failed), markdown(POOLED, list(_pooled_rows(frame)))
     twins = pd.DataFrame([_twin(line) for line in done])
     page = "\n".join(
         [
-            short,
+            f"{short}\n",
+            coverage,
             f"{_remarks(done, twins)}\n",
             "By parameter; widths and z on the estimation scale, the prior's width that of its own 90 % interval:\n",
             markdown(BY_PARAMETER, list(_parameter_rows(frame))),
@@ -60,7 +61,7 @@ def report(lines: Sequence[dict[str, Any]]) -> tuple[str, str, dict[str, Any]]:
         "twins": twins.to_dict("records"),
         "intervals": frame.to_dict("records"),
     }
-    return short, page, data
+    return short, coverage, page, data
 
 
 def intervals(lines: Sequence[dict[str, Any]]) -> pd.DataFrame:

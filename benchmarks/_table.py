@@ -1,4 +1,4 @@
-"""Tables of the benchmarks: JSON and Markdown beside each other, and the marked sections of the README."""
+"""Tables of the benchmarks: JSON and Markdown beside each other, and the marked sections of README and docs."""
 
 from __future__ import annotations
 
@@ -21,12 +21,24 @@ def markdown(columns: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
 
 
 def write(out: Path, name: str, table: str, data: Any, readme: bool) -> None:
-    """Write ``name.json`` and ``name.md`` to ``out`` and, if asked, the table between its marks in the README."""
+    """Write ``name.json`` and ``name.md`` to ``out`` and, if asked, the table between its marks in README or docs."""
     out.mkdir(parents=True, exist_ok=True)
     (out / f"{name}.json").write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
     (out / f"{name}.md").write_text(table, encoding="utf-8")
     if readme:
-        replace_section(ROOT / "README.md", name, table)
+        publish(name, table)
+
+
+def publish(name: str, table: str) -> None:
+    """Replace the section of a name, on the page of README and documentation that has its marks."""
+    pages = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+    marked = [page for page in pages if f"<!-- begin {name} -->" in page.read_text(encoding="utf-8")]
+    if len(marked) != 1:
+        found = ", ".join(str(page.relative_to(ROOT)) for page in marked) or "none"
+        raise SystemExit(
+            f"{name}: expected the marks <!-- begin {name} --> on one page of README and docs, found {found}"
+        )
+    replace_section(marked[0], name, table)
 
 
 def replace_section(page: Path, name: str, table: str) -> None:

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from _code import code
-from _table import ROOT, markdown, replace_section, write
+from _table import markdown, publish, write
 from energyplus_trials.drawing import draw_spec, without
 
 from calibration.diagnosis import Trial, score, trial_of
@@ -150,7 +150,7 @@ def report(out: Path, readme: bool) -> str:
     plain = {**scored, "rates": {name: r.to_dict() for name, r in scored["rates"].items()}}
     write(out, NAME, page, plain, readme=False)
     if readme:
-        replace_section(ROOT / "README.md", NAME, short)
+        publish(NAME, short)
     return page
 
 

@@ -46,7 +46,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--cases", type=Path, help="folder of case folders")
     parser.add_argument("--out", type=Path, default=Path("results"))
-    parser.add_argument("--readme", action="store_true", help="replace the table in the README")
+    parser.add_argument("--readme", action="store_true", help="replace the table in README or docs")
     arguments = parser.parse_args()
     paths = sorted(p.parent for p in arguments.cases.glob("*/building.yaml")) if arguments.cases else []
     data, rows = [], []

@@ -5,7 +5,7 @@ Without ``--case`` the bundled case, and beside it ``practice_none_prbs`` where 
 repository: 12 zones, 0.5 m, two weeks to tune on. Parameters that are not estimated keep their start.
 
 Run: ``python benchmarks/calibration_speed.py --out results/speed [--case CASE ...] [--readme]``; two minutes on two
-cores. Writes ``calibration_speed.json`` and ``.md``; with ``--readme`` also the table in the README.
+cores. Writes ``calibration_speed.json`` and ``.md``; with ``--readme`` also the table between its marks.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=Path, required=True, help="folder of the results")
     parser.add_argument("--case", type=Path, action="append", help="case folder with floor plans; may be repeated")
-    parser.add_argument("--readme", action="store_true", help="replace the table in the README")
+    parser.add_argument("--readme", action="store_true", help="replace the table in README or docs")
     options = parser.parse_args()
     paths = options.case or [bundled_case_path(), *([PRACTICE] if PRACTICE.exists() else [])]
     rows = [row for path in paths for row in measure(path)]

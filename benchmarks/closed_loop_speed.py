@@ -13,7 +13,7 @@ A step of the grid has two solves: without supply air, for the local controls th
 Times are CPU times of the process on one thread; the median of a step, and the least in brackets.
 
 Run: ``python benchmarks/closed_loop_speed.py --out results/loop [--readme]``; a minute on one core. Writes
-``closed_loop_speed.json`` and ``.md``; with ``--readme`` also the table in the README.
+``closed_loop_speed.json`` and ``.md``; with ``--readme`` also the table between its marks.
 """
 
 from __future__ import annotations
@@ -124,7 +124,7 @@ def main() -> None:
     use_one_thread()
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=Path, required=True, help="folder of the results")
-    parser.add_argument("--readme", action="store_true", help="replace the table in the README")
+    parser.add_argument("--readme", action="store_true", help="replace the table in README or docs")
     options = parser.parse_args()
     found = measure()
     text = report(found)

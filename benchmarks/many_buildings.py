@@ -12,7 +12,7 @@ The bound of the speed-up is measured beside it: two processes that do nothing b
 programs took meanwhile (from ``/proc/stat``) is listed: a speed-up means something where that is next to nothing.
 
 Run: ``python benchmarks/many_buildings.py --out results/many [--readme]``; eight minutes on two quiet cores. Writes
-``many_buildings.json`` and ``.md``; with ``--readme`` also the table in the README.
+``many_buildings.json`` and ``.md``; with ``--readme`` also the table between its marks.
 """
 
 from __future__ import annotations
@@ -154,7 +154,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=Path, required=True, help="folder of the results")
     parser.add_argument("--buildings", type=int, default=BUILDINGS, help="how many")
-    parser.add_argument("--readme", action="store_true", help="replace the table in the README")
+    parser.add_argument("--readme", action="store_true", help="replace the table in README or docs")
     options = parser.parse_args()
     os.environ.update(dict.fromkeys(ONE_THREAD, "1"))  # for the peer's processes
     load = os.getloadavg()[0]

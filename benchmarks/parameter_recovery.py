@@ -38,7 +38,7 @@ from typing import Any, Literal
 
 from _code import code
 from _recovery_tables import report
-from _table import ROOT, replace_section, write
+from _table import publish, write
 
 from calibration import CalibrationResult, ParameterEstimate, calibrate, evaluate_case
 from thermal import Building, Case, Parameter, load_case
@@ -196,7 +196,7 @@ def main() -> None:
     parser.add_argument("--meter", choices=("sensors", "exact"), default="sensors", help="see generate_twin")
     parser.add_argument("--case", type=Path, help="use this case's building for every twin")
     parser.add_argument("--retry", action="store_true", help="measure seeds again that failed")
-    parser.add_argument("--readme", action="store_true", help="replace the table in the README")
+    parser.add_argument("--readme", action="store_true", help="replace the table in README or docs")
     options = parser.parse_args()
     case = str(options.case) if options.case else None
     kept = {name: getattr(options, name) for name in ("days", "zones", "floor_area", "dx", "excitation", "meter")}
@@ -206,10 +206,11 @@ def main() -> None:
     if missing:
         run(study, missing, options.workers, path)
         lines = read_lines(path, study)
-    short, page, data = report([lines[seed] for seed in sorted(lines) if seed < options.seeds])
+    short, coverage, page, data = report([lines[seed] for seed in sorted(lines) if seed < options.seeds])
     write(options.out, NAME, page, data, readme=False)
     if options.readme:
-        replace_section(ROOT / "README.md", NAME, short)
+        publish(NAME, short)
+        publish(f"{NAME}_coverage", coverage)
     print(page)
 
 

@@ -20,7 +20,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from _table import ROOT, markdown, replace_section, write
+from _table import markdown, publish, write
 from _trial_answers import answer_cases
 
 NAME = "practice_cases"
@@ -82,7 +82,7 @@ def main() -> int:
     table = f"Method {versions}.\n\n{markdown(_COLUMNS, rows(known, labels))}"
     write(options.out, NAME, table, known, readme=False)
     if options.docs:
-        replace_section(ROOT / "docs" / "diagnosis.md", NAME, table)
+        publish(NAME, table)
     print(table)
     return 1 if failed else 0
 

@@ -14,7 +14,7 @@ Times are CPU times of the process on one thread, so that other processes count 
 so each is a median, with the minimum in brackets.
 
 Run: ``python benchmarks/simulator_speed.py --out results/speed [--readme]``; a minute on one core. Writes
-``simulator_speed.json`` and ``.md``; with ``--readme`` also the table in the README.
+``simulator_speed.json`` and ``.md``; with ``--readme`` also the table between its marks.
 """
 
 from __future__ import annotations
@@ -224,7 +224,7 @@ def main() -> None:
     use_one_thread()
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=Path, required=True, help="folder of the results")
-    parser.add_argument("--readme", action="store_true", help="replace the table in the README")
+    parser.add_argument("--readme", action="store_true", help="replace the table in README or docs")
     options = parser.parse_args()
     bandwidth = read_bandwidth()
     building = pilot()

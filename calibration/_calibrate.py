@@ -152,10 +152,11 @@ def calibrate(
     found = CaseModel(case, settings, grid, inputs, best.theta, "estimate")
     after, check = _evaluated(found, best.model, intervals, horizon, progress)
     seconds = time.perf_counter() - began
+    information = information_of(best)
     return CalibrationResult(
         case=case.building.name,
         zones=network.zones,
-        parameters=describe(best, network.nominal),
+        parameters=describe(best, information, network.nominal),
         theta=best.theta,
         tuning=tuple(tuned),
         held_out=tuple(judged),
@@ -174,7 +175,7 @@ def calibrate(
         ),
         disturbance=best.disturbance,
         excess=best.excess,
-        information=information_of(best),
+        information=information,
         grid_check=check,
         objective=objective,
         horizon=horizon,

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
 from calibration._estimate import Estimate
+from calibration._information import Information
 from calibration._result import ParameterEstimate
 from thermal import Parameter
 
@@ -24,18 +26,24 @@ _TAILS = (0.05, 0.95)
 _DETERMINED = 0.5
 
 
-def describe(found: Estimate, nominal: Mapping[str, tuple[float, str]]) -> tuple[ParameterEstimate, ...]:
+def describe(
+    found: Estimate, information: Information, nominal: Mapping[str, tuple[float, str]]
+) -> tuple[ParameterEstimate, ...]:
     """Parameters with standard errors, intervals, bounds and what the data determine.
 
     Parameters
     ----------
     found : Estimate
         From `estimate`.
+    information : Information
+        Of this estimate: a parameter that is known only because priors hold the others is not determined by the data.
     nominal : mapping of str to (float, str)
         Values that were never estimated, with their units.
     """
     deviations = dict(zip(found.problem.free, np.sqrt(np.diag(found.covariance)), strict=True))
-    return describe_parameters(found.problem.grid.network.parameters, found.theta, deviations, nominal)
+    described = describe_parameters(found.problem.grid.network.parameters, found.theta, deviations, nominal)
+    told = {p.name for p in information.parameters if p.status == "determined"}
+    return tuple(replace(p, identifiable=p.identifiable and p.name in told) for p in described)
 
 
 def describe_parameters(

@@ -41,7 +41,7 @@ class ParameterEstimate:
     standard_error : float or None
         Posterior standard error [parameter units]; None for what was not estimated.
     identifiable : bool
-        Whether the data at least halve the prior's spread, and no bound is hit.
+        Whether the data halve the prior's spread, not only because priors hold the others, and no bound is hit.
     source : str
         Where the range comes from, or why the value was not estimated.
     interval90 : tuple of float or None

@@ -94,13 +94,13 @@ def test_every_method_on_a_twin(study: ModuleType, tables: ModuleType, bench: An
     rows.append({**ours, "method": "ours", "tuned_on": bench.intervals.inside(bench.inputs, bench.intervals.tuning)})
     lines = [{"case": name, "study": bench.study.to_dict(), "code": "0", "rows": rows} for name in ("one", "two")]
     first = {"commit": "0123456789", "cases": {"one": {"calibrated": 0.25}}}
-    short, page = tables.report(lines, {"three": "ValueError: no day"}, first)
+    short, by_case, page = tables.report(lines, {"three": "ValueError: no day"}, first)
     medians = next(line for line in short.splitlines() if line.startswith("| ours |"))
     assert medians.count("(") == 3
-    assert f"| one | {held_out[0]:.3f} | {held_out[1]:.3f} | {held_out[2]:.3f} | 0.250 | {held_out[2]:.3f} |" in short
-    assert "| median of 1 |" in short
+    assert f"| one | {held_out[0]:.3f} | {held_out[1]:.3f} | {held_out[2]:.3f} | 0.250 | {held_out[2]:.3f} |" in by_case
+    assert "| median of 1 |" in by_case
     assert "**1 cases failed:** three: ValueError: no day" in short
-    assert page.startswith(short)
+    assert page.startswith(by_case)
     json.dumps(lines)
 
 

@@ -80,7 +80,7 @@ def lines(study: Any) -> Lines:
 
 
 def test_an_estimator_of_known_coverage_passes(tables: ModuleType, lines: Lines) -> None:
-    short, page, data = tables.report(lines())
+    short, _, page, data = tables.report(lines())
     by_level = {c["level"]: c for c in data["pooled"]["all"]}
     assert by_level[0.9]["coverage"] == pytest.approx(0.9, abs=0.03)
     assert by_level[0.9]["design_effect"] > 1.2
@@ -106,7 +106,7 @@ def test_where_data_say_nothing_the_prior_covers_once_it_is_cut_to_the_range(
                 standard_error=p.prior_deviation * p.slope(p.start),
             )  # fmt: skip
             line["parameters"].append(recovery.on_estimation_scale(prior, p, drawn[name]))
-    _, _, data = tables.report(found)
+    *_, data = tables.report(found)
     for c in data["pooled"]["all, cut to range"]:
         assert c["inside"]
     whole = data["pooled"]["all"][1]
@@ -115,7 +115,7 @@ def test_where_data_say_nothing_the_prior_covers_once_it_is_cut_to_the_range(
 
 
 def test_half_the_width_fails(tables: ModuleType, lines: Lines) -> None:
-    short, page, data = tables.report(lines(width=0.5))
+    short, _, page, data = tables.report(lines(width=0.5))
     found = {c["level"]: c for c in data["pooled"]["all"]}[0.9]
     assert found["coverage"] == pytest.approx(0.59, abs=0.05)  # of 0.82 deviations to either side
     assert not found["inside"]
@@ -124,7 +124,7 @@ def test_half_the_width_fails(tables: ModuleType, lines: Lines) -> None:
 
 
 def test_intervals_of_the_result_itself_take_their_place(tables: ModuleType, lines: Lines) -> None:
-    _, _, data = tables.report(lines(width=0.5, own=True))
+    *_, data = tables.report(lines(width=0.5, own=True))
     inside = {c["level"]: c["inside"] for c in data["pooled"]["all"]}
     assert inside == {0.5: False, 0.9: True, 0.95: False}
 
@@ -133,7 +133,7 @@ def test_failures_and_stale_lines_are_named(tables: ModuleType, lines: Lines) ->
     found = lines()
     found[7] = {"seed": 7, "study": found[7]["study"], "code": "0", "failure": "CalibrationError: every start failed"}
     found[8] |= {"solver": {"status": "Maximum_Iterations_Exceeded", "success": False}, "code": "1"}
-    short, page, data = tables.report(found)
+    short, _, page, data = tables.report(found)
     assert "**1 twins failed:** 7: CalibrationError: every start failed" in short
     assert data["failed"] == {7: "CalibrationError: every start failed"}
     assert "**Did not converge:** seeds [8]" in page
@@ -184,7 +184,7 @@ def test_a_twin_from_plan_to_line(recovery: ModuleType, tables: ModuleType) -> N
         assert p["error"] > 0.0
     assert json.loads(json.dumps(line)) == line
     assert 0.0 < line["mae"]["truth"] < line["mae"]["before"]
-    assert tables.report([line])[2]["twins"][0]["seed"] == 1
+    assert tables.report([line])[-1]["twins"][0]["seed"] == 1
     broken = recovery.measure(recovery.Study(days=2.0, dx=0.3, **small), 1)
     assert broken["failure"].startswith("CellSizeError")
 

@@ -4,15 +4,26 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from calibration import HORIZONS, CalibrationError, CalibrationResult, calibrate, evaluate_model, load_parameters
+from calibration import (
+    HORIZONS,
+    CalibrationError,
+    CalibrationResult,
+    Estimate,
+    calibrate,
+    evaluate_model,
+    load_parameters,
+)
+from calibration._describe import describe
 from calibration.errors import ParameterFileError
 from thermal import SymbolicModel, ThermalNetwork, build_network, load_bundled_case, replay_inputs
 
@@ -129,16 +140,41 @@ def test_calibrated_parameters_are_physical_and_theirs_is_the_model_s_order() ->
 
 
 def test_bounds_and_identifiability_are_what_they_say() -> None:
+    status = {p.name: p.status for p in calibrated().information.parameters}
+    assert "through_priors" in status.values()
     for p in calibrated().parameters:
         if p.standard_error is None:
             continue
         (model,) = (q for q in network().parameters if q.name == p.name)
         z, low, high = (model.transform(v) for v in (p.value, model.lower, model.upper))
         assert p.at_bound == (min(z - low, high - z) < 0.01 * (high - low))
-        # at least half of the prior's spread is gone
+        # at least half of the prior's spread is gone, and wider priors of the others would not change that
         deviation = p.standard_error / model.slope(p.value)
-        assert p.identifiable == (deviation < 0.5 * model.prior_deviation and not p.at_bound)
+        halved = deviation < 0.5 * model.prior_deviation and not p.at_bound
+        assert p.identifiable == (halved and status[p.name] == "determined")
         assert deviation <= model.prior_deviation * (1 + 1e-9)
+
+
+def test_a_parameter_that_the_data_determine_is_identifiable() -> None:
+    found = calibrated()
+    halved = {p.name for p in found.information.parameters if p.ratio < 0.5}
+    assert halved
+    told = replace(
+        found.information,
+        parameters=tuple(
+            replace(p, status="determined" if p.name in halved else p.status) for p in found.information.parameters
+        ),
+    )
+    deviations = np.diag([p.posterior_deviation**2 for p in told.parameters])
+    names = [p.name for p in network().parameters]
+    free = [names.index(p.name) for p in told.parameters]
+    estimate = SimpleNamespace(
+        problem=SimpleNamespace(free=free, grid=SimpleNamespace(network=network())),
+        covariance=deviations,
+        theta=found.theta,
+    )
+    assert {p.name for p in describe(cast(Estimate, estimate), told, {}) if p.identifiable} == halved
+    assert not any(p.identifiable for p in describe(cast(Estimate, estimate), found.information, {}))
 
 
 def test_reduced_model_is_certified_on_the_grid() -> None:
