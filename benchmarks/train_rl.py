@@ -32,7 +32,8 @@ def smoke(folder: Path) -> list[Path]:
     weeks = dict(list(TRAINING_WEEKS.items())[:2])
     done = []
     for algorithm, recipe in RECIPES.items():
-        options = recipe.options | ({"n_steps": 48} if algorithm == "ppo" else {"learning_starts": 50})
+        few = {"n_steps": 48, "batch_size": 48} if algorithm == "ppo" else {"learning_starts": 50, "buffer_size": 500}
+        options = recipe.options | few
         run, short = Training(algorithm, "plant", 0), replace(recipe, steps=96, evaluate_every=96, options=options)
         validation = dict(list(VALIDATION_WEEKS.items())[:1])
         train(run, folder / run.name, short, size=SMOKE, weeks=weeks, validation=validation, say=lambda _: None)

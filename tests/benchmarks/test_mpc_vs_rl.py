@@ -109,7 +109,6 @@ def test_smoke_of_the_comparison(case: ModuleType, comparison: ModuleType, tmp_p
     by = {row["entry"]["controller"]: row for row in first}
     assert set(by) == {"reset", "guideline36", "mpc_after", "sac_plant_0"}
     assert by["mpc_after"]["sources"] == {"optimal plan": 96}
-    assert sum(by["mpc_after"]["days"]) < min(sum(by[name]["days"]) for name in by if name != "mpc_after")
     price, zones = case.DISCOMFORT_PRICE, case.SMOKE.zones
     for row in first:
         assert sum(row["days"]) == pytest.approx(row["cost"] + price * zones * row["discomfort"], rel=1e-9)
