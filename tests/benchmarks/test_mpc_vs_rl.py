@@ -87,7 +87,7 @@ def test_test_weeks_are_not_those_of_the_training(case: ModuleType) -> None:
 
 def test_the_models_of_the_comparison_are_those_of_the_commands(case: ModuleType) -> None:
     known = {world: json.loads(case.model_file(world).read_text()) for world in ("before", "after")}
-    assert [entry["id"] for entry in known["after"]["effects"]] == list(case.EFFECTS)
+    assert [entry["effect"] for entry in known["after"]["effects"]] == list(case.EFFECTS)
     assert not known["before"]["effects"]
 
 
