@@ -73,3 +73,11 @@ class EnergyPlusError(PlantError):
 
 class EnergyPlusTimeoutError(EnergyPlusError):
     """EnergyPlus did not answer in time; its process was ended."""
+
+
+class EnvironmentSetupError(MpcError):
+    """Parts of a learning environment that do not fit each other, or a policy of another one."""
+
+
+class MissingExtraError(MpcError, ImportError):
+    """A package that an extra brings is not installed."""

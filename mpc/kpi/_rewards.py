@@ -242,5 +242,7 @@ class StageCost:
         price_g = scenario.gas_price[k] + self.carbon_price * scenario.gas_carbon[k]
         step = scenario.grid.step
         energy = (price_e * power_e + price_g * power_g) * step / KILOWATT_HOUR
+        if (np.minimum(first, last) >= lower).all() and (np.maximum(first, last) <= upper).all():
+            return np.asarray(energy)
         discomfort = excess(lower - first, lower - last)[0] + excess(first - upper, last - upper)[0]
         return np.asarray(energy + self.discomfort_price * discomfort.sum(axis=-1) * step / _HOUR)

@@ -2,7 +2,7 @@
 
 from mpc.plants._actuators import ACTION_LIMITS, Actuator
 from mpc.plants._building import BuildingFlows, BuildingModel, BuildingStep, GridBuilding
-from mpc.plants._history import SystemBalance
+from mpc.plants._history import RecentSteps, SystemBalance
 from mpc.plants._make import pilot_building, pilot_weather, save_pilot, simulated_plant
 from mpc.plants._noise import SensorNoise
 from mpc.plants._operation import Operation, scheduled_operation
@@ -28,6 +28,7 @@ __all__ = [
     "Plant",
     "PlantDevices",
     "PointLayout",
+    "RecentSteps",
     "ReducedBuilding",
     "RestorablePlant",
     "SensorNoise",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -38,6 +39,25 @@ class PlantStep(NamedTuple):
     done: HvacStep
     mean: FloatArray
     end: FloatArray
+
+
+class RecentSteps(NamedTuple):
+    """The last steps of a plant's record, for rewards.
+
+    Parameters
+    ----------
+    step : float
+        Step of the plant [s].
+    zone_temperature : sequence of ndarray, shape (n_zone,)
+        At the edges of the steps [K].
+    electricity, gas : sequence of float
+        Powers, means over the steps, one fewer than the edges [W].
+    """
+
+    step: float
+    zone_temperature: Sequence[FloatArray]
+    electricity: Sequence[float]
+    gas: Sequence[float]
 
 
 class SystemBalance(NamedTuple):

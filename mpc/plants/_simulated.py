@@ -14,7 +14,7 @@ from mpc.errors import PlantError
 from mpc.kpi import PlantRecord
 from mpc.plants._actuators import SUPPLY_AIR, SUPPLY_WATER, Actuator, actuators_of, checked_actions
 from mpc.plants._building import BuildingModel, zone_response
-from mpc.plants._history import PlantStep, SystemBalance
+from mpc.plants._history import PlantStep, RecentSteps, SystemBalance
 from mpc.plants._inputs import boundary_series, check_parts, sensor_offset
 from mpc.plants._local import LocalControl
 from mpc.plants._noise import SensorNoise
@@ -278,10 +278,21 @@ class SimulatedPlant:
         PlantError
             When there was no step yet.
         """
-        done = [s.done for s in self._kept()]
-        temperature = np.stack([self._first, *(s.end for s in self._steps)])
-        electricity, gas = (np.array([getattr(d, f"{kind}_power") for d in done]) for kind in ("electric", "fuel"))
-        return PlantRecord(self._step, temperature, electricity, gas)
+        step, temperature, electricity, gas = self.recent(len(self._kept()))
+        return PlantRecord(step, np.array(temperature), np.array(electricity), np.array(gas))
+
+    def recent(self, steps: int) -> RecentSteps:
+        """Give the last steps of `record`, at a cost that does not grow with the run.
+
+        Parameters
+        ----------
+        steps : int
+            How many of the plant's own steps, 1 or more.
+        """
+        last, before = self._kept()[-steps:], len(self._steps) - steps
+        temperature = [self._steps[before - 1].end if before > 0 else self._first, *(s.end for s in last)]
+        powers = [s.done.electric_power for s in last], [s.done.fuel_power for s in last]
+        return RecentSteps(self._step, temperature, *powers)
 
     def telemetry(self) -> pd.DataFrame:
         """Give what was measured in the run since the reset, shape (n_steps, n_column) [library's units].

@@ -1,0 +1,147 @@
+"""The comparison's statistics against closed forms, and a smoke run of it and of the training."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip("gymnasium", reason="needs the extra [rl]")
+
+from mpc.environment import ActorNetwork, ControlEnvironment
+
+
+@pytest.fixture(scope="module")
+def case(script: Callable[[str], ModuleType]) -> ModuleType:
+    return script("_learning_case")
+
+
+@pytest.fixture(scope="module")
+def tables(script: Callable[[str], ModuleType], case: ModuleType) -> ModuleType:
+    script("_table")
+    return script("_comparison_tables")
+
+
+@pytest.fixture(scope="module")
+def comparison(script: Callable[[str], ModuleType], tables: ModuleType) -> ModuleType:
+    script("_comparison")
+    script("simulator_speed")
+    return script("mpc_vs_rl")
+
+
+@pytest.fixture(scope="module")
+def training(script: Callable[[str], ModuleType], comparison: ModuleType) -> ModuleType:
+    pytest.importorskip("torch", reason="needs the extra [rl]")
+    pytest.importorskip("stable_baselines3", reason="needs the extra [rl]")
+    script("_training")
+    return script("train_rl")
+
+
+def run(controller: str, week: str, days: list[float], price: float = 1.0, discomfort: float = 0.0) -> dict[str, Any]:
+    return {"entry": {"controller": controller, "price": price}, "week": week, "days": days, "cost": sum(days),
+            "discomfort": discomfort, "about": {}}  # fmt: skip
+
+
+def test_a_constant_difference_has_an_interval_of_no_width(tables: ModuleType) -> None:
+    one = [run("mpc_after", week, [1.0, 5.0, 2.0]) for week in ("winter", "summer")]
+    other = [run("schedule", week, [1.5, 5.5, 2.5]) for week in ("winter", "summer")]
+    assert tables.bootstrap(other, one) == pytest.approx((1.5, 1.5, 1.5))
+    mean, low, high = tables.bootstrap(other)
+    assert mean == pytest.approx(9.5) and low < mean < high
+
+
+def test_an_interval_is_that_of_the_mean_of_days(tables: ModuleType) -> None:
+    rng = np.random.default_rng(1)
+    days = rng.normal(10.0, 2.0, 60)
+    mean, low, high = tables.bootstrap([run("reset", "winter", days.tolist())])
+    width = 2.0 * 1.96 * days.std() / np.sqrt(60.0) * 60.0
+    assert mean == pytest.approx(days.sum())
+    assert high - low == pytest.approx(width, rel=0.1)
+
+
+def test_seeds_of_a_policy_are_one_line(tables: ModuleType) -> None:
+    runs = [run(f"ppo_plant_{k}", "winter", [k + 1.0]) for k in range(3)] + [run("mpc_after", "winter", [1.0], 3.0)]
+    found = tables.lines(runs)
+    assert list(found) == ["ppo_plant"] and len(tables.by_seed(found["ppo_plant"])) == 3
+
+
+def test_cost_at_equal_comfort_is_read_off_the_front(tables: ModuleType) -> None:
+    runs = [run("mpc_after", "winter", [cost], price, discomfort)
+            for cost, price, discomfort in ((30.0, 3.0, 0.0), (20.0, 1.0, 1.0), (18.0, 0.3, 3.0))]  # fmt: skip
+    points = tables.front(runs, "mpc_after")
+    assert points == [(0.0, 30.0), (1.0, 20.0), (3.0, 18.0)]
+    assert [tables.cost_at(points, d) for d in (0.0, 0.5, 2.0, 9.0)] == [30.0, 25.0, 19.0, 18.0]
+
+
+def test_test_weeks_are_not_those_of_the_training(case: ModuleType) -> None:
+    weeks = [case.TEST_WEEKS, case.VALIDATION_WEEKS, case.TRAINING_WEEKS]
+    seeds = [{seed for _, seed in of.values()} for of in weeks]
+    assert sum(map(len, seeds)) == len(set.union(*seeds))
+
+
+def test_the_models_of_the_comparison_are_those_of_the_commands(case: ModuleType) -> None:
+    known = {world: json.loads(case.model_file(world).read_text()) for world in ("before", "after")}
+    assert [entry["effect"] for entry in known["after"]["effects"]] == list(case.EFFECTS)
+    assert not known["before"]["effects"]
+
+
+def random_policy(case: ModuleType, folder: Path) -> None:
+    """A policy of the small office that nobody has trained."""
+    plant = case.make_plant(case.TEST_WEEKS["winter"], case.building_model("plant", case.SMOKE), size=case.SMOKE)
+    inputs = len(ControlEnvironment(plant, block_ends=case.BLOCK_ENDS).layout)
+    rng = np.random.default_rng(0)
+    weights = (0.1 * rng.standard_normal((2, inputs)),)
+    about = {"steps": 0, "seed": 0, "hours_a_step": 0.25, "cpu_seconds": 0.0, "curve": [[1, 40.0], [2, 30.0]]}
+    ActorNetwork(weights, (np.zeros(2),), "tanh", True, about).save(folder / "sac_plant_0.npz")
+
+
+def test_smoke_of_the_comparison(case: ModuleType, comparison: ModuleType, tmp_path: Path) -> None:
+    random_policy(case, tmp_path)
+    asked = ["--out", str(tmp_path / "out"), "--policies", str(tmp_path), "--weeks", "winter", "--smoke",
+             "--prices", "1", "--controllers", "reset", "guideline36", "mpc_after", "sac_plant_0"]  # fmt: skip
+    first = comparison.main(asked)
+    by = {row["entry"]["controller"]: row for row in first}
+    assert set(by) == {"reset", "guideline36", "mpc_after", "sac_plant_0"}
+    assert by["mpc_after"]["sources"] == {"optimal plan": 96}
+    price, zones = case.DISCOMFORT_PRICE, case.SMOKE.zones
+    for row in first:
+        assert sum(row["days"]) == pytest.approx(row["cost"] + price * zones * row["discomfort"], rel=1e-9)
+    text = (tmp_path / "out" / "mpc_vs_rl.md").read_text()
+    assert "SAC, trained on the plant | 1 |" in text
+    stamps = {file: file.stat().st_mtime_ns for file in (tmp_path / "out" / "runs").iterdir()}
+    assert comparison.main(asked) == first
+    assert stamps == {file: file.stat().st_mtime_ns for file in (tmp_path / "out" / "runs").iterdir()}
+    assert (tmp_path / "out" / "mpc_vs_rl_front.svg").exists() and (
+        tmp_path / "out" / "mpc_vs_rl_learning.svg"
+    ).exists()
+
+
+def test_smoke_of_the_training(training: ModuleType, tmp_path: Path) -> None:
+    for path in training.smoke(tmp_path):
+        network = ActorNetwork.load(path)
+        assert network.about["steps"] == 96 and path.stat().st_size < 100_000
+
+
+def test_training_goes_on_where_it_was_interrupted(case: ModuleType, training: ModuleType, tmp_path: Path) -> None:
+    weeks, validation = ({"week": next(iter(of.values()))} for of in (case.TRAINING_WEEKS, case.VALIDATION_WEEKS))
+    options = training.RECIPES["ppo"].options | {"n_steps": 24, "batch_size": 24, "n_epochs": 1}
+    recipe, said = replace(training.RECIPES["ppo"], steps=48, evaluate_every=24, options=options), list[str]()
+    run = training.Training("ppo", "plant", 1)
+    given: dict[str, Any] = {"size": case.SMOKE, "weeks": weeks, "validation": validation}
+
+    def interrupt(line: str) -> None:
+        raise KeyboardInterrupt
+
+    assert not training.train(run, tmp_path, recipe, until=0.0, **given)
+    with pytest.raises(KeyboardInterrupt):
+        training.train(run, tmp_path, recipe, say=interrupt, **given)
+    assert not (tmp_path / "policy.npz").exists()
+    assert training.train(run, tmp_path, recipe, say=said.append, **given) and len(said) == 1
+    about = ActorNetwork.load(tmp_path / "policy.npz").about
+    assert [row[0] for row in about["curve"]] == [24, 48] and about["steps"] == 48
