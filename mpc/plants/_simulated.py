@@ -290,9 +290,8 @@ class SimulatedPlant:
             How many of the plant's own steps, 1 or more.
         """
         last, before = self._kept()[-steps:], len(self._steps) - steps
-        temperature = [self._steps[before - 1].end if before > 0 else self._first, *(s.end for s in last)]
-        powers = [s.done.electric_power for s in last], [s.done.fuel_power for s in last]
-        return RecentSteps(self._step, temperature, *powers)
+        zones = [self._steps[before - 1].end if before > 0 else self._first, *(s.end for s in last)]
+        return RecentSteps(self._step, zones, [s.done.electric_power for s in last], [s.done.fuel_power for s in last])
 
     def telemetry(self) -> pd.DataFrame:
         """Give what was measured in the run since the reset, shape (n_steps, n_column) [library's units].
