@@ -211,7 +211,7 @@ def cost_bars(runs: Sequence[ControlRun]) -> list[Picture]:
     figure = Figure(figsize=(10.0, 0.9 + 0.42 * len(runs)))
     left, right = figure.subplots(1, 2, sharey=True, gridspec_kw={"width_ratios": [2.0, 1.0]})
     names, place = [NAMES[run.controller] for run in runs], np.arange(len(runs))
-    parts = np.array([cost_parts(run) for run in runs])
+    parts = np.array([_cost_parts(run) for run in runs])
     left.barh(place, parts[:, 0], color=MEASURED, alpha=0.8, label="electricity")
     left.barh(place, parts[:, 1], left=parts[:, 0], color=SIMULATED, alpha=0.8, label="gas")
     left.set_yticks(place, names)
@@ -223,7 +223,7 @@ def cost_bars(runs: Sequence[ControlRun]) -> list[Picture]:
     return [picture(figure, "Energy cost and discomfort of the controllers")]
 
 
-def cost_parts(run: ControlRun) -> tuple[float, float]:
+def _cost_parts(run: ControlRun) -> tuple[float, float]:
     """Give what electricity and gas cost [currency].
 
     Parameters

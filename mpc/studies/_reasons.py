@@ -12,7 +12,7 @@ from mpc.studies._run import ControlRun
 _CHANGING = re.compile(r"\d{4}-\d\d-\d\d \d\d:\d\d|\b\d+(\.\d+)?\b")  # times and numbers within a reason
 
 
-class ReasonRow(NamedTuple):
+class _Reason(NamedTuple):
     """A reason that was given once or more.
 
     Parameters
@@ -31,7 +31,7 @@ class ReasonRow(NamedTuple):
     reason: str
 
 
-def reason_rows(run: ControlRun) -> list[ReasonRow]:
+def reason_rows(run: ControlRun) -> list[_Reason]:
     """Give the reasons of a run, those that differ in times and numbers only taken together, the first time first.
 
     Parameters
@@ -39,13 +39,13 @@ def reason_rows(run: ControlRun) -> list[ReasonRow]:
     run : ControlRun
         Of `run_controller`.
     """
-    found: dict[str, ReasonRow] = {}
+    found: dict[str, _Reason] = {}
     for decision in run.decisions:
         for reason in decision.reasons:
             kind = _CHANGING.sub("#", reason)
             before = found.get(kind)
             if before is None:
-                found[kind] = ReasonRow(decision.stamp, decision.stamp, 1, reason)
+                found[kind] = _Reason(decision.stamp, decision.stamp, 1, reason)
             else:
                 found[kind] = before._replace(last=decision.stamp, times=before.times + 1)
     return list(found.values())

@@ -13,8 +13,8 @@ import pandas as pd
 
 from calibration import check_results_folder, write_results
 from calibration.pages import clock, counted, render, significant
-from mpc.studies import _figures as figures
 from mpc.studies._compare import Comparison
+from mpc.studies._figures import NAMES, cost_bars, course, expectations, side_by_side
 from mpc.studies._reasons import reason_rows
 from mpc.studies._run import ControlRun, prediction_errors
 from thermal.case.points import POINT_TYPES, split_column
@@ -125,7 +125,7 @@ def write_control(run: ControlRun, out: str | Path, *, command: str = "", force:
         When the folder holds something and ``force`` is not set.
     """
     check_results_folder(out, force)
-    content = _frame([run], control_verdict(run), f"Control of {run.study.name}: {figures.NAMES[run.controller]}")
+    content = _frame([run], control_verdict(run), f"Control of {run.study.name}: {NAMES[run.controller]}")
     page = render("control", content | {"runs": [_section(run, True)], "table": None, "bars": [], "together": [],
                                         "reproduce": _reproduce(run, command)}, "mpc")  # fmt: skip
     files: dict[str, Any] = {
@@ -144,7 +144,7 @@ def control_verdict(run: ControlRun) -> str:
     """
     k, worst = run.kpis, max(run.kpis.zones, key=lambda z: z.below + z.above)
     parts = [
-        f"{figures.NAMES[run.controller].capitalize()} spent {_money(run.cost, k.currency)} on energy in "
+        f"{NAMES[run.controller].capitalize()} spent {_money(run.cost, k.currency)} on energy in "
         f"{k.hours / 24:g} days ({significant(k.ener_tot)} kWh/m², of which {_electric(run):.0%} electricity)."
     ]
     if k.tdis_tot < 1e-3:
@@ -207,9 +207,9 @@ def comparison_verdict(comparison: Comparison) -> str:
     best, mpc = comparison.best_rule, comparison.of("mpc")
     if best is None or mpc is None:
         cheapest = min(comparison.runs, key=lambda run: run.objective)
-        name = figures.NAMES[cheapest.controller]
+        name = NAMES[cheapest.controller]
         return f"{name.capitalize()} costs least: {control_verdict(cheapest)}"
-    name, change = figures.NAMES[best.controller], 1.0 - mpc.cost / best.cost
+    name, change = NAMES[best.controller], 1.0 - mpc.cost / best.cost
     comfort = mpc.kpis.tdis_tot - best.kpis.tdis_tot
     parts = [
         f"Optimal control spent {_money(mpc.cost, mpc.kpis.currency)} on energy, the best rule ({name}) "
@@ -261,7 +261,7 @@ def write_comparison(comparison: Comparison, out: str | Path, *, command: str = 
     shown = comparison.of("mpc") or runs[0]
     page = render("control", content | {
         "runs": [_section(run, run is shown) for run in runs], "table": comparison_rows(comparison),
-        "bars": figures.cost_bars(runs), "together": figures.side_by_side(runs),
+        "bars": cost_bars(runs), "together": side_by_side(runs),
         "reproduce": _reproduce(runs[0], command),
     }, "mpc")  # fmt: skip
     files: dict[str, Any] = {"comparison.json": comparison_summary(comparison), "report.html": page}
@@ -282,7 +282,7 @@ def comparison_rows(comparison: Comparison) -> list[list[str]]:
         k, saving, way = run.kpis, comparison.saving(run), comparison.way_to_bound(run)
         worst = max(z.below + z.above for z in k.zones)
         rows.append([
-            figures.NAMES[run.controller], f"{run.cost:,.2f}", f"{run.objective:,.2f}",
+            NAMES[run.controller], f"{run.cost:,.2f}", f"{run.objective:,.2f}",
             "–" if saving is None or run is comparison.best_rule else f"{saving:.1%}".replace("-", "−"),
             f"{k.tdis_tot:.3f}", f"{worst:.2f}", f"{k.ener_tot:.3f}", f"{1e3 * (k.pele_tot or 0.0):.1f}",
             "–" if k.emis_tot is None else f"{1e3 * k.emis_tot:.1f}",
@@ -296,7 +296,7 @@ def _frame(runs: list[ControlRun], verdict: str, title: str) -> dict[str, Any]:
     study, run = runs[0].study, next((r for r in runs if r.controller == "mpc"), runs[0])
     k, planned = run.kpis, run.sources.get("optimal plan", 0)
     cards = [
-        (_money(run.cost, k.currency), f"energy, {figures.NAMES[run.controller]}"),
+        (_money(run.cost, k.currency), f"energy, {NAMES[run.controller]}"),
         (f"{significant(k.ener_tot)} kWh/m²", "energy"),
         (f"{significant(k.tdis_tot, 2)} K h", "outside of the comfort band, mean zone"),
         (f"{1e3 * (k.pele_tot or 0.0):.1f} W/m²", "highest quarter of an hour of electricity"),
@@ -317,10 +317,10 @@ def _section(run: ControlRun, shown: bool) -> dict[str, Any]:
     step, hours = round(run.plant.control_step / 60.0), 12.0
     errors, zones = prediction_errors(run), sorted(run.kpis.zones, key=lambda z: -(z.below + z.above))
     return {
-        "name": figures.NAMES[run.controller].capitalize(), "shown": shown,
+        "name": NAMES[run.controller].capitalize(), "shown": shown,
         "how": _RULES[run.controller].format(step=step, hours=hours),
-        "course": figures.course(run),
-        "expectations": figures.expectations(run) if shown else [],
+        "course": course(run),
+        "expectations": expectations(run) if shown else [],
         "errors": errors,
         "reasons": [[clock(r.first), clock(r.last), str(r.times), r.reason] for r in reason_rows(run)[:40]],
         "more_reasons": max(len(reason_rows(run)) - 40, 0),

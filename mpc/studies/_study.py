@@ -39,6 +39,7 @@ from thermal.hvac import HvacSystem
 from thermal.model import ReducedModel
 from thermal.pilot import size_system
 
+#: What steps the plant: the reduced model, its grid with the mean of the shuffle, or with the random shuffle.
 PlantKind = Literal["reduced", "grid", "random"]
 
 #: Time between two actions of optimal control, and of rules [s].

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from mpc.errors import BoptestRequestError, PlantError
 from mpc.plants._building import BuildingModel
+from mpc.plants._noise import SensorNoise
 from mpc.plants._operation import Operation, scheduled_operation
-from mpc.plants._sensors import SensorNoise
 from mpc.plants.boptest._clock import DAY, YearClock
 from mpc.plants.boptest._periods import Period, find_periods
 from mpc.plants.boptest._prices import scenario_prices
