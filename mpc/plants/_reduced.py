@@ -62,6 +62,11 @@ class ReducedBuilding:
         """Number of states."""
         return int(self._end.size)
 
+    @property
+    def modal_state(self) -> FloatArray:
+        """Modes of the building's model, from `REFERENCE_TEMPERATURE` on, shape (order,) [K]."""
+        return self._scale * self._state
+
     def reset(self, zone: FloatArray, boundary: FloatArray, signals: FloatArray) -> FloatArray:
         """Start from a steady state; see `BuildingModel`.
 

@@ -41,7 +41,7 @@ class KnownState(Observer):
         """
         building = self._plant.model
         if isinstance(building, ReducedBuilding):
-            self.state[: self.order] = building.save_state()[0]
+            self.state[: self.order] = building.modal_state
 
     def update(self, zone: FloatArray, heat: FloatArray, boundary: FloatArray) -> FloatArray:
         """Take the state.

@@ -100,7 +100,7 @@ def test_the_bound_knows_the_state(make: Callable[..., Study]) -> None:
     known = KnownState(study.truth, plant)
     controller = make_controller(study.truth, plant, observer=known)
     action = controller.step(plant.reset(0), plant.forecast())
-    np.testing.assert_array_equal(known.modal_state, plant.model.save_state()[0])
+    np.testing.assert_array_equal(known.modal_state, plant.model.modal_state)
     assert not known.disturbance.any()
     plant.step(action)
     planned = action.solution.rollout.zone[3]
