@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -122,8 +124,18 @@ def test_smoke_of_the_comparison(case: ModuleType, comparison: ModuleType, tmp_p
     ).exists()
 
 
-def test_smoke_of_the_training(training: ModuleType, tmp_path: Path) -> None:
-    for path in training.smoke(tmp_path):
+def test_smoke_of_the_training(tmp_path: Path) -> None:
+    """As a command: torch shares no process with the solvers of other tests."""
+    pytest.importorskip("stable_baselines3", reason="the extra [rl] is not installed")
+    script = Path(__file__).parents[2] / "benchmarks" / "train_rl.py"
+    done = subprocess.run(
+        [sys.executable, "-W", "ignore", str(script), "--out", str(tmp_path), "--smoke"],
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    policies = sorted(tmp_path.glob("*/policy.npz"))
+    assert len(policies) == 2
+    for path in policies:
         network = ActorNetwork.load(path)
         assert network.about["steps"] == 96 and path.stat().st_size < 100_000
 

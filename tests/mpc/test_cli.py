@@ -16,8 +16,7 @@ from thermal.data import bundled_case_path
 CASE = str(bundled_case_path())
 EPILOGS = (
     *("check", "simulate", "evaluate", "calibrate", "diagnose", "demo", "doctor", "import-plan", "import-devices"),
-    "serve",
-    *("control", "compare"),
+    *("control", "compare", "serve", "label"),
 )
 
 
