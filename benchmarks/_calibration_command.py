@@ -95,7 +95,7 @@ def main(description: str) -> None:
     parser.add_argument("--evaluations", type=int, default=EVALUATIONS, help="of the paper's search")
     parser.add_argument("--seed", type=int, default=0, help="of the searches")
     parser.add_argument("--workers", type=int, default=1, help="processes, one thread each")
-    parser.add_argument("--readme", action="store_true", help="replace the table in README or docs")
+    parser.add_argument("--publish", action="store_true", help="replace the table between its marks")
     parser.add_argument("--first-version", metavar="COMMIT", help="write first_accuracy.json from this commit and stop")
     options = parser.parse_args()
     if options.first_version:
@@ -110,8 +110,8 @@ def main(description: str) -> None:
     lines = read_lines(folder, study)
     measured = [lines[name] for name in cases if name in lines]
     short, by_case, page = report(measured, failed, first)
-    write(options.out, NAME, page, {"first_version": first, "cases": measured, "failed": failed}, readme=False)
-    if options.readme:
+    write(options.out, NAME, page, {"first_version": first, "cases": measured, "failed": failed}, published=False)
+    if options.publish:
         publish(NAME, short)
         publish(f"{NAME}_cases", by_case)
     print(page)

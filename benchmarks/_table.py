@@ -20,12 +20,12 @@ def markdown(columns: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
     return "\n".join([*lines, *("| " + " | ".join(cell(v) for v in row) + " |" for row in rows)]) + "\n"
 
 
-def write(out: Path, name: str, table: str, data: Any, readme: bool) -> None:
+def write(out: Path, name: str, table: str, data: Any, published: bool) -> None:
     """Write ``name.json`` and ``name.md`` to ``out`` and, if asked, the table between its marks in README or docs."""
     out.mkdir(parents=True, exist_ok=True)
     (out / f"{name}.json").write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
     (out / f"{name}.md").write_text(table, encoding="utf-8")
-    if readme:
+    if published:
         publish(name, table)
 
 

@@ -112,15 +112,15 @@ def _twins(label: Mapping[str, Any]) -> list[str]:
     return [spec.twin().name for _ in spec.effects]
 
 
-def report(out: Path, readme: bool) -> str:
+def report(out: Path, published: bool) -> str:
     """Score what is answered, and write the tables.
 
     Parameters
     ----------
     out : Path
         Folder of the trials.
-    readme : bool
-        Also replace the table in the README.
+    published : bool
+        Also replace the table between its marks.
     """
     trials = read_trials(out)
     if not trials:
@@ -148,8 +148,8 @@ def report(out: Path, readme: bool) -> str:
         ]
     )
     plain = {**scored, "rates": {name: r.to_dict() for name, r in scored["rates"].items()}}
-    write(out, NAME, page, plain, readme=False)
-    if readme:
+    write(out, NAME, page, plain, published=False)
+    if published:
         publish(NAME, short)
     return page
 

@@ -1,6 +1,6 @@
 """Held-out error of the baseline before and after calibration, on every case of a folder.
 
-Run: ``python benchmarks/baseline_accuracy.py [--cases CASES] --out DIR [--readme]``; always with the bundled case.
+Run: ``python benchmarks/baseline_accuracy.py [--cases CASES] --out DIR [--publish]``; always with the bundled case.
 A case that holds an effect which the baseline leaves out keeps an error: finding that effect is what diagnosis is for.
 """
 
@@ -46,7 +46,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--cases", type=Path, help="folder of case folders")
     parser.add_argument("--out", type=Path, default=Path("results"))
-    parser.add_argument("--readme", action="store_true", help="replace the table in README or docs")
+    parser.add_argument("--publish", action="store_true", help="replace the table between its marks")
     arguments = parser.parse_args()
     paths = sorted(p.parent for p in arguments.cases.glob("*/building.yaml")) if arguments.cases else []
     data, rows = [], []
@@ -68,7 +68,7 @@ def main() -> None:
             ]
         )
         print(" | ".join(str(v) for v in rows[-1]), flush=True)
-    write(arguments.out, "baseline_accuracy", markdown(COLUMNS, rows), data, arguments.readme)
+    write(arguments.out, "baseline_accuracy", markdown(COLUMNS, rows), data, arguments.publish)
 
 
 if __name__ == "__main__":

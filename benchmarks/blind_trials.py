@@ -124,7 +124,7 @@ def main() -> int:
     command.set_defaults(run=lambda o: 1 if answer_all(o.out, o.workers, o.most) else 0)
     command = commands.add_parser("score", help="open the seals of answered trials and score the answers")
     command.add_argument("--out", type=Path, required=True, help="folder of the trials")
-    command.add_argument("--readme", action="store_true", help="replace the table in README or docs")
+    command.add_argument("--publish", action="store_true", help="replace the table between its marks")
     command.set_defaults(run=_score)
     command = commands.add_parser("levels", help="write the levels of answered development nulls into the package")
     command.add_argument("--out", type=Path, required=True, help="folder of the trials")
@@ -139,7 +139,7 @@ def _levels(options: argparse.Namespace) -> int:
 
 
 def _score(options: argparse.Namespace) -> int:
-    print(report(options.out, options.readme))
+    print(report(options.out, options.publish))
     return 0
 
 

@@ -7,7 +7,7 @@ hours; and by it on the first two thirds of the telemetry. The plain search is t
 and nothing of how. `_paper_search.py` has searches, ranges and how its parameters map to ours, `_calibration_study.py`
 the intervals and what is shared, so that methods differ in nothing but method.
 
-Run: ``python benchmarks/calibration.py --out results/calibration [--cases CASES] [--readme]``; some three minutes a
+Run: ``python benchmarks/calibration.py --out results/calibration [--cases CASES] [--publish]``; some three minutes a
 case on a core. Each case is one file of ``cases/`` in ``--out`` as soon as it is done: run the same command again after
 an interruption and it goes on where it was.
 

@@ -4,8 +4,8 @@ First two thirds of the telemetry to tune on, last third held out; everything el
 Without ``--case`` the bundled case, and beside it ``practice_none_prbs`` where the shared cases lie next to the
 repository: 12 zones, 0.5 m, two weeks to tune on. Parameters that are not estimated keep their start.
 
-Run: ``python benchmarks/calibration_speed.py --out results/speed [--case CASE ...] [--readme]``; two minutes on two
-cores. Writes ``calibration_speed.json`` and ``.md``; with ``--readme`` also the table between its marks.
+Run: ``python benchmarks/calibration_speed.py --out results/speed [--case CASE ...] [--publish]``; two minutes on two
+cores. Writes ``calibration_speed.json`` and ``.md``; with ``--publish`` also the table between its marks.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=Path, required=True, help="folder of the results")
     parser.add_argument("--case", type=Path, action="append", help="case folder with floor plans; may be repeated")
-    parser.add_argument("--readme", action="store_true", help="replace the table in README or docs")
+    parser.add_argument("--publish", action="store_true", help="replace the table between its marks")
     options = parser.parse_args()
     paths = options.case or [bundled_case_path(), *([PRACTICE] if PRACTICE.exists() else [])]
     rows = [row for path in paths for row in measure(path)]
@@ -81,7 +81,7 @@ def main() -> None:
         f"{os.cpu_count()} cores, {os.environ.get('OMP_NUM_THREADS', 'as many')} threads of linear algebra, load "
         f"average {os.getloadavg()[0]:.1f}; MAE of six-hour predictions on the last third of the telemetry.\n"
     )
-    write(options.out, "calibration_speed", f"{table}\n{note}", rows, options.readme)
+    write(options.out, "calibration_speed", f"{table}\n{note}", rows, options.publish)
     print(table, note, sep="\n")
 
 

@@ -14,8 +14,8 @@ Times are CPU times of the thread. Steps of reduced models are each the least of
 what other processes on the machine take from caches; the day is the sum of them. Beside the pilot stands an office of
 12 zones with sensor noise, all of whose measurements are read at every step, as a learning controller would.
 
-Run: ``python benchmarks/closed_loop_speed.py --out results/loop [--readme]``; a minute on one core. Writes
-``closed_loop_speed.json`` and ``.md``; with ``--readme`` also the table between its marks.
+Run: ``python benchmarks/closed_loop_speed.py --out results/loop [--publish]``; a minute on one core. Writes
+``closed_loop_speed.json`` and ``.md``; with ``--publish`` also the table between its marks.
 """
 
 from __future__ import annotations
@@ -144,11 +144,11 @@ def main() -> None:
     use_one_thread()
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=Path, required=True, help="folder of the results")
-    parser.add_argument("--readme", action="store_true", help="replace the table in README or docs")
+    parser.add_argument("--publish", action="store_true", help="replace the table between its marks")
     options = parser.parse_args()
     found = measure()
     text = report(found)
-    write(options.out, "closed_loop_speed", text, found, options.readme)
+    write(options.out, "closed_loop_speed", text, found, options.publish)
     print(text)
 
 

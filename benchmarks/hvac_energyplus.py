@@ -6,8 +6,8 @@ temperatures and humidities, air flows, setpoints, weather, and the discharge te
 give mixing, coil loads, compressor, fans, hot water, pump and fuel. Energies that neither model counts more than 1 kWh
 of are left out.
 
-Run: ``python benchmarks/hvac_energyplus.py --out results/hvac [--docs docs]`` with the extra ``[energyplus]``; a minute
-on one core. Writes ``hvac_energyplus.json`` and ``.md``; with ``--docs`` also the table in ``hvac.md``.
+Run: ``python benchmarks/hvac_energyplus.py --out results/hvac [--publish]`` with the extra ``[energyplus]``; a minute
+on one core. Writes ``hvac_energyplus.json`` and ``.md``; with ``--publish`` also the table in ``hvac.md``.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from pathlib import Path
 
 from _hvac_offices import Compared, air_handler_outputs, compare_large, compare_medium, loop_outputs
 from _hvac_reference import WEATHER, ReferenceRunError, reference_weeks
-from _table import markdown, replace_section, write
+from _table import markdown, write
 
 LEAST = 1.0  # kWh: energies below this on both sides say nothing
 FLOORS = ("bot", "mid", "top")
@@ -40,7 +40,7 @@ def main() -> int:
     """Run the benchmark."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--out", type=Path, default=Path("results/hvac"))
-    parser.add_argument("--docs", type=Path, help="folder of hvac.md, whose table is replaced")
+    parser.add_argument("--publish", action="store_true", help="replace the table between its marks")
     options = parser.parse_args()
     try:
         rows = compared()
@@ -57,9 +57,7 @@ def main() -> int:
         "rows": [{"building": b, **row._asdict(), "difference_percent": _percent(row)} for b, row in rows],
         "largest_difference_percent": max(abs(_percent(row)) for _, row in rows),
     }
-    write(options.out, "hvac_energyplus", table, data, readme=False)
-    if options.docs:
-        replace_section(options.docs / "hvac.md", "hvac_energyplus", table)
+    write(options.out, "hvac_energyplus", table, data, options.publish)
     print(table)
     return 0
 

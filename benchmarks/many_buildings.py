@@ -11,8 +11,8 @@ when the run ends without its results; what differs are held-out errors that are
 The bound of the speed-up is measured beside it: two processes that do nothing but arithmetic, against one. What other
 programs took meanwhile (from ``/proc/stat``) is listed: a speed-up means something where that is next to nothing.
 
-Run: ``python benchmarks/many_buildings.py --out results/many [--readme]``; eight minutes on two quiet cores. Writes
-``many_buildings.json`` and ``.md``; with ``--readme`` also the table between its marks.
+Run: ``python benchmarks/many_buildings.py --out results/many [--publish]``; eight minutes on two quiet cores. Writes
+``many_buildings.json`` and ``.md``; with ``--publish`` also the table between its marks.
 """
 
 from __future__ import annotations
@@ -154,7 +154,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=Path, required=True, help="folder of the results")
     parser.add_argument("--buildings", type=int, default=BUILDINGS, help="how many")
-    parser.add_argument("--readme", action="store_true", help="replace the table in README or docs")
+    parser.add_argument("--publish", action="store_true", help="replace the table between its marks")
     options = parser.parse_args()
     os.environ.update(dict.fromkeys(ONE_THREAD, "1"))  # for the peer's processes
     load = os.getloadavg()[0]
@@ -177,7 +177,7 @@ def main() -> None:
         f"processes of arithmetic alone. {os.cpu_count()} cores, load average {load:.1f} before.\n"
     )
     data = {"office": OFFICE, "bound": bound, "load": load, "cores": os.cpu_count(), "rows": rows}
-    write(options.out, "many_buildings", f"{table}\n{note}", data, options.readme)
+    write(options.out, "many_buildings", f"{table}\n{note}", data, options.publish)
     print(table, note, sep="\n")
 
 

@@ -16,9 +16,8 @@ the way from the best rule to the bound.
 Every run is a file of its own under ``OUT/runs``, and what is there is not run again. A day of optimal control takes
 one to two minutes on one core, one of a rule some ten seconds.
 
-Run: ``python benchmarks/mpc_closed_loop.py --out results/mpc_loop --days 7 --docs docs [--readme]``; an hour and a half
-on one core. Writes ``mpc_closed_loop.json`` and ``.md``, with ``--docs`` the table in ``mpc.md``, with ``--readme`` the
-short one in the README.
+Run: ``python benchmarks/mpc_closed_loop.py --out results/mpc_loop --days 7 [--publish]``; an hour and a half
+on one core. Writes ``mpc_closed_loop.json`` and ``.md``; with ``--publish`` also the tables in ``mpc.md`` and the README.
 """
 
 from __future__ import annotations
@@ -33,7 +32,7 @@ from pathlib import Path
 from typing import Any
 
 import pandas as pd
-from _table import markdown, replace_section, write
+from _table import markdown, publish, write
 from simulator_speed import use_one_thread
 
 from mpc.plants import SensorNoise, pilot_building, pilot_weather
@@ -171,8 +170,7 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--dx", type=float, default=DX, help="distance between control volumes [m]")
     parser.add_argument("--price", type=float, default=PRICE, help="of discomfort [currency/K/h]")
     parser.add_argument("--no-run", action="store_true", help="only lay out what has been run")
-    parser.add_argument("--docs", type=Path, help="folder of mpc.md, whose table is replaced")
-    parser.add_argument("--readme", action="store_true", help="replace the short table in the README")
+    parser.add_argument("--publish", action="store_true", help="replace the table between its marks")
     return parser.parse_args(arguments)
 
 
@@ -184,11 +182,9 @@ def main(arguments: list[str] | None = None) -> list[dict[str, Any]]:
     if not rows:
         raise SystemExit("nothing has been run yet")
     text = table(rows)
-    write(options.out, "mpc_closed_loop", text, {"runs": rows}, False)
-    if options.docs is not None:
-        replace_section(options.docs / "mpc.md", "mpc_closed_loop", text)
-    if options.readme:
-        replace_section(Path(__file__).parents[1] / "README.md", "mpc_closed_loop", short(rows))
+    write(options.out, "mpc_closed_loop", text, {"runs": rows}, options.publish)
+    if options.publish:
+        publish("mpc_closed_loop_short", short(rows))
     print(text)
     return rows
 

@@ -12,9 +12,9 @@ Optimal control decides the supply air of each air handler, and in the Large Off
 EnergyPlus' sizes, measurements with noise and the weather file as forecast, and not what people, lights and equipment
 will do.
 
-Run: ``python benchmarks/mpc_energyplus.py --out results/mpc_energyplus [--docs docs]`` with the extra ``[energyplus]``;
+Run: ``python benchmarks/mpc_energyplus.py --out results/mpc_energyplus [--publish]`` with the extra ``[energyplus]``;
 some 25 minutes on one core. What is finished is kept, and the same command goes on from there: one file a run. Writes
-``mpc_energyplus.json`` and ``.md``; with ``--docs`` also the table in ``mpc.md``.
+``mpc_energyplus.json`` and ``.md``; with ``--publish`` also the table in ``mpc.md``.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ import numpy as np
 from _code import code
 from _energyplus_control import optimal
 from _energyplus_offices import CONTROL_DAYS, HORIZON, OFFICES, Office, telemetry_case
-from _table import markdown, replace_section, write
+from _table import markdown, write
 
 from calibration.diagnosis import diagnose, write_diagnosis
 from mpc.baselines import OutdoorReset
@@ -158,7 +158,7 @@ def main() -> int:
     parser.add_argument("--offices", nargs="+", default=list(OFFICES), choices=list(OFFICES))
     parser.add_argument("--days", type=int, default=CONTROL_DAYS)
     parser.add_argument("--anew", action="store_true", help="forget what is finished")
-    parser.add_argument("--docs", type=Path, help="folder of mpc.md, whose table is replaced")
+    parser.add_argument("--publish", action="store_true", help="replace the table between its marks")
     options = parser.parse_args()
     if options.anew:
         shutil.rmtree(options.out, ignore_errors=True)
@@ -168,9 +168,7 @@ def main() -> int:
         print(error, file=sys.stderr)
         return 1
     table = table_of(results)
-    write(options.out, "mpc_energyplus", table, results, readme=False)
-    if options.docs:
-        replace_section(options.docs / "mpc.md", "mpc_energyplus", table)
+    write(options.out, "mpc_energyplus", table, results, options.publish)
     print(table)
     return 0
 

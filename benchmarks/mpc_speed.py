@@ -15,7 +15,7 @@ Times are CPU times of the process on one thread.
 
 Run: ``python benchmarks/mpc_speed.py --out results/mpc_speed``; three minutes on one core, most of them Ipopt's. The
 peer needs the extra ``[benchmarks]``. Writes ``mpc_speed.json`` and ``.md``, ``mpc_peers.json`` and ``.md``;
-``--readme`` replaces the tables in README and documentation.
+``--publish`` replaces the tables in README and documentation.
 """
 
 from __future__ import annotations
@@ -205,13 +205,13 @@ def main() -> None:
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--warm", type=int, default=WARM, help="solves from a shifted plan")
     parser.add_argument("--horizons", nargs="*", default=list(HORIZONS), choices=list(HORIZONS))
-    parser.add_argument("--readme", action="store_true", help="replace the tables in README and documentation")
+    parser.add_argument("--publish", action="store_true", help="replace the table between its marks")
     arguments = parser.parse_args()
     horizons, reference = instances(arguments.warm)
     peers = [compare(name, horizons, reference) for name in (*SETTINGS, *STAGES)]
     table, short = peer_tables(peers)
-    write(arguments.out, "mpc_peers", table, {"seed": SEED, "rows": peers}, arguments.readme)
-    if arguments.readme:
+    write(arguments.out, "mpc_peers", table, {"seed": SEED, "rows": peers}, arguments.publish)
+    if arguments.publish:
         publish("mpc_peers_short", short)
     print(table)
     if not arguments.horizons:
@@ -234,7 +234,7 @@ def main() -> None:
         "over_ipopt",
     )
     table = markdown(COLUMNS, [[row[key] for key in keys] for row in rows])
-    write(arguments.out, "mpc_speed", table, {"order": ORDER, "seed": SEED, "rows": rows}, arguments.readme)
+    write(arguments.out, "mpc_speed", table, {"order": ORDER, "seed": SEED, "rows": rows}, arguments.publish)
     print(table)
 
 

@@ -13,7 +13,7 @@ measurements and the same forecasts of twelve hours with errors. Lines:
 
 Indicators have BOPTEST's names. A run is a file in ``OUT/runs``, and the same command goes on where it was interrupted.
 
-Run: ``python benchmarks/mpc_vs_rl.py --out results/mpc_vs_rl --processes 2 [--readme]``. Writes ``mpc_vs_rl.json``,
+Run: ``python benchmarks/mpc_vs_rl.py --out results/mpc_vs_rl --processes 2 [--publish]``. Writes ``mpc_vs_rl.json``,
 ``.md``, ``mpc_vs_rl_front.svg`` and ``mpc_vs_rl_learning.svg``; ``--smoke`` is a day on four zones.
 """
 
@@ -71,7 +71,7 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--prices", nargs="+", type=float, default=list(PRICES), help="of discomfort, for the fronts")
     parser.add_argument("--controllers", nargs="+", help="only these; all by default")
     parser.add_argument("--processes", type=int, default=1)
-    parser.add_argument("--readme", action="store_true", help="replace the table in the README")
+    parser.add_argument("--publish", action="store_true", help="replace the table between its marks")
     parser.add_argument("--smoke", action="store_true", help="a day on four zones")
     return parser.parse_args(arguments)
 
@@ -94,7 +94,7 @@ def main(arguments: list[str] | None = None) -> list[dict[str, Any]]:
         raise SystemExit(f"no controller of {options.controllers}; policies are looked for in {options.policies}")
     runs = gather(jobs, size, options.policies, options.processes)
     text = table(runs)
-    write(options.out, "mpc_vs_rl", text, {"runs": runs}, options.readme)
+    write(options.out, "mpc_vs_rl", text, {"runs": runs}, options.publish)
     draw_front(runs, options.out / "mpc_vs_rl_front.svg")
     draw_learning(runs, options.out / "mpc_vs_rl_learning.svg")
     print(text)

@@ -97,7 +97,7 @@ def main() -> None:
             done = [(line["case"], line["objective"], line["settings"]) for line in lines]
             if (name, objective, settings) not in done:
                 lines.append(measure(case, name, truth, objective, **settings))
-                write(options.out, NAME, markdown(COLUMNS, [cells(line) for line in lines]), lines, readme=False)
+                write(options.out, NAME, markdown(COLUMNS, [cells(line) for line in lines]), lines, published=False)
 
 
 if __name__ == "__main__":

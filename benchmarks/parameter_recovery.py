@@ -196,7 +196,7 @@ def main() -> None:
     parser.add_argument("--meter", choices=("sensors", "exact"), default="sensors", help="see generate_twin")
     parser.add_argument("--case", type=Path, help="use this case's building for every twin")
     parser.add_argument("--retry", action="store_true", help="measure seeds again that failed")
-    parser.add_argument("--readme", action="store_true", help="replace the table in README or docs")
+    parser.add_argument("--publish", action="store_true", help="replace the table between its marks")
     options = parser.parse_args()
     case = str(options.case) if options.case else None
     kept = {name: getattr(options, name) for name in ("days", "zones", "floor_area", "dx", "excitation", "meter")}
@@ -207,8 +207,8 @@ def main() -> None:
         run(study, missing, options.workers, path)
         lines = read_lines(path, study)
     short, coverage, page, data = report([lines[seed] for seed in sorted(lines) if seed < options.seeds])
-    write(options.out, NAME, page, data, readme=False)
-    if options.readme:
+    write(options.out, NAME, page, data, published=False)
+    if options.publish:
         publish(NAME, short)
         publish(f"{NAME}_coverage", coverage)
     print(page)

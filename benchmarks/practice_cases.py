@@ -6,9 +6,9 @@ where it was. Cases without a label are measured buildings, whose truth nobody h
 Run from the repository's root::
 
     pip install -e .
-    python benchmarks/practice_cases.py --cases ../shared/cases --out results/practice [--docs]
+    python benchmarks/practice_cases.py --cases ../shared/cases --out results/practice [--publish]
 
-``--docs`` replaces the table in ``docs/diagnosis.md``.
+``--publish`` replaces the table in ``docs/diagnosis.md``.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ def main() -> int:
     parser.add_argument("--cases", type=Path, required=True, help="folder of case folders, with labels.json")
     parser.add_argument("--out", type=Path, required=True, help="folder of the answers and the table")
     parser.add_argument("--workers", type=int, default=min(2, os.cpu_count() or 1), help="processes at a time")
-    parser.add_argument("--docs", action="store_true", help="replace the table in docs/diagnosis.md")
+    parser.add_argument("--publish", action="store_true", help="replace the table between its marks")
     options = parser.parse_args()
     file = options.cases / "labels.json"
     if not file.is_file():
@@ -80,8 +80,8 @@ def main() -> int:
     known = {n: json.loads(f.read_text(encoding="utf-8")) for n, f in answers.items() if f.exists()}
     versions = ", ".join(sorted({str(a.get("code")) for a in known.values()}))
     table = f"Method {versions}.\n\n{markdown(_COLUMNS, rows(known, labels))}"
-    write(options.out, NAME, table, known, readme=False)
-    if options.docs:
+    write(options.out, NAME, table, known, published=False)
+    if options.publish:
         publish(NAME, table)
     print(table)
     return 1 if failed else 0

@@ -13,8 +13,8 @@ once for all slopes together.
 Times are CPU times of the process on one thread, so that other processes count less; but they share cache and memory,
 so each is a median, with the minimum in brackets.
 
-Run: ``python benchmarks/simulator_speed.py --out results/speed [--readme]``; a minute on one core. Writes
-``simulator_speed.json`` and ``.md``; with ``--readme`` also the table between its marks.
+Run: ``python benchmarks/simulator_speed.py --out results/speed [--publish]``; a minute on one core. Writes
+``simulator_speed.json`` and ``.md``; with ``--publish`` also the table between its marks.
 """
 
 from __future__ import annotations
@@ -224,14 +224,14 @@ def main() -> None:
     use_one_thread()
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=Path, required=True, help="folder of the results")
-    parser.add_argument("--readme", action="store_true", help="replace the table in README or docs")
+    parser.add_argument("--publish", action="store_true", help="replace the table between its marks")
     options = parser.parse_args()
     bandwidth = read_bandwidth()
     building = pilot()
     rows = [measure(building, dx, bandwidth) for dx in SPACINGS]
     text = report(rows, bandwidth)
     data = {"bandwidth": bandwidth, "seed": SEED, "step": STEP, "steps": N_STEP, "parameters": PARAMETERS, "rows": rows}
-    write(options.out, "simulator_speed", text, data, options.readme)
+    write(options.out, "simulator_speed", text, data, options.publish)
     print(text)
 
 
