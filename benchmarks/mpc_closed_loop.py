@@ -17,7 +17,7 @@ Every run is a file of its own under ``OUT/runs``, and what is there is not run 
 one to two minutes on one core, one of a rule some ten seconds.
 
 Run: ``python benchmarks/mpc_closed_loop.py --out results/mpc_loop --days 7 [--publish]``; an hour and a half
-on one core. Writes ``mpc_closed_loop.json`` and ``.md``; with ``--publish`` also the tables in ``mpc.md`` and the README.
+on one core. Writes ``mpc_closed_loop.json`` and ``.md``; with ``--publish`` also the tables of ``mpc.md`` and README.
 """
 
 from __future__ import annotations
