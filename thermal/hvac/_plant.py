@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from thermal.errors import HvacActionError, describe
 from thermal.hvac._advance import advance
 from thermal.hvac._checks import action, scalar_action
+from thermal.hvac._compiled import CompiledCentral
 from thermal.hvac._operations import StepOperations, Value
 from thermal.hvac._settings import Settings, settings_of
 from thermal.hvac._step import Actions, Calls, Conditions, HvacStep
@@ -78,7 +79,7 @@ class HvacPlant:
 
     def __init__(self, system: HvacSystem) -> None:
         self.system = system
-        self._ops = StepOperations()
+        self._ops, self._central = StepOperations(), CompiledCentral(system)
         self._checked: tuple[object, object] = (None, None)
         self._asked: tuple[Actions | None, Any] = (None, None)
 
@@ -143,7 +144,7 @@ class HvacPlant:
         else:
             heat, cool = thermostat.calls(ops, zone, heating, cooling)
         calls = Calls(system.at_terminals(ops, heat), system.at_terminals(ops, cool))
-        done = advance(ops, system, state.water, calls, conditions, settings, seconds)
+        done = advance(ops, system, state.water, calls, conditions, settings, seconds, self._central)
         return HvacState(done.loop.water, mode, was), done
 
     def heat(self, step: HvacStep) -> FloatArray:
