@@ -126,9 +126,9 @@ def _parts(values: Any) -> tuple[Any, ...]:
 
 def _of_list(values: Sequence[Any], n: int) -> Supplied:
     """Lay out what stands in a row: air, coils and allowances of n air handlers."""
-    mixed = tuple([Mixed(*values[k : k + _AIR]) for k in range(0, _AIR * n, _AIR)])
+    mixed = tuple([Mixed._make(values[k : k + _AIR]) for k in range(0, _AIR * n, _AIR)])
     begin, end = _AIR * n, (_AIR + _COIL) * n
-    warmed = tuple([Warmed(*values[k : k + _COIL]) for k in range(begin, end, _COIL)])
+    warmed = tuple([Warmed._make(values[k : k + _COIL]) for k in range(begin, end, _COIL)])
     return Supplied(mixed, warmed, values[end:])
 
 
