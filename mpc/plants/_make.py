@@ -10,6 +10,7 @@ import pandas as pd
 
 from mpc.errors import PlantError
 from mpc.plants._building import BuildingModel, GridBuilding
+from mpc.plants._extras import RadiantGains, check_extras
 from mpc.plants._noise import SensorNoise
 from mpc.plants._reduced import reduced_building
 from mpc.plants._run import FixedSetpoints
@@ -17,6 +18,7 @@ from mpc.plants._simulated import SimulatedPlant
 from mpc.scenario import (
     CarbonIntensity,
     Forecaster,
+    InternalGains,
     Occupancy,
     StepGrid,
     Tariff,
@@ -29,6 +31,7 @@ from thermal import Building, Case, Simulator, load_case, save_case
 from thermal.effects import Chosen
 from thermal.errors import describe
 from thermal.hvac import HvacSystem
+from thermal.network import Extension
 from thermal.pilot import MOUNTAIN_VIEW, devices, generate_office, generate_weather, size_system
 
 ModelKind = Literal["reduced", "grid", "random"]
@@ -48,6 +51,7 @@ def simulated_plant(
     order: int | None = None,
     system: HvacSystem | None = None,
     occupancy: Occupancy | None = None,
+    gains: InternalGains | None = None,
     tariff: Tariff | None = None,
     carbon: CarbonIntensity | None = None,
     control_steps: int = 1,
@@ -82,6 +86,8 @@ def simulated_plant(
         Its plant; sized by `thermal.pilot.size_system` by default.
     occupancy : Occupancy, optional
         People; an office's schedule by default.
+    gains : InternalGains, optional
+        Heat of people, light and equipment; an office's, all of it into the air, by default.
     tariff : Tariff, optional
         Prices; those of the paper's simulator by default.
     carbon : CarbonIntensity, optional
@@ -105,23 +111,25 @@ def simulated_plant(
     Raises
     ------
     PlantError
-        When the parts do not fit each other, or the kind of model is not known.
+        When the parts do not fit each other, the kind of model is not known, or the building cannot have an effect.
     """
     grid = StepGrid.between(start, end, step_seconds, building)
     scenario = build_scenario(
         building, grid, weather, tariff or paper_tariff(), carbon=carbon or paper_carbon(), occupancy=occupancy,
-        seed=seed,
+        gains=gains, seed=seed,
     )  # fmt: skip
     built: BuildingModel
+    extras: tuple[Extension, ...] = (*effects, RadiantGains()) if scenario.heat.radiates else effects
     if model == "reduced":
-        built = reduced_building(building, parameters, step_seconds=step_seconds, dx=dx, effects=effects, order=order)
+        built = reduced_building(building, parameters, step_seconds=step_seconds, dx=dx, effects=extras, order=order)
     elif model in ("grid", "random"):
         shuffle: Literal["mean", "random"] = "random" if model == "random" else "mean"
         built = GridBuilding(
-            Simulator(building, parameters, step_seconds, dx, shuffle=shuffle, seed=seed, effects=effects)
+            Simulator(building, parameters, step_seconds, dx, shuffle=shuffle, seed=seed, effects=extras)
         )
     else:
         raise PlantError(describe("model", "'reduced', 'grid' or 'random'", repr(model)))
+    check_extras(effects, built.network)
     return SimulatedPlant(
         scenario, system or size_system(building), built, control_steps=control_steps, noise=noise,
         forecaster=None if horizon is None else Forecaster(scenario, horizon), warm_up_days=warm_up_days, seed=seed,

@@ -132,7 +132,7 @@ class SimulatedPlant:
         self._hvac, self._step = HvacPlant(system), float(scenario.grid.step)
         self._supply = SupplySetpoints(self.devices, system)
         self._sensors = Sensors(system, self.devices, scenario, noise, count_people)
-        self._signals = EffectSignals(model.network, scenario, system)
+        self._signals = self._given_signals = EffectSignals(model.network, scenario, system)
         self._boundary = boundary_series(scenario, model, boundaries or {})
         self._outdoor = [float(v) for v in scenario.outdoor]
         self._schedule = Schedule(self.operation, system, scenario.zones)
@@ -223,7 +223,8 @@ class SimulatedPlant:
         if self.finished:
             found = f"{self.scenario.grid.n_steps - self._number} of its {self.scenario.grid.n_steps}"
             raise PlantError(describe("scenario", f"{self.control_steps} more steps", found, "make it longer"))
-        fresh = [self._advance(self._number + i, given, self._gains) for i in range(self.control_steps)]
+        drivers = self._gains, self._signals
+        fresh = [self._advance(self._number + i, given, *drivers) for i in range(self.control_steps)]
         self._steps += fresh
         self._number += self.control_steps
         return self._seen(fresh, int(self.scenario.grid.edges[self._number]))
@@ -327,6 +328,9 @@ class SimulatedPlant:
         if seed != self._drawn:
             self.scenario = self._given if seed is None else self._given.redrawn(seed)
             self._gains, self._drawn = shared_rows(self.scenario.gains), seed
+            self._signals = self._given_signals
+            if seed is not None and self.model.network.signals:  # some may be those of people
+                self._signals = EffectSignals(self.model.network, self.scenario, self.system)
 
     def _kept(self) -> list[PlantStep]:
         if not self._steps:
@@ -352,23 +356,25 @@ class SimulatedPlant:
         step_count = max(self._warm_up_steps, 1)
         day = min(round(_DAY / self._step), self.scenario.grid.n_steps)
         start = np.clip(_ZONES, self.operation.heating[0], self.operation.cooling[0])
-        self._reading = self.model.reset(start, self._boundary[0], self._signals.known(0))
+        self._reading = self.model.reset(start, self._boundary[0], self._given_signals.known(0))
         self.model.reseed(0)
         self._state, self._cycling = self._hvac.start(_WATER), (False,) * len(self.system.air_handlers)
         gains = shared_rows(self.scenario.expected_gains)
         self._local.missed = np.zeros_like(start)
         begin = self.model.save_state(), self._state, self._cycling, self._reading, self._local.missed
         for k in range(step_count):
-            last = self._advance(k % day, self.default_actions, gains)
+            last = self._advance(k % day, self.default_actions, gains, self._given_signals)
         if self._warm_up_steps:
             begin = self.model.save_state(), self._state, self._cycling, self._reading, self._local.missed
         self._warm = (*begin, last)
 
-    def _advance(self, k: int, given: Mapping[str, float], gains: list[FloatArray]) -> PlantStep:
+    def _advance(
+        self, k: int, given: Mapping[str, float], gains: list[FloatArray], effects: EffectSignals
+    ) -> PlantStep:
         """Take a step of the scenario."""
         heating, cooling = self._schedule.setpoints(k, given)
         runs, self._cycling = self._schedule.runs(k, self._reading, heating, cooling, self._cycling)
-        signals = self._signals.known(k)
+        signals = effects.known(k)
         free = self.model.begin(gains[k], self._boundary[k], signals)
         actions, reach = self._supply.actions(given, runs, self._schedule.ventilation[k])
         zone = self._reading
@@ -377,7 +383,7 @@ class SimulatedPlant:
         conditions = Conditions(zone, heating, cooling, self._outdoor[k])
         self._state, done = self._hvac.step(self._state, conditions, actions, self._step, self._schedule.set_back[k])
         heat = self._hvac.heat(done)
-        mean, self._reading = self.model.finish(heat, self._signals.at(k, done.airflow, heat))
+        mean, self._reading = self.model.finish(heat, effects.at(k, done.airflow, heat))
         self._local.learn(self._reading)
         end = self._reading - self._offset if self._biased else self._reading
         return PlantStep(k, conditions, actions, done, mean, end)
