@@ -58,6 +58,7 @@ def simulated_plant(
     noise: SensorNoise | None = None,
     horizon: int | None = None,
     warm_up_days: int = 1,
+    pressures: bool = False,
     seed: int = 0,
 ) -> SimulatedPlant:
     """Make a plant of a building in one call; `SimulatedPlant` has every choice.
@@ -100,6 +101,8 @@ def simulated_plant(
         Steps of the forecasts, perfect ones; none by default.
     warm_up_days : int
         How often the first day is run before the start [d].
+    pressures : bool
+        Whether the pressures of ducts and loop are measured.
     seed : int
         Of all that is random.
 
@@ -132,7 +135,8 @@ def simulated_plant(
     check_extras(effects, built.network)
     return SimulatedPlant(
         scenario, system or size_system(building), built, control_steps=control_steps, noise=noise,
-        forecaster=None if horizon is None else Forecaster(scenario, horizon), warm_up_days=warm_up_days, seed=seed,
+        forecaster=None if horizon is None else Forecaster(scenario, horizon), warm_up_days=warm_up_days,
+        pressures=pressures, seed=seed,
     )  # fmt: skip
 
 
@@ -205,6 +209,7 @@ def save_pilot(
     parameters: Mapping[str, float] | None = None,
     noise: SensorNoise | None = None,
     setpoints: Mapping[str, float] | None = None,
+    pressures: bool = False,
     overwrite: bool = False,
 ) -> Case:
     """Run the pilot building in closed loop and save plans, devices and telemetry as a case folder.
@@ -238,6 +243,8 @@ def save_pilot(
         Errors of sensors; the defaults of `SensorNoise` by default.
     setpoints : mapping of str to float, optional
         By kind of action [K] or [Pa]; those of `SimulatedPlant.default_actions` by default.
+    pressures : bool
+        Whether the pressures of ducts and loop are measured; the case is then one of format 2.
     overwrite : bool
         Whether a case that is there already is replaced.
 
@@ -250,7 +257,7 @@ def save_pilot(
     end = (pd.Timestamp(start) + pd.Timedelta(days=days)).isoformat()
     plant = simulated_plant(
         building, pilot_weather(seed, start, days), start, end, model=model, dx=dx, effects=effects,
-        parameters=parameters, noise=noise or SensorNoise(), seed=seed,
+        parameters=parameters, noise=noise or SensorNoise(), pressures=pressures, seed=seed,
     )  # fmt: skip
     plant.reset()
     chosen = dict(plant.default_actions)

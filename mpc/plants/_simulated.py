@@ -85,6 +85,8 @@ class SimulatedPlant:
         how they started.
     count_people : bool
         Whether people in the zones are measured.
+    pressures : bool
+        Whether the pressures of ducts and loop are measured; a case that has them is one of format 2.
     boundaries : mapping of str to float or ndarray, optional
         Temperatures of boundaries beside outdoor, one or one a step [K].
     seed : int
@@ -110,6 +112,7 @@ class SimulatedPlant:
         default_actions: Mapping[str, float] | None = None,
         warm_up_days: int = 1,
         count_people: bool = False,
+        pressures: bool = False,
         boundaries: Mapping[str, float | FloatArray] | None = None,
         seed: int = 0,
     ) -> None:
@@ -131,7 +134,7 @@ class SimulatedPlant:
         self.operation.fits(scenario.grid.n_steps, len(scenario.zones), len(system.air_handlers))
         self._hvac, self._step = HvacPlant(system), float(scenario.grid.step)
         self._supply = SupplySetpoints(self.devices, system)
-        self._sensors = Sensors(system, self.devices, scenario, noise, count_people)
+        self._sensors = Sensors(system, self.devices, scenario, noise, count_people, pressures)
         self._signals = self._given_signals = EffectSignals(model.network, scenario, system)
         self._boundary = boundary_series(scenario, model, boundaries or {})
         self._outdoor = [float(v) for v in scenario.outdoor]
