@@ -33,7 +33,7 @@ class CompiledCentral:
 
     Notes
     -----
-    A plant of two air handlers has some 900 operations on single numbers a step, 50 ns each in Python and 4 ns here. The
+    A plant of two air handlers has some 900 operations on single numbers a step, 50 ns each in Python, 4 ns here. The
     two functions share their memory: the second reads what the first was given and what it gave.
     """
 
