@@ -19,7 +19,7 @@ from thermal.signals import Drivers
 
 FloatArray = NDArray[np.float64]
 
-#: Zones beyond which none is sought: the model of a large building with parameters at their start is not worth its time.
+#: Zones beyond which none is sought: one more model of a large building would take its time.
 _MOST_ZONES = 40
 
 #: How often a window is opened while people are there and while nobody is, and shut again [1/h].

@@ -242,6 +242,27 @@ def test_a_weather_clock_that_is_off_moves_all_that_outdoor_air_touches(lively_c
     assert np.abs((flow[:, column] + 0.5 * flow[:, network.n_node]).toarray()).max() < 1e-9
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_station_elsewhere_reads_too_high_for_all_that_outdoor_air_touches(lively_case: CaseOf, kind: str) -> None:
+    case = lively_case(kind)
+    ids = ("wrong_station", "infiltration", "thermal_bridge")
+    network = build_network(case.building, effects=chosen(ids))
+    theta = network.values({
+        "station_offset": 1.5, "station_swing": -0.2, "infiltration_rate": 0.3, "thermal_bridge_u_value": 0.2,
+    })  # fmt: skip
+    flow = SymbolicModel(network).matrices(theta).flow.tocsc()
+    first, names = network.n_node + len(network.boundaries), [s.name for s in network.signals]
+    for name, factor in (("constant", 1.5), ("outdoor temperature about its day's mean", -0.2)):
+        column = first + names.index(name)
+        assert np.abs((flow[:, column] + factor * flow[:, network.n_node]).toarray()).max() < 1e-9
+    daily = next(s for s in network.signals if s.name == "outdoor temperature about its day's mean")
+    drivers = Drivers(case)
+    drivers.outdoor = 280.0 + 4.0 * np.sin(2.0 * np.pi * np.arange(len(case.stamps)) * case.step / 86400.0)
+    day = round(86400.0 / case.step)
+    inner = slice(day, len(case.stamps) - day)
+    assert np.abs(daily.of(drivers)[inner] - (drivers.outdoor - 280.0)[inner]).max() < 0.05
+
+
 def test_the_modes_read_the_sensor(lively_case: CaseOf) -> None:
     # heated from rest, the first minute hardly shows in a sensor of eight minutes, and shows in the air
     network = build_network(lively_case("table").building, effects=chosen(["sensor_lag"]))
