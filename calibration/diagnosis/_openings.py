@@ -19,6 +19,9 @@ from thermal.signals import Drivers
 
 FloatArray = NDArray[np.float64]
 
+#: Deviations within which 90 % of a normal distribution are [-].
+_NINETY = 1.645
+
 #: Zones beyond which none is sought: one more model of a large building would take its time.
 _MOST_ZONES = 40
 
@@ -36,7 +39,7 @@ _MOST = 6.0
 
 #: Gain in log-likelihood from which openings are there, the most of the time that they may last, and the least of it
 #: that people are there [-].
-_SEEN, _LONGEST, _PRESENT = 100.0, 0.25, 0.6
+_SEEN, _LONGEST, _PRESENT = 100.0, 0.25, 0.75
 
 
 def seen_openings(drivers: Drivers, settings: ModelSettings) -> FloatArray:
@@ -90,18 +93,16 @@ def opened_when(lost: FloatArray, unit: FloatArray, presence: FloatArray, step: 
     never = np.zeros(len(lost))
     if size.size < 24 * hour:
         return never
-    noise = max(1.4826 * float(np.median(size)), 0.43 * float(np.quantile(size, 0.9)), 1e-6)
-    opens = np.where(presence > 0.05, _OPENED, _OPENED_ALONE) / hour
-    shuts = min(_SHUT / hour, 0.5)
+    noise = max(1.4826 * float(np.median(size)), float(np.quantile(size, 0.9)) / _NINETY, 1e-6)
+    there = presence > 0.05
+    opens, shuts = np.where(there, _OPENED, _OPENED_ALONE) / hour, min(_SHUT / hour, 0.5)
     best, most = never, _SEEN
     for area in _AREAS:
         odds = (sudden**2 - (sudden - area * unit) ** 2) / (2.0 * noise**2)
         path, gain = most_likely_path(np.where(known, np.clip(odds, -_MOST, _MOST), 0.0), opens, shuts)
-        if gain > most:
+        if gain > most and path.mean() < _LONGEST and path[there].sum() > _PRESENT * path.sum():
             best, most = path, gain
-    often = float(best.mean())
-    people = float((best * (presence > 0.05)).sum()) / max(float(best.sum()), 1.0)
-    return best if 0.0 < often < _LONGEST and people > _PRESENT else never
+    return best
 
 
 def most_likely_path(odds: FloatArray, opens: FloatArray, shuts: float) -> tuple[FloatArray, float]:
