@@ -62,11 +62,11 @@ def seen_openings(drivers: Drivers, settings: ModelSettings) -> FloatArray:
     rows, metered, needed = step_balance(model, theta, inputs)
     unit = -network.anatomy.air_heat_capacity * drivers.through_windows[rows]
     for k in range(len(drivers.zones)):
-        opened[rows, k] = opened_when((metered - needed)[:, k], unit[:, k], drivers.occupancy[rows], inputs.step)
+        opened[rows, k] = _opened_when((metered - needed)[:, k], unit[:, k], drivers.occupancy[rows], inputs.step)
     return opened
 
 
-def opened_when(lost: FloatArray, unit: FloatArray, presence: FloatArray, step: float) -> FloatArray:
+def _opened_when(lost: FloatArray, unit: FloatArray, presence: FloatArray, step: float) -> FloatArray:
     """When a window of one zone stands open; never where what is lost does not look like one that people open.
 
     Parameters
@@ -99,13 +99,13 @@ def opened_when(lost: FloatArray, unit: FloatArray, presence: FloatArray, step: 
     best, most = never, _SEEN
     for area in _AREAS:
         odds = (sudden**2 - (sudden - area * unit) ** 2) / (2.0 * noise**2)
-        path, gain = most_likely_path(np.where(known, np.clip(odds, -_MOST, _MOST), 0.0), opens, shuts)
+        path, gain = _most_likely_path(np.where(known, np.clip(odds, -_MOST, _MOST), 0.0), opens, shuts)
         if gain > most and path.mean() < _LONGEST and path[there].sum() > _PRESENT * path.sum():
             best, most = path, gain
     return best
 
 
-def most_likely_path(odds: FloatArray, opens: FloatArray, shuts: float) -> tuple[FloatArray, float]:
+def _most_likely_path(odds: FloatArray, opens: FloatArray, shuts: float) -> tuple[FloatArray, float]:
     """Most likely course of a hidden state that is 0 or 1 (Viterbi 1967).
 
     Parameters

@@ -252,21 +252,6 @@ def test_outdoor_air(lively_case: CaseOf, kind: str, name: str) -> None:
         assert heat[b.network.zone == k].sum() == pytest.approx(expected, rel=1e-9, abs=1e-9)
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_a_window_that_is_seen_open(lively_case: CaseOf, kind: str) -> None:
-    # ρ c A ½ (0.001 v² + 0.0035 h |ΔT| + 0.01)^½ (T_out - T), h = 1 m, while it stands open
-    b = bench(lively_case(kind), "window_opening", **{"opened_window_area@A": 0.7, "opened_window_area@B": 0.7})
-    b.drivers.openings = np.zeros((len(b.drivers.stamps), len(b.drivers.zones)))
-    b.drivers.openings[b.stamp, b.drivers.zones.index("A")] = 1.0
-    b.signals = signal_values(b.network.signals, b.drivers)[b.stamp]
-    difference = b.outdoor() - b.usual("A")
-    speed = 0.5 * np.sqrt(0.001 * float(b.drivers.wind[b.stamp]) ** 2 + 0.0035 * abs(difference) + 0.01)
-    heat = b.heat()
-    in_a = b.network.zone == b.network.zones.index("A")
-    assert heat[in_a].sum() == pytest.approx(AIR * 0.7 * speed * difference, rel=1e-9)
-    assert heat[~in_a] == pytest.approx(0.0)  # that of B is shut
-
-
 def test_infiltration_without_wind_measured_blows_as_usual(lively_case: CaseOf) -> None:
     case = lively_case("table")
     frame = case.telemetry.frame.drop(columns="weather_station/wind_speed_sensor")

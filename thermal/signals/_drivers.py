@@ -25,7 +25,7 @@ REFERENCE_TEMPERATURE = 293.15
 STEFAN_BOLTZMANN = 5.670374419e-8
 
 #: Wind where none is measured [m/s].
-USUAL_WIND = 3.0
+_USUAL_WIND = 3.0
 
 #: Hours of a working day unless occupancy is measured, and how long people take to come and go [h].
 _WORK, _RAMP = (8.0, 18.0), 1.0
@@ -156,7 +156,7 @@ class Drivers:
         (de Gids and Phaff 1982, Air Infiltration Review 4(1), 1-5).
         """
         difference = self.outdoor[:, None] - self.usual
-        wind = self.wind if self.measured(WIND) else np.full(len(self.stamps), USUAL_WIND)
+        wind = self.wind if self.measured(WIND) else np.full(len(self.stamps), _USUAL_WIND)
         speed = 0.5 * np.sqrt(0.001 * wind[:, None] ** 2 + 0.0035 * np.abs(difference) + 0.01)
         return np.asarray(speed * difference)
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from calibration._heat_balance import heat_balance, step_balance
 from calibration._intervals import Interval
-from calibration.diagnosis._openings import most_likely_path, opened_when
+from calibration.diagnosis._openings import _most_likely_path, _opened_when
 from thermal import SymbolicModel, build_network, load_bundled_case, reduced_model, replay_inputs
 
 FloatArray = NDArray[np.float64]
@@ -43,7 +43,7 @@ def test_openings_are_found(area: float) -> None:
     state = opened(rng)
     heat = lost(state, UNIT, rng, area)
     heat[500:520] = np.nan
-    found = opened_when(heat, UNIT, PRESENCE, STEP)
+    found = _opened_when(heat, UNIT, PRESENCE, STEP)
     assert (found * state).sum() > 0.85 * state.sum()
     assert (found * state).sum() > 0.85 * found.sum()
 
@@ -51,15 +51,15 @@ def test_openings_are_found(area: float) -> None:
 def test_noise_a_slow_loss_and_a_steady_one_are_no_openings() -> None:
     rng = np.random.default_rng(5)
     for state in (np.zeros(DAYS * DAY), np.ones(DAYS * DAY)):
-        assert not opened_when(lost(state, UNIT, rng), UNIT, PRESENCE, STEP).any()
+        assert not _opened_when(lost(state, UNIT, rng), UNIT, PRESENCE, STEP).any()
 
 
 def test_what_comes_at_night_and_what_warms_is_not_opened_by_people() -> None:
     rng = np.random.default_rng(6)
     at_night = opened(rng, 0, 60)
-    assert not opened_when(lost(at_night, UNIT, rng), UNIT, PRESENCE, STEP).any()
+    assert not _opened_when(lost(at_night, UNIT, rng), UNIT, PRESENCE, STEP).any()
     by_day = opened(rng)
-    assert not opened_when(-by_day * UNIT + 100.0 * rng.standard_normal(by_day.size), UNIT, PRESENCE, STEP).any()
+    assert not _opened_when(-by_day * UNIT + 100.0 * rng.standard_normal(by_day.size), UNIT, PRESENCE, STEP).any()
 
 
 def test_the_path_is_the_most_likely_of_all() -> None:
@@ -75,7 +75,7 @@ def test_the_path_is_the_most_likely_of_all() -> None:
         return total
 
     best = max(product((0, 1), repeat=9), key=value)
-    path, gain = most_likely_path(odds, opens, shuts)
+    path, gain = _most_likely_path(odds, opens, shuts)
     assert tuple(path.astype(int)) == best
     assert gain == pytest.approx(value(best) - value((0,) * 9))
 
