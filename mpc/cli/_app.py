@@ -96,7 +96,11 @@ def _report(error: Exception, command: str) -> int:
 
 
 for _command, _help, _example in (
-    (demo, "Calibrate the bundled case and evaluate it on held-out days, in under two minutes.", "demo --out demo"),
+    (
+        demo,
+        "Check, calibrate, diagnose, evaluate and control the bundled case, in under two minutes.",
+        "demo --out demo_results",
+    ),
     (doctor, "Say what is installed and what is missing, and test the solvers.", "doctor"),
     (check, "Validate a case folder: geometry, quality of the telemetry, what each point is.", "check cases/office"),
     (
