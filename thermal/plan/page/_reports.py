@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from thermal.errors import ReportError, describe, nearest
-from thermal.plan.page._store import OWN_FOLDER
+from thermal.plan._kept import OWN_FOLDER
 
 Progress = Callable[[str, int, int], None]
 
