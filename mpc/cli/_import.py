@@ -196,8 +196,10 @@ def _match_content(match: PointMatch) -> dict[str, Any]:
 
 def _show_plan(found: PlanImport, name: str) -> None:
     """Write floors and zones to stdout."""
+    from calibration.pages import counted
+
     say(
-        f"{name}: {len(found.area_errors)} zones on {len(found.floors)} floors, cells of {found.plans.cell_size:g} m, "
+        f"{name}: {counted(len(found.area_errors), 'zone')} on {counted(len(found.floors), 'floor')}, cells of {found.plans.cell_size:g} m, "
         f"areas within {100 * found.largest_error:.1f} % of the drawings"
     )
     for remark in found.remarks:

@@ -107,7 +107,11 @@ def case(drawings: Path, tmp_path: Path) -> Path:
 @pytest.fixture
 def export(tmp_path: Path) -> Path:
     """Ten minutes of a building automation system, in its own names and units."""
-    rows = ("timestamp,V1 zat,V1 airflow,lights", "2023-01-09T00:05:00-08:00,68,100,7", "2023-01-09T00:10:00-08:00,,,7")
+    rows = (
+        "timestamp,V1 zat,V1 airflow,lights,V1 zn t",
+        "2023-01-09T00:05:00-08:00,68,100,7,1",
+        "2023-01-09T00:10:00-08:00,,,7,1",
+    )
     (tmp_path / "export.csv").write_text("\n".join(rows), encoding="utf-8")
     return tmp_path / "export.csv"
 
@@ -119,7 +123,7 @@ def test_telemetry_of_any_names_and_units(case: Path, export: Path, tmp_path: Pa
     units = ("--unit", "zone_air_temperature_sensor=degF", "--unit", "supply_air_flowrate_sensor=cfm")
     answer = run("import-telemetry", case, export, *units, "--out", tmp_path / "new")
     assert (answer.exit_code, answer.stderr) == (0, "")
-    assert "2 of 3 columns matched" in answer.stdout and "lights" in answer.stdout
+    assert "2 of 4 columns matched" in answer.stdout and "fits as well" in answer.stdout
     frame = load_case(tmp_path / "new").telemetry.frame
     assert frame["V1/zone_air_temperature_sensor"].iloc[0] == pytest.approx(293.15)
     cubic_metres = 100 * 0.3048**3 / 60

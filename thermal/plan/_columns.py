@@ -82,8 +82,7 @@ def read_matches(path: str | PathLike[str]) -> tuple[PointMatch, ...]:
     Returns
     -------
     tuple of PointMatch
-        One a row. A row without an entity or a point is a column that is left out; one with both is taken, whatever
-        its remark.
+        One a row. A row with a remark, or without an entity or a point, is a column that is left out.
 
     Raises
     ------
@@ -107,5 +106,6 @@ def read_matches(path: str | PathLike[str]) -> tuple[PointMatch, ...]:
         column, entity, point = ((row[name] or "").strip() for name in _HEADER[:3])
         if not column:
             raise PointListError(describe(f"{file.name}: line {number}", "the name of a column", "none"))
-        matches.append(PointMatch(column, entity, point, 1.0, "" if entity and point else "left out"))
+        remark = (row.get("remark") or "").strip() or ("" if entity and point else "left out")
+        matches.append(PointMatch(column, entity, point, 1.0, remark))
     return tuple(matches)
