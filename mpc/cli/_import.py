@@ -198,10 +198,9 @@ def _show_plan(found: PlanImport, name: str) -> None:
     """Write floors and zones to stdout."""
     from calibration.pages import counted
 
-    say(
-        f"{name}: {counted(len(found.area_errors), 'zone')} on {counted(len(found.floors), 'floor')}, cells of {found.plans.cell_size:g} m, "
-        f"areas within {100 * found.largest_error:.1f} % of the drawings"
-    )
+    size = f"{counted(len(found.area_errors), 'zone')} on {counted(len(found.floors), 'floor')}"
+    near = f"areas within {100 * found.largest_error:.1f} % of the drawings"
+    say(f"{name}: {size}, cells of {found.plans.cell_size:g} m, {near}")
     for remark in found.remarks:
         say(f"- {remark}")
     rows = [

@@ -159,7 +159,7 @@ def run_demo(
     folder, done = check_results_folder(out, force), progress or _silent
     case = case or load_bundled_case()
     judged = default_intervals(case)[1]
-    first, last = working_day(case, judged[-1])
+    first, last = _working_day(case, judged[-1])
     pages: dict[str, Path] = {}
     verdicts: dict[str, str] = {}
 
@@ -207,26 +207,8 @@ def _page(demo: Demo) -> str:
     return render_demo(demo.case.building.name, demo.verdicts, links, errors, demo.effects, demo.comparison, demo.fine)
 
 
-def working_day(case: Case, interval: Interval) -> tuple[str, str]:
-    """Last whole working day of an interval of a case.
-
-    Parameters
-    ----------
-    case : Case
-        Whose local time counts.
-    interval : Interval
-        Of its telemetry.
-
-    Returns
-    -------
-    tuple of str
-        Its beginning and its end, ISO 8601.
-
-    Raises
-    ------
-    ControlError
-        When there is none.
-    """
+def _working_day(case: Case, interval: Interval) -> tuple[str, str]:
+    """Begin and end of the last whole working day of an interval, ISO 8601."""
     zone = case.building.location.timezone
     days = pd.date_range(interval.start.tz_convert(zone).ceil("D"), interval.end.tz_convert(zone), freq="D")
     whole = [day for day in days[:-1] if day.weekday() < 5]

@@ -76,7 +76,7 @@ def render_demo(
         {"title": title, "what": what, "verdict": verdicts[step], "link": links[step], "pictures": []}
         for step, (title, what) in _STEPS.items()
     ]
-    steps[3]["pictures"] = error_lines(errors)
+    steps[3]["pictures"] = _error_lines(errors)
     steps[4]["pictures"] = cost_bars(comparison.runs)
     content = {
         "case": case, "fine": fine, "cards": cards, "steps": steps,
@@ -91,14 +91,8 @@ def render_demo(
 
 
 @styled
-def error_lines(errors: Mapping[str, Evaluation]) -> list[Picture]:
-    """Draw the held-out error of models over the horizon.
-
-    Parameters
-    ----------
-    errors : mapping of str to Evaluation
-        By name of the model.
-    """
+def _error_lines(errors: Mapping[str, Evaluation]) -> list[Picture]:
+    """Draw the held-out error of models over the horizon."""
     figure = Figure(figsize=(10.0, 3.2))
     axes = figure.subplots()
     for (name, found), colour in zip(errors.items(), (MUTED, MEASURED, SIMULATED), strict=True):

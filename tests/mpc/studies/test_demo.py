@@ -16,7 +16,7 @@ from calibration.errors import ResultsExistError
 from mpc.cli._app import app
 from mpc.errors import ControlError
 from mpc.studies import Demo, run_demo
-from mpc.studies._demo import working_day
+from mpc.studies._demo import _working_day
 from thermal import Case, load_bundled_case
 
 STEPS = ["check", "calibrate", "diagnose", "evaluate", "compare"]
@@ -34,7 +34,7 @@ def demo(case: Case, tmp_path_factory: pytest.TempPathFactory) -> tuple[Demo, li
     said: list[str] = []
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("mpc.studies._demo.CONTROLLERS", ("reset", "mpc"))
-        patch.setattr("mpc.studies._demo.working_day", lambda *_: ("2023-03-10T06:00", "2023-03-10T07:00"))
+        patch.setattr("mpc.studies._demo._working_day", lambda *_: ("2023-03-10T06:00", "2023-03-10T07:00"))
         out = tmp_path_factory.mktemp("demo") / "results"
         return run_demo(out, case=case, dx=1.0, told=lambda step, verdict: said.append(step)), said
 
@@ -89,10 +89,10 @@ def test_the_command_prints_what_was_found(
     assert run(["demo", "--out", str(tmp_path / "out")]).exit_code == 2
 
 
-def test_the_last_whole_working_day_is_controlled(case: Case) -> None:
+def test_the_last_whole__working_day_is_controlled(case: Case) -> None:
     def of(start: str, end: str) -> tuple[str, str]:
         zone = case.building.location.timezone
-        return working_day(case, Interval(pd.Timestamp(start, tz=zone), pd.Timestamp(end, tz=zone)))
+        return _working_day(case, Interval(pd.Timestamp(start, tz=zone), pd.Timestamp(end, tz=zone)))
 
     assert of("2023-03-07 16:00", "2023-03-11") == ("2023-03-10T00:00:00-05:00", "2023-03-11T00:00:00-05:00")
     assert of("2023-03-07 16:00", "2023-03-13 12:00")[0].startswith("2023-03-10")  # Friday, before the weekend
