@@ -54,13 +54,13 @@ class Recipe:
 SMALL = {"net_arch": [64, 64]}
 RECIPES = {
     "ppo": Recipe(
-        300_000, 20_160,
+        150_000, 15_120,
         {"n_steps": 336, "batch_size": 192, "gamma": 0.98, "learning_rate": 3e-4,
          "policy_kwargs": {**SMALL, "log_std_init": -0.5}},
     ),
     "sac": Recipe(
-        60_000, 5_000,
-        {"buffer_size": 60_000, "learning_starts": 2_688, "train_freq": 1, "gradient_steps": 2, "gamma": 0.98,
+        30_000, 5_000,
+        {"buffer_size": 30_000, "learning_starts": 2_688, "train_freq": 1, "gradient_steps": 2, "gamma": 0.98,
          "learning_rate": 3e-4, "policy_kwargs": SMALL},
     ),
 }  # fmt: skip

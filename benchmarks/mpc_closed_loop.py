@@ -5,8 +5,8 @@ loads. It steps on its grid with the paper's random shuffle, its sensors have no
 forecasts have the errors of day-ahead ones (`DAY_AHEAD_ERRORS`), issued every hour; all controllers meet the same
 weather, people, prices (PG&E's time of use as in the paper's simulator) and noise. Optimal control decides the supply
 air, common to both air handlers, and the supply water every 15 minutes, 12 hours ahead, on the reduced model with the
-building's parameters; rules act every 5 minutes. The bound is the same optimal control on a plant that is its own
-model, with exact sensors, known state, and weather and people known in advance.
+building's parameters; rules act every 5 minutes. The bound is the same optimal control of the same building with exact
+sensors, and weather and people known in advance.
 
 Cost is that of energy. Discomfort is the mean over zones of the kelvin hours outside of BOPTEST's office band (21 to
 24 degC from 6 to 19 o'clock on weekdays, 15 to 30 degC else). Since no two controllers leave zones equally comfortable,

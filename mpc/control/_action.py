@@ -12,6 +12,7 @@ from mpc.control._assembly import ComfortOperation
 from mpc.control._back_off import BackOff
 from mpc.control._rules import ResetRule
 from mpc.control._solution import Solution
+from mpc.kpi import DISCOMFORT_PRICE
 from mpc.scenario import DemandCharge
 
 
@@ -83,7 +84,7 @@ class ControllerSettings:
         Of the recognition of stuck sensors, see `StuckSensors` [-], [K].
     """
 
-    comfort_price: float = 0.2
+    comfort_price: float = DISCOMFORT_PRICE
     carbon_price: float = 0.0
     heat_value: float = 0.0
     time_limit: float = 60.0

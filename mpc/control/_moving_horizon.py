@@ -116,15 +116,13 @@ class MovingHorizonObserver(Observer):
         ndarray, shape (n_zone,)
             Innovations: measured minus predicted [K]; NaN where missing.
         """
-        whole, space = self.kalman.whole, self.kalman.space
-        u = np.concatenate([self._counted(boundary), heat])
-        error = zone - REFERENCE_TEMPERATURE - (whole.observation @ self.state + space.feedthrough @ u)
+        u, error = self._innovation(zone, heat, boundary)
         if len(self._window) == self.steps:
             self._arrival = self._carried(self._arrival, np.isfinite(self._window[0].zone))
             self._window.pop(0)
         self._window.append(_Step(self.state, np.asarray(zone - REFERENCE_TEMPERATURE), u))
         self.state = self.trajectory()[-1]
-        return np.asarray(error)
+        return error
 
     def _carried(self, covariance: FloatArray, reported: NDArray[np.bool_]) -> FloatArray:
         """Covariance of the prediction one step on, after those sensors that reported."""

@@ -78,16 +78,20 @@ class Observer:
         ndarray, shape (n_zone,)
             Innovations: measured minus predicted [K]; NaN where missing.
         """
-        whole, space = self.kalman.whole, self.kalman.space
-        u = np.concatenate([self._counted(boundary), heat])
-        error = zone - REFERENCE_TEMPERATURE - (whole.observation @ self.state + space.feedthrough @ u)
+        u, error = self._innovation(zone, heat, boundary)
         reported = np.isfinite(error)
         corrected = self.state
         if reported.any():
             corrected = self.state + self._gain(reported) @ error[reported]
-        self.state = whole.advance(corrected)
-        self.state[: self.order] += space.drive @ u
-        return np.asarray(error)
+        self.state = self.kalman.whole.advance(corrected)
+        self.state[: self.order] += self.kalman.space.drive @ u
+        return error
+
+    def _innovation(self, zone: FloatArray, heat: FloatArray, boundary: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Give the inputs of a step, and what was measured in it minus what the state predicts [K]."""
+        u = np.concatenate([self._counted(boundary), heat])
+        predicted = self.kalman.whole.observation @ self.state + self.kalman.space.feedthrough @ u
+        return u, np.asarray(zone - REFERENCE_TEMPERATURE - predicted)
 
     @property
     def innovation_deviation(self) -> FloatArray:

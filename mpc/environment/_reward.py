@@ -38,10 +38,10 @@ class EconomicReward:
     Parameters
     ----------
     stage : StageCost
-        Prices of discomfort and of emissions. The default discomfort price is that of `mpc.control`'s controller.
+        Prices of discomfort and of emissions.
     """
 
-    stage: StageCost = field(default_factory=lambda: StageCost(0.2))
+    stage: StageCost = field(default_factory=StageCost)
 
     def of_steps(self, done: RecentSteps, scenario: Scenario, first_step: int) -> float:
         """Reward a control step [currency].

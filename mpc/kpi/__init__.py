@@ -2,9 +2,10 @@
 
 from mpc.kpi._kpis import PEAK_WINDOW, Kpis, ZoneComfort, measure_kpis
 from mpc.kpi._record import PlantRecord
-from mpc.kpi._rewards import PaperReward, RewardTerms, StageCost
+from mpc.kpi._rewards import DISCOMFORT_PRICE, PaperReward, RewardTerms, StageCost
 
 __all__ = [
+    "DISCOMFORT_PRICE",
     "PEAK_WINDOW",
     "Kpis",
     "PaperReward",

@@ -186,6 +186,11 @@ class PaperReward:
         return np.asarray((electricity * factors[0] + gas * factors[1]) / highest if highest > 0 else 0.0 * electricity)
 
 
+#: What a zone's kelvin outside of its band for an hour counts [currency/K/h], unless told otherwise: so much that
+#: optimal control of the pilot building leaves its bands by no more than hundredths of a kelvin hour a day.
+DISCOMFORT_PRICE = 1.0
+
+
 @dataclass(frozen=True)
 class StageCost:
     """Cost of a step: energy, carbon and discomfort in one currency; a reward is minus it.
@@ -197,7 +202,7 @@ class StageCost:
     Parameters
     ----------
     discomfort_price : float
-        p_d [currency/K/h] of a zone.
+        p_d [currency/K/h] of a zone; default `DISCOMFORT_PRICE`, which is that of optimal control.
     carbon_price : float
         p_c [currency/kg]; default 0.
 
@@ -207,7 +212,7 @@ class StageCost:
         When a price is negative.
     """
 
-    discomfort_price: float
+    discomfort_price: float = DISCOMFORT_PRICE
     carbon_price: float = 0.0
 
     def __post_init__(self) -> None:

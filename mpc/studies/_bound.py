@@ -13,6 +13,31 @@ from thermal.model import ReducedModel, modal_model
 
 FloatArray = NDArray[np.float64]
 
+#: Unmeasured heat of a plant that is known, but for the random shuffle of its air [W/m2].
+SHUFFLED = 1.0
+
+
+def knowing_observer(model: ReducedModel, plant: SimulatedPlant) -> Observer:
+    """Make the observer of a controller that has the plant's own parameters.
+
+    Parameters
+    ----------
+    model : ReducedModel
+        With the parameters of the plant's building.
+    plant : SimulatedPlant
+        To be controlled.
+
+    Returns
+    -------
+    Observer
+        `KnownState` where the plant's building is such a model, else a filter that hardly expects unmeasured heat.
+    """
+    if isinstance(plant.model, ReducedBuilding):
+        return KnownState(model, plant)
+    modes = modal_model(model.matrices(model.theta))
+    shuffled = DisturbanceModel(SHUFFLED * plant.scenario.areas, LASTING, SENSOR_NOISE)
+    return Observer(KalmanFilter(held_space(modes, plant.control_step), shuffled), modes)
+
 
 class KnownState(Observer):
     """Reads the state off the plant's building in the place of estimating it; there is no unmeasured heat.

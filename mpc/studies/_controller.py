@@ -42,8 +42,9 @@ UNMEASURED, LASTING, SENSOR_NOISE = 5.0, 6 * 3600.0, 0.05
 #: a tenth longer.
 SMOOTHING = 0.005
 
-#: Excess of a band at which discomfort has its full price [K]: small, so that what is optimised is what is measured.
-SOFTNESS = 0.05
+#: Excess of a band at which discomfort has its full price [K]: small, so that what is optimised is what is measured. At
+#: 0.05 a winter day of the pilot costs 9 % more with its discomfort; solves take 5 % longer at 0.01.
+SOFTNESS = 0.01
 
 _KINDS = {"supply_air_temperature": "supply_air_temperature_setpoint",
           "supply_water_temperature": "supply_water_temperature_setpoint"}  # fmt: skip

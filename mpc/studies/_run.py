@@ -17,7 +17,7 @@ from mpc.errors import ControlError
 from mpc.kpi import Kpis, measure_kpis
 from mpc.plants import ClosedLoopRun, Controller, Measurements, SimulatedPlant, run_closed_loop
 from mpc.scenario import Forecast
-from mpc.studies._bound import KnownState
+from mpc.studies._bound import knowing_observer
 from mpc.studies._controller import MODEL_STEP, default_horizon, make_controller, site_points
 from mpc.studies._study import HORIZON_HOURS, Study
 from thermal.errors import describe, nearest
@@ -132,8 +132,9 @@ def run_controller(study: Study, name: str, progress: Progress | None = None) ->
     study : Study
         What it is run on.
     name : str
-        ``mpc``, ``schedule``, ``reset``, ``guideline36``, or ``bound``: optimal control on a plant that is its own
-        model, with exact sensors, that knows the state, the weather and the people.
+        ``mpc``, ``schedule``, ``reset``, ``guideline36``, or ``bound``: optimal control with the plant's own parameters
+        and exact sensors, that knows the weather and the people. Where the plant is its own model it knows the state;
+        the state of a grid it estimates.
     progress : callable, optional
         Called with stage, done, total.
 
@@ -182,7 +183,7 @@ def controller_of(study: Study, plant: SimulatedPlant, name: ControllerName) -> 
     model = study.truth if name == "bound" else study.model
     return make_controller(
         model, plant, settings=study.settings, horizon=default_horizon(study.control_step, HORIZON_HOURS),
-        observer=KnownState(model, plant) if name == "bound" else None,
+        observer=knowing_observer(model, plant) if name == "bound" else None,
     )  # fmt: skip
 
 

@@ -13,6 +13,7 @@ import pandas as pd
 from calibration import ModelSettings
 from mpc.control import ControllerSettings
 from mpc.errors import PlantError
+from mpc.kpi import DISCOMFORT_PRICE
 from mpc.plants import BuildingModel, GridBuilding, ReducedBuilding, SensorNoise, SimulatedPlant
 from mpc.scenario import (
     CarbonIntensity,
@@ -47,9 +48,6 @@ CONTROL_STEP = 900.0
 
 #: How far forecasts reach [h].
 HORIZON_HOURS = 12.0
-
-#: A zone's kelvin outside of its band for an hour [currency/K/h], as the default of optimal control.
-COMFORT_PRICE = 1.0
 
 _DAY = pd.Timedelta(days=1)
 
@@ -100,7 +98,7 @@ class Study:
     kind: PlantKind = "reduced"
     noise: SensorNoise | None = None
     errors: Mapping[str, ErrorGrowth] = field(default_factory=dict)
-    settings: ControllerSettings = field(default_factory=lambda: ControllerSettings(comfort_price=COMFORT_PRICE))
+    settings: ControllerSettings = field(default_factory=ControllerSettings)
     control_step: float = CONTROL_STEP
     seed: int = 0
     notes: tuple[str, ...] = ()
@@ -123,8 +121,8 @@ class Study:
         control_step : float
             Time between two actions [s], a multiple of `MODEL_STEP`.
         bound : bool
-            The plant of the perfect bound: its building is the reduced truth, its sensors are exact, and forecasts
-            know weather and people.
+            The plant of the perfect bound: its sensors are exact, and forecasts know weather and people; of kind
+            ``reduced`` its building is `truth` itself, whose state can be read.
 
         Raises
         ------
@@ -139,7 +137,8 @@ class Study:
             self.scenario, ahead, {} if bound else self.errors, occupancy="actual" if bound else "expected",
             seed=self.seed,
         )  # fmt: skip
-        building = ReducedBuilding(self.truth, step_seconds=MODEL_STEP) if bound else self._plants_building()
+        known = bound and self.kind == "reduced"
+        building = ReducedBuilding(self.truth, step_seconds=MODEL_STEP) if known else self._plants_building()
         return SimulatedPlant(
             self.scenario, self.system, building, control_steps=count, noise=None if bound else self.noise,
             forecaster=forecaster, seed=self.seed,
@@ -205,7 +204,7 @@ def make_study(
     comfort: ComfortBand | None = None,
     noise: SensorNoise | None = None,
     errors: Mapping[str, ErrorGrowth] | None = None,
-    comfort_price: float = COMFORT_PRICE,
+    comfort_price: float = DISCOMFORT_PRICE,
     control_step: float = CONTROL_STEP,
     order: int | None = ORDER,
     seed: int = 0,

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import chdir
 from pathlib import Path
 from typing import Any
 
@@ -100,10 +102,11 @@ class Unit:
         self.end()
         c = self._description.coSimulation
         try:
-            slave = self._fmpy.fmi2.FMU2Slave(
-                guid=self._description.guid, unzipDirectory=str(self._folder), modelIdentifier=c.modelIdentifier,
-                instanceName=self.name,
-            )  # fmt: skip
+            with chdir(os.curdir):  # FMPy loads a library from its own folder, and stays there if that fails
+                slave = self._fmpy.fmi2.FMU2Slave(
+                    guid=self._description.guid, unzipDirectory=str(self._folder), modelIdentifier=c.modelIdentifier,
+                    instanceName=self.name,
+                )  # fmt: skip
             slave.instantiate()
         except Exception as error:
             raise FmuError(f"FMU {self.name}: cannot be started: {error}") from error

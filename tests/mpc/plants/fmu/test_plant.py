@@ -198,8 +198,10 @@ def test_files_that_are_no_such_unit(room: Path, tmp_path: Path) -> None:
         with pytest.raises(FmuError, match=says):
             FmuPlant(path, SIGNALS, 900.0, START, 3600.0)
     broken = FmuPlant(packed(tmp_path / "broken.fmu", text, library), SIGNALS, 900.0, START, 3600.0)
+    here = Path.cwd()
     with pytest.raises(FmuError, match="cannot be started"):
         broken.reset()
+    assert Path.cwd() == here
     broken.close()
     with pytest.raises(FmuError, match="a time with a time zone"):
         FmuPlant(room, SIGNALS, 900.0, pd.Timestamp("2023-01-09"), 3600.0)
