@@ -25,6 +25,7 @@ NAMES = {
     "sac_after": "SAC, trained in the diagnosed model, moved to the plant",
 }  # fmt: skip
 REFERENCE = "mpc_after"
+PEERS = {"mpc_after": "ours", "mpc_as_do_mpc": "ours, on do-mpc's problem", "do_mpc": "do-mpc"}
 COLUMNS = (
     "controller", "seeds", "cost_tot, USD/m2", "tdis_tot, K h", "ener_tot, kWh/m2", "pele_tot, W/m2",
     "emis_tot, kg/m2", "stage cost of a week, USD", "over the reference, USD a week",
@@ -116,7 +117,26 @@ def table(runs: Sequence[dict[str, Any]]) -> str:
         f"hour; in brackets 95 % by bootstrap over days and seeds, differences paired by day. Reference: "
         f"{NAMES[REFERENCE]}, whose front over prices of discomfort gives its cost at another's comfort.\n"
     )
-    return markdown(COLUMNS, rows) + "\n" + note + "\n" + budgets(found)
+    return "\n".join(part for part in (markdown(COLUMNS, rows), note, budgets(found), peers(runs)) if part)
+
+
+def peers(runs: Sequence[dict[str, Any]]) -> str:
+    """Lay do-mpc out beside ours, on the days that do-mpc was run; nothing where it was not."""
+    here = [r for r in runs if r["entry"]["price"] == DISCOMFORT_PRICE and r["entry"]["controller"] in PEERS]
+    days = {r["week"]: len(r["days"]) for r in here if r["entry"]["controller"] == "do_mpc"}
+    if not days:
+        return ""
+    rows = []
+    for name, said in PEERS.items():
+        of = {r["week"]: r for r in here if r["entry"]["controller"] == name}
+        if days.keys() <= of.keys():
+            cost = [sum(of[week]["days"][:count]) for week, count in days.items()]
+            median, largest = (max(of[week]["step_seconds"][key] for week in days) for key in ("median", "largest"))
+            plans = sum(of[week]["sources"].get("optimal plan", 0) for week in days)
+            asked = sum(sum(of[week]["sources"].values()) for week in days)
+            rows.append([said, *(f"{c:.3f}" for c in cost), f"{median:.2f}", f"{largest:.2f}", f"{plans} of {asked}"])
+    columns = ("solver", *(f"stage cost, {week}, USD" for week in days), "an action, median CPU s", "largest", "solved")
+    return markdown(columns, rows)
 
 
 def budgets(found: dict[str, list[dict[str, Any]]]) -> str:
