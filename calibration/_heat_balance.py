@@ -14,7 +14,7 @@ from calibration._corrected import rows_of
 from calibration._intervals import Interval
 from calibration._state_space import REFERENCE
 from thermal import Inputs, SymbolicModel, spin_up
-from thermal.model import SPIN_UP, Matrices
+from thermal.model import LEAST_SPIN_UP, SPIN_UP, Matrices
 from thermal.units import AIR_HEAT_CAPACITY
 
 FloatArray = NDArray[np.float64]
@@ -164,14 +164,48 @@ def heat_balance(
     for interval in intervals:
         begin, at, stop = rows_of(inputs, interval, spin_up_seconds, "exact")
         rows = np.arange(at + 1, stop + 1)
-        needed = _needed_heat(matrices, inputs, begin, rows, model.network.airflows)
-        # the last value is held through a gap; where the sensor speaks again, the jump is no heat
-        known = np.isfinite(inputs.zone[rows]) & np.isfinite(inputs.zone[rows - 1]) & inputs.complete[rows, None]
-        metered = np.where(known, inputs.heat[rows], np.nan)
-        parts.append(hourly_means(inputs.stamps[rows], inputs.step, metered, np.where(known, needed, np.nan)))
+        steps = _step_balance(matrices, inputs, begin, rows, model.network.airflows)
+        parts.append(hourly_means(inputs.stamps[rows], inputs.step, *steps))
     stamps = parts[0][0].append([p[0] for p in parts[1:]])
     metered, needed = (np.concatenate([p[i] for p in parts]) for i in (1, 2))
     return HeatBalance(pd.DatetimeIndex(stamps), model.network.zones, metered, needed)
+
+
+def step_balance(
+    model: SymbolicModel, theta: FloatArray, inputs: Inputs
+) -> tuple[NDArray[np.int64], FloatArray, FloatArray]:
+    """Metered heat and that which a model needs, step by step over all telemetry but the least spin-up.
+
+    Parameters
+    ----------
+    model : SymbolicModel
+        Reduced, or a small grid.
+    theta : ndarray, shape (n_parameter,)
+        Parameter values [parameter units].
+    inputs : Inputs
+        The telemetry.
+
+    Returns
+    -------
+    tuple of ndarray
+        Rows of the steps, shape (n,), none where telemetry is shorter; metered and needed heat, shape (n, n_zone) [W],
+        NaN where an input or the zone's temperature is missing.
+    """
+    rows = np.arange(int(np.ceil(LEAST_SPIN_UP / inputs.step)) + 1, len(inputs.stamps))
+    if rows.size < 2:
+        none = np.empty((0, len(model.network.zones)))
+        return rows[:0], none, none
+    return rows, *_step_balance(model.matrices(theta), inputs, 0, rows, model.network.airflows)
+
+
+def _step_balance(
+    matrices: Matrices, inputs: Inputs, begin: int, rows: NDArray[np.int64], airflows: tuple[tuple[int, int], ...]
+) -> tuple[FloatArray, FloatArray]:
+    """Metered and needed heat of single steps, NaN where either is not known."""
+    needed = _needed_heat(matrices, inputs, begin, rows, airflows)
+    # the last value is held through a gap; where the sensor speaks again, the jump is no heat
+    known = np.isfinite(inputs.zone[rows]) & np.isfinite(inputs.zone[rows - 1]) & inputs.complete[rows, None]
+    return np.where(known, inputs.heat[rows], np.nan), np.where(known, needed, np.nan)
 
 
 def _needed_heat(

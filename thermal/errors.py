@@ -352,6 +352,14 @@ class DeviceListError(PlanError):
     """A list of devices that cannot be understood."""
 
 
+class LostWorkError(PlanError):
+    """What somebody has done on a case would be lost."""
+
+
+class PointListError(PlanError):
+    """A list of points and columns that cannot be understood, or names none of them."""
+
+
 # The labelling page
 class LabelError(ThermalError):
     """Something is wrong with what the labelling page is asked for."""

@@ -48,6 +48,7 @@ QUANTITIES: dict[str, _Quantity] = {
     "count": _Quantity("a number of people", "dimensionless", "-", "-, 1, count"),
     "speed": _Quantity("a speed", "meter / second", "m/s", "m/s, km/h, mph"),
     "angle": _Quantity("an angle", "degree", "deg", "deg, rad"),
+    "pressure": _Quantity("a pressure", "pascal", "Pa", "Pa, kPa, inH2O, psi"),
     "irradiance": _Quantity("a power per area", "watt / meter ** 2", "W/m^2", "W/m^2, kW/m^2"),
 }
 

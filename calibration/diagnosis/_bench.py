@@ -16,6 +16,7 @@ from calibration._problem import Problem
 from calibration._settings import ModelSettings
 from calibration._starts import tuning_runs
 from calibration.diagnosis._fit import Found, descend, evidence_of
+from calibration.diagnosis._openings import seen_openings
 from thermal import Case, Inputs, SymbolicModel, ThermalNetwork, build_network, reduced_model, replay_inputs
 from thermal.effects import CATALOGUE, chosen
 from thermal.model import ReducedModel
@@ -162,8 +163,10 @@ class Bench:
 
     @cached_property
     def drivers(self) -> Drivers:
-        """Sun, sky, wind and schedules of the case."""
-        return Drivers(self.case)
+        """Sun, sky, wind and schedules of the case, and when windows are seen to stand open."""
+        drivers = Drivers(self.case)
+        drivers.openings = seen_openings(drivers, self.settings)
+        return drivers
 
     @cached_property
     def anatomy(self) -> Anatomy:

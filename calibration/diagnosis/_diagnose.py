@@ -25,7 +25,7 @@ from thermal.effects import CATALOGUE
 #: Subsystem that an effect belongs to.
 SUBSYSTEMS = {
     **dict.fromkeys(("flow_gain", "duct_loss", "capacity_limit", "valve_leak"), "terminal"),
-    **dict.fromkeys(("sensor_bias", "sensor_lag", "clock_shift"), "sensor"),
+    **dict.fromkeys(("sensor_bias", "sensor_lag", "clock_shift", "wrong_station"), "sensor"),
     **dict.fromkeys(("internal_gains", "latent_load"), "use"),
 }
 

@@ -15,8 +15,9 @@ GENERIC_GAP = 8.0
 #: has over so many times its share of the squared error, the smaller one counts [K, -].
 LEFT_OVER, LEFT_IN_A_ZONE, CONCENTRATED = 0.2, 0.1, 3.5
 
-#: Least share of the squared error that accepted effects must explain for a cause to be named [-].
-EXPLAINED = 0.4
+#: Least share of the squared error that accepted effects must explain for a cause to be named, and where much is left
+#: over [-].
+EXPLAINED, EXPLAINED_OF_MUCH = 0.4, 0.6
 
 #: Difference of gains within which effects of a round cannot be told apart [-].
 APART = 3.0

@@ -127,4 +127,4 @@ class Work:
 def _places(fit: Fit, effect: str) -> int:
     """Count the zones, or pairs of zones, in which a fitted model has an effect."""
     mine = (p for p in fit.problem.parameters if p.effect == effect and is_strength(p.name, effect))
-    return len({p.member for p in mine})
+    return len({p.member for p in mine} - {None})

@@ -105,7 +105,13 @@ class Screening:
         members: dict[str, list[int]] = {}
         for i in index:
             members.setdefault(self.parameters[i].member or "", []).append(int(i))
-        return self._grow(effect, {name: np.array(found) for name, found in members.items()})
+        everywhere = members.pop("", [])  # a strength that all zones share
+        silent = [name for name, mine in members.items() if not self._whole[mine, mine].any()]
+        members = {name: mine for name, mine in members.items() if name not in silent or len(silent) == len(members)}
+        found = [self._grow(effect, {name: np.array(i) for name, i in members.items()})] if members else []
+        if everywhere:
+            found.append(self._gain(effect, np.array(everywhere), ()))
+        return max(found, key=lambda g: g.gain)
 
     def promised(self, *gains: Gain) -> dict[str, float]:
         """Parameters where the tangents point: the effects' strengths, and what the fitted ones then would be.

@@ -12,6 +12,7 @@ from calibration._evaluate import Progress
 from calibration.diagnosis._bench import Bench, Fit
 from calibration.diagnosis._gain import Gain
 from calibration.diagnosis._held_out import HeldOut, held_out
+from calibration.diagnosis._levels import APART
 from calibration.diagnosis._pairs import Pair, nominate
 from calibration.diagnosis._refit import ACCEPTED, Refit, Work
 from calibration.diagnosis._screen import Screening, screen
@@ -118,7 +119,7 @@ def search(
         made, gains, generic = screen(bench, fit, open_)
         work = Work(bench, fit, errors, made)
         refits = _refits(work, gains, ahead)
-        best = next((r for r in refits if r.counts), None)
+        best = _first(errors, refits)
         chosen = _best_pair(work, gains, refits, best) if ahead is None else None
         pair = None
         if chosen is not None:
@@ -131,6 +132,25 @@ def search(
     if progress is not None:
         progress("diagnose", ROUNDS, ROUNDS)
     return tuple(done)
+
+
+def _first(before: HeldOut, refits: Sequence[Refit]) -> Refit | None:
+    """Of the effects that count the one that gains most; of those it cannot be told from, the held-out days decide.
+
+    Only where they can: their errors must be as much more probable as gains must differ to tell effects apart.
+    """
+    counting = [r for r in refits if r.counts]
+    if not counting:
+        return None
+    zones = len(counting[0].fit.built.network.zones)
+
+    def held_out_gain(r: Refit) -> float:
+        return before.days.size * zones * float(np.log(before.mae / max(r.held_out.mae, 1e-9)))
+
+    best = counting[0]
+    near = [r for r in counting if r.gain > best.gain - APART]
+    other = max(near, key=lambda r: r.gain + held_out_gain(r))
+    return other if other.gain + held_out_gain(other) > best.gain + held_out_gain(best) + APART else best
 
 
 def _refits(work: Work, gains: Sequence[Gain], ahead: Refit | None) -> list[Refit]:

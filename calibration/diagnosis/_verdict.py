@@ -15,6 +15,7 @@ from calibration.diagnosis._levels import (
     APART,
     CONCENTRATED,
     EXPLAINED,
+    EXPLAINED_OF_MUCH,
     GENERIC_GAP,
     IN_SET,
     LARGEST_GROUP,
@@ -141,11 +142,14 @@ def judge(rounds: Sequence[Round], untestable: Mapping[str, str]) -> Verdict:
             chain.append((tuple(r.before.effects), real * none))
             real *= 1.0 - none
     chain.append((tuple(rounds[-1].after.effects), real))
+    name = _name(rounds)
+    if name == "unexplained" and chain[1:]:  # what explains a part only is there with no more than that probability
+        share = float(np.clip(_explained(rounds, _left_over(rounds[-1].after)), 0.0, 1.0))
+        probability = {e: share * p for e, p in probability.items()}
     suspects = sorted(
         (_suspect(e, probability[e], score[e], best.get(e), rounds, untestable.get(e)) for e in CATALOGUE),
         key=lambda s: (-s.probability, -last.get(s.effect, -np.inf), -s.score),
     )
-    name = _name(rounds)
     return Verdict(name, tuple(suspects), _inside(rounds, suspects) if name in ("named", "group") else (), dict(chain))
 
 
@@ -186,7 +190,7 @@ def group_of(r: Round, effect: str) -> tuple[str, ...]:
 def _name(rounds: Sequence[Round]) -> VerdictName:
     first, final = rounds[0], rounds[-1].after
     left_over = _left_over(final)
-    if first.accepted is not None and _explained(rounds, left_over) >= EXPLAINED:
+    if first.accepted is not None and _explained(rounds, left_over) >= (EXPLAINED_OF_MUCH if left_over else EXPLAINED):
         size = len(group_of(first, first.accepted.screened.effect))
         if size <= LARGEST_GROUP:
             return "named" if size == 1 else "group"

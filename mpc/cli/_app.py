@@ -20,7 +20,7 @@ from mpc.cli._demo import demo
 from mpc.cli._diagnose import diagnose
 from mpc.cli._doctor import doctor
 from mpc.cli._evaluate import evaluate
-from mpc.cli._import import import_devices, import_plan
+from mpc.cli._import import import_devices, import_plan, import_telemetry
 from mpc.cli._label import label
 from mpc.cli._serve import serve
 from mpc.cli._simulate import simulate
@@ -96,7 +96,11 @@ def _report(error: Exception, command: str) -> int:
 
 
 for _command, _help, _example in (
-    (demo, "Calibrate the bundled case and evaluate it on held-out days, in under two minutes.", "demo --out demo"),
+    (
+        demo,
+        "Check, calibrate, diagnose, evaluate and control the bundled case, in under two minutes.",
+        "demo --out demo_results",
+    ),
     (doctor, "Say what is installed and what is missing, and test the solvers.", "doctor"),
     (check, "Validate a case folder: geometry, quality of the telemetry, what each point is.", "check cases/office"),
     (
@@ -108,6 +112,11 @@ for _command, _help, _example in (
         import_devices,
         "Give a case its devices from CSV, Brick or Haystack, and match columns of telemetry to them.",
         "import-devices cases/office devices.ttl --telemetry export.csv --out cases/office-2",
+    ),
+    (
+        import_telemetry,
+        "Give a case its telemetry, whatever its columns are called.",
+        "import-telemetry cases/office export.csv --points points.csv --out cases/office-3",
     ),
     (
         label,

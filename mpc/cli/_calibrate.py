@@ -14,7 +14,6 @@ from mpc.cli._evaluate import Dx, SchemeName
 
 if TYPE_CHECKING:
     from calibration import CalibrationResult, CaseOutcome
-    from thermal import Case
 
 _BUILDING = "building.yaml"
 
@@ -84,55 +83,25 @@ def calibrate(
     if json:
         write_json(result.to_dict())
     else:
-        show_calibration(result, report)
+        _show(result, report)
     return _exit_code(result)
 
 
 def _calibrate_one(folder: Path, out: Path, settings: dict[str, Any], force: bool) -> tuple[CalibrationResult, Path]:
+    import calibration
     from calibration import parse_interval
     from thermal import load_case
 
     case = load_case(folder)
     intervals = {name: [parse_interval(text, case) for text in settings[name]] for name in ("tune", "hold_out")}
-    return calibrate_and_write(case, out, f"calibrate {folder.name}", force, **settings | intervals)
-
-
-def calibrate_and_write(
-    case: Case, out: Path, label: str, force: bool, **settings: Any
-) -> tuple[CalibrationResult, Path]:
-    """Calibrate a case behind a progress bar and write its results.
-
-    Parameters
-    ----------
-    case : Case
-        What to calibrate.
-    out : Path
-        Folder of the results.
-    label : str
-        Of the progress bar.
-    force : bool
-        Replace earlier results.
-    **settings
-        Passed to `calibration.calibrate`.
-    """
-    import calibration
-
-    with Waiting(label) as progress:
-        result = calibration.calibrate(case, progress=progress, **settings)
+    with Waiting(f"calibrate {folder.name}") as progress:
+        result = calibration.calibrate(case, progress=progress, **(settings | intervals))
         report = calibration.write_calibration(result, case, out, force=force)
     return result, report
 
 
-def show_calibration(result: CalibrationResult, report: Path) -> None:
-    """Write what a calibration found to stdout.
-
-    Parameters
-    ----------
-    result : CalibrationResult
-        From `calibration.calibrate`.
-    report : Path
-        Its page.
-    """
+def _show(result: CalibrationResult, report: Path) -> None:
+    """Write what a calibration found to stdout."""
     from calibration import calibration_verdict
 
     say(calibration_verdict(result))

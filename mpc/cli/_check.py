@@ -30,21 +30,15 @@ def check(
     if json:
         write_json(found.to_dict())
         return 0
-    show_check(found)
+    _show(found)
     _show_points(found)
     if report is not None:
         say(f"Report: {report}")
     return 0
 
 
-def show_check(found: CaseCheck) -> None:
-    """Write the geometry and the quality of a case to stdout.
-
-    Parameters
-    ----------
-    found : CaseCheck
-        From `thermal.case.check_case`.
-    """
+def _show(found: CaseCheck) -> None:
+    """Write the geometry and the quality of a case to stdout."""
     from calibration import check_verdict, quality_rows
 
     say(

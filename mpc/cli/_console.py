@@ -149,6 +149,21 @@ class Waiting:
                 name, done, full = self._state
                 self._bar.update(self._task, description=name, completed=done, total=full)
 
+    def say(self, text: str) -> None:
+        """Write a sentence or two to stdout, above the bar.
+
+        Parameters
+        ----------
+        text : str
+            As for `say`.
+        """
+        with self._lock:
+            if self._bar is not None:
+                self._bar.stop()
+            say(text)
+            if self._bar is not None:
+                self._bar.start()
+
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:

@@ -1,7 +1,8 @@
-"""``buildingmpc import-plan`` and ``buildingmpc import-devices``."""
+"""``buildingmpc import-plan``, ``import-devices`` and ``import-telemetry``."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -23,8 +24,20 @@ def import_plan(
     json: Json = False,
 ) -> int:
     """Make a case of drawings."""
-    from thermal.plan import building_of, import_drawings, import_page, read_devices, read_drawing_list, save_plan_case
+    from thermal.plan import (
+        building_of,
+        check_nothing_lost,
+        held_work,
+        import_drawings,
+        import_page,
+        read_devices,
+        read_drawing_list,
+        save_plan_case,
+    )
 
+    if not force:
+        check_nothing_lost(out)
+    lost = held_work(out)
     listed = read_drawing_list(drawings)
     with Waiting(f"import {drawings.name}") as progress:
         found = import_drawings(drawings, progress=progress)
@@ -44,10 +57,12 @@ def import_plan(
         write_json({**_plan_content(found), **({"devices": _device_content(served)} if served is not None else {})})
         return 0
     _show_plan(found, listed.name)
+    for work in lost:
+        say(f"Replaced: {work}")
     if served is not None:
         _show_devices(served)
     say(f"Case: {folder}   Picture: {folder / 'report.html'}")
-    say("Next: replace the empty telemetry, then buildingmpc check " + str(folder))
+    say(f"Next: buildingmpc import-telemetry {folder} EXPORT --out CASE, or correct it: buildingmpc label {folder}")
     return 0
 
 
@@ -62,8 +77,8 @@ def import_devices(
     json: Json = False,
 ) -> int:
     """Give a case its devices, and match columns of telemetry to them."""
-    from thermal import load_case, save_case
-    from thermal.plan import match_points, read_columns, read_devices, with_devices, write_matches
+    from thermal import load_case
+    from thermal.plan import match_points, read_columns, read_devices, save_with_labels, with_devices, write_matches
 
     zones = load_case(case).building.zone_names
     served = read_devices(devices, zones)
@@ -71,7 +86,7 @@ def import_devices(
     columns = read_columns(telemetry) if telemetry is not None else ()
     station = new.building.weather_station
     matches = match_points(columns, served.devices, zones, weather_station=station, listed=served.points)
-    folder = save_case(new, out, overwrite=force)
+    folder = save_with_labels(new, case, out, overwrite=force)
     if telemetry is not None:
         write_matches(matches, folder / "points.csv")
     if json:
@@ -83,6 +98,63 @@ def import_devices(
         say(f"Points: {folder / 'points.csv'}")
     say(f"Case: {folder}")
     return 0
+
+
+def import_telemetry(
+    case: Annotated[Path, typer.Argument(metavar="CASE", help="Case folder with zones and devices.")],
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="CSV or Parquet; columns of any names.")],
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Case folder to make, with this telemetry.")],
+    points: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="points.csv, corrected by hand; default: matched by name.")
+    ] = None,
+    unit: Annotated[
+        list[str] | None,
+        typer.Option(metavar="POINT=UNIT", help="Unit in the file, repeatable; default: degC, kg/s, W, %, W/m^2."),
+    ] = None,
+    force: Force = False,
+    json: Json = False,
+) -> int:
+    """Give a case its telemetry, whatever its columns are called."""
+    from thermal import load_case
+    from thermal.plan import (
+        match_points,
+        read_columns,
+        read_matches,
+        save_with_labels,
+        with_telemetry,
+        write_matches,
+    )
+
+    units = _units(unit or ())
+    if points is not None:
+        matches = read_matches(points)
+    else:
+        building = load_case(case).building
+        columns = read_columns(file)
+        matches = match_points(columns, building.devices, building.zone_names, weather_station=building.weather_station)
+    new = with_telemetry(case, file, matches, units)
+    folder = save_with_labels(new, case, out, overwrite=force)
+    write_matches(matches, folder / "points.csv")
+    frame = new.telemetry.frame
+    if json:
+        span = {"start": frame.index[0].isoformat(), "end": frame.index[-1].isoformat(), "step_seconds": new.step}
+        write_json({**span, "columns": frame.shape[1], "points": [_match_content(m) for m in matches]})
+        return 0
+    _show_matches(matches)
+    say(f"{frame.shape[1]} columns from {frame.index[0]:%Y-%m-%d %H:%M} to {frame.index[-1]:%Y-%m-%d %H:%M}")
+    say(f"Case: {folder}   Points: {folder / 'points.csv'}")
+    say(f"Next: buildingmpc check {folder}")
+    return 0
+
+
+def _units(given: Sequence[str]) -> dict[str, str]:
+    """Take options POINT=UNIT apart."""
+    from thermal.errors import PointListError, describe
+
+    for text in given:
+        if not all(text.partition("=")):
+            raise PointListError(describe("--unit", "POINT=UNIT, such as zone_air_temperature_sensor=degF", repr(text)))
+    return {point.strip(): unit.strip() for point, _, unit in (text.partition("=") for text in given)}
 
 
 def _plan_content(found: PlanImport) -> dict[str, Any]:
@@ -124,10 +196,11 @@ def _match_content(match: PointMatch) -> dict[str, Any]:
 
 def _show_plan(found: PlanImport, name: str) -> None:
     """Write floors and zones to stdout."""
-    say(
-        f"{name}: {len(found.area_errors)} zones on {len(found.floors)} floors, cells of {found.plans.cell_size:g} m, "
-        f"areas within {100 * found.largest_error:.1f} % of the drawings"
-    )
+    from calibration.pages import counted
+
+    size = f"{counted(len(found.area_errors), 'zone')} on {counted(len(found.floors), 'floor')}"
+    near = f"areas within {100 * found.largest_error:.1f} % of the drawings"
+    say(f"{name}: {size}, cells of {found.plans.cell_size:g} m, {near}")
     for remark in found.remarks:
         say(f"- {remark}")
     rows = [

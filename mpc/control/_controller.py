@@ -18,9 +18,11 @@ from mpc.control._observer import Observer
 from mpc.control._problem import ControlProblem
 from mpc.control._reading import Readings, SitePoints
 from mpc.control._solution import Solution, Solver, Status
+from mpc.control._start_up import past_forecast, past_steps
 from mpc.control._watch import FarFromModel, StuckSensors
-from mpc.errors import MpcError
+from mpc.errors import ControlError, MpcError
 from mpc.scenario import Forecast
+from thermal.errors import describe
 
 FloatArray = NDArray[np.float64]
 
@@ -112,6 +114,49 @@ class MpcController:
         self._previous = values
         named = self.points.setpoints(self.problem.predictor.channels, values, self.problem.predictor.hvac)
         return Action(named, source, tuple(reasons), solution, stamp)
+
+    def start_up(self, telemetry: pd.DataFrame) -> None:
+        """Bring the state up from telemetry of the time before the first step; nothing is decided.
+
+        Walls and slabs remember a day or two; without this they begin at rest with the zones as they are. Energy that
+        was metered counts for the month's demand charges.
+
+        Parameters
+        ----------
+        telemetry : DataFrame, shape (n_time, n_column)
+            Means over steps that end at the stamps, which have a time zone; by ``ENTITY/POINT`` in the library's units,
+            as `thermal.case.Telemetry` has them; ``ZONE/internal_gain`` [W] is expected heat of people, lights and
+            equipment, none where absent. NaN is missing.
+
+        Raises
+        ------
+        ControlError
+            When there is less than a control step, no zone ever reports, or the model has effects whose weather lacks.
+
+        Examples
+        --------
+        >>> controller.start_up(case.telemetry.frame.loc["2023-01-09":"2023-01-11"])  # doctest: +SKIP
+        """
+        control_step = self.problem.predictor.horizon.control_step
+        steps = past_steps(telemetry, self.points, control_step)
+        others = np.zeros((len(steps), 0))
+        if self.signals is not None:
+            stamps = pd.DatetimeIndex([step.stamp for step in steps])
+            others = self.signals(past_forecast(telemetry, self.points), stamps)
+        started = False
+        for step, other in zip(steps, others, strict=True):
+            read = self._readings.read(step.measured)
+            boundary, seen = np.concatenate([[step.outdoor], other]), np.isfinite(read.zone)
+            if started:
+                self.observer.update(read.zone, np.nan_to_num(read.heat) + step.gains, boundary)
+            elif seen.any():
+                self.observer.start(np.where(seen, read.zone, read.zone[seen].mean()), boundary)
+                started = True
+            self._demand.add(read.electricity, step.stamp, control_step)
+            self._water = read.water if np.isfinite(read.water) else self._water
+        if not started:
+            raise ControlError(describe("start-up: telemetry", "a zone that reports", "none that does"))
+        self._started, self._gains = True, steps[-1].gains
 
     def _now(
         self, measurements: Mapping[str, float], forecast: Forecast | None, now: pd.Timestamp | None

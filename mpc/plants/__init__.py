@@ -2,6 +2,7 @@
 
 from mpc.plants._actuators import ACTION_LIMITS, Actuator
 from mpc.plants._building import BuildingFlows, BuildingModel, BuildingStep, GridBuilding
+from mpc.plants._extras import RadiantGains
 from mpc.plants._history import RecentSteps, SystemBalance
 from mpc.plants._make import pilot_building, pilot_weather, save_pilot, simulated_plant
 from mpc.plants._noise import SensorNoise
@@ -28,6 +29,7 @@ __all__ = [
     "Plant",
     "PlantDevices",
     "PointLayout",
+    "RadiantGains",
     "RecentSteps",
     "ReducedBuilding",
     "RestorablePlant",

@@ -22,6 +22,7 @@ SIGNAL_UNITS = {
     "count": "1",
     "speed": "m/s",
     "angle": "deg",
+    "pressure": "Pa",
     "irradiance": "W/m2",
 }
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from mpc.errors import PlantError
 from mpc.plants._building import BuildingModel
+from mpc.plants._extras import check_radiant
 from mpc.scenario import Scenario
 from thermal.errors import describe
 
@@ -40,6 +41,7 @@ def check_parts(scenario: Scenario, model: BuildingModel, control_steps: int, wa
         raise PlantError(describe("building model", f"the scenario's step of {scenario.grid.step:g} s", found))
     if model.network.airflows:
         raise PlantError(describe("building", "one without airflows from zone to zone", "some"))
+    check_radiant(model.network, scenario)
     if not (isinstance(control_steps, int) and control_steps >= 1 and warm_up_days >= 0 and seed >= 0):
         found = f"{control_steps}, {warm_up_days} and {seed}"
         raise PlantError(describe("plant", "control_steps from 1, warm_up_days and seed from 0 on", found))

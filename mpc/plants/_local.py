@@ -43,7 +43,7 @@ class LocalControl:
         self._columns = np.arange(len(response))
         self._known: tuple[Any, ...] = ()
         self._line: tuple[FloatArray, ...] = ()
-        self._start = self._begin = self._end = self._slope = self._offset = np.zeros((0, 0))
+        self._start = self._table = np.zeros((0, 0))
         self.missed = np.zeros(len(response))
 
     @property
@@ -92,9 +92,8 @@ class LocalControl:
 
     def _lines(self, free: FloatArray) -> tuple[FloatArray, ...]:
         """On which line each zone is: where it begins and ends, and its offset and slope."""
-        place = np.add.reduce(self._start[1:-1] < free, axis=0) * free.size + self._columns
-        tables = self._begin, self._end, self._offset, self._slope
-        return tuple(table.take(place) for table in tables)
+        place = np.add.reduce(self._start < free, axis=0) * free.size + self._columns
+        return tuple(self._table.take(place, axis=1))
 
     def learn(self, reached: FloatArray) -> None:
         """Take note of where the zones came to, for what the next step is to make up for.
@@ -125,9 +124,10 @@ class LocalControl:
             np.bincount(zone, AIR_HEAT_CAPACITY * flow * (leaving - end[zone]), system.zone_count)
             for flow, leaving, end in zip(flows, discharge, ends, strict=True)
         ])  # fmt: skip
-        self._start = ends - self._response * heat
-        self._slope = np.diff(ends, axis=0) / np.diff(self._start, axis=0)
-        self._offset = ends[:-1] - self._slope * self._start[:-1]
+        start = ends - self._response * heat
+        slope = np.diff(ends, axis=0) / np.diff(start, axis=0)
         # the outer lines go on for ever
-        self._begin, self._end = self._start[:-1].copy(), self._start[1:].copy()
-        self._begin[0], self._end[-1] = -_ENDLESS, _ENDLESS
+        begin, end = start[:-1].copy(), start[1:].copy()
+        begin[0], end[-1] = -_ENDLESS, _ENDLESS
+        self._start = start[1:-1]
+        self._table = np.stack([t.ravel() for t in (begin, end, ends[:-1] - slope * start[:-1], slope)])

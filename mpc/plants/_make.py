@@ -10,6 +10,7 @@ import pandas as pd
 
 from mpc.errors import PlantError
 from mpc.plants._building import BuildingModel, GridBuilding
+from mpc.plants._extras import RadiantGains, check_extras
 from mpc.plants._noise import SensorNoise
 from mpc.plants._reduced import reduced_building
 from mpc.plants._run import FixedSetpoints
@@ -17,6 +18,7 @@ from mpc.plants._simulated import SimulatedPlant
 from mpc.scenario import (
     CarbonIntensity,
     Forecaster,
+    InternalGains,
     Occupancy,
     StepGrid,
     Tariff,
@@ -29,6 +31,7 @@ from thermal import Building, Case, Simulator, load_case, save_case
 from thermal.effects import Chosen
 from thermal.errors import describe
 from thermal.hvac import HvacSystem
+from thermal.network import Extension
 from thermal.pilot import MOUNTAIN_VIEW, devices, generate_office, generate_weather, size_system
 
 ModelKind = Literal["reduced", "grid", "random"]
@@ -48,12 +51,14 @@ def simulated_plant(
     order: int | None = None,
     system: HvacSystem | None = None,
     occupancy: Occupancy | None = None,
+    gains: InternalGains | None = None,
     tariff: Tariff | None = None,
     carbon: CarbonIntensity | None = None,
     control_steps: int = 1,
     noise: SensorNoise | None = None,
     horizon: int | None = None,
     warm_up_days: int = 1,
+    pressures: bool = False,
     seed: int = 0,
 ) -> SimulatedPlant:
     """Make a plant of a building in one call; `SimulatedPlant` has every choice.
@@ -82,6 +87,8 @@ def simulated_plant(
         Its plant; sized by `thermal.pilot.size_system` by default.
     occupancy : Occupancy, optional
         People; an office's schedule by default.
+    gains : InternalGains, optional
+        Heat of people, light and equipment; an office's, all of it into the air, by default.
     tariff : Tariff, optional
         Prices; those of the paper's simulator by default.
     carbon : CarbonIntensity, optional
@@ -94,6 +101,8 @@ def simulated_plant(
         Steps of the forecasts, perfect ones; none by default.
     warm_up_days : int
         How often the first day is run before the start [d].
+    pressures : bool
+        Whether the pressures of ducts and loop are measured.
     seed : int
         Of all that is random.
 
@@ -105,26 +114,29 @@ def simulated_plant(
     Raises
     ------
     PlantError
-        When the parts do not fit each other, or the kind of model is not known.
+        When the parts do not fit each other, the kind of model is not known, or the building cannot have an effect.
     """
     grid = StepGrid.between(start, end, step_seconds, building)
     scenario = build_scenario(
         building, grid, weather, tariff or paper_tariff(), carbon=carbon or paper_carbon(), occupancy=occupancy,
-        seed=seed,
+        gains=gains, seed=seed,
     )  # fmt: skip
     built: BuildingModel
+    extras: tuple[Extension, ...] = (*effects, RadiantGains()) if scenario.heat.radiates else effects
     if model == "reduced":
-        built = reduced_building(building, parameters, step_seconds=step_seconds, dx=dx, effects=effects, order=order)
+        built = reduced_building(building, parameters, step_seconds=step_seconds, dx=dx, effects=extras, order=order)
     elif model in ("grid", "random"):
         shuffle: Literal["mean", "random"] = "random" if model == "random" else "mean"
         built = GridBuilding(
-            Simulator(building, parameters, step_seconds, dx, shuffle=shuffle, seed=seed, effects=effects)
+            Simulator(building, parameters, step_seconds, dx, shuffle=shuffle, seed=seed, effects=extras)
         )
     else:
         raise PlantError(describe("model", "'reduced', 'grid' or 'random'", repr(model)))
+    check_extras(effects, built.network)
     return SimulatedPlant(
         scenario, system or size_system(building), built, control_steps=control_steps, noise=noise,
-        forecaster=None if horizon is None else Forecaster(scenario, horizon), warm_up_days=warm_up_days, seed=seed,
+        forecaster=None if horizon is None else Forecaster(scenario, horizon), warm_up_days=warm_up_days,
+        pressures=pressures, seed=seed,
     )  # fmt: skip
 
 
@@ -197,6 +209,7 @@ def save_pilot(
     parameters: Mapping[str, float] | None = None,
     noise: SensorNoise | None = None,
     setpoints: Mapping[str, float] | None = None,
+    pressures: bool = False,
     overwrite: bool = False,
 ) -> Case:
     """Run the pilot building in closed loop and save plans, devices and telemetry as a case folder.
@@ -230,6 +243,8 @@ def save_pilot(
         Errors of sensors; the defaults of `SensorNoise` by default.
     setpoints : mapping of str to float, optional
         By kind of action [K] or [Pa]; those of `SimulatedPlant.default_actions` by default.
+    pressures : bool
+        Whether the pressures of ducts and loop are measured; the case is then one of format 2.
     overwrite : bool
         Whether a case that is there already is replaced.
 
@@ -242,7 +257,7 @@ def save_pilot(
     end = (pd.Timestamp(start) + pd.Timedelta(days=days)).isoformat()
     plant = simulated_plant(
         building, pilot_weather(seed, start, days), start, end, model=model, dx=dx, effects=effects,
-        parameters=parameters, noise=noise or SensorNoise(), seed=seed,
+        parameters=parameters, noise=noise or SensorNoise(), pressures=pressures, seed=seed,
     )  # fmt: skip
     plant.reset()
     chosen = dict(plant.default_actions)

@@ -35,6 +35,9 @@ class SensorNoise:
         Handbook, Fundamentals 2017, ch. 37).
     power : float
         Standard deviation of meters as a share of the power [-]; the default is a class 1 meter's (IEC 62053-21).
+    pressure : float
+        Standard deviation of pressure transmitters as a share of the pressure [-]; the default is usual for those of
+        ducts and pumps (accuracy of 1 %).
 
     Raises
     ------
@@ -46,6 +49,7 @@ class SensorNoise:
     resolution: float = 0.02
     flow: float = 0.02
     power: float = 0.01
+    pressure: float = 0.01
 
     def __post_init__(self) -> None:
         for field in fields(self):
@@ -77,7 +81,8 @@ class NoiseSource:
         for k, column in enumerate(self.layout.columns):
             point = split_column(column, "plant")[1]
             quantity = POINT_TYPES[point].quantity
-            by = {"temperature": (noise.temperature, 0.0), "air_flow": (0.0, noise.flow), "power": (0.0, noise.power)}
+            by = {"temperature": (noise.temperature, 0.0), "air_flow": (0.0, noise.flow), "power": (0.0, noise.power),
+                  "pressure": (0.0, noise.pressure)}  # fmt: skip
             if point.endswith("_sensor") and quantity in by:
                 rows.append((k, *by[quantity], quantity == "temperature"))
         index, absolute, relative, stepped = (np.array(v) for v in zip(*rows, strict=True))

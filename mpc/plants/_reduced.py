@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from mpc.errors import PlantError
 from mpc.plants._building import BuildingFlows, BuildingStep
 from thermal import Building, SymbolicModel, build_network, reduced_model
-from thermal.effects import Chosen
 from thermal.errors import describe
 from thermal.model import IMPLICIT_EULER, ModalModel, ReducedModel, modal_model
+from thermal.network import Extension
 from thermal.signals import REFERENCE_TEMPERATURE
 
 FloatArray = NDArray[np.float64]
@@ -164,7 +164,7 @@ def reduced_building(
     *,
     step_seconds: float = 300.0,
     dx: float | None = None,
-    effects: tuple[Chosen, ...] = (),
+    effects: Sequence[Extension] = (),
     order: int | None = None,
     tolerance: float | None = None,
 ) -> ReducedBuilding:
@@ -180,8 +180,8 @@ def reduced_building(
         Time step [s].
     dx : float, optional
         Distance between control volumes of a plan [m].
-    effects : tuple of Chosen
-        What is added to the baseline, `thermal.effects.chosen`; strengths are among the parameters.
+    effects : sequence of Extension
+        What is added to the baseline, `thermal.effects.chosen` or `RadiantGains`; strengths are among the parameters.
     order : int, optional
         Largest number of states.
     tolerance : float, optional

@@ -96,6 +96,9 @@ class Measured:
         self.water_setpoint = self._of(boiler, "supply_water_temperature_setpoint")[:, 0]
         self.gas = self._of(boiler, "gas_power_sensor")[:, 0]
         self.entering = self.supply[:, system.terminals.air_handler]
+        self.static = self._pressure(handlers, "supply_air_static_pressure_sensor", system.static_pressures)
+        usual = (system.loop.pump.differential_pressure,)
+        self.differential = self._pressure((devices.boiler,), "differential_pressure_sensor", usual)[:, 0]
         # what is missing keeps its last value where a replay runs on, and is not compared
         self.running = self.flow > _LEAST_SHARE * system.terminals.design_flow
         of_handler = system.members
@@ -105,6 +108,12 @@ class Measured:
     def power(self, device: str) -> FloatArray:
         """Electric power of a device, shape (n_time,) [W]."""
         return self._of([device], "electrical_power_sensor")[:, 0]
+
+    def _pressure(self, devices: tuple[str, ...], point: str, usual: tuple[float, ...]) -> FloatArray:
+        """Pressures as they were measured, the design ones where they were not, shape (n_time, n_device) [Pa]."""
+        columns = [f"{device}/{point}" for device in devices]
+        frame = self._frame.reindex(columns=columns).ffill().bfill()
+        return np.where(frame.isna(), np.array(usual), np.maximum(frame.to_numpy(dtype=float), 1.0))
 
     def _of(self, devices: tuple[str, ...] | list[str], point: str) -> FloatArray:
         columns = [f"{device}/{point}" for device in devices]
@@ -133,7 +142,11 @@ def replay_plant(
     room : float
         Temperature of the plant room [K].
     """
-    terminals = replay_terminals(system.terminals, seen.damper, seen.valve, seen.entering, seen.water)
+    pump, statics = system.loop.pump, seen.static / np.array(system.static_pressures)
+    terminals = replay_terminals(
+        system.terminals, seen.damper, seen.valve, seen.entering, seen.water,
+        statics[:, system.terminals.air_handler], seen.differential / pump.differential_pressure,
+    )  # fmt: skip
     found = _terminals(seen, terminals, devices)
     heating, drawn = np.zeros(len(seen.water)), terminals.water_flow.sum(axis=1)
     compressors = np.zeros(len(seen.water))
@@ -173,14 +186,15 @@ def _air_handler(
     """Mixing box, coils and fans of an air handler; the heat and the water of its coil, and its compressor's power."""
     handler, flow = system.air_handlers[k], np.where(seen.handling[:, k], seen.supplied[:, k], 0.0)
     on, rate = seen.handling[:, k], AIR_HEAT_CAPACITY * flow
+    static = seen.static[:, k]
     outdoor, setpoint, mixed = seen.outdoor[:, k], seen.supply_setpoint[:, k], seen.mixed[:, k]
     humid = _USUAL_HUMIDITY
     whole = replay_air_handler(
-        handler, flow, seen.returning[:, k], outdoor, setpoint, humid, humid, water=seen.water, ventilation=ventilation
+        handler, flow, seen.returning[:, k], outdoor, setpoint, humid, humid, static, seen.water, ventilation
     )
     # the coils alone: air comes as it was measured behind the mixing box
     closed = replace(handler, economizer=False, minimum_outdoor_share=0.0, minimum_outdoor_flow=0.0, exhaust_fan=None)
-    coils = replay_air_handler(closed, flow, mixed, outdoor, setpoint, humid, humid, water=seen.water)
+    coils = replay_air_handler(closed, flow, mixed, outdoor, setpoint, humid, humid, static, seen.water)
 
     def gap(
         signal: str, model: FloatArray, real: FloatArray, scale: FloatArray | float, handled: FloatArray
@@ -216,7 +230,14 @@ def _hot_water(
     loop, on = system.loop, seen.handling.any(axis=1)
     flow = np.where(on, np.maximum(drawn, 1e-9), 0.0)
     replayed = replay_loop(
-        loop, np.where(on, load, 0.0), flow, seen.water_setpoint, seen.step, float(seen.water[0]), room
+        loop,
+        np.where(on, load, 0.0),
+        flow,
+        seen.water_setpoint,
+        seen.step,
+        float(seen.water[0]),
+        room,
+        seen.differential,
     )
     pumped = np.maximum(flow, loop.pump.minimum_share * loop.pump.design_flow)
     warm = np.where(on, replayed.supply_temperature - seen.water, np.nan)

@@ -94,6 +94,8 @@ class Schedule:
         if self._limit is None or min(scheduled) == 1.0:
             return scheduled, (False,) * len(scheduled)
         beyond = np.maximum(heating - zone, zone - cooling)
+        if beyond[beyond.argmax()] <= 0.0:  # none has drifted at all
+            return scheduled, (False,) * len(scheduled)
         worst = [float(beyond[zones].max()) for zones in self._served]
         now = tuple(w > (0.0 if was else self._limit) for w, was in zip(worst, cycling, strict=True))
         return tuple(max(s, float(c)) for s, c in zip(scheduled, now, strict=True)), now

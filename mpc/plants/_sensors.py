@@ -98,12 +98,20 @@ class Sensors:
         None reads exactly.
     counted : bool
         Whether people are counted.
+    pressures : bool
+        Whether the pressures of ducts and loop are measured.
     """
 
     def __init__(
-        self, system: HvacSystem, devices: PlantDevices, scenario: Scenario, noise: SensorNoise | None, counted: bool
+        self,
+        system: HvacSystem,
+        devices: PlantDevices,
+        scenario: Scenario,
+        noise: SensorNoise | None,
+        counted: bool,
+        pressures: bool = False,
     ) -> None:
-        self._points = HvacPoints(system, devices.terminals, devices.air_handlers, devices.boiler)
+        self._points = HvacPoints(system, devices.terminals, devices.air_handlers, devices.boiler, pressures)
         self._system, self._counted = system, counted
         building = scenario.building
         chiller = [] if devices.chiller is None else [f"{devices.chiller}/electrical_power_sensor"]

@@ -9,24 +9,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mpc.errors import PlantError
+from mpc.plants._extras import ScenarioDrivers
 from mpc.scenario import Scenario
 from thermal.errors import describe
-from thermal.hvac import HvacSystem
+from thermal.hvac import HvacSystem, replay_reheat
 from thermal.network import ThermalNetwork
-from thermal.signals import Drivers, Signal
+from thermal.signals import Signal
 from thermal.units import AIR_HEAT_CAPACITY
 
 FloatArray = NDArray[np.float64]
 
-#: Zone temperature that design capacities of terminals are counted from [K].
-_ROOM = 294.15
+#: Zone, supply air and supply water that design capacities of terminals are counted at [K], those of `Terminals.sized`.
+_ROOM, _SUPPLY, _WATER = 294.15, 285.95, 355.35
 
 
 class _NeedsLoop(PlantError):  # noqa: N818 - control flow within this module, never seen outside
     """A signal asks for what only the running loop knows."""
 
 
-class _InAdvance(Drivers):
+class _InAdvance(ScenarioDrivers):
     """Drivers of a scenario, which does not know what the plant will do."""
 
     def _unknown(self) -> Any:
@@ -53,6 +54,14 @@ class _Now:
         raise _NeedsLoop(name)
 
 
+def _most_heat(system: HvacSystem) -> FloatArray:
+    """Heat that the terminals can bring to their zones at design, shape (n_terminal,) [W]."""
+    terminals, flow = system.terminals, system.terminals.heating_flow
+    entering, wanted = np.full((1, len(flow)), _SUPPLY), np.full((1, len(flow)), terminals.discharge_limit)
+    reached = replay_reheat(terminals, flow[np.newaxis], entering, wanted, np.array([_WATER])).discharge[0]
+    return np.asarray(AIR_HEAT_CAPACITY * flow * np.maximum(reached - _ROOM, 0.0))
+
+
 class EffectSignals:
     """Signals of a network's effects, step by step.
 
@@ -63,7 +72,7 @@ class EffectSignals:
     scenario : Scenario
         Weather and people.
     system : HvacSystem
-        Whose terminals say what the most of air and heat is.
+        Whose terminals say what the most of air and heat is: their design flows, and what their coils give at design.
 
     Raises
     ------
@@ -76,12 +85,10 @@ class EffectSignals:
     def __init__(self, network: ThermalNetwork, scenario: Scenario, system: HvacSystem) -> None:
         self._values = np.zeros((scenario.grid.n_steps, len(network.signals)))
         self._system, terminals = system, system.terminals
-        rate = AIR_HEAT_CAPACITY * terminals.heating_flow
-        most = terminals.design_flow, rate * (terminals.discharge_limit - _ROOM)
-        flow, heat = (system.rooms.T @ value for value in most)
+        flow, heat = (system.rooms.T @ value for value in (terminals.design_flow, _most_heat(system)))
         self._now = _Now(network.zones, flow, heat)
         self._live: list[tuple[int, Signal]] = []
-        drivers = _InAdvance(scenario.driving_case()) if network.signals else None
+        drivers = _InAdvance(scenario.driving_case(), scenario) if network.signals else None
         for k, signal in enumerate(network.signals):
             try:
                 self._values[:, k] = signal.of(drivers)  # type: ignore[arg-type]

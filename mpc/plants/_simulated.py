@@ -13,27 +13,23 @@ from numpy.typing import NDArray
 from mpc.errors import PlantError
 from mpc.kpi import PlantRecord
 from mpc.plants._actuators import SUPPLY_AIR, SUPPLY_WATER, Actuator, actuators_of, checked_actions
-from mpc.plants._building import BuildingModel, zone_response
+from mpc.plants._building import BuildingModel
 from mpc.plants._history import PlantStep, RecentSteps, SystemBalance
-from mpc.plants._inputs import boundary_series, check_parts, sensor_offset
-from mpc.plants._local import LocalControl
+from mpc.plants._inputs import boundary_series, check_parts
+from mpc.plants._loop import LoopState, PlantLoop
 from mpc.plants._noise import SensorNoise
 from mpc.plants._operation import Operation, scheduled_operation, shared_rows
 from mpc.plants._plant import Measurements, need_running
-from mpc.plants._schedule import Schedule
 from mpc.plants._sensors import Sensors, plant_devices
 from mpc.plants._signals import EffectSignals
-from mpc.plants._supply import SupplySetpoints
 from mpc.scenario import Forecast, Forecaster, Scenario
 from thermal import Case, Telemetry
 from thermal.errors import describe
-from thermal.hvac import Conditions, HvacPlant, HvacState, HvacSystem, energy_balance
+from thermal.hvac import HvacSystem, energy_balance
 
 FloatArray = NDArray[np.float64]
 
 _DAY = 86400.0
-_WATER = 320.0  # K, of the loop before a warm-up
-_ZONES = 293.15  # K, of the zones before a warm-up
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,11 +37,7 @@ class _Saved:
     """A plant at some time; the steps are those of a list that only grows."""
 
     number: int
-    building: Any
-    hvac: HvacState
-    cycling: tuple[bool, ...]
-    reading: FloatArray
-    missed: FloatArray
+    loop: LoopState
     first: FloatArray
     seed: int
     drawn: int | None
@@ -85,6 +77,8 @@ class SimulatedPlant:
         how they started.
     count_people : bool
         Whether people in the zones are measured.
+    pressures : bool
+        Whether the pressures of ducts and loop are measured; a case that has them is one of format 2.
     boundaries : mapping of str to float or ndarray, optional
         Temperatures of boundaries beside outdoor, one or one a step [K].
     seed : int
@@ -110,6 +104,7 @@ class SimulatedPlant:
         default_actions: Mapping[str, float] | None = None,
         warm_up_days: int = 1,
         count_people: bool = False,
+        pressures: bool = False,
         boundaries: Mapping[str, float | FloatArray] | None = None,
         seed: int = 0,
     ) -> None:
@@ -129,23 +124,16 @@ class SimulatedPlant:
         )
         self.operation = operation or scheduled_operation(scenario, len(system.air_handlers))
         self.operation.fits(scenario.grid.n_steps, len(scenario.zones), len(system.air_handlers))
-        self._hvac, self._step = HvacPlant(system), float(scenario.grid.step)
-        self._supply = SupplySetpoints(self.devices, system)
-        self._sensors = Sensors(system, self.devices, scenario, noise, count_people)
-        self._signals = EffectSignals(model.network, scenario, system)
-        self._boundary = boundary_series(scenario, model, boundaries or {})
-        self._outdoor = [float(v) for v in scenario.outdoor]
-        self._schedule = Schedule(self.operation, system, scenario.zones)
-        self._offset = sensor_offset(model)
-        self._biased = bool(self._offset.any())
-        rated = system.rooms.T @ system.terminals.design_flow
-        self._local = LocalControl(system, zone_response(model, 1e4 * rated))
+        boundary = boundary_series(scenario, model, boundaries or {})
+        self._loop = PlantLoop(scenario, system, model, self.operation, self.devices, boundary)
+        self._step = float(scenario.grid.step)
+        self._sensors = Sensors(system, self.devices, scenario, noise, count_people, pressures)
+        self._signals = self._given_signals = EffectSignals(model.network, scenario, system)
         self._given, self._gains = scenario, shared_rows(scenario.gains)
         self._drawn: int | None = None
-        self._warm: Any = None
+        self._warm: tuple[LoopState, PlantStep] | None = None
         self._number, self._steps = -1, list[PlantStep]()
-        self._reading = self._first = np.zeros(len(scenario.zones))
-        self._state, self._cycling = self._hvac.start(_WATER), (False,) * len(self.system.air_handlers)
+        self._first = np.zeros(len(scenario.zones))
 
     @property
     def control_step(self) -> float:
@@ -190,12 +178,10 @@ class SimulatedPlant:
                 raise PlantError(describe("seed", "0 or more", repr(seed)))
             self._seed = seed
             self._draw(seed)
-        if self._warm is None:
-            self._warm_up()
-        building, self._state, self._cycling, self._reading, self._local.missed, last = self._warm
-        self.model.restore_state(building)
+        warm, last = self._warmed_up()
+        self._loop.restore(warm)
         self.model.reseed(self._seed)
-        self._first, self._number, self._steps = self._reading - self._offset, 0, []
+        self._first, self._number, self._steps = self._loop.air, 0, []
         return self._seen([last], int(self.scenario.grid.edges[0]))
 
     def step(self, actions: Mapping[str, float]) -> Measurements:
@@ -223,7 +209,8 @@ class SimulatedPlant:
         if self.finished:
             found = f"{self.scenario.grid.n_steps - self._number} of its {self.scenario.grid.n_steps}"
             raise PlantError(describe("scenario", f"{self.control_steps} more steps", found, "make it longer"))
-        fresh = [self._advance(self._number + i, given, self._gains) for i in range(self.control_steps)]
+        first, advance, gains = self._number, self._loop.advance, self._gains
+        fresh = [advance(k, given, gains[k], self._signals) for k in range(first, first + self.control_steps)]
         self._steps += fresh
         self._number += self.control_steps
         return self._seen(fresh, int(self.scenario.grid.edges[self._number]))
@@ -243,10 +230,8 @@ class SimulatedPlant:
     def save_state(self) -> Any:
         """Keep everything that the next steps depend on, and the run so far; for `restore_state`, on this plant."""
         need_running(self._number >= 0)
-        return _Saved(
-            self._number, self.model.save_state(), self._state, self._cycling, self._reading,
-            self._local.missed, self._first, self._seed, self._drawn, self._steps, len(self._steps),
-        )  # fmt: skip
+        steps = self._steps
+        return _Saved(self._number, self._loop.save(), self._first, self._seed, self._drawn, steps, len(steps))
 
     def restore_state(self, saved: Any) -> None:
         """Return to a saved state: what follows is bit for bit what followed then.
@@ -261,12 +246,10 @@ class SimulatedPlant:
         PlantError
             When it is no such state, or that of another building.
         """
-        if not isinstance(saved, _Saved) or len(saved.reading) != len(self.zone_names):
+        if not isinstance(saved, _Saved) or len(saved.first) != len(self.zone_names):
             raise PlantError(describe("state", "what save_state of such a plant gave", type(saved).__name__))
-        self.model.restore_state(saved.building)
-        self._number, self._state, self._cycling = saved.number, saved.hvac, saved.cycling
-        self._reading, self._local.missed, self._first = saved.reading, saved.missed, saved.first
-        self._seed = saved.seed
+        self._loop.restore(saved.loop)
+        self._number, self._first, self._seed = saved.number, saved.first, saved.seed
         self._draw(saved.drawn)
         self._steps = saved.steps[: saved.count]
 
@@ -327,6 +310,9 @@ class SimulatedPlant:
         if seed != self._drawn:
             self.scenario = self._given if seed is None else self._given.redrawn(seed)
             self._gains, self._drawn = shared_rows(self.scenario.gains), seed
+            self._signals = self._given_signals
+            if seed is not None and self.model.network.signals:  # some may be those of people
+                self._signals = EffectSignals(self.model.network, self.scenario, self.system)
 
     def _kept(self) -> list[PlantStep]:
         if not self._steps:
@@ -347,37 +333,14 @@ class SimulatedPlant:
 
         return Measurements(self._sensors.layout, seconds, values)
 
-    def _warm_up(self) -> None:
-        """Run the first day with expected people from a steady state, once for all seeds."""
-        step_count = max(self._warm_up_steps, 1)
-        day = min(round(_DAY / self._step), self.scenario.grid.n_steps)
-        start = np.clip(_ZONES, self.operation.heating[0], self.operation.cooling[0])
-        self._reading = self.model.reset(start, self._boundary[0], self._signals.known(0))
-        self.model.reseed(0)
-        self._state, self._cycling = self._hvac.start(_WATER), (False,) * len(self.system.air_handlers)
-        gains = shared_rows(self.scenario.expected_gains)
-        self._local.missed = np.zeros_like(start)
-        begin = self.model.save_state(), self._state, self._cycling, self._reading, self._local.missed
-        for k in range(step_count):
-            last = self._advance(k % day, self.default_actions, gains)
-        if self._warm_up_steps:
-            begin = self.model.save_state(), self._state, self._cycling, self._reading, self._local.missed
-        self._warm = (*begin, last)
-
-    def _advance(self, k: int, given: Mapping[str, float], gains: list[FloatArray]) -> PlantStep:
-        """Take a step of the scenario."""
-        heating, cooling = self._schedule.setpoints(k, given)
-        runs, self._cycling = self._schedule.runs(k, self._reading, heating, cooling, self._cycling)
-        signals = self._signals.known(k)
-        free = self.model.begin(gains[k], self._boundary[k], signals)
-        actions, reach = self._supply.actions(given, runs, self._schedule.ventilation[k])
-        zone = self._reading
-        if self._local.settles:
-            zone = self._local.settle(free, heating, cooling, actions.supply_air_temperature, reach)
-        conditions = Conditions(zone, heating, cooling, self._outdoor[k])
-        self._state, done = self._hvac.step(self._state, conditions, actions, self._step, self._schedule.set_back[k])
-        heat = self._hvac.heat(done)
-        mean, self._reading = self.model.finish(heat, self._signals.at(k, done.airflow, heat))
-        self._local.learn(self._reading)
-        end = self._reading - self._offset if self._biased else self._reading
-        return PlantStep(k, conditions, actions, done, mean, end)
+    def _warmed_up(self) -> tuple[LoopState, PlantStep]:
+        """State after the first day, run with expected people from a steady state, and its last step; once for all."""
+        if self._warm is None:
+            loop, effects, gains = self._loop, self._given_signals, shared_rows(self._given.expected_gains)
+            day = min(round(_DAY / self._step), self.scenario.grid.n_steps)
+            loop.start(effects.known(0))
+            begin = loop.save()
+            for k in range(max(self._warm_up_steps, 1)):
+                last = loop.advance(k % day, self.default_actions, gains[k % day], effects)
+            self._warm = loop.save() if self._warm_up_steps else begin, last
+        return self._warm

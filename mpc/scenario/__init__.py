@@ -4,7 +4,7 @@ from mpc.scenario._carbon import GAS_CARBON, CarbonIntensity
 from mpc.scenario._comfort import ComfortBand
 from mpc.scenario._forecast import FORECAST_UNITS, Forecast, column_unit
 from mpc.scenario._forecaster import DAY_AHEAD_ERRORS, ErrorGrowth, Forecaster
-from mpc.scenario._gains import InternalGains
+from mpc.scenario._gains import RADIANT_SHARES, InternalGains
 from mpc.scenario._grid import Calendar, StepGrid
 from mpc.scenario._occupancy import (
     OFFICE_AREA_PER_PERSON,
@@ -38,6 +38,7 @@ __all__ = [
     "KILOWATT_HOUR",
     "OFFICE_AREA_PER_PERSON",
     "OFFICE_PRESENCE",
+    "RADIANT_SHARES",
     "WEATHER_POINTS",
     "Calendar",
     "CarbonIntensity",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +12,10 @@ from mpc.errors import ScenarioError
 from thermal.errors import describe
 
 FloatArray = NDArray[np.float64]
+
+#: Shares of an office's gains that radiate [-]: people and equipment with fans by ASHRAE Fundamentals 2017, ch. 18,
+#: table 14; lights as recessed luminaires without lens, the middle of 0.48 to 0.68 in its table 3.
+RADIANT_SHARES: Mapping[str, float] = {"radiant_people": 0.60, "radiant_equipment": 0.10, "radiant_lights": 0.58}
 
 
 @dataclass(frozen=True)
@@ -30,6 +35,9 @@ class InternalGains:
         (Deru et al. 2011, NREL/TP-5500-46861).
     idle_equipment, idle_lights : float
         Share of that while nobody is in, 0 to 1 [-]; defaults from the same buildings' nights.
+    radiant_people, radiant_equipment, radiant_lights : float
+        Share of the sensible heat that radiates to the surfaces, 0 to 1 [-]; by default all of it goes into the air.
+        `RADIANT_SHARES` has an office's.
 
     Raises
     ------
@@ -48,10 +56,13 @@ class InternalGains:
     lights: float = 10.76
     idle_equipment: float = 0.4
     idle_lights: float = 0.05
+    radiant_people: float = 0.0
+    radiant_equipment: float = 0.0
+    radiant_lights: float = 0.0
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
-            if not (np.isfinite(value) and 0 <= value <= (1.0 if name.startswith("idle") else np.inf)):
+            if not (np.isfinite(value) and 0 <= value <= (1.0 if name.startswith(("idle", "radiant")) else np.inf)):
                 raise ScenarioError(describe(f"gains: {name}", "0 or more, shares up to 1", repr(value)))
 
     def heat(self, occupancy: ArrayLike, people: ArrayLike, areas: ArrayLike) -> FloatArray:
@@ -71,13 +82,57 @@ class InternalGains:
         ndarray, shape (n_time, n_zone)
             Positive into the zone [W].
         """
+        return self._weighed(occupancy, people, areas, (1.0, 1.0, 1.0))
+
+    def radiant_heat(self, occupancy: ArrayLike, people: ArrayLike, areas: ArrayLike) -> FloatArray:
+        """Heat that radiates to the surfaces, a part of `heat`.
+
+        Parameters
+        ----------
+        occupancy : array_like, shape (n_time, n_zone)
+            People in each zone [-].
+        people : array_like, shape (n_zone,)
+            People assigned to each zone [-].
+        areas : array_like, shape (n_zone,)
+            Floor areas [m2].
+
+        Returns
+        -------
+        ndarray, shape (n_time, n_zone)
+            Positive into the zone [W].
+
+        Examples
+        --------
+        >>> office = InternalGains(**RADIANT_SHARES)
+        >>> office.radiant_heat([[1.0]], people=[1.0], areas=[18.58]).round(1).tolist()
+        [[180.9]]
+        """
+        return self._weighed(occupancy, people, areas, self._radiant)
+
+    @property
+    def radiates(self) -> bool:
+        """Whether any of the heat radiates."""
+        return any(self._radiant)
+
+    @property
+    def _radiant(self) -> tuple[float, float, float]:
+        return self.radiant_people, self.radiant_equipment, self.radiant_lights
+
+    def _weighed(
+        self, occupancy: ArrayLike, people: ArrayLike, areas: ArrayLike, weights: tuple[float, float, float]
+    ) -> FloatArray:
+        """Add up heat of people, equipment and lights, each by its weight [W]."""
         count, all_in = np.asarray(occupancy, dtype=float), np.asarray(people, dtype=float)
         share = np.divide(count, all_in, out=np.zeros_like(count), where=all_in > 0)
+        of_people, of_equipment, of_lights = weights
         density = sum(
-            power * (idle + (1.0 - idle) * share)
-            for power, idle in ((self.equipment, self.idle_equipment), (self.lights, self.idle_lights))
+            weight * power * (idle + (1.0 - idle) * share)
+            for weight, power, idle in (
+                (of_equipment, self.equipment, self.idle_equipment),
+                (of_lights, self.lights, self.idle_lights),
+            )
         )
-        return np.asarray(count * self.sensible + density * np.asarray(areas, dtype=float))
+        return np.asarray(of_people * count * self.sensible + density * np.asarray(areas, dtype=float))
 
     def moisture_heat(self, occupancy: ArrayLike) -> FloatArray:
         """Latent heat of the people in each zone.

@@ -45,7 +45,7 @@ class Scenario:
     occupancy, expected_occupancy : ndarray, shape (n_steps, n_zone)
         People as they come, and as a forecast may expect them [-].
     gains, expected_gains : ndarray, shape (n_steps, n_zone)
-        Sensible heat of people, light and equipment, into the zone [W].
+        Sensible heat of people, light and equipment, into the zone [W]; `radiant_gains` is the part that radiates.
     latent : ndarray, shape (n_steps, n_zone)
         Latent heat of people [W].
     lower, upper : ndarray, shape (n_steps, n_zone)
@@ -98,6 +98,11 @@ class Scenario:
         drawn = self.people.draw(self.grid, self.zones, seed)
         gains = self.heat.heat(drawn, self.people.people(self.zones), self.areas)
         return replace(self, occupancy=drawn, gains=gains, latent=self.heat.moisture_heat(drawn))
+
+    @cached_property
+    def radiant_gains(self) -> FloatArray:
+        """The part of the gains that radiates to the surfaces, shape (n_steps, n_zone) [W]."""
+        return self.heat.radiant_heat(self.occupancy, self.people.people(self.zones), self.areas)
 
     @property
     def zones(self) -> tuple[str, ...]:

@@ -3,18 +3,10 @@
 from mpc.studies._bound import KnownState
 from mpc.studies._compare import Comparison, compare_controllers
 from mpc.studies._controller import default_horizon, held_space, make_controller, site_points
+from mpc.studies._demo import Demo, run_demo
 from mpc.studies._equip import equip
 from mpc.studies._model import ORDER, control_model
-from mpc.studies._report import (
-    comparison_rows,
-    comparison_summary,
-    comparison_verdict,
-    control_summary,
-    control_verdict,
-    trajectory,
-    write_comparison,
-    write_control,
-)
+from mpc.studies._report import write_comparison, write_control
 from mpc.studies._run import (
     ControllerName,
     ControlRun,
@@ -25,6 +17,8 @@ from mpc.studies._run import (
     run_controller,
 )
 from mpc.studies._study import CONTROL_STEP, HORIZON_HOURS, PlantKind, Study, check_kind, make_study
+from mpc.studies._summaries import comparison_rows, comparison_summary, control_summary, trajectory
+from mpc.studies._verdicts import comparison_verdict, control_verdict
 
 __all__ = [
     "CONTROL_STEP",
@@ -34,6 +28,7 @@ __all__ = [
     "ControlRun",
     "ControllerName",
     "Decision",
+    "Demo",
     "KnownState",
     "PlantKind",
     "Study",
@@ -54,6 +49,7 @@ __all__ = [
     "make_study",
     "prediction_errors",
     "run_controller",
+    "run_demo",
     "site_points",
     "trajectory",
     "write_comparison",

@@ -28,6 +28,7 @@ from mpc.studies._run import AHEAD, ControlRun, compared_decisions
 FloatArray = NDArray[np.float64]
 
 _KILO = 1000.0
+_FELT = 0.1  # K h outside of the band: bars of less are to look like little
 _OTHERS = ("#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 
 #: Colour of each controller, from a palette that the colour-blind can tell apart.
@@ -218,7 +219,9 @@ def cost_bars(runs: Sequence[ControlRun]) -> list[Picture]:
     left.invert_yaxis()
     left.set_xlabel(f"energy cost [{runs[0].study.scenario.currency}]")
     left.legend(loc="lower right", fontsize=8)
-    right.barh(place, [run.kpis.tdis_tot for run in runs], color=WARNING, alpha=0.7)
+    discomfort = [run.kpis.tdis_tot for run in runs]
+    right.barh(place, discomfort, color=WARNING, alpha=0.7)
+    right.set_xlim(0.0, 1.05 * max(_FELT, *discomfort))
     right.set_xlabel("outside of the band, mean zone [K h]")
     return [picture(figure, "Energy cost and discomfort of the controllers")]
 

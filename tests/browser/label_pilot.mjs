@@ -176,6 +176,24 @@ async function hostile() {
   return refusal;
 }
 
+// A report is made, listed with what it found, and opened in a window of its own.
+async function report() {
+  await page.getByRole("button", { name: "Reports" }).click();
+  await page.click("#make-check");
+  const link = page.locator("#reports-body td a", { hasText: "Check" });
+  await link.waitFor({ timeout: 120000 });
+  const found = await page.locator("#reports-body .found").first().textContent();
+  expect(found.startsWith("The case is valid"), `what the check found beside its report, found "${found}"`);
+  await picture("reports");
+  const [opened] = await Promise.all([context.waitForEvent("page"), link.click()]);
+  await opened.waitForSelector("h1");
+  expect(/pilot/.test(await opened.textContent("h1")), "the report of the case");
+  await picture("report", opened);
+  await opened.close();
+  await page.keyboard.press("Escape");
+  return found;
+}
+
 await page.goto(address);
 await page.waitForSelector("#empty:not([hidden])");
 await picture("empty");
@@ -204,11 +222,12 @@ await correct();
 const refusal = await hostile();
 await page.waitForFunction(() => /valid case$/.test(document.getElementById("saved").textContent) && !/not/.test(document.getElementById("saved").textContent), null, { timeout: 30000 });
 await picture("done");
+const checked = await report();
 expect(!faults.length, `no error in the page's console, found ${faults.join("; ")}`);
 await browser.close();
 
 const total = (Date.now() - began) / 1000, devices = Object.keys(truth.devices).length;
 process.stdout.write(JSON.stringify({
   devices, placed: times.length, import_seconds: imported, seconds_per_placement: times.reduce((a, b) => a + b, 0) / times.length, slowest_placement: Math.max(...times),
-  total_seconds: total, seconds_per_device: total / devices, told, refusal,
+  total_seconds: total, seconds_per_device: total / devices, told, refusal, checked,
 }));

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import csv
 import json
+import struct
+import zlib
 from pathlib import Path
 from typing import Any
 
@@ -19,13 +21,13 @@ MARGIN = 40  # px of paper around the building
 
 
 def draw_pilot(
-    folder: Path, *, seed: int = 0, zones: int = 123, floor_area: float = 6317.0, pixel: float = 0.025
+    folder: Path, *, seed: int = 0, zones: int = 123, floor_area: float = 6317.0, floors: int = 2, pixel: float = 0.025
 ) -> dict[str, Any]:
     """Draw each floor as a PNG, write the devices as CSV, and say what is true of them.
 
     The list names the room of each terminal; on the drawings the rooms have no names.
     """
-    plans = generate_office(seed, floor_area=floor_area, zones=zones)
+    plans = generate_office(seed, floor_area=floor_area, zones=zones, floors=floors)
     side = round(plans.cell_size / pixel)
     rooms: dict[str, Any] = {}
     for floor in plans.floors:
@@ -67,3 +69,14 @@ def scale_of(plans: FloorPlans, side: int) -> dict[str, Any]:
     first, last = int(columns[0]), int(columns[-1])
     points = [[MARGIN + first * side, MARGIN + row * side], [MARGIN + (last + 1) * side, MARGIN + row * side]]
     return {"points": points, "distance": (last + 1 - first) * plans.cell_size}
+
+
+def write_bomb(folder: Path) -> None:
+    """Write ``bomb.png``: some hundred bytes that say that they are 90,000 x 90,000 pixels."""
+
+    def chunk(kind: bytes, content: bytes) -> bytes:
+        return struct.pack(">I", len(content)) + kind + content + struct.pack(">I", zlib.crc32(kind + content))
+
+    header = struct.pack(">IIBBBBB", 90_000, 90_000, 8, 0, 0, 0, 0)
+    parts = (chunk(b"IHDR", header), chunk(b"IDAT", zlib.compress(bytes(1000))), chunk(b"IEND", b""))
+    (folder / "bomb.png").write_bytes(b"\x89PNG\r\n\x1a\n" + b"".join(parts))

@@ -15,10 +15,8 @@ import os
 import re
 import shutil
 import signal
-import struct
 import subprocess
 import sys
-import zlib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -34,18 +32,6 @@ CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 MODULES = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "buildingmpc-browser" / "node_modules"
 if CHROMIUM is None or shutil.which("node") is None or not (MODULES / "playwright-core").is_dir():
     pytest.skip("needs chromium and playwright-core: run tests/browser/install.sh", allow_module_level=True)
-
-
-def bomb() -> bytes:
-    """A PNG of some hundred bytes that says it has 90,000 x 90,000 pixels."""
-
-    def chunk(kind: bytes, content: bytes) -> bytes:
-        return struct.pack(">I", len(content)) + kind + content + struct.pack(">I", zlib.crc32(kind + content))
-
-    header = struct.pack(">IIBBBBB", 90_000, 90_000, 8, 0, 0, 0, 0)
-    return (
-        b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(bytes(1000))) + chunk(b"IEND", b"")
-    )
 
 
 def shrink(picture: Path) -> None:
@@ -66,7 +52,7 @@ def truth(tmp_path: Path) -> dict[str, Any]:
     pilot = module_from_spec(spec)
     spec.loader.exec_module(pilot)
     (tmp_path / "drawings").mkdir()
-    (tmp_path / "drawings" / "bomb.png").write_bytes(bomb())
+    pilot.write_bomb(tmp_path / "drawings")
     size = {} if FULL else {"seed": 1, "zones": 12, "floor_area": 600.0, "pixel": 0.05}
     return pilot.draw_pilot(tmp_path / "drawings", **size)  # type: ignore[no-any-return]
 

@@ -16,7 +16,7 @@ from thermal.data import bundled_case_path
 CASE = str(bundled_case_path())
 EPILOGS = (
     *("check", "simulate", "evaluate", "calibrate", "diagnose", "demo", "doctor", "import-plan", "import-devices"),
-    *("control", "compare", "serve", "label"),
+    *("control", "compare", "serve", "label", "import-telemetry"),
 )
 
 
@@ -235,11 +235,3 @@ def test_doctor_reports_what_is_broken(monkeypatch: pytest.MonkeyPatch) -> None:
     answer = run("doctor")
     assert answer.exit_code == 1
     assert "ImportError: no module named casadi" in answer.stdout and "FAILED" in answer.stdout
-
-
-def test_demo(tmp_path: Path) -> None:
-    answer = run("demo", "--out", tmp_path / "demo")
-    assert (answer.exit_code, answer.stderr) == (0, "")
-    for text in ("The bundled case", "The case is valid", "on data it was not fitted to", "Solve_Succeeded"):
-        assert text in answer.stdout
-    assert f"Report: {tmp_path / 'demo' / 'report.html'}" in answer.stdout

@@ -94,3 +94,87 @@ def test_bad_lists_are_refused_by_name(drawings: Path, tmp_path: Path, old: str,
     assert (answer.exit_code, answer.stdout) == (2, "")
     assert answer.stderr.startswith(f"error: {error}: ")
     assert not (tmp_path / "case").exists()
+
+
+@pytest.fixture
+def case(drawings: Path, tmp_path: Path) -> Path:
+    """Three rooms with terminals in two of them, without telemetry."""
+    devices = tmp_path / "devices.csv"
+    assert run("import-plan", drawings, "--devices", devices, "--out", tmp_path / "case").exit_code == 0
+    return tmp_path / "case"
+
+
+@pytest.fixture
+def export(tmp_path: Path) -> Path:
+    """Ten minutes of a building automation system, in its own names and units."""
+    rows = (
+        "timestamp,V1 zat,V1 airflow,lights,V1 zn t",
+        "2023-01-09T00:05:00-08:00,68,100,7,1",
+        "2023-01-09T00:10:00-08:00,,,7,1",
+    )
+    (tmp_path / "export.csv").write_text("\n".join(rows), encoding="utf-8")
+    return tmp_path / "export.csv"
+
+
+def test_telemetry_of_any_names_and_units(case: Path, export: Path, tmp_path: Path) -> None:
+    from thermal import load_case
+    from thermal.units import air_density
+
+    units = ("--unit", "zone_air_temperature_sensor=degF", "--unit", "supply_air_flowrate_sensor=cfm")
+    answer = run("import-telemetry", case, export, *units, "--out", tmp_path / "new")
+    assert (answer.exit_code, answer.stderr) == (0, "")
+    assert "2 of 4 columns matched" in answer.stdout and "fits as well" in answer.stdout
+    frame = load_case(tmp_path / "new").telemetry.frame
+    assert frame["V1/zone_air_temperature_sensor"].iloc[0] == pytest.approx(293.15)
+    cubic_metres = 100 * 0.3048**3 / 60
+    assert frame["V1/supply_air_flowrate_sensor"].iloc[0] == pytest.approx(cubic_metres * air_density(20.0), rel=1e-3)
+    assert run("check", tmp_path / "new").exit_code == 0
+
+    points = tmp_path / "new" / "points.csv"
+    text = points.read_text(encoding="utf-8")
+    points.write_text(text.replace("V1 airflow,V1,supply_air_flowrate_sensor", "V1 airflow,,"), encoding="utf-8")
+    answer = run("import-telemetry", case, export, "--points", points, "--out", tmp_path / "less", "--json")
+    assert answer.exit_code == 0 and json.loads(answer.stdout)["columns"] == 1
+
+
+@pytest.mark.parametrize(
+    ("points", "more", "error"),
+    [
+        ("column,entity\nV1 zat,V1", (), "PointListError"),
+        ("column,entity,point\n,V1,zone_air_temperature_sensor", (), "PointListError"),
+        ("column,entity,point\nV1 zat,,", (), "PointListError"),
+        ("column,entity,point\nnone,V1,zone_air_temperature_sensor", (), "PointListError"),
+        ("column,entity,point\nV1 zat,V1,zone_air_temprature_sensor", (), "UnknownPointError"),
+        ("column,entity,point\nV1 zat,V9,zone_air_temperature_sensor", (), "UnknownEntityError"),
+        ("column,entity,point\nV1 zat,V1,zone_air_temperature_sensor", ("--unit", "degF"), "PointListError"),
+        (
+            "column,entity,point\nV1 zat,V1,zone_air_temperature_sensor",
+            ("--unit", "zone_air_temperature_sensor=W"),
+            "IncompatibleUnitError",
+        ),
+    ],
+)
+def test_bad_points_are_refused_by_name(
+    case: Path, export: Path, tmp_path: Path, points: str, more: tuple[str, ...], error: str
+) -> None:
+    (tmp_path / "points.csv").write_text(points, encoding="utf-8")
+    given = ("--points", tmp_path / "points.csv", *more)
+    answer = run("import-telemetry", case, export, *given, "--out", tmp_path / "new")
+    assert (answer.exit_code, answer.stdout) == (2, "")
+    assert answer.stderr.startswith(f"error: {error}: ")
+    assert not (tmp_path / "new").exists()
+
+
+def test_work_on_a_case_is_not_lost_by_the_way(drawings: Path, case: Path, export: Path, tmp_path: Path) -> None:
+    (case / "labelling").mkdir()
+    draft = {"devices": [{"x": 1.0}, {"x": None}], "floors": [{}, {}], "seconds": 600.0}
+    (case / "labelling" / "labelling.json").write_text(json.dumps(draft), encoding="utf-8")
+    assert run("import-telemetry", case, export, "--out", case, "--force").exit_code == 0
+    assert json.loads((case / "labelling" / "labelling.json").read_text(encoding="utf-8")) == draft
+    answer = run("import-plan", drawings, "--out", case)
+    assert answer.exit_code == 2 and answer.stderr.startswith("error: LostWorkError: ")
+    for text in ("10 minutes of work", "2 floors", "1 devices put", "4 devices", "telemetry of 2 columns", "--force"):
+        assert text in answer.stderr
+    answer = run("import-plan", drawings, "--out", case, "--force")
+    assert answer.exit_code == 0 and "Replaced: 10 minutes of work" in answer.stdout
+    assert not (case / "labelling").exists()

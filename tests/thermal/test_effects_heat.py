@@ -380,6 +380,7 @@ def test_every_effect_of_heat_is_worked_out_here_or_with_the_meters() -> None:
     with_the_meters = {
         "hidden_mass",
         "clock_shift",
+        "wrong_station",
         "flow_gain",
         "duct_loss",
         "capacity_limit",

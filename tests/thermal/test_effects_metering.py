@@ -150,14 +150,29 @@ def test_hidden_mass_is_a_second_node(lively_case: CaseOf) -> None:
     assert capacity[node] == pytest.approx(stored)
 
 
-def signal_heat(case: Case, effect: str, zone: str, **values: float) -> FloatArray:
+def signal_heat(case: Case, effect: str, zone: str, drivers: Drivers | None = None, **values: float) -> FloatArray:
     """Heat that an effect of signals alone brings to a zone at every stamp [W]."""
     network = build_network(case.building, effects=chosen([effect]))
     flow = SymbolicModel(network).matrices(network.values(values)).flow
     zero = SymbolicModel(network).matrices(network.start()).flow
     brought = -np.asarray((flow - zero)[:, network.n_node + len(network.boundaries) :].todense())
     mine = network.zone == network.zones.index(zone)
-    return np.asarray(brought[mine].sum(axis=0)).ravel() @ signal_values(network.signals, Drivers(case)).T
+    return np.asarray(brought[mine].sum(axis=0)).ravel() @ signal_values(network.signals, drivers or Drivers(case)).T
+
+
+def test_a_window_that_is_seen_open(lively_case: CaseOf) -> None:
+    # ρ c A ½ (0.001 v² + 0.0035 h |ΔT| + 0.01)^½ (T_out - T), h = 1 m, while it stands open
+    case = lively_case("plan")
+    drivers = Drivers(case)
+    drivers.openings = np.zeros((len(case.stamps), len(drivers.zones)))
+    drivers.openings[70:90, drivers.zones.index("A")] = 1.0
+    difference = drivers.outdoor - drivers.usual[:, drivers.zones.index("A")]
+    speed = 0.5 * np.sqrt(0.001 * drivers.wind**2 + 0.0035 * np.abs(difference) + 0.01)
+    expected = air_density(690.0) * AIR_HEAT_CAPACITY * 0.7 * speed * difference
+    expected[:70] = expected[90:] = 0.0
+    areas = {"opened_window_area@A": 0.7, "opened_window_area@B": 0.7}
+    assert signal_heat(case, "window_opening", "A", drivers, **areas) == pytest.approx(expected)
+    assert signal_heat(case, "window_opening", "B", drivers, **areas) == pytest.approx(0.0 * expected)
 
 
 def test_a_heat_meter_that_reads_low(lively_case: CaseOf) -> None:
@@ -240,6 +255,27 @@ def test_a_weather_clock_that_is_off_moves_all_that_outdoor_air_touches(lively_c
         + [s.name for s in network.signals].index("change of outdoor temperature")
     )
     assert np.abs((flow[:, column] + 0.5 * flow[:, network.n_node]).toarray()).max() < 1e-9
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_station_elsewhere_reads_too_high_for_all_that_outdoor_air_touches(lively_case: CaseOf, kind: str) -> None:
+    case = lively_case(kind)
+    ids = ("wrong_station", "infiltration", "thermal_bridge")
+    network = build_network(case.building, effects=chosen(ids))
+    theta = network.values({
+        "station_offset": 1.5, "station_swing": -0.2, "infiltration_rate": 0.3, "thermal_bridge_u_value": 0.2,
+    })  # fmt: skip
+    flow = SymbolicModel(network).matrices(theta).flow.tocsc()
+    first, names = network.n_node + len(network.boundaries), [s.name for s in network.signals]
+    for name, factor in (("constant", 1.5), ("outdoor temperature about its day's mean", -0.2)):
+        column = first + names.index(name)
+        assert np.abs((flow[:, column] + factor * flow[:, network.n_node]).toarray()).max() < 1e-9
+    daily = next(s for s in network.signals if s.name == "outdoor temperature about its day's mean")
+    drivers = Drivers(case)
+    drivers.outdoor = 280.0 + 4.0 * np.sin(2.0 * np.pi * np.arange(len(case.stamps)) * case.step / 86400.0)
+    day = round(86400.0 / case.step)
+    inner = slice(day, len(case.stamps) - day)
+    assert np.abs(daily.of(drivers)[inner] - (drivers.outdoor - 280.0)[inner]).max() < 0.05
 
 
 def test_the_modes_read_the_sensor(lively_case: CaseOf) -> None:

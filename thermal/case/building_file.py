@@ -76,10 +76,10 @@ def read_building_file(folder: Path) -> schema.BuildingFile:
     content = _read_yaml(folder)
     number = content.get("format")
     if "format" not in content:
-        raise MissingKeyError(describe(f"{NAME}: format", "1", "no such key", "add 'format: 1'"))
-    if number != 1 or isinstance(number, bool):
+        raise MissingKeyError(describe(f"{NAME}: format", "1 or 2", "no such key", "add 'format: 1'"))
+    if type(number) is not int or number not in (1, 2):
         advice = "use a library that reads this format, or migrate the case"
-        raise UnsupportedFormatError(describe(f"{NAME}: format", "1", repr(number), advice))
+        raise UnsupportedFormatError(describe(f"{NAME}: format", "1 or 2", repr(number), advice))
     try:
         parsed = schema.BuildingFile.model_validate(content)
     except ValidationError as error:

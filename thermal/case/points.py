@@ -63,9 +63,17 @@ _TABLE: tuple[tuple[str, str, float, float, str], ...] = (
     ("diffuse_horizontal_irradiance_sensor", "irradiance", -30.0, 1500.0, "diffuse sun on the horizontal"),
     ("global_horizontal_irradiance_sensor", "irradiance", -30.0, 1700.0, "all sun on the horizontal"),
     ("horizontal_infrared_irradiance_sensor", "irradiance", 50.0, 700.0, "longwave from the sky"),
+    # since format 2; transmitters may read a little below zero
+    ("supply_air_static_pressure_setpoint", "pressure", -50.0, 3e3, "setpoint of the duct's static pressure"),
+    ("supply_air_static_pressure_sensor", "pressure", -50.0, 3e3, "static pressure in the duct"),
+    ("differential_pressure_setpoint", "pressure", -5e3, 1e6, "setpoint of the water's differential pressure"),
+    ("differential_pressure_sensor", "pressure", -5e3, 1e6, "differential pressure of the water"),
 )
 
 POINT_TYPES: dict[str, PointType] = {row[0]: PointType(*row) for row in _TABLE}
+
+#: Point types that came with the second number of the format; a case that has none of them is written as format 1.
+SINCE_FORMAT_2 = frozenset(name for name, point in POINT_TYPES.items() if point.quantity == "pressure")
 
 ZONE_TEMPERATURE = "zone_air_temperature_sensor"
 OUTDOOR_TEMPERATURE = "outside_air_temperature_sensor"

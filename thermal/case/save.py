@@ -18,12 +18,11 @@ from thermal.case.building import Building, FloorPlan, FloorPlans
 from thermal.case.building_file import NAME
 from thermal.case.case import Case
 from thermal.case.load import load_case
-from thermal.case.points import POINT_TYPES, split_column
+from thermal.case.points import POINT_TYPES, SINCE_FORMAT_2, split_column
 from thermal.case.telemetry import Telemetry
 from thermal.errors import CaseExistsError, describe
 from thermal.units import QUANTITIES, from_si
 
-FORMAT = 1
 TELEMETRY_FILE = "telemetry.parquet"
 
 
@@ -125,7 +124,7 @@ def _write_plan(floor: FloorPlan, path: Path) -> None:
 def _content(building: Building, frame: pd.DataFrame) -> dict[str, Any]:
     points = dict.fromkeys(split_column(str(column), TELEMETRY_FILE)[1] for column in frame.columns)
     return {
-        "format": FORMAT,
+        "format": 2 if SINCE_FORMAT_2 & points.keys() else 1,
         "name": building.name,
         "location": building.location.model_dump(),
         "orientation": building.orientation,

@@ -180,7 +180,7 @@ class BuildingFile(_Entry):
     Parameters
     ----------
     format
-        Version of the case format.
+        Version of the case format; 2 has points of pressure beside those of 1, and nothing else is new.
     name
         Of the case.
     location
@@ -207,7 +207,7 @@ class BuildingFile(_Entry):
         The zone table.
     """
 
-    format: Literal[1]
+    format: Literal[1, 2]
     name: Text
     location: Location
     orientation: Azimuth = 0.0

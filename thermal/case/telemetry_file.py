@@ -32,7 +32,9 @@ MISSING = frozenset({"", "nan", "na", "n/a", "null", "none", "<na>"})  # in a CS
 _OFFSET = re.compile(r"(?:[zZ]|[+-]\d{2}:?\d{2}(?::\d{2})?|[+-]\d{2})$")
 
 
-def read_telemetry(path: Path, units: Mapping[str, str], location: Location) -> Telemetry:
+def read_telemetry(
+    path: Path, units: Mapping[str, str], location: Location, names: Mapping[str, str] | None = None
+) -> Telemetry:
     """Read a telemetry file.
 
     Parameters
@@ -43,6 +45,8 @@ def read_telemetry(path: Path, units: Mapping[str, str], location: Location) -> 
         Unit of each point type in the file.
     location
         Site: its time zone is the telemetry's, its elevation gives the density for volume flows.
+    names
+        Columns to read, and what they are in the case format; by default all, as they are.
 
     Returns
     -------
@@ -57,6 +61,9 @@ def read_telemetry(path: Path, units: Mapping[str, str], location: Location) -> 
     if path.suffix.lower() not in SUFFIXES:
         raise UnknownFileTypeError(describe("building.yaml: telemetry", "a .parquet or a .csv file", repr(path.name)))
     raw = _read_csv(path) if path.suffix.lower() == ".csv" else _read_parquet(path)
+    if names is not None:
+        raw = raw.loc[:, [str(column) in names for column in raw.columns]]
+        raw = raw.set_axis([names[str(column)] for column in raw.columns], axis=1)
     if isinstance(raw.index, pd.DatetimeIndex) and raw.index.tz is not None:
         raw = raw.tz_convert(location.timezone)
     columns = [str(column) for column in raw.columns]

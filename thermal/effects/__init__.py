@@ -8,7 +8,7 @@ from thermal.effects._air import INFILTRATION, THERMAL_BRIDGE, WINDOW_OPENING, Z
 from thermal.effects._effect import CONSTANT, PAIR, Chosen, Effect, Joining, shape, strength
 from thermal.effects._metering import CAPACITY_LIMIT, DUCT_LOSS, FLOW_GAIN, SENSOR_BIAS, SENSOR_LAG, VALVE_LEAK
 from thermal.effects._next_door import GROUND_EXCHANGE, HIDDEN_MASS, INTERFLOOR_EXCHANGE, NEIGHBOUR, ROOF_EXCHANGE
-from thermal.effects._outside import LONGWAVE_SKY, WIND_FILM
+from thermal.effects._outside import LONGWAVE_SKY, WIND_FILM, WRONG_STATION
 from thermal.effects._people import CLOCK_SHIFT, INTERNAL_GAINS, LATENT_LOAD
 from thermal.effects._sun import BLINDS, SOLAR_GAIN, SOLAR_OPAQUE
 from thermal.effects._words import catalogue_table
@@ -20,7 +20,8 @@ CATALOGUE: dict[str, Effect] = {
     for e in (
         ROOF_EXCHANGE, SOLAR_GAIN, BLINDS, SOLAR_OPAQUE, LONGWAVE_SKY, WIND_FILM, INFILTRATION, THERMAL_BRIDGE,
         WINDOW_OPENING, INTERNAL_GAINS, LATENT_LOAD, INTERFLOOR_EXCHANGE, GROUND_EXCHANGE, NEIGHBOUR, HIDDEN_MASS,
-        ZONE_MIXING, CLOCK_SHIFT, FLOW_GAIN, DUCT_LOSS, CAPACITY_LIMIT, VALVE_LEAK, SENSOR_BIAS, SENSOR_LAG,
+        ZONE_MIXING, WRONG_STATION, CLOCK_SHIFT, FLOW_GAIN, DUCT_LOSS, CAPACITY_LIMIT, VALVE_LEAK, SENSOR_BIAS,
+        SENSOR_LAG,
     )
 }  # fmt: skip
 

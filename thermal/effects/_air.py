@@ -44,6 +44,11 @@ def _by_opening(drivers: Drivers, zone: str) -> FloatArray:
     return (drivers.occupancy * mild - _OPEN) * _out(drivers, zone)
 
 
+def _by_hand(drivers: Drivers, zone: str) -> FloatArray:
+    k = drivers.zones.index(zone)
+    return np.asarray(drivers.openings[:, k] * drivers.through_windows[:, k])
+
+
 def _by_presence(drivers: Drivers, first: str, second: str) -> FloatArray:
     usual = [drivers.usual[:, drivers.zones.index(z)] for z in (first, second)]
     return np.asarray((drivers.occupancy - _PRESENCE) * (usual[1] - usual[0]))
@@ -83,10 +88,12 @@ def _build_bridge(join: Joining) -> None:
 
 
 def _build_opening(join: Joining) -> None:
-    rate = join.parameter("window_opening_rate")
+    rate, heat = join.parameter("window_opening_rate"), join.anatomy.air_heat_capacity
     for room in _exposed(join):
         varying = Signal(f"open windows of {room.name}", "K", partial(_by_opening, zone=room.name))
         _exchange(join, room, rate, _OPEN, varying)
+        seen = Signal(f"windows seen open in {room.name}", "K*m/s", partial(_by_hand, zone=room.name))
+        join.heat_air(room, join.parameter("opened_window_area", zone=room.name), seen, heat)
 
 
 def _build_mixing(join: Joining) -> None:
@@ -141,14 +148,20 @@ THERMAL_BRIDGE = Effect(
 
 WINDOW_OPENING = Effect(
     id="window_opening",
-    title="windows opened when it is mild",
-    equation="ρ c V n occ(t) m(T_out) (T_out - T), m from 0 at 12 to 1 at 22 degC",
-    source="Rijal et al. (2007), doi:10.1016/j.enbuild.2007.02.003 (opening rises with outdoor temperature)",
+    title="windows that people open",
+    equation="ρ c (V n occ(t) m(T_out) + A_w o(t) ½ (0.001 v² + 0.0035 |ΔT| + 0.01)^½) (T_out - T), "
+    "m from 0 at 12 to 1 at 22 degC, o when one is seen to stand open",
+    source="Rijal et al. (2007), doi:10.1016/j.enbuild.2007.02.003 (opening rises with outdoor temperature); "
+    "de Gids and Phaff (1982) (flow through one open window)",
     acts_on="air of the zones with exterior walls",
-    confounders=("infiltration", "internal_gains"),
+    confounders=("infiltration", "internal_gains", "capacity_limit"),
     separated_by="window contacts; mild and cold days",
-    parameters=(strength("window_opening_rate", "1/h", 6.0, "single-sided ventilation: CIBSE AM10", "window_opening"),),
+    parameters=(
+        strength("window_opening_rate", "1/h", 6.0, "single-sided ventilation: CIBSE AM10", "window_opening"),
+        strength("opened_window_area", "m^2", 4.0, "a few casements: de Gids and Phaff (1982)", "window_opening"),
+    ),
     build=_build_opening,
+    zonal=True,
     applies=without_facades,
 )
 

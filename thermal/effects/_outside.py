@@ -1,13 +1,14 @@
-"""Cold sky, and wind on the outside film."""
+"""Cold sky, wind on the outside film, and weather that is measured elsewhere."""
 
 from __future__ import annotations
 
 from functools import partial
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
-from thermal.effects._effect import Effect, Joining, strength
+from thermal.effects._effect import CONSTANT, Effect, Joining, strength
 from thermal.network import Anatomy
 from thermal.signals import INFRARED, WIND, Drivers, Signal
 
@@ -41,6 +42,21 @@ def _build_film(join: Joining) -> None:
         join.graph.source(join.key(), value, faces.node, signal, faces.area)
 
 
+def _swing(drivers: Drivers) -> FloatArray:
+    """Outdoor temperature about its mean over the day around each step [K]."""
+    day = max(1, round(86400.0 / drivers.case.step))
+    outdoor = pd.Series(drivers.outdoor)
+    return np.asarray(outdoor - outdoor.rolling(day, center=True, min_periods=1).mean())
+
+
+def _build_station(join: Joining) -> None:
+    offset, swing = join.parameter("station_offset"), join.parameter("station_swing")
+    daily = Signal("outdoor temperature about its day's mean", "K", _swing)
+    for value, _, node, weight in join.graph.touching(np.array([join.graph.boundary("outdoor")])):
+        join.graph.source(join.key(), -offset * value, node, CONSTANT, weight)
+        join.graph.source(join.key(), -swing * value, node, daily, weight)
+
+
 def _no_faces(anatomy: Anatomy) -> str | None:
     return None if anatomy.outer else "the building has no surfaces to outdoor"
 
@@ -70,5 +86,21 @@ WIND_FILM = Effect(
     parameters=(strength("wind_film_slope", "W*s/m^3/K", 6.0, "2 to 6 (McAdams 1954; ISO 6946)", "wind_film"),),
     build=_build_film,
     needs=(WIND,),
+    applies=_no_faces,
+)
+
+WRONG_STATION = Effect(
+    id="wrong_station",
+    title="weather that is measured elsewhere",
+    equation="-κ A (b_o + s_o (T_out - daily mean))",
+    source="Oke (1982), doi:10.1002/qj.49710845502 (town and country differ by night); WMO-No. 8 (siting, shelter)",
+    acts_on="whatever touches the outdoor air",
+    confounders=("longwave_sky", "ground_exchange", "thermal_bridge", "solar_opaque"),
+    separated_by="a second thermometer in the shade of the building",
+    parameters=(
+        strength("station_offset", "K", 4.0, "plus or minus 4 K: Oke (1982)", "wrong_station", -4.0),
+        strength("station_swing", "1", 0.5, "swings of sheltered and sunlit sites", "wrong_station", -0.5),
+    ),
+    build=_build_station,
     applies=_no_faces,
 )

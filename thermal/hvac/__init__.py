@@ -7,6 +7,9 @@ from thermal.hvac._boiler import BoilerLoop, Heated, Pump
 from thermal.hvac._coil import WaterCoil
 from thermal.hvac._cooling import Cooled, CoolingCoil
 from thermal.hvac._curves import (
+    CHILLER_CAPACITY,
+    CHILLER_INPUT,
+    CHILLER_PART_LOAD,
     CONDENSING_BOILER,
     CONSTANT_EFFICIENCY,
     DX_CAPACITY,
@@ -37,6 +40,9 @@ from thermal.hvac._terminals import Terminals
 from thermal.hvac._thermostat import Mode, Thermostat
 
 __all__ = [
+    "CHILLER_CAPACITY",
+    "CHILLER_INPUT",
+    "CHILLER_PART_LOAD",
     "CONDENSING_BOILER",
     "CONSTANT_EFFICIENCY",
     "DX_CAPACITY",

@@ -185,13 +185,13 @@ class WaterSide(NamedTuple):
         Heat capacity rate [W/K].
     resistance : Value
         1/hA of the film [K/W].
-    curve : Characteristic
+    curve : _Characteristic
         That follows from both.
     """
 
     rate: Value
     resistance: Value
-    curve: Characteristic
+    curve: _Characteristic
 
 
 def water_side(ops: Operations, rate: Value, film: Value, share: Value) -> WaterSide:
@@ -230,7 +230,7 @@ def coil_conductance(ops: Operations, air_rate: Value, air_resistance: Value, wa
     return _effectiveness(ops, transfer_units, least / most) * least
 
 
-class Characteristic(NamedTuple):
+class _Characteristic(NamedTuple):
     """How a coil's heat goes with its water, per conductance of the open coil.
 
     Parameters
@@ -243,7 +243,7 @@ class Characteristic(NamedTuple):
     slope: Value
 
 
-def _characteristic(ops: Operations, water_rate: Value, water_resistance: Value) -> Characteristic:
+def _characteristic(ops: Operations, water_rate: Value, water_resistance: Value) -> _Characteristic:
     """Derive how a coil's heat goes with its water from what is known of both ends.
 
     At full flow S is the relative change of heat by that of water. With mean temperatures of air and water ``1/G =
@@ -262,10 +262,10 @@ def _characteristic(ops: Operations, water_rate: Value, water_resistance: Value)
     """
     full = ops.maximum(1.0 / water_rate, 0.6 / water_rate + 0.85 * water_resistance, 1e-5)
     little = -1.0 / (water_rate * ops.expm1(-_LITTLE_NTU / (water_resistance * water_rate)))
-    return Characteristic(little, full - little)
+    return _Characteristic(little, full - little)
 
 
-def water_share(throttled: Value, conductance: Value, curve: Characteristic) -> Value:
+def water_share(throttled: Value, conductance: Value, curve: _Characteristic) -> Value:
     """Share of the full water flow [-] at which a coil has a conductance below that of the open valve.
 
     With r the one over the other: ``phi = S r / (1 - r + S r)``, the form of Petitjean, Total Hydronic Balancing
@@ -276,14 +276,14 @@ def water_share(throttled: Value, conductance: Value, curve: Characteristic) -> 
     ----------
     throttled, conductance : Value
         Of the coil with its valve as it stands, and open [W/K].
-    curve : Characteristic
+    curve : _Characteristic
         Of its water side.
     """
     part = (curve.offset * conductance + curve.slope * throttled) * throttled  # G S r
     return part / (conductance - throttled + part)
 
 
-def heat_share(ops: Operations, flow_share: Value, conductance: Value, curve: Characteristic) -> Value:
+def heat_share(ops: Operations, flow_share: Value, conductance: Value, curve: _Characteristic) -> Value:
     """Inverse of `water_share`: share of the full heat [-] at a share of the full water flow [-]."""
     first, second = conductance * curve.offset, conductance * curve.slope
     linear = first + flow_share * (1.0 - first)

@@ -8,7 +8,17 @@ from typing import NamedTuple
 from thermal.errors import HvacParameterError, describe
 from thermal.hvac._air import EVAPORATION_HEAT, dew_point, saturation_humidity, wet_bulb
 from thermal.hvac._checks import fields_in_range
-from thermal.hvac._curves import DX_CAPACITY, DX_INPUT, DX_PART_LOAD, Biquadratic, Polynomial, celsius
+from thermal.hvac._curves import (
+    CHILLER_CAPACITY,
+    CHILLER_INPUT,
+    CHILLER_PART_LOAD,
+    DX_CAPACITY,
+    DX_INPUT,
+    DX_PART_LOAD,
+    Biquadratic,
+    Polynomial,
+    celsius,
+)
 from thermal.hvac._operations import Operations, Value
 from thermal.units import AIR_HEAT_CAPACITY
 
@@ -111,6 +121,41 @@ class CoolingCoil:
                     "chilled_water": ("K", 268.15, 293.15),
                 },
             )
+
+    @classmethod
+    def chilled(
+        cls, capacity: float, cop: float = 3.0, *, chilled_water: float = 279.82, auxiliaries: float = 0.05
+    ) -> CoolingCoil:
+        """Make a coil of an air-cooled reciprocating chiller, whose COP goes with outdoor temperature and part load.
+
+        Parameters
+        ----------
+        capacity : float
+            Cooling at 6.67 degC of chilled water and 29.4 degC outdoors [W], positive.
+        cop : float
+            Coefficient of performance there [-], 1 to 10; the default is near ASHRAE 90.1-2016's least (table 6.8.1-3,
+            2.985).
+        chilled_water : float
+            Temperature of the chilled water [K]; the default is the rated one.
+        auxiliaries : float
+            Electric power of condenser fans and chilled-water pump per cooling [-]; the default has the 0.035 of
+            EnergyPlus' template for the fans, and a pump.
+
+        Returns
+        -------
+        CoolingCoil
+            With the curves `CHILLER_CAPACITY`, `CHILLER_INPUT` and `CHILLER_PART_LOAD`; the coil's surface is no colder
+            than the water.
+
+        Examples
+        --------
+        >>> CoolingCoil.chilled(50_000.0).part_load.lowest
+        0.25
+        """
+        return cls(
+            capacity, cop, coldest=chilled_water, chilled_water=chilled_water, auxiliaries=auxiliaries,
+            capacity_curve=CHILLER_CAPACITY, input_curve=CHILLER_INPUT, part_load=CHILLER_PART_LOAD,
+        )  # fmt: skip
 
     def cool(
         self, ops: Operations, flow: Value, temperature: Value, humidity: Value, target: Value, outdoor: Value

@@ -100,6 +100,20 @@ DX_INPUT = Biquadratic(
 )  # fmt: skip
 #: Energy input over part load [-]: that of the Medium Office's coil, which loses nothing at part load.
 DX_PART_LOAD = Polynomial((0.0, 1.0), 0.0, 1.0, _OFFICE + "Medium Office: No_PLR_Degredation")
+_CHILLER = "EnergyPlus ExpandObjects, HVACTemplate:Plant:Chiller, reciprocating (those of DOE-2.1E): Recip"
+_CHILLED, _CONDENSER = (5.0, 10.0), (24.0, 35.0)  # degC
+
+#: Capacity over that at 6.67 degC of chilled water and 29.4 degC at the condenser [-] of a reciprocating chiller; x
+#: chilled water, y air at the condenser [degC].
+CHILLER_CAPACITY = Biquadratic(
+    (0.507883, 0.145228, -0.00625644, -0.0011178, -0.0001296, -0.00028188), _CHILLED, _CONDENSER, _CHILLER + "CapFT"
+)
+#: Energy input ratio over the rated one [-] of the same chiller; x chilled water, y air at the condenser [degC].
+CHILLER_INPUT = Biquadratic(
+    (1.03076, -0.103536, 0.00710208, 0.0093186, 0.00031752, -0.00104328), _CHILLED, _CONDENSER, _CHILLER + "EIRFT"
+)
+#: Its energy input over that at full load [-], by part load; below a quarter, its least unloading, it cycles.
+CHILLER_PART_LOAD = Polynomial((0.088065, 1.137742, -0.225806), 0.25, 1.0, _CHILLER + "EIRFPLR")
 #: Fan power over design power [-] at a share of the design flow, variable speed.
 FAN_PART_LOAD = Polynomial(
     (0.0407598940, 0.08804497, -0.072926120, 0.9437398230), 0.0, 1.0,

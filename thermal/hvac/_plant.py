@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from thermal.errors import HvacActionError, describe
 from thermal.hvac._advance import advance
 from thermal.hvac._checks import action, scalar_action
+from thermal.hvac._compiled import CompiledCentral
 from thermal.hvac._operations import StepOperations, Value
 from thermal.hvac._settings import Settings, settings_of
 from thermal.hvac._step import Actions, Calls, Conditions, HvacStep
@@ -19,8 +20,9 @@ from thermal.hvac._thermostat import Mode, ModeArray
 FloatArray = NDArray[np.float64]
 _Limits = tuple[str, str, float, float]  # name, unit, lowest, highest
 _AIR = (233.15, 353.15)  # K, of rooms: what lies outside is a fault of the caller's
+_COLDEST, _HOTTEST = 193.15, 338.15  # K, outdoors
 _CONDITIONS = (
-    ("outdoor_temperature", "K", 193.15, 338.15),
+    ("outdoor_temperature", "K", _COLDEST, _HOTTEST),
     ("outdoor_humidity", "kg/kg", 0.0, 0.05),
     ("return_humidity", "kg/kg", 0.0, 0.05),
     ("room_temperature", "K", *_AIR),
@@ -78,8 +80,9 @@ class HvacPlant:
 
     def __init__(self, system: HvacSystem) -> None:
         self.system = system
-        self._ops = StepOperations()
+        self._ops, self._central = StepOperations(), CompiledCentral(system)
         self._checked: tuple[object, object] = (None, None)
+        self._usual: tuple[object, ...] = (None, None, None)
         self._asked: tuple[Actions | None, Any] = (None, None)
 
     def start(self, water: float = 293.15) -> HvacState:
@@ -143,7 +146,7 @@ class HvacPlant:
         else:
             heat, cool = thermostat.calls(ops, zone, heating, cooling)
         calls = Calls(system.at_terminals(ops, heat), system.at_terminals(ops, cool))
-        done = advance(ops, system, state.water, calls, conditions, settings, seconds)
+        done = advance(ops, system, state.water, calls, conditions, settings, seconds, self._central)
         return HvacState(done.loop.water, mode, was), done
 
     def heat(self, step: HvacStep) -> FloatArray:
@@ -173,10 +176,20 @@ class HvacPlant:
             self._check_setpoints(*setpoints)
         if not (type(seconds) is float and 1.0 <= seconds <= 3600.0):
             scalar_action("step", seconds, "s", 1.0, 3600.0)
-        if not self._is_fine(_CONDITIONS, conditions[3:]):
-            values = [self._checked_value(*row) for row in zip(_CONDITIONS, conditions[3:], strict=True)]
-            conditions = Conditions(*conditions[:3], *values)
+        _, _, _, outdoor, damp, humid, room = conditions
+        known = self._usual
+        same = damp is known[0] and humid is known[1] and room is known[2]
+        if not (same and type(outdoor) is float and _COLDEST <= outdoor <= _HOTTEST):
+            conditions = self._check_surroundings(conditions)
         return conditions, self._asked[1] if actions is self._asked[0] else self._settings(actions)
+
+    def _check_surroundings(self, conditions: Conditions) -> Conditions:
+        """Check weather and rooms; what has been found fine, but for the weather, is known again."""
+        if self._is_fine(_CONDITIONS, conditions[3:]):
+            self._usual = conditions[4:]
+            return conditions
+        values = [self._checked_value(*row) for row in zip(_CONDITIONS, conditions[3:], strict=True)]
+        return Conditions(*conditions[:3], *values)
 
     def _settings(self, actions: Actions) -> Settings:
         """Check actions and lay them out; the same object, of nothing but floats, is not looked at again."""

@@ -11,7 +11,7 @@ from thermal.errors import HvacParameterError, describe
 from thermal.hvac._air_handler import Heater
 from thermal.hvac._coil import valve_position
 from thermal.hvac._operations import StepOperations
-from thermal.hvac._settings import settings_of
+from thermal.hvac._settings import Settings, settings_of
 from thermal.hvac._step import Actions, Conditions, HvacStep
 from thermal.hvac._system import HvacSystem
 
@@ -32,6 +32,8 @@ _LOOP = (
     "supply_water_temperature_setpoint", "supply_water_temperature_sensor", "return_water_temperature_sensor",
     "gas_power_sensor", "pump_power_sensor",
 )  # fmt: skip
+_DUCT = ("supply_air_static_pressure_setpoint", "supply_air_static_pressure_sensor")
+_PUMP = ("differential_pressure_setpoint", "differential_pressure_sensor")
 
 
 class HvacPoints:
@@ -45,6 +47,8 @@ class HvacPoints:
         Names of the devices, in the order of the system.
     boiler : str
         Name of the boiler.
+    pressures : bool
+        Whether the pressures of ducts and loop are read too, their drives holding the setpoints while they run.
 
     Raises
     ------
@@ -52,7 +56,14 @@ class HvacPoints:
         There are too many names, too few, or the same twice.
     """
 
-    def __init__(self, system: HvacSystem, terminals: Sequence[str], air_handlers: Sequence[str], boiler: str) -> None:
+    def __init__(
+        self,
+        system: HvacSystem,
+        terminals: Sequence[str],
+        air_handlers: Sequence[str],
+        boiler: str,
+        pressures: bool = False,
+    ) -> None:
         wanted = (len(system.terminals), len(system.air_handlers))
         names = [*terminals, *air_handlers, boiler]
         if (len(terminals), len(air_handlers)) != wanted or len(set(names)) != len(names):
@@ -63,6 +74,9 @@ class HvacPoints:
         self._heaters = [h.heating if isinstance(h.heating, Heater) else None for h in system.air_handlers]
         self._electric = [h is not None and h.electric for h in self._heaters]
         entities = [(terminals, _TERMINAL), (air_handlers, _AIR_HANDLER), ([boiler], _LOOP)]
+        if pressures:
+            entities += [(air_handlers, _DUCT), ([boiler], _PUMP)]
+        self._pressures = pressures
         #: Columns ``ENTITY/POINT`` in the order of `read`, point by point.
         self.columns = tuple(f"{e}/{p}" for devices, points in entities for p in points for e in devices)
 
@@ -107,5 +121,13 @@ class HvacPoints:
                 *[m.return_temperature for m in step.mixed], *[outdoor] * len(step.mixed),
                 *[m.supply_fan_power for m in step.mixed], *meters, *gas,
                 settings.supply_water, step.loop.water, step.return_water, step.fuel_power - sum(gas), step.pump_power,
+                *(_pressures(settings) if self._pressures else ()),
             ],
         ])  # fmt: skip
+
+
+def _pressures(settings: Settings) -> list[float]:
+    """Pressures of ducts and loop, setpoints and what sensors say of them [Pa]."""
+    static, loop = settings.static_pressure, settings.differential_pressure
+    held = [run * pressure for run, pressure in zip(settings.running, static, strict=True)]
+    return [*static, *held, loop, settings.boiler * loop]

@@ -227,7 +227,7 @@ def replay_loop(
     step: float,
     start: float,
     room: float = 293.15,
-    differential_pressure: float | None = None,
+    differential_pressure: FloatArray | float | None = None,
 ) -> LoopReplay:
     """Replay a hot-water loop under a measured load.
 
@@ -247,8 +247,8 @@ def replay_loop(
         Supply water at the start [K].
     room : float
         Temperature of the plant room [K].
-    differential_pressure : float, optional
-        Setpoint at the pump's sensor [Pa]; the design value by default.
+    differential_pressure : numpy.ndarray or float, optional
+        At the pump's sensor [Pa], shape (n_time,) or one; the design value by default.
 
     Returns
     -------

@@ -50,7 +50,7 @@ class HvacSystem:
             missing = sorted(set(range(int(zones[-1]))) - set(zones.tolist()))
             raise HvacParameterError(describe("HvacSystem", "a terminal in each zone", f"none in zones {missing[:8]}"))
 
-    @property
+    @cached_property
     def zone_count(self) -> int:
         """Zones that terminals serve."""
         return int(self.terminals.zone.max()) + 1

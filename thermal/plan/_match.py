@@ -230,6 +230,8 @@ def _point(words: Sequence[str], kind: str) -> tuple[str, float]:
         meant |= {"water"}
     if not meant:
         return "", 0.0
+    if kind == "zone":
+        meant |= {"zone"}  # of a room's temperature nobody says that it is the room's
     best, share = "", 0.0
     for point in POINT_TYPES:
         wanted = set(words_of(point))

@@ -74,7 +74,8 @@ def propose_zones(
         titles.append(title)
     joined = int(np.count_nonzero(owner[1:] != np.arange(1, len(owner))))
     if joined:
-        remark = f"{joined} rooms under {smallest_zone:g} m2 are part of the zone next to them"
+        small = "1 room" if joined == 1 else f"{joined} rooms"
+        remark = f"{small} under {smallest_zone:g} m2 joined the zone behind the door"
         survey = replace(survey, remarks=(*survey.remarks, remark))
     return ZonedFloor(floor, float(height), survey, number[rooms], tuple(titles))
 

@@ -24,6 +24,9 @@ REFERENCE_TEMPERATURE = 293.15
 #: Stefan-Boltzmann constant [W/m2/K4].
 STEFAN_BOLTZMANN = 5.670374419e-8
 
+#: Wind where none is measured [m/s].
+_USUAL_WIND = 3.0
+
 #: Hours of a working day unless occupancy is measured, and how long people take to come and go [h].
 _WORK, _RAMP = (8.0, 18.0), 1.0
 
@@ -136,6 +139,26 @@ class Drivers:
         rise = np.clip((hour - _WORK[0]) / _RAMP + 0.5, 0.0, 1.0)
         fall = np.clip((_WORK[1] - hour) / _RAMP + 0.5, 0.0, 1.0)
         return np.where(middle.day_of_week < 5, rise * fall, 0.0)
+
+    @cached_property
+    def openings(self) -> FloatArray:
+        """Whether a window of each zone is seen to stand open, shape (n_time, n_zone): 1 where one is.
+
+        Telemetry has no window contacts: windows are shut unless a diagnosis sees what they let out, and sets this.
+        """
+        return np.zeros((len(self.stamps), len(self.zones)))
+
+    @cached_property
+    def through_windows(self) -> FloatArray:
+        """Air that passes an open window, times how much colder it is outdoor: shape (n_time, n_zone) [K*m/s].
+
+        Flow per area of a window of 1 m height on one side of a room, ``½ (0.001 v² + 0.0035 h |ΔT| + 0.01)^½``
+        (de Gids and Phaff 1982, Air Infiltration Review 4(1), 1-5).
+        """
+        difference = self.outdoor[:, None] - self.usual
+        wind = self.wind if self.measured(WIND) else np.full(len(self.stamps), _USUAL_WIND)
+        speed = 0.5 * np.sqrt(0.001 * wind[:, None] ** 2 + 0.0035 * np.abs(difference) + 0.01)
+        return np.asarray(speed * difference)
 
     @cached_property
     def supply(self) -> tuple[FloatArray, FloatArray]:

@@ -45,7 +45,7 @@ class ObservedPlant(SimulatedPlant):
     @property
     def zone_temperature(self) -> FloatArray:
         """True temperatures of the zones now, shape (n_zone,) [K]."""
-        return self._reading - self._offset
+        return self._loop.air
 
 
 def _signal_names(names: Iterable[str]) -> dict[str, str]:

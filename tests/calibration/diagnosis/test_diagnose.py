@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from calibration.diagnosis import Diagnosis, diagnose
-from calibration.diagnosis._bench import Bench
+from calibration.diagnosis._bench import Bench, Fit
 from calibration.diagnosis._refit import ACCEPTED, Refit
 from calibration.diagnosis._screen import Screening
+from calibration.diagnosis._search import _first
 from calibration.diagnosis._verdict import judge
 from thermal import Building, Case, Telemetry
 from thermal.effects import CATALOGUE
@@ -121,6 +122,43 @@ def test_what_counts_for_little_is_ranked_by_what_it_gains_and_what_predicts_wor
     worse = next(s for s in found.suspects if s.effect == "infiltration")
     assert worse.probability < found.suspects[1].probability < 0.3
     assert found.name == "no_gap"
+
+
+def test_held_out_days_decide_between_what_gains_alike() -> None:
+    r = diagnosed(None).rounds[0]
+    by_name = {g.effect: g for g in r.gains}
+
+    def refit(effect: str, gain: float, left: float) -> Refit:
+        errors = replace(r.held_out, daily=left * r.held_out.daily)
+        return Refit(by_name[effect], r.before, gain, 0.1, errors, worse=False, counts=True)
+
+    most, other = refit("duct_loss", 20.0, 0.8), refit("flow_gain", 18.5, 0.6)
+    assert _first(r.held_out, [most, other]) is other
+    assert _first(r.held_out, [most, refit("flow_gain", 16.0, 0.6)]) is most  # gains can tell
+    assert _first(r.held_out, [most, refit("flow_gain", 18.5, 0.79)]) is most  # held-out days cannot
+    assert _first(r.held_out, [replace(most, counts=False)]) is None
+    found = judge((replace(r, refits=(most, other), accepted=other),), {})
+    assert [s.effect for s in found.suspects[:2]] == ["flow_gain", "duct_loss"]
+    assert set(found.suspects[0].group) >= {"flow_gain", "duct_loss"}
+
+
+def test_what_explains_a_part_of_large_errors_is_not_named() -> None:
+    """A fit that leaves half of a large squared error, and a first model that has that error."""
+    r = diagnosed(None).rounds[0]
+    gain = next(g for g in r.gains if g.effect == "duct_loss")
+
+    def with_error(left: float) -> Fit:
+        return replace(r.before, found=replace(r.before.found, mean_square=left))
+
+    large, half, little = with_error(1.0), with_error(0.5), with_error(0.05)
+    verdicts = []
+    for fit in (half, little):
+        accepted = Refit(gain, fit, 40.0, 0.3, r.held_out, worse=False, counts=True)
+        rounds = (replace(r, before=large, refits=(accepted,), accepted=accepted), replace(r, before=fit))
+        verdicts.append(judge(rounds, {}))
+    assert [v.name for v in verdicts] == ["unexplained", "named"]
+    assert verdicts[0].suspects[0].probability == pytest.approx(0.5, abs=0.01)
+    assert verdicts[1].suspects[0].probability > 0.99
 
 
 def test_tangents_promise_what_a_fit_keeps() -> None:

@@ -16,6 +16,7 @@ from mpc.control import (
     SitePoints,
     Source,
 )  # fmt: skip
+from mpc.errors import ControlError
 from mpc.scenario import DemandCharge, Forecast
 from thermal.model import IMPLICIT_EULER
 
@@ -78,6 +79,30 @@ def test_a_closed_loop_without_offset(controller, modes, points, make_forecast) 
         )
         twin.step(None)
     np.testing.assert_allclose(controller.observer.disturbance, 120.0, rtol=0.1)
+
+
+def test_telemetry_tells_what_the_structure_remembers(controller, modes, points) -> None:
+    """From a week of it the state is that of the plant, which a start at rest is far from."""
+    twin, rows = Twin(modes, len(points.zones)), []
+    for _ in range(2000):
+        twin.step(None)
+        rows.append(twin.measure(points))
+    index = pd.date_range(end=START, periods=len(rows), freq=STEP)
+    past = pd.DataFrame(rows, index=index).assign(**{f"{zone}/internal_gain": 30.0 for zone in points.zones})
+    controller.observer.start(twin.zone, np.array([276.0]))
+    at_rest = np.abs(controller.observer.modal_state - twin.x).max()
+    past.iloc[100:110, 3] = np.nan
+    controller.start_up(past)
+    assert np.abs(controller.observer.modal_state - twin.x).max() < 0.15 * at_rest
+    np.testing.assert_allclose(controller.observer.disturbance, 0.0, atol=5.0)
+    controller.start_up(past.drop(columns=[c for c in past if c.endswith("internal_gain")]))
+    np.testing.assert_allclose(controller.observer.disturbance, 30.0, atol=5.0)  # what nobody expected is found
+    with pytest.raises(ControlError, match="a time zone"):
+        controller.start_up(past.tz_localize(None))
+    with pytest.raises(ControlError, match="a zone that reports"):
+        controller.start_up(past.filter(regex="outside|power"))
+    with pytest.raises(ControlError, match="an outdoor temperature"):
+        controller.start_up(past.drop(columns="weather_station/outside_air_temperature_sensor"))
 
 
 def test_saved_and_restored_it_goes_on_bit_for_bit(controller, modes, points, make_forecast) -> None:

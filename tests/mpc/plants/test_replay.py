@@ -57,14 +57,18 @@ class Lab:
         setpoints: dict[str, float] | None = None,
         change: Change | None = None,
         gains: bool = False,
+        pressures: bool = False,
     ) -> tuple[Case, SimulatedPlant]:
         """Four winter days of telemetry, with noise; nobody gives off heat unless there are to be gains."""
         plant = SimulatedPlant(
-            self._busy if gains else self._idle, system or self.system, building or self._reduced, noise=SensorNoise()
-        )
+            self._busy if gains else self._idle, system or self.system, building or self._reduced, noise=SensorNoise(),
+            pressures=pressures,
+        )  # fmt: skip
         plant.reset()
         kinds = setpoints or {}
-        actions = {n: kinds.get(n.rpartition("/")[2], v) for n, v in plant.default_actions.items()}
+        actions = plant.default_actions | {
+            a.name: kinds[kind] for a in plant.actuators if (kind := a.name.rpartition("/")[2]) in kinds
+        }
         while not plant.finished:
             plant.step(actions)
         frame = plant.telemetry()
@@ -147,6 +151,21 @@ def test_a_boiler_that_is_off_its_setpoint_is_in_the_hot_water(lab: Lab) -> None
     found = lab.find(change=offset)
     assert {(g.subsystem, g.device) for g in found.located} == {("hot water", "BOILER")}
     assert found.located[0].bias == pytest.approx(-4.0, abs=0.5)
+
+
+def test_a_boiler_that_wastes_gas_is_in_the_hot_water(lab: Lab) -> None:
+    worn = replace(lab.system.loop, efficiency=0.75 * lab.system.loop.efficiency)
+    found = lab.find(replace(lab.system, loop=worn))
+    assert {(g.device, g.signal) for g in found.located} == {("BOILER", "gas power")}
+    assert found.located[0].bias < 0.0  # a sound one would burn less
+
+
+def test_pressures_off_their_design_are_no_fault_where_they_are_measured(lab: Lab) -> None:
+    pressures = {"supply_air_static_pressure_setpoint": 100.0, "differential_pressure_setpoint": 30_000.0}
+    for measured in (False, True):
+        case, plant = lab.run(setpoints=pressures, pressures=measured)
+        found = replay_subsystems(case, lab.system, ventilation=plant.operation.ventilation)
+        assert (not found.located) == measured
 
 
 def test_what_the_building_model_lacks_is_in_the_zones(lab: Lab) -> None:

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 
 from mpc.errors import PlantError
 from mpc.plants import SensorNoise, SimulatedPlant
 from mpc.plants._sensors import plant_devices
-from thermal import Building
+from thermal import Building, load_case, save_case
 from thermal.case.points import POINT_TYPES, split_column
 from thermal.case.schema import Device
 from thermal.hvac import HvacSystem
@@ -23,7 +25,7 @@ def test_metered_heat_is_what_the_zones_received(make_plant: Drive, drive: Drive
     """By the case format's own formula, of the telemetry alone."""
     plant = drive(make_plant(), 150)
     metered = plant.case().zone_heat().to_numpy()
-    given = np.array([plant._hvac.heat(step.done) for step in plant._steps])
+    given = np.array([plant._loop.hvac.heat(step.done) for step in plant._steps])
     np.testing.assert_allclose(metered, given, atol=1e-6)
 
 
@@ -77,3 +79,23 @@ def test_a_device_too_few_or_too_many_is_named(building: Building, system: HvacS
         plant_devices(replace(building, devices=(*devices, Device(name="second", type="chiller"))), system)
     with pytest.raises(PlantError, match="sensor noise: flow"):
         SensorNoise(flow=-0.1)
+
+
+def test_pressures_are_in_the_telemetry_and_in_the_case(make_plant: Drive, drive: Drive, tmp_path: Path) -> None:
+    """Of format 2, which a saved case then says; nothing else is measured otherwise."""
+    setpoints = {"AHU_F1/supply_air_static_pressure_setpoint": 150.0, "BOILER/differential_pressure_setpoint": 4e4}
+    plant = drive(make_plant(pressures=True, noise=SensorNoise()), 150, setpoints)
+    plain = drive(make_plant(noise=SensorNoise()), 150, setpoints)
+    frame = plant.telemetry()
+    assert frame["AHU_F1/supply_air_static_pressure_setpoint"].eq(150.0).all()
+    on = frame["AHU_F1/supply_air_static_pressure_sensor"].iloc[120:]
+    assert on.mean() == pytest.approx(150.0, rel=0.01) and on.std() > 0.0
+    assert frame["BOILER/differential_pressure_sensor"].iloc[-1] == pytest.approx(4e4, rel=0.05)
+    saved = [yaml.safe_load((save_case(p.case(), tmp_path / name) / "building.yaml").read_text())
+             for name, p in (("with", plant), ("without", plain))]  # fmt: skip
+    assert [content["format"] for content in saved] == [2, 1]
+    assert saved[0]["units"]["differential_pressure_sensor"] == "Pa"
+    again = load_case(tmp_path / "with").telemetry.frame
+    np.testing.assert_allclose(again[frame.columns], frame)
+    commands = [c for c in plain.columns if c.endswith(("_setpoint", "_command"))]
+    assert plain.telemetry()[commands].equals(frame[commands])

@@ -108,6 +108,28 @@ def test_a_compressor_cycles_below_its_least_part_load():
         CoolingCoil(40_000.0, part_load=Polynomial((0.2, 0.8), 0.0, 1.0, "test"))
 
 
+def test_a_chiller_by_hand():
+    """At 6.67 degC of water and 29.4 degC outdoors the curves are 1 by their rating; half the load costs 0.600."""
+    coil = CoolingCoil.chilled(40_000.0, auxiliaries=0.0)
+    half = coil.cool(OPS, 20_000.0 / (1006.0 * 8.0), 296.0, 0.001, 288.0, 302.55)
+    assert half.sensible == pytest.approx(20_000.0) and half.latent == 0.0
+    by_part_load = 0.088065 + 1.137742 * 0.5 - 0.225806 * 0.25
+    assert half.power == pytest.approx(40_000.0 / 3.0 * by_part_load, rel=0.01)
+
+
+@pytest.mark.parametrize("load", [0.3, 0.6, 0.95])
+def test_the_cop_of_a_chiller_goes_with_weather_and_part_load(load):
+    coil = CoolingCoil.chilled(40_000.0)
+
+    def cop(share, outdoor):
+        cooled = coil.cool(OPS, share * 40_000.0 / (1006.0 * 8.0), 296.0, 0.001, 288.0, outdoor)
+        return (cooled.sensible + cooled.latent) / cooled.power
+
+    assert cop(load, 298.15) > 1.05 * cop(load, 303.15) > 1.05 * cop(load, 308.15)
+    assert cop(0.3, 303.15) < 0.95 * cop(0.9, 303.15)  # a compressor that is throttled wastes some
+    assert cop(0.1, 303.15) == pytest.approx(cop(0.2, 303.15))  # one that cycles does not
+
+
 def test_parameters_out_of_range_are_refused():
     with pytest.raises(HvacParameterError, match=r"CoolingCoil.cop: expected 1 to 10 -, found 12.0"):
         CoolingCoil(1000.0, cop=12.0)

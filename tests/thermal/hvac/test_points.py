@@ -7,12 +7,12 @@ from thermal.hvac import Actions, Conditions, HvacParameterError, HvacPlant, Hva
 NAMES = [f"VAV_{k}" for k in range(5)]
 
 
-def read(system, names, actions):
+def read(system, names, actions, pressures=False):
     plant = HvacPlant(system)
     zone = np.array([290.0, 294.0, 296.5, 297.4, 300.0])
     conditions = Conditions(zone, np.full(5, 293.0), np.full(5, 297.0), 275.0)
     state, step = plant.step(plant.start(330.0), conditions, actions, 300.0)
-    points = HvacPoints(system, NAMES, names, "BOILER")
+    points = HvacPoints(system, NAMES, names, "BOILER", pressures)
     return dict(zip(points.columns, points.read(conditions, actions, step), strict=True)), step, state
 
 
@@ -47,6 +47,19 @@ def test_an_air_handler_that_is_off_has_closed_dampers(plant_system):
     values, _, _ = read(plant_system, ["AHU_1", "AHU_2"], Actions(287.0, 335.0, running=(0.0, 1.0)))
     assert values["VAV_0/supply_air_damper_percentage_command"] == 0.0
     assert values["VAV_1/supply_air_damper_percentage_command"] > 0.0
+
+
+def test_pressures_are_held_while_the_drives_run(plant_system):
+    actions = Actions(287.0, 335.0, (120.0, 300.0), 4e4, running=(0.0, 1.0))
+    plain, _, _ = read(plant_system, ["AHU_1", "AHU_2"], actions)
+    values, _, _ = read(plant_system, ["AHU_1", "AHU_2"], actions, pressures=True)
+    more = {column: value for column, value in values.items() if column not in plain}
+    assert more == {
+        "AHU_1/supply_air_static_pressure_setpoint": 120.0, "AHU_2/supply_air_static_pressure_setpoint": 300.0,
+        "AHU_1/supply_air_static_pressure_sensor": 0.0, "AHU_2/supply_air_static_pressure_sensor": 300.0,
+        "BOILER/differential_pressure_setpoint": 4e4, "BOILER/differential_pressure_sensor": 4e4,
+    }  # fmt: skip
+    assert {column: values[column] for column in plain} == plain
 
 
 def test_names_that_do_not_fit_are_refused(plant_system):

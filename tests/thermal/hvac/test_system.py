@@ -1,3 +1,5 @@
+from functools import cache
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -38,9 +40,12 @@ def situation(s):
     return conditions, actions
 
 
+plant_of = cache(HvacPlant)
+
+
 def taken(system, s):
     conditions, actions = situation(s)
-    plant = HvacPlant(system)
+    plant = plant_of(system)
     state, step = plant.step(plant.start(s["before"]), conditions, actions, s["seconds"])
     return conditions, step, state, plant.heat(step)
 
@@ -61,7 +66,7 @@ def test_energy_closes(plant_system, s):
 def test_energy_closes_with_gas_coils(gas_system, s):
     s = s | {"ventilation": 1.0}
     conditions, actions = situation(s)
-    plant = HvacPlant(gas_system)
+    plant = plant_of(gas_system)
     _, step = plant.step(plant.start(s["before"]), conditions, actions._replace(ventilation=1.0), s["seconds"])
     balance = energy_balance(gas_system, conditions, step)
     assert abs(balance.residual) <= 1e-9 * balance.turnover + 1e-6

@@ -132,6 +132,7 @@ def test_columns_of_the_trade_are_matched() -> None:
     devices = [Device(name="VAV_1", type="vav"), Device(name="VAV_11", type="vav"), Device(name="AHU_F1", type="ahu")]
     wanted = {
         "vav-01 Zn Temp": "VAV_1/zone_air_temperature_sensor",
+        "F1-R02 temp": "F1_R02/zone_air_temperature_sensor",
         "VAV11.DAT": "VAV_11/discharge_air_temperature_sensor",
         "VAV11_airflow": "VAV_11/supply_air_flowrate_sensor",
         "VAV 1 Damper Pos": "VAV_1/supply_air_damper_percentage_command",
@@ -140,7 +141,7 @@ def test_columns_of_the_trade_are_matched() -> None:
         "AHU-F1 SAT": "AHU_F1/supply_air_temperature_sensor",
         "OAT": "weather_station/outside_air_temperature_sensor",
     }
-    matches = match_points(list(wanted), devices)
+    matches = match_points(list(wanted), devices, ZONES)
     assert {m.column: f"{m.entity}/{m.point}" for m in matches} == wanted
     assert not any(m.remark for m in matches)
 

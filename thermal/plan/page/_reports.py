@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import hashlib
+import html
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from thermal.errors import ReportError, describe, nearest
-from thermal.plan.page._store import OWN_FOLDER
+from thermal.plan._guard import inside_folder
+from thermal.plan._kept import OWN_FOLDER
 
 Progress = Callable[[str, int, int], None]
 
@@ -17,7 +20,18 @@ Progress = Callable[[str, int, int], None]
 ReportMaker = Callable[[Path, Path, Progress], None]
 
 _PAGE = "report.html"
-_KINDS = {"diagnosis.json": "diagnosis", "calibration.json": "calibration", "check.json": "check"}
+_KINDS = {
+    "demo.json": "from check to control",
+    "diagnosis.json": "diagnosis",  # before the next: a diagnosis has a calibration beside it
+    "calibration.json": "calibration",
+    "comparison.json": "comparison of controllers",
+    "control.json": "control",
+    "simulation.json": "simulation",
+    "evaluation.json": "evaluation",
+    "check.json": "check",
+}
+_VERDICT = re.compile(r'<p class="verdict[^>]*>(.*?)</p>', re.DOTALL)
+_HEAD = 40_000  # characters of a page in which its verdict is looked for
 _DEEP = 3  # folders below the case, or below a folder of results, in which reports are looked for
 _MOST = 200
 
@@ -31,9 +45,11 @@ class _Report:
     key : str
         To ask for it.
     kind : str
-        ``check``, ``calibration``, ``diagnosis``, or ``other``.
+        ``check``, ``calibration``, ``diagnosis``, ..., or ``other``.
     title : str
-        Its folder, as seen from the case.
+        Its folder, as seen from the case; empty for one that the page has made.
+    verdict : str
+        What it found, in plain words; empty where it does not say.
     time : float
         When it was written [s since 1970].
     path : Path
@@ -43,12 +59,13 @@ class _Report:
     key: str
     kind: str
     title: str
+    verdict: str
     time: float
     path: Path
 
     def to_dict(self) -> dict[str, Any]:
         """Give it as plain types, for JSON."""
-        return {"key": self.key, "kind": self.kind, "title": self.title, "time": self.time}
+        return {name: getattr(self, name) for name in ("key", "kind", "title", "verdict", "time")}
 
 
 class Reports:
@@ -85,27 +102,33 @@ class Reports:
         pages = {page for root in (self._case, *self._folders) for page in _pages(root)}
         return tuple(sorted(map(self._report, pages), key=lambda report: -report.time)[:_MOST])
 
-    def page(self, key: str) -> Path:
-        """Path of a report.
+    def page(self, key: str, name: str = _PAGE) -> Path:
+        """Path of a report, or of one that it leads to.
 
         Parameters
         ----------
         key : str
             Of the report.
+        name : str
+            Of the page, as seen from the report's folder.
 
         Returns
         -------
         Path
-            Its page.
+            The page.
 
         Raises
         ------
         ReportError
             There is none.
+        OutsideFolderError
+            The name leads out of the report's folder.
         """
         for report in self.found():
             if report.key == key:
-                return report.path
+                path = inside_folder(report.path.parent, name, "report")
+                if path.name == _PAGE and path.is_file():
+                    return path
         raise ReportError(describe("report", "one of the list", repr(key[:40]), "load the list anew"))
 
     def make(self, kind: str, progress: Progress) -> dict[str, Any]:
@@ -159,10 +182,18 @@ class Reports:
     def _report(self, page: Path) -> _Report:
         folder = page.parent
         kind = next((kind for name, kind in _KINDS.items() if (folder / name).is_file()), "other")
-        inside = folder.is_relative_to(self._case)
-        title = folder.relative_to(self._case).as_posix() if inside else folder.name
+        made = folder.parent == self._case / OWN_FOLDER / "reports"
+        seen = folder.relative_to(self._case).as_posix() if folder.is_relative_to(self._case) else folder.name
+        title = "" if made else "imported plans" if seen == "." else seen
         key = hashlib.sha256(str(page).encode("utf-8", "surrogateescape")).hexdigest()[:16]
-        return _Report(key, kind, "imported plans" if title == "." else title, page.stat().st_mtime, page)
+        return _Report(key, kind, title, _verdict(page), page.stat().st_mtime, page)
+
+
+def _verdict(page: Path) -> str:
+    """Sentence that a report begins with."""
+    with page.open(encoding="utf-8", errors="replace") as stream:
+        found = _VERDICT.search(stream.read(_HEAD))
+    return " ".join(html.unescape(found[1]).split()) if found else ""
 
 
 def _pages(root: Path) -> list[Path]:

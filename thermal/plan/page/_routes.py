@@ -206,9 +206,9 @@ def _add_reports(app: FastAPI, desk: LabelDesk) -> None:
         job = busy or desk.jobs.start(kind, lambda progress: desk.reports.make(kind, progress))
         return job.to_dict()
 
-    @app.get("/reports/{key}")
-    def show(key: str) -> Response:
-        page = desk.reports.page(key)
+    @app.get("/reports/{key}/{name:path}")
+    def show(key: str, name: str) -> Response:
+        page = desk.reports.page(key, name)
         return FileResponse(page, media_type="text/html", headers={"content-security-policy": REPORT_POLICY})
 
 

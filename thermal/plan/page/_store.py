@@ -18,14 +18,11 @@ from thermal.errors import CaseError, LabelledCaseError, ThermalError, describe
 from thermal.plan._columns import read_columns
 from thermal.plan._folder import save_plan_case
 from thermal.plan._guard import inside_folder
+from thermal.plan._kept import DRAFT, OWN_FOLDER
 from thermal.plan.page._convert import building_of_draft, draft_of, parse_draft
 from thermal.plan.page._draft import Draft
 from thermal.plan.page._findings import DraftFinding, find_faults
 
-#: Folder inside the case that holds what is the page's own: draft, drawings, pictures, reports.
-OWN_FOLDER = "labelling"
-
-_DRAFT = "labelling.json"
 _MOST_DRAFT = 50_000_000  # bytes
 _NOTE = "# labelled with buildingmpc label, {minutes:.0f} minutes of work\n"
 
@@ -142,7 +139,7 @@ class CaseStore:
         bool
             Whether the case folder now says the same as the draft.
         """
-        write_whole(self.own / _DRAFT, draft.model_dump_json(by_alias=True).encode("utf-8"))
+        write_whole(self.own / DRAFT, draft.model_dump_json(by_alias=True).encode("utf-8"))
         self.draft = draft
         self._find_faults()
         if any(finding.level == "error" for finding in self.findings):
@@ -198,7 +195,7 @@ def _read_draft(folder: Path, is_case: bool) -> Draft:
 
     A case that was changed by hand since the page last wrote it counts more than the page's own file.
     """
-    file = folder / OWN_FOLDER / _DRAFT
+    file = folder / OWN_FOLDER / DRAFT
     draft: Draft | None = None
     if file.is_file():
         if file.stat().st_size > _MOST_DRAFT:
@@ -206,7 +203,7 @@ def _read_draft(folder: Path, is_case: bool) -> Draft:
         try:
             draft = parse_draft(json.loads(file.read_text(encoding="utf-8")), file.name)
         except (OSError, ValueError, RecursionError, ThermalError) as error:
-            advice = f"move {OWN_FOLDER}/{_DRAFT} away to begin with the case"
+            advice = f"move {OWN_FOLDER}/{DRAFT} away to begin with the case"
             raise LabelledCaseError(describe(str(file), "the page's own file", str(error), advice)) from error
     if not is_case:
         return draft or Draft(name=folder.name)

@@ -19,7 +19,7 @@ def write_report(case: Path, out: Path, progress: Progress) -> None:
     progress("writing", 1, 2)
     out.mkdir(parents=True, exist_ok=True)
     (out / "check.json").write_text("{}", encoding="utf-8")
-    (out / "report.html").write_text(f"<p>{case.name}", encoding="utf-8")
+    (out / "report.html").write_text(f'<p class="verdict bad">Fine &amp;\n {case.name}</p>', encoding="utf-8")
 
 
 def fail(case: Path, out: Path, progress: Progress) -> None:
@@ -67,9 +67,10 @@ def test_a_report_is_made_and_shown_in_a_box(reader: Any, busy_desk: LabelDesk) 
     job = wait(reader, reader.post(reader.at("api/reports/check")).json()["number"])
     assert job["state"] == "done" and job["stage"] == "writing"
     (listed,) = reader.get(reader.at("api/reports")).json()["reports"]
-    assert (listed["kind"], listed["title"]) == ("check", "labelling/reports/check") and job["result"] == listed
-    shown = reader.get(reader.at(f"reports/{listed['key']}"))
-    assert shown.text == "<p>case"
+    assert (listed["kind"], listed["title"], listed["verdict"]) == ("check", "", "Fine & case")
+    assert job["result"] == listed
+    shown = reader.get(reader.at(f"reports/{listed['key']}/report.html"))
+    assert "case</p>" in shown.text
     assert shown.headers["content-security-policy"].startswith("sandbox allow-scripts")  # no access to the page
 
 
@@ -79,6 +80,18 @@ def test_reports_of_results_are_found_and_links_out_are_not(reader: Any, busy_de
     (busy_desk.store.folder / "link").symlink_to(tmp_path / "secret")
     listed = reader.get(reader.at("api/reports")).json()["reports"]
     assert [report["title"] for report in listed] == ["first"]
+
+
+def test_a_report_leads_to_those_below_it_and_to_nothing_else(reader: Any, tmp_path: Path) -> None:
+    for name in ("demo", "demo/check", "other"):
+        write_report(tmp_path, tmp_path / "results" / name, lambda *_: None)
+    (tmp_path / "results" / "demo" / "demo.json").write_text("{}", encoding="utf-8")
+    listed = {report["title"]: report for report in reader.get(reader.at("api/reports")).json()["reports"]}
+    assert listed["demo"]["kind"] == "from check to control"
+    below = f"reports/{listed['demo']['key']}/"
+    assert reader.get(reader.at(below + "check/report.html")).status_code == 200
+    for name in ("demo.json", "%2e%2e/other/report.html", "none/report.html", "check"):
+        assert reader.get(reader.at(below + name)).status_code in (400, 404)
 
 
 def test_what_goes_wrong_is_said_and_what_takes_long_is_stopped(reader: Any) -> None:

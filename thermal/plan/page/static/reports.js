@@ -35,17 +35,22 @@ function draw(reports) {
     const [title, text] = WORDS[kind] || [kind, ""], job = jobs.get(kind);
     return el("section", { class: "card" }, el("h3", {}, title), el("p", { class: "soft" }, text),
       job ? el("div", { class: "working", id: `job-${kind}` }, el("p", { role: "status", "aria-live": "polite" }, words(job.state)), el("progress", job.state.total ? { max: job.state.total, value: job.state.done } : {}), el("button", { type: "button", onclick: () => job.stop.abort() }, "Stop"))
-        : el("button", { type: "button", class: "primary", id: `make-${kind}`, disabled: errors || !page.written, onclick: () => make(kind) }, `${title} now`));
+        : el("button", { type: "button", class: "primary", id: `make-${kind}`, disabled: errors || !page.written || (kind !== "check" && !page.telemetry), onclick: () => make(kind) }, `${title} now`));
   });
   const rows = reports.map((report) => el("tr", {},
-    el("td", {}, el("a", { href: api.address(`reports/${report.key}`), target: "_blank", rel: "noopener" }, report.title)), el("td", {}, report.kind), el("td", {}, new Date(report.time * 1000).toLocaleString())));
+    el("td", {}, el("a", { href: api.address(`reports/${report.key}/report.html`), target: "_blank", rel: "noopener" }, capital(report.kind === "other" ? report.title : report.kind))),
+    el("td", { class: "found" }, report.verdict), el("td", { class: "soft" }, report.title || "made here"), el("td", { class: "soft" }, moment(report.time))));
   body.replaceChildren(
-    errors ? el("p", { class: "message" }, "Reports can be made as soon as the case is valid.") : !page.telemetry ? el("p", { class: "soft" }, "The case has no telemetry yet: check works, calibrate and diagnose need it.") : "",
+    errors ? el("p", { class: "message" }, "Reports can be made as soon as the case is valid.") : !page.telemetry ? el("p", { class: "soft" }, "The case has no telemetry yet: check works, calibrate and diagnose wait for it (buildingmpc import-telemetry).") : "",
     el("div", { class: "cards" }, cards),
-    reports.length ? el("table", {}, el("caption", {}, "Reports of this case"), el("thead", {}, el("tr", {}, ["Report", "Kind", "Written"].map((h) => el("th", { scope: "col" }, h)))), el("tbody", {}, rows))
+    reports.length ? el("table", {}, el("caption", {}, "Reports of this case"), el("thead", {}, el("tr", {}, ["Report", "What it found", "Folder", "Written"].map((h) => el("th", { scope: "col" }, h)))), el("tbody", {}, rows))
       : el("p", { class: "soft" }, "No reports yet. Those of results folders inside the case, or given with --results, are listed here."),
   );
 }
+
+const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);
+
+const moment = (seconds) => new Date(seconds * 1000).toLocaleString([], { dateStyle: "short", timeStyle: "short" });
 
 const words = (state) => `${state.stage || "working"} · ${Math.round(state.seconds)} s`;
 
