@@ -159,9 +159,9 @@ def _interval(mean: float, low: float, high: float, sign: str = "+") -> str:
 
 def draw_front(runs: Sequence[dict[str, Any]], path: Path) -> None:
     """Draw cost over discomfort: fronts of optimal control as lines, everything else as points, a seed each."""
-    figure, axes = plt.subplots(figsize=(8.0, 5.0), layout="constrained")
+    figure, axes = plt.subplots(figsize=(8.0, 6.0), layout="constrained")
     for k, name in enumerate(lines(runs)):
-        color = f"C{k % 10}"
+        color = plt.get_cmap("tab20")((2 * k) % 20 + k // 10)
         points = front(runs, name)
         if len(points) > 1:
             axes.plot(*zip(*points, strict=True), "-o", color=color, label=NAMES[name])
@@ -176,7 +176,7 @@ def draw_front(runs: Sequence[dict[str, Any]], path: Path) -> None:
     axes.set_xlabel("discomfort of a week, tdis_tot [K h]")
     axes.set_ylabel("energy cost of a week [USD]")
     axes.grid(alpha=0.3)
-    axes.legend(fontsize=8)
+    figure.legend(loc="outside lower center", ncols=2, fontsize=8)
     figure.savefig(path)
     plt.close(figure)
 
@@ -192,10 +192,12 @@ def draw_learning(runs: Sequence[dict[str, Any]], path: Path) -> bool:
         steps, cost = zip(*about["curve"], strict=True)
         known = axes.get_legend_handles_labels()[1]
         label = NAMES[family(name)]
-        axes.plot(steps, cost, "o-", ms=3, lw=1, color=f"C{names.index(family(name))}",
+        axes.plot(np.array(steps) / 1e3, cost, "o-", ms=3, lw=1, color=f"C{names.index(family(name))}",
                   label=None if label in known else label)  # fmt: skip
     axes.set_yscale("log")
-    axes.set_xlabel("control steps of a quarter of an hour")
+    for ticks in (axes.yaxis.set_major_formatter, axes.yaxis.set_minor_formatter):
+        ticks(lambda value, _: f"{value:g}")
+    axes.set_xlabel("thousand control steps of a quarter of an hour")
     axes.set_ylabel("stage cost of a validation week,\nin the world of the training [USD]")
     axes.grid(alpha=0.3, which="both")
     axes.legend(fontsize=8)
