@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -75,7 +76,8 @@ def entries(prices: tuple[float, ...] = PRICES, policies: Path = POLICIES) -> li
     """List everything that is compared: rules, optimal control at several prices, all policies of a folder."""
     learned = sorted(path.stem for path in policies.glob("*.npz"))
     fronts = [Entry(name, price) for name in OPTIMAL for price in prices]
-    return [*map(Entry, RULES), *fronts, *map(Entry, PEERS), *map(Entry, learned)]
+    peers = PEERS if find_spec("do_mpc") is not None else ()  # of the extra [benchmarks]
+    return [*map(Entry, RULES), *fronts, *map(Entry, peers), *map(Entry, learned)]
 
 
 def controller_of(entry: Entry, plant: SimulatedPlant, size: Size, policies: Path) -> Controller:
@@ -116,7 +118,7 @@ def peer_controller(entry: Entry, plant: SimulatedPlant, size: Size, hours: floa
     )  # fmt: skip
     if entry.controller == "mpc_as_do_mpc":
         return ours
-    from _do_mpc_loop import do_mpc_controller  # of the extra [benchmarks]
+    from _do_mpc_loop import do_mpc_controller  # needs do-mpc
 
     return do_mpc_controller(ours)
 
