@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +25,7 @@ from _learning_case import (
 )
 
 from mpc.baselines import Guideline36, OutdoorReset, day_schedule
-from mpc.control import ControllerSettings
+from mpc.control import ControllerSettings, Horizon, MpcController
 from mpc.environment import ActorNetwork, ControlEnvironment, EconomicReward, PolicyController
 from mpc.kpi import StageCost, measure_kpis
 from mpc.plants import (
@@ -44,6 +45,10 @@ STEPS_A_DAY = 96
 PRICES = (0.3, 1.0, 3.0)
 RULES = ("floor", "schedule", "reset", "guideline36")
 OPTIMAL = ("mpc_before", "mpc_after", "bound")
+#: do-mpc, and our solver on the very problem that do-mpc solves.
+PEERS = ("do_mpc", "mpc_as_do_mpc")
+#: What do-mpc solves: steps of a quarter of an hour, fewer of them and fewer modes, for the sake of its time.
+PEER_HOURS, PEER_ORDER, PEER_DAYS = 6.0, 30, 1
 
 
 @dataclass(frozen=True)
@@ -71,7 +76,8 @@ def entries(prices: tuple[float, ...] = PRICES, policies: Path = POLICIES) -> li
     """List everything that is compared: rules, optimal control at several prices, all policies of a folder."""
     learned = sorted(path.stem for path in policies.glob("*.npz"))
     fronts = [Entry(name, price) for name in OPTIMAL for price in prices]
-    return [*map(Entry, RULES), *fronts, *map(Entry, learned)]
+    peers = PEERS if find_spec("do_mpc") is not None else ()  # of the extra [benchmarks]
+    return [*map(Entry, RULES), *fronts, *map(Entry, peers), *map(Entry, learned)]
 
 
 def controller_of(entry: Entry, plant: SimulatedPlant, size: Size, policies: Path) -> Controller:
@@ -95,19 +101,38 @@ def controller_of(entry: Entry, plant: SimulatedPlant, size: Size, policies: Pat
             horizon=default_horizon(plant.control_step, HORIZON_HOURS),
             observer=KnownState(model, plant) if entry.controller == "bound" else None,
         )  # fmt: skip
+    if entry.controller in PEERS:
+        return peer_controller(entry, plant, size)
     network = ActorNetwork.load(policies / f"{entry.controller}.npz")
     world = ControlEnvironment(plant, block_ends=BLOCK_ENDS)
     return PolicyController(network, world.layout, world.actions)
 
 
+def peer_controller(entry: Entry, plant: SimulatedPlant, size: Size, hours: float = PEER_HOURS) -> MpcController:
+    """Make optimal control with do-mpc as its solver, or with ours on the same problem."""
+    model = known_model("after", size, order=PEER_ORDER)
+    steps = round(hours * 3600.0 / plant.control_step)
+    ours = make_controller(
+        model, plant, settings=ControllerSettings(comfort_price=entry.price),
+        horizon=Horizon.regular(hours, plant.control_step, steps),
+    )  # fmt: skip
+    if entry.controller == "mpc_as_do_mpc":
+        return ours
+    from _do_mpc_loop import do_mpc_controller  # needs do-mpc
+
+    return do_mpc_controller(ours)
+
+
 class _Counted:
-    """A controller whose fallbacks are counted."""
+    """A controller whose fallbacks are counted, and its time."""
 
     def __init__(self, inner: Controller) -> None:
-        self.inner, self.sources = inner, dict[str, int]()
+        self.inner, self.sources, self.seconds = inner, dict[str, int](), list[float]()
 
     def step(self, measurements: Measurements, forecast: Forecast | None) -> Mapping[str, float]:
+        begin = time.process_time()
         action = self.inner.step(measurements, forecast)
+        self.seconds.append(time.process_time() - begin)
         source = str(getattr(action, "source", "controller"))
         self.sources[source] = self.sources.get(source, 0) + 1
         return action
@@ -120,17 +145,22 @@ def run(entry: Entry, week: str, size: Size = FULL, policies: Path = POLICIES) -
     controller = _Counted(controller_of(entry, plant, size, policies))
     begin = time.process_time()
     forecasts = entry.controller not in RULES
-    loop = run_closed_loop(
-        plant, controller, steps=size.days * STEPS_A_DAY, seed=TEST_WEEKS[week][1], forecasts=forecasts
-    )
+    days = min(size.days, PEER_DAYS) if entry.controller in PEERS else size.days
+    loop = run_closed_loop(plant, controller, steps=days * STEPS_A_DAY, seed=TEST_WEEKS[week][1], forecasts=forecasts)
     kpis = measure_kpis(loop.record, plant.scenario, control_step=plant.control_step)
     plain = {name: value for name, value in kpis.to_dict().items() if name != "zones"}
     area = kpis.floor_area
     return {
         "entry": asdict(entry), "week": week, "size": asdict(size), "kpis": plain, "cost": kpis.cost_tot * area,
         "discomfort": kpis.tdis_tot, "days": daily_stage_cost(plant), "sources": controller.sources,
-        "cpu_seconds": round(time.process_time() - begin, 2), "about": about(entry, policies),
+        "cpu_seconds": round(time.process_time() - begin, 2), "step_seconds": step_seconds(controller),
+        "about": about(entry, policies),
     }  # fmt: skip
+
+
+def step_seconds(controller: _Counted) -> dict[str, float]:
+    """CPU time that a controller took for its actions [s]."""
+    return {"median": float(np.median(controller.seconds)), "largest": max(controller.seconds)}
 
 
 def about(entry: Entry, policies: Path) -> dict[str, Any]:

@@ -25,6 +25,7 @@ NAMES = {
     "sac_after": "SAC, trained in the diagnosed model, moved to the plant",
 }  # fmt: skip
 REFERENCE = "mpc_after"
+PEERS = {"mpc_after": "ours", "mpc_as_do_mpc": "ours, on do-mpc's problem", "do_mpc": "do-mpc"}
 COLUMNS = (
     "controller", "seeds", "cost_tot, USD/m2", "tdis_tot, K h", "ener_tot, kWh/m2", "pele_tot, W/m2",
     "emis_tot, kg/m2", "stage cost of a week, USD", "over the reference, USD a week",
@@ -116,7 +117,26 @@ def table(runs: Sequence[dict[str, Any]]) -> str:
         f"hour; in brackets 95 % by bootstrap over days and seeds, differences paired by day. Reference: "
         f"{NAMES[REFERENCE]}, whose front over prices of discomfort gives its cost at another's comfort.\n"
     )
-    return markdown(COLUMNS, rows) + "\n" + note + "\n" + budgets(found)
+    return "\n".join(part for part in (markdown(COLUMNS, rows), note, budgets(found), peers(runs)) if part)
+
+
+def peers(runs: Sequence[dict[str, Any]]) -> str:
+    """Lay do-mpc out beside ours, on the days that do-mpc was run; nothing where it was not."""
+    here = [r for r in runs if r["entry"]["price"] == DISCOMFORT_PRICE and r["entry"]["controller"] in PEERS]
+    days = {r["week"]: len(r["days"]) for r in here if r["entry"]["controller"] == "do_mpc"}
+    if not days:
+        return ""
+    rows = []
+    for name, said in PEERS.items():
+        of = {r["week"]: r for r in here if r["entry"]["controller"] == name}
+        if days.keys() <= of.keys():
+            cost = [sum(of[week]["days"][:count]) for week, count in days.items()]
+            median, largest = (max(of[week]["step_seconds"][key] for week in days) for key in ("median", "largest"))
+            plans = sum(of[week]["sources"].get("optimal plan", 0) for week in days)
+            asked = sum(sum(of[week]["sources"].values()) for week in days)
+            rows.append([said, *(f"{c:.3f}" for c in cost), f"{median:.2f}", f"{largest:.2f}", f"{plans} of {asked}"])
+    columns = ("solver", *(f"stage cost, {week}, USD" for week in days), "an action, median CPU s", "largest", "solved")
+    return markdown(columns, rows)
 
 
 def budgets(found: dict[str, list[dict[str, Any]]]) -> str:
@@ -139,9 +159,9 @@ def _interval(mean: float, low: float, high: float, sign: str = "+") -> str:
 
 def draw_front(runs: Sequence[dict[str, Any]], path: Path) -> None:
     """Draw cost over discomfort: fronts of optimal control as lines, everything else as points, a seed each."""
-    figure, axes = plt.subplots(figsize=(8.0, 5.0), layout="constrained")
+    figure, axes = plt.subplots(figsize=(8.0, 6.0), layout="constrained")
     for k, name in enumerate(lines(runs)):
-        color = f"C{k % 10}"
+        color = plt.get_cmap("tab20")((2 * k) % 20 + k // 10)
         points = front(runs, name)
         if len(points) > 1:
             axes.plot(*zip(*points, strict=True), "-o", color=color, label=NAMES[name])
@@ -156,7 +176,7 @@ def draw_front(runs: Sequence[dict[str, Any]], path: Path) -> None:
     axes.set_xlabel("discomfort of a week, tdis_tot [K h]")
     axes.set_ylabel("energy cost of a week [USD]")
     axes.grid(alpha=0.3)
-    axes.legend(fontsize=8)
+    figure.legend(loc="outside lower center", ncols=2, fontsize=8)
     figure.savefig(path)
     plt.close(figure)
 
@@ -172,10 +192,12 @@ def draw_learning(runs: Sequence[dict[str, Any]], path: Path) -> bool:
         steps, cost = zip(*about["curve"], strict=True)
         known = axes.get_legend_handles_labels()[1]
         label = NAMES[family(name)]
-        axes.plot(steps, cost, "o-", ms=3, lw=1, color=f"C{names.index(family(name))}",
+        axes.plot(np.array(steps) / 1e3, cost, "o-", ms=3, lw=1, color=f"C{names.index(family(name))}",
                   label=None if label in known else label)  # fmt: skip
     axes.set_yscale("log")
-    axes.set_xlabel("control steps of a quarter of an hour")
+    for ticks in (axes.yaxis.set_major_formatter, axes.yaxis.set_minor_formatter):
+        ticks(lambda value, _: f"{value:g}")
+    axes.set_xlabel("thousand control steps of a quarter of an hour")
     axes.set_ylabel("stage cost of a validation week,\nin the world of the training [USD]")
     axes.grid(alpha=0.3, which="both")
     axes.legend(fontsize=8)

@@ -44,7 +44,7 @@ from mpc.scenario import (
     paper_carbon,
     paper_tariff,
 )
-from mpc.studies import control_model
+from mpc.studies import ORDER, control_model
 from thermal import Building, Case
 from thermal.effects import chosen
 from thermal.hvac import HvacSystem
@@ -124,13 +124,13 @@ def scenario_of(start: str, seed: int, days: float, gains: InternalGains | None 
 
 
 @cache
-def known_model(world: World, size: Size = FULL, folder: Path = POLICIES) -> ReducedModel:
-    """Make the reduced model of the building as it is, or as a model has it."""
+def known_model(world: World, size: Size = FULL, folder: Path = POLICIES, order: int = ORDER) -> ReducedModel:
+    """Make the reduced model of the building as it is, or as a model has it, with a number of states at most."""
     if world == "plant":
-        return control_model(office(size), TRUTH, dx=DX, effects=chosen(EFFECTS))
+        return control_model(office(size), TRUTH, dx=DX, effects=chosen(EFFECTS), order=order)
     if size != FULL:  # tests have no telemetry: a model that is wrong in the same ways
-        return control_model(office(size), dx=DX)
-    return control_model(office(), model_file(world, folder))
+        return control_model(office(size), dx=DX, order=order)
+    return control_model(office(), model_file(world, folder), order=order)
 
 
 def building_model(world: World, size: Size = FULL) -> ReducedBuilding:

@@ -6,6 +6,7 @@ measurements and the same forecasts of twelve hours with errors. Lines:
 
 - least action, schedule, outdoor reset, ASHRAE Guideline 36;
 - MPC with the model before diagnosis (the calibrated baseline) and after, untuned, at three prices of discomfort;
+- do-mpc with the model after diagnosis, and ours on the problem that do-mpc solves, on a day of each week;
 - MPC that knows state, model, weather and people, with exact sensors: a bound but for the valleys of its problem;
 - PPO and SAC of `train_rl.py`, every policy of `benchmarks/policies`: trained in the model before diagnosis and moved
   to the plant, and trained on the plant. Their reward is minus the stage cost; the best policy on validation weeks of

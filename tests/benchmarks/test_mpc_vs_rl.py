@@ -93,6 +93,37 @@ def test_the_models_of_the_comparison_are_those_of_the_commands(case: ModuleType
     assert not known["before"]["effects"]
 
 
+def test_do_mpc_stands_beside_ours_on_its_days_only(tables: ModuleType) -> None:
+    runs = [run("mpc_after", "winter", [2.0, 3.0]), run("do_mpc", "winter", [2.5])]
+    for row, plans in zip(runs, ({"optimal plan": 192}, {"optimal plan": 95, "previous plan": 1}), strict=True):
+        row |= {"sources": plans, "step_seconds": {"median": 0.1, "largest": 0.2}}
+    text = tables.peers(runs)
+    assert "| ours | 2.000 | 0.10 | 0.20 | 192 of 192 |" in text
+    assert "| do-mpc | 2.500 | 0.10 | 0.20 | 95 of 96 |" in text
+    assert tables.peers(runs[:1]) == ""
+
+
+def test_do_mpc_predicts_as_ours_does(
+    script: Callable[[str], ModuleType], case: ModuleType, comparison: ModuleType
+) -> None:
+    """Its own equations at its own plan, against the predictor's roll-out of it; and it stays near our cost."""
+    pytest.importorskip("do_mpc", reason="do-mpc comes with the extra [benchmarks]", exc_type=Exception)
+    script("_do_mpc_loop")
+    compared = script("_comparison")
+    plant = case.make_plant(case.TEST_WEEKS["winter"], case.building_model("plant", case.SMOKE), size=case.SMOKE)
+    both = [compared.peer_controller(compared.Entry(name), plant, case.SMOKE, hours=3.0) for name in compared.PEERS]
+    seen = plant.reset(1)
+    rule = compared.day_schedule(tuple(a for a in plant.actuators if a.required))
+    for _ in range(22):  # until half past five, when heating begins
+        seen = plant.step(rule.step(seen, None))
+    forecast = plant.forecast()
+    peer, ours = (controller.step(seen, forecast).solution for controller in both)
+    assert peer is not None and ours is not None and peer.solver == "do-mpc" and peer.usable
+    zone = both[0].solver.zones()
+    assert np.abs(zone - peer.rollout.zone[1:]).max() < 0.02
+    assert peer.terms.total == pytest.approx(ours.terms.total, rel=0.01)
+
+
 def random_policy(case: ModuleType, folder: Path) -> None:
     """A policy of the small office that nobody has trained."""
     plant = case.make_plant(case.TEST_WEEKS["winter"], case.building_model("plant", case.SMOKE), size=case.SMOKE)

@@ -142,9 +142,12 @@ def test_a_process_that_does_not_answer_is_ended(office, make_plant, left_over):
 def test_a_handle_that_is_not_there_is_named(office, make_plant):
     from mpc.plants.energyplus._process import EnergyPlusProcess
 
-    job = make_plant().job()._replace(variables=(("Zone Air Temperature", "Nowhere"),), products=())
+    job = make_plant().job()._replace(
+        variables=(("Zone Air Temperature", "Nowhere"),), meters=("No:Meter",),
+        actuators=(("System Node Setpoint", "Temperature Setpoint", "No Node"),), products=(),
+    )  # fmt: skip
     process = EnergyPlusProcess(job)
-    with pytest.raises(EnergyPlusError, match="no handle for variables.*Nowhere"):
+    with pytest.raises(EnergyPlusError, match="no handle for variables.*Nowhere.*meters.*No:Meter.*actuators.*No Node"):
         process.ask(1, [None] * len(job.actuators))
     assert not process.folder.exists()
 

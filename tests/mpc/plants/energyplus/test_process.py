@@ -6,6 +6,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -39,3 +40,23 @@ def test_a_broken_input_is_a_named_error_with_energyplus_own_words():
     job = Job("Version,25.2;\nZone,;\nNothing,1;\n", "in.idf", weather_path(CHICAGO), stepped=False)
     with pytest.raises(EnergyPlusError, match="Severe"):
         run_energyplus(job, [])
+
+
+@pytest.mark.parametrize(
+    ("said", "fine"),
+    [
+        ("EnergyPlus Completed Successfully-- 3 Warning; 0 Severe Errors; Elapsed Time=00hr 00min 1.00sec", True),
+        ("EnergyPlus Completed Successfully-- 3 Warning; 2 Severe Errors; Elapsed Time=00hr 00min 1.00sec", False),
+        ("EnergyPlus Terminated--Fatal Error Detected. 1 Warning; 1 Severe Errors; Elapsed Time=00hr", False),
+        ("", False),
+        (None, False),
+    ],
+)
+def test_the_end_file_tells_whether_it_ended_well(said, fine, tmp_path):
+    from mpc.plants.energyplus._process import EnergyPlusProcess
+
+    if said is not None:
+        (tmp_path / "eplusout.end").write_text(said)
+    failures = []
+    EnergyPlusProcess.check(SimpleNamespace(output=tmp_path, _fail=failures.append))
+    assert failures == ([] if fine else ["no end file" if said is None else said])
