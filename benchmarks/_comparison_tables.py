@@ -120,6 +120,25 @@ def table(runs: Sequence[dict[str, Any]]) -> str:
     return "\n".join(part for part in (markdown(COLUMNS, rows), note, budgets(found), peers(runs)) if part)
 
 
+def short(runs: Sequence[dict[str, Any]]) -> str:
+    """Lay out for the README what each line costs and how comfortable it is."""
+    found, rows = lines(runs), []
+    reference, points = found.get(REFERENCE), front(runs, REFERENCE)
+    for name, of in found.items():
+        cost, discomfort = (float(np.mean([r[key] for r in of])) for key in ("cost", "discomfort"))
+        rows.append([
+            NAMES[name], f"{cost:.1f}", f"{discomfort:.2f}", f"{cost_at(points, discomfort):.1f}" if points else "",
+            "" if reference is None or name == REFERENCE else _interval(*bootstrap(of, reference)),
+        ])  # fmt: skip
+    return markdown(
+        (
+            "a week", "energy cost, USD", "discomfort, K h", f"cost of {NAMES[REFERENCE]}, as comfortable",
+            "cost with discomfort over it",
+        ),
+        rows,
+    )  # fmt: skip
+
+
 def peers(runs: Sequence[dict[str, Any]]) -> str:
     """Lay do-mpc out beside ours, on the days that do-mpc was run; nothing where it was not."""
     here = [r for r in runs if r["entry"]["price"] == DISCOMFORT_PRICE and r["entry"]["controller"] in PEERS]

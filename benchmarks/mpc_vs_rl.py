@@ -30,9 +30,9 @@ from pathlib import Path
 from typing import Any
 
 from _comparison import PRICES, Entry, entries, run
-from _comparison_tables import draw_front, draw_learning, table
+from _comparison_tables import draw_front, draw_learning, short, table
 from _learning_case import FULL, POLICIES, SMOKE, TEST_WEEKS, Size
-from _table import write
+from _table import publish, write
 from simulator_speed import use_one_thread
 
 Job = tuple[Entry, str]
@@ -72,7 +72,7 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--prices", nargs="+", type=float, default=list(PRICES), help="of discomfort, for the fronts")
     parser.add_argument("--controllers", nargs="+", help="only these; all by default")
     parser.add_argument("--processes", type=int, default=1)
-    parser.add_argument("--publish", action="store_true", help="replace the table between its marks")
+    parser.add_argument("--publish", action="store_true", help="replace the tables between their marks")
     parser.add_argument("--smoke", action="store_true", help="a day on four zones")
     return parser.parse_args(arguments)
 
@@ -96,6 +96,8 @@ def main(arguments: list[str] | None = None) -> list[dict[str, Any]]:
     runs = gather(jobs, size, options.policies, options.processes)
     text = table(runs)
     write(options.out, "mpc_vs_rl", text, {"runs": runs}, options.publish)
+    if options.publish:
+        publish("mpc_vs_rl_short", short(runs))
     draw_front(runs, options.out / "mpc_vs_rl_front.svg")
     draw_learning(runs, options.out / "mpc_vs_rl_learning.svg")
     print(text)

@@ -147,6 +147,8 @@ def test_smoke_of_the_comparison(case: ModuleType, comparison: ModuleType, tmp_p
         assert sum(row["days"]) == pytest.approx(row["cost"] + price * zones * row["discomfort"], rel=1e-9)
     text = (tmp_path / "out" / "mpc_vs_rl.md").read_text()
     assert "SAC, trained on the plant | 1 |" in text
+    rows = comparison.short(first).splitlines()
+    assert len(rows) == 6 and rows[4].startswith("| MPC, model after diagnosis |") and rows[4].endswith("|  |")
     stamps = {file: file.stat().st_mtime_ns for file in (tmp_path / "out" / "runs").iterdir()}
     assert comparison.main(asked) == first
     assert stamps == {file: file.stat().st_mtime_ns for file in (tmp_path / "out" / "runs").iterdir()}
