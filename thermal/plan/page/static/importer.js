@@ -66,7 +66,7 @@ export async function openImport() {
   try {
     const { drawings } = await api.get("api/drawings");
     for (const found of drawings) if (!used(found.file) && !sheets.some((s) => s.file === found.file)) addSheet(found);
-    if (byId("import-status")) draw(); // it may have been closed, or left for another, while the server was busy
+    if (byId("dialog").open && byId("import-status")) draw(); // closed, or left for another, while the server was busy: so it stays
   } catch (error) {
     status(error.message, true);
   }
