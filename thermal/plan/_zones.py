@@ -75,7 +75,7 @@ def propose_zones(
     joined = int(np.count_nonzero(owner[1:] != np.arange(1, len(owner))))
     if joined:
         small = "1 room" if joined == 1 else f"{joined} rooms"
-        remark = f"{small} under {smallest_zone:g} m2 joined the zone behind the door"
+        remark = f"{small} under {smallest_zone:g} m2 joined the zone behind the door, or beside where there is none"
         survey = replace(survey, remarks=(*survey.remarks, remark))
     return ZonedFloor(floor, float(height), survey, number[rooms], tuple(titles))
 

@@ -108,7 +108,7 @@ def test_floors_are_aligned_by_outline_and_by_anchor() -> None:
 def test_small_rooms_join_and_names_are_kept() -> None:
     survey = survey_codes(rooms_of([40, 10], 30, 1), 0.1)
     joined = propose_zones(survey, "F1", 3.0)
-    assert joined.names == ("F1_R01",) and "part of the zone next to them" in joined.survey.remarks[-1]
+    assert joined.names == ("F1_R01",) and "1 room under 4 m2 joined the zone" in joined.survey.remarks[-1]
     named = propose_zones(survey, "F1", 3.0, names={"closet": (45.0, 10.0)})
     assert named.names == ("F1_R01", "closet")
     with pytest.raises(RoomNameError, match="outside"):
