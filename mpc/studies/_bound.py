@@ -9,7 +9,7 @@ from calibration import DisturbanceModel, KalmanFilter
 from mpc.control import Observer
 from mpc.plants import ReducedBuilding, SimulatedPlant
 from mpc.studies._controller import LASTING, SENSOR_NOISE, UNMEASURED, held_space
-from thermal.model import ReducedModel, modal_model
+from thermal.model import ModalModel, ReducedModel, modal_model
 
 FloatArray = NDArray[np.float64]
 
@@ -34,9 +34,14 @@ def knowing_observer(model: ReducedModel, plant: SimulatedPlant) -> Observer:
     """
     if isinstance(plant.model, ReducedBuilding):
         return KnownState(model, plant)
+    return Observer(*_filter(model, plant, SHUFFLED))
+
+
+def _filter(model: ReducedModel, plant: SimulatedPlant, unmeasured: float) -> tuple[KalmanFilter, ModalModel]:
+    """Make a filter over the plant's control step that expects so much unmeasured heat [W/m2], and its modes."""
     modes = modal_model(model.matrices(model.theta))
-    shuffled = DisturbanceModel(SHUFFLED * plant.scenario.areas, LASTING, SENSOR_NOISE)
-    return Observer(KalmanFilter(held_space(modes, plant.control_step), shuffled), modes)
+    expected = DisturbanceModel(unmeasured * plant.scenario.areas, LASTING, SENSOR_NOISE)
+    return KalmanFilter(held_space(modes, plant.control_step), expected), modes
 
 
 class KnownState(Observer):
@@ -51,9 +56,7 @@ class KnownState(Observer):
     """
 
     def __init__(self, model: ReducedModel, plant: SimulatedPlant) -> None:
-        modes = modal_model(model.matrices(model.theta))
-        usual = DisturbanceModel(UNMEASURED * plant.scenario.areas, LASTING, SENSOR_NOISE)
-        super().__init__(KalmanFilter(held_space(modes, plant.control_step), usual), modes)
+        super().__init__(*_filter(model, plant, UNMEASURED))
         self._plant = plant
 
     def start(self, zone: FloatArray, boundary: FloatArray) -> None:
