@@ -72,6 +72,9 @@ class ControllerSettings:
         Of heat that the building holds at the end [currency/kWh].
     time_limit : float
         Wall time of a solve [s].
+    second_start : float
+        Time between solves that begin at the rules as well as at the plan that is carried on [s], see `Starts`;
+        infinite is never.
     operation : ComfortOperation
         Schedules of the building's automation.
     rule : ResetRule
@@ -88,6 +91,7 @@ class ControllerSettings:
     carbon_price: float = 0.0
     heat_value: float = 0.0
     time_limit: float = 60.0
+    second_start: float = 7200.0
     operation: ComfortOperation = field(default_factory=ComfortOperation)
     rule: ResetRule = field(default_factory=ResetRule)
     demand: tuple[DemandCharge, ...] = ()

@@ -17,6 +17,7 @@ from mpc.control._explain import explain_comfort
 from mpc.control._observer import Observer
 from mpc.control._problem import ControlProblem
 from mpc.control._reading import Readings, SitePoints
+from mpc.control._second_start import Starts
 from mpc.control._solution import Solution, Solver, Status
 from mpc.control._start_up import past_forecast, past_steps
 from mpc.control._watch import FarFromModel, StuckSensors
@@ -66,6 +67,7 @@ class MpcController:
         self._readings = Readings(points, self.problem.predictor.hvac.system)
         self._previous = self.settings.rule.setpoints(self.problem.predictor.channels, 283.15)
         self._plan: tuple[pd.Timestamp, FloatArray] | None = None
+        self._starts = Starts(self.settings.second_start)
         self._forecast: Forecast | None = None
         self._gains: FloatArray | None = None
         self._demand = DemandCount(self.settings.demand)
@@ -250,11 +252,12 @@ class MpcController:
 
     def _solve(self, data: HorizonData, now: pd.Timestamp, reasons: list[str]) -> Solution | None:
         reasons.extend(self.problem.explain_limits(data))
-        first = self._shifted(now)
-        if first is None:
-            first = self.settings.rule.plan(self.problem.predictor, data.outdoor_temperature)
+        carried, limit = self._shifted(now), self.settings.time_limit
+        rules = self.settings.rule.plan(self.problem.predictor, data.outdoor_temperature)
         try:
-            solution = self.solver.solve(data, first, self.settings.time_limit)
+            solution, changed = self._starts.solve(self.solver, data, carried, rules, now, limit)
+            if changed:
+                reasons.append("a plan begun at the rules is cheaper than the one carried on: it is used")
         except Exception as error:  # whatever a solver dies of, the building goes on
             reasons.append(f"solver broke: {type(error).__name__}: {error}")
             self.solver.forget()
@@ -313,7 +316,7 @@ class MpcController:
             "plan": None if self._plan is None else (self._plan[0], self._plan[1].copy()), "forecast": self._forecast,
             "gains": None if self._gains is None else self._gains.copy(), "peaks": dict(self._demand.peaks),
             "windows": list(self._demand.windows), "stuck": self._stuck.memory, "far": self._far.count,
-            "memory": self.solver.memory, "heat": self._heat, "water": self._water,
+            "memory": self.solver.memory, "heat": self._heat, "water": self._water, "begun": self._starts.begun,
         }  # fmt: skip
 
     def restore_state(self, saved: Mapping[str, Any]) -> None:
@@ -328,5 +331,5 @@ class MpcController:
         self._previous, self._plan, self._forecast = saved["previous"].copy(), saved["plan"], saved["forecast"]
         self._gains, self._stuck.memory, self._far.count = saved["gains"], saved["stuck"], saved["far"]
         self._demand.peaks, self._demand.windows = dict(saved["peaks"]), list(saved["windows"])
-        self._heat, self._water = saved["heat"], saved["water"]
+        self._heat, self._water, self._starts.begun = saved["heat"], saved["water"], saved["begun"]
         self.solver.memory = saved["memory"]
