@@ -11,7 +11,7 @@ from mpc.control._solution import Solution, Solver
 
 FloatArray = NDArray[np.float64]
 
-#: Share of the cost by which a plan begun at the rules has to be cheaper [-]: of plans that cost the same the carried one
+#: Share of the cost by which a plan begun at the rules has to be cheaper [-]: of plans of equal cost the carried one
 #: is kept, or setpoints would leap from valley to valley.
 CHEAPER = 0.01
 
@@ -31,10 +31,10 @@ class Starts:
 
     Notes
     -----
-    The cost is not convex: in a room that is too warm a terminal opens wider the warmer the supply air is, and a plan
-    that a warm-up has led there finds no decrease on the way back. Carried on alone, such a plan overheated the core of
-    a medium office for a morning and more, 8.3 K h a zone in a winter week; with a second start every two hours it is
-    1.1, at 2 % less cost.
+    A setpoint beyond what its coil reaches makes no difference, and has no slope: a plan that a warm-up has led there
+    stays there, though all of the way to a colder setpoint further down the cost falls. Carried on alone, such a plan
+    overheated the core of a medium office for a morning and more, 8.3 K h a zone in a winter week; with a second start
+    every two hours it is 1.1, at 2 % less cost.
     """
 
     def __init__(self, every: float) -> None:

@@ -1,0 +1,102 @@
+"""Where solves begin: a plateau that a plan carried on does not leave, and what a second start may take."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from mpc.control import Channel, ControlProblem, Horizon, HorizonData, Predictor, SequentialSolver, Solution
+from mpc.control._problem import CostTerms
+from mpc.control._second_start import CHEAPER, Starts
+from thermal.hvac import Heater, SmoothHvac
+
+NOW = pd.Timestamp("2023-01-16 10:00", tz="Etc/GMT+8")
+HOUR = pd.Timedelta(hours=1)
+
+
+@pytest.fixture(scope="module")
+def plateau(modes, system, make_data) -> tuple[ControlProblem, HorizonData]:
+    """Rooms too warm, and a heater in the air handler that never reaches what it is asked for."""
+    handler = system.air_handlers[0]
+    small = replace(handler, heating=Heater(1006.0 * handler.supply_fan.design_flow))
+    horizon = Horizon.growing([(1.0, 300.0), (2.0, 900.0)], [0.5, 0.5, 1.0, 1.0])
+    hvac = SmoothHvac(replace(system, air_handlers=(small,)), 0.005)
+    channels = (Channel("supply_air_temperature", 283.15, 313.15),)
+    problem = ControlProblem(Predictor(modes, hvac, horizon, channels, 6 * 3600.0))
+    return problem, make_data(problem, outdoor=283.0, zone=299.5, previous=np.array([313.15]))
+
+
+def test_a_plan_that_asks_for_more_than_the_coil_gives_is_left(plateau) -> None:
+    """Carried on it stays, as there is no slope; begun at the rules as well it does not."""
+    problem, data = plateau
+    carried, rules = np.full(problem.shape, 313.0), np.full(problem.shape, 288.0)
+    rollout = problem.predictor.rollout(data, carried)
+    assert np.abs(problem.gradient(data, rollout, problem.predictor.sensitivity(data, rollout))).max() < 1e-4
+    alone = SequentialSolver(problem).solve(data, carried)
+    both, changed = Starts(7200.0).solve(SequentialSolver(problem), data, carried, rules, NOW, 60.0)
+    assert alone.terms.total == pytest.approx(alone.start)
+    assert changed and both.terms.total < 0.1 * alone.terms.total
+
+
+@dataclass
+class Told:
+    """A solver that says what it is told to, by the first setpoint that it is given."""
+
+    costs: dict[float, float]
+    like: Solution
+    seconds: float = 1.0
+    memory: float | None = None
+    asked: list[float] = field(default_factory=list)
+
+    def solve(self, data: HorizonData, plan: np.ndarray, time_limit: float | None = None) -> Solution:
+        at = float(plan[0, 0])
+        self.asked.append(at)
+        self.memory = at
+        cost = self.costs[at]
+        terms = CostTerms(electricity=cost, gas=0.0, demand=0.0, comfort=0.0, moves=0.0, storage=0.0)
+        return replace(self.like, plan=plan, terms=terms, start=np.inf, seconds=self.seconds)
+
+    def forget(self) -> None:
+        self.memory = None
+
+
+@pytest.fixture(scope="module")
+def like(plateau) -> Solution:
+    problem, data = plateau
+    return SequentialSolver(problem, iterations=1).solve(data, np.full(problem.shape, 288.0))
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "taken"),
+    [
+        (1.0, 1.0 - 2.0 * CHEAPER, True),
+        (1.0, 1.0 - 0.5 * CHEAPER, False),
+        (1.0, 1.5, False),
+        (np.nan, 1.5, True),  # the plan carried on leads to no number at all
+    ],
+)
+def test_the_second_counts_where_it_is_cheaper_by_enough(plateau, like, first, second, taken) -> None:
+    problem, data = plateau
+    carried, rules = np.full(problem.shape, 300.0), np.full(problem.shape, 288.0)
+    solver = Told({300.0: first, 288.0: second}, like)
+    found, changed = Starts(7200.0).solve(solver, data, carried, rules, NOW, 60.0)
+    assert changed is taken and found.plan[0, 0] == (288.0 if taken else 300.0)
+    assert solver.memory == found.plan[0, 0]  # what was learned on the way to the plan that counts
+
+
+def test_when_the_second_is_asked(plateau, like) -> None:
+    """At first, then every two hours; after a start from the rules alone they count from there."""
+    problem, data = plateau
+    carried, rules = np.full(problem.shape, 300.0), np.full(problem.shape, 288.0)
+    starts, solver = Starts(7200.0), Told({300.0: 1.0, 288.0: 1.0}, like)
+    starts.solve(solver, data, None, rules, NOW, 60.0)
+    for hours in (0.5, 1.9, 2.0, 3.0):
+        starts.solve(solver, data, carried, rules, NOW + hours * HOUR, 60.0)
+    assert solver.asked == [288.0, 300.0, 300.0, 300.0, 288.0, 300.0]
+    assert starts.begun == NOW + 2 * HOUR
+    slow = Told({300.0: 1.0, 288.0: 0.5}, like, seconds=40.0)
+    found, changed = Starts(7200.0).solve(slow, data, carried, rules, NOW, 60.0)
+    assert slow.asked == [300.0] and not changed and found.terms.total == 1.0  # 20 s are left, 40 would be needed
