@@ -2,7 +2,7 @@
 
 from mpc.control._action import Action, ControllerSettings, Source
 from mpc.control._assembly import ComfortOperation, Expected, Schedule, expect, peak_data
-from mpc.control._back_off import BackOff
+from mpc.control._back_off import BackOff, Margin
 from mpc.control._channels import Channel, supply_channels
 from mpc.control._controller import MpcController
 from mpc.control._data import HorizonData, PeakData
@@ -44,6 +44,7 @@ __all__ = [
     "HorizonData",
     "IpoptSolver",
     "LinearSolver",
+    "Margin",
     "MovingHorizonObserver",
     "MpcController",
     "Observer",

@@ -9,7 +9,7 @@ from enum import StrEnum
 import pandas as pd
 
 from mpc.control._assembly import ComfortOperation
-from mpc.control._back_off import BackOff
+from mpc.control._back_off import BackOff, Margin
 from mpc.control._rules import ResetRule
 from mpc.control._solution import Solution
 from mpc.kpi import DISCOMFORT_PRICE
@@ -81,7 +81,7 @@ class ControllerSettings:
         First guess, and what is done when there is no plan.
     demand : tuple of DemandCharge
         Of the tariff.
-    back_off : BackOff, optional
+    back_off : BackOff or Margin, optional
         Narrows the comfort bands by what is uncertain; none by default.
     false_alarm, resolution : float
         Of the recognition of stuck sensors, see `StuckSensors` [-], [K].
@@ -95,6 +95,6 @@ class ControllerSettings:
     operation: ComfortOperation = field(default_factory=ComfortOperation)
     rule: ResetRule = field(default_factory=ResetRule)
     demand: tuple[DemandCharge, ...] = ()
-    back_off: BackOff | None = None
+    back_off: BackOff | Margin | None = None
     false_alarm: float = 1e-5
     resolution: float = 0.1

@@ -195,7 +195,7 @@ class MpcController:
         schedule = settings.operation.schedule(expected.band, horizon.edges)
         n_steps, n_zone = expected.gains.shape
         n_air = self.problem.predictor.hvac.n_air_handler
-        data = HorizonData(
+        return HorizonData(
             state=self.observer.modal_state.copy(), water=water, disturbance=self.observer.disturbance.copy(),
             previous=self._previous, boundary=boundary, outdoor_temperature=expected.outdoor_temperature,
             outdoor_humidity=np.full(n_steps, _USUAL_HUMIDITY), gains=expected.gains, lower=expected.lower,
@@ -207,7 +207,6 @@ class MpcController:
             peaks=peak_data(settings.demand, horizon, now, self._demand.peaks, self._demand.used(now)),
             heat_value=settings.heat_value,
         )  # fmt: skip
-        return data if settings.back_off is None else settings.back_off.narrow(data)
 
     def _boundary(self, expected: Expected, forecast: Forecast, stamps: pd.DatetimeIndex) -> FloatArray:
         outdoor = expected.outdoor_temperature[:, None]
@@ -252,10 +251,11 @@ class MpcController:
 
     def _solve(self, data: HorizonData, now: pd.Timestamp, reasons: list[str]) -> Solution | None:
         reasons.extend(self.problem.explain_limits(data))
-        carried, limit = self._shifted(now), self.settings.time_limit
+        carried, limit, back_off = self._shifted(now), self.settings.time_limit, self.settings.back_off
+        narrowed = data if back_off is None else back_off.narrow(data)
         rules = self.settings.rule.plan(self.problem.predictor, data.outdoor_temperature)
         try:
-            solution, changed = self._starts.solve(self.solver, data, carried, rules, now, limit)
+            solution, changed = self._starts.solve(self.solver, narrowed, carried, rules, now, limit)
             if changed:
                 reasons.append("a plan begun at the rules is cheaper than the one carried on: it is used")
         except Exception as error:  # whatever a solver dies of, the building goes on

@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.stats import binom
+from scipy.stats import binom, norm
 
 from calibration import DisturbanceModel, KalmanFilter, state_space
-from mpc.control import BackOff, ControlProblem, HeatPredictor, Horizon, LinearSolver, heat_channels
+from mpc.control import BackOff, ControlProblem, HeatPredictor, Horizon, LinearSolver, Margin, heat_channels
 from mpc.errors import ControlError
 from mpc.scenario import ErrorGrowth
 from thermal.model import IMPLICIT_EULER
@@ -91,3 +91,24 @@ def test_too_narrow_a_band_shrinks_to_its_middle(kalman, modes, make_data) -> No
     np.testing.assert_allclose(narrowed.upper, 294.155)
     with pytest.raises(ControlError, match="up to 0.5"):
         BackOff(kalman, modes, HORIZON, 0.7)
+
+
+def test_a_margin_prices_the_expected_excess(modes, make_data) -> None:
+    """With a softness of twice its width it is the mean penalty of a zone whose prediction has a normal error."""
+    channels = heat_channels(np.full(5, 3e3), np.zeros(5))
+    deviation = 0.2
+    width = 1.5 * deviation
+    problem = ControlProblem(HeatPredictor(modes, HORIZON, channels), softness=2.0 * width, terminal_time=0.0)
+    data = make_data(problem, previous=np.zeros(5), disturbance=np.zeros(5))
+    narrowed = Margin(width).narrow(data)
+    price = data.comfort_price[0, 0] * HORIZON.steps[0] / 3600.0
+    for excess in np.linspace(-1.0, 1.0, 21):
+        zone = np.full(data.upper.shape, data.upper[0, 0] + excess)
+        expected = deviation * norm.pdf(excess / deviation) + excess * norm.cdf(excess / deviation)
+        found = problem.penalty(narrowed, zone).value[0, 0] / price
+        assert found == pytest.approx(expected, abs=0.05 * deviation)
+    tight = Margin(5.0).narrow(data)
+    np.testing.assert_array_equal(tight.lower, 0.5 * (data.lower + data.upper))
+    np.testing.assert_array_equal(tight.lower, tight.upper)
+    with pytest.raises(ControlError, match="0 K or more"):
+        Margin(-0.1)
