@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
@@ -43,16 +44,19 @@ class ReducedModel(SymbolicModel):
     projection : ndarray, shape (n_node, r)
         Orthonormal basis [-].
     theta : ndarray, shape (n_parameter,)
-        Where the basis was made and certified [parameter units].
-    certificate : Certificate
-        Its replay on the grid.
+        Where the basis was made [parameter units].
     """
 
-    def __init__(
-        self, grid: SymbolicModel, projection: FloatArray, theta: FloatArray, certificate: Certificate
-    ) -> None:
+    def __init__(self, grid: SymbolicModel, projection: FloatArray, theta: FloatArray) -> None:
         super().__init__(grid.network, projection)
-        self.grid, self.theta, self.certificate = grid, theta, certificate
+        self.grid, self.theta = grid, theta
+
+    @cached_property
+    def certificate(self) -> Certificate:
+        """Error of its replay on the grid at its θ; made when it is asked for, as it costs a third of a reduction."""
+        replay = closed_loop(self.grid.matrices(self.theta))
+        errors = differences(self.matrices(self.theta), replay)
+        return Certificate(self.network.n_node, self.order, replay.hours, replay.step, *errors)
 
     @property
     def order(self) -> int:
@@ -180,7 +184,7 @@ def reduced_model(
     model : SymbolicModel
         On the grid.
     thetas : sequence of ndarray, shape (n_parameter,)
-        Where the basis is made [parameter units]; it is certified at the first.
+        Where the basis is made [parameter units]; its certificate is of the first.
     order : int, optional
         Largest number of states.
     tolerance : float, optional
@@ -191,7 +195,7 @@ def reduced_model(
     Returns
     -------
     ReducedModel
-        With the certificate of its replay on the grid.
+        On the basis.
 
     Raises
     ------
@@ -212,22 +216,12 @@ def reduced_model(
     inputs = len(model.network.zones) + len(model.network.boundaries)
     chosen = shifts or (SHIFTS if inputs < _MANY_INPUTS else FEW_SHIFTS)
     whole = [model.matrices(t, slopes=bool(model.network.signals)) for t in thetas]
-    basis, replay = krylov_basis(whole, chosen), closed_loop(whole[0])
-    small = _turned(whole[0], basis)
-    errors = differences(small, replay)
+    basis = krylov_basis(whole, chosen)
     if tolerance is not None:
-        if errors[1] > tolerance:
-            raise ModelError(
-                f"tolerance: expected at least {errors[1]:.2g} K, the error of all {small.n} states of the basis, "
-                f"came {tolerance:g}; add shifts"
-            )
-        turn, errors = _least(small, _ranked([small]), tolerance, replay)
-        basis = basis @ turn
-    elif order is not None and order < small.n:
-        turn = _ranked([small, *(_turned(m, basis) for m in whole[1:])])[:, :order]
-        basis, errors = basis @ turn, differences(_turned(small, turn), replay)
-    certificate = Certificate(model.network.n_node, basis.shape[1], replay.hours, replay.step, *errors)
-    return ReducedModel(model, basis, np.asarray(thetas[0], dtype=float), certificate)
+        basis = basis @ _least(_turned(whole[0], basis), tolerance, closed_loop(whole[0]))
+    elif order is not None and order < basis.shape[1]:
+        basis = basis @ _ranked([_turned(m, basis) for m in whole])[:, :order]
+    return ReducedModel(model, basis, np.asarray(thetas[0], dtype=float))
 
 
 def _ranked(models: Sequence[Matrices]) -> FloatArray:
@@ -278,15 +272,20 @@ def _dense(matrix: Matrix) -> FloatArray:
     return np.asarray(matrix.toarray() if sp.issparse(matrix) else matrix)
 
 
-def _least(m: Matrices, ranked: FloatArray, tolerance: float, replay: Replay) -> tuple[FloatArray, tuple[float, float]]:
+def _least(m: Matrices, tolerance: float, replay: Replay) -> FloatArray:
     """Fewest directions whose replay is within the tolerance, by bisection."""
+    least = differences(m, replay)[1]
+    if least > tolerance:
+        raise ModelError(
+            f"tolerance: expected at least {least:.2g} K, the error of all {m.n} states of the basis, "
+            f"came {tolerance:g}; add shifts"
+        )
+    ranked = _ranked([m])
     low, high = 1, ranked.shape[1]
-    best = differences(m, replay)
     while high - low > max(1, high // 50):
         middle = (low + high) // 2
-        found = differences(_turned(m, ranked[:, :middle]), replay)
-        if found[1] <= tolerance:
-            high, best = middle, found
+        if differences(_turned(m, ranked[:, :middle]), replay)[1] <= tolerance:
+            high = middle
         else:
             low = middle
-    return ranked[:, :high], best
+    return ranked[:, :high]
