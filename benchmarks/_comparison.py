@@ -25,7 +25,7 @@ from _learning_case import (
 )
 
 from mpc.baselines import Guideline36, OutdoorReset, day_schedule
-from mpc.control import ControllerSettings, Horizon, MpcController
+from mpc.control import ControllerSettings, Horizon, Margin, MpcController
 from mpc.environment import ActorNetwork, ControlEnvironment, EconomicReward, PolicyController
 from mpc.kpi import StageCost, measure_kpis
 from mpc.plants import (
@@ -112,8 +112,10 @@ def peer_controller(entry: Entry, plant: SimulatedPlant, size: Size, hours: floa
     """Make optimal control with do-mpc as its solver, or with ours on the same problem."""
     model = known_model("after", size, order=PEER_ORDER)
     steps = round(hours * 3600.0 / plant.control_step)
+    # do-mpc's slacks are linear from the edge of a band on: a margin belongs to a penalty that begins softly
+    back_off = Margin(0.0) if entry.controller == "do_mpc" else None
     ours = make_controller(
-        model, plant, settings=ControllerSettings(comfort_price=entry.price),
+        model, plant, settings=ControllerSettings(comfort_price=entry.price, back_off=back_off),
         horizon=Horizon.regular(hours, plant.control_step, steps),
     )  # fmt: skip
     if entry.controller == "mpc_as_do_mpc":
