@@ -73,8 +73,8 @@ class ControllerSettings:
     time_limit : float
         Wall time of a solve [s].
     second_start : float
-        Time between solves that begin at the rules as well as at the plan that is carried on [s], see `Starts`;
-        infinite is never.
+        Time between solves that begin anew as well as at the plan that is carried on [s], see `Starts`; infinite is
+        never.
     operation : ComfortOperation
         Schedules of the building's automation.
     rule : ResetRule

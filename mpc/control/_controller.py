@@ -257,7 +257,7 @@ class MpcController:
         try:
             solution, changed = self._starts.solve(self.solver, narrowed, carried, rules, now, limit)
             if changed:
-                reasons.append("a plan begun at the rules is cheaper than the one carried on: it is used")
+                reasons.append("a plan begun anew is cheaper than the one carried on: it is used")
         except Exception as error:  # whatever a solver dies of, the building goes on
             reasons.append(f"solver broke: {type(error).__name__}: {error}")
             self.solver.forget()

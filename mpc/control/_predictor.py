@@ -46,6 +46,10 @@ class Rollout:
         Of the plant, where its slopes are taken [as in `thermal.hvac.HvacSlopes`].
     heat : ndarray, shape (N, n_zone)
         From the plant into the zones [W].
+    air : ndarray, shape (N, n_air_handler)
+        Supply air as it leaves each air handler [K].
+    water : ndarray, shape (N,)
+        Supply water at the ends of the steps [K].
     """
 
     plan: FloatArray
@@ -57,6 +61,8 @@ class Rollout:
     knobs: FloatArray
     sums: FloatArray
     heat: FloatArray
+    air: FloatArray
+    water: FloatArray
 
     @property
     def finite(self) -> bool:
@@ -245,8 +251,41 @@ class Predictor:
             water = done[k, n + 2]
             x = left + self._push[dt] @ done[k, :n]
             zone[k + 1] = free + self._response[dt] @ done[k, :n]
-        sums = np.ascontiguousarray(done[:, n + 3 : n + 3 + self.hvac.n_sum])
-        return Rollout(plan, zone, seen, done[:, n], done[:, n + 1], x, knobs, sums, done[:, :n])
+        sums, air = np.split(done[:, n + 3 : -n], [self.hvac.n_sum], axis=1)
+        return Rollout(
+            plan, zone, seen, done[:, n], done[:, n + 1], x, knobs, np.ascontiguousarray(sums), done[:, :n], air,
+            done[:, n + 2],
+        )  # fmt: skip
+
+    def reached(self, data: HorizonData, rollout: Rollout) -> FloatArray:
+        """Plan with each supply temperature moved to where its device comes nearest to it, (n_block, n_channel).
+
+        A setpoint beyond what a coil or the boiler reaches leads to the same, and has no slope; where it is reached, it
+        has one.
+
+        Parameters
+        ----------
+        data : HorizonData
+            Of the horizon.
+        rollout : Rollout
+            Of a plan, with the same data.
+        """
+        plan, at = rollout.plan.copy(), self.hvac.knobs
+        for c, (channel, mine) in enumerate(zip(self.channels, self.at, strict=True)):
+            if channel.quantity == "supply_air_temperature":
+                which = mine - at.supply_air.start
+                found, there = rollout.air[:, which], data.running[:, which] > 0.0
+            elif channel.quantity == "supply_water_temperature":
+                found, there = rollout.water[:, None], data.boiler[:, None] > 0.0
+            else:
+                continue
+            least, most = np.full(len(plan), np.inf), np.full(len(plan), -np.inf)
+            np.minimum.at(least, self.horizon.block_of, np.where(there, found, np.inf).min(axis=1))
+            np.maximum.at(most, self.horizon.block_of, np.where(there, found, -np.inf).max(axis=1))
+            used = np.isfinite(least)
+            near = np.clip(plan[used, c], least[used], most[used])
+            plan[used, c] = np.clip(near, channel.lower, channel.upper)
+        return plan
 
     def _settle(self, free: FloatArray, own: FloatArray, guess: FloatArray) -> FloatArray:
         """Solve ``T = T_free + g Q(T)``; the stepper is left with the step at T."""

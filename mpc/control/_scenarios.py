@@ -112,7 +112,17 @@ class _TreePredictor(Predictor):
         electric, fuel, end = (
             np.mean([getattr(run, n) for run in runs], axis=0) for n in ("electric", "fuel", "end_state")
         )
-        return _TreeRollout(plan, zone, seen, electric, fuel, end, runs[0].knobs, runs[0].sums, heat, tuple(runs))
+        first = runs[0]
+        return _TreeRollout(
+            plan, zone, seen, electric, fuel, end, first.knobs, first.sums, heat, first.air, first.water, tuple(runs)
+        )
+
+    def reached(self, data: HorizonData, rollout: Rollout) -> FloatArray:
+        plan = rollout.plan.copy()
+        pairs = zip(data.parts, rollout.parts, self.blocks, strict=True)  # type: ignore[attr-defined]
+        for one, run, blocks in reversed([*pairs]):  # common blocks are the first scenario's
+            plan[blocks] = self.base.reached(one, run)
+        return plan
 
     def sensitivity(self, data: HorizonData, rollout: Rollout) -> Sensitivity:
         n, m, share = self.base.n_zone, len(self.channels), 1.0 / len(self.blocks)

@@ -114,8 +114,9 @@ class SequentialSolver:
         """
         begin = time.perf_counter()
         self._deadline = np.inf if time_limit is None else begin + time_limit
-        point = self._at(data, self.problem.admitted(data, self.problem.shares(plan)))
-        start, status, message, k = point.cost, Status.ITERATION_LIMIT, f"after {self.iterations} steps", 0
+        given = self._at(data, self.problem.admitted(data, self.problem.shares(plan)))
+        point, start = self._off_plateaus(data, given), given.cost
+        status, message, k = Status.ITERATION_LIMIT, f"after {self.iterations} steps", 0
         if not np.isfinite(point.cost):
             status, message = Status.FAILED, "the plan to start from has no finite cost"
         last: tuple[FloatArray, FloatArray, Sensitivity] | None = None
@@ -164,6 +165,7 @@ class SequentialSolver:
                 status, message = Status.CONVERGED, f"two steps brought less than {self.tolerance:g} of the cost each"
                 break
         self._reach = float(np.clip(reach, 0.05, self.reach))
+        point = given if given.cost < point.cost else point
         return Solution(
             self.problem.plan(point.shares), point.rollout, point.terms, start, status, message, k,
             time.perf_counter() - begin, "sequential",
@@ -173,6 +175,14 @@ class SequentialSolver:
         rollout = self.problem.predictor.rollout(data, self.problem.plan(shares), near)
         terms = self.problem.terms(data, rollout)
         return _Point(shares, rollout, terms, terms.total if rollout.finite else np.inf)
+
+    def _off_plateaus(self, data: HorizonData, point: _Point) -> _Point:
+        """Begin where setpoints are reached: beyond, the cost has no slope and the solve would stay."""
+        if not np.isfinite(point.cost):
+            return point
+        plan = self.problem.predictor.reached(data, point.rollout)
+        near = self._at(data, self.problem.admitted(data, self.problem.shares(plan)), point.rollout)
+        return near if near.cost <= point.cost + self.tolerance * max(abs(point.cost), 1e-6) else point
 
     def _learn(
         self,

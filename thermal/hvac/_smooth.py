@@ -157,10 +157,11 @@ class SmoothHvac:
         heat = system.at_zones(plain, done.terminal_heat)
         self._slopes, local = self._slope_functions(cut, zone, knobs, around)
         # both graphs hold the step itself, which is computed once
-        everything = casadi.cse(casadi.vertcat(heat, *_totals(done), sums, local(zone, knobs, around, sums)))
+        supply = casadi.vertcat(*done.supply_temperature)
+        everything = casadi.cse(casadi.vertcat(heat, *_totals(done), sums, supply, local(zone, knobs, around, sums)))
         self._step = casadi.Function("hvac_step", [zone, knobs, around], [casadi.densify(everything)])
         self._buffers: dict[int, Any] = {}
-        self._outputs = 2 * self.n_zone + 3 + self.n_sum
+        self._outputs = 2 * self.n_zone + 3 + self.n_sum + n_air
 
     def around(
         self,
@@ -310,9 +311,9 @@ class HvacStepper:
 
         Returns
         -------
-        ndarray, shape (2 n_zone + 3 + m,)
-            Heat [W]; electric and fuel power [W]; water at the end [K]; sums; slope of each zone's heat by its own
-            temperature, sums held [W/K]. Overwritten by the next step.
+        ndarray, shape (2 n_zone + 3 + m + n_air_handler,)
+            Heat [W]; electric and fuel power [W]; water at the end [K]; sums; supply air as it leaves each air handler
+            [K]; slope of each zone's heat by its own temperature, sums held [W/K]. Overwritten by the next step.
         """
         self._run()
         return self.output

@@ -1,4 +1,4 @@
-"""Where solves begin: a plateau that a plan carried on does not leave, and what a second start may take."""
+"""Where solves begin: plateaus that a plan carried on does not leave, and what a new start may take."""
 
 from __future__ import annotations
 
@@ -8,7 +8,16 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from mpc.control import Channel, ControlProblem, Horizon, HorizonData, Predictor, SequentialSolver, Solution
+from mpc.control import (
+    Channel,
+    ControlProblem,
+    Horizon,
+    HorizonData,
+    Predictor,
+    SequentialSolver,
+    Solution,
+    supply_channels,
+)  # fmt: skip
 from mpc.control._problem import CostTerms
 from mpc.control._second_start import CHEAPER, Starts
 from thermal.hvac import Heater, SmoothHvac
@@ -30,21 +39,33 @@ def plateau(modes, system, make_data) -> tuple[ControlProblem, HorizonData]:
 
 
 def test_a_plan_that_asks_for_more_than_the_coil_gives_is_left(plateau) -> None:
-    """Carried on it stays, as there is no slope; begun at the rules as well it does not."""
+    """There is no slope there; a plan of what the coil reaches costs the same and has one."""
     problem, data = plateau
-    carried, rules = np.full(problem.shape, 313.0), np.full(problem.shape, 288.0)
+    carried = np.full(problem.shape, 313.0)
     rollout = problem.predictor.rollout(data, carried)
     assert np.abs(problem.gradient(data, rollout, problem.predictor.sensitivity(data, rollout))).max() < 1e-4
-    alone = SequentialSolver(problem).solve(data, carried)
-    both, changed = Starts(7200.0).solve(SequentialSolver(problem), data, carried, rules, NOW, 60.0)
-    assert alone.terms.total == pytest.approx(alone.start)
-    assert changed and both.terms.total < 0.1 * alone.terms.total
+    near = problem.predictor.reached(data, rollout)
+    np.testing.assert_allclose(near[0, 0], rollout.air[problem.predictor.horizon.block_of == 0].max())
+    there = problem.predictor.rollout(data, near)
+    assert problem.terms(data, there).total == pytest.approx(problem.terms(data, rollout).total, rel=1e-2)
+    assert problem.gradient(data, there, problem.predictor.sensitivity(data, there)).max() > 1e-2
+    found = SequentialSolver(problem).solve(data, carried)
+    assert found.terms.total < 0.1 * found.start
+
+
+def test_a_new_start_has_the_rules_air_and_the_coldest_water() -> None:
+    """From there every decision has a slope, that of comfort."""
+    rules = np.array([[290.0, 350.0], [291.0, 340.0]])
+    np.testing.assert_array_equal(Starts.anew(supply_channels(), rules), [[290.0, 310.0], [291.0, 310.0]])
+    np.testing.assert_array_equal(rules[:, 1], [350.0, 340.0])
+    np.testing.assert_array_equal(Starts.anew(supply_channels()[:1], rules[:, :1]), rules[:, :1])
 
 
 @dataclass
 class Told:
     """A solver that says what it is told to, by the first setpoint that it is given."""
 
+    problem: ControlProblem
     costs: dict[float, float]
     like: Solution
     seconds: float = 1.0
@@ -81,22 +102,22 @@ def like(plateau) -> Solution:
 def test_the_second_counts_where_it_is_cheaper_by_enough(plateau, like, first, second, taken) -> None:
     problem, data = plateau
     carried, rules = np.full(problem.shape, 300.0), np.full(problem.shape, 288.0)
-    solver = Told({300.0: first, 288.0: second}, like)
+    solver = Told(problem, {300.0: first, 288.0: second}, like)
     found, changed = Starts(7200.0).solve(solver, data, carried, rules, NOW, 60.0)
     assert changed is taken and found.plan[0, 0] == (288.0 if taken else 300.0)
     assert solver.memory == found.plan[0, 0]  # what was learned on the way to the plan that counts
 
 
 def test_when_the_second_is_asked(plateau, like) -> None:
-    """At first, then every two hours; after a start from the rules alone they count from there."""
+    """At first, then every two hours, if there is time."""
     problem, data = plateau
     carried, rules = np.full(problem.shape, 300.0), np.full(problem.shape, 288.0)
-    starts, solver = Starts(7200.0), Told({300.0: 1.0, 288.0: 1.0}, like)
+    starts, solver = Starts(7200.0), Told(problem, {300.0: 1.0, 288.0: 1.0}, like)
     starts.solve(solver, data, None, rules, NOW, 60.0)
     for hours in (0.5, 1.9, 2.0, 3.0):
         starts.solve(solver, data, carried, rules, NOW + hours * HOUR, 60.0)
-    assert solver.asked == [288.0, 300.0, 300.0, 300.0, 288.0, 300.0]
+    assert solver.asked == [288.0, 288.0, 300.0, 300.0, 300.0, 288.0, 300.0]
     assert starts.begun == NOW + 2 * HOUR
-    slow = Told({300.0: 1.0, 288.0: 0.5}, like, seconds=40.0)
+    slow = Told(problem, {300.0: 1.0, 288.0: 0.5}, like, seconds=40.0)
     found, changed = Starts(7200.0).solve(slow, data, carried, rules, NOW, 60.0)
     assert slow.asked == [300.0] and not changed and found.terms.total == 1.0  # 20 s are left, 40 would be needed
