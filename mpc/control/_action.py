@@ -35,8 +35,8 @@ class Action(Mapping[str, float]):
     source : Source
         Optimal plan, previous plan or rules.
     reasons : tuple of str
-        In words: what failed, what was missing, what took the place of the plan carried on, where comfort is not met and
-        what stands in its way.
+        In words: what failed, what was missing, whether a plan begun anew took the place of the one carried on, where
+        comfort is not met and what stands in its way.
     solution : Solution or None
         Of the solver; None where it did not run or broke.
     stamp : pandas.Timestamp
