@@ -161,12 +161,15 @@ def _parameter_variance(
     fit: Fit, model: ReducedModel, intervals: Sequence[Interval], spin_up_seconds: float
 ) -> FloatArray:
     """Variance of the missing heat that the parameters of a fit leave, shape (n_hour, n_zone) [W²]."""
-    point, jacobian = fit.found.point, fit.found.jacobian
-    slopes = []
+    point, jacobian, slopes = fit.found.point, fit.found.jacobian, []
     for i in range(point.size):
-        moved = [fit.problem.theta(point + s * _SLOPE_STEP * np.eye(point.size)[i]) for s in (-1.0, 1.0)]
-        low, high = (heat_balance(model, t, fit.built.inputs, intervals, spin_up_seconds).needed for t in moved)
-        slopes.append((high - low) / (2.0 * _SLOPE_STEP))
+        # a strength at the end of its range is moved inwards only: beyond, heat would flow from cold to warm
+        ends = [np.clip(point + s * _SLOPE_STEP * np.eye(point.size)[i], *fit.problem.bounds) for s in (-1.0, 1.0)]
+        low, high = (
+            heat_balance(model, fit.problem.theta(end), fit.built.inputs, intervals, spin_up_seconds).needed
+            for end in ends
+        )
+        slopes.append((high - low) / (ends[1] - ends[0])[i])
     roots = np.tensordot(np.linalg.inv(np.linalg.cholesky(jacobian.T @ jacobian)), np.array(slopes), axes=1)
     return np.asarray((roots**2).sum(axis=0))
 

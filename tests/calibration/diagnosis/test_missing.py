@@ -145,3 +145,15 @@ def test_many_zones_are_smoothed_alike(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(_missing, "_ORDER", 20)
     many = missing_heat(robbed(bench.fit({}, [{}]))[0], bench.judged)
     assert np.nanmean(np.abs(many.watts.to_numpy() - found.watts.to_numpy())) < 0.05 * EXTRA
+
+
+def test_strengths_at_the_end_of_their_range_have_a_band_too() -> None:
+    """A building without leakage: beyond its end of the range the strength would be a negative conductance."""
+    bench, _ = twin(5, 0.05)
+    fit = bench.fit({"infiltration": ()}, [{}])
+    names = [p.name for p in fit.problem.parameters]
+    point = fit.found.point.copy()
+    point[[k for k, name in enumerate(names) if name.startswith("infiltration")]] = 0.0
+    found = missing_heat(replace(fit, found=replace(fit.found, point=point)), bench.judged)
+    deviation = found.deviation.to_numpy()
+    assert np.isfinite(deviation).any() and np.nanmin(deviation) > 0.0
