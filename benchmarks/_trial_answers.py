@@ -12,6 +12,7 @@ from concurrent.futures import ThreadPoolExecutor, as_completed
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from _code import code
 from _table import markdown, publish, write
 from energyplus_trials.drawing import draw_spec, without
@@ -135,6 +136,9 @@ def report(out: Path, published: bool) -> str:
     )
     if len(versions) > 1:
         head += " **The answers come from several versions of the method; answer again before quoting.**"
+    alone = sum(not np.isfinite(t.twins).all() for t in trials)
+    if alone:
+        head += f" **{alone} count whatever their gap, as their twin has no answer: answer the twins before quoting.**"
     short = f"{head}\n\n{_rates(scored)}\n{_summary(scored)}\n"
     page = "\n".join(
         [
