@@ -96,18 +96,15 @@ def cost_at(points: Sequence[tuple[float, float]], discomfort: float) -> float:
 def table(runs: Sequence[dict[str, Any]]) -> str:
     """Lay all lines out."""
     found, rows = lines(runs), []
-    reference, points = found.get(REFERENCE), front(runs, REFERENCE)
-    for name, of in found.items():
+    for (name, of), (cost, _, same, whole) in zip(found.items(), beside(runs, found), strict=True):
         kpis = {key: np.mean([r["kpis"][key] or 0.0 for r in of]) for key in
                 ("cost_tot", "tdis_tot", "ener_tot", "pele_tot", "emis_tot", "time_rat")}  # fmt: skip
         mean, low, high = bootstrap(of)
-        whole = "" if reference is None or name == REFERENCE else _interval(*bootstrap(of, reference))
-        cost, discomfort = (float(np.mean([r[key] for r in of])) for key in ("cost", "discomfort"))
         seeds = len(by_seed(of)) if "trained" in NAMES[name] else ""
         rows.append([
             NAMES[name], seeds, f"{kpis['cost_tot']:.4f}", f"{kpis['tdis_tot']:.2f}", f"{kpis['ener_tot']:.3f}",
             f"{1e3 * kpis['pele_tot']:.1f}", f"{kpis['emis_tot']:.3f}", _interval(mean, low, high, sign=""), whole,
-            f"{cost:.1f}, {cost_at(points, discomfort):.1f}" if points else "", f"{kpis['time_rat']:.1e}",
+            f"{cost}, {same}" if same else "", f"{kpis['time_rat']:.1e}",
         ])  # fmt: skip
     weeks = sorted({r["week"] for r in runs})
     size = runs[0]["size"]
@@ -120,23 +117,24 @@ def table(runs: Sequence[dict[str, Any]]) -> str:
     return "\n".join(part for part in (markdown(COLUMNS, rows), note, budgets(found), peers(runs)) if part)
 
 
-def short(runs: Sequence[dict[str, Any]]) -> str:
-    """Lay out for the README what each line costs and how comfortable it is."""
-    found, rows = lines(runs), []
-    reference, points = found.get(REFERENCE), front(runs, REFERENCE)
+def beside(runs: Sequence[dict[str, Any]], found: dict[str, list[dict[str, Any]]]) -> list[tuple[str, str, str, str]]:
+    """Give for each line cost, discomfort, cost of the reference as comfortable, and stage cost over it, as text."""
+    reference, points, cells = found.get(REFERENCE), front(runs, REFERENCE), []
     for name, of in found.items():
         cost, discomfort = (float(np.mean([r[key] for r in of])) for key in ("cost", "discomfort"))
-        rows.append([
-            NAMES[name], f"{cost:.1f}", f"{discomfort:.2f}", f"{cost_at(points, discomfort):.1f}" if points else "",
-            "" if reference is None or name == REFERENCE else _interval(*bootstrap(of, reference)),
-        ])  # fmt: skip
-    return markdown(
-        (
-            "a week", "energy cost, USD", "discomfort, K h", f"cost of {NAMES[REFERENCE]}, as comfortable",
-            "cost with discomfort over it",
-        ),
-        rows,
-    )  # fmt: skip
+        same = f"{cost_at(points, discomfort):.1f}" if points else ""
+        over = "" if reference is None or name == REFERENCE else _interval(*bootstrap(of, reference))
+        cells.append((f"{cost:.1f}", f"{discomfort:.2f}", same, over))
+    return cells
+
+
+def short(runs: Sequence[dict[str, Any]]) -> str:
+    """Lay out for the README what each line costs and how comfortable it is."""
+    found = lines(runs)
+    rows = [[NAMES[name], *cells] for name, cells in zip(found, beside(runs, found), strict=True)]
+    same = f"cost of {NAMES[REFERENCE]}, as comfortable"
+    columns = ("a week", "energy cost, USD", "discomfort, K h", same, "cost with discomfort over it")
+    return markdown(columns, rows)
 
 
 def peers(runs: Sequence[dict[str, Any]]) -> str:

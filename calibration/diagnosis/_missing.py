@@ -162,9 +162,9 @@ def _parameter_variance(
 ) -> FloatArray:
     """Variance of the missing heat that the parameters of a fit leave, shape (n_hour, n_zone) [W²]."""
     point, jacobian, slopes = fit.found.point, fit.found.jacobian, []
-    for i in range(point.size):
+    for i, step in enumerate(_SLOPE_STEP * np.eye(point.size)):
         # a strength at the end of its range is moved inwards only: beyond, heat would flow from cold to warm
-        ends = [np.clip(point + s * _SLOPE_STEP * np.eye(point.size)[i], *fit.problem.bounds) for s in (-1.0, 1.0)]
+        ends = [np.clip(moved, *fit.problem.bounds) for moved in (point - step, point + step)]
         low, high = (
             heat_balance(model, fit.problem.theta(end), fit.built.inputs, intervals, spin_up_seconds).needed
             for end in ends

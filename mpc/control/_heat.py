@@ -181,18 +181,6 @@ class HeatPredictor(Predictor):
         electric, fuel = given @ self.electric_per_channel, given @ self.fuel_per_channel
         return Rollout(plan, zone, zone[1:], electric, fuel, x, none, none, heat, none, none)
 
-    def reached(self, data: HorizonData, rollout: Rollout) -> FloatArray:
-        """Plan as it is: heat that is asked for is given, see `Predictor.reached`.
-
-        Parameters
-        ----------
-        data : HorizonData
-            Of the horizon.
-        rollout : Rollout
-            Of a plan, with the same data.
-        """
-        return rollout.plan
-
     def sensitivity(self, data: HorizonData, rollout: Rollout) -> Sensitivity:
         """Differentiate by all decisions; the same everywhere.
 

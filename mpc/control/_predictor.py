@@ -261,7 +261,7 @@ class Predictor:
         """Plan with each supply temperature moved to where its device comes nearest to it, (n_block, n_channel).
 
         A setpoint beyond what a coil or the boiler reaches leads to the same, and has no slope; where it is reached, it
-        has one.
+        has one. Every other decision stays as it is.
 
         Parameters
         ----------
@@ -270,10 +270,10 @@ class Predictor:
         rollout : Rollout
             Of a plan, with the same data.
         """
-        plan, at = rollout.plan.copy(), self.hvac.knobs
-        for c, (channel, mine) in enumerate(zip(self.channels, self.at, strict=True)):
+        plan = rollout.plan.copy()
+        for c, channel in enumerate(self.channels):
             if channel.quantity == "supply_air_temperature":
-                which = mine - at.supply_air.start
+                which = self.at[c] - self.hvac.knobs.supply_air.start
                 found, there = rollout.air[:, which], data.running[:, which] > 0.0
             elif channel.quantity == "supply_water_temperature":
                 found, there = rollout.water[:, None], data.boiler[:, None] > 0.0

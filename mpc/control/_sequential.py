@@ -181,6 +181,8 @@ class SequentialSolver:
         if not np.isfinite(point.cost):
             return point
         plan = self.problem.predictor.reached(data, point.rollout)
+        if np.array_equal(plan, point.rollout.plan):
+            return point
         near = self._at(data, self.problem.admitted(data, self.problem.shares(plan)), point.rollout)
         return near if near.cost <= point.cost + self.tolerance * max(abs(point.cost), 1e-6) else point
 
