@@ -6,15 +6,15 @@ What does not depend on the parameter, ``Σ_k a_i^(n-1-k) w_l[k]``, is summed on
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 
-#: Most numbers of an array of fading sums.
-_LARGEST = 4_000_000
+#: Most numbers of an array of fading sums: they are gone over again and again, so that they should fit the cache.
+_LARGEST = 2**18
 
 #: Shares below which the past is forgotten: denormal numbers are slow.
 _FORGOTTEN = 1e-200
@@ -39,16 +39,34 @@ def fading_sums(stay: FloatArray, drive: FloatArray, ends: NDArray[np.int64]) ->
     """
     flat = drive.reshape(len(drive), -1)
     total = np.zeros((stay.size, flat.shape[1]))
-    before = 0
+    before, left = 0, np.ones((stay.size, 1))
     for end in ends:
-        age = np.arange(int(end) - before, -1, -1)
-        left = stay[:, None] ** age
-        left[left < _FORGOTTEN] = 0.0
+        if int(end) - before + 1 != left.shape[1]:
+            left = stay[:, None] ** np.arange(int(end) - before, -1, -1)
+            left[left < _FORGOTTEN] = 0.0
         total *= left[:, :1]
         if end > before:
             total += left[:, 1:] @ flat[before:end]
         before = int(end)
         yield total.reshape(stay.size, *drive.shape[1:])
+
+
+def all_fading_sums(stay: FloatArray, drive: FloatArray, ends: NDArray[np.int64]) -> FloatArray:
+    """Fading sums of every n at once, shape (r, n_drive, n_end).
+
+    Parameters
+    ----------
+    stay : ndarray, shape (r,)
+        What a step leaves of each mode [-].
+    drive : ndarray, shape (n_time, n_drive)
+        What drives, step by step.
+    ends : ndarray of int
+        The numbers of steps n, increasing.
+    """
+    sums = np.empty((stay.size, ends.size, drive.shape[1]))
+    for position, one in enumerate(fading_sums(stay, drive, ends)):
+        sums[:, position] = one
+    return sums.transpose(0, 2, 1)
 
 
 def rows_of(count: int, columns: int) -> Iterator[slice]:
@@ -64,33 +82,3 @@ def rows_of(count: int, columns: int) -> Iterator[slice]:
     together = max(1, _LARGEST // max(1, columns))
     for low in range(0, count, together):
         yield slice(low, min(low + together, count))
-
-
-class Stack:
-    """Matrices of the parameters that have one, side by side for each mode.
-
-    Parameters
-    ----------
-    matrices : sequence of ndarray or None, shape (r, n)
-        One a parameter.
-    """
-
-    def __init__(self, matrices: Sequence[FloatArray | None]) -> None:
-        there = [(j, m) for j, m in enumerate(matrices) if m is not None]
-        self.parameters = np.array([j for j, _ in there], dtype=np.int64)
-        self._stack = np.stack([m for _, m in there], axis=1) if there else None
-
-    def add(self, out: FloatArray, rows: slice, sums: FloatArray) -> None:
-        """Add what the parameters make of fading sums.
-
-        Parameters
-        ----------
-        out : ndarray, shape (n_row, n_parameter, m)
-            Added to.
-        rows : slice
-            The modes.
-        sums : ndarray, shape (n_row, n, m)
-            Their fading sums.
-        """
-        if self._stack is not None:
-            out[:, self.parameters] += self._stack[rows] @ sums

@@ -14,62 +14,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal.model._modal import SHIFT, ModalModel, divided_differences, modal_model, propagator_functions
-from thermal.model._modal_fading import Stack, fading_sums, rows_of
+from thermal.model._modal import SHIFT, divided_differences, modal_model, propagator_functions
+from thermal.model._modal_fading import all_fading_sums, fading_sums, rows_of
 from thermal.model._modal_held import HeldFrame, scan
+from thermal.model._modal_slopes import ModalSlopes
 from thermal.model._scheme import Scheme
 
 if TYPE_CHECKING:
     from thermal.model._symbolic import Matrices
 
 FloatArray = NDArray[np.float64]
-
-
-class _ModalSlopes:
-    """Derivatives of a reduced model's matrices with respect to θ, in its modes.
-
-    Parameters
-    ----------
-    matrices : Matrices
-        Of the reduced model, with slopes.
-    modes : ModalModel
-        Its modes.
-
-    Attributes
-    ----------
-    capacity, stiffness : list of ndarray or None, shape (r, r)
-        dC and dK of every parameter; None where they do not depend on it.
-    boundary : list of ndarray or None, shape (r, n_boundary)
-        dB.
-    """
-
-    def __init__(self, matrices: Matrices, modes: ModalModel) -> None:
-        t, n = modes.states, matrices.n
-        self._capacities = modes.capacity
-        self.capacity: list[FloatArray | None] = []
-        self.stiffness: list[FloatArray | None] = []
-        self.boundary: list[FloatArray | None] = []
-        for capacity, flow in zip(matrices.capacity_slopes, matrices.flow_slopes, strict=True):
-            self.capacity.append(t.T @ (capacity @ t) if np.any(capacity) else None)
-            self.stiffness.append(t.T @ (flow[:, :n] @ t) if np.any(flow[:, :n]) else None)
-            self.boundary.append(-t.T @ flow[:, n:] if np.any(flow[:, n:]) else None)
-
-    def __len__(self) -> int:
-        return len(self.capacity)
-
-    def turn(self, j: int) -> tuple[FloatArray | None, FloatArray | None]:
-        """``dC - d(K + s C) c`` and ``d(K + s C)`` of one parameter; None where it moves B alone, as sources do.
-
-        Parameters
-        ----------
-        j : int
-            Number of the parameter.
-        """
-        c, capacity, stiffness = self._capacities, self.capacity[j], self.stiffness[j]
-        if capacity is None:
-            return (None, None) if stiffness is None else (-stiffness * c, stiffness)
-        stiffer = SHIFT * capacity if stiffness is None else stiffness + SHIFT * capacity
-        return capacity - stiffer * c, stiffer
 
 
 class ModalRuns:
@@ -88,9 +42,9 @@ class ModalRuns:
         self._frames: dict[bytes, HeldFrame] = {}
 
     @cached_property
-    def slopes(self) -> _ModalSlopes:
+    def slopes(self) -> ModalSlopes:
         """Derivatives of the matrices in the modes."""
-        return _ModalSlopes(self.matrices, self.modes)
+        return ModalSlopes(self.matrices, self.modes)
 
     def _frame(self, held: NDArray[np.bool_]) -> HeldFrame:
         """Frame of held zones; a spin-up needs it for its steady state, its steps and its derivatives."""
@@ -168,50 +122,37 @@ class ModalRuns:
         slopes: FloatArray,
     ) -> FloatArray:
         """Differentiate the means of `run`, (m, n_keep, n_zone, n_parameter)."""
-        modes, propagator = self.modes, self.modes.propagator(step, scheme)
+        modes, slope, propagator = self.modes, self.slopes, self.modes.propagator(step, scheme)
         r, count, m = path.shape
         functions = propagator_functions(step, scheme)
         end, end_gain, mean, mean_gain = (divided_differences(f, modes.capacity) for f in functions)
         observe, drive, last = modes.output, np.hstack([modes.boundary, modes.heating]), keep - 1
-        seen_path = path[:, last].reshape(r, -1)
-        seen_inputs = inputs.reshape(-1, count, m)[:, last].reshape(-1, keep.size * m)
-        p = len(self.slopes)
-        out = np.empty((p, observe.shape[0], keep.size * m))
-        from_path: list[FloatArray | None] = []
-        from_inputs: list[FloatArray | None] = []
-        for j in range(p):
-            turn, stiffer = self.slopes.turn(j)
-            pushed = self._pushed(j, stiffer, drive)
-            by_input = propagator.end_gain[:, None] * pushed
-            out[j] = ((observe * propagator.mean_gain) @ pushed) @ seen_inputs
-            if turn is not None:
-                by_input += (turn * end_gain) @ drive
-                out[j] += (observe @ (turn * mean)) @ seen_path
-                out[j] += (observe @ ((turn * mean_gain) @ drive)) @ seen_inputs
-            from_path.append(None if turn is None else turn * end)
-            from_inputs.append(by_input)
-        out = out.reshape(p, observe.shape[0], keep.size, m)
-        stacks = Stack(from_path), Stack(from_inputs)
-        driven = np.concatenate([path, inputs.reshape(-1, count, m)]).transpose(1, 0, 2)
+        n_zone, p = observe.shape[0], len(slope)
+        driven = np.concatenate([path, inputs.reshape(-1, count, m)]).transpose(1, 0, 2).copy()
         starts = (modes.coordinates @ slopes).reshape(r, p, m)
         seen = observe * propagator.mean
+        out = np.zeros((keep.size, n_zone, p, m))
+        by_path, by_input = (np.zeros((n_zone, slope.turning.size, r)) for _ in range(2))
         for rows in rows_of(r, (driven.shape[1] + p) * m):
             stay = propagator.end[rows]
+            push = propagator.end_gain[rows, None] * slope.boundary.values[rows]
+            size = stay.size * driven.shape[1]
+            pushed = slope.boundary.spread(push, np.arange(r, size, driven.shape[1]), size)
+            turned = slope.turned(rows, end_gain, propagator.end_gain) @ drive
+            turned = np.concatenate([slope.turned(rows, end), turned], axis=2)
+            by_path += np.tensordot(observe[:, rows], slope.turned(rows, mean), axes=1)
+            by_input += np.tensordot(observe[:, rows], slope.turned(rows, mean_gain, propagator.mean_gain), axes=1)
             for position, sums in enumerate(fading_sums(stay, driven, last)):
                 moved = stay[:, None, None] ** last[position] * starts[rows]
-                stacks[0].add(moved, rows, sums[:, :r])
-                stacks[1].add(moved, rows, sums[:, r:])
-                part = seen[:, rows] @ moved.reshape(stay.size, -1)
-                out[:, :, position] += part.reshape(-1, p, m).transpose(1, 0, 2)
-        return out.transpose(3, 2, 1, 0)
-
-    def _pushed(self, j: int, stiffer: FloatArray | None, drive: FloatArray) -> FloatArray:
-        """Differentiate ``(K + s C)^-1 [B, H]`` with respect to one parameter, (r, n_boundary + n_zone)."""
-        moved = self.slopes.boundary[j]
-        pushed = np.zeros_like(drive) if stiffer is None else -stiffer @ drive
-        if moved is not None:
-            pushed[:, : moved.shape[1]] += moved
-        return np.asarray(pushed)
+                moved[:, slope.turning] += turned @ sums
+                moved += (pushed @ sums.reshape(-1, m)).reshape(moved.shape)
+                out[position] += (seen[:, rows] @ moved.reshape(stay.size, -1)).reshape(n_zone, p, m)
+        now = driven[last].transpose(1, 0, 2).reshape(-1, keep.size * m)
+        push = (observe * propagator.mean_gain) @ slope.boundary.values
+        direct = (slope.boundary.spread(push, np.full(n_zone, r), len(now)) @ now).reshape(n_zone, p, -1)
+        direct[:, slope.turning] += by_path @ now[:r] + (by_input @ drive) @ now[r:]
+        out += direct.reshape(n_zone, p, keep.size, m).transpose(2, 0, 1, 3)
+        return out.transpose(3, 0, 1, 2)
 
     def backward(self, weights: FloatArray, step: float, scheme: Scheme) -> tuple[FloatArray, FloatArray]:
         """Differentiate weighted sums of the zone means of free runs with respect to heat and start: the adjoint.
@@ -311,19 +252,22 @@ class ModalRuns:
         """Slopes of the held frame's states after some steps, (r, n_parameter, n_end), from ``first`` and one kick."""
         system = frame.capacity + step * (1.0 - SHIFT * frame.capacity)
         stay, gain = frame.capacity / system, frame.basis.T / system[:, None]
-        slopes = self.slopes
-        parts = (
-            (np.diff(path), [None if m is None else -gain @ m for m in slopes.capacity]),
-            (path[:, 1:], [None if m is None else -step * (gain @ m) for m in slopes.stiffness]),
-            (boundary.T, [None if m is None else step * (gain @ m) for m in slopes.boundary]),
-        )
+        slopes, change = self.slopes, np.diff(path) - step * SHIFT * path[:, 1:]
         left, since = (stay[:, None, None] ** n for n in (ends, ends - 1))
         out = first[:, :, None] * left + (kick / system[:, None])[:, :, None] * since
-        for drive, matrices in parts:
-            stack = Stack(matrices)
-            for rows in rows_of(stay.size, len(drive) * ends.size):
-                sums = np.stack([f.copy() for f in fading_sums(stay[rows], drive.T, ends)], axis=2)
-                stack.add(out[rows], rows, sums)
+        parts = ((change.T, -1.0, slopes.capacity), (path[:, 1:].T, -step, slopes.stiffness))
+        for drive, factor, stack in parts:
+            if len(boundary) == 1:  # one step: what drives is turned, not every matrix
+                out[:, stack.parameters] += factor * (gain @ (stack.values @ drive[0]))[:, :, None]
+                continue
+            turned = stack.times(factor * gain)
+            for rows in rows_of(stay.size, len(path) * ends.size):
+                out[rows, stack.parameters] += turned[rows] @ all_fading_sums(stay[rows], drive, ends)
+        sums = all_fading_sums(stay, boundary, ends).reshape(-1, ends.size)
+        push = step * (gain @ slopes.boundary.values)
+        out += (slopes.boundary.spread(push, np.arange(0, len(sums), boundary.shape[1]), len(sums)) @ sums).reshape(
+            out.shape
+        )
         return np.asarray(out)
 
     def held_response(self, held: NDArray[np.bool_], step: float) -> FloatArray:
