@@ -11,7 +11,7 @@ from thermal import SymbolicModel, build_network
 from thermal.data import load_bundled_case
 from thermal.errors import SingularModelError
 from thermal.model import _factor, factorise
-from thermal.model._factor import SparseSolver
+from thermal.model._factor import Elimination, SparseSolver
 
 
 @pytest.fixture(scope="module")
@@ -85,3 +85,14 @@ def test_singular_matrix_is_refused(model: SymbolicModel) -> None:
     system[:, 5] = 0.0
     with pytest.raises(SingularModelError, match="cannot be factorised"):
         factorise(sp.csr_matrix(system))
+
+
+def test_an_order_serves_all_of_its_structure(model: SymbolicModel) -> None:
+    """Matrices of the same structure, then of another, against each one's own factors."""
+    other = sp.csr_matrix(sp.diags([-1.0, 2.5, -1.0], [-1, 0, 1], shape=(40, 40)))
+    elimination = Elimination()
+    for system in (*(system_of(model, step) for step in (60.0, 1e6)), other, other.multiply(2.0), system_of(model, 1e9)):
+        for shape in ((system.shape[0],), (system.shape[0], 20)):
+            rhs = np.random.default_rng(2).standard_normal(shape)
+            found, expected = elimination(sp.csr_matrix(system))(rhs), complete(system).solve(rhs)
+            np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12 * np.abs(expected).max())

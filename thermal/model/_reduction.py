@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from thermal.errors import ModelError
 from thermal.model._certificate import Certificate, Replay, closed_loop, differences
+from thermal.model._factor import Elimination
 from thermal.model._modal import modal_model
 from thermal.model._stepper import factorise
 from thermal.model._symbolic import Matrices, Matrix, SymbolicModel
@@ -82,7 +83,7 @@ class ReducedModel(SymbolicModel):
             seen = []
             for m in (whole, small):
                 outside = -5.0 * (m.flow[:, m.n :] @ (np.arange(m.n_boundary) < m.n_boundary - m.n_signal)[:, None])
-                response = factorise(_shifted(m, shift))(np.hstack([m.heating @ heat, outside]))
+                response = factorise(_shifted(m, shift), self.grid.elimination)(np.hstack([m.heating @ heat, outside]))
                 seen.append(m.output @ response)
             worst = max(worst, float(np.abs(seen[0] - seen[1]).max()))
         return worst
@@ -95,7 +96,10 @@ def _shifted(m: Matrices, shift: float) -> Matrix:
 
 
 def krylov_basis(
-    matrices: Sequence[Matrices], shifts: Sequence[float] = SHIFTS, tolerance: float = 1e-10
+    matrices: Sequence[Matrices],
+    shifts: Sequence[float] = SHIFTS,
+    tolerance: float = 1e-10,
+    elimination: Elimination | None = None,
 ) -> FloatArray:
     """Orthonormal basis of the responses to every input at several shifts, over one or more θ.
 
@@ -111,17 +115,19 @@ def krylov_basis(
         Expansion points [1/s], positive.
     tolerance : float
         Relative eigenvalue of the Gram matrix below which a direction is dropped [-].
+    elimination : Elimination, optional
+        Of the grid model, where it is at hand.
 
     Returns
     -------
     ndarray, shape (n, r)
         Orthonormal columns; the uniform temperature is among their span.
     """
-    blocks = [np.ones((matrices[0].n, 1))]
+    blocks, elimination = [np.ones((matrices[0].n, 1))], elimination or Elimination()
     for m in matrices:
         inputs = _inputs(m)
         for shift in shifts:
-            block = factorise(_shifted(m, shift))(inputs)
+            block = factorise(_shifted(m, shift), elimination)(inputs)
             blocks.append(block / np.linalg.norm(block, axis=0))
     stacked = np.hstack(blocks)
     sensors = _sensors(matrices[0])
@@ -216,7 +222,7 @@ def reduced_model(
     inputs = len(model.network.zones) + len(model.network.boundaries)
     chosen = shifts or (SHIFTS if inputs < _MANY_INPUTS else FEW_SHIFTS)
     whole = [model.matrices(t, slopes=bool(model.network.signals)) for t in thetas]
-    basis = krylov_basis(whole, chosen)
+    basis = krylov_basis(whole, chosen, elimination=model.elimination)
     if tolerance is not None:
         basis = basis @ _least(_turned(whole[0], basis), tolerance, closed_loop(whole[0]))
     elif order is not None and order < basis.shape[1]:

@@ -11,7 +11,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from thermal.errors import ModelError, SingularModelError
-from thermal.model._factor import SparseSolver
+from thermal.model._factor import Elimination, SparseSolver
 from thermal.model._scheme import IMPLICIT_EULER, Scheme, Stage
 from thermal.model._symbolic import Matrices, Matrix
 from thermal.units import AIR_HEAT_CAPACITY
@@ -306,13 +306,15 @@ def _combine(weights: tuple[float, ...], trail: list[FloatArray]) -> FloatArray:
     return np.asarray(total)
 
 
-def factorise(system: Matrix) -> Callable[[FloatArray], FloatArray]:
+def factorise(system: Matrix, elimination: Elimination | None = None) -> Callable[[FloatArray], FloatArray]:
     """Factorise a symmetric positive definite matrix, sparse (SuperLU) or dense (inverse by Cholesky).
 
     Parameters
     ----------
     system : sparse matrix or ndarray, shape (n, n)
         Matrix of the step [J/K].
+    elimination : Elimination, optional
+        What factorises sparse matrices of its structure, for a few solves each; a step is solved many times.
 
     Returns
     -------
@@ -326,7 +328,7 @@ def factorise(system: Matrix) -> Callable[[FloatArray], FloatArray]:
     """
     try:
         if sp.issparse(system):
-            return SparseSolver(system)
+            return SparseSolver(system) if elimination is None else elimination(system)
         factor = sl.cho_factor(np.asarray(system))
         inverse = sl.cho_solve(factor, np.eye(system.shape[0]))
         return lambda rhs: np.asarray(inverse @ rhs)

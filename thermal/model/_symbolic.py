@@ -12,6 +12,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from thermal.errors import ModelError
+from thermal.model._factor import Elimination
 from thermal.model._modal_runs import ModalRuns
 from thermal.network import ConductanceClass, ThermalNetwork
 
@@ -103,6 +104,8 @@ class SymbolicModel:
         ``[K, -B]`` and C of each class at unit value, sources left out.
     sources : object
         Columns of -B that the sources' classes bring; their values follow those of the faces in κ.
+    elimination : Elimination
+        What factorises its matrices where they are solved with a few times only.
 
     Examples
     --------
@@ -128,6 +131,7 @@ class SymbolicModel:
         self._uniform = np.ones(network.n_node)
         self._faces = faces
         self.sources = _Sources(network, sources, projection)
+        self.elimination = Elimination()
         self.class_flows: list[Matrix]
         self.class_masses: list[Matrix]
         if projection is None:
