@@ -91,7 +91,12 @@ def test_an_order_serves_all_of_its_structure(model: SymbolicModel) -> None:
     """Matrices of the same structure, then of another, against each one's own factors."""
     other = sp.csr_matrix(sp.diags([-1.0, 2.5, -1.0], [-1, 0, 1], shape=(40, 40)))
     elimination = Elimination()
-    for system in (*(system_of(model, step) for step in (60.0, 1e6)), other, other.multiply(2.0), system_of(model, 1e9)):
+    for system in (
+        *(system_of(model, step) for step in (60.0, 1e6)),
+        other,
+        other.multiply(2.0),
+        system_of(model, 1e9),
+    ):
         for shape in ((system.shape[0],), (system.shape[0], 20)):
             rhs = np.random.default_rng(2).standard_normal(shape)
             found, expected = elimination(sp.csr_matrix(system))(rhs), complete(system).solve(rhs)

@@ -14,7 +14,7 @@ from thermal.model._certificate import Certificate, Replay, closed_loop, differe
 from thermal.model._factor import Elimination
 from thermal.model._modal import modal_model
 from thermal.model._stepper import factorise
-from thermal.model._symbolic import Matrices, Matrix, SymbolicModel
+from thermal.model._symbolic import Matrices, Matrix, SymbolicModel, congruent
 
 FloatArray = NDArray[np.float64]
 
@@ -99,6 +99,7 @@ def krylov_basis(
     matrices: Sequence[Matrices],
     shifts: Sequence[float] = SHIFTS,
     tolerance: float = 1e-10,
+    sources: Sequence[Matrix] = (),
     elimination: Elimination | None = None,
 ) -> FloatArray:
     """Orthonormal basis of the responses to every input at several shifts, over one or more θ.
@@ -110,11 +111,13 @@ def krylov_basis(
     Parameters
     ----------
     matrices : sequence of Matrices
-        The grid model at the θ to be accurate for; with slopes, also for sources whose strength is zero there.
+        The grid model at the θ to be accurate for.
     shifts : sequence of float
         Expansion points [1/s], positive.
     tolerance : float
         Relative eigenvalue of the Gram matrix below which a direction is dropped [-].
+    sources : sequence of matrix, shape (n, n_source), optional
+        Further heat at every θ, such as that of sources whose strength is zero there.
     elimination : Elimination, optional
         Of the grid model, where it is at hand.
 
@@ -124,8 +127,8 @@ def krylov_basis(
         Orthonormal columns; the uniform temperature is among their span.
     """
     blocks, elimination = [np.ones((matrices[0].n, 1))], elimination or Elimination()
-    for m in matrices:
-        inputs = _inputs(m)
+    for m, further in zip(matrices, sources or [None] * len(matrices), strict=True):
+        inputs = _inputs(m, further)
         for shift in shifts:
             block = factorise(_shifted(m, shift), elimination)(inputs)
             blocks.append(block / np.linalg.norm(block, axis=0))
@@ -134,7 +137,7 @@ def krylov_basis(
     stacked[sensors] = 0.0
     capacity = np.abs(matrices[0].capacity.diagonal())
     weight = capacity + 1e-6 * capacity.max()
-    gram = stacked.T @ (weight[:, None] * stacked)
+    gram = congruent(stacked, weight)
     norms = np.sqrt(np.diag(gram))
     values, vectors = np.linalg.eigh(gram / np.outer(norms, norms))
     keep = values > tolerance * values[-1]
@@ -144,11 +147,9 @@ def krylov_basis(
     return np.asarray(np.linalg.qr(np.hstack([1.0 - own.sum(axis=1, keepdims=True), basis, own]))[0])
 
 
-def _inputs(m: Matrices) -> FloatArray:
+def _inputs(m: Matrices, further: Matrix | None) -> FloatArray:
     """Patterns of heat that drive a model: zones, boundaries and sources, each once, shape (n, n_input)."""
-    signals = m.flow.shape[1] - m.n_signal
-    sources = [s[:, signals:] for s in m.flow_slopes] if m.n_signal else []
-    columns = sp.csc_matrix(sp.hstack([m.heating, -m.flow[:, m.n :], *sources]))
+    columns = sp.csc_matrix(sp.hstack([m.heating, -m.flow[:, m.n :], *([] if further is None else [further])]))
     size = np.sqrt(np.asarray(columns.multiply(columns).sum(axis=0)).ravel())
     there = np.flatnonzero(size)  # a boundary that no face touches moves nothing
     unit = sp.csc_matrix(columns[:, there] @ sp.diags(1.0 / size[there]))
@@ -221,8 +222,9 @@ def reduced_model(
         raise ModelError(f"order: expected at least 2 states, came {order}")
     inputs = len(model.network.zones) + len(model.network.boundaries)
     chosen = shifts or (SHIFTS if inputs < _MANY_INPUTS else FEW_SHIFTS)
-    whole = [model.matrices(t, slopes=bool(model.network.signals)) for t in thetas]
-    basis = krylov_basis(whole, chosen, elimination=model.elimination)
+    whole = [model.matrices(t) for t in thetas]
+    sources = [model.source_slopes(t) for t in thetas]
+    basis = krylov_basis(whole, chosen, sources=sources, elimination=model.elimination)
     if tolerance is not None:
         basis = basis @ _least(_turned(whole[0], basis), tolerance, closed_loop(whole[0]))
     elif order is not None and order < basis.shape[1]:

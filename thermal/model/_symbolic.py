@@ -17,6 +17,7 @@ from thermal.model._modal_runs import ModalRuns
 from thermal.network import ConductanceClass, ThermalNetwork
 
 FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
 
 #: A csr_matrix on the grid, an ndarray when reduced; the stubs of scipy cannot type products with such a union.
 Matrix = Any
@@ -142,7 +143,7 @@ class SymbolicModel:
 
     def _project(self, v: FloatArray) -> None:
         self.class_flows = [_projected_class(c, v, self.network.n_boundary) for c in self._faces]
-        self.class_masses = [_congruent(v[c.node], c.weight) for c in self.network.capacities]
+        self.class_masses = [congruent(v[c.node], c.weight) for c in self.network.capacities]
         self._uniform = v.T @ np.ones(self.network.n_node)
         self._heating = v.T @ self.network.heating.toarray()
         self._observation = self.network.observation @ v
@@ -201,6 +202,17 @@ class SymbolicModel:
             n_signal=len(self.network.signals),
         )
 
+    def source_slopes(self, theta: FloatArray) -> Matrix:
+        """Heat that the signals bring per unit of every parameter, a column for each that the parameter moves.
+
+        Parameters
+        ----------
+        theta : ndarray, shape (n_parameter,)
+            Parameter values [parameter units].
+        """
+        slopes = np.asarray(self._slopes(np.asarray(theta, dtype=float))[0])
+        return self.sources.columns(slopes[len(self.class_flows) :])
+
     def _flow(self, weights: FloatArray) -> Matrix:
         """Sum of the classes of faces, then of sources, with weights."""
         count = len(self.class_flows)
@@ -251,6 +263,21 @@ class _Sources:
         np.add.at(flow.T, n + self.signal[there], -weights[there, None] * self.spread[:, there].T)
         return flow
 
+    def columns(self, slopes: FloatArray) -> Matrix:
+        """Columns of B per unit of every parameter, those of one parameter after those of another, zeros left out.
+
+        Parameters
+        ----------
+        slopes : ndarray, shape (n_source, n_parameter)
+            Of the values of the classes.
+        """
+        parameter, source = np.nonzero(slopes.T)
+        place = parameter * (self.signal.max(initial=0) + 1) + self.signal[source]
+        there, column = np.unique(place, return_inverse=True)
+        return self.spread @ sp.csc_matrix(
+            (slopes[source, parameter], (source, column)), shape=(len(slopes), there.size)
+        )
+
 
 def _weighted(terms: list[Matrix], weights: FloatArray) -> Matrix:
     """Sum of class matrices with weights; zero weights cost nothing."""
@@ -272,19 +299,37 @@ def _projected_class(c: ConductanceClass, v: FloatArray, n_boundary: int) -> Flo
     total = np.zeros((r, r + n_boundary))
     for begin in range(0, c.weight.size, _FACES):
         part = slice(begin, begin + _FACES)
-        ends = (c.first[part], c.second[part])
-        inside, weight = [e < n for e in ends], c.weight[part]
-        drop = np.where(inside[0][:, None], v[np.where(inside[0], ends[0], 0)], 0.0)
-        drop -= np.where(inside[1][:, None], v[np.where(inside[1], ends[1], 0)], 0.0)
-        total[:, :r] += _congruent(drop, weight)
-        for sign, end, within in zip((1.0, -1.0), ends, inside, strict=True):
-            out = ~within
-            np.add.at(total.T, r + end[out] - n, sign * weight[out, None] * drop[out])
+        ends, weight = (c.first[part], c.second[part]), c.weight[part]
+        drop = _at(v, ends[0]) - _at(v, ends[1])
+        total[:, :r] += congruent(drop, weight)
+        for sign, end in zip((1.0, -1.0), ends, strict=True):
+            out = np.flatnonzero(end >= n)
+            for boundary in np.unique(end[out]):
+                faces = out[end[out] == boundary]
+                total[:, r + boundary - n] += sign * (weight[faces] @ drop[faces])
     return total
 
 
-def _congruent(rows: FloatArray, weight: FloatArray) -> FloatArray:
-    """``V' diag(w) V`` of positive weights, by a symmetric product."""
+def _at(v: FloatArray, end: IntArray) -> FloatArray:
+    """Rows of a basis at the ends of faces; zero at boundaries."""
+    within = end < len(v)
+    if within.all():
+        return v[end]
+    rows = np.zeros((end.size, v.shape[1]))
+    rows[within] = v[end[within]]
+    return rows
+
+
+def congruent(rows: FloatArray, weight: FloatArray) -> FloatArray:
+    """``V' diag(w) V`` of positive weights, by a symmetric product, shape (r, r).
+
+    Parameters
+    ----------
+    rows : ndarray, shape (n, r)
+        V.
+    weight : ndarray, shape (n,)
+        w, not negative.
+    """
     scaled = np.sqrt(weight)[:, None] * rows
     return np.asarray(scaled.T @ scaled)
 
