@@ -61,19 +61,18 @@ def seen_openings(drivers: Drivers, settings: ModelSettings) -> FloatArray:
     model = reduced_model(SymbolicModel(network), [theta])
     rows, metered, needed = step_balance(model, theta, inputs)
     unit = -network.anatomy.air_heat_capacity * drivers.through_windows[rows]
-    for k in range(len(drivers.zones)):
-        opened[rows, k] = _opened_when((metered - needed)[:, k], unit[:, k], drivers.occupancy[rows], inputs.step)
+    opened[rows] = _opened_when(metered - needed, unit, drivers.occupancy[rows], inputs.step)
     return opened
 
 
 def _opened_when(lost: FloatArray, unit: FloatArray, presence: FloatArray, step: float) -> FloatArray:
-    """When a window of one zone stands open; never where what is lost does not look like one that people open.
+    """When a window of a zone stands open; never where what is lost does not look like one that people open.
 
     Parameters
     ----------
-    lost : ndarray, shape (n_time,)
-        Metered heat less that which the zone's model needs [W]; NaN where it is not known.
-    unit : ndarray, shape (n_time,)
+    lost : ndarray, shape (n_time, n_zone)
+        Metered heat less that which the zones' model needs [W]; NaN where it is not known.
+    unit : ndarray, shape (n_time, n_zone)
         Heat that a window of 1 m2 lets out [W/m2].
     presence : ndarray, shape (n_time,)
         Of people, between 0 and 1 [-].
@@ -82,35 +81,41 @@ def _opened_when(lost: FloatArray, unit: FloatArray, presence: FloatArray, step:
 
     Returns
     -------
-    ndarray, shape (n_time,)
+    ndarray, shape (n_time, n_zone)
         1 where one stands open [-].
     """
     hour = max(1.0, 3600.0 / step)
     known = np.isfinite(lost)
-    slow = pd.Series(lost).rolling(max(3, round(_SLOW * hour)), center=True, min_periods=1).median()
+    slow = pd.DataFrame(lost).rolling(max(3, round(_SLOW * hour)), center=True, min_periods=1).median()
     sudden = np.where(known, lost - slow.to_numpy(), 0.0)
-    size = np.abs(sudden[known])
-    never = np.zeros(len(lost))
-    if size.size < 24 * hour:
-        return never
-    noise = max(1.4826 * float(np.median(size)), float(np.quantile(size, 0.9)) / _NINETY, 1e-6)
+    opened = np.zeros(lost.shape)
+    sought = np.flatnonzero(known.sum(axis=0) >= 24 * hour)
+    if not sought.size:
+        return opened
     there = presence > 0.05
     opens, shuts = np.where(there, _OPENED, _OPENED_ALONE) / hour, min(_SHUT / hour, 0.5)
-    best, most = never, _SEEN
-    for area in _AREAS:
-        odds = (sudden**2 - (sudden - area * unit) ** 2) / (2.0 * noise**2)
-        path, gain = _most_likely_path(np.where(known, np.clip(odds, -_MOST, _MOST), 0.0), opens, shuts)
-        if gain > most and path.mean() < _LONGEST and path[there].sum() > _PRESENT * path.sum():
-            best, most = path, gain
-    return best
+    odds = []
+    for k in sought:
+        size = np.abs(sudden[known[:, k], k])
+        noise = max(1.4826 * float(np.median(size)), float(np.quantile(size, 0.9)) / _NINETY, 1e-6)
+        first = sudden[:, [k]]
+        more = (first**2 - (first - _AREAS * unit[:, [k]]) ** 2) / (2.0 * noise**2)
+        odds.append(np.where(known[:, [k]], np.clip(more, -_MOST, _MOST), 0.0))
+    paths, gains = _most_likely_paths(np.hstack(odds), opens, shuts)
+    for k, mine, gained in zip(sought, np.split(paths, sought.size, axis=1), np.split(gains, sought.size), strict=True):
+        often = (mine.mean(axis=0) < _LONGEST) & (mine[there].sum(axis=0) > _PRESENT * mine.sum(axis=0))
+        likely = np.where(often, gained, -np.inf)
+        if likely.max() > _SEEN:
+            opened[:, k] = mine[:, np.argmax(likely)]
+    return opened
 
 
-def _most_likely_path(odds: FloatArray, opens: FloatArray, shuts: float) -> tuple[FloatArray, float]:
-    """Most likely course of a hidden state that is 0 or 1 (Viterbi 1967).
+def _most_likely_paths(odds: FloatArray, opens: FloatArray, shuts: float) -> tuple[FloatArray, FloatArray]:
+    """Most likely courses of hidden states that are 0 or 1 each (Viterbi 1967).
 
     Parameters
     ----------
-    odds : ndarray, shape (n_time,)
+    odds : ndarray, shape (n_time, m)
         Logarithm of the likelihood of state 1 over that of state 0, step by step [-].
     opens : ndarray, shape (n_time,)
         Probability of the change from 0 to 1 [-].
@@ -120,20 +125,19 @@ def _most_likely_path(odds: FloatArray, opens: FloatArray, shuts: float) -> tupl
     Returns
     -------
     tuple
-        The course, shape (n_time,); and what it gains in log-likelihood over a state that stays 0 [-].
+        The courses, shape (n_time, m); and what each gains in log-likelihood over a state that stays 0, (m,) [-].
     """
     to_open, stay_shut, to_shut, stay_open = np.log(opens), np.log1p(-opens), np.log(shuts), np.log1p(-shuts)
-    came = np.zeros((len(odds), 2), dtype=np.int8)
-    shut, open_ = 0.0, -np.inf
+    came = np.zeros((2, *odds.shape), dtype=bool)
+    shut, open_ = np.zeros(odds.shape[1]), np.full(odds.shape[1], -np.inf)
     for k in range(len(odds)):
         from_shut, from_open = shut + stay_shut[k], open_ + to_shut
         opening, staying = shut + to_open[k], open_ + stay_open
-        came[k] = from_open > from_shut, staying > opening
-        shut, open_ = max(from_shut, from_open), max(opening, staying) + odds[k]
-    state = int(open_ > shut)
-    gain = max(shut, open_) - float(stay_shut.sum())
-    path = np.zeros(len(odds))
+        came[0, k], came[1, k] = from_open > from_shut, staying > opening
+        shut, open_ = np.maximum(from_shut, from_open), np.maximum(opening, staying) + odds[k]
+    state = open_ > shut
+    paths = np.zeros(odds.shape)
     for k in range(len(odds) - 1, -1, -1):
-        path[k] = state
-        state = int(came[k, state])
-    return path, float(gain)
+        paths[k] = state
+        state = np.where(state, came[1, k], came[0, k])
+    return paths, np.maximum(shut, open_) - stay_shut.sum()

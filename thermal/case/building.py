@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,7 +34,7 @@ class FloorPlan:
     height: float
     tokens: NDArray[np.str_]
 
-    @property
+    @cached_property
     def zone_names(self) -> tuple[str, ...]:
         """Zones of the floor, in the order of their first cell, row by row."""
         seen = dict.fromkeys(str(token) for token in self.tokens.ravel())

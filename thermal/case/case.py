@@ -131,6 +131,10 @@ class Case:
             that nothing measures is all NaN. Where several sensors measure a zone (its devices', its own), it is the
             mean of those that are usable at the stamp.
         """
+        return self._zone_temperatures.copy()
+
+    @cached_property
+    def _zone_temperatures(self) -> pd.DataFrame:
         frame = self.usable
         measured = {}
         for zone in self.building.zone_names:
@@ -154,7 +158,11 @@ class Case:
         same stamp. A flow of exactly zero brings no heat, whatever the discharge sensor says or fails to say. A
         terminal unit or heater of a known type that reports neither flow nor power makes its zone's heat unknown: NaN.
         """
-        temperatures = self.zone_temperatures()
+        return self._zone_heat.copy()
+
+    @cached_property
+    def _zone_heat(self) -> pd.DataFrame:
+        temperatures = self._zone_temperatures
         heat = pd.DataFrame(0.0, index=temperatures.index, columns=temperatures.columns)
         for device in self.building.devices:
             if device.zone is not None:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from calibration._heat_balance import heat_balance, step_balance
 from calibration._intervals import Interval
-from calibration.diagnosis._openings import _most_likely_path, _opened_when
+from calibration.diagnosis._openings import _most_likely_paths, _opened_when
 from thermal import SymbolicModel, build_network, load_bundled_case, reduced_model, replay_inputs
 
 FloatArray = NDArray[np.float64]
@@ -37,29 +37,34 @@ def lost(state: FloatArray, unit: FloatArray, rng: np.random.Generator, area: fl
 UNIT = 1200.0 + 400.0 * np.sin(2.0 * np.pi * (np.arange(DAYS * DAY) - 100) / DAY)
 
 
+def found_in(*heat: FloatArray) -> FloatArray:
+    """Openings of zones whose windows let out alike, shape (n_time, n_zone)."""
+    return _opened_when(np.column_stack(heat), np.tile(UNIT[:, None], len(heat)), PRESENCE, STEP)
+
+
 @pytest.mark.parametrize("area", [0.5, 1.0, 3.0])
 def test_openings_are_found(area: float) -> None:
     rng = np.random.default_rng(3)
     state = opened(rng)
     heat = lost(state, UNIT, rng, area)
     heat[500:520] = np.nan
-    found = _opened_when(heat, UNIT, PRESENCE, STEP)
+    found = found_in(heat)[:, 0]
     assert (found * state).sum() > 0.85 * state.sum()
     assert (found * state).sum() > 0.85 * found.sum()
 
 
 def test_noise_a_slow_loss_and_a_steady_one_are_no_openings() -> None:
     rng = np.random.default_rng(5)
-    for state in (np.zeros(DAYS * DAY), np.ones(DAYS * DAY)):
-        assert not _opened_when(lost(state, UNIT, rng), UNIT, PRESENCE, STEP).any()
+    states = (np.zeros(DAYS * DAY), np.ones(DAYS * DAY))
+    assert not found_in(*(lost(state, UNIT, rng) for state in states), np.full(DAYS * DAY, np.nan)).any()
 
 
 def test_what_comes_at_night_and_what_warms_is_not_opened_by_people() -> None:
     rng = np.random.default_rng(6)
     at_night = opened(rng, 0, 60)
-    assert not _opened_when(lost(at_night, UNIT, rng), UNIT, PRESENCE, STEP).any()
+    assert not found_in(lost(at_night, UNIT, rng)).any()
     by_day = opened(rng)
-    assert not _opened_when(-by_day * UNIT + 100.0 * rng.standard_normal(by_day.size), UNIT, PRESENCE, STEP).any()
+    assert not found_in(-by_day * UNIT + 100.0 * rng.standard_normal(by_day.size)).any()
 
 
 def test_the_path_is_the_most_likely_of_all() -> None:
@@ -75,9 +80,10 @@ def test_the_path_is_the_most_likely_of_all() -> None:
         return total
 
     best = max(product((0, 1), repeat=9), key=value)
-    path, gain = _most_likely_path(odds, opens, shuts)
-    assert tuple(path.astype(int)) == best
-    assert gain == pytest.approx(value(best) - value((0,) * 9))
+    paths, gains = _most_likely_paths(np.column_stack([odds, np.full(9, -5.0)]), opens, shuts)
+    assert tuple(paths[:, 0].astype(int)) == best
+    assert gains == pytest.approx([value(best) - value((0,) * 9), 0.0])
+    assert not paths[:, 1].any()
 
 
 def test_the_balance_of_steps_is_that_of_hours() -> None:
