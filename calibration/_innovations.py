@@ -102,7 +102,7 @@ class TunedDisturbance:
         What was found.
     spread : mapping of str to float
         Standard deviation of the logarithm of each number [-], from the curvature at the optimum; 0.1 is about 10 %.
-        Empty when there are more than 30.
+        Empty when there are more than 30, or when it is not wanted.
     log_likelihood : float
         Of all measurements of the intervals, the priors left out [-].
     count : int
@@ -146,6 +146,7 @@ def tune_disturbance(
     scheme: Scheme = IMPLICIT_EULER,
     covariance: Covariance = "exact",
     spin_up_seconds: float = SPIN_UP,
+    curvature: bool = True,
     progress: Progress | None = None,
 ) -> TunedDisturbance:
     """Find the unmeasured heat and the sensors' noise that make the innovations likeliest.
@@ -179,6 +180,8 @@ def tune_disturbance(
         See `KalmanFilter`; with ``steady`` the derivatives hold but for the ends of the intervals.
     spin_up_seconds : float
         Telemetry before an interval that the spin-up may use [s].
+    curvature : bool
+        Whether the spread of the numbers is wanted: it takes one evaluation more for each.
     progress : callable, optional
         Called with stage, done, total after every evaluation; the total is the largest number of them.
 
@@ -211,7 +214,7 @@ def tune_disturbance(
     close = np.minimum(solved.x - low, high - solved.x) < _AT_BOUND
     return TunedDisturbance(
         disturbance=tuning.disturbance(solved.x),
-        spread=_spread(tuning, solved.x, np.asarray(solved.jac)),
+        spread=_spread(tuning, solved.x, np.asarray(solved.jac)) if curvature else {},
         log_likelihood=float(tuning.prior(solved.x)[0] - tuning.count * solved.fun),
         count=tuning.count,
         success=bool(solved.success),

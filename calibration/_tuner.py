@@ -40,6 +40,7 @@ def tune(problem: Problem, model: ReducedModel, theta: FloatArray) -> Disturbanc
         start=problem.disturbance,
         scheme=problem.scheme,
         covariance="steady",  # where sensors come and go exact gains take ten times as long
+        curvature=False,
     )
     return tuned.disturbance
 

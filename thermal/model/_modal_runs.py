@@ -18,7 +18,7 @@ from thermal.model._modal import SHIFT, divided_differences, modal_model, propag
 from thermal.model._modal_fading import all_fading_sums, fading_sums, rows_of
 from thermal.model._modal_held import HeldFrame, scan
 from thermal.model._modal_slopes import ModalSlopes
-from thermal.model._scheme import Scheme
+from thermal.model._scheme import IMPLICIT_EULER, Scheme
 
 if TYPE_CHECKING:
     from thermal.model._symbolic import Matrices
@@ -138,13 +138,18 @@ class ModalRuns:
             push = propagator.end_gain[rows, None] * slope.boundary.values[rows]
             size = stay.size * driven.shape[1]
             pushed = slope.boundary.spread(push, np.arange(r, size, driven.shape[1]), size)
-            turned = slope.turned(rows, end_gain, propagator.end_gain) @ drive
-            turned = np.concatenate([slope.turned(rows, end), turned], axis=2)
+            if scheme == IMPLICIT_EULER:
+                turned, ahead = slope.summed_by_parts(rows, step)
+                starts[rows, slope.turning] -= ahead @ path[:, 0]
+                by_path += np.tensordot(seen[:, rows], ahead, axes=1)
+            else:
+                by_drive = slope.turned(rows, end_gain, propagator.end_gain) @ drive
+                turned = np.concatenate([slope.turned(rows, end), by_drive], axis=2)
             by_path += np.tensordot(observe[:, rows], slope.turned(rows, mean), axes=1)
             by_input += np.tensordot(observe[:, rows], slope.turned(rows, mean_gain, propagator.mean_gain), axes=1)
             for position, sums in enumerate(fading_sums(stay, driven, last)):
                 moved = stay[:, None, None] ** last[position] * starts[rows]
-                moved[:, slope.turning] += turned @ sums
+                moved[:, slope.turning] += turned @ sums[:, : turned.shape[2]]
                 moved += (pushed @ sums.reshape(-1, m)).reshape(moved.shape)
                 out[position] += (seen[:, rows] @ moved.reshape(stay.size, -1)).reshape(n_zone, p, m)
         now = driven[last].transpose(1, 0, 2).reshape(-1, keep.size * m)

@@ -147,6 +147,33 @@ class ModalSlopes:
         turned[:, self._heavy] += self.capacity.values[rows] * quotient[rows][:, None]
         return np.asarray(turned)
 
+    def summed_by_parts(self, rows: slice, step: float) -> tuple[FloatArray, FloatArray]:
+        """Differentiate runs of implicit Euler: what the past of their states, and the last one, is multiplied with.
+
+        A step ``(c + Δt k) dx' = c dx - dC (x' - x) - Δt dK x'`` gives sums over both of its ends. Those over x' are
+        those over x, with the last state and less the first, so that one sum over the past is left:
+        ``dx_n = a^n (dx_0 - A x_0) + A x_n + T Σ_k a^(n-1-k) x_k``.
+
+        Parameters
+        ----------
+        rows : slice
+            The modes.
+        step : float
+            Time step [s].
+
+        Returns
+        -------
+        tuple of ndarray, shape (n_row, n_turning, r)
+            T and A, without the part of B.
+        """
+        c = self._capacities[rows, None, None]
+        system = c + step * (1.0 - SHIFT * c)
+        stiffness, capacity = self.stiffness.values[rows], self.capacity.values[rows]
+        past, ahead = (-step * c / system**2) * stiffness, (-step / system) * stiffness
+        past[:, self._heavy] += (step / system**2) * capacity
+        ahead[:, self._heavy] -= ((1.0 - step * SHIFT) / system) * capacity
+        return past, ahead
+
 
 def _stack(parameters: list[int], matrices: Iterable[Matrix], states: FloatArray) -> Stack:
     """Matrices in the modes."""
