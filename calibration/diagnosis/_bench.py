@@ -17,10 +17,10 @@ from calibration._settings import ModelSettings
 from calibration._starts import tuning_runs
 from calibration.diagnosis._fit import Found, descend, evidence_of
 from calibration.diagnosis._openings import seen_openings
-from thermal import Case, Inputs, SymbolicModel, ThermalNetwork, build_network, reduced_model, replay_inputs
+from thermal import Case, Inputs, SymbolicModel, ThermalNetwork, reduced_model, replay_inputs
 from thermal.effects import CATALOGUE, chosen
 from thermal.model import ReducedModel
-from thermal.network import Anatomy, Extension
+from thermal.network import Anatomy, Blueprint, Extension, blueprint
 from thermal.signals import Drivers
 
 FloatArray = NDArray[np.float64]
@@ -169,6 +169,12 @@ class Bench:
         return drivers
 
     @cached_property
+    def blueprint(self) -> Blueprint:
+        """The building without effects."""
+        s = self.settings
+        return blueprint(self.case.building, s.dx, s.reach, s.scopes, structure=s.structure)
+
+    @cached_property
     def anatomy(self) -> Anatomy:
         """What the building's volumes and faces are part of."""
         return self.settings.network(self.case.building).anatomy
@@ -188,10 +194,7 @@ class Bench:
         further : sequence of Extension
             What else to add.
         """
-        s = self.settings
-        network = build_network(
-            self.case.building, s.dx, s.reach, s.scopes, structure=s.structure, effects=(*chosen(effects), *further)
-        )
+        network = self.blueprint.network((*chosen(effects), *further))
         return Built(network, SymbolicModel(network), replay_inputs(self.case, network, self.drivers))
 
     def problem(self, built: Built, theta: FloatArray) -> Problem:

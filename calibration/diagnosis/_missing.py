@@ -153,7 +153,8 @@ def _tuned(fit: Fit, model: ReducedModel, many: bool, scheme: Scheme, spin_up_se
     stretch = Interval(max(last.start, last.end - pd.Timedelta(seconds=_TUNED_MANY if many else _TUNED)), last.end)
     return tune_disturbance(
         model, fit.theta, fit.built.inputs, [stretch], per_zone=() if many else ("deviation",),
-        weights=air_volumes(model.network), scheme=scheme, covariance="steady", spin_up_seconds=spin_up_seconds, curvature=False,
+        weights=air_volumes(model.network), scheme=scheme, covariance="steady", spin_up_seconds=spin_up_seconds,
+        curvature=False,
     ).disturbance  # fmt: skip
 
 

@@ -1,6 +1,4 @@
-"""Sparse factors of the symmetric matrix of a step: for many solves without the entries that lie far below round-off,
-for few with an order of elimination that serves all matrices of one structure.
-"""
+"""Sparse factors of the symmetric matrix of a step: lean ones for many solves, ordered once for few."""
 
 from __future__ import annotations
 

@@ -24,7 +24,7 @@ IntArray = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
-class Stack:
+class _Stack:
     """Matrices of the parameters that have one, side by side for each mode.
 
     Parameters
@@ -50,7 +50,7 @@ class Stack:
 
 
 @dataclass(frozen=True)
-class Columns:
+class _Columns:
     """Single columns of the parameters' matrices; all others are zero.
 
     Parameters
@@ -68,7 +68,7 @@ class Columns:
     values: FloatArray
 
     def spread(self, values: FloatArray, places: IntArray, size: int) -> sp.csr_matrix:
-        """What became of the columns, for every row all parameters one after the other, (n_row n_parameter, size).
+        """Spread what became of the columns: for every row one parameter after another, (n_row n_parameter, size).
 
         Parameters
         ----------
@@ -98,9 +98,9 @@ class ModalSlopes:
 
     Attributes
     ----------
-    capacity, stiffness : Stack
+    capacity, stiffness : _Stack
         dC and d(K + s C).
-    boundary : Columns
+    boundary : _Columns
         dB.
     """
 
@@ -175,18 +175,18 @@ class ModalSlopes:
         return past, ahead
 
 
-def _stack(parameters: list[int], matrices: Iterable[Matrix], states: FloatArray) -> Stack:
+def _stack(parameters: list[int], matrices: Iterable[Matrix], states: FloatArray) -> _Stack:
     """Matrices in the modes."""
     r = states.shape[1]
     values = np.empty((r, len(parameters), r))
     for k, matrix in enumerate(matrices):
         np.matmul(states.T, matrix @ states, out=values[:, k])
-    return Stack(np.array(parameters, dtype=np.int64), values)
+    return _Stack(np.array(parameters, dtype=np.int64), values)
 
 
-def _columns(matrices: list[Matrix], states: FloatArray) -> Columns:
+def _columns(matrices: list[Matrix], states: FloatArray) -> _Columns:
     """Columns of -B that are not zero, as those of B in the modes."""
     there = [np.flatnonzero(m.any(axis=0)) for m in matrices]
     ends = np.cumsum([0, *(columns.size for columns in there)])
     moved = np.hstack([m[:, columns] for m, columns in zip(matrices, there, strict=True)])
-    return Columns(ends, np.concatenate(there), -states.T @ moved)
+    return _Columns(ends, np.concatenate(there), -states.T @ moved)

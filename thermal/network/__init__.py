@@ -1,7 +1,8 @@
 """Control volumes and faces of a building, as one graph."""
 
 from thermal.network._anatomy import UPWARD, Anatomy, OuterFaces, Outlook, Room
-from thermal.network._build import build_network
+from thermal.network._blueprint import Blueprint
+from thermal.network._build import blueprint, build_network
 from thermal.network._extension import Extension
 from thermal.network._films import series, surface_mesh
 from thermal.network._graph import GraphBuilder
@@ -16,6 +17,7 @@ __all__ = [
     "SHUFFLE_STEP",
     "UPWARD",
     "Anatomy",
+    "Blueprint",
     "CapacityClass",
     "ConductanceClass",
     "Extension",
@@ -26,6 +28,7 @@ __all__ = [
     "Room",
     "Structure",
     "ThermalNetwork",
+    "blueprint",
     "build_network",
     "floor_grid",
     "series",

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from copy import copy
+from dataclasses import dataclass, field, fields, replace
 
 import casadi as ca
 import numpy as np
@@ -198,6 +199,10 @@ class Anatomy:
     facades: dict[tuple[str, float], float] = field(default_factory=dict)
     air_heat_capacity: float = 0.0
     airflows: tuple[tuple[int, int], ...] = ()
+
+    def copy(self) -> Anatomy:
+        """Another with the same parts, to which more can be added."""
+        return replace(self, **{f.name: copy(getattr(self, f.name)) for f in fields(self)})
 
 
 def azimuth_of(side: str, orientation: float) -> float:

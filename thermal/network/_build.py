@@ -8,11 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal.case import Building, ZoneTable
+from thermal.network._blueprint import Blueprint
 from thermal.network._extension import Extension
 from thermal.network._network import ThermalNetwork
-from thermal.network._plan import plan_network
+from thermal.network._plan import plan_blueprint
 from thermal.network._structure import BASELINE, Structure
-from thermal.network._table import table_network
+from thermal.network._table import table_blueprint
 from thermal.parameters import Scope
 
 
@@ -67,7 +68,48 @@ def build_network(
     >>> [p.member for p in network.parameters if p.base == "window_u_value"]
     ['north', 'south', 'west', 'east']
     """
+    return blueprint(building, dx, reach, scopes, diffusers, mean_shuffle, structure).network(effects)
+
+
+def blueprint(
+    building: Building,
+    dx: float | None = None,
+    reach: float | None = None,
+    scopes: Mapping[str, Scope] | None = None,
+    diffusers: Mapping[str, NDArray[np.bool_]] | None = None,
+    mean_shuffle: bool = True,
+    structure: Structure = BASELINE,
+) -> Blueprint:
+    """Build the baseline of a building once, for networks with many sets of effects.
+
+    Parameters
+    ----------
+    building : Building
+        What the case folder describes.
+    dx, reach : float, optional
+        Distance between control volumes, and reach of the shuffle [m]; see `build_network`.
+    scopes, diffusers, mean_shuffle, structure
+        As in `build_network`.
+
+    Returns
+    -------
+    Blueprint
+        Its `network` is that of `build_network`.
+
+    Raises
+    ------
+    ModelError
+        When a cell size, a scope, a mask of diffusers or the structure does not fit the building.
+
+    Examples
+    --------
+    >>> from thermal import load_bundled_case
+    >>> from thermal.effects import chosen
+    >>> baseline = blueprint(load_bundled_case().building, dx=1.0)
+    >>> len(baseline.network().signals), len(baseline.network(chosen({"solar_gain": ()})).signals) > 0
+    (0, True)
+    """
     geometry = building.geometry
     if isinstance(geometry, ZoneTable):
-        return table_network(building, geometry, scopes, structure, effects)
-    return plan_network(building, geometry, dx, reach, scopes, diffusers, mean_shuffle, structure, effects)
+        return table_blueprint(building, geometry, scopes, structure)
+    return plan_blueprint(building, geometry, dx, reach, scopes, diffusers, mean_shuffle, structure)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from copy import copy
 from typing import Any, get_args
 
 import casadi as ca
@@ -62,6 +63,18 @@ class GraphBuilder:
         self._count = 0
         self._faces: dict[str, tuple[ca.SX, list[tuple[Any, Any, Any]]]] = {}
         self._masses: dict[str, tuple[ca.SX, list[tuple[IntArray, FloatArray]]]] = {}
+
+    def copy(self) -> GraphBuilder:
+        """Another with the same volumes and faces, to which more can be added."""
+        other = copy(self)
+        for name in (
+            "nominal", "_signals", "_numbers", "_readings", "_sources", "_parameters", "_kind", "_zone", "_place",
+        ):  # fmt: skip
+            setattr(other, name, copy(getattr(self, name)))
+        other._faces = {key: (value, list(faces)) for key, (value, faces) in self._faces.items()}
+        other._masses = {key: (value, list(masses)) for key, (value, masses) in self._masses.items()}
+        other.anatomy = self.anatomy.copy()
+        return other
 
     def parameter(self, name: str, zone: str | None = None, factor: float = 1.0, *, facade: str | None = None) -> ca.SX:
         """Symbol of a parameter; that of a zone or a facade when its scope says so.

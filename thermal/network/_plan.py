@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from thermal.case import Building, FloorPlans, facade_areas, zone_floor_areas
 from thermal.errors import ModelError
 from thermal.network._anatomy import UNKNOWN_GLAZING, VERTICAL, Pane, azimuth_of, partition_areas, stacked_areas
-from thermal.network._extension import Extension
+from thermal.network._blueprint import Blueprint
 from thermal.network._floor import Floor
 from thermal.network._graph import GraphBuilder
 from thermal.network._grid import floor_grid
 from thermal.network._interior import Zone
-from thermal.network._network import ThermalNetwork
 from thermal.network._structure import BASELINE, Structure
 from thermal.network._walls import Walls
 from thermal.parameters import Scope
@@ -25,7 +23,7 @@ from thermal.units import AIR_HEAT_CAPACITY, air_density
 FloatArray = NDArray[np.float64]
 
 
-def plan_network(
+def plan_blueprint(
     building: Building,
     plans: FloorPlans,
     dx: float | None = None,
@@ -34,9 +32,8 @@ def plan_network(
     diffusers: Mapping[str, NDArray[np.bool_]] | None = None,
     mean_shuffle: bool = True,
     structure: Structure = BASELINE,
-    effects: Sequence[Extension] = (),
-) -> ThermalNetwork:
-    """Build the network of a building given by floor plans.
+) -> Blueprint:
+    """Build the baseline of a building given by floor plans.
 
     Parameters
     ----------
@@ -56,12 +53,10 @@ def plan_network(
         Whether the mean of the shuffle is a term of K; off for a simulator that shuffles at random.
     structure : Structure
         What the model is made of.
-    effects : sequence of Extension
-        What is added to the baseline.
 
     Returns
     -------
-    ThermalNetwork
+    Blueprint
         Boundary ``outdoor``; slabs adiabatic at their back; no air exchange between zones (both are effects of the
         catalogue).
     """
@@ -86,18 +81,9 @@ def plan_network(
         Walls(floor, zones, plans.cell_size, building.orientation).add(plans.glazing)
         graph.anatomy.partitions |= partition_areas(plan, plans.cell_size)
     _remember(graph, building, plans, zones, areas)
-    for effect in effects:
-        effect.extend(graph)
-    n = graph.size
-    columns = [(z.air, np.full(z.air.size, z.number), diffuser_weight[z.number]) for z in zones.values()]
-    node = np.concatenate([c[0] for c in columns])
-    column = np.concatenate([c[1] for c in columns])
-    share = np.concatenate([c[2] for c in columns])
-    mean = np.concatenate([z.share for z in zones.values()])
-    shape = (n, len(graph.zones))
-    heating = sp.csr_matrix((share, (node, column)), shape=shape)
-    observation = sp.csr_matrix((mean, (column, node)), shape=shape[::-1])
-    return graph.finish(observation, heating, graph.anatomy.airflows, grid.spacing, tuple(shapes))
+    columns = [(z.air, np.full(z.air.size, z.number), z.share, diffuser_weight[z.number]) for z in zones.values()]
+    air, zone, mean, share = (np.concatenate([c[k] for c in columns]) for k in range(4))
+    return Blueprint(graph, air, zone, mean, share, grid.spacing, tuple(shapes))
 
 
 def _remember(

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import casadi as ca
 import numpy as np
-import scipy.sparse as sp
 
 from thermal.case import Building, Layer, Surface, ZoneTable
 from thermal.network._anatomy import DOWNWARD, UPWARD, VERTICAL, GroundFace, OuterFaces, Outlook, Pane
+from thermal.network._blueprint import Blueprint
 from thermal.network._chains import Chain
-from thermal.network._extension import Extension
 from thermal.network._facades import facade_of
 from thermal.network._films import series
 from thermal.network._graph import GraphBuilder
@@ -22,20 +21,18 @@ from thermal.network._materials import (
     RATED_OUTSIDE_FILM,
     WINDOW_RATED_FILM,
 )
-from thermal.network._network import ThermalNetwork
 from thermal.network._structure import BASELINE, Structure
 from thermal.parameters import Scope
 from thermal.units import AIR_HEAT_CAPACITY, air_density
 
 
-def table_network(
+def table_blueprint(
     building: Building,
     table: ZoneTable,
     scopes: Mapping[str, Scope] | None = None,
     structure: Structure = BASELINE,
-    effects: Sequence[Extension] = (),
-) -> ThermalNetwork:
-    """Build the network of a building given by a zone table.
+) -> Blueprint:
+    """Build the baseline of a building given by a zone table.
 
     Parameters
     ----------
@@ -47,12 +44,10 @@ def table_network(
         Parameters with one value a facade (`thermal.network._facades.facade_of`) or a zone.
     structure : Structure
         What the model is made of.
-    effects : sequence of Extension
-        What is added to the baseline.
 
     Returns
     -------
-    ThermalNetwork
+    Blueprint
         Boundaries ``outdoor`` and the measured ones. Surfaces to ``ground`` are adiabatic at their back
         (``ground_exchange`` is an effect of the catalogue).
     """
@@ -72,12 +67,8 @@ def table_network(
     graph.anatomy.airflows = tuple(
         (graph.zones.index(a.source), graph.zones.index(a.target)) for a in building.airflows
     )
-    for effect in effects:
-        effect.extend(graph)
-    number = np.arange(len(zones))
-    node = np.concatenate([zones[z].air for z in graph.zones])
-    heating = sp.csr_matrix((np.ones(len(zones)), (node, number)), shape=(graph.size, len(zones)))
-    return graph.finish(heating.T.tocsr(), heating, graph.anatomy.airflows)
+    air, ones = np.concatenate([zones[z].air for z in graph.zones]), np.ones(len(zones))
+    return Blueprint(graph, air, np.arange(len(zones)), ones, ones)
 
 
 def _add_surface(
