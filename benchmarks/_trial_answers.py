@@ -188,9 +188,8 @@ def report(out: Path, published: bool) -> str:
     if alone:
         head += f" **{alone} count whatever their gap, as their twin has no answer: answer the twins before quoting.**"
     short = f"{head}\n\n{_rates(scored)}\n{_summary(scored)}\n"
-    page = "\n".join(
+    detail = "\n".join(
         [
-            short,
             "By effect:\n",
             _rows(scored["by_effect"]),
             "By strength:\n",
@@ -199,10 +198,14 @@ def report(out: Path, published: bool) -> str:
             _reliability(scored["reliability"]),
         ]
     )
+    page = f"{short}\n{detail}"
     plain = {**scored, "rates": {name: r.to_dict() for name, r in scored["rates"].items()}}
     write(out, NAME, page, plain, published=False)
-    if published:
-        publish(NAME if len(_kinds(trials)) > 1 else f"{NAME}_{trials[0].kind}", short)
+    if published and len(_kinds(trials)) > 1:
+        publish(NAME, short)
+        publish(f"{NAME}_detail", detail)
+    elif published:
+        publish(f"{NAME}_{trials[0].kind}", short)
     return page
 
 
