@@ -215,26 +215,27 @@ def _kinds(trials: Sequence[Trial]) -> list[str]:
 
 def _rates(scored: Mapping[str, Any]) -> str:
     rows = [
-        [
-            name,
-            f"{r.share:.0%}" if r.of else "-",
-            f"{r.interval[0]:.0%} to {r.interval[1]:.0%}" if r.of else "-",
-            f"{r.hits} of {r.of}",
-        ]
+        [name, f"{r.share:.0%}", f"{r.interval[0]:.0%} to {r.interval[1]:.0%}", f"{r.hits} of {r.of}"]
         for name, r in scored["rates"].items()
+        if r.of
     ]
     return markdown(("of trials", "share", "95 % interval", "number"), rows)
 
 
 def _summary(scored: Mapping[str, Any]) -> str:
     hidden = ", ".join(f"{v} {n}" for v, n in scored["uncounted"].items() if n)
-    low, middle, high = scored["strength"] or [float("nan")] * 3
-    return (
-        f"Strength found over the true one, where both are one number: median {middle:.2f}, half of them between "
-        f"{low:.2f} and {high:.2f}. Median share of the gap closed: {scored['closed']:.0%}. Effects in a 90 % set: "
-        f"{scored['set_size']:.1f} on average. Trials without a gap: {hidden or 'none'}. Median time of a diagnosis: "
-        f"{scored['seconds']:.0f} s."
-    )
+    said = []
+    if scored["strength"]:
+        low, middle, high = scored["strength"]
+        said.append(
+            f"Strength found over the true one, where both are one number: median {middle:.2f}, half of them between "
+            f"{low:.2f} and {high:.2f}."
+        )
+    said += [f"Median share of the gap closed: {scored['closed']:.0%}.",
+             f"Effects in a 90 % set: {scored['set_size']:.1f} on average.",
+             f"Trials without a gap: {hidden or 'none'}.",
+             f"Median time of a diagnosis: {scored['seconds']:.0f} s."]  # fmt: skip
+    return " ".join(said)
 
 
 def _rows(table: Mapping[str, Mapping[str, Any]]) -> str:
