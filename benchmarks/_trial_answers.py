@@ -17,25 +17,28 @@ from _code import code
 from _table import markdown, publish, write
 from energyplus_trials.drawing import draw_spec, without
 
-from calibration.diagnosis import Trial, score, trial_of
+from calibration.diagnosis import LEAST_GAP, Trial, score, trial_of
 
 NAME = "blind_trials"
-CASES, SEALED, ANSWERS = "cases", "sealed", "answers"
+CASES, SEALED, ANSWERS, GAPS = "cases", "sealed", "answers", "gaps"
 
+#: What answers a trial, and what only measures its gap, a tenth of the work.
+_ANSWER, _GAP = "diagnose(case).to_dict()", '{"gap": {"mae": baseline_gap(case)}}'
 #: The program of the process that answers one trial: it gets the case folder and a file to write to, and nothing else.
 _PROGRAM = """
 import json, sys
 from pathlib import Path
-from calibration.diagnosis import diagnose
+from calibration.diagnosis import baseline_gap, diagnose
 from thermal import load_case
-answer = diagnose(load_case(sys.argv[1])).to_dict() | {"code": sys.argv[3]}
+case = load_case(sys.argv[1])
+answer = %s | {"code": sys.argv[3]}
 part = Path(sys.argv[2] + ".part")
 part.write_text(json.dumps(answer), encoding="utf-8")
 part.replace(sys.argv[2])
 """
 
 
-def answer_all(out: Path, workers: int, most: int | None = None) -> list[str]:
+def answer_all(out: Path, workers: int, most: int | None = None, *, showing: bool = False) -> list[str]:
     """Diagnose every trial that has no answer yet; returns the names of those that failed.
 
     Parameters
@@ -46,13 +49,32 @@ def answer_all(out: Path, workers: int, most: int | None = None) -> list[str]:
         Processes at a time, one thread each.
     most : int, optional
         Most trials to answer now.
+    showing : bool
+        Only trials of several effects of which two or more show; their gaps must have been measured.
     """
-    folder = out / ANSWERS
-    folder.mkdir(exist_ok=True)
-    return answer_cases(sorted((out / CASES).iterdir()), folder, workers, most)
+    cases = sorted((out / CASES).iterdir())
+    if showing:
+        cases = [case for case in cases if case.name in _of_several_that_show(out)]
+    return answer_cases(cases, out / ANSWERS, workers, most)
 
 
-def answer_cases(cases: Sequence[Path], folder: Path, workers: int, most: int | None = None) -> list[str]:
+def measure_gaps(out: Path, workers: int) -> list[str]:
+    """Measure the gap of every trial that has neither gap nor answer; returns the names of those that failed.
+
+    Parameters
+    ----------
+    out : Path
+        Folder of the trials.
+    workers : int
+        Processes at a time, one thread each.
+    """
+    cases = [p for p in sorted((out / CASES).iterdir()) if not (out / ANSWERS / f"{p.name}.json").exists()]
+    return answer_cases(cases, out / GAPS, workers, program=_GAP)
+
+
+def answer_cases(
+    cases: Sequence[Path], folder: Path, workers: int, most: int | None = None, *, program: str = _ANSWER
+) -> list[str]:
     """Diagnose every case that has no answer yet, in a process of its own; returns the names of those that failed.
 
     Parameters
@@ -60,31 +82,58 @@ def answer_cases(cases: Sequence[Path], folder: Path, workers: int, most: int | 
     cases : sequence of Path
         Case folders.
     folder : Path
-        Where the answers go, one file a case.
+        Where the answers go, one file a case; made where it is not there.
     workers : int
         Processes at a time, one thread each.
     most : int, optional
         Most cases to answer now.
+    program : str
+        What is asked of a case.
     """
+    folder.mkdir(exist_ok=True)
     waiting = [p for p in cases if not (folder / f"{p.name}.json").exists()][:most]
     failed, began = [], time.perf_counter()
     with ThreadPoolExecutor(workers) as pool:
-        tasks = {pool.submit(_answer, case, folder / f"{case.name}.json"): case.name for case in waiting}
+        tasks = {pool.submit(_answer, case, folder / f"{case.name}.json", program): case.name for case in waiting}
         for number, task in enumerate(as_completed(tasks), 1):
             error = task.result()
             if error:
                 failed.append(tasks[task])
             seconds = time.perf_counter() - began
-            print(f"{number} of {len(waiting)} ({seconds:.0f} s): {tasks[task]}: {error or 'answered'}", flush=True)
+            print(f"{number} of {len(waiting)} ({seconds:.0f} s): {tasks[task]}: {error or 'done'}", flush=True)
     return failed
 
 
-def _answer(case: Path, answer: Path) -> str:
+def _answer(case: Path, answer: Path, program: str) -> str:
     """Run one process; returns the last line of what went wrong."""
     quiet = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")}
-    command = [sys.executable, "-c", _PROGRAM, str(case), str(answer), code()]
+    command = [sys.executable, "-c", _PROGRAM % program, str(case), str(answer), code()]
     done = subprocess.run(command, env={**os.environ, **quiet}, capture_output=True, text=True, check=False)
     return "" if done.returncode == 0 else (done.stderr.strip().splitlines() or ["no message"])[-1]
+
+
+def _read(folder: Path) -> dict[str, Any]:
+    """Contents of the files of a folder by their names; none where it is not there."""
+    return {p.stem: json.loads(p.read_text(encoding="utf-8")) for p in sorted(folder.glob("*.json"))}
+
+
+def _gaps(out: Path) -> dict[str, float]:
+    """Held-out error of the calibrated baseline by trial [K]."""
+    return {name: float(a["gap"]["mae"]) for name, a in (_read(out / GAPS) | _read(out / ANSWERS)).items()}
+
+
+def _of_several_that_show(out: Path) -> set[str]:
+    """Names of the trials of which two effects or more leave a gap."""
+    gaps, found = _gaps(out), set()
+    for name, label in _read(out / SEALED).items():
+        twins = _twins(label) if label["kind"] == "pair" else []
+        missing = [n for n in (name, *twins) if twins and n not in gaps]
+        if missing:
+            raise SystemExit(f"{out}: expected the gap of {missing[0]}, a trial of several effects or its twin, found "
+                             "none; make the twins and run `gaps` first")  # fmt: skip
+        if sum(gaps[name] - gaps[twin] > LEAST_GAP for twin in twins) > 1:
+            found.add(name)
+    return found
 
 
 def read_trials(out: Path) -> list[Trial]:
@@ -95,9 +144,8 @@ def read_trials(out: Path) -> list[Trial]:
     out : Path
         Folder of the trials.
     """
-    answers = {p.stem: json.loads(p.read_text(encoding="utf-8")) for p in sorted((out / ANSWERS).glob("*.json"))}
+    answers, gaps = _read(out / ANSWERS), _gaps(out)
     labels = {name: json.loads((out / SEALED / f"{name}.json").read_text(encoding="utf-8")) for name in answers}
-    gaps = {name: answer["gap"]["mae"] for name, answer in answers.items()}
     return [
         trial_of(name, label, answers[name], [gaps.get(twin, float("nan")) for twin in _twins(label)])
         for name, label in labels.items()
@@ -140,9 +188,8 @@ def report(out: Path, published: bool) -> str:
     if alone:
         head += f" **{alone} count whatever their gap, as their twin has no answer: answer the twins before quoting.**"
     short = f"{head}\n\n{_rates(scored)}\n{_summary(scored)}\n"
-    page = "\n".join(
+    detail = "\n".join(
         [
-            short,
             "By effect:\n",
             _rows(scored["by_effect"]),
             "By strength:\n",
@@ -151,10 +198,14 @@ def report(out: Path, published: bool) -> str:
             _reliability(scored["reliability"]),
         ]
     )
+    page = f"{short}\n{detail}"
     plain = {**scored, "rates": {name: r.to_dict() for name, r in scored["rates"].items()}}
     write(out, NAME, page, plain, published=False)
-    if published:
+    if published and len(_kinds(trials)) > 1:
         publish(NAME, short)
+        publish(f"{NAME}_detail", detail)
+    elif published:
+        publish(f"{NAME}_{trials[0].kind}", short)
     return page
 
 
@@ -164,26 +215,27 @@ def _kinds(trials: Sequence[Trial]) -> list[str]:
 
 def _rates(scored: Mapping[str, Any]) -> str:
     rows = [
-        [
-            name,
-            f"{r.share:.0%}" if r.of else "-",
-            f"{r.interval[0]:.0%} to {r.interval[1]:.0%}" if r.of else "-",
-            f"{r.hits} of {r.of}",
-        ]
+        [name, f"{r.share:.0%}", f"{r.interval[0]:.0%} to {r.interval[1]:.0%}", f"{r.hits} of {r.of}"]
         for name, r in scored["rates"].items()
+        if r.of
     ]
     return markdown(("of trials", "share", "95 % interval", "number"), rows)
 
 
 def _summary(scored: Mapping[str, Any]) -> str:
     hidden = ", ".join(f"{v} {n}" for v, n in scored["uncounted"].items() if n)
-    low, middle, high = scored["strength"] or [float("nan")] * 3
-    return (
-        f"Strength found over the true one, where both are one number: median {middle:.2f}, half of them between "
-        f"{low:.2f} and {high:.2f}. Median share of the gap closed: {scored['closed']:.0%}. Effects in a 90 % set: "
-        f"{scored['set_size']:.1f} on average. Trials without a gap: {hidden or 'none'}. Median time of a diagnosis: "
-        f"{scored['seconds']:.0f} s."
-    )
+    said = []
+    if scored["strength"]:
+        low, middle, high = scored["strength"]
+        said.append(
+            f"Strength found over the true one, where both are one number: median {middle:.2f}, half of them between "
+            f"{low:.2f} and {high:.2f}."
+        )
+    said += [f"Median share of the gap closed: {scored['closed']:.0%}.",
+             f"Effects in a 90 % set: {scored['set_size']:.1f} on average.",
+             f"Trials without a gap: {hidden or 'none'}.",
+             f"Median time of a diagnosis: {scored['seconds']:.0f} s."]  # fmt: skip
+    return " ".join(said)
 
 
 def _rows(table: Mapping[str, Mapping[str, Any]]) -> str:

@@ -12,12 +12,16 @@ Run from the repository's root, in an environment with Python 3.11 or newer::
     python benchmarks/blind_trials.py make --out results/blind --kind null --seeds 0-9      # their twins
     python benchmarks/blind_trials.py make --out results/blind --kind pair --seeds 0-9
     python benchmarks/blind_trials.py make --out results/blind --kind without --seeds 0-9   # pairs less one effect
+    python benchmarks/blind_trials.py gaps --out results/blind
     python benchmarks/blind_trials.py diagnose --out results/blind
     python benchmarks/blind_trials.py score --out results/blind
     python benchmarks/blind_trials.py levels --out results/blind    # null levels, from development seeds only
 
 `diagnose` answers each trial in a process of its own, which gets the case folder and nothing else; `score` opens the
-seals of what is answered. An interrupted run goes on where it was: trials and answers that are there are left alone.
+seals of what is answered. Pairs less one effect are needed for their gap only, which `gaps` measures in a tenth of the
+time; few pairs have two effects that show, and ``diagnose --showing`` answers only those. ``score --publish`` of a
+folder with one kind of trials goes to a table of its own. An interrupted run goes on where it was: trials and answers
+that are there are left alone.
 """
 
 from __future__ import annotations
@@ -29,7 +33,7 @@ from concurrent.futures import Future, ThreadPoolExecutor, as_completed
 from pathlib import Path
 
 from _null_levels import make_levels
-from _trial_answers import CASES, SEALED, answer_all, report
+from _trial_answers import CASES, SEALED, answer_all, measure_gaps, report
 from energyplus_trials.drawing import DAYS, draw_spec, without
 from energyplus_trials.errors import EnergyPlusMissingError, TrialError
 from energyplus_trials.specification import KINDS, TrialSpec
@@ -121,7 +125,12 @@ def main() -> int:
     command.add_argument("--out", type=Path, required=True, help="folder of the trials")
     command.add_argument("--workers", type=int, default=min(2, os.cpu_count() or 1), help="processes at a time")
     command.add_argument("--most", type=int, help="most trials to answer now")
-    command.set_defaults(run=lambda o: 1 if answer_all(o.out, o.workers, o.most) else 0)
+    command.add_argument("--showing", action="store_true", help="only those of several effects of which two show")
+    command.set_defaults(run=lambda o: 1 if answer_all(o.out, o.workers, o.most, showing=o.showing) else 0)
+    command = commands.add_parser("gaps", help="measure the gap of trials without an answer, as twins need no more")
+    command.add_argument("--out", type=Path, required=True, help="folder of the trials")
+    command.add_argument("--workers", type=int, default=min(2, os.cpu_count() or 1), help="processes at a time")
+    command.set_defaults(run=lambda o: 1 if measure_gaps(o.out, o.workers) else 0)
     command = commands.add_parser("score", help="open the seals of answered trials and score the answers")
     command.add_argument("--out", type=Path, required=True, help="folder of the trials")
     command.add_argument("--publish", action="store_true", help="replace the table between its marks")

@@ -1,14 +1,16 @@
 """Diagnosis of the sim-to-real gap: where it lies, which effect causes it, and how far it shrinks with it."""
 
-from calibration.diagnosis._diagnose import Diagnosis, diagnose
+from calibration.diagnosis._diagnose import Diagnosis, baseline_gap, diagnose
 from calibration.diagnosis._page import write_diagnosis
-from calibration.diagnosis._scoring import Rate, Trial, score, trial_of
+from calibration.diagnosis._scoring import LEAST_GAP, Rate, Trial, score, trial_of
 from calibration.diagnosis._words import called, diagnosis_verdict, in_zones
 
 __all__ = [
+    "LEAST_GAP",
     "Diagnosis",
     "Rate",
     "Trial",
+    "baseline_gap",
     "called",
     "diagnose",
     "diagnosis_verdict",

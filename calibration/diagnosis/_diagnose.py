@@ -12,6 +12,7 @@ from calibration._evaluate import Progress
 from calibration._intervals import Interval
 from calibration._settings import ModelSettings
 from calibration.diagnosis._bench import Bench, Fit
+from calibration.diagnosis._held_out import held_out
 from calibration.diagnosis._how_far import Step, how_far
 from calibration.diagnosis._levels import p_value
 from calibration.diagnosis._refit import ACCEPTED
@@ -227,3 +228,33 @@ def _step(step: Step) -> dict[str, Any]:
         "placebo": {"shuffled": step.shuffled, "runner_up": step.runner_up},
         "on_bound": list(step.bounds),
     }
+
+
+def baseline_gap(
+    case: Case,
+    tune: Sequence[Interval] = (),
+    hold_out: Sequence[Interval] = (),
+    *,
+    dx: float | None = None,
+    horizon: str = "6h",
+) -> float:
+    """Calibrate the baseline and give its held-out error, the gap that `diagnose` begins with [K].
+
+    Parameters
+    ----------
+    case : Case
+        Building and telemetry.
+    tune, hold_out : sequence of Interval
+        As in `diagnose`.
+    dx : float, optional
+        Distance between control volumes of a plan [m]; the plan's cell size by default.
+    horizon : str
+        Prediction horizon, such as ``6h``.
+
+    Raises
+    ------
+    CalibrationError
+        When an interval has no usable run.
+    """
+    bench = Bench(case, ModelSettings(dx=dx), tune, hold_out, horizon)
+    return float(held_out(bench, bench.fit({}, [{}])).mae)

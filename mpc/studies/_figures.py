@@ -218,10 +218,11 @@ def cost_bars(runs: Sequence[ControlRun]) -> list[Picture]:
     left.set_yticks(place, names)
     left.invert_yaxis()
     left.set_xlabel(f"energy cost [{runs[0].study.scenario.currency}]")
-    left.legend(loc="lower right", fontsize=8)
+    left.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, fontsize=8)  # above: bars fill the axes
     discomfort = [run.kpis.tdis_tot for run in runs]
-    right.barh(place, discomfort, color=WARNING, alpha=0.7)
-    right.set_xlim(0.0, 1.05 * max(_FELT, *discomfort))
+    bars = right.barh(place, discomfort, color=WARNING, alpha=0.7)
+    right.bar_label(bars, fmt="%.2f", padding=3.0, fontsize=8)  # where nobody leaves the band there is no bar
+    right.set_xlim(0.0, 1.25 * max(_FELT, *discomfort))
     right.set_xlabel("outside of the band, mean zone [K h]")
     return [picture(figure, "Energy cost and discomfort of the controllers")]
 

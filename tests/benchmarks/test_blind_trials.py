@@ -77,6 +77,24 @@ def test_the_label_holds_the_whole_truth(trials, small, tmp_path):
     assert label["layout"]["floors"] == 1 and label["run"] == {"seconds": 1.0}
 
 
+def test_only_trials_of_which_two_effects_show_are_asked_for(trials, script, command, tmp_path):
+    """Three pairs: both effects leave a gap, one does, and one whose twin was not measured."""
+    answers = script("_trial_answers")
+    specs = [trials("drawing").draw_spec(seed, "pair") for seed in range(3)]
+    (tmp_path / "gaps").mkdir()
+    for spec, least in zip(specs, (0.06, 0.04, None), strict=True):
+        trials("folder").write_label(tmp_path / "sealed", spec, {})
+        twins = trials("drawing").without(spec)
+        gaps = {spec.name: 0.5, **{t.name: 0.5 - 0.06 for t in twins[:1]}}
+        gaps |= {t.name: 0.5 - least for t in twins[1:] if least is not None}
+        for name, gap in gaps.items():
+            (tmp_path / "gaps" / f"{name}.json").write_text(json.dumps({"gap": {"mae": gap}}))
+    with pytest.raises(SystemExit, match="expected the gap of"):
+        answers._of_several_that_show(tmp_path)
+    (tmp_path / "sealed" / f"{specs[2].name}.json").unlink()
+    assert answers._of_several_that_show(tmp_path) == {specs[0].name}
+
+
 @pytest.mark.energyplus
 @needs_energyplus
 def test_a_trial_is_a_case_that_tells_nothing(trials, command, small, tmp_path):

@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from calibration.diagnosis import Diagnosis, diagnose
+from calibration.diagnosis import Diagnosis, baseline_gap, diagnose
 from calibration.diagnosis._bench import Bench, Fit
 from calibration.diagnosis._refit import ACCEPTED, Refit
 from calibration.diagnosis._screen import Screening
@@ -48,6 +48,7 @@ def diagnosed(zone: str | None) -> Diagnosis:
 def test_nothing_is_found_where_nothing_is_missing() -> None:
     found = diagnosed(None)
     assert found.verdict.name == "no_gap"
+    assert baseline_gap(twin(), dx=1.0) == found.gap
     assert found.steps == ()
     assert found.verdict.set90 == ()
     assert max(g.gain for g in found.rounds[0].gains) < ACCEPTED
