@@ -26,3 +26,4 @@ def test_parts_of_the_modes_make_up_the_whole() -> None:
     assert [i for rows in parts for i in range(5)[rows]] == list(range(5))
     assert len(parts) == 3
     assert len(list(rows_of(3, 10**9))) == 3  # never less than a mode
+    assert len(list(rows_of(9, 10**9, least=4))) == 3

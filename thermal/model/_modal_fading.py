@@ -69,7 +69,7 @@ def all_fading_sums(stay: FloatArray, drive: FloatArray, ends: NDArray[np.int64]
     return sums.transpose(0, 2, 1)
 
 
-def rows_of(count: int, columns: int) -> Iterator[slice]:
+def rows_of(count: int, columns: int, least: int = 1) -> Iterator[slice]:
     """Cut modes into parts whose fading sums stay small enough.
 
     Parameters
@@ -78,7 +78,9 @@ def rows_of(count: int, columns: int) -> Iterator[slice]:
         Number of modes.
     columns : int
         Numbers that each has.
+    least : int
+        Fewest modes of a part, where what they are added to is large itself.
     """
-    together = max(1, _LARGEST // max(1, columns))
+    together = max(1, least, _LARGEST // max(1, columns))
     for low in range(0, count, together):
         yield slice(low, min(low + together, count))

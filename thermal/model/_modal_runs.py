@@ -133,7 +133,7 @@ class ModalRuns:
         seen = observe * propagator.mean
         out = np.zeros((keep.size, n_zone, p, m))
         by_path, by_input = (np.zeros((n_zone, slope.turning.size, r)) for _ in range(2))
-        for rows in rows_of(r, (driven.shape[1] + p) * m):
+        for rows in rows_of(r, (driven.shape[1] + p) * m, least=n_zone * p // driven.shape[1]):
             stay = propagator.end[rows]
             push = propagator.end_gain[rows, None] * slope.boundary.values[rows]
             size = stay.size * driven.shape[1]
