@@ -17,7 +17,7 @@ from mpc.environment._outlook import BLOCK_ENDS, Outlook, clock
 from mpc.environment._reward import REWARDS, Reward
 from mpc.errors import EnvironmentSetupError
 from mpc.kpi import measure_kpis
-from mpc.plants import Measurements, Plant, RecentSteps, SimulatedPlant
+from mpc.plants import Measurements, Plant, RecentSteps
 from mpc.scenario import Forecaster, Scenario
 from thermal.errors import describe, nearest
 
@@ -31,6 +31,20 @@ class ScenarioPlant(Plant, Protocol):
     scenario: Scenario
 
 
+@runtime_checkable
+class _RecordingPlant(Plant, Protocol):
+    """A plant that gives its last steps at a cost that does not grow with the run."""
+
+    def recent(self, steps: int) -> RecentSteps:
+        """Give the last steps of the record.
+
+        Parameters
+        ----------
+        steps : int
+            How many of the plant's own steps, 1 or more.
+        """
+
+
 class _Course:
     """What is known of a plant's time: where an episode ends, the clock, and forecasts where there are some.
 
@@ -41,6 +55,7 @@ class _Course:
         scenario, grid = plant.scenario, plant.scenario.grid
         self.timezone = scenario.building.location.timezone
         self.each = round(plant.control_step / grid.step)
+        self.recording = isinstance(plant, _RecordingPlant)  # asked once: such a check is slow
         forecaster = getattr(plant, "forecaster", None)
         self.forecaster: Forecaster | None = forecaster if isinstance(forecaster, Forecaster) else None
         self.outlook: Outlook | None = None
@@ -192,12 +207,19 @@ class ControlEnvironment(gymnasium.Env[Observation, NDArray[np.float32]]):
         plant, course, begin = self._plant, self._course, self._step
         seen = plant.step(self.actions.setpoints(action))
         self._step, self._done = begin + course.each, self._done + 1
-        reward = self.reward.of_steps(_last_steps(plant, course.each), plant.scenario, begin)
+        reward = self.reward.of_steps(_last_steps(plant, course), plant.scenario, begin)
         truncated = plant.finished or self._step + course.each > course.last or self._done == self.episode_steps
         info: dict[str, Any] = {}
         if truncated:
             info["kpis"] = measure_kpis(plant.record(), plant.scenario, control_step=plant.control_step).to_dict()
         return self._observe(seen, truncated), reward, False, truncated, info
+
+    def close(self) -> None:
+        """Close the plants that hold something open, such as a process of EnergyPlus."""
+        for plant in self.plants:
+            close = getattr(plant, "close", None)
+            if close is not None:
+                close()
 
     def _observe(self, seen: Measurements, ended: bool = False) -> Observation:
         course = self._course
@@ -238,10 +260,11 @@ def _reward_of(reward: str | Reward) -> Reward:
     return REWARDS[reward]
 
 
-def _last_steps(plant: Plant, each: int) -> RecentSteps:
-    """Read what a plant did in its last control step, of some steps of the scenario."""
-    if isinstance(plant, SimulatedPlant):
-        return plant.recent(each)
+def _last_steps(plant: Any, course: _Course) -> RecentSteps:
+    """Read what a plant did in its last control step."""
+    if course.recording:
+        recent: RecentSteps = plant.recent(course.each)
+        return recent
     whole = plant.record()
     if whole.district_heating is not None:
         raise EnvironmentSetupError(describe("reward: plant", "electricity and gas", "district heating too"))

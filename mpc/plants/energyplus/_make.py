@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import pandas as pd
 
 from mpc.plants._noise import SensorNoise
 from mpc.plants.energyplus._building import EnergyPlusBuilding, energyplus_building
+from mpc.plants.energyplus._holidays import holidays
 from mpc.plants.energyplus._install import CHICAGO
 from mpc.plants.energyplus._plant import EnergyPlusPlant
 from mpc.scenario import (
+    Calendar,
     CarbonIntensity,
     ComfortBand,
     ErrorGrowth,
@@ -62,7 +65,7 @@ def energyplus_scenario(
     carbon : CarbonIntensity, optional
         Emissions; not counted by default.
     comfort : ComfortBand, optional
-        Of all zones; `OFFICE_COMFORT` by default.
+        Of all zones; `OFFICE_COMFORT` with the holidays of the building by default.
     gains : InternalGains, optional
         What forecasts say of people and equipment; nothing by default.
 
@@ -73,9 +76,10 @@ def energyplus_scenario(
     """
     zone = source.building.location.timezone
     grid = StepGrid(pd.Timestamp(start, tz=zone), step_seconds, round(days * 86_400 / step_seconds) + horizon)
+    free = holidays(source.source, range(grid.start.year, grid.start.year + 2))
     return build_scenario(
         source.building, grid, read_epw(source.weather), tariff or paper_tariff(), carbon=carbon,
-        comfort=comfort or OFFICE_COMFORT, gains=gains or _UNKNOWN_GAINS,
+        comfort=comfort or replace(OFFICE_COMFORT, calendar=Calendar(free)), gains=gains or _UNKNOWN_GAINS,
     )  # fmt: skip
 
 
@@ -120,7 +124,7 @@ def energyplus_plant(
     carbon : CarbonIntensity, optional
         Emissions; not counted by default.
     comfort : ComfortBand, optional
-        Of all zones; `OFFICE_COMFORT` by default.
+        Of all zones; `OFFICE_COMFORT` with the holidays of the building by default.
     noise : SensorNoise, optional
         Errors of what is measured; none by default.
     lead_days : int

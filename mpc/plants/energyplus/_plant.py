@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from mpc.errors import PlantError
 from mpc.kpi import PlantRecord
 from mpc.plants._actuators import checked_actions
+from mpc.plants._history import RecentSteps
 from mpc.plants._noise import NoiseSource, SensorNoise
 from mpc.plants._plant import Measurements, PointLayout, need_running
 from mpc.plants.energyplus._building import EnergyPlusBuilding
@@ -218,12 +219,28 @@ class EnergyPlusPlant:
         PlantError
             When there was no step yet.
         """
-        energy = np.concatenate(self._kept(self._energy)) / self.scenario.grid.step
-        count = len(self._meters[0])
-        return PlantRecord(
-            float(self.scenario.grid.step), np.stack([self._first, *self._rooms]), energy[:, :count].sum(axis=1),
-            energy[:, count:].sum(axis=1),
-        )  # fmt: skip
+        step, temperature, electricity, gas = self.recent(len(self._rooms))
+        return PlantRecord(step, np.array(temperature), np.array(electricity), np.array(gas))
+
+    def recent(self, steps: int) -> RecentSteps:
+        """Give the last steps of `record`, at a cost that does not grow with the run.
+
+        Parameters
+        ----------
+        steps : int
+            How many of the plant's own steps, 1 or more.
+
+        Raises
+        ------
+        PlantError
+            When there was no step yet.
+        """
+        last, count = self._kept(self._energy)[-steps // self.control_steps :], len(self._meters[0])
+        power = np.concatenate(last)[-steps:] / self.scenario.grid.step
+        before = len(self._rooms) - steps
+        zones = [self._rooms[before - 1] if before > 0 else self._first, *self._rooms[-steps:]]
+        electricity, gas = power[:, :count].sum(axis=1), power[:, count:].sum(axis=1)
+        return RecentSteps(float(self.scenario.grid.step), zones, electricity.tolist(), gas.tolist())
 
     def metered(self) -> dict[str, float]:
         """Add up the meters over the run since the reset [J].

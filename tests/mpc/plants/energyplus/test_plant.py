@@ -70,6 +70,9 @@ def test_its_own_setpoints_as_actions_change_nothing(own, make_plant):
 
 def test_energies_are_integrals_of_powers(own):
     record, telemetry, step = own.record(), own.telemetry(), 600.0
+    last = own.recent(5)
+    assert np.array_equal(last.zone_temperature, record.zone_temperature[-6:])
+    assert np.array_equal(last.electricity, record.electricity[-5:])
     gas = sum(telemetry[c].sum() for c in telemetry if c.endswith("gas_power_sensor")) * step
     assert gas == pytest.approx(own.metered()["Heating:NaturalGas"], rel=1e-3)
     fans = sum(telemetry[c].sum() for c in telemetry if c.endswith("supply_fan_power_sensor")) * step
@@ -128,6 +131,18 @@ def test_a_dead_process_is_a_named_error_and_nothing_is_left(make_plant, left_ov
     assert not left_over() - before
     with pytest.raises(PlantError, match="closed"):
         plant.step({})
+
+
+def test_a_warm_up_that_swings_without_end_is_no_error_of_the_run(office):
+    """A plenum of that day has two states that follow each other for 25 days, which EnergyPlus calls severe."""
+    from mpc.plants.energyplus import energyplus_plant
+
+    plant = energyplus_plant("RefBldgMediumOfficeNew2004_Chicago", "2023-08-28", 1, control_steps=288)
+    plant.reset()
+    process = plant._process
+    assert "CheckWarmupConvergence" in (process.output / "eplusout.err").read_text(encoding="latin-1")
+    plant.step({})
+    assert plant.finished and plant._process is None
 
 
 def test_a_process_that_does_not_answer_is_ended(office, make_plant, left_over):
