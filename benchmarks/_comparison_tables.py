@@ -12,12 +12,16 @@ matplotlib.use("agg")
 
 import matplotlib.pyplot as plt
 import numpy as np
-from _learning_case import DISCOMFORT_PRICE
+from _site import Site
 from _table import markdown
 
+#: Prices of discomfort in optimal control over that of the comparison, for its front [-].
+PRICES = (0.3, 1.0, 3.0)
+
 NAMES = {
-    "floor": "least action: 27 degC air, 37 degC water", "schedule": "schedule", "reset": "outdoor reset",
-    "guideline36": "Guideline 36", "mpc_before": "MPC, model before diagnosis",
+    "floor": "least action: warmest air, coolest water", "own": "the building's own control",
+    "schedule": "schedule", "reset": "outdoor reset", "guideline36": "Guideline 36",
+    "mpc_before": "MPC, model before diagnosis",
     "mpc_after": "MPC, model after diagnosis", "bound": "MPC that knows everything",
     "ppo_before": "PPO, trained in the model, moved to the plant", "ppo_plant": "PPO, trained on the plant",
     "sac_before": "SAC, trained in the model, moved to the plant", "sac_plant": "SAC, trained on the plant",
@@ -42,7 +46,7 @@ def family(controller: str) -> str:
 
 def lines(runs: Sequence[dict[str, Any]]) -> dict[str, list[dict[str, Any]]]:
     """Sort the runs at the price of the comparison into lines, in the order of `NAMES`."""
-    here = [r for r in runs if r["entry"]["price"] == DISCOMFORT_PRICE]
+    here = [r for r in runs if r["entry"]["price"] == 1.0]
     found = {name: [r for r in here if family(r["entry"]["controller"]) == name] for name in NAMES}
     return {name: rows for name, rows in found.items() if rows}
 
@@ -93,7 +97,7 @@ def cost_at(points: Sequence[tuple[float, float]], discomfort: float) -> float:
     return float(np.interp(discomfort, [p[0] for p in points], [p[1] for p in points]))
 
 
-def table(runs: Sequence[dict[str, Any]]) -> str:
+def table(site: Site, runs: Sequence[dict[str, Any]]) -> str:
     """Lay all lines out."""
     found, rows = lines(runs), []
     for (name, of), (cost, _, same, whole) in zip(found.items(), beside(runs, found), strict=True):
@@ -107,12 +111,11 @@ def table(runs: Sequence[dict[str, Any]]) -> str:
             f"{cost}, {same}" if same else "", f"{kpis['time_rat']:.1e}",
         ])  # fmt: skip
     weeks = sorted({r["week"] for r in runs})
-    size = runs[0]["size"]
     note = (
-        f"Means over {len(weeks)} weeks of {size['days']} days ({', '.join(weeks)}), {size['zones']} zones, "
-        f"{size['floor_area']:.0f} m2; stage cost: energy, and discomfort at {DISCOMFORT_PRICE:g} USD a zone's kelvin "
-        f"hour; in brackets 95 % by bootstrap over days and seeds, differences paired by day. Reference: "
-        f"{NAMES[REFERENCE]}, whose front over prices of discomfort gives its cost at another's comfort.\n"
+        f"{site.name}: means over {len(weeks)} weeks of {site.days} days ({', '.join(weeks)}); stage cost: energy, and "
+        f"discomfort at {site.discomfort_price:.3g} USD a zone's kelvin hour; in brackets 95 % by bootstrap over days "
+        f"and seeds, differences paired by day. Reference: {NAMES[REFERENCE]}, whose front over prices of discomfort "
+        f"gives its cost at another's comfort.\n"
     )
     return "\n".join(part for part in (markdown(COLUMNS, rows), note, budgets(found), peers(runs)) if part)
 
@@ -128,18 +131,18 @@ def beside(runs: Sequence[dict[str, Any]], found: dict[str, list[dict[str, Any]]
     return cells
 
 
-def short(runs: Sequence[dict[str, Any]]) -> str:
+def short(site: Site, runs: Sequence[dict[str, Any]]) -> str:
     """Lay out for the README what each line costs and how comfortable it is."""
     found = lines(runs)
     rows = [[NAMES[name], *cells] for name, cells in zip(found, beside(runs, found), strict=True)]
     same = f"cost of {NAMES[REFERENCE]}, as comfortable"
-    columns = ("a week", "energy cost, USD", "discomfort, K h", same, "cost with discomfort over it")
+    columns = (f"a week, {site.name}", "energy cost, USD", "discomfort, K h", same, "cost with discomfort over it")
     return markdown(columns, rows)
 
 
 def peers(runs: Sequence[dict[str, Any]]) -> str:
     """Lay do-mpc out beside ours, on the days that do-mpc was run; nothing where it was not."""
-    here = [r for r in runs if r["entry"]["price"] == DISCOMFORT_PRICE and r["entry"]["controller"] in PEERS]
+    here = [r for r in runs if r["entry"]["price"] == 1.0 and r["entry"]["controller"] in PEERS]
     days = {r["week"]: len(r["days"]) for r in here if r["entry"]["controller"] == "do_mpc"}
     if not days:
         return ""
@@ -174,7 +177,7 @@ def _interval(mean: float, low: float, high: float, sign: str = "+") -> str:
     return f"{mean:{sign}.1f} ({low:{sign}.1f} to {high:{sign}.1f})"
 
 
-def draw_front(runs: Sequence[dict[str, Any]], path: Path) -> None:
+def draw_front(site: Site, runs: Sequence[dict[str, Any]], path: Path) -> None:
     """Draw cost over discomfort: fronts of optimal control as lines, everything else as points, a seed each."""
     figure, axes = plt.subplots(figsize=(8.0, 6.0), layout="constrained")
     for k, name in enumerate(lines(runs)):
@@ -192,13 +195,14 @@ def draw_front(runs: Sequence[dict[str, Any]], path: Path) -> None:
     axes.set_xlim(left=0.0)
     axes.set_xlabel("discomfort of a week, tdis_tot [K h]")
     axes.set_ylabel("energy cost of a week [USD]")
+    axes.set_title(site.name)
     axes.grid(alpha=0.3)
     figure.legend(loc="outside lower center", ncols=2, fontsize=8)
     figure.savefig(path)
     plt.close(figure)
 
 
-def draw_learning(runs: Sequence[dict[str, Any]], path: Path) -> bool:
+def draw_learning(site: Site, runs: Sequence[dict[str, Any]], path: Path) -> bool:
     """Draw the validation cost of each policy over its training; False where no policy has a curve."""
     curves = {r["entry"]["controller"]: r["about"] for r in runs if r["about"].get("curve")}
     if not curves:
@@ -214,7 +218,8 @@ def draw_learning(runs: Sequence[dict[str, Any]], path: Path) -> bool:
     axes.set_yscale("log")
     for ticks in (axes.yaxis.set_major_formatter, axes.yaxis.set_minor_formatter):
         ticks(lambda value, _: f"{value:g}")
-    axes.set_xlabel("thousand control steps of a quarter of an hour")
+    axes.set_xlabel(f"thousand control steps of {60.0 * site.hours_a_step:g} minutes")
+    axes.set_title(site.name)
     axes.set_ylabel("stage cost of a validation week,\nin the world of the training [USD]")
     axes.grid(alpha=0.3, which="both")
     axes.legend(fontsize=8)

@@ -27,6 +27,22 @@ AHEAD = Horizon.growing([(2.0, 900.0), (10.0, 1800.0)], [0.5, 0.5, 1.0, 1.0, 2.0
 WATER = (323.15, 355.35)  # K: no warmer than the building's own
 
 
+class Own:
+    """The building's own control: nothing is overridden."""
+
+    def step(self, measurements: Measurements, forecast: Forecast | None) -> dict[str, float]:
+        """Choose nothing.
+
+        Parameters
+        ----------
+        measurements : Measurements
+            Without effect.
+        forecast : Forecast or None
+            Without effect.
+        """
+        return {}
+
+
 class MeasuredBoundaries:
     """Signals of a controller's model whose boundaries beside outdoor are measured: their last values are held.
 
@@ -95,7 +111,10 @@ class Optimal:
 
 
 def optimal(
-    plant: EnergyPlusPlant, parameters: Mapping[str, float], effects: Mapping[str, Sequence[str]] | None = None
+    plant: EnergyPlusPlant,
+    parameters: Mapping[str, float],
+    effects: Mapping[str, Sequence[str]] | None = None,
+    price: float | None = None,
 ) -> Optimal:
     """Make the controller of a plant.
 
@@ -107,6 +126,8 @@ def optimal(
         Of its model, by name; starts for the rest [parameter units].
     effects : mapping of str to sequence of str, optional
         Effects of its model with their zones; none by default.
+    price : float, optional
+        Of discomfort in a zone [USD/K/h]; `COMFORT_PRICE` times the mean area by default.
     """
     source = plant.source
     model = control_model(source.building, parameters, effects=chosen(effects or {}))
@@ -118,7 +139,7 @@ def optimal(
     if source.layout.water_loops:
         channels.append(Channel("supply_water_temperature", *WATER))
     others = model.network.boundaries[1:]
-    price = COMFORT_PRICE * float(plant.scenario.areas.mean())
+    price = COMFORT_PRICE * float(plant.scenario.areas.mean()) if price is None else price
     controller = make_controller(
         model, plant, system=controller_system(source, GAS / ELECTRICITY),
         points=site_points(source.building, source.devices), building=source.building,

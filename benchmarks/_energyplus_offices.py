@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from datetime import date, timedelta
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from calibration.diagnosis import diagnose, write_diagnosis
 from mpc.plants import Measurements, SensorNoise, run_closed_loop
 from mpc.plants.energyplus import EnergyPlusPlant, energyplus_plant
 from mpc.scenario import ConstantRate, Forecast, Tariff
@@ -145,3 +148,29 @@ def telemetry_case(office: Office, folder: Path) -> Case:
         case = plant.case()
         save_case(replace(case, building=replace(case.building, name=office.key)), folder)
     return load_case(folder)
+
+
+def prepared(office: Office, folder: Path) -> dict[str, Any]:
+    """Make telemetry and diagnose it, which calibrates the baseline; what is there is kept.
+
+    The models of both controllers are those of the diagnosis: the calibrated baseline, and that with all effects that
+    it accepted.
+    """
+    done = folder / "models.json"
+    if done.exists():
+        return json.loads(done.read_text(encoding="utf-8"))
+    case = telemetry_case(office, folder / "case")
+    found = diagnose(case)
+    write_diagnosis(found, case, folder / "diagnosis", force=True)
+    fits = {"before": found.rounds[0].before, "after": found.final}
+    models = {
+        name: {
+            "effects": {effect: list(zones) for effect, zones in fit.effects.items()},
+            "values": {p.name: float(v) for p, v in zip(fit.built.network.parameters, fit.theta, strict=True)},
+        }
+        for name, fit in fits.items()
+    }
+    errors = {"before": found.gap, "after": found.steps[-1].after if found.steps else found.gap, "floor": found.floor}
+    data = {**models, "held_out_mae": errors}
+    done.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
+    return data

@@ -3,23 +3,16 @@
 from __future__ import annotations
 
 import json
+import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import torch
-from _learning_case import (
-    DISCOMFORT_PRICE,
-    FULL,
-    TRAINING_WEEKS,
-    VALIDATION_WEEKS,
-    Size,
-    World,
-    environment,
-)
+from _site import Site, Week, World
 from gymnasium.wrappers import TransformReward
 from stable_baselines3 import PPO, SAC
 from stable_baselines3.common.monitor import Monitor
@@ -28,7 +21,6 @@ from stable_baselines3.common.vec_env import DummyVecEnv, VecEnv
 from mpc.environment import ActorNetwork, ControlEnvironment
 
 ENVIRONMENTS = 4
-REWARD_SCALE = 10.0  # 1/currency: a quarter of an hour costs about a tenth of a unit, and returns come to some ten
 VALIDATION_SEED = 11
 
 
@@ -38,15 +30,12 @@ class Recipe:
 
     Parameters
     ----------
-    steps : int
-        Control steps in all, of a quarter of an hour.
     evaluate_every : int
         Control steps between two evaluations on the validation weeks; the best policy of them is kept.
     options : dict
         Of the algorithm.
     """
 
-    steps: int
     evaluate_every: int
     options: dict[str, Any] = field(default_factory=dict)
 
@@ -54,12 +43,12 @@ class Recipe:
 SMALL = {"net_arch": [64, 64]}
 RECIPES = {
     "ppo": Recipe(
-        150_000, 15_120,
+        15_120,
         {"n_steps": 336, "batch_size": 192, "gamma": 0.98, "learning_rate": 3e-4,
          "policy_kwargs": {**SMALL, "log_std_init": -0.5}},
     ),
     "sac": Recipe(
-        30_000, 5_000,
+        5_000,
         {"buffer_size": 30_000, "learning_starts": 2_688, "train_freq": 1, "gradient_steps": 2, "gamma": 0.98,
          "learning_rate": 3e-4, "policy_kwargs": SMALL},
     ),
@@ -69,10 +58,12 @@ _KINDS = {"ppo": PPO, "sac": SAC}
 
 @dataclass(frozen=True)
 class Training:
-    """A run: one algorithm in one world with one seed.
+    """A run: one algorithm in one world of a site with one seed.
 
     Parameters
     ----------
+    site : Site
+        The building, its weeks and prices.
     algorithm : str
         ``ppo`` or ``sac``.
     world : str
@@ -81,6 +72,7 @@ class Training:
         Of networks, exploration, and the order of weeks and people.
     """
 
+    site: Site
     algorithm: str
     world: World
     seed: int
@@ -91,14 +83,19 @@ class Training:
         return f"{self.algorithm}_{self.world}_{self.seed}"
 
 
-def training_environment(run: Training, size: Size, weeks: dict[str, tuple[str, int]]) -> VecEnv:
+def cpu_time() -> float:
+    """CPU time of this process and of those that it started and that have ended [s]."""
+    return sum(os.times()[:4])
+
+
+def training_environment(run: Training, weeks: Mapping[str, Week]) -> VecEnv:
     """Environments in one process, each with its share of the training weeks."""
 
     def maker(k: int) -> Callable[[], Any]:
         def make() -> Any:
             mine = dict(list(weeks.items())[k::ENVIRONMENTS])
-            scaled = TransformReward(environment(run.world, mine, size=size), lambda reward: REWARD_SCALE * reward)
-            return Monitor(scaled)
+            world, scale = run.site.environment(run.world, mine), run.site.reward_scale
+            return Monitor(TransformReward(world, lambda reward: scale * reward))
 
         return make
 
@@ -121,38 +118,44 @@ def train(
     run: Training,
     folder: Path,
     recipe: Recipe,
+    steps: int,
     *,
-    size: Size = FULL,
-    weeks: dict[str, tuple[str, int]] = TRAINING_WEEKS,
-    validation: dict[str, tuple[str, int]] = VALIDATION_WEEKS,
+    weeks: Mapping[str, Week] | None = None,
+    validation: Mapping[str, Week] | None = None,
     until: float = np.inf,
     say: Callable[[str], None] = print,
 ) -> bool:
-    """Train, or go on with, a run; the policy is ``policy.npz`` when it is done, which is what comes back."""
+    """Train, or go on with, a run for some control steps in all; the policy is ``policy.npz`` when it is done.
+
+    Weeks are those of the site where none are given. Returns whether it is done.
+    """
     torch.set_num_threads(1)
     folder.mkdir(parents=True, exist_ok=True)
     state = _read(folder / "progress.json") or {"steps": 0, "cpu_seconds": 0.0, "curve": [], "best": None}
-    if state["steps"] >= recipe.steps:
+    if state["steps"] >= steps:
         return True
-    judge = environment(run.world, validation, size=size)
-    model = _model(run, folder, recipe, training_environment(run, size, weeks), state["steps"])
-    while state["steps"] < recipe.steps and time.time() < until:
-        begin = time.process_time()
-        chunk = min(recipe.evaluate_every, recipe.steps - state["steps"])
+    judge = run.site.environment(run.world, validation or run.site.validation_weeks)
+    worlds = training_environment(run, weeks or run.site.training_weeks)
+    model = _model(run, folder, recipe, worlds, state["steps"])
+    while state["steps"] < steps and time.time() < until:
+        begin = cpu_time()
+        chunk = min(recipe.evaluate_every, steps - state["steps"])
         model.learn(chunk, reset_num_timesteps=False)
         network = ActorNetwork.of_stable_baselines(model)
         cost = stage_cost(network, judge)
         state["steps"] = int(model.num_timesteps)
-        state["cpu_seconds"] += time.process_time() - begin
+        state["cpu_seconds"] += cpu_time() - begin
         state["curve"].append([state["steps"], cost])
         if state["best"] is None or cost < state["best"][1]:
             state["best"] = [state["steps"], cost]
             ActorNetwork.of_stable_baselines(model, _about(run, recipe, state)).save(folder / "best.npz")
         _keep(model, folder, state)
         rate = state["steps"] / max(state["cpu_seconds"], 1e-9)
-        say(f"{run.name}: {state['steps']:,} of {recipe.steps:,} steps, validation {cost:.2f} (best "
+        say(f"{run.name}: {state['steps']:,} of {steps:,} steps, validation {cost:.2f} (best "
             f"{state['best'][1]:.2f} at {state['best'][0]:,}), {rate:.0f} steps/s")  # fmt: skip
-    if state["steps"] < recipe.steps:
+    worlds.close()
+    judge.close()
+    if state["steps"] < steps:
         return False
     best = ActorNetwork.load(folder / "best.npz")
     whole = {**best.about, "steps": state["steps"], "cpu_seconds": round(state["cpu_seconds"], 1),
@@ -188,9 +191,10 @@ def _keep(model: Any, folder: Path, state: dict[str, Any]) -> None:
 
 def _about(run: Training, recipe: Recipe, state: dict[str, Any]) -> dict[str, Any]:
     return {
-        **asdict(run), "best_step": state["steps"], "validation_cost": state["best"][1], "recipe": asdict(recipe),
-        "reward": f"minus stage cost, {DISCOMFORT_PRICE:g} a kelvin hour and zone", "reward_scale": REWARD_SCALE,
-        "environments": ENVIRONMENTS, "hours_a_step": 0.25,
+        "site": run.site.key, "algorithm": run.algorithm, "world": run.world, "seed": run.seed,
+        "best_step": state["steps"], "validation_cost": state["best"][1], "recipe": asdict(recipe),
+        "reward": f"minus stage cost, {run.site.discomfort_price:g} a kelvin hour and zone",
+        "reward_scale": run.site.reward_scale, "environments": ENVIRONMENTS, "hours_a_step": run.site.hours_a_step,
     }  # fmt: skip
 
 

@@ -31,11 +31,10 @@ from typing import Any
 
 import numpy as np
 from _code import code
-from _energyplus_control import optimal
-from _energyplus_offices import CONTROL_DAYS, HORIZON, OFFICES, Office, telemetry_case
+from _energyplus_control import Own, optimal
+from _energyplus_offices import CONTROL_DAYS, HORIZON, OFFICES, Office, prepared
 from _table import markdown, write
 
-from calibration.diagnosis import diagnose, write_diagnosis
 from mpc.baselines import OutdoorReset
 from mpc.errors import EnergyPlusError
 from mpc.kpi import measure_kpis
@@ -46,40 +45,6 @@ CONTROLLERS = {"own": "own control", "reset": "outdoor reset", "before": "MPC be
 COLUMNS = ("office", "week", "controller", "electricity, kWh", "gas, kWh", "cost, USD", "against own, %",
            "discomfort, K h a zone", "worst zone, K h")  # fmt: skip
 KILOWATT_HOUR = 3.6e6  # J
-
-
-class Own:
-    """The building's own control: nothing is overridden."""
-
-    def step(self, measurements: Any, forecast: Any) -> dict[str, float]:
-        """Choose nothing."""
-        return {}
-
-
-def prepared(office: Office, folder: Path) -> dict[str, Any]:
-    """Make telemetry and diagnose it, which calibrates the baseline; what is there is kept.
-
-    The models of both controllers are those of the diagnosis: the calibrated baseline, and that with all effects that
-    it accepted.
-    """
-    done = folder / "models.json"
-    if done.exists():
-        return json.loads(done.read_text(encoding="utf-8"))
-    case = telemetry_case(office, folder / "case")
-    found = diagnose(case)
-    write_diagnosis(found, case, folder / "diagnosis", force=True)
-    fits = {"before": found.rounds[0].before, "after": found.final}
-    models = {
-        name: {
-            "effects": {effect: list(zones) for effect, zones in fit.effects.items()},
-            "values": {p.name: float(v) for p, v in zip(fit.built.network.parameters, fit.theta, strict=True)},
-        }
-        for name, fit in fits.items()
-    }
-    errors = {"before": found.gap, "after": found.steps[-1].after if found.steps else found.gap, "floor": found.floor}
-    data = {**models, "held_out_mae": errors}
-    done.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
-    return data
 
 
 def controller_of(name: str, plant: EnergyPlusPlant, models: dict[str, Any]) -> Any:

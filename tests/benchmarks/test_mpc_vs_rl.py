@@ -7,6 +7,8 @@ import subprocess
 import sys
 from collections.abc import Callable
 from dataclasses import replace
+from datetime import date
+from importlib.util import find_spec
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -16,12 +18,13 @@ import pytest
 
 pytest.importorskip("gymnasium", reason="needs the extra [rl]")
 
-from mpc.environment import ActorNetwork, ControlEnvironment
+from mpc.environment import ActorNetwork
 
 
 @pytest.fixture(scope="module")
 def case(script: Callable[[str], ModuleType]) -> ModuleType:
-    return script("_learning_case")
+    script("_site")
+    return script("_office_site")
 
 
 @pytest.fixture(scope="module")
@@ -32,7 +35,15 @@ def tables(script: Callable[[str], ModuleType], case: ModuleType) -> ModuleType:
 
 @pytest.fixture(scope="module")
 def comparison(script: Callable[[str], ModuleType], tables: ModuleType) -> ModuleType:
-    script("_comparison")
+    for name in (
+        "_energyplus_offices",
+        "_energyplus_control",
+        "_modelled_office",
+        "_medium_office_site",
+        "_sites",
+        "_comparison",
+    ):
+        script(name)
     script("simulator_speed")
     return script("mpc_vs_rl")
 
@@ -82,15 +93,45 @@ def test_cost_at_equal_comfort_is_read_off_the_front(tables: ModuleType) -> None
 
 
 def test_test_weeks_are_not_those_of_the_training(case: ModuleType) -> None:
-    weeks = [case.TEST_WEEKS, case.VALIDATION_WEEKS, case.TRAINING_WEEKS]
-    seeds = [{seed for _, seed in of.values()} for of in weeks]
+    site = case.OfficeSite()
+    seeds = [{seed for _, seed in of.values()} for of in (site.test_weeks, site.validation_weeks, site.training_weeks)]
     assert sum(map(len, seeds)) == len(set.union(*seeds))
+
+
+def test_weeks_of_energyplus_do_not_overlap(script: Callable[[str], ModuleType], comparison: ModuleType) -> None:
+    site = script("_sites").SITES["medium_office"]
+    weeks = (site.test_weeks, site.validation_weeks, site.training_weeks)
+    days = [date.fromisoformat(day) for of in weeks for day, _ in of.values()]
+    assert len(days) == len(set(days)) and all(day.weekday() == 0 for day in days)
 
 
 def test_the_models_of_the_comparison_are_those_of_the_commands(case: ModuleType) -> None:
     known = {world: json.loads(case.model_file(world).read_text()) for world in ("before", "after")}
     assert [entry["effect"] for entry in known["after"]["effects"]] == list(case.EFFECTS)
     assert not known["before"]["effects"]
+
+
+@pytest.mark.energyplus
+@pytest.mark.skipif(find_spec("pyenergyplus") is None, reason="needs EnergyPlus: pip install -e .[energyplus]")
+def test_a_model_in_the_place_of_energyplus_shows_what_it_shows(
+    script: Callable[[str], ModuleType], comparison: ModuleType
+) -> None:
+    """Same observation and actions, so that a policy can move; flows of air handlers are those of their terminals."""
+    site = script("_medium_office_site").MediumOfficeSite(1)
+    week = site.test_weeks["winter"]
+    both = [site.plant(week, world) for world in ("plant", "before")]
+    worlds = [site.world_of(plant) for plant in both]
+    assert worlds[0].layout.features == worlds[1].layout.features
+    assert worlds[0].action_space == worlds[1].action_space
+    seen = both[1].reset(1)
+    for _ in range(20):  # until ten
+        seen = both[1].step(dict.fromkeys(site.actions, 290.0))
+    terminals = [seen[c] for c in seen if c.endswith("Box Component/supply_air_flowrate_sensor")]
+    handlers = [seen[f"VAV_{k}/supply_air_flowrate_sensor"] for k in (1, 2, 3)]
+    assert len(terminals) == 15 and sum(handlers) == pytest.approx(sum(terminals)) and min(handlers) > 0.5
+    assert seen["VAV_1/supply_air_temperature_setpoint"] == 290.0
+    with pytest.raises(ValueError, match="no bound"):
+        site.plant(week, bound=True)
 
 
 def test_do_mpc_stands_beside_ours_on_its_days_only(tables: ModuleType) -> None:
@@ -109,13 +150,13 @@ def test_do_mpc_predicts_as_ours_does(
     """Its own equations at its own plan, against the predictor's roll-out of it; and it stays near our cost."""
     pytest.importorskip("do_mpc", reason="do-mpc comes with the extra [benchmarks]", exc_type=Exception)
     script("_do_mpc_loop")
-    compared = script("_comparison")
-    plant = case.make_plant(case.TEST_WEEKS["winter"], case.building_model("plant", case.SMOKE), size=case.SMOKE)
-    both = [compared.peer_controller(compared.Entry(name), plant, case.SMOKE, hours=3.0) for name in compared.PEERS]
+    site = case.OfficeSite(case.SMOKE)
+    plant = site.plant(site.test_weeks["winter"])
+    both = [site.peer(name, 1.0, plant, hours=3.0) for name in site.peers]
     # no time for a second start: what do-mpc tells of its zones is of its last solve
     both[0].settings = replace(both[0].settings, time_limit=1e-3)
     seen = plant.reset(1)
-    rule = compared.day_schedule(tuple(a for a in plant.actuators if a.required))
+    rule = site.controller("schedule", 1.0, plant)
     for _ in range(22):  # until half past five, when heating begins
         seen = plant.step(rule.step(seen, None))
     forecast = plant.forecast()
@@ -128,8 +169,8 @@ def test_do_mpc_predicts_as_ours_does(
 
 def random_policy(case: ModuleType, folder: Path) -> None:
     """A policy of the small office that nobody has trained."""
-    plant = case.make_plant(case.TEST_WEEKS["winter"], case.building_model("plant", case.SMOKE), size=case.SMOKE)
-    inputs = len(ControlEnvironment(plant, block_ends=case.BLOCK_ENDS).layout)
+    site = case.OfficeSite(case.SMOKE)
+    inputs = len(site.world_of(site.plant(site.test_weeks["winter"])).layout)
     rng = np.random.default_rng(0)
     weights = (0.1 * rng.standard_normal((2, inputs)),)
     about = {"steps": 0, "seed": 0, "hours_a_step": 0.25, "cpu_seconds": 0.0, "curve": [[1, 40.0], [2, 30.0]]}
@@ -144,19 +185,18 @@ def test_smoke_of_the_comparison(case: ModuleType, comparison: ModuleType, tmp_p
     by = {row["entry"]["controller"]: row for row in first}
     assert set(by) == {"reset", "guideline36", "mpc_after", "sac_plant_0"}
     assert by["mpc_after"]["sources"] == {"optimal plan": 96}
-    price, zones = case.DISCOMFORT_PRICE, case.SMOKE.zones
+    site = case.OfficeSite(case.SMOKE)
+    price, zones = site.discomfort_price, site.size.zones
     for row in first:
         assert sum(row["days"]) == pytest.approx(row["cost"] + price * zones * row["discomfort"], rel=1e-9)
     text = (tmp_path / "out" / "mpc_vs_rl.md").read_text()
     assert "SAC, trained on the plant | 1 |" in text
-    rows = comparison.short(first).splitlines()
+    rows = comparison.short(site, first).splitlines()
     assert len(rows) == 6 and rows[4].startswith("| MPC, model after diagnosis |") and rows[4].endswith("|  |")
-    stamps = {file: file.stat().st_mtime_ns for file in (tmp_path / "out" / "runs").iterdir()}
+    stamps = {file: file.stat().st_mtime_ns for file in (tmp_path / "out" / "office").iterdir()}
     assert comparison.main(asked) == first
-    assert stamps == {file: file.stat().st_mtime_ns for file in (tmp_path / "out" / "runs").iterdir()}
-    assert (tmp_path / "out" / "mpc_vs_rl_front.svg").exists() and (
-        tmp_path / "out" / "mpc_vs_rl_learning.svg"
-    ).exists()
+    assert stamps == {file: file.stat().st_mtime_ns for file in (tmp_path / "out" / "office").iterdir()}
+    assert all((tmp_path / "out" / f"mpc_vs_rl_{what}_office.svg").exists() for what in ("front", "learning"))
 
 
 def test_smoke_of_the_training(tmp_path: Path) -> None:
@@ -176,19 +216,20 @@ def test_smoke_of_the_training(tmp_path: Path) -> None:
 
 
 def test_training_goes_on_where_it_was_interrupted(case: ModuleType, training: ModuleType, tmp_path: Path) -> None:
-    weeks, validation = ({"week": next(iter(of.values()))} for of in (case.TRAINING_WEEKS, case.VALIDATION_WEEKS))
+    site = case.OfficeSite(case.SMOKE)
+    weeks, validation = ({"week": next(iter(of.values()))} for of in (site.training_weeks, site.validation_weeks))
     options = training.RECIPES["ppo"].options | {"n_steps": 24, "batch_size": 24, "n_epochs": 1}
-    recipe, said = replace(training.RECIPES["ppo"], steps=48, evaluate_every=24, options=options), list[str]()
-    run = training.Training("ppo", "plant", 1)
-    given: dict[str, Any] = {"size": case.SMOKE, "weeks": weeks, "validation": validation}
+    recipe, said = replace(training.RECIPES["ppo"], evaluate_every=24, options=options), list[str]()
+    run = training.Training(site, "ppo", "plant", 1)
+    given: dict[str, Any] = {"weeks": weeks, "validation": validation}
 
     def interrupt(line: str) -> None:
         raise KeyboardInterrupt
 
-    assert not training.train(run, tmp_path, recipe, until=0.0, **given)
+    assert not training.train(run, tmp_path, recipe, 48, until=0.0, **given)
     with pytest.raises(KeyboardInterrupt):
-        training.train(run, tmp_path, recipe, say=interrupt, **given)
+        training.train(run, tmp_path, recipe, 48, say=interrupt, **given)
     assert not (tmp_path / "policy.npz").exists()
-    assert training.train(run, tmp_path, recipe, say=said.append, **given) and len(said) == 1
+    assert training.train(run, tmp_path, recipe, 48, say=said.append, **given) and len(said) == 1
     about = ActorNetwork.load(tmp_path / "policy.npz").about
     assert [row[0] for row in about["curve"]] == [24, 48] and about["steps"] == 48
