@@ -59,7 +59,7 @@ class MediumOfficeSite(Site):
     length: int = 7
 
     key, name = "medium_office", "EnergyPlus' Medium Office, Chicago, 15 zones, 4982 m2"
-    hours_a_step, horizon_hours = CONTROL_STEPS * STEP / 3600.0, HORIZON * STEP / 3600.0
+    hours_a_step = CONTROL_STEPS * STEP / 3600.0
     block_ends = (0.5, 1.0, 2.0, 3.0, 4.5, 6.0, 9.0, 12.0)
     actions = tuple(f"{name}/supply_air_temperature_setpoint" for name in _HANDLERS)
     discomfort_price, reward_scale = COMFORT_PRICE * _MEAN_AREA, 0.3
@@ -116,10 +116,12 @@ def season_of(plant: EnergyPlusPlant) -> str:
 
 
 @cache
-def models(folder: Path = POLICIES / MediumOfficeSite.key) -> Mapping[str, Any]:
+def models() -> Mapping[str, Any]:
     """Read the models of the seasons: effects with their zones and parameters, before and after diagnosis."""
-    known = {s: json.loads((folder / f"models_{s}.json").read_text(encoding="utf-8")) for s in SEASONS}
-    return known
+    return {
+        s: json.loads((POLICIES / MediumOfficeSite.key / f"models_{s}.json").read_text(encoding="utf-8"))
+        for s in SEASONS
+    }
 
 
 @cache

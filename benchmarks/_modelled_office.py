@@ -4,15 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from _energyplus_control import OPERATION
 from _energyplus_offices import ELECTRICITY, GAS
+from numpy.typing import NDArray
 
 from mpc.kpi import PlantRecord
-from mpc.plants import Measurements, PointLayout, RecentSteps, ReducedBuilding, SensorNoise, SimulatedPlant
-from mpc.plants import scheduled_operation as scheduled
+from mpc.plants import (
+    Measurements,
+    PointLayout,
+    RecentSteps,
+    ReducedBuilding,
+    SensorNoise,
+    SimulatedPlant,
+    scheduled_operation,
+)
 from mpc.plants.energyplus import EnergyPlusBuilding, EnergyPlusPlant, controller_system
 from mpc.scenario import Forecast
 from thermal import Building
@@ -44,7 +51,7 @@ class ModelledOffice:
         system = controller_system(source, GAS / ELECTRICITY)
         self._inner = SimulatedPlant(
             self.scenario, system, ReducedBuilding(model, step_seconds=plant.scenario.grid.step),
-            scheduled(self.scenario, len(air), lead_hours=OPERATION.lead_hours, margin=OPERATION.margin),
+            scheduled_operation(self.scenario, len(air), lead_hours=OPERATION.lead_hours, margin=OPERATION.margin),
             control_steps=plant.control_steps, noise=SensorNoise(), forecaster=plant.forecaster,
             limits={"supply_air_temperature_setpoint": (air[0].lowest, air[0].highest)},
             boundaries=dict.fromkeys(model.network.boundaries[1:], _PLENUM),
@@ -117,7 +124,7 @@ def modelled_building(source: EnergyPlusBuilding) -> Building:
     return replace(source.building, devices=(*source.building.devices, Device(name=_REHEAT, type="boiler")))
 
 
-def _reader(plant: EnergyPlusPlant, inner: SimulatedPlant) -> Any:
+def _reader(plant: EnergyPlusPlant, inner: SimulatedPlant) -> NDArray[np.float64]:
     """Matrix from what the model's plant measures, and the plenums' temperature, to what the plant does."""
     position = {column: k for k, column in enumerate(inner.columns)}
     reader = np.zeros((len(plant.columns), len(position) + 1))

@@ -145,7 +145,7 @@ class OfficeSite(Site):
     size: Size = FULL
 
     key = "office"
-    hours_a_step, horizon_hours = CONTROL_STEPS * STEP / 3600.0, HORIZON_HOURS
+    hours_a_step = CONTROL_STEPS * STEP / 3600.0
     block_ends = (0.5, 1.0, 2.0, 3.0, 4.5, 6.0, 9.0, 12.0)
     actions = SUPPLY_SETPOINTS
     discomfort_price, reward_scale = 1.0, 10.0

@@ -28,8 +28,6 @@ class Site(ABC):
         For files.
     hours_a_step : float
         Time between two actions [h].
-    horizon_hours : float
-        How far forecasts reach [h].
     block_ends : tuple of float
         Blocks of the forecast that a policy sees [h].
     actions : tuple of str
@@ -48,7 +46,6 @@ class Site(ABC):
 
     key: ClassVar[str]
     hours_a_step: ClassVar[float]
-    horizon_hours: ClassVar[float]
     block_ends: ClassVar[tuple[float, ...]]
     actions: ClassVar[tuple[str, ...]]
     discomfort_price: ClassVar[float]

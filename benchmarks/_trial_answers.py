@@ -54,7 +54,8 @@ def answer_all(out: Path, workers: int, most: int | None = None, *, showing: boo
     """
     cases = sorted((out / CASES).iterdir())
     if showing:
-        cases = [case for case in cases if case.name in _of_several_that_show(out)]
+        asked = _of_several_that_show(out)
+        cases = [case for case in cases if case.name in asked]
     return answer_cases(cases, out / ANSWERS, workers, most)
 
 
