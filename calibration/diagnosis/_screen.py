@@ -9,6 +9,7 @@ all, so that zones, pairs and generic heat are compared without another run of t
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import replace
 
 import numpy as np
@@ -23,6 +24,7 @@ from thermal.model import FEW_SHIFTS
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
 
 #: Sweeps of the quadratic programme, and the change of an estimate in prior deviations that ends them [-].
 _SWEEPS, _TOLERANCE = 200, 1e-6
@@ -73,21 +75,49 @@ class Screening:
         jacobian = slopes[seen] * problem.slopes(theta)
         gram = self.scale * jacobian.T @ jacobian
         score = -self.scale * jacobian.T @ error[seen]
-        known = np.array([p.name in fit.values for p in self.parameters])
-        prior = np.array([p.prior_deviation for p in self.parameters])
-        away = problem.point(theta)[known] - np.array([p.transform(p.start) for p in self.parameters])[known]
-        self._whole = gram
-        hessian = gram[np.ix_(known, known)] + np.diag(prior[known] ** -2.0)
-        turn = np.linalg.solve(hessian, gram[known])
-        pull = score[known] - away / prior[known] ** 2
-        self._known, self._turn, self._home = known, turn, np.linalg.solve(hessian, pull)
-        self._point = problem.point(theta)
-        self.score = score - turn.T @ pull
-        self.gram = gram - gram[:, known] @ turn
-        self.prior = prior
-        self._position = {p.name: i for i, p in enumerate(self.parameters)}
+        self.prior = np.array([p.prior_deviation for p in self.parameters])
         self.lower = np.array([p.lower for p in self.parameters])
         self.upper = np.array([p.upper for p in self.parameters])
+        self._position = {p.name: i for i, p in enumerate(self.parameters)}
+        self._start = np.array([p.transform(p.start) for p in self.parameters])
+        self._point = problem.point(theta)
+        self._whole, self._slope = gram, score
+        self._project(np.array([p.name in fit.values for p in self.parameters]))
+
+    def _project(self, known: BoolArray) -> None:
+        """Let the known parameters follow all others, held by their priors: (D2)."""
+        away = (self._point - self._start)[known]
+        hessian = self._whole[np.ix_(known, known)] + np.diag(self.prior[known] ** -2.0)
+        turn = np.linalg.solve(hessian, self._whole[known])
+        pull = self._slope[known] - away / self.prior[known] ** 2
+        self._known, self._turn, self._home = known, turn, np.linalg.solve(hessian, pull)
+        self.score = self._slope - turn.T @ pull
+        self.gram = self._whole - self._whole[:, known] @ turn
+
+    def without(self, effect: str) -> Screening:
+        """Screening of the model less one of its effects, by tangents: what is left in it makes up for that.
+
+        Parameters
+        ----------
+        effect : str
+            Id of one that the model has.
+        """
+        left = self._known & np.array([p.effect != effect for p in self.parameters])
+        move = np.zeros(len(self.parameters))
+        strengths = self._strengths(effect)
+        move[strengths] = -self._point[strengths]
+        away = (self._point - self._start)[left]
+        hessian = self._whole[np.ix_(left, left)] + np.diag(self.prior[left] ** -2.0)
+        move[left] = np.linalg.solve(
+            hessian, self._slope[left] - away / self.prior[left] ** 2 - self._whole[left] @ move
+        )
+        factor = self.count / (self.count - 2.0 * self._slope @ move + move @ self._whole @ move)
+        less = copy(self)
+        less.scale = factor * self.scale
+        less._whole, less._slope = factor * self._whole, factor * (self._slope - self._whole @ move)
+        less._point = self._point + move
+        less._project(left)
+        return less
 
     def of(self, effect: str) -> Gain:
         """Gain of one effect: over the building, or in the zones where it explains most.

@@ -112,11 +112,16 @@ def search(
     """
     done: list[Round] = []
     fit, errors, ahead = baseline, held_out(bench, baseline), None
-    for number in range(ROUNDS):
+    while len(done) < ROUNDS:
         if progress is not None:
-            progress("diagnose", number, ROUNDS)
+            progress("diagnose", len(done), ROUNDS)
         open_ = [e for e in candidates if all(r in fit.effects for r in CATALOGUE[e].requires)]
         made, gains, generic = screen(bench, fit, open_)
+        exchanged = _exchanged(bench, done, made, open_)
+        if exchanged is not None:
+            done[-2:] = [exchanged]
+            fit, errors, ahead = exchanged.after, exchanged.after_held_out, exchanged.pair
+            continue
         work = Work(bench, fit, errors, made)
         refits = _refits(work, gains, ahead)
         best = _first(errors, refits)
@@ -142,15 +147,21 @@ def _first(before: HeldOut, refits: Sequence[Refit]) -> Refit | None:
     counting = [r for r in refits if r.counts]
     if not counting:
         return None
-    zones = len(counting[0].fit.built.network.zones)
-
-    def held_out_gain(r: Refit) -> float:
-        return before.days.size * zones * float(np.log(before.mae / max(r.held_out.mae, 1e-9)))
-
     best = counting[0]
     near = [r for r in counting if r.gain > best.gain - APART]
-    other = max(near, key=lambda r: r.gain + held_out_gain(r))
-    return other if other.gain + held_out_gain(other) > best.gain + held_out_gain(best) + APART else best
+    other = max(near, key=lambda r: r.gain + _held_out_gain(before, r))
+    return other if _better(before, other, best) else best
+
+
+def _held_out_gain(before: HeldOut, r: Refit) -> float:
+    zones = len(r.fit.built.network.zones)
+    return before.days.size * zones * float(np.log(before.mae / max(r.held_out.mae, 1e-9)))
+
+
+def _better(before: HeldOut, one: Refit, other: Refit) -> bool:
+    """Whether what gains about as much as another, or more, is the likelier with its held-out days."""
+    gained = one.gain - other.gain
+    return gained > -APART and gained + _held_out_gain(before, one) - _held_out_gain(before, other) > APART
 
 
 def _refits(work: Work, gains: Sequence[Gain], ahead: Refit | None) -> list[Refit]:
@@ -218,6 +229,48 @@ def _best_pair(
     known = {r.screened.effect: r for r in refits if r.screened.zones == pair.first.zones}
     first = known.get(pair.first.effect) or work.refit([pair.first], work.made.promised(pair.first))
     return None if first is None else (first, both)
+
+
+def _exchanged(bench: Bench, done: Sequence[Round], made: Screening, candidates: Sequence[str]) -> Round | None:
+    """The round before the last, led by what the last one accepted, where another effect with that does better.
+
+    What was accepted while much was missing may have stood for two effects; now that the second is in the model, the
+    third may explain the rest of it better. Tangents about the model with both say which, without another screening.
+
+    Parameters
+    ----------
+    bench : Bench
+        The case.
+    done : sequence of Round
+        So far.
+    made : Screening
+        Of the model with what they accepted.
+    candidates : sequence of str
+        Effects that the case can tell with these in the model.
+    """
+    if len(done) < 2 or done[-2].accepted is None or done[-1].accepted is None or done[-2].pair is not None:
+        return None
+    before, (first, second) = done[-2], (done[-2].accepted.screened, done[-1].accepted)
+    kept = second.fit.effects
+    if any(first.effect in CATALOGUE[e].requires for e in kept):
+        return None
+    less = made.without(first.effect)
+    free = [e for e in candidates if e not in kept and first.effect not in CATALOGUE[e].requires]
+    other = max((less.of(e) for e in free), key=lambda g: g.gain, default=None)
+    if other is None or other.gain < less.of(first.effect).gain - APART:
+        return None
+    work = Work(bench, before.before, before.held_out, before.screening)
+    both = work.weighed([first, second.screened], second.fit)
+    instead = work.refit([second.screened, other], less.promised(other))
+    if instead is None or not instead.counts or not _better(before.held_out, instead, both):
+        return None
+    known = (r for r in before.refits if r.screened.effect == second.screened.effect)
+    alone = next((r for r in known if r.screened.zones == second.screened.zones), None)
+    alone = alone or work.refit([second.screened], work.accepted)
+    if alone is None:
+        return None
+    refits = sorted({id(r): r for r in (*before.refits, alone)}.values(), key=lambda r: -r.gain)
+    return replace(before, refits=tuple(refits), accepted=alone, pair=instead)
 
 
 def _within(single: Refit, pair: Pair) -> bool:
