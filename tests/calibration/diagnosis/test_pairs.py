@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -13,7 +16,7 @@ from calibration.diagnosis._held_out import held_out
 from calibration.diagnosis._pairs import nominate
 from calibration.diagnosis._refit import ACCEPTED, Work
 from calibration.diagnosis._screen import Screening
-from calibration.diagnosis._search import _best_pair
+from calibration.diagnosis._search import Round, _best_pair, _exchanged
 from thermal import Building, Case, Telemetry
 from thermal.effects import CATALOGUE
 from thermal.pilot import MOUNTAIN_VIEW, TwinRanges, devices, generate_office, generate_twin
@@ -27,18 +30,19 @@ NAMES = ("roof_exchange", "ground_exchange", "interfloor_exchange", "infiltratio
 COUNT, NOISE = 300, 0.1
 
 
-def screening(signatures: FloatArray, errors: FloatArray) -> Screening:
-    """A screening of a model that is linear in its strengths, and has no other parameters."""
+def screening(signatures: FloatArray, errors: FloatArray, fitted: Mapping[str, float] | None = None) -> Screening:
+    """A screening of a model that is linear in its strengths, of which it has some already."""
     made = Screening.__new__(Screening)
     made.parameters = tuple(CATALOGUE[name].parameters[0] for name in NAMES)
     made.count, made.scale = float(len(errors)), float(len(errors) / np.sum(errors**2))
-    made.gram = made.scale * signatures.T @ signatures
-    made.score = -made.scale * signatures.T @ errors
     made.prior = np.array([p.prior_deviation for p in made.parameters])
     made.lower = np.array([p.lower for p in made.parameters])
     made.upper = np.array([p.upper for p in made.parameters])
-    made._whole, made._elsewhere = made.gram, 0
+    made._elsewhere = 0
     made._position = {p.name: i for i, p in enumerate(made.parameters)}
+    made._whole, made._slope = made.scale * signatures.T @ signatures, -made.scale * signatures.T @ errors
+    made._start, made._point = np.zeros(len(NAMES)), np.array([(fitted or {}).get(name, 0.0) for name in NAMES])
+    made._project(np.array([name in (fitted or {}) for name in NAMES]))
     return made
 
 
@@ -88,8 +92,31 @@ def test_a_pair_s_gain_is_the_evidence_of_both() -> None:
     assert made.reach(first, second) == pytest.approx(gain, abs=0.5)
 
 
-def test_a_pair_is_accepted_where_neither_member_would_be() -> None:
-    """A twin whose meter of one zone reads low and whose sensor of another reads high, each hardly seen alone."""
+def test_a_screening_less_an_effect_is_that_of_the_model_without_it() -> None:
+    """Exactly where errors are linear and priors say nothing of what is fitted."""
+    rng = np.random.default_rng(8)
+    signatures = rng.standard_normal((COUNT, 4)) + 0.5 * rng.standard_normal((COUNT, 1))
+    errors = NOISE * rng.standard_normal(COUNT) - signatures @ np.array([0.5, 0.3, 0.0, 0.4])
+
+    def fitted(*names: str) -> Screening:
+        at = [NAMES.index(name) for name in names]
+        best = -np.linalg.lstsq(signatures[:, at], errors, rcond=None)[0]
+        made = screening(signatures, errors + signatures[:, at] @ best, dict(zip(names, best.tolist(), strict=True)))
+        made.prior = np.where(np.isin(np.arange(4), at), 1e6, made.prior)
+        made._project(made._known)
+        return made
+
+    alone, less = fitted("infiltration"), fitted("roof_exchange", "infiltration").without("roof_exchange")
+    less.prior = alone.prior
+    for name in ("roof_exchange", "ground_exchange", "interfloor_exchange"):
+        one, other = less.of(name), alone.of(name)
+        assert one.gain == pytest.approx(other.gain, rel=1e-8)
+        assert one.strengths == pytest.approx(other.strengths, rel=1e-8)
+        assert less.promised(one) == pytest.approx(alone.promised(other), rel=1e-6)
+
+
+def biased_and_misread() -> tuple[Bench, str, str]:
+    """A twin whose meter of one zone reads low and whose sensor of another reads high; the two zones."""
     plans = generate_office(3, floor_area=120.0, zones=4, floors=1)
     building = Building("office", MOUNTAIN_VIEW, 0.0, plans, devices(plans))
     quiet = TwinRanges(disturbance_deviation=(0.05, 0.1), noise=(0.005, 0.01))
@@ -100,15 +127,20 @@ def test_a_pair_is_accepted_where_neither_member_would_be() -> None:
     frame[f"{device.name}/supply_air_flowrate_sensor"] /= 1.25
     (device,) = building.devices_of(high)
     frame[f"{device.name}/zone_air_temperature_sensor"] += 0.8
-    bench = Bench(Case(building, Telemetry.from_frame(frame)), ModelSettings(dx=1.0))
+    return Bench(Case(building, Telemetry.from_frame(frame)), ModelSettings(dx=1.0)), low, high
+
+
+def in_zone(made: Screening, effect: str, zone: str) -> Gain:
+    index = np.array([k for k, p in enumerate(made.parameters) if p.name == f"{effect}@{zone}"])
+    return made._gain(effect, index, (zone,), choice_of(1, 4), 4)
+
+
+def test_a_pair_is_accepted_where_neither_member_would_be() -> None:
+    """Each is hardly seen alone."""
+    bench, low, high = biased_and_misread()
     baseline = bench.fit({}, [{}])
     made = Screening(bench, baseline, ("flow_gain", "sensor_bias"))
-
-    def alone(effect: str, zone: str) -> Gain:
-        index = np.array([k for k, p in enumerate(made.parameters) if p.name == f"{effect}@{zone}"])
-        return made._gain(effect, index, (zone,), choice_of(1, 4), 4)
-
-    gains = sorted((alone("flow_gain", low), alone("sensor_bias", high)), key=lambda g: -g.gain)
+    gains = sorted((in_zone(made, "flow_gain", low), in_zone(made, "sensor_bias", high)), key=lambda g: -g.gain)
     assert all(g.gain < ACCEPTED for g in gains)
     found = _best_pair(Work(bench, baseline, held_out(bench, baseline), made), gains, (), None)
     assert found is not None
@@ -117,3 +149,35 @@ def test_a_pair_is_accepted_where_neither_member_would_be() -> None:
     assert both.gain > 2.0 * ACCEPTED > first.gain
     assert both.fit.values[f"flow_gain@{low}"] == pytest.approx(0.25, abs=0.05)
     assert both.fit.values[f"sensor_bias@{high}"] == pytest.approx(0.8, abs=0.1)
+
+
+def test_what_stood_for_another_effect_is_exchanged_once_the_second_is_in_the_model() -> None:
+    bench, low, high = biased_and_misread()
+    baseline = bench.fit({}, [{}])
+    names = ("flow_gain", "sensor_bias", "valve_leak")
+
+    def searched(first: str) -> tuple[list[Round], Screening]:
+        """Two rounds of which the first accepts an effect in the zone whose meter is wrong, the second the bias."""
+        fit, rounds = baseline, []
+        for effect, zone in ((first, low), ("sensor_bias", high)):
+            made = Screening(bench, fit, [n for n in names if n not in fit.effects])
+            work = Work(bench, fit, held_out(bench, fit), made)
+            gain = in_zone(made, effect, zone)
+            refit = work.refit([gain], made.promised(gain))
+            assert refit is not None
+            generic = replace(gain, effect="generic")
+            rounds.append(Round(fit, work.held_out, made, (gain,), generic, (refit,), refit))
+            fit = refit.fit
+        return rounds, Screening(bench, fit, [n for n in names if n not in fit.effects])
+
+    rounds, made = searched("valve_leak")
+    found = _exchanged(bench, rounds, made, names)
+    assert found is not None and found.accepted is not None and found.pair is not None
+    assert found.before is baseline
+    assert (found.accepted.screened.effect, found.pair.screened.effect) == ("sensor_bias", "flow_gain")
+    assert list(found.accepted.fit.effects) == ["sensor_bias"]
+    assert found.pair.fit.effects == {"sensor_bias": (high,), "flow_gain": (low,)}
+    assert found.pair.fit.found.mean_square < rounds[-1].after.found.mean_square
+    rounds, made = searched("flow_gain")
+    assert _exchanged(bench, rounds, made, names) is None
+    assert _exchanged(bench, rounds[:1], made, names) is None
