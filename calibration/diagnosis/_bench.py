@@ -129,6 +129,17 @@ class Fit:
         known = np.isfinite(squared)
         return np.asarray(np.where(known, squared, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1))
 
+    @property
+    def change(self) -> float:
+        """Root mean square of how far measured zone temperatures change over the horizon [K]."""
+        zone, steps = self.built.inputs.zone, self.problem.steps
+        return float(np.sqrt(np.nanmean((zone[steps:] - zone[:-steps]) ** 2)))
+
+    @cached_property
+    def deviations(self) -> FloatArray:
+        """Standard errors of the parameters on the estimation scale, shape (n_parameter,) [-]."""
+        return np.asarray(np.sqrt(np.diag(np.linalg.inv(self.found.jacobian.T @ self.found.jacobian))))
+
     @cached_property
     def values(self) -> dict[str, float]:
         """Parameters by name [parameter units]."""

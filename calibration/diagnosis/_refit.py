@@ -13,6 +13,7 @@ from calibration.diagnosis._held_out import HeldOut, growth, held_out
 from calibration.diagnosis._screen import Screening
 from calibration.errors import CalibrationError
 from thermal import ModelError
+from thermal.effects import CATALOGUE
 
 #: Evaluations of a fit from one start.
 _EVALUATIONS = 6
@@ -121,7 +122,15 @@ class Work:
         grown, error = growth(self.held_out, errors)
         worse = grown > NO_WORSE + CHANCE * error
         counts = gain > ACCEPTED * len(gains) and not worse and max(fall, -grown) > MATTERS
+        counts = counts and all(_beyond_a_step(anew, g.effect) for g in gains)
         return Refit(gains[-1], anew, gain, fall, errors, worse, counts)
+
+
+def _beyond_a_step(fit: Fit, effect: str) -> bool:
+    """Whether what an effect moves in time, if anything, is moved by more than a step of telemetry, and surely so."""
+    shifts, step = CATALOGUE[effect].shifts, fit.built.inputs.step / 3600.0
+    at = [i for i, p in enumerate(fit.problem.parameters) if p.name in shifts]
+    return not at or bool(np.any(np.abs(fit.theta[at]) - CHANCE * fit.deviations[at] > step))
 
 
 def _places(fit: Fit, effect: str) -> int:

@@ -20,6 +20,7 @@ from calibration.diagnosis._levels import (
     IN_SET,
     LARGEST_GROUP,
     LEFT_IN_A_ZONE,
+    LEFT_OF_CHANGE,
     LEFT_OVER,
     RIVAL,
 )
@@ -211,7 +212,7 @@ def _left_over(fit: Fit) -> bool:
     """Whether the errors of a model are larger than what cases without a missing effect keep."""
     zones = fit.by_zone[fit.by_zone > 0.0]
     size = float(np.sqrt(fit.found.mean_square))
-    return size > LEFT_OVER or (size > LEFT_IN_A_ZONE and float(zones.max() / zones.mean()) > CONCENTRATED)
+    return size > max(LEFT_OVER, LEFT_OF_CHANGE * fit.change) or (size > LEFT_IN_A_ZONE and float(zones.max() / zones.mean()) > CONCENTRATED)
 
 
 def _source(r: Round, effect: str) -> Gain | Refit:
@@ -248,8 +249,7 @@ def _parameters(best: Gain | Refit, effect: str) -> dict[str, tuple[float, str, 
             ends = [float(np.clip(value + s * reach, kind.lower, kind.upper)) for s in (-1.0, 1.0)]
             told[name] = (value, kind.unit, (ends[0], ends[1]))
         return told
-    problem, found = best.fit.problem, best.fit.found
-    spread = np.sqrt(np.diag(np.linalg.inv(found.jacobian.T @ found.jacobian)))
+    problem, found, spread = best.fit.problem, best.fit.found, best.fit.deviations
     told = {}
     for i, p in enumerate(problem.parameters):
         if p.effect == effect:

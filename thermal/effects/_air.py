@@ -14,9 +14,10 @@ from thermal.signals import WIND, Drivers, Signal
 
 FloatArray = NDArray[np.float64]
 
-#: Wind speed [m/s], root of temperature difference [K^0.5], presence and opening [-] at which a varying exchange is
-#: part of K; what they differ from it acts as heat at usual zone temperatures. Unmeasured wind blows at this speed.
-_WIND, _ROOT, _PRESENCE, _OPEN = 3.0, 3.0, 0.3, 0.1
+#: Wind speed [m/s], root of temperature difference [K^0.5] and presence [-] at which a varying exchange is part of K;
+#: what they differ from it acts as heat at usual zone temperatures. Unmeasured wind blows at this speed. Windows are no
+#: part of K: where none is ever opened, it would tie the zones to their usual temperatures.
+_WIND, _ROOT, _PRESENCE = 3.0, 3.0, 0.3
 
 #: Outdoor temperatures between which windows come to be opened [K].
 _MILD = (285.15, 295.15)
@@ -41,7 +42,7 @@ def _by_stack(drivers: Drivers, zone: str) -> FloatArray:
 
 def _by_opening(drivers: Drivers, zone: str) -> FloatArray:
     mild = np.clip((drivers.outdoor - _MILD[0]) / (_MILD[1] - _MILD[0]), 0.0, 1.0)
-    return (drivers.occupancy * mild - _OPEN) * _out(drivers, zone)
+    return drivers.occupancy * mild * _out(drivers, zone)
 
 
 def _by_hand(drivers: Drivers, zone: str) -> FloatArray:
@@ -91,7 +92,7 @@ def _build_opening(join: Joining) -> None:
     rate, heat = join.parameter("window_opening_rate"), join.anatomy.air_heat_capacity
     for room in _exposed(join):
         varying = Signal(f"open windows of {room.name}", "K", partial(_by_opening, zone=room.name))
-        _exchange(join, room, rate, _OPEN, varying)
+        join.heat_air(room, rate, varying, heat * room.volume / 3600.0)
         seen = Signal(f"windows seen open in {room.name}", "K*m/s", partial(_by_hand, zone=room.name))
         join.heat_air(room, join.parameter("opened_window_area", zone=room.name), seen, heat)
 

@@ -58,6 +58,9 @@ class Effect:
         Effects that it modifies, and without which it means nothing.
     applies : callable, optional
         Says why a building cannot have it, None when it can; every building can by default.
+    shifts : tuple of str
+        Parameters that move telemetry in time [h]. Up to a step they say how a value is spread over its own step, which
+        telemetry cannot tell from the effect.
     """
 
     id: str
@@ -73,6 +76,7 @@ class Effect:
     zonal: bool = False
     requires: tuple[str, ...] = ()
     applies: Callable[[Anatomy], str | None] | None = None
+    shifts: tuple[str, ...] = ()
 
     def untestable(self, drivers: Drivers, anatomy: Anatomy) -> str | None:
         """Say why a case cannot tell whether the effect is there; None when it can.

@@ -103,4 +103,5 @@ CLOCK_SHIFT = Effect(
         strength("weather_clock_shift", "h", 1.0, "an hour, as by daylight saving", "clock_shift", -1.0),
     ),
     build=_build_shift,
+    shifts=("heat_clock_shift", "weather_clock_shift"),
 )
