@@ -11,9 +11,9 @@ import numpy as np
 #: Gain of generic heat above which a gap is there though no effect of the catalogue explains it [-].
 GENERIC_GAP = 8.0
 
-#: Root mean square of the tuning errors of the last model above which something is left unexplained [K], and its share of
-#: that by which zone temperatures change over the horizon, for a model is as wrong as it is driven hard [-]: the larger
-#: counts. Where one zone has over so many times its share of the squared error, the smaller one does [K, -].
+#: Root mean square of the tuning errors of the last model above which something is left unexplained [K], and its share
+#: of that by which zone temperatures change over the horizon, for a model is as wrong as it is driven hard [-]: the
+#: larger counts. Where one zone has over so many times its share of the squared error, the smaller one does [K, -].
 LEFT_OVER, LEFT_OF_CHANGE, LEFT_IN_A_ZONE, CONCENTRATED = 0.2, 0.11, 0.1, 3.5
 
 #: Least share of the squared error that accepted effects must explain for a cause to be named, and where much is left

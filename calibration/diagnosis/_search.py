@@ -232,7 +232,7 @@ def _best_pair(
 
 
 def _exchanged(bench: Bench, done: Sequence[Round], made: Screening, candidates: Sequence[str]) -> Round | None:
-    """The round before the last, led by what the last one accepted, where another effect with that does better.
+    """Give the round before the last anew, led by what the last one accepted, where another effect fits that better.
 
     What was accepted while much was missing may have stood for two effects; now that the second is in the model, the
     third may explain the rest of it better. Tangents about the model with both say which, without another screening.

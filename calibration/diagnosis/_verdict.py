@@ -212,7 +212,9 @@ def _left_over(fit: Fit) -> bool:
     """Whether the errors of a model are larger than what cases without a missing effect keep."""
     zones = fit.by_zone[fit.by_zone > 0.0]
     size = float(np.sqrt(fit.found.mean_square))
-    return size > max(LEFT_OVER, LEFT_OF_CHANGE * fit.change) or (size > LEFT_IN_A_ZONE and float(zones.max() / zones.mean()) > CONCENTRATED)
+    return size > max(LEFT_OVER, LEFT_OF_CHANGE * fit.change) or (
+        size > LEFT_IN_A_ZONE and float(zones.max() / zones.mean()) > CONCENTRATED
+    )
 
 
 def _source(r: Round, effect: str) -> Gain | Refit:

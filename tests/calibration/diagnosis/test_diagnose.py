@@ -8,12 +8,15 @@ from functools import cache
 import numpy as np
 import pytest
 
+from calibration._settings import ModelSettings
 from calibration.diagnosis import Diagnosis, baseline_gap, diagnose
 from calibration.diagnosis._bench import Bench, Fit
-from calibration.diagnosis._refit import ACCEPTED, Refit
+from calibration.diagnosis._held_out import held_out
+from calibration.diagnosis._levels import CONCENTRATED, LEFT_OF_CHANGE, LEFT_OVER
+from calibration.diagnosis._refit import ACCEPTED, CHANCE, MATTERS, Refit, Work, _beyond_a_step
 from calibration.diagnosis._screen import Screening
 from calibration.diagnosis._search import _first
-from calibration.diagnosis._verdict import judge
+from calibration.diagnosis._verdict import _left_over, judge
 from thermal import Building, Case, Telemetry
 from thermal.effects import CATALOGUE
 from thermal.pilot import MOUNTAIN_VIEW, TwinRanges, devices, generate_office, generate_twin
@@ -160,6 +163,55 @@ def test_what_explains_a_part_of_large_errors_is_not_named() -> None:
     assert [v.name for v in verdicts] == ["unexplained", "named"]
     assert verdicts[0].suspects[0].probability == pytest.approx(0.5, abs=0.01)
     assert verdicts[1].suspects[0].probability > 0.99
+
+
+def test_telemetry_is_shifted_only_by_more_than_one_of_its_steps() -> None:
+    """However much it gains: a shift within a step says how a value is spread over that."""
+    bench = Bench(twin(), ModelSettings(dx=1.0))
+    baseline = bench.fit({}, [{}])
+    work = Work(bench, baseline, held_out(bench, baseline), Screening(bench, baseline, ["clock_shift"]))
+    gain = work.made.of("clock_shift")
+    found = work.refit([gain], work.made.promised(gain))
+    assert found is not None
+    names = [p.name for p in found.fit.problem.parameters]
+    heat, weather = (names.index(f"{what}_clock_shift") for what in ("heat", "weather"))
+    step, error = twin().step / 3600.0, CHANCE * found.fit.deviations
+
+    def moved(by_heat: float, by_weather: float) -> Fit:
+        point = found.fit.found.point.copy()
+        point[[heat, weather]] = by_heat, by_weather
+        return replace(found.fit, found=replace(found.fit.found, point=point))
+
+    assert not _beyond_a_step(moved(0.9 * step, 0.0), "clock_shift")
+    assert not _beyond_a_step(moved(step + 0.9 * error[heat], -0.9 * step), "clock_shift")
+    assert _beyond_a_step(moved(-step - 1.1 * error[heat], 0.0), "clock_shift")
+    assert _beyond_a_step(moved(0.0, step + 1.1 * error[weather]), "clock_shift")
+    assert _beyond_a_step(baseline, "solar_gain")  # moves nothing in time
+    evident = replace(found.fit, evidence=baseline.evidence + 50.0, found=replace(found.fit.found, mean_square=0.0))
+    weighed = work.weighed([gain], evident)
+    assert weighed.gain > ACCEPTED
+    assert weighed.fall > MATTERS
+    assert not weighed.worse
+    assert not weighed.counts
+
+
+def test_what_may_be_left_over_grows_with_how_far_temperatures_change() -> None:
+    fit = diagnosed(None).final
+    zone = fit.built.inputs.zone
+    changes = zone[fit.problem.steps :] - zone[: -fit.problem.steps]
+    assert fit.change == pytest.approx(np.sqrt(np.nanmean(changes**2)))
+    by_zone = fit.by_zone / fit.by_zone.mean()
+
+    def left(rms: float, driven: float) -> bool:
+        built = replace(fit.built, inputs=replace(fit.built.inputs, zone=driven * zone))
+        as_large = replace(fit, built=built, found=replace(fit.found, mean_square=rms**2))
+        as_large.__dict__["by_zone"] = rms**2 * by_zone
+        return _left_over(as_large)
+
+    share = LEFT_OF_CHANGE * fit.change / LEFT_OVER  # of the border, as the twin is driven
+    assert by_zone.max() < CONCENTRATED
+    assert (left(0.99 * LEFT_OVER, 0.5 / share), left(1.01 * LEFT_OVER, 0.5 / share)) == (False, True)
+    assert (left(1.98 * LEFT_OVER, 2.0 / share), left(2.02 * LEFT_OVER, 2.0 / share)) == (False, True)
 
 
 def test_tangents_promise_what_a_fit_keeps() -> None:
