@@ -1,9 +1,9 @@
 """Windows that people open: when one is seen to stand open in the heat that a zone loses beyond its model.
 
 An open window is a conductance to outdoor that comes and goes at a stroke, a few times a day and while people are
-there. The heat that the model of the case needs to follow the measured temperatures, step by step and with every
-parameter at its start (calibration would hide part of it), is set against that which was metered; a hidden Markov model
-of two states says when the difference is that of a window of one size.
+there. The heat that a model of the case needs to follow the measured temperatures, step by step, is set against that
+which was metered; a hidden Markov model of two states says when the difference is that of a window of one size. The
+model has every parameter at its start first, for calibration without windows would hide part of it.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from calibration._heat_balance import step_balance
 from calibration._settings import ModelSettings
-from thermal import SymbolicModel, reduced_model, replay_inputs
+from thermal import Inputs, SymbolicModel, reduced_model, replay_inputs
 from thermal.signals import Drivers
 
 FloatArray = NDArray[np.float64]
@@ -43,7 +43,7 @@ _SEEN, _LONGEST, _PRESENT = 100.0, 0.25, 0.75
 
 
 def seen_openings(drivers: Drivers, settings: ModelSettings) -> FloatArray:
-    """When a window is seen to stand open, shape (n_time, n_zone): 1 where one is.
+    """When a window is seen to stand open before anything is fitted, shape (n_time, n_zone): 1 where one is.
 
     Parameters
     ----------
@@ -52,15 +52,33 @@ def seen_openings(drivers: Drivers, settings: ModelSettings) -> FloatArray:
     settings : ModelSettings
         How its model is built.
     """
+    if len(drivers.zones) > _MOST_ZONES:
+        return np.zeros((len(drivers.stamps), len(drivers.zones)))
+    network = settings.network(drivers.case.building)
+    theta = np.array([p.start for p in network.parameters])
+    return openings_beyond(SymbolicModel(network), theta, drivers, replay_inputs(drivers.case, network, drivers))
+
+
+def openings_beyond(grid: SymbolicModel, theta: FloatArray, drivers: Drivers, inputs: Inputs) -> FloatArray:
+    """When a window is seen to stand open in the heat that is lost beyond a model, shape (n_time, n_zone): 1 where one is.
+
+    Parameters
+    ----------
+    grid : SymbolicModel
+        The model, whose windows are shut.
+    theta : ndarray, shape (n_parameter,)
+        Its parameters [parameter units].
+    drivers : Drivers
+        Of the case.
+    inputs : Inputs
+        Its telemetry, as the model takes it.
+    """
     opened = np.zeros((len(drivers.stamps), len(drivers.zones)))
     if len(drivers.zones) > _MOST_ZONES:
         return opened
-    network = settings.network(drivers.case.building)
-    theta = np.array([p.start for p in network.parameters])
-    inputs = replay_inputs(drivers.case, network, drivers)
-    model = reduced_model(SymbolicModel(network), [theta])
+    model = reduced_model(grid, [theta])
     rows, metered, needed = step_balance(model, theta, inputs)
-    unit = -network.anatomy.air_heat_capacity * drivers.through_windows[rows]
+    unit = -model.network.anatomy.air_heat_capacity * drivers.through_windows[rows]
     opened[rows] = _opened_when(metered - needed, unit, drivers.occupancy[rows], inputs.step)
     return opened
 
