@@ -34,8 +34,9 @@ _SLOW = 8.0
 #: Areas that an opening may have [m2].
 _AREAS = np.geomspace(0.1, 6.0, 14)
 
-#: Most that one step may say for either state [-]: what lasts one step is noise of another kind.
-_MOST = 6.0
+#: Most that one step may say for either state [-]: what lasts one step is noise of another kind. Its degrees of freedom
+#: as Student's t [-]: a window's heat differs from its law by far more than noise does, and shut ones show no such heat.
+_MOST, _FREEDOM = 6.0, 3.0
 
 #: Gain in log-likelihood from which openings are there, the most of the time that they may last, and the least of it
 #: that people are there [-].
@@ -114,10 +115,10 @@ def _opened_when(lost: FloatArray, unit: FloatArray, presence: FloatArray, step:
     opens, shuts = np.where(there, _OPENED, _OPENED_ALONE) / hour, min(_SHUT / hour, 0.5)
     odds = []
     for k in sought:
-        size = np.abs(sudden[known[:, k], k])
-        noise = max(1.4826 * float(np.median(size)), float(np.quantile(size, 0.9)) / _NINETY, 1e-6)
+        noise = _noise(sudden[known[:, k], k], unit[known[:, k], k])
         first = sudden[:, [k]]
-        more = (first**2 - (first - _AREAS * unit[:, [k]]) ** 2) / (2.0 * noise**2)
+        shut, open_ = (np.log1p((e / noise) ** 2 / _FREEDOM) for e in (first, first - _AREAS * unit[:, [k]]))
+        more = 0.5 * (_FREEDOM + 1.0) * (shut - open_)
         odds.append(np.where(known[:, [k]], np.clip(more, -_MOST, _MOST), 0.0))
     paths, gains = _most_likely_paths(np.hstack(odds), opens, shuts)
     for k, mine, gained in zip(sought, np.split(paths, sought.size, axis=1), np.split(gains, sought.size), strict=True):
@@ -126,6 +127,14 @@ def _opened_when(lost: FloatArray, unit: FloatArray, presence: FloatArray, step:
         if likely.max() > _SEEN:
             opened[:, k] = mine[:, np.argmax(likely)]
     return opened
+
+
+def _noise(sudden: FloatArray, unit: FloatArray) -> float:
+    """Size of what is sudden and no window's: of that which has the other sign [W]."""
+    size = np.abs(sudden[sudden * unit < 0.0])
+    if not size.size:
+        return 1e-6
+    return max(1.4826 * float(np.median(size)), float(np.quantile(size, 0.9)) / _NINETY, 1e-6)
 
 
 def _most_likely_paths(odds: FloatArray, opens: FloatArray, shuts: float) -> tuple[FloatArray, FloatArray]:
