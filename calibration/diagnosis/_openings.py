@@ -34,9 +34,11 @@ _SLOW = 8.0
 #: Areas that an opening may have [m2].
 _AREAS = np.geomspace(0.1, 6.0, 14)
 
-#: Most that one step may say for either state [-]: what lasts one step is noise of another kind. Its degrees of freedom
-#: as Student's t [-]: a window's heat differs from its law by far more than noise does, and shut ones show no such heat.
-_MOST, _FREEDOM = 6.0, 3.0
+#: Most that one step may say for either state [-]: what lasts one step is noise of another kind.
+_MOST = 6.0
+
+#: Degrees of freedom of the noise as Student's t [-]: a window's heat differs from its law by far more than noise does.
+_FREEDOM = 3.0
 
 #: Gain in log-likelihood from which openings are there, the most of the time that they may last, and the least of it
 #: that people are there [-].
@@ -61,7 +63,7 @@ def seen_openings(drivers: Drivers, settings: ModelSettings) -> FloatArray:
 
 
 def openings_beyond(grid: SymbolicModel, theta: FloatArray, drivers: Drivers, inputs: Inputs) -> FloatArray:
-    """When a window is seen to stand open in the heat that is lost beyond a model, shape (n_time, n_zone): 1 where one is.
+    """When a window is seen to stand open in heat that is lost beyond a model, shape (n_time, n_zone): 1 where one is.
 
     Parameters
     ----------

@@ -10,12 +10,15 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from calibration.diagnosis._bench import Fit
 from calibration.diagnosis._gain import Gain
 from calibration.diagnosis._openings import openings_beyond
 from calibration.diagnosis._refit import Refit, Work
 from thermal.effects import CATALOGUE
+
+FloatArray = NDArray[np.float64]
 
 #: The effect whose signal is seen and not measured.
 WINDOWS = "window_opening"
@@ -54,7 +57,7 @@ def look_again(work: Work, gains: Sequence[Gain], refits: Sequence[Refit], best:
     fit, own = best.fit, best.screened.effect
     for _ in range(_LOOKS):
         opened = openings_beyond(fit.built.grid, _without(fit, own), drivers, fit.built.inputs)
-        zones = tuple(z for z, some in zip(drivers.zones, opened.any(axis=0), strict=True) if some and z in exposed)
+        zones = tuple(z for k, z in enumerate(drivers.zones) if z in exposed and opened[:, k].any())
         if not zones or np.array_equal(opened, drivers.openings):
             break
         before, drivers.openings = drivers.openings, opened
@@ -72,7 +75,7 @@ def _may_be_windows(effect: str) -> bool:
     return effect == WINDOWS or WINDOWS in CATALOGUE[effect].confounders
 
 
-def _without(fit: Fit, effect: str) -> np.ndarray:
+def _without(fit: Fit, effect: str) -> FloatArray:
     """Parameters of a fit with one effect absent [parameter units]."""
     parameters = fit.built.network.parameters
     return np.array([p.start if p.effect == effect else fit.values[p.name] for p in parameters])
