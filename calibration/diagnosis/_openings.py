@@ -119,8 +119,8 @@ def _opened_when(lost: FloatArray, unit: FloatArray, presence: FloatArray, step:
     for k in sought:
         noise = _noise(sudden[known[:, k], k], unit[known[:, k], k])
         first = sudden[:, [k]]
-        shut, open_ = (np.log1p((e / noise) ** 2 / _FREEDOM) for e in (first, first - _AREAS * unit[:, [k]]))
-        more = 0.5 * (_FREEDOM + 1.0) * (shut - open_)
+        shut, open_ = (1.0 + (e / noise) ** 2 / _FREEDOM for e in (first, first - _AREAS * unit[:, [k]]))
+        more = 0.5 * (_FREEDOM + 1.0) * np.log(shut / open_)
         odds.append(np.where(known[:, [k]], np.clip(more, -_MOST, _MOST), 0.0))
     paths, gains = _most_likely_paths(np.hstack(odds), opens, shuts)
     for k, mine, gained in zip(sought, np.split(paths, sought.size, axis=1), np.split(gains, sought.size), strict=True):
