@@ -1,9 +1,9 @@
 """Windows that people open: when one is seen to stand open in the heat that a zone loses beyond its model.
 
 An open window is a conductance to outdoor that comes and goes at a stroke, a few times a day and while people are
-there. The heat that the model of the case needs to follow the measured temperatures, step by step and with every
-parameter at its start (calibration would hide part of it), is set against that which was metered; a hidden Markov model
-of two states says when the difference is that of a window of one size.
+there. The heat that a model of the case needs to follow the measured temperatures, step by step, is set against that
+which was metered; a hidden Markov model of two states says when the difference is that of a window of one size. The
+model has every parameter at its start first, for calibration without windows would hide part of it.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from calibration._heat_balance import step_balance
 from calibration._settings import ModelSettings
-from thermal import SymbolicModel, reduced_model, replay_inputs
+from thermal import Inputs, SymbolicModel, reduced_model, replay_inputs
 from thermal.signals import Drivers
 
 FloatArray = NDArray[np.float64]
@@ -37,13 +37,16 @@ _AREAS = np.geomspace(0.1, 6.0, 14)
 #: Most that one step may say for either state [-]: what lasts one step is noise of another kind.
 _MOST = 6.0
 
+#: Degrees of freedom of the noise as Student's t [-]: a window's heat differs from its law by far more than noise does.
+_FREEDOM = 3.0
+
 #: Gain in log-likelihood from which openings are there, the most of the time that they may last, and the least of it
 #: that people are there [-].
 _SEEN, _LONGEST, _PRESENT = 100.0, 0.25, 0.75
 
 
 def seen_openings(drivers: Drivers, settings: ModelSettings) -> FloatArray:
-    """When a window is seen to stand open, shape (n_time, n_zone): 1 where one is.
+    """When a window is seen to stand open before anything is fitted, shape (n_time, n_zone): 1 where one is.
 
     Parameters
     ----------
@@ -52,15 +55,33 @@ def seen_openings(drivers: Drivers, settings: ModelSettings) -> FloatArray:
     settings : ModelSettings
         How its model is built.
     """
+    if len(drivers.zones) > _MOST_ZONES:
+        return np.zeros((len(drivers.stamps), len(drivers.zones)))
+    network = settings.network(drivers.case.building)
+    theta = np.array([p.start for p in network.parameters])
+    return openings_beyond(SymbolicModel(network), theta, drivers, replay_inputs(drivers.case, network, drivers))
+
+
+def openings_beyond(grid: SymbolicModel, theta: FloatArray, drivers: Drivers, inputs: Inputs) -> FloatArray:
+    """When a window is seen to stand open in heat that is lost beyond a model, shape (n_time, n_zone): 1 where one is.
+
+    Parameters
+    ----------
+    grid : SymbolicModel
+        The model, whose windows are shut.
+    theta : ndarray, shape (n_parameter,)
+        Its parameters [parameter units].
+    drivers : Drivers
+        Of the case.
+    inputs : Inputs
+        Its telemetry, as the model takes it.
+    """
     opened = np.zeros((len(drivers.stamps), len(drivers.zones)))
     if len(drivers.zones) > _MOST_ZONES:
         return opened
-    network = settings.network(drivers.case.building)
-    theta = np.array([p.start for p in network.parameters])
-    inputs = replay_inputs(drivers.case, network, drivers)
-    model = reduced_model(SymbolicModel(network), [theta])
+    model = reduced_model(grid, [theta])
     rows, metered, needed = step_balance(model, theta, inputs)
-    unit = -network.anatomy.air_heat_capacity * drivers.through_windows[rows]
+    unit = -model.network.anatomy.air_heat_capacity * drivers.through_windows[rows]
     opened[rows] = _opened_when(metered - needed, unit, drivers.occupancy[rows], inputs.step)
     return opened
 
@@ -96,10 +117,10 @@ def _opened_when(lost: FloatArray, unit: FloatArray, presence: FloatArray, step:
     opens, shuts = np.where(there, _OPENED, _OPENED_ALONE) / hour, min(_SHUT / hour, 0.5)
     odds = []
     for k in sought:
-        size = np.abs(sudden[known[:, k], k])
-        noise = max(1.4826 * float(np.median(size)), float(np.quantile(size, 0.9)) / _NINETY, 1e-6)
+        noise = _noise(sudden[known[:, k], k], unit[known[:, k], k])
         first = sudden[:, [k]]
-        more = (first**2 - (first - _AREAS * unit[:, [k]]) ** 2) / (2.0 * noise**2)
+        shut, open_ = (1.0 + (e / noise) ** 2 / _FREEDOM for e in (first, first - _AREAS * unit[:, [k]]))
+        more = 0.5 * (_FREEDOM + 1.0) * np.log(shut / open_)
         odds.append(np.where(known[:, [k]], np.clip(more, -_MOST, _MOST), 0.0))
     paths, gains = _most_likely_paths(np.hstack(odds), opens, shuts)
     for k, mine, gained in zip(sought, np.split(paths, sought.size, axis=1), np.split(gains, sought.size), strict=True):
@@ -108,6 +129,14 @@ def _opened_when(lost: FloatArray, unit: FloatArray, presence: FloatArray, step:
         if likely.max() > _SEEN:
             opened[:, k] = mine[:, np.argmax(likely)]
     return opened
+
+
+def _noise(sudden: FloatArray, unit: FloatArray) -> float:
+    """Size of what is sudden and no window's: of that which has the other sign [W]."""
+    size = np.abs(sudden[sudden * unit < 0.0])
+    if not size.size:
+        return 1e-6
+    return max(1.4826 * float(np.median(size)), float(np.quantile(size, 0.9)) / _NINETY, 1e-6)
 
 
 def _most_likely_paths(odds: FloatArray, opens: FloatArray, shuts: float) -> tuple[FloatArray, FloatArray]:

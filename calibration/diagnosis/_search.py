@@ -16,6 +16,7 @@ from calibration.diagnosis._levels import APART
 from calibration.diagnosis._pairs import Pair, nominate
 from calibration.diagnosis._refit import ACCEPTED, Refit, Work
 from calibration.diagnosis._screen import Screening, screen
+from calibration.diagnosis._windows import WINDOWS, look_again
 from thermal.effects import CATALOGUE
 
 #: Most rounds, and most effects that a round fits anew.
@@ -125,6 +126,8 @@ def search(
         work = Work(bench, fit, errors, made)
         refits = _refits(work, gains, ahead)
         best = _first(errors, refits)
+        refits = look_again(work, gains, refits, best)
+        best = _first(errors, refits)
         chosen = _best_pair(work, gains, refits, best) if ahead is None else None
         pair = None
         if chosen is not None:
@@ -183,7 +186,7 @@ def _refits(work: Work, gains: Sequence[Gain], ahead: Refit | None) -> list[Refi
             found.extend(sorted((t for t in tries if t is not None), key=lambda t: -t.gain)[:1])
     best = max((r for r in found if r.counts), key=lambda r: r.gain, default=None)
     if best is not None and best.screened.zones:
-        fitted = {r.screened.effect for r in found}
+        fitted = {r.screened.effect for r in found} | {WINDOWS}  # these are sought anew, not only fitted: `look_again`
         for g in gains:
             alike = g.effect in CATALOGUE[best.screened.effect].confounders and CATALOGUE[g.effect].zonal
             if alike and g.effect not in fitted:  # tangents at no strength may miss where it is, or what it does

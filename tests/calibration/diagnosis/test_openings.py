@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from calibration._heat_balance import heat_balance, step_balance
 from calibration._intervals import Interval
-from calibration.diagnosis._openings import _most_likely_paths, _opened_when
+from calibration.diagnosis._openings import _most_likely_paths, _noise, _opened_when
 from thermal import SymbolicModel, build_network, load_bundled_case, reduced_model, replay_inputs
 
 FloatArray = NDArray[np.float64]
@@ -51,6 +51,28 @@ def test_openings_are_found(area: float) -> None:
     found = found_in(heat)[:, 0]
     assert (found * state).sum() > 0.85 * state.sum()
     assert (found * state).sum() > 0.85 * found.sum()
+
+
+def test_a_window_whose_heat_departs_from_its_law_is_told_from_a_small_loss_of_every_evening() -> None:
+    rng = np.random.default_rng(4)
+    state = opened(rng)
+    spell = np.repeat(rng.uniform(0.6, 1.4, state.size // 12), 12)
+    evening = np.tile((np.arange(DAY) >= 195) & (np.arange(DAY) < 213), DAYS)
+    heat = 4.0 * spell * state * UNIT + 150.0 * evening + 50.0 * rng.standard_normal(state.size)
+    found = found_in(heat)[:, 0]
+    assert (found * state).sum() > 0.95 * state.sum()
+    assert (found * state).sum() > 0.95 * found.sum()
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_noise_is_that_of_heat_that_no_window_loses(sign: float) -> None:
+    """However long windows stand open, in the cold and where it is warmer outdoor."""
+    rng = np.random.default_rng(9)
+    unit, quiet = sign * UNIT, 70.0 * rng.standard_normal(UNIT.size)
+    assert _noise(quiet, unit) == pytest.approx(70.0, rel=0.05)
+    state = (rng.uniform(size=unit.size) < 0.2).astype(float)
+    assert _noise(quiet + 2.0 * state * unit, unit) == pytest.approx(70.0, rel=0.05)
+    assert _noise(np.zeros(3), unit[:3]) > 0.0
 
 
 def test_noise_a_slow_loss_and_a_steady_one_are_no_openings() -> None:
