@@ -125,8 +125,7 @@ def search(
             continue
         work = Work(bench, fit, errors, made)
         refits = _refits(work, gains, ahead)
-        best = _first(errors, refits)
-        refits = look_again(work, gains, refits, best)
+        refits = look_again(work, gains, refits, _first(errors, refits))
         best = _first(errors, refits)
         chosen = _best_pair(work, gains, refits, best) if ahead is None else None
         pair = None
