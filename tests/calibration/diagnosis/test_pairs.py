@@ -130,6 +130,20 @@ def biased_and_misread() -> tuple[Bench, str, str]:
     return Bench(Case(building, Telemetry.from_frame(frame)), ModelSettings(dx=1.0)), low, high
 
 
+def test_a_screening_keeps_the_basis_of_another_where_it_serves() -> None:
+    bench, low, _ = biased_and_misread()
+    names = ("flow_gain", "sensor_bias", "infiltration", "internal_gains")
+    first = Screening(bench, bench.fit({}, [{}]), names)
+    fit = bench.fit({"infiltration": ()}, [{}])
+    own, kept = Screening(bench, fit, names), Screening(bench, fit, names, first)
+    assert kept._basis is first._basis
+    assert not np.array_equal(own._basis, first._basis)
+    for name in ("flow_gain", "sensor_bias", "internal_gains"):
+        assert kept.of(name).gain == pytest.approx(own.of(name).gain, abs=0.1)
+    for zones in ((), (low,)):  # θ far from where the basis was made, and a model with fewer parameters
+        assert Screening(bench, bench.fit({"flow_gain": zones}, [{}]), names, first)._basis is not first._basis
+
+
 def in_zone(made: Screening, effect: str, zone: str) -> Gain:
     index = np.array([k for k, p in enumerate(made.parameters) if p.name == f"{effect}@{zone}"])
     return made._gain(effect, index, (zone,), choice_of(1, 4), 4)
