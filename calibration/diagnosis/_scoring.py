@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any
@@ -15,21 +15,35 @@ LEAST_GAP = 0.05
 
 _VERDICTS = ("no_gap", "named", "group", "unexplained")
 
+
+def _same(number: float) -> float:
+    return number
+
+
+def _in_minutes(seconds: float) -> float:
+    return seconds / 60.0
+
+
+def _to_add(read_too_much: float) -> float:
+    """Share of the metered heat that is missing, from the share by which the meter reads too much."""
+    return -read_too_much / (1.0 + read_too_much)
+
+
 #: Where generator and catalogue have one number for how strong an effect is: its name there, the names whose sum it is
-#: here, and how many of the units here are one there [-].
-_STRENGTH = {
-    "interfloor_exchange": ("u_value_W_m2_K", ("interfloor_u_value",), 1.0),
-    "ground_exchange": ("u_value_W_m2_K", ("ground_u_value",), 1.0),
-    "roof_exchange": ("u_value_W_m2_K", ("roof_u_value",), 1.0),
-    "neighbour": ("u_value_W_m2_K", ("neighbour_u_value",), 1.0),
-    "internal_gains": ("power_W_m2", ("internal_gain", "base_load"), 1.0),
-    "latent_load": ("power_W_m2", ("latent_load",), 1.0),
-    "valve_leak": ("power_W_m2", ("valve_leak",), 1.0),
-    "capacity_limit": ("lost_share", ("capacity_lost",), 1.0),
-    "solar_opaque": ("absorptance", ("solar_absorptance",), 1.0),
-    "flow_gain": ("gain", ("flow_gain",), 1.0),
-    "sensor_bias": ("bias_K", ("sensor_bias",), 1.0),
-    "sensor_lag": ("time_constant_s", ("sensor_lag",), 1.0 / 60.0),
+#: here, and what makes one of the other.
+_STRENGTH: Mapping[str, tuple[str, tuple[str, ...], Callable[[float], float]]] = {
+    "interfloor_exchange": ("u_value_W_m2_K", ("interfloor_u_value",), _same),
+    "ground_exchange": ("u_value_W_m2_K", ("ground_u_value",), _same),
+    "roof_exchange": ("u_value_W_m2_K", ("roof_u_value",), _same),
+    "neighbour": ("u_value_W_m2_K", ("neighbour_u_value",), _same),
+    "internal_gains": ("power_W_m2", ("internal_gain", "base_load"), _same),
+    "latent_load": ("power_W_m2", ("latent_load",), _same),
+    "valve_leak": ("power_W_m2", ("valve_leak",), _same),
+    "capacity_limit": ("lost_share", ("capacity_lost",), _same),
+    "solar_opaque": ("absorptance", ("solar_absorptance",), _same),
+    "flow_gain": ("gain", ("flow_gain",), _to_add),
+    "sensor_bias": ("bias_K", ("sensor_bias",), _same),
+    "sensor_lag": ("time_constant_s", ("sensor_lag",), _in_minutes),
 }
 
 #: Confidence of the intervals of shares [-].
@@ -146,7 +160,7 @@ class Trial:
         found = next((w for w in self.answer["which"] if self.labels and w["effect"] == self.labels[0]), None)
         if known is None or found is None or known[0] not in self.numbers:
             return None
-        key, names, factor = known
+        key, names, here = known
         total: dict[str, float] = {}
         for name, told in found["parameters"].items():
             base, _, member = name.partition("@")
@@ -154,7 +168,7 @@ class Trial:
                 total[member] = total.get(member, 0.0) + told["value"]
         true = self.numbers[key]
         each = true if isinstance(true, Mapping) else dict.fromkeys(total, true)
-        ratios = [total[m] / (factor * each[m]) for m in total if m in each]
+        ratios = [total[m] / here(each[m]) for m in total if m in each]
         return float(np.mean(ratios)) if ratios else None
 
 

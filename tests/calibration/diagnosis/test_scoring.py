@@ -121,3 +121,9 @@ def test_a_strength_is_compared_where_both_are_one_number() -> None:
     assert found.strength_found == pytest.approx(0.75)
     assert score([found])["strength"] == pytest.approx([0.75] * 3)
     assert trial("single", ("solar_gain",), answer("named", "solar_gain")).strength_found is None
+    # a meter that reads a fifth too little misses a quarter of what it reads
+    told = answer("named", "flow_gain")
+    told["which"][0]["parameters"] = {"flow_gain@A": {"value": 0.25}}
+    effect |= {"name": "flow_gain", "answers": ["flow_gain"], "parameters": {"gain": -0.2}}
+    found = trial_of("made_up", {"kind": "single", "stream": 0, "effects": [effect]}, told, [0.05])
+    assert found.strength_found == pytest.approx(1.0)
