@@ -252,15 +252,6 @@ def test_outdoor_air(lively_case: CaseOf, kind: str, name: str) -> None:
         assert heat[b.network.zone == k].sum() == pytest.approx(expected, rel=1e-9, abs=1e-9)
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_windows_that_nobody_opens_let_nothing_through(lively_case: CaseOf, kind: str) -> None:
-    # at night, however far zones are from their usual temperatures
-    b = bench(lively_case(kind), "window_opening", window_opening_rate=3.0)
-    (night,) = np.flatnonzero(b.drivers.occupancy == 0.0)[:1]
-    b.signals = signal_values(b.network.signals, b.drivers)[night]
-    assert not b.heat().any()
-
-
 def test_infiltration_without_wind_measured_blows_as_usual(lively_case: CaseOf) -> None:
     case = lively_case("table")
     frame = case.telemetry.frame.drop(columns="weather_station/wind_speed_sensor")

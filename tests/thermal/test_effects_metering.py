@@ -175,6 +175,23 @@ def test_a_window_that_is_seen_open(lively_case: CaseOf) -> None:
     assert signal_heat(case, "window_opening", "B", drivers, **areas) == pytest.approx(0.0 * expected)
 
 
+def test_windows_that_people_open_on_mild_days(lively_case: CaseOf) -> None:
+    # ρ c V n occ(t) m(T_out) (T_out - T), m from 0 at 12 to 1 at 22 degC; shut ones do nothing, wherever zones are
+    case = lively_case("plan")
+    network, rate = build_network(case.building, effects=chosen(["window_opening"])), {"window_opening_rate": 3.0}
+    opened, shut = (SymbolicModel(network).matrices(v).flow for v in (network.values(rate), network.start()))
+    assert not np.any((opened - shut)[:, : network.n_node + len(network.boundaries)].todense())
+    drivers = Drivers(case)
+    drivers.outdoor = np.linspace(280.0, 300.0, len(case.stamps))
+    drivers.occupancy = np.arange(len(case.stamps)) % 7 / 6.0
+    mild = np.clip((drivers.outdoor - 285.15) / 10.0, 0.0, 1.0)
+    volume = network.anatomy.rooms["A"].volume
+    difference = drivers.outdoor - drivers.usual[:, drivers.zones.index("A")]
+    expected = air_density(690.0) * AIR_HEAT_CAPACITY * volume * 3.0 / 3600.0 * drivers.occupancy * mild * difference
+    assert np.abs(expected).max() > 100.0
+    assert signal_heat(case, "window_opening", "A", drivers, **rate) == pytest.approx(expected)
+
+
 def test_a_heat_meter_that_reads_low(lively_case: CaseOf) -> None:
     case = lively_case("plan")
     heat = case.zone_heat()["B"].to_numpy()
