@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-import numpy as np
 import pandas as pd
 
 from calibration._describe import describe_parameters
@@ -161,9 +160,7 @@ def describe_fit(fit: Fit) -> tuple[ParameterEstimate, ...]:
     fit : Fit
         With the Jacobian of its errors and priors.
     """
-    jacobian = fit.found.jacobian
-    deviations = np.sqrt(np.diag(np.linalg.inv(jacobian.T @ jacobian)))
-    known = dict(zip(fit.problem.free, deviations.tolist(), strict=True))
+    known = dict(zip(fit.problem.free, fit.deviations.tolist(), strict=True))
     network = fit.built.network
     return describe_parameters(network.parameters, fit.theta, known, network.nominal)
 
