@@ -17,7 +17,7 @@ from _code import code
 from _table import markdown, publish, write
 from energyplus_trials.drawing import draw_spec, without
 
-from calibration.diagnosis import LEAST_GAP, Trial, score, trial_of
+from calibration.diagnosis import LEAST_GAP, Trial, gap_of, score, trial_of
 
 NAME = "blind_trials"
 CASES, SEALED, ANSWERS, GAPS = "cases", "sealed", "answers", "gaps"
@@ -119,8 +119,8 @@ def _read(folder: Path) -> dict[str, Any]:
 
 
 def _gaps(out: Path) -> dict[str, float]:
-    """Held-out error of the calibrated baseline by trial [K]."""
-    return {name: float(a["gap"]["mae"]) for name, a in (_read(out / GAPS) | _read(out / ANSWERS)).items()}
+    """Held-out error of the calibrated baseline in the last third of the telemetry by trial [K]."""
+    return {name: gap_of(answer) for name, answer in (_read(out / GAPS) | _read(out / ANSWERS)).items()}
 
 
 def _of_several_that_show(out: Path) -> set[str]:

@@ -17,6 +17,9 @@ from thermal.model import LEAST_SPIN_UP, SPIN_UP
 
 IntArray = NDArray[np.int64]
 
+#: Days that tune before one that is held out, where they alternate, and fewest such turns.
+_TUNING_DAYS, _TURNS = 2, 3
+
 
 @dataclass(frozen=True)
 class Interval:
@@ -100,6 +103,42 @@ def default_intervals(
         return [Interval(stamps[0], stamps[split - 1])], [Interval(stamps[split], stamps[-1])]
     tune, hold_out = merge(tune), merge(hold_out)
     return tune or [_rest(stamps, hold_out)], hold_out or [_rest(stamps, tune)]
+
+
+def alternating_intervals(case: Case) -> tuple[list[Interval], list[Interval]]:
+    """Tuning and held-out intervals that take turns, so that both see the weather and the use of all the telemetry.
+
+    Parameters
+    ----------
+    case : Case
+        With telemetry.
+
+    Returns
+    -------
+    tuple of lists
+        Two days in three, and the third, from midnight to midnight; what is left at the end tunes where it is over
+        a day, and is held out else.
+
+    Raises
+    ------
+    NotEnoughDataError
+        When the telemetry is shorter than three such turns.
+    """
+    stamps, day = case.stamps, pd.Timedelta(days=1)
+    start, end, step = stamps[0], stamps[-1], stamps[1] - stamps[0]
+    midnight = start.normalize()
+    days = (end + step - midnight) / day
+    turns = int(days) // (_TUNING_DAYS + 1)
+    if turns < _TURNS:
+        raise NotEnoughDataError(
+            f"alternating intervals: expected {_TURNS * (_TUNING_DAYS + 1)} days of telemetry or more, found {days:.1f}"
+        )
+    begins = [midnight + k * (_TUNING_DAYS + 1) * day for k in range(turns)]  # the last stamp of the turn before
+    tuned = [Interval(max(b + step, start), b + _TUNING_DAYS * day) for b in begins]
+    judged = [Interval(i.end + step, min(i.end + day, end)) for i in tuned]
+    if end - judged[-1].end > day:
+        return [*tuned, Interval(judged[-1].end + step, end)], judged
+    return tuned, [*judged[:-1], Interval(judged[-1].start, end)]
 
 
 def _rest(stamps: pd.DatetimeIndex, given: Sequence[Interval]) -> Interval:

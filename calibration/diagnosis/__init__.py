@@ -2,7 +2,7 @@
 
 from calibration.diagnosis._diagnose import Diagnosis, baseline_gap, diagnose
 from calibration.diagnosis._page import write_diagnosis
-from calibration.diagnosis._scoring import LEAST_GAP, Rate, Trial, score, trial_of
+from calibration.diagnosis._scoring import LEAST_GAP, Rate, Trial, gap_of, score, trial_of
 from calibration.diagnosis._words import called, diagnosis_verdict, in_zones
 
 __all__ = [
@@ -14,6 +14,7 @@ __all__ = [
     "called",
     "diagnose",
     "diagnosis_verdict",
+    "gap_of",
     "in_zones",
     "score",
     "trial_of",

@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 
 from calibration._estimate import DRIFT_TOLERANCE
 from calibration._evaluate import Predictions, evaluate_model
-from calibration._intervals import Interval, default_intervals, horizon_steps
+from calibration._intervals import Interval, alternating_intervals, default_intervals, horizon_steps
 from calibration._problem import Problem
 from calibration._settings import ModelSettings
-from calibration._starts import tuning_runs
+from calibration._starts import joined, tuning_runs
 from calibration.diagnosis._fit import Found, descend, evidence_of
 from calibration.diagnosis._openings import seen_openings
+from calibration.errors import NotEnoughDataError
 from thermal import Case, Inputs, SymbolicModel, ThermalNetwork, reduced_model, replay_inputs
 from thermal.effects import CATALOGUE, chosen
 from thermal.model import ReducedModel
@@ -172,6 +173,16 @@ class Bench:
     def __post_init__(self) -> None:
         self.tuned, self.judged = default_intervals(self.case, self.tune, self.hold_out)
 
+    def alternate(self) -> bool:
+        """Let tuning and held-out days take turns where no intervals were given; whether they do now."""
+        if self.tune or self.hold_out:
+            return False
+        try:
+            self.tuned, self.judged = alternating_intervals(self.case)
+        except NotEnoughDataError:
+            return False
+        return True
+
     @cached_property
     def drivers(self) -> Drivers:
         """Sun, sky, wind and schedules of the case, and when windows are seen to stand open."""
@@ -221,7 +232,7 @@ class Bench:
         steps = horizon_steps(self.horizon, built.inputs.step)
         runs = tuning_runs(built.inputs, self.tuned, steps, self.settings.spin_up_seconds)
         free = tuple(range(len(theta)))
-        return Problem(built.grid, built.inputs, runs, steps, free, theta, self.settings.stepping)
+        return Problem(built.grid, built.inputs, joined(runs), steps, free, theta, self.settings.stepping)
 
     def fit(
         self,

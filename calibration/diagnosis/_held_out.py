@@ -12,6 +12,10 @@ from calibration.diagnosis._bench import Bench, Fit
 
 FloatArray = NDArray[np.float64]
 
+#: Held-out mean absolute error over the root mean square of the tuning errors above which they are errors of other
+#: days [-]; 0.7 is usual.
+_ELSEWHERE = 1.2
+
 
 @dataclass(frozen=True)
 class HeldOut:
@@ -59,6 +63,21 @@ def held_out(bench: Bench, fit: Fit, horizon: str | None = None) -> HeldOut:
     there, index = np.unique(days[known], return_inverse=True)
     weight = np.bincount(index).astype(float)
     return HeldOut(there, np.bincount(index, sizes[known]) / weight, weight)
+
+
+def elsewhere(fit: Fit, errors: HeldOut) -> bool:
+    """Whether a model errs so much more where it is held out than where it was fitted that it was fitted elsewhere.
+
+    What is missing then acts in the weather or the use of the held-out days, and hardly in those that could show it.
+
+    Parameters
+    ----------
+    fit : Fit
+        The calibrated baseline.
+    errors : HeldOut
+        Its held-out errors.
+    """
+    return errors.mae > _ELSEWHERE * float(np.sqrt(fit.found.mean_square))
 
 
 def growth(before: HeldOut, after: HeldOut) -> tuple[float, float]:

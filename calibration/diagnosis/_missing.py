@@ -76,13 +76,14 @@ def missing_heat(
     scheme: Scheme = IMPLICIT_EULER,
     spin_up_seconds: float = SPIN_UP,
     fixed: bool = False,
+    since: pd.Timestamp | None = None,
 ) -> Missing:
     """Estimate the heat that a fitted model lacks on intervals of telemetry, by the hour.
 
     A Kalman smoother holds the model to the measured temperatures by an autocorrelated heat in every zone
     (`calibration.smooth`). How large that heat is in each zone, how long it lasts, and how noisy the readings are is
-    found by the likelihood of the innovations on the last four days of the tuning intervals. The band holds what the
-    noise leaves unknown of the heat, and what the fit leaves unknown of the parameters.
+    found by the likelihood of the innovations on the last four days of the last tuning interval. The band holds what
+    the noise leaves unknown of the heat, and what the fit leaves unknown of the parameters.
 
     Parameters
     ----------
@@ -96,6 +97,8 @@ def missing_heat(
         Telemetry before an interval that the spin-up may use [s].
     fixed : bool
         Take the parameters as they are: the band is of the noise alone.
+    since : Timestamp, optional
+        Beginning of the last tuning interval, where held-out days lie between tuning intervals.
 
     Raises
     ------
@@ -112,7 +115,7 @@ def missing_heat(
     if many and model.order > _ORDER:
         model = reduced_model(fit.built.grid, [fit.theta], order=_ORDER)
     covariance: Covariance = "steady" if many else "exact"
-    disturbance = _tuned(fit, model, many, scheme, spin_up_seconds)
+    disturbance = _tuned(fit, model, since, scheme, spin_up_seconds)
     parts = []
     for interval in intervals:
         filtered = filter_interval(
@@ -147,10 +150,13 @@ def at_start(fit: Fit) -> Fit:
     return replace(fit, model=model, found=replace(fit.found, point=point))
 
 
-def _tuned(fit: Fit, model: ReducedModel, many: bool, scheme: Scheme, spin_up_seconds: float) -> DisturbanceModel:
+def _tuned(
+    fit: Fit, model: ReducedModel, since: pd.Timestamp | None, scheme: Scheme, spin_up_seconds: float
+) -> DisturbanceModel:
     """Size and course of the missing heat and noise of the sensors, on the last of what was fitted."""
-    last = fit.problem.stretches[-1]
-    stretch = Interval(max(last.start, last.end - pd.Timedelta(seconds=_TUNED_MANY if many else _TUNED)), last.end)
+    many, last = len(model.network.zones) > _MANY_ZONES, fit.problem.stretches[-1]
+    latest = last.end - pd.Timedelta(seconds=_TUNED_MANY if many else _TUNED)
+    stretch = Interval(max(last.start, latest, since or latest), last.end)
     return tune_disturbance(
         model, fit.theta, fit.built.inputs, [stretch], per_zone=() if many else ("deviation",),
         weights=air_volumes(model.network), scheme=scheme, covariance="steady", spin_up_seconds=spin_up_seconds,

@@ -99,7 +99,7 @@ class Trial:
     @property
     def shown(self) -> tuple[frozenset[str], ...]:
         """Names that are right for each effect that leaves a gap which calibration cannot hide."""
-        mae = self.answer["gap"]["mae"]
+        mae = gap_of(self.answer)
         return tuple(t for t, twin in zip(self.truths, self.twins, strict=True) if not mae - twin <= LEAST_GAP)
 
     @property
@@ -170,6 +170,18 @@ class Trial:
         each = true if isinstance(true, Mapping) else dict.fromkeys(total, true)
         ratios = [total[m] / here(each[m]) for m in total if m in each]
         return float(np.mean(ratios)) if ratios else None
+
+
+def gap_of(answer: Mapping[str, Any]) -> float:
+    """Held-out error of the calibrated baseline in the last third of a trial, whichever days were held out later [K].
+
+    Parameters
+    ----------
+    answer : mapping
+        Contents of ``diagnosis.json``.
+    """
+    elsewhere = answer.get("intervals", {}).get("mae_of_last_third")
+    return float(answer["gap"]["mae"] if elsewhere is None else elsewhere)
 
 
 def trial_of(name: str, label: Mapping[str, Any], answer: Mapping[str, Any], twins: Sequence[float]) -> Trial:

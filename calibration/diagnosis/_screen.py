@@ -15,12 +15,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from calibration.diagnosis._bench import TYPICAL, Bench, Built, Fit, is_strength
+from calibration.diagnosis._bench import Bench, Fit, is_strength
 from calibration.diagnosis._gain import Gain, choice_of
 from calibration.diagnosis._generic import GENERIC, ZONE_HEAT
 from thermal import Parameter, reduced_model
 from thermal.effects import CATALOGUE, PAIR, Chosen
-from thermal.model import FEW_SHIFTS, ReducedModel
+from thermal.model import FEW_SHIFTS
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -31,9 +31,6 @@ _SWEEPS, _TOLERANCE = 200, 1e-6
 
 #: Order of the reduced model of a large building.
 _LARGEST_ORDER = 700
-
-#: Drift of a basis up to which it serves another round, over the errors of its model [-]: gains differ by 0.1 at most.
-_SERVED = 0.005
 
 #: Most zones in which effects of single zones are sought.
 _MOST_ZONES = 24
@@ -53,22 +50,17 @@ class Screening:
         The model.
     candidates : sequence of str
         Effects to screen.
-    before : Screening, optional
-        Of another model of the case; its basis is kept where it serves.
     """
 
-    def __init__(self, bench: Bench, fit: Fit, candidates: Sequence[str], before: Screening | None = None) -> None:
+    def __init__(self, bench: Bench, fit: Fit, candidates: Sequence[str]) -> None:
         here = _worst_zones(fit)
         lacking = {e: here if CATALOGUE[e].zonal else () for e in candidates if e not in fit.effects}
         built = bench.build({**fit.effects, **lacking}, (Chosen(GENERIC, here),))
         self._elsewhere = len(built.network.zones) - len(here) if here else 0
         theta = built.theta(fit.values)
-        model = _served(built, theta, fit, before) or reduced_model(
-            # the shifts of a large building: two more cost twice the time and change no gain by 0.01
-            built.grid, [theta, built.theta(fit.values, TYPICAL)], shifts=FEW_SHIFTS,
-            order=_LARGEST_ORDER if here else None,
-        )  # fmt: skip
-        self._basis = np.asarray(model.projection)
+        # a Galerkin basis of a symmetric model serves its tangents too: neither two shifts more nor a second θ, with
+        # every effect at work, changes a gain by over 0.03
+        model = reduced_model(built.grid, [theta], shifts=FEW_SHIFTS, order=_LARGEST_ORDER if here else None)
         problem = bench.problem(built, theta)
         parts = [problem.errors(model, theta, runs, slopes=True) for runs in problem.runs]
         slopes = np.concatenate([m.reshape(-1, m.shape[-1]) for _, m in parts if m is not None])
@@ -310,14 +302,6 @@ class Screening:
         return float(gain), share
 
 
-def _served(built: Built, theta: FloatArray, fit: Fit, before: Screening | None) -> ReducedModel | None:
-    """Reduced model on the basis of another screening, where that has the same volumes and its basis serves this θ."""
-    if before is None or before.parameters != built.network.parameters:
-        return None
-    model = ReducedModel(built.grid, before._basis, theta)
-    return model if model.drift(theta) < _SERVED * np.sqrt(fit.found.mean_square) else None
-
-
 def _worst_zones(fit: Fit) -> tuple[str, ...]:
     """Zones with the largest errors, in which effects of single zones are sought; none where that is all of them."""
     zones = fit.built.network.zones
@@ -327,9 +311,7 @@ def _worst_zones(fit: Fit) -> tuple[str, ...]:
     return tuple(z for k, z in enumerate(zones) if k in worst)
 
 
-def screen(
-    bench: Bench, fit: Fit, candidates: Sequence[str], before: Screening | None = None
-) -> tuple[Screening, list[Gain], Gain]:
+def screen(bench: Bench, fit: Fit, candidates: Sequence[str]) -> tuple[Screening, list[Gain], Gain]:
     """Screen all candidates; they come by what they gain, and the generic heat beside them.
 
     Parameters
@@ -340,9 +322,7 @@ def screen(
         The model so far.
     candidates : sequence of str
         Effects that the case can tell.
-    before : Screening, optional
-        Of the round before.
     """
-    made = Screening(bench, fit, candidates, before)
+    made = Screening(bench, fit, candidates)
     gains = [made.of(e) for e in candidates if e not in fit.effects]
     return made, sorted(gains, key=lambda g: -g.gain), made.of(GENERIC.id)

@@ -112,13 +112,12 @@ def search(
         Called with stage, done, total.
     """
     done: list[Round] = []
-    made: Screening | None = None
     fit, errors, ahead = baseline, held_out(bench, baseline), None
     while len(done) < ROUNDS:
         if progress is not None:
             progress("diagnose", len(done), ROUNDS)
         open_ = [e for e in candidates if all(r in fit.effects for r in CATALOGUE[e].requires)]
-        made, gains, generic = screen(bench, fit, open_, made)
+        made, gains, generic = screen(bench, fit, open_)
         exchanged = _exchanged(bench, done, made, open_)
         if exchanged is not None:
             done[-2:] = [exchanged]

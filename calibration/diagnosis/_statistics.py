@@ -39,6 +39,12 @@ def statistics_content(result: Diagnosis) -> dict[str, Any]:
         "detectable": [(zone, watts(w)) for zone, w in result.detectable.items()],
         "parameters": _parameters(baseline, final if result.final.effects else ()),
         "bounds": _bounds(baseline, final if result.final.effects else ()),
+        "elsewhere": ""
+        if result.last_third is None
+        else (
+            "The telemetry's last third shows other weather or use than the days before it: a baseline tuned on these "
+            f"misses it by {kelvin(result.last_third)} K. So tuning and held-out days alternate."
+        ),
         "intervals": [
             (name, clock(i.start), clock(i.end))
             for name, part in (("tuning", result.tuned), ("held out", result.judged))

@@ -113,15 +113,15 @@ def where_it_lies(bench: Bench, fit: Fit) -> Where:
     zones = parts.zone_groups()
     times = parts.times()
     single = {z: parts.zone_mask([z]) for z in parts.zones}
-    stepping, spin_up = bench.settings.stepping, bench.settings.spin_up_seconds
+    stepping, spin_up, since = bench.settings.stepping, bench.settings.spin_up_seconds, bench.tuned[-1].start
     return Where(
         sentence=parts.sentence(zones, times),
         zones=tuple(parts.share(z, mask) for z, mask in single.items()),
         hours=parts.by_hour(),
         modes={name: parts.share(name, mask) for name, mask in times.items()},
         groups=tuple(parts.share(name, mask) for name, mask in zones.items()),
-        missing=missing_heat(fit, bench.judged, stepping, spin_up),
-        missing_at_start=missing_heat(at_start(fit), bench.judged, stepping, spin_up, fixed=True),
+        missing=missing_heat(fit, bench.judged, stepping, spin_up, since=since),
+        missing_at_start=missing_heat(at_start(fit), bench.judged, stepping, spin_up, fixed=True, since=since),
         drift=drift_of(fit, bench.judged, stepping, spin_up),
     )
 
