@@ -25,6 +25,10 @@ ROUNDS, MOST_REFITS = 8, 4
 #: Gain by tangents from which an effect is fitted anew [-], and the least share of the best's that it must have.
 LEAST_GAIN, LEAST_SHARE = 3.0, 0.4
 
+#: Share of what its tangents promise that the best effect of a round must keep when fitted, else it is fitted from
+#: another start too [-].
+_KEPT = 0.75
+
 #: Most pairs that a round fits.
 MOST_PAIRS = 2
 
@@ -180,7 +184,8 @@ def _refits(work: Work, gains: Sequence[Gain], ahead: Refit | None) -> list[Refi
             break
         if ahead is None or ahead.screened.effect != g.effect:
             tries = [work.refit([g], work.made.promised(g))]
-            if g is gains[0] and (tries[0] is None or tries[0].gain < g.gain):  # a calibrated θ may have hidden it
+            kept = 0.0 if tries[0] is None else tries[0].gain
+            if g is gains[0] and kept < _KEPT * g.gain:  # a calibrated θ may have hidden it
                 tries.append(work.refit([g], work.accepted | dict(g.strengths)))
             found.extend(sorted((t for t in tries if t is not None), key=lambda t: -t.gain)[:1])
     best = max((r for r in found if r.counts), key=lambda r: r.gain, default=None)

@@ -19,8 +19,11 @@ from calibration import (
     parse_interval,
     select_runs,
 )
+from calibration._intervals import Runs, alternating_intervals, merge
+from calibration._starts import joined, tuning_runs
 from calibration.errors import HorizonError, IntervalError, NotEnoughDataError
 from thermal import Case, Inputs, Telemetry, build_network, load_bundled_case, replay_inputs
+from thermal.model import SPIN_UP
 
 
 def inputs_of(days: float = 6.0, step: float = 300.0, start: str = "2023-03-01T00:05:00-05:00", **given: Any) -> Inputs:
@@ -192,6 +195,48 @@ def test_what_one_kind_of_interval_leaves_serves_the_other() -> None:
         default_intervals(bundled(), [Interval(stamps[0], stamps[-1])])
     with pytest.raises(IntervalError, match="overlap"):
         default_intervals(bundled(), [early, early])
+
+
+@pytest.mark.parametrize(("first", "last"), [(0, 2880), (100, 2700), (0, 2650), (0, 2600)])
+def test_intervals_take_turns_and_share_out_all_telemetry(first: int, last: int) -> None:
+    case = bundled()
+    case = Case(case.building, Telemetry.from_frame(case.telemetry.frame.iloc[first:last]))
+    tuning, held_out = alternating_intervals(case)
+    ordered = sorted([*tuning, *held_out], key=lambda i: i.start)
+    assert merge(ordered) == ordered
+    whose = np.zeros(len(case.stamps), dtype=int)
+    for number, part in enumerate((tuning, held_out), 1):
+        for i in part:
+            whose[(case.stamps >= i.start) & (case.stamps <= i.end)] += number
+    assert set(whose) == {1, 2}  # every stamp in one of them
+    assert 0.59 < np.mean(whose == 1) < 0.72
+    assert ordered[0] in tuning
+    lengths = {round((i.end - i.start) / pd.Timedelta("1D"), 1) for i in held_out[:-1]}
+    assert lengths == {1.0}
+    assert all(i.end.time() == pd.Timestamp("00:00").time() for i in tuning[:-1])
+
+
+def test_telemetry_too_short_for_turns_is_told() -> None:
+    case = bundled()
+    short = Case(case.building, Telemetry.from_frame(case.telemetry.frame.iloc[: 8 * 288]))
+    with pytest.raises(NotEnoughDataError, match="expected 9 days of telemetry or more, found 8.0"):
+        alternating_intervals(short)
+
+
+def test_runs_that_take_turns_share_a_spin_up_and_keep_to_their_days() -> None:
+    case = bundled()
+    inputs = replay_inputs(case, build_network(case.building, dx=1.5))
+    tuning, _ = alternating_intervals(case)
+    apart = tuning_runs(inputs, tuning, 72, SPIN_UP)
+    (together,) = joined(apart)
+    assert together.begin == apart[0].begin
+    assert together.starts.tolist() == [s for r in apart for s in r.starts]
+    residuals = (together.starts[:, None] + np.arange(1, 73)).ravel()
+    inside = [(inputs.stamps[residuals] >= i.start) & (inputs.stamps[residuals] <= i.end) for i in tuning]
+    assert np.any(inside, axis=0).all()
+    assert all(r.starts.size == 8 for r in apart[1:-1])  # two days of six hours, from midnight on
+    far = Runs(int(together.starts[-1]) + 1, together.starts + 3000, 0)
+    assert joined([together, far]) == (together, far)
 
 
 def test_interval_as_text() -> None:

@@ -1,11 +1,17 @@
-"""Growth of held-out errors between two models, by hand."""
+"""Growth of held-out errors between two models, by hand; and which days are held out."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
+from calibration import default_intervals
+from calibration._intervals import alternating_intervals
+from calibration.diagnosis import baseline_gap, diagnose, gap_of
 from calibration.diagnosis._held_out import HeldOut, growth
+from calibration.diagnosis._statistics import statistics_content
+from thermal import Building, Case, Telemetry
+from thermal.pilot import MOUNTAIN_VIEW, TwinRanges, devices, generate_office, generate_twin
 
 
 def errors(days: list[int], daily: list[float], weight: list[float]) -> HeldOut:
@@ -26,3 +32,36 @@ def test_days_with_few_runs_count_less_and_one_day_has_no_error() -> None:
     assert grown == pytest.approx(0.1)
     assert error == pytest.approx(np.sqrt(2.0 * ((0.75 * 0.1) ** 2 + (0.25 * 0.3) ** 2)))
     assert growth(before, errors([2], [0.5], [10.0])) == (pytest.approx(0.3), 0.0)
+
+
+def late_heat() -> Case:
+    """A twin of 15 days in which a meter of one zone misses half of the air in the last five."""
+    plans = generate_office(3, floor_area=120.0, zones=4, floors=1)
+    building = Building("office", MOUNTAIN_VIEW, 0.0, plans, devices(plans))
+    quiet = TwinRanges(disturbance_deviation=(0.05, 0.1), noise=(0.005, 0.01))
+    case = generate_twin(building, 3, days=15.0, step_seconds=900.0, dx=1.0, meter="exact", ranges=quiet)[0]
+    frame = case.telemetry.frame.copy()
+    (device,) = building.devices_of(building.zone_names[1])
+    flow = frame.columns.get_loc(f"{device.name}/supply_air_flowrate_sensor")
+    frame.iloc[len(frame) * 2 // 3 :, flow] *= 0.5
+    return Case(building, Telemetry.from_frame(frame))
+
+
+def test_days_alternate_where_the_last_third_shows_what_the_others_do_not() -> None:
+    case = late_heat()
+    found = diagnose(case, dx=1.0)
+    answer = found.to_dict()
+    assert found.last_third is not None and found.last_third > found.gap
+    assert (list(found.tuned), list(found.judged)) == alternating_intervals(case)
+    assert gap_of(answer) == found.last_third == pytest.approx(baseline_gap(case, dx=1.0), rel=1e-12)
+    assert max(found.where.zones, key=lambda s: s.share).name == case.building.zone_names[1]
+    assert "tuning and held-out days alternate" in statistics_content(found)["elsewhere"]
+
+
+def test_given_intervals_are_kept_whatever_they_show() -> None:
+    case = late_heat()
+    tuning, judged = default_intervals(case)
+    found = diagnose(case, tuning, judged, dx=1.0)
+    assert found.last_third is None
+    assert (list(found.tuned), list(found.judged)) == (tuning, judged)
+    assert gap_of(found.to_dict()) == found.gap
