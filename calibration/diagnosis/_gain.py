@@ -34,6 +34,8 @@ class Gain:
         Share of its signature that calibration cannot imitate [-].
     direction : ndarray, shape (n_strength,)
         Its strengths among all those screened, for cosines [parameter units].
+    index : ndarray of int
+        Positions of its strengths there.
     places : int
         How many zones or pairs of zones it may be in; 0 where it acts on the whole building.
     choice : float
@@ -48,6 +50,7 @@ class Gain:
     deviations: Mapping[str, float]
     retained: float
     direction: FloatArray
+    index: NDArray[np.int64]
     places: int = 0
     choice: float = 0.0
 

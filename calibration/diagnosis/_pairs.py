@@ -10,6 +10,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
+import numpy as np
+
 from calibration.diagnosis._gain import Gain
 from calibration.diagnosis._screen import Screening
 
@@ -50,6 +52,6 @@ def nominate(made: Screening, gains: Sequence[Gain], least: float) -> list[Pair]
     for first, second in combinations(gains, 2):
         if made.reach(first, second) > least:
             pair = Pair(*made.together(first, second))
-            if pair.gain > least and all(any(g.strengths.values()) for g in (pair.first, pair.second)):
+            if pair.gain > least and all(np.any(g.direction) for g in (pair.first, pair.second)):
                 found.append(pair)
     return sorted(found, key=lambda p: -p.gain)

@@ -15,12 +15,13 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from calibration._problem import Problem
 from calibration.diagnosis._bench import Bench, Fit, is_strength
 from calibration.diagnosis._gain import Gain, choice_of
 from calibration.diagnosis._generic import GENERIC, ZONE_HEAT
 from thermal import Parameter, reduced_model
 from thermal.effects import CATALOGUE, PAIR, Chosen
-from thermal.model import FEW_SHIFTS
+from thermal.model import FEW_SHIFTS, ReducedModel
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -57,30 +58,35 @@ class Screening:
         lacking = {e: here if CATALOGUE[e].zonal else () for e in candidates if e not in fit.effects}
         built = bench.build({**fit.effects, **lacking}, (Chosen(GENERIC, here),))
         self._elsewhere = len(built.network.zones) - len(here) if here else 0
-        theta = built.theta(fit.values)
+        own: tuple[Parameter, ...] = built.network.parameters
+        self._levels = {p.effect: p for p in own if p.effect in lacking and p.name == CATALOGUE[p.effect].level}
+        levels = {p.name: (p.lower, p.upper) for p in self._levels.values()}
+        theta, other = (built.theta({**fit.values, **{name: ends[k] for name, ends in levels.items()}}) for k in (0, 1))
         # a Galerkin basis of a symmetric model serves its tangents too: neither two shifts more nor a second θ, with
         # every effect at work, changes a gain by over 0.03
         model = reduced_model(built.grid, [theta], shifts=FEW_SHIFTS, order=_LARGEST_ORDER if here else None)
         problem = bench.problem(built, theta)
-        parts = [problem.errors(model, theta, runs, slopes=True) for runs in problem.runs]
-        slopes = np.concatenate([m.reshape(-1, m.shape[-1]) for _, m in parts if m is not None])
+        slopes = _slopes(problem, model, theta)
+        twice = [i for i, p in enumerate(own) if p.effect in self._levels and is_strength(p.name, p.effect)]
+        if twice:
+            slopes = np.hstack([slopes, _slopes(problem, model, other)[:, twice]])
+        self._twins = {len(own) + k: i for k, i in enumerate(twice)}
+        self.parameters = (*own, *(replace(own[i], name=f"{own[i].name} at the other end") for i in twice))
         error = np.concatenate([
             fit.problem.errors(fit.model, fit.theta, runs, slopes=False)[0].ravel()
             for runs in fit.problem.runs
         ])  # fmt: skip
         seen = np.isfinite(error)
-        self.parameters: tuple[Parameter, ...] = built.network.parameters
         self.count = problem.effective_size()
         self.scale = self.count / float(np.sum(error[seen] ** 2))
-        jacobian = slopes[seen] * problem.slopes(theta)
+        jacobian = slopes[seen]
         gram = self.scale * jacobian.T @ jacobian
         score = -self.scale * jacobian.T @ error[seen]
         self.prior = np.array([p.prior_deviation for p in self.parameters])
         self.lower = np.array([p.lower for p in self.parameters])
         self.upper = np.array([p.upper for p in self.parameters])
-        self._position = {p.name: i for i, p in enumerate(self.parameters)}
         self._start = np.array([p.transform(p.start) for p in self.parameters])
-        self._point = problem.point(theta)
+        self._point = np.concatenate([problem.point(theta), np.zeros(len(twice))])
         self._whole, self._slope = gram, score
         self._project(np.array([p.name in fit.values for p in self.parameters]))
 
@@ -168,7 +174,7 @@ class Screening:
         first, second : Gain
             With their zones.
         """
-        index = np.concatenate([self._of(first), self._of(second)])
+        index = np.concatenate([first.index, second.index])
         hessian = self.gram[np.ix_(index, index)] + np.diag(self.prior[index] ** -2.0)
         return self._weigh(index, np.linalg.solve(hessian, self.score[index]))[0] - first.choice - second.choice
 
@@ -180,13 +186,13 @@ class Screening:
         first, second : Gain
             With their zones.
         """
-        parts = self._of(first), self._of(second)
+        parts = first.index, second.index
         x, gain, _ = self._solve(np.concatenate(parts))
         found = []
         for one, index, strengths in zip((first, second), parts, np.split(x, [parts[0].size]), strict=True):
             direction = np.zeros(len(self.parameters))
             direction[index] = strengths
-            named = dict(zip(one.strengths, strengths.tolist(), strict=True))
+            named = self._named(one.effect, index, strengths, np.zeros((index.size, index.size)))[0]
             found.append(replace(one, strengths=named, direction=direction))
         return found[0], found[1], gain - first.choice - second.choice
 
@@ -226,9 +232,21 @@ class Screening:
         sizes = [self._gain(GENERIC.id, f, (), tightness=t) for f in families for t in _TIGHTNESS]
         return max(sizes, key=lambda g: g.gain)
 
-    def _of(self, gain: Gain) -> IntArray:
-        """Positions of the strengths of an effect in its zones, in their order."""
-        return np.array([self._position[name] for name in gain.strengths], dtype=np.int64)
+    def _named(
+        self, effect: str, index: IntArray, x: FloatArray, covariance: FloatArray
+    ) -> tuple[dict[str, float], dict[str, float]]:
+        """Parameters by name and their standard errors: strengths, and the level between its ends that they weigh."""
+        own = np.array([self._twins.get(i, i) for i in index.tolist()])
+        rows = {self.parameters[i].name: (own == i).astype(float) for i in dict.fromkeys(own.tolist())}
+        values = {name: float(row @ x) for name, row in rows.items()}
+        level, whole = self._levels.get(effect), float(x.sum())
+        if level is not None:
+            reach, upper = level.upper - level.lower, own != index
+            share = float(x[upper].sum()) / whole if whole > 0.0 else (level.start - level.lower) / reach
+            values[level.name] = level.lower + share * reach
+            rows[level.name] = reach * (upper - share) / whole if whole > 0.0 else np.zeros(len(x))
+        errors = {name: float(np.sqrt(row @ covariance @ row)) for name, row in rows.items()}
+        return values, errors
 
     def _strengths(self, effect: str) -> IntArray:
         return np.array(
@@ -266,14 +284,12 @@ class Screening:
         x, gain, share = self._solve(index, tightness)
         direction = np.zeros(len(self.parameters))
         direction[index] = x
-        names = [self.parameters[i].name for i in index]
         sharper = self.gram[np.ix_(index, index)] / (1.0 - share) + np.diag(self.prior[index] ** -2.0)
-        deviations = np.sqrt(np.diag(np.linalg.inv(sharper)))
         along = direction if np.any(direction) else np.isin(np.arange(len(direction)), index).astype(float)
         whole = float(along @ self._whole @ along)
         kept = float(along @ self.gram @ along) / whole if whole > 0.0 else 0.0
-        strengths, errors = (dict(zip(names, v.tolist(), strict=True)) for v in (x, deviations))
-        return Gain(effect, zones, gain - choice, share, strengths, errors, kept, direction, places, choice)
+        strengths, errors = self._named(effect, index, x, np.linalg.inv(sharper))
+        return Gain(effect, zones, gain - choice, share, strengths, errors, kept, direction, index, places, choice)
 
     def _solve(self, index: IntArray, tightness: float = 1.0) -> tuple[FloatArray, float, float]:
         """Strengths, gain and share of the squared error: coordinate descent within the ranges."""
@@ -300,6 +316,12 @@ class Screening:
         gain = -0.5 * self.count * np.log1p(-share) - 0.5 * pull - 0.5 * occam
         gain += np.log(2.0) * np.count_nonzero((self.lower[index] == 0.0) & (x > 0.0))
         return float(gain), share
+
+
+def _slopes(problem: Problem, model: ReducedModel, theta: FloatArray) -> FloatArray:
+    """Differentiate all errors with respect to the parameters on the estimation scale, (n_error, n_parameter)."""
+    parts = [problem.errors(model, theta, runs, slopes=True)[1] for runs in problem.runs]
+    return np.concatenate([m.reshape(-1, m.shape[-1]) for m in parts if m is not None]) * problem.slopes(theta)
 
 
 def _worst_zones(fit: Fit) -> tuple[str, ...]:

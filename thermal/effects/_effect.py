@@ -61,6 +61,9 @@ class Effect:
     shifts : tuple of str
         Parameters that move telemetry in time [h]. Up to a step they say how a value is spread over its own step, which
         telemetry cannot tell from the effect.
+    level : str
+        Parameter that the effect's heat per unit of strength is linear in, so that what it is matters as much as the
+        strength; empty where there is none.
     """
 
     id: str
@@ -77,6 +80,7 @@ class Effect:
     requires: tuple[str, ...] = ()
     applies: Callable[[Anatomy], str | None] | None = None
     shifts: tuple[str, ...] = ()
+    level: str = ""
 
     def untestable(self, drivers: Drivers, anatomy: Anatomy) -> str | None:
         """Say why a case cannot tell whether the effect is there; None when it can.

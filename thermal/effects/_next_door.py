@@ -148,6 +148,7 @@ GROUND_EXCHANGE = Effect(
     ),
     build=_build_ground,
     applies=_no_ground,
+    level="ground_temperature",
 )
 
 NEIGHBOUR = Effect(
@@ -164,6 +165,7 @@ NEIGHBOUR = Effect(
     ),
     build=_build_neighbour,
     applies=_no_party_side,
+    level="neighbour_temperature",
 )
 
 HIDDEN_MASS = Effect(

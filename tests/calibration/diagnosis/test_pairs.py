@@ -39,7 +39,7 @@ def screening(signatures: FloatArray, errors: FloatArray, fitted: Mapping[str, f
     made.lower = np.array([p.lower for p in made.parameters])
     made.upper = np.array([p.upper for p in made.parameters])
     made._elsewhere = 0
-    made._position = {p.name: i for i, p in enumerate(made.parameters)}
+    made._levels, made._twins = {}, {}
     made._whole, made._slope = made.scale * signatures.T @ signatures, -made.scale * signatures.T @ errors
     made._start, made._point = np.zeros(len(NAMES)), np.array([(fitted or {}).get(name, 0.0) for name in NAMES])
     made._project(np.array([name in (fitted or {}) for name in NAMES]))
