@@ -147,6 +147,34 @@ def test_a_screening_sees_the_tangents_of_the_grid(monkeypatch: pytest.MonkeyPat
             assert one.strengths == pytest.approx(other.strengths, rel=0.03, abs=2e-3), name
 
 
+def test_tangents_know_both_ends_of_the_ground_temperature() -> None:
+    """Columns of the Gram matrix are those of differences of runs; their mixture is U times the distance to T_g."""
+    bench, *_ = biased_and_misread()
+    fit = bench.fit({}, [{}])
+    made = Screening(bench, fit, ("ground_exchange",))
+    names = [p.name for p in made.parameters]
+    level = next(p for p in made.parameters if p.name == "ground_temperature")
+    columns = [names.index("ground_u_value"), len(names) - 1]
+    built = bench.build({"ground_exchange": ()})
+
+    def errors(u_value: float, temperature: float) -> FloatArray:
+        theta = built.theta({**fit.values, "ground_u_value": u_value, "ground_temperature": temperature})
+        problem = bench.problem(built, theta)
+        return np.concatenate([problem.errors(built.grid, theta, r, slopes=False)[0].ravel() for r in problem.runs])
+
+    away = 1e-3
+    none, middle = errors(0.0, level.start), 0.25 * level.lower + 0.75 * level.upper
+    low, high, between = ((errors(away, t) - none) / away for t in (level.lower, level.upper, middle))
+    assert between == pytest.approx(0.25 * low + 0.75 * high, abs=1e-3 * np.abs(high).max())
+    wanted = made.scale * np.array([[low @ low, low @ high], [low @ high, high @ high]])
+    assert made._whole[np.ix_(columns, columns)] == pytest.approx(wanted, rel=0.02)
+    values, errors_of = made._named("ground_exchange", np.array(columns), np.array([0.1, 0.3]), 1e-4 * np.eye(2))
+    assert values == pytest.approx({"ground_u_value": 0.4, "ground_temperature": middle})
+    assert errors_of["ground_u_value"] == pytest.approx(0.01 * np.sqrt(2.0))
+    span = level.upper - level.lower
+    assert errors_of["ground_temperature"] == pytest.approx(0.01 * span * np.hypot(0.75, 0.25) / 0.4)
+
+
 def in_zone(made: Screening, effect: str, zone: str) -> Gain:
     index = np.array([k for k, p in enumerate(made.parameters) if p.name == f"{effect}@{zone}"])
     return made._gain(effect, index, (zone,), choice_of(1, 4), 4)
