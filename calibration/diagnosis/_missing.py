@@ -77,6 +77,7 @@ def missing_heat(
     spin_up_seconds: float = SPIN_UP,
     fixed: bool = False,
     since: pd.Timestamp | None = None,
+    near: DisturbanceModel | None = None,
 ) -> Missing:
     """Estimate the heat that a fitted model lacks on intervals of telemetry, by the hour.
 
@@ -99,6 +100,8 @@ def missing_heat(
         Take the parameters as they are: the band is of the noise alone.
     since : Timestamp, optional
         Beginning of the last tuning interval, where held-out days lie between tuning intervals.
+    near : DisturbanceModel, optional
+        Size and course of the heat that a like model lacks, to begin with.
 
     Raises
     ------
@@ -115,7 +118,7 @@ def missing_heat(
     if many and model.order > _ORDER:
         model = reduced_model(fit.built.grid, [fit.theta], order=_ORDER)
     covariance: Covariance = "steady" if many else "exact"
-    disturbance = _tuned(fit, model, since, scheme, spin_up_seconds)
+    disturbance = _tuned(fit, model, since, near, scheme, spin_up_seconds)
     parts = []
     for interval in intervals:
         filtered = filter_interval(
@@ -151,7 +154,12 @@ def at_start(fit: Fit) -> Fit:
 
 
 def _tuned(
-    fit: Fit, model: ReducedModel, since: pd.Timestamp | None, scheme: Scheme, spin_up_seconds: float
+    fit: Fit,
+    model: ReducedModel,
+    since: pd.Timestamp | None,
+    near: DisturbanceModel | None,
+    scheme: Scheme,
+    spin_up_seconds: float,
 ) -> DisturbanceModel:
     """Size and course of the missing heat and noise of the sensors, on the last of what was fitted."""
     many, last = len(model.network.zones) > _MANY_ZONES, fit.problem.stretches[-1]
@@ -159,8 +167,8 @@ def _tuned(
     stretch = Interval(max(last.start, latest, since or latest), last.end)
     return tune_disturbance(
         model, fit.theta, fit.built.inputs, [stretch], per_zone=() if many else ("deviation",),
-        weights=air_volumes(model.network), scheme=scheme, covariance="steady", spin_up_seconds=spin_up_seconds,
-        curvature=False,
+        weights=air_volumes(model.network), start=near, scheme=scheme, covariance="steady",
+        spin_up_seconds=spin_up_seconds, curvature=False,
     ).disturbance  # fmt: skip
 
 

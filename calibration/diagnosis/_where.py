@@ -114,14 +114,18 @@ def where_it_lies(bench: Bench, fit: Fit) -> Where:
     times = parts.times()
     single = {z: parts.zone_mask([z]) for z in parts.zones}
     stepping, spin_up, since = bench.settings.stepping, bench.settings.spin_up_seconds, bench.tuned[-1].start
+    missing = missing_heat(fit, bench.judged, stepping, spin_up, since=since)
+    start = missing_heat(
+        at_start(fit), bench.judged, stepping, spin_up, fixed=True, since=since, near=missing.disturbance
+    )
     return Where(
         sentence=parts.sentence(zones, times),
         zones=tuple(parts.share(z, mask) for z, mask in single.items()),
         hours=parts.by_hour(),
         modes={name: parts.share(name, mask) for name, mask in times.items()},
         groups=tuple(parts.share(name, mask) for name, mask in zones.items()),
-        missing=missing_heat(fit, bench.judged, stepping, spin_up, since=since),
-        missing_at_start=missing_heat(at_start(fit), bench.judged, stepping, spin_up, fixed=True, since=since),
+        missing=missing,
+        missing_at_start=start,
         drift=drift_of(fit, bench.judged, stepping, spin_up),
     )
 
