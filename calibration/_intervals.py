@@ -116,28 +116,28 @@ def alternating_intervals(case: Case) -> tuple[list[Interval], list[Interval]]:
     Returns
     -------
     tuple of lists
-        Two days in three, and the third, from midnight to midnight; what is left at the end tunes where it is over
-        a day, and is held out else.
+        Two local days in three from midnight to midnight, from whose stamps runs start and end, and what lies between
+        them; what is left at the end tunes where it is over a day, and is held out else.
 
     Raises
     ------
     NotEnoughDataError
         When the telemetry is shorter than three such turns.
     """
-    stamps, day = case.stamps, pd.Timedelta(days=1)
+    stamps = case.stamps
     start, end, step = stamps[0], stamps[-1], stamps[1] - stamps[0]
-    midnight = start.normalize()
-    days = (end + step - midnight) / day
-    turns = int(days) // (_TUNING_DAYS + 1)
+    midnight, turn = start.normalize(), _TUNING_DAYS + 1
+    days = ((end + step).tz_localize(None) - midnight.tz_localize(None)) / pd.Timedelta(days=1)
+    turns = int(days) // turn
     if turns < _TURNS:
         raise NotEnoughDataError(
-            f"alternating intervals: expected {_TURNS * (_TUNING_DAYS + 1)} days of telemetry or more, found {days:.1f}"
+            f"alternating intervals: expected {_TURNS * turn} days of telemetry or more, found {days:.1f}"
         )
-    begins = [midnight + k * (_TUNING_DAYS + 1) * day for k in range(turns)]  # the last stamp of the turn before
-    tuned = [Interval(max(b + step, start), b + _TUNING_DAYS * day) for b in begins]
-    judged = [Interval(i.end + step, min(i.end + day, end)) for i in tuned]
-    if end - judged[-1].end > day:
-        return [*tuned, Interval(judged[-1].end + step, end)], judged
+    begins = [midnight + pd.DateOffset(days=k * turn) for k in range(turns + 1)]
+    tuned = [Interval(max(b, start), b + pd.DateOffset(days=_TUNING_DAYS)) for b in begins[:-1]]
+    judged = [Interval(i.end + step, b - step) for i, b in zip(tuned, begins[1:], strict=True)]
+    if end - begins[-1] > pd.Timedelta(days=1):
+        return [*tuned, Interval(begins[-1], end)], judged
     return tuned, [*judged[:-1], Interval(judged[-1].start, end)]
 
 

@@ -47,7 +47,7 @@ def tuning_runs(inputs: Inputs, intervals: Sequence[Interval], steps: int, spin_
             found = select_runs(inputs, interval, steps, spin_up=spin_up, least=max(LEAST_SPIN_UP, min(spin_up, half)))
         except NotEnoughDataError:
             found = select_runs(inputs, interval, steps, spin_up=spin_up)
-        inside = found.starts >= inputs.stamps.searchsorted(interval.start) - 1  # every residual lies in the interval
+        inside = found.starts >= inputs.stamps.searchsorted(interval.start)  # every residual lies in the interval
         chosen.append(Runs(found.begin, found.starts[inside], found.skipped))
     runs = tuple(r for r in thin(chosen, steps) if r.starts.size)
     if not runs:
@@ -55,23 +55,6 @@ def tuning_runs(inputs: Inputs, intervals: Sequence[Interval], steps: int, spin_
             "tuning: every run misses inputs or zone temperatures; `buildingmpc check` shows the gaps"
         )
     return runs
-
-
-def joined(runs: Sequence[Runs]) -> tuple[Runs, ...]:
-    """Let runs share one spin-up where that of the later ones would begin before the earlier ones end.
-
-    Parameters
-    ----------
-    runs : sequence of Runs
-        One entry an interval, in order.
-    """
-    joined: list[Runs] = []
-    for r in runs:
-        if joined and r.begin <= joined[-1].starts[-1]:
-            last = joined.pop()
-            r = Runs(last.begin, np.concatenate([last.starts, r.starts]), last.skipped + r.skipped)
-        joined.append(r)
-    return tuple(joined)
 
 
 def solve_starts(

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from calibration._estimate import DRIFT_TOLERANCE
 from calibration._evaluate import Predictions, evaluate_model
-from calibration._intervals import Interval, alternating_intervals, default_intervals, horizon_steps
+from calibration._intervals import Interval, alternating_intervals, default_intervals, horizon_steps, select_runs
 from calibration._problem import Problem
 from calibration._settings import ModelSettings
-from calibration._starts import joined, tuning_runs
+from calibration._starts import tuning_runs
 from calibration.diagnosis._fit import Found, descend, evidence_of
 from calibration.diagnosis._openings import seen_openings
 from calibration.errors import NotEnoughDataError
@@ -35,6 +35,9 @@ TYPICAL = 0.25
 #: Evaluations of a fit, and of what follows when its model had to be reduced anew: models are compared by what they
 #: explain, which the last digits of θ do not change.
 EVALUATIONS, _AFTER = 14, 4
+
+#: Fewest held-out days that may take turns with those that tune.
+_LEAST_DAYS = 3
 
 #: Parameters on the linear scale that are no strength: they act on one.
 _SHIFTS = ("internal_gain_delay",)
@@ -173,14 +176,26 @@ class Bench:
     def __post_init__(self) -> None:
         self.tuned, self.judged = default_intervals(self.case, self.tune, self.hold_out)
 
-    def alternate(self) -> bool:
-        """Let tuning and held-out days take turns where no intervals were given; whether they do now."""
+    def alternate(self, inputs: Inputs) -> bool:
+        """Let tuning and held-out days take turns where no intervals were given; whether they do now.
+
+        Parameters
+        ----------
+        inputs : Inputs
+            The telemetry; days without a run are left out, and too few of them leave the intervals as they were.
+        """
         if self.tune or self.hold_out:
             return False
+        steps, spin_up = horizon_steps(self.horizon, inputs.step), self.settings.spin_up_seconds
         try:
-            self.tuned, self.judged = alternating_intervals(self.case)
+            tuned, judged = alternating_intervals(self.case)
+            tuning_runs(inputs, tuned, steps, spin_up)
+            judged = [i for i in judged if select_runs(inputs, i, steps, spin_up=spin_up).starts.size]
         except NotEnoughDataError:
             return False
+        if len(judged) < _LEAST_DAYS:
+            return False
+        self.tuned, self.judged = tuned, judged
         return True
 
     @cached_property
@@ -232,7 +247,7 @@ class Bench:
         steps = horizon_steps(self.horizon, built.inputs.step)
         runs = tuning_runs(built.inputs, self.tuned, steps, self.settings.spin_up_seconds)
         free = tuple(range(len(theta)))
-        return Problem(built.grid, built.inputs, joined(runs), steps, free, theta, self.settings.stepping)
+        return Problem(built.grid, built.inputs, runs, steps, free, theta, self.settings.stepping)
 
     def fit(
         self,

@@ -196,9 +196,9 @@ def diagnose(
     untestable = bench.untestable()
     baseline = bench.fit({}, [{}])
     first = held_out(bench, baseline)
-    turns = elsewhere(baseline, first) and bench.alternate()
+    turns = elsewhere(baseline, first) and bench.alternate(baseline.built.inputs)
     if turns:
-        baseline = bench.fit({}, [baseline.values], baseline.built)
+        baseline = bench.fit({}, [{}], baseline.built)
     where = where_it_lies(bench, baseline)
     rounds = search(bench, baseline, [e for e in CATALOGUE if e not in untestable], progress)
     steps, gap, floor = how_far(bench, rounds)
@@ -249,7 +249,7 @@ def baseline_gap(
     dx: float | None = None,
     horizon: str = "6h",
 ) -> float:
-    """Calibrate the baseline and give its held-out error, the gap that `diagnose` begins with [K].
+    """Calibrate the baseline and give its held-out error, by which `diagnose` chooses its days [K].
 
     Parameters
     ----------

@@ -57,7 +57,7 @@ def held_out(bench: Bench, fit: Fit, horizon: str | None = None) -> HeldOut:
     for p in bench.predictions(fit, horizon=horizon):
         step = pd.Timedelta(seconds=fit.built.inputs.step)
         size.append(np.nanmean(np.abs(p.error), axis=1))
-        day.append((p.start + int(p.steps[-1]) * step).normalize().asi8)
+        day.append((p.start + (int(p.steps[-1]) - 1) * step).normalize().asi8)  # a stamp ends its step
     sizes, days = np.concatenate(size), np.concatenate(day)
     known = np.isfinite(sizes)
     there, index = np.unique(days[known], return_inverse=True)

@@ -76,7 +76,6 @@ def missing_heat(
     scheme: Scheme = IMPLICIT_EULER,
     spin_up_seconds: float = SPIN_UP,
     fixed: bool = False,
-    since: pd.Timestamp | None = None,
     near: DisturbanceModel | None = None,
 ) -> Missing:
     """Estimate the heat that a fitted model lacks on intervals of telemetry, by the hour.
@@ -98,8 +97,6 @@ def missing_heat(
         Telemetry before an interval that the spin-up may use [s].
     fixed : bool
         Take the parameters as they are: the band is of the noise alone.
-    since : Timestamp, optional
-        Beginning of the last tuning interval, where held-out days lie between tuning intervals.
     near : DisturbanceModel, optional
         Size and course of the heat that a like model lacks, to begin with.
 
@@ -118,7 +115,7 @@ def missing_heat(
     if many and model.order > _ORDER:
         model = reduced_model(fit.built.grid, [fit.theta], order=_ORDER)
     covariance: Covariance = "steady" if many else "exact"
-    disturbance = _tuned(fit, model, since, near, scheme, spin_up_seconds)
+    disturbance = _tuned(fit, model, near, scheme, spin_up_seconds)
     parts = []
     for interval in intervals:
         filtered = filter_interval(
@@ -156,7 +153,6 @@ def at_start(fit: Fit) -> Fit:
 def _tuned(
     fit: Fit,
     model: ReducedModel,
-    since: pd.Timestamp | None,
     near: DisturbanceModel | None,
     scheme: Scheme,
     spin_up_seconds: float,
@@ -164,7 +160,7 @@ def _tuned(
     """Size and course of the missing heat and noise of the sensors, on the last of what was fitted."""
     many, last = len(model.network.zones) > _MANY_ZONES, fit.problem.stretches[-1]
     latest = last.end - pd.Timedelta(seconds=_TUNED_MANY if many else _TUNED)
-    stretch = Interval(max(last.start, latest, since or latest), last.end)
+    stretch = Interval(max(last.start, latest), last.end)
     return tune_disturbance(
         model, fit.theta, fit.built.inputs, [stretch], per_zone=() if many else ("deviation",),
         weights=air_volumes(model.network), start=near, scheme=scheme, covariance="steady",

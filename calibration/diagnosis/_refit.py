@@ -26,7 +26,7 @@ MATTERS = 0.03
 #: differs from day to day by chance disproves nothing.
 NO_WORSE, CHANCE = 0.005, 1.645
 
-#: Gain of the fit from which an effect is accepted [-]; null cases stay below, as with `calibration.diagnosis._levels`.
+#: Gain of the fit from which an effect is accepted [-]; of 60 null cases one has more, and counts.
 ACCEPTED = 6.0
 
 

@@ -238,7 +238,8 @@ class Screening:
         """Parameters by name and their standard errors: strengths, and the level between its ends that they weigh."""
         own = np.array([self._twins.get(i, i) for i in index.tolist()])
         rows = {self.parameters[i].name: (own == i).astype(float) for i in dict.fromkeys(own.tolist())}
-        values = {name: float(row @ x) for name, row in rows.items()}
+        most = {self.parameters[i].name: self.parameters[i].upper for i in own.tolist()}
+        values = {name: min(float(row @ x), most[name]) for name, row in rows.items()}
         level, whole = self._levels.get(effect), float(x.sum())
         if level is not None:
             reach, upper = level.upper - level.lower, own != index
@@ -249,10 +250,8 @@ class Screening:
         return values, errors
 
     def _strengths(self, effect: str) -> IntArray:
-        return np.array(
-            [i for i, p in enumerate(self.parameters) if p.effect == effect and is_strength(p.name, effect)],
-            dtype=np.int64,
-        )
+        own = ((i, self.parameters[self._twins.get(i, i)]) for i in range(len(self.parameters)))
+        return np.array([i for i, p in own if p.effect == effect and is_strength(p.name, effect)], dtype=np.int64)
 
     def _grow(self, effect: str, members: Mapping[str, IntArray]) -> Gain:
         """Add zones, or pairs of them, as long as each more than pays for having been chosen among all."""

@@ -113,11 +113,9 @@ def where_it_lies(bench: Bench, fit: Fit) -> Where:
     zones = parts.zone_groups()
     times = parts.times()
     single = {z: parts.zone_mask([z]) for z in parts.zones}
-    stepping, spin_up, since = bench.settings.stepping, bench.settings.spin_up_seconds, bench.tuned[-1].start
-    missing = missing_heat(fit, bench.judged, stepping, spin_up, since=since)
-    start = missing_heat(
-        at_start(fit), bench.judged, stepping, spin_up, fixed=True, since=since, near=missing.disturbance
-    )
+    stepping, spin_up = bench.settings.stepping, bench.settings.spin_up_seconds
+    missing = missing_heat(fit, bench.judged, stepping, spin_up)
+    start = missing_heat(at_start(fit), bench.judged, stepping, spin_up, fixed=True, near=missing.disturbance)
     return Where(
         sentence=parts.sentence(zones, times),
         zones=tuple(parts.share(z, mask) for z, mask in single.items()),
@@ -142,7 +140,7 @@ class _Parts:
         self.known = np.isfinite(squared)
         self.squared = np.where(self.known, squared, 0.0)
         self.row = fit.built.inputs.stamps.get_indexer(self.target)
-        self.days = np.unique(self.target.normalize(), return_inverse=True)[1]
+        self.days = np.unique((self.target - step).normalize(), return_inverse=True)[1]  # a stamp ends its step
         self.heat = fit.built.inputs.heat[self.row]
         self.network: ThermalNetwork = fit.built.network
 

@@ -29,11 +29,17 @@ def diagnose(
     ],
     tune: Annotated[
         list[str] | None,
-        typer.Option(metavar="START/END", help="Tuning interval, repeatable; default: the first two thirds."),
+        typer.Option(
+            metavar="START/END",
+            help="Tuning interval, repeatable; default: the first two thirds, "
+            "or two days in three where the last third shows other weather.",
+        ),
     ] = None,
     hold_out: Annotated[
         list[str] | None,
-        typer.Option(metavar="START/END", help="Held-out interval, repeatable; default: the last third."),
+        typer.Option(
+            metavar="START/END", help="Held-out interval, repeatable; default: the last third, or every third day."
+        ),
     ] = None,
     dx: Dx = None,
     horizon: Annotated[str, typer.Option(metavar="TIME", help="Prediction horizon, such as 6h or 90min.")] = "6h",

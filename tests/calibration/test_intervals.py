@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -19,11 +20,16 @@ from calibration import (
     parse_interval,
     select_runs,
 )
-from calibration._intervals import Runs, alternating_intervals, merge
-from calibration._starts import joined, tuning_runs
+from calibration._intervals import alternating_intervals, merge
+from calibration._starts import tuning_runs
 from calibration.errors import HorizonError, IntervalError, NotEnoughDataError
 from thermal import Case, Inputs, Telemetry, build_network, load_bundled_case, replay_inputs
 from thermal.model import SPIN_UP
+
+
+def replace_stamps(stamps: pd.DatetimeIndex) -> Any:
+    """Something with stamps, which is all that intervals of a case need."""
+    return SimpleNamespace(stamps=stamps)
 
 
 def inputs_of(days: float = 6.0, step: float = 300.0, start: str = "2023-03-01T00:05:00-05:00", **given: Any) -> Inputs:
@@ -223,20 +229,26 @@ def test_telemetry_too_short_for_turns_is_told() -> None:
         alternating_intervals(short)
 
 
-def test_runs_that_take_turns_share_a_spin_up_and_keep_to_their_days() -> None:
+def test_runs_that_take_turns_keep_to_their_days() -> None:
     case = bundled()
     inputs = replay_inputs(case, build_network(case.building, dx=1.5))
-    tuning, _ = alternating_intervals(case)
+    tuning, held_out = alternating_intervals(case)
     apart = tuning_runs(inputs, tuning, 72, SPIN_UP)
-    (together,) = joined(apart)
-    assert together.begin == apart[0].begin
-    assert together.starts.tolist() == [s for r in apart for s in r.starts]
-    residuals = (together.starts[:, None] + np.arange(1, 73)).ravel()
-    inside = [(inputs.stamps[residuals] >= i.start) & (inputs.stamps[residuals] <= i.end) for i in tuning]
-    assert np.any(inside, axis=0).all()
     assert all(r.starts.size == 8 for r in apart[1:-1])  # two days of six hours, from midnight on
-    far = Runs(int(together.starts[-1]) + 1, together.starts + 3000, 0)
-    assert joined([together, far]) == (together, far)
+    judged = [select_runs(inputs, i, 72) for i in held_out]
+    for part, runs in ((tuning, apart), (held_out, judged)):
+        targets = [inputs.stamps[r.starts + 72] for r in runs]
+        assert all(i.start <= t[0] and t[-1] <= i.end for i, t in zip(part, targets, strict=True))
+
+
+def test_days_take_turns_from_midnight_to_midnight_where_clocks_change() -> None:
+    stamps = pd.date_range("2023-03-09T00:05", periods=12 * 288, freq="5min", tz="America/New_York")
+    case = replace_stamps(stamps)
+    tuning, held_out = alternating_intervals(case)
+    assert {i.end.strftime("%H:%M") for i in tuning[:-1]} == {"00:00"}
+    assert {i.start.strftime("%H:%M") for i in held_out} == {"00:05"}
+    assert {i.start.day for i in held_out} == {11, 14, 17, 20}
+    assert tuning[1].end - tuning[1].start == pd.Timedelta("47h")  # clocks are put forward on the 12th
 
 
 def test_interval_as_text() -> None:

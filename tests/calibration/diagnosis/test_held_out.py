@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from calibration import default_intervals
 from calibration._intervals import alternating_intervals
+from calibration._settings import ModelSettings
 from calibration.diagnosis import baseline_gap, diagnose, gap_of
-from calibration.diagnosis._held_out import HeldOut, growth
+from calibration.diagnosis._bench import Bench
+from calibration.diagnosis._held_out import HeldOut, growth, held_out
 from calibration.diagnosis._statistics import statistics_content
 from thermal import Building, Case, Telemetry
 from thermal.pilot import MOUNTAIN_VIEW, TwinRanges, devices, generate_office, generate_twin
@@ -65,3 +68,20 @@ def test_given_intervals_are_kept_whatever_they_show() -> None:
     assert found.last_third is None
     assert (list(found.tuned), list(found.judged)) == (tuning, judged)
     assert gap_of(found.to_dict()) == found.gap
+
+
+def test_days_do_not_alternate_where_runs_have_no_room_and_lose_what_is_not_measured() -> None:
+    case = late_heat()
+    long = Bench(case, ModelSettings(dx=1.0), horizon="60h")
+    before = long.tuned, long.judged
+    inputs = long.build({}).inputs
+    assert not long.alternate(inputs)  # no run of 60 hours begins and ends in two days
+    assert (long.tuned, long.judged) == before
+    _, judged = alternating_intervals(case)
+    gap = case.telemetry.frame.copy()
+    missing = (gap.index > judged[1].start - pd.Timedelta("6h")) & (gap.index <= judged[1].end)
+    gap.loc[missing, [c for c in gap.columns if c.endswith("zone_air_temperature_sensor")]] = np.nan
+    bench = Bench(Case(case.building, Telemetry.from_frame(gap)), ModelSettings(dx=1.0))
+    assert bench.alternate(bench.build({}).inputs)
+    assert bench.judged == [judged[0], *judged[2:]]
+    assert held_out(bench, bench.fit({}, [{}])).days.size == len(bench.judged)  # each is one day
