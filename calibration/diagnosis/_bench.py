@@ -9,16 +9,15 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from calibration._estimate import DRIFT_TOLERANCE
 from calibration._evaluate import Predictions, evaluate_model
 from calibration._intervals import Interval, alternating_intervals, default_intervals, horizon_steps, select_runs
 from calibration._problem import Problem
 from calibration._settings import ModelSettings
 from calibration._starts import tuning_runs
-from calibration.diagnosis._fit import Found, descend, evidence_of
+from calibration.diagnosis._fit import Found, evidence_of, settle
 from calibration.diagnosis._openings import seen_openings
 from calibration.errors import NotEnoughDataError
-from thermal import Case, Inputs, SymbolicModel, ThermalNetwork, reduced_model, replay_inputs
+from thermal import Case, Inputs, SymbolicModel, ThermalNetwork, replay_inputs
 from thermal.effects import CATALOGUE, chosen
 from thermal.model import ReducedModel
 from thermal.network import Anatomy, Blueprint, Extension, blueprint
@@ -32,9 +31,8 @@ Effects = Mapping[str, Sequence[str]]
 #: Share of its plausible range that the strength of an effect has where a basis is made and a fit begins [-].
 TYPICAL = 0.25
 
-#: Evaluations of a fit, and of what follows when its model had to be reduced anew: models are compared by what they
-#: explain, which the last digits of θ do not change.
-EVALUATIONS, _AFTER = 14, 4
+#: Evaluations of a fit: models are compared by what they explain, which the last digits of θ do not change.
+EVALUATIONS = 18
 
 #: Fewest held-out days that may take turns with those that tune.
 _LEAST_DAYS = 3
@@ -274,11 +272,7 @@ class Bench:
         for known in starts:
             theta = built.theta(known, TYPICAL)
             problem = self.problem(built, theta)
-            model = reduced_model(built.grid, [theta])
-            found = descend(problem, model, problem.point(theta), evaluations)
-            if model.drift(problem.theta(found.point)) > DRIFT_TOLERANCE:
-                model = reduced_model(built.grid, [problem.theta(found.point)])
-                found = descend(problem, model, found.point, _AFTER)
+            model, found = settle(problem, built.grid, theta, evaluations)
             value = evidence_of(problem, found)
             if best is None or value > best.evidence:
                 best = Fit({e: tuple(z) for e, z in effects.items()}, built, problem, model, found, value)

@@ -7,15 +7,17 @@ enough. Errors count as one a day and zone, with the deviation that they have: t
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 from scipy.special import log_ndtr
 
+from calibration._estimate import DRIFT_TOLERANCE
 from calibration._problem import Problem
-from thermal import SymbolicModel
+from thermal import SymbolicModel, reduced_model
+from thermal.model import ReducedModel
 
 FloatArray = NDArray[np.float64]
 
@@ -24,6 +26,10 @@ _LONGEST = 1.5
 
 #: Length of a step in standard errors a parameter below which another would change nothing [-].
 _SHORTEST = 0.1
+
+#: Evaluations that a basis serves before it is judged, and fall of the cost that the next one must confirm for the
+#: descent to go on [-].
+_TOGETHER, _CONFIRMED = 2, 0.5
 
 #: Times that a step is halved before it is given up.
 _HALVINGS = 4
@@ -41,8 +47,8 @@ class Found:
         Of the errors [K²].
     cost : float
         See the module [-].
-    jacobian : ndarray
-        Of weighted errors and priors there [-].
+    residual, jacobian : ndarray
+        Weighted errors and priors there, and their derivatives [-].
     evaluations : int
         Of the errors with their derivatives.
     settled : bool
@@ -52,12 +58,56 @@ class Found:
     point: FloatArray
     mean_square: float
     cost: float
+    residual: FloatArray
     jacobian: FloatArray
     evaluations: int
     settled: bool
 
 
-def descend(problem: Problem, model: SymbolicModel, z: FloatArray, evaluations: int) -> Found:
+def settle(
+    problem: Problem, grid: SymbolicModel, theta: FloatArray, evaluations: int, model: ReducedModel | None = None
+) -> tuple[ReducedModel, Found]:
+    """Descend on reduced models, each made anew where the last one no longer serves.
+
+    A reduced model is exact where it was made. What a few steps gain on one counts as far as the next, made where they
+    lead, confirms it: without that, a fit goes where its basis is wrong.
+
+    Parameters
+    ----------
+    problem : Problem
+        What to fit.
+    grid : SymbolicModel
+        To be reduced.
+    theta : ndarray, shape (n_parameter,)
+        Start [parameter units].
+    evaluations : int
+        Most evaluations of errors with derivatives.
+    model : ReducedModel, optional
+        Made at the start, where it is at hand.
+
+    Returns
+    -------
+    tuple
+        The model that serves the estimate, and the estimate.
+    """
+    model = model or reduced_model(grid, [theta])
+    here, together = descend(problem, model, problem.point(theta), 1), _TOGETHER
+    while not here.settled and here.evaluations < evaluations:
+        ahead = descend(problem, model, here, min(together, evaluations - here.evaluations))
+        together = _TOGETHER if ahead.cost < here.cost else _HALVINGS + 2  # all halvings of a step that is too long
+        if ahead.cost == here.cost or model.drift(problem.theta(ahead.point)) <= DRIFT_TOLERANCE:
+            here = ahead
+            continue
+        anew = reduced_model(grid, [problem.theta(ahead.point)])
+        there = descend(problem, anew, ahead.point, 1)
+        there = replace(there, evaluations=ahead.evaluations + 1)
+        if there.cost > here.cost - _CONFIRMED:
+            return (model, replace(here, settled=True)) if here.cost <= there.cost else (anew, there)
+        model, here = anew, there
+    return model, here
+
+
+def descend(problem: Problem, model: SymbolicModel, start: FloatArray | Found, evaluations: int) -> Found:
     """Fit by Gauss-Newton steps.
 
     Parameters
@@ -66,17 +116,22 @@ def descend(problem: Problem, model: SymbolicModel, z: FloatArray, evaluations: 
         What to fit.
     model : SymbolicModel
         Reduced.
-    z : ndarray, shape (n_parameter,)
-        Start on the estimation scale [-].
+    start : ndarray, shape (n_parameter,), or Found
+        On the estimation scale [-]; what is known there already is not evaluated again.
     evaluations : int
-        Most evaluations of errors with derivatives.
+        Most evaluations of errors with derivatives from here on.
     """
     lower, upper = problem.bounds
     reach = _LONGEST * np.array([p.prior_deviation for p in problem.parameters])
-    cost, mean, residual, jacobian = _at(problem, model, z)
-    used, settled, factor = 1, False, 1.0
+    if isinstance(start, Found):
+        z, cost, mean, residual, jacobian = start.point, start.cost, start.mean_square, start.residual, start.jacobian
+        used = before = start.evaluations
+    else:
+        z, (cost, mean, residual, jacobian) = start, _at(problem, model, start)
+        used, before = 1, 0
+    settled, factor = False, 1.0
     step = np.zeros_like(z)
-    while used < evaluations:
+    while used - before < evaluations:
         if factor == 1.0:
             low, high = np.maximum(lower - z, -reach), np.minimum(upper - z, reach)
             step = lsq_linear(jacobian, -residual, (np.minimum(low, -1e-12), np.maximum(high, 1e-12))).x
@@ -93,7 +148,7 @@ def descend(problem: Problem, model: SymbolicModel, z: FloatArray, evaluations: 
             break
         else:
             factor *= 0.5
-    return Found(z, mean, cost, jacobian, used, settled)
+    return Found(z, mean, cost, residual, jacobian, used, settled)
 
 
 def evidence_of(problem: Problem, found: Found) -> float:

@@ -11,7 +11,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from calibration.diagnosis._bench import Bench, Built, Fit
-from calibration.diagnosis._fit import descend
+from calibration.diagnosis._fit import settle
 from calibration.diagnosis._generic import GENERIC
 from calibration.diagnosis._held_out import HeldOut, held_out
 from calibration.diagnosis._refit import Refit
@@ -169,8 +169,8 @@ def _shuffled(bench: Bench, r: Round, accepted: Refit) -> float | None:
         return None
     permuted = Built(built.network, built.grid, _permuted(built.inputs, varying))
     problem = bench.problem(permuted, fit.theta)
-    found = descend(problem, fit.model, fit.found.point, _EVALUATIONS)  # the model is the same, and so is its basis
-    return held_out(bench, replace(fit, built=permuted, problem=problem, found=found)).mae
+    model, found = settle(problem, built.grid, fit.theta, _EVALUATIONS, fit.model)
+    return held_out(bench, replace(fit, built=permuted, problem=problem, model=model, found=found)).mae
 
 
 def _permuted(inputs: Inputs, columns: Sequence[int]) -> Inputs:

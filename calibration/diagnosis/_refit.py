@@ -16,7 +16,7 @@ from thermal import ModelError
 from thermal.effects import CATALOGUE
 
 #: Evaluations of a fit from one start.
-_EVALUATIONS = 6
+_EVALUATIONS = 10
 
 #: Least fall of an error by which an effect matters to predictions, of the root mean square where it is fitted or of
 #: the mean where it is held out [K].

@@ -10,8 +10,11 @@ import pytest
 from numpy.typing import NDArray
 from scipy.integrate import trapezoid
 
+from calibration._settings import ModelSettings
+from calibration.diagnosis._bench import Bench
 from calibration.diagnosis._fit import descend, evidence_of
-from thermal import Parameter
+from thermal import Building, Parameter
+from thermal.pilot import MOUNTAIN_VIEW, devices, generate_office, generate_twin
 
 FloatArray = NDArray[np.float64]
 
@@ -90,3 +93,28 @@ def test_evidence_is_the_integral_over_the_prior() -> None:
         assert evidence_of(problem, found) == pytest.approx(exact, abs=0.1)
         strengths[truth] = exact + 150.0 * np.log(np.mean(wanted**2))
     assert strengths[0.3] > 0.0 > strengths[0.0]
+
+
+def test_what_a_fit_finds_is_so_on_the_grid() -> None:
+    """Far from where the first basis was made: it would promise errors that the grid does not have."""
+    plans = generate_office(3, floor_area=120.0, zones=4, floors=1)
+    building = Building("office", MOUNTAIN_VIEW, 0.0, plans, devices(plans))
+    case = generate_twin(building, 5, days=9.0, step_seconds=900.0, dx=1.0, meter="exact")[0]
+    bench = Bench(case, ModelSettings(dx=1.0))
+    start = {"slab_coupling": 20.0, "slab_heat_capacity": 6e5, "furniture_coupling": 8.0, "window_u_value": 5.0}
+    fit = bench.fit({"roof_exchange": ()}, [start])
+    errors = [fit.problem.errors(fit.built.grid, fit.theta, r, slopes=False)[0].ravel() for r in fit.problem.runs]
+    grid = np.concatenate(errors)
+    assert fit.found.mean_square == pytest.approx(np.nanmean(grid**2), rel=0.02)
+    near = bench.fit({"roof_exchange": ()}, [{}])
+    assert fit.evidence == pytest.approx(near.evidence, abs=2.0)  # from wherever it starts
+
+
+def test_a_descent_in_parts_comes_to_where_one_does() -> None:
+    problem = linear()
+    whole = descend(problem, problem, np.array([-40.0, 30.0]), 60)
+    part = descend(problem, problem, np.array([-40.0, 30.0]), 1)
+    while not part.settled:
+        part = descend(problem, problem, part, 3)
+    np.testing.assert_array_equal(part.point, whole.point)
+    assert part.evaluations == whole.evaluations
