@@ -10,11 +10,8 @@ import pytest
 from numpy.typing import NDArray
 from scipy.integrate import trapezoid
 
-from calibration._settings import ModelSettings
-from calibration.diagnosis._bench import Bench
-from calibration.diagnosis._fit import descend, evidence_of
-from thermal import Building, Parameter
-from thermal.pilot import MOUNTAIN_VIEW, devices, generate_office, generate_twin
+from calibration.diagnosis._fit import descend, evidence_of, settle
+from thermal import Parameter
 
 FloatArray = NDArray[np.float64]
 
@@ -34,6 +31,9 @@ class Linear:
 
     def theta(self, z: FloatArray) -> FloatArray:
         return z
+
+    def point(self, theta: FloatArray) -> FloatArray:
+        return theta
 
     def slopes(self, theta: FloatArray) -> FloatArray:
         return np.ones_like(theta)
@@ -95,19 +95,43 @@ def test_evidence_is_the_integral_over_the_prior() -> None:
     assert strengths[0.3] > 0.0 > strengths[0.0]
 
 
-def test_what_a_fit_finds_is_so_on_the_grid() -> None:
-    """Far from where the first basis was made: it would promise errors that the grid does not have."""
-    plans = generate_office(3, floor_area=120.0, zones=4, floors=1)
-    building = Building("office", MOUNTAIN_VIEW, 0.0, plans, devices(plans))
-    case = generate_twin(building, 5, days=9.0, step_seconds=900.0, dx=1.0, meter="exact")[0]
-    bench = Bench(case, ModelSettings(dx=1.0))
-    start = {"slab_coupling": 20.0, "slab_heat_capacity": 6e5, "furniture_coupling": 8.0, "window_u_value": 5.0}
-    fit = bench.fit({"roof_exchange": ()}, [start])
-    errors = [fit.problem.errors(fit.built.grid, fit.theta, r, slopes=False)[0].ravel() for r in fit.problem.runs]
-    grid = np.concatenate(errors)
-    assert fit.found.mean_square == pytest.approx(np.nanmean(grid**2), rel=0.02)
-    near = bench.fit({"roof_exchange": ()}, [{}])
-    assert fit.evidence == pytest.approx(near.evidence, abs=2.0)  # from wherever it starts
+@dataclass
+class Basis:
+    """A model that is exact where it was made, and promises smaller errors the farther away it is used."""
+
+    theta: FloatArray
+
+    def drift(self, theta: FloatArray) -> float:
+        return float(np.linalg.norm(theta - self.theta))
+
+
+class Flattered(Linear):
+    def residuals(self, model: Any, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
+        error, slopes = super().residuals(model, theta)
+        away = theta - model.theta
+        less = np.exp(-0.5 * away @ away)
+        return less * error, less * (slopes - np.outer(error, away))
+
+
+def test_a_fit_counts_what_the_next_basis_confirms(monkeypatch: pytest.MonkeyPatch) -> None:
+    made: list[Basis] = []
+
+    def reduced(_: Any, thetas: list[FloatArray]) -> Basis:
+        made.append(Basis(np.array(thetas[0])))
+        return made[-1]
+
+    monkeypatch.setattr("calibration.diagnosis._fit.reduced_model", reduced)
+    plain = linear(4.0, -4.0)
+    problem: Any = Flattered(plain.matrix, plain.wanted, plain.parameters, plain.count)
+    start = np.array([-3.0, 3.0])
+    model, found = settle(problem, problem, start, 60)
+    exact = np.mean(plain.residuals(None, found.point)[0] ** 2)
+    assert len(made) > 2
+    assert model is made[-1] or model is made[-2]
+    assert found.mean_square == pytest.approx(exact, rel=1e-9)
+    assert exact < np.mean(plain.residuals(None, start)[0] ** 2) / 10.0
+    one = descend(problem, Basis(start), start, 60)  # a single basis runs away
+    assert np.mean(plain.residuals(None, one.point)[0] ** 2) > 10.0 * one.mean_square
 
 
 def test_a_descent_in_parts_comes_to_where_one_does() -> None:
