@@ -30,6 +30,9 @@ BoolArray = NDArray[np.bool_]
 #: Sweeps of the quadratic programme, and the change of an estimate in prior deviations that ends them [-].
 _SWEEPS, _TOLERANCE = 200, 1e-6
 
+#: Share of its range that a strength has where it is asked what a level changes [-].
+_LITTLE = 1e-3
+
 #: Order of the reduced model of a large building.
 _LARGEST_ORDER = 700
 
@@ -68,17 +71,16 @@ class Screening:
         problem = bench.problem(built, theta)
         slopes = _slopes(problem, model, theta)
         twice = [i for i, p in enumerate(own) if p.effect in self._levels and is_strength(p.name, p.effect)]
-        if twice:
-            slopes = np.hstack([slopes, _slopes(problem, model, other)[:, twice]])
+        for i in twice:
+            little = _LITTLE * own[i].upper * (np.arange(len(own)) == i)
+            low, high = (_errors(problem, model, end + little) for end in (theta, other))
+            slopes = np.column_stack([slopes, slopes[:, i] + (high - low) / little[i]])
         self._twins = {len(own) + k: i for k, i in enumerate(twice)}
         self.parameters = (*own, *(replace(own[i], name=f"{own[i].name} at the other end") for i in twice))
-        error = np.concatenate([
-            fit.problem.errors(fit.model, fit.theta, runs, slopes=False)[0].ravel()
-            for runs in fit.problem.runs
-        ])  # fmt: skip
+        error = _errors(fit.problem, fit.model, fit.theta)
         seen = np.isfinite(error)
         self.count = problem.effective_size()
-        self.scale = self.count / float(np.sum(error[seen] ** 2))
+        self.scale: float = self.count / float(np.sum(error[seen] ** 2))
         jacobian = slopes[seen]
         gram = self.scale * jacobian.T @ jacobian
         score = -self.scale * jacobian.T @ error[seen]
@@ -117,7 +119,7 @@ class Screening:
         move[left] = np.linalg.solve(
             hessian, self._slope[left] - away / self.prior[left] ** 2 - self._whole[left] @ move
         )
-        factor = self.count / (self.count - 2.0 * self._slope @ move + move @ self._whole @ move)
+        factor = self.count / float(self.count - 2.0 * self._slope @ move + move @ self._whole @ move)
         less = copy(self)
         less.scale = factor * self.scale
         less._whole, less._slope = factor * self._whole, factor * (self._slope - self._whole @ move)
@@ -287,7 +289,7 @@ class Screening:
         along = direction if np.any(direction) else np.isin(np.arange(len(direction)), index).astype(float)
         whole = float(along @ self._whole @ along)
         kept = float(along @ self.gram @ along) / whole if whole > 0.0 else 0.0
-        strengths, errors = self._named(effect, index, x, np.linalg.inv(sharper))
+        strengths, errors = self._named(effect, index, x, np.asarray(np.linalg.inv(sharper)))
         return Gain(effect, zones, gain - choice, share, strengths, errors, kept, direction, index, places, choice)
 
     def _solve(self, index: IntArray, tightness: float = 1.0) -> tuple[FloatArray, float, float]:
@@ -315,6 +317,11 @@ class Screening:
         gain = -0.5 * self.count * np.log1p(-share) - 0.5 * pull - 0.5 * occam
         gain += np.log(2.0) * np.count_nonzero((self.lower[index] == 0.0) & (x > 0.0))
         return float(gain), share
+
+
+def _errors(problem: Problem, model: ReducedModel, theta: FloatArray) -> FloatArray:
+    """List all errors, shape (n_error,); NaN where nothing is measured."""
+    return np.concatenate([problem.errors(model, theta, runs, slopes=False)[0].ravel() for runs in problem.runs])
 
 
 def _slopes(problem: Problem, model: ReducedModel, theta: FloatArray) -> FloatArray:
