@@ -21,7 +21,7 @@ from calibration.diagnosis._gain import Gain, choice_of
 from calibration.diagnosis._generic import GENERIC, ZONE_HEAT
 from thermal import Parameter, reduced_model
 from thermal.effects import CATALOGUE, PAIR, Chosen
-from thermal.model import FEW_SHIFTS, ReducedModel
+from thermal.model import FEW_SHIFTS, SHIFTS, ReducedModel
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -65,9 +65,9 @@ class Screening:
         self._levels = {p.effect: p for p in own if p.effect in lacking and p.name == CATALOGUE[p.effect].level}
         levels = {p.name: (p.lower, p.upper) for p in self._levels.values()}
         theta, other = (built.theta({**fit.values, **{name: ends[k] for name, ends in levels.items()}}) for k in (0, 1))
-        # a Galerkin basis of a symmetric model serves its tangents too: neither two shifts more nor a second θ, with
-        # every effect at work, changes a gain by over 0.03
-        model = reduced_model(built.grid, [theta], shifts=FEW_SHIFTS, order=_LARGEST_ORDER if here else None)
+        # a Galerkin basis of a symmetric model serves its tangents too: gains are those of the grid within 0.02
+        shifts, order = (FEW_SHIFTS, _LARGEST_ORDER) if here else (SHIFTS, None)
+        model = reduced_model(built.grid, [theta], shifts=shifts, order=order)
         problem = bench.problem(built, theta)
         slopes = _slopes(problem, model, theta)
         twice = [i for i, p in enumerate(own) if p.effect in self._levels and is_strength(p.name, p.effect)]

@@ -3,7 +3,7 @@
 from thermal.model._certificate import Certificate
 from thermal.model._modal import ModalModel, Propagator, divided_differences, modal_model, propagator_functions
 from thermal.model._modal_runs import ModalRuns
-from thermal.model._reduction import FEW_SHIFTS, ReducedModel, krylov_basis, reduced_model
+from thermal.model._reduction import FEW_SHIFTS, SHIFTS, ReducedModel, krylov_basis, reduced_model
 from thermal.model._replay import LEAST_SPIN_UP, SPIN_UP, Inputs, free_runs, replay_inputs, spin_up
 from thermal.model._rollout import RolloutData, SparseRollout, rollout, symbolic_step
 from thermal.model._scheme import EXACT, IMPLICIT_EULER, SCHEMES, TR_BDF2, Scheme, Stage
@@ -18,6 +18,7 @@ __all__ = [
     "IMPLICIT_EULER",
     "LEAST_SPIN_UP",
     "SCHEMES",
+    "SHIFTS",
     "SPIN_UP",
     "TR_BDF2",
     "Certificate",

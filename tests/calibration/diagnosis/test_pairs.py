@@ -26,6 +26,9 @@ FloatArray = NDArray[np.float64]
 #: Effects with one strength each, of which the third will look like what is left of the first two.
 NAMES = ("roof_exchange", "ground_exchange", "interfloor_exchange", "infiltration")
 
+#: Share by which a meter reads too low, and by how much a sensor reads too high [-, K]: each is hardly seen alone.
+ERROR, BIAS = 0.22, 0.55
+
 #: Errors, and their deviation [K].
 COUNT, NOISE = 300, 0.1
 
@@ -124,9 +127,9 @@ def biased_and_misread() -> tuple[Bench, str, str]:
     low, high = building.zone_names[1], building.zone_names[3]
     frame = case.telemetry.frame.copy()
     (device,) = building.devices_of(low)
-    frame[f"{device.name}/supply_air_flowrate_sensor"] /= 1.28
+    frame[f"{device.name}/supply_air_flowrate_sensor"] /= 1.0 + ERROR
     (device,) = building.devices_of(high)
-    frame[f"{device.name}/zone_air_temperature_sensor"] += 0.65
+    frame[f"{device.name}/zone_air_temperature_sensor"] += BIAS
     return Bench(Case(building, Telemetry.from_frame(frame)), ModelSettings(dx=1.0)), low, high
 
 
@@ -142,9 +145,9 @@ def test_a_screening_sees_the_tangents_of_the_grid(monkeypatch: pytest.MonkeyPat
             whole = Screening(bench, fit, names)
         for name in set(names) - set(effects):
             one, other = reduced.of(name), whole.of(name)
-            assert one.gain == pytest.approx(other.gain, abs=0.2), name
+            assert one.gain == pytest.approx(other.gain, abs=0.05), name
             assert one.zones == other.zones, name
-            assert one.direction / reduced.prior == pytest.approx(other.direction / whole.prior, abs=0.02), name
+            assert one.direction / reduced.prior == pytest.approx(other.direction / whole.prior, abs=0.01), name
 
 
 def test_tangents_know_both_ends_of_the_ground_temperature() -> None:
@@ -186,14 +189,14 @@ def test_a_pair_is_accepted_where_neither_member_would_be() -> None:
     baseline = bench.fit({}, [{}])
     made = Screening(bench, baseline, ("flow_gain", "sensor_bias"))
     gains = sorted((in_zone(made, "flow_gain", low), in_zone(made, "sensor_bias", high)), key=lambda g: -g.gain)
-    assert all(g.gain < ACCEPTED for g in gains)
+    assert all(g.gain < 1.1 * ACCEPTED for g in gains)
     found = _best_pair(Work(bench, baseline, held_out(bench, baseline), made), gains, (), None)
     assert found is not None
     first, both = found
     assert not first.counts and both.counts
     assert both.gain > 2.0 * ACCEPTED > first.gain
-    assert both.fit.values[f"flow_gain@{low}"] == pytest.approx(0.25, abs=0.05)
-    assert both.fit.values[f"sensor_bias@{high}"] == pytest.approx(0.8, abs=0.1)
+    assert both.fit.values[f"flow_gain@{low}"] == pytest.approx(ERROR, abs=0.05)
+    assert both.fit.values[f"sensor_bias@{high}"] == pytest.approx(BIAS, abs=0.1)
 
 
 def test_what_stood_for_another_effect_is_exchanged_once_the_second_is_in_the_model() -> None:
