@@ -91,15 +91,15 @@ def settle(
         The model that serves the estimate, and the estimate.
     """
     model = model or reduced_model(grid, [theta])
-    here, together = descend(problem, model, problem.point(theta), 1), _TOGETHER
+    here, together = _descend(problem, model, problem.point(theta), 1), _TOGETHER
     while not here.settled and here.evaluations < evaluations:
-        ahead = descend(problem, model, here, min(together, evaluations - here.evaluations))
+        ahead = _descend(problem, model, here, min(together, evaluations - here.evaluations))
         together = _TOGETHER if ahead.cost < here.cost else _HALVINGS + 2  # all halvings of a step that is too long
         if ahead.cost == here.cost or model.drift(problem.theta(ahead.point)) <= DRIFT_TOLERANCE:
             here = ahead
             continue
         anew = reduced_model(grid, [problem.theta(ahead.point)])
-        there = descend(problem, anew, ahead.point, 1)
+        there = _descend(problem, anew, ahead.point, 1)
         there = replace(there, evaluations=ahead.evaluations + 1)
         if there.cost > here.cost - _CONFIRMED:
             return (model, replace(here, settled=True)) if here.cost <= there.cost else (anew, there)
@@ -107,7 +107,7 @@ def settle(
     return model, here
 
 
-def descend(problem: Problem, model: SymbolicModel, start: FloatArray | Found, evaluations: int) -> Found:
+def _descend(problem: Problem, model: SymbolicModel, start: FloatArray | Found, evaluations: int) -> Found:
     """Fit by Gauss-Newton steps.
 
     Parameters

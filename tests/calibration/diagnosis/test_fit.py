@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.integrate import trapezoid
 
-from calibration.diagnosis._fit import descend, evidence_of, settle
+from calibration.diagnosis._fit import _descend, evidence_of, settle
 from thermal import Parameter
 
 FloatArray = NDArray[np.float64]
@@ -18,7 +18,7 @@ FloatArray = NDArray[np.float64]
 
 @dataclass
 class Linear:
-    """What `descend` asks of a problem, for errors ``A z - b`` and independent priors."""
+    """What `_descend` asks of a problem, for errors ``A z - b`` and independent priors."""
 
     matrix: FloatArray
     wanted: FloatArray
@@ -61,7 +61,7 @@ def linear(upper: float = 1e3, lower: float = -1e3) -> Any:
 
 def test_least_squares_are_found_from_afar() -> None:
     problem = linear()
-    found = descend(problem, problem, np.array([-40.0, 30.0]), 60)
+    found = _descend(problem, problem, np.array([-40.0, 30.0]), 60)
     best = np.linalg.lstsq(problem.matrix, problem.wanted, rcond=None)[0]
     assert found.settled
     np.testing.assert_allclose(found.point, best, atol=2e-3)
@@ -70,7 +70,7 @@ def test_least_squares_are_found_from_afar() -> None:
 
 def test_a_strength_stays_in_its_range() -> None:
     problem = linear(upper=1.5, lower=0.0)
-    found = descend(problem, problem, np.array([0.4, 0.4]), 30)
+    found = _descend(problem, problem, np.array([0.4, 0.4]), 30)
     assert found.point[0] == pytest.approx(1.5, abs=1e-6)
     assert 0.0 <= found.point[1] <= 1.5
 
@@ -83,7 +83,7 @@ def test_evidence_is_the_integral_over_the_prior() -> None:
     for truth in (0.0, 0.3):
         wanted = truth * matrix[:, 0] + rng.standard_normal(300)
         problem: Any = Linear(matrix, wanted, (parameter("a", 1.0),), 300.0)
-        found = descend(problem, problem, np.array([0.2]), 30)
+        found = _descend(problem, problem, np.array([0.2]), 30)
         grid = np.linspace(0.0, 1.0, 20001)
         errors = wanted[None, :] - grid[:, None] * matrix[:, 0][None, :]
         log_likelihood = -150.0 * np.log(np.mean(errors**2, axis=1))
@@ -130,15 +130,15 @@ def test_a_fit_counts_what_the_next_basis_confirms(monkeypatch: pytest.MonkeyPat
     assert model is made[-1] or model is made[-2]
     assert found.mean_square == pytest.approx(exact, rel=1e-9)
     assert exact < np.mean(plain.residuals(None, start)[0] ** 2) / 10.0
-    one = descend(problem, Basis(start), start, 60)  # a single basis runs away
+    one = _descend(problem, Basis(start), start, 60)  # a single basis runs away
     assert np.mean(plain.residuals(None, one.point)[0] ** 2) > 10.0 * one.mean_square
 
 
 def test_a_descent_in_parts_comes_to_where_one_does() -> None:
     problem = linear()
-    whole = descend(problem, problem, np.array([-40.0, 30.0]), 60)
-    part = descend(problem, problem, np.array([-40.0, 30.0]), 1)
+    whole = _descend(problem, problem, np.array([-40.0, 30.0]), 60)
+    part = _descend(problem, problem, np.array([-40.0, 30.0]), 1)
     while not part.settled:
-        part = descend(problem, problem, part, 3)
+        part = _descend(problem, problem, part, 3)
     np.testing.assert_array_equal(part.point, whole.point)
     assert part.evaluations == whole.evaluations
