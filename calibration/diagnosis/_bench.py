@@ -28,7 +28,7 @@ FloatArray = NDArray[np.float64]
 #: Effects in a model, each with its zones; none is the whole building.
 Effects = Mapping[str, Sequence[str]]
 
-#: Share of its plausible range that the strength of an effect has where a basis is made and a fit begins [-].
+#: Share of its plausible range that the strength of an effect has where a fit begins [-].
 TYPICAL = 0.25
 
 #: Evaluations of a fit: models are compared by what they explain, which the last digits of θ do not change.

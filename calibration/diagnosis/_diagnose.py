@@ -195,12 +195,13 @@ def diagnose(
     bench = Bench(case, ModelSettings(dx=dx), tune, hold_out, horizon)
     untestable = bench.untestable()
     baseline = bench.fit({}, [{}])
-    first = held_out(bench, baseline)
+    first = errors = held_out(bench, baseline)
     turns = elsewhere(baseline, first) and bench.alternate(baseline.built.inputs)
     if turns:
         baseline = bench.fit({}, [{}], baseline.built)
+        errors = held_out(bench, baseline)
     where = where_it_lies(bench, baseline)
-    rounds = search(bench, baseline, [e for e in CATALOGUE if e not in untestable], progress)
+    rounds = search(bench, baseline, errors, [e for e in CATALOGUE if e not in untestable], progress)
     steps, gap, floor = how_far(bench, rounds)
     areas = {name: room.floor_area for name, room in bench.anatomy.rooms.items()}
     watts = rounds[0].screening.detectable(ACCEPTED)

@@ -15,13 +15,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from calibration._problem import Problem
 from calibration.diagnosis._bench import Bench, Fit, is_strength
 from calibration.diagnosis._gain import Gain, choice_of
 from calibration.diagnosis._generic import GENERIC, ZONE_HEAT
 from thermal import Parameter, reduced_model
 from thermal.effects import CATALOGUE, PAIR, Chosen
-from thermal.model import FEW_SHIFTS, SHIFTS, ReducedModel
+from thermal.model import FEW_SHIFTS, SHIFTS
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -69,21 +68,19 @@ class Screening:
         shifts, order = (FEW_SHIFTS, _LARGEST_ORDER) if here else (SHIFTS, None)
         model = reduced_model(built.grid, [theta], shifts=shifts, order=order)
         problem = bench.problem(built, theta)
-        slopes = _slopes(problem, model, theta)
+        jacobian = problem.residuals(model, theta)[1] * problem.slopes(theta)
         twice = [i for i, p in enumerate(own) if p.effect in self._levels and is_strength(p.name, p.effect)]
         for i in twice:
             little = _LITTLE * own[i].upper * (np.arange(len(own)) == i)
-            low, high = (_errors(problem, model, end + little) for end in (theta, other))
-            slopes = np.column_stack([slopes, slopes[:, i] + (high - low) / little[i]])
+            low, high = (problem.residuals_only(model, end + little) for end in (theta, other))
+            jacobian = np.column_stack([jacobian, jacobian[:, i] + (high - low) / little[i]])
         self._twins = {len(own) + k: i for k, i in enumerate(twice)}
         self.parameters = (*own, *(replace(own[i], name=f"{own[i].name} at the other end") for i in twice))
-        error = _errors(fit.problem, fit.model, fit.theta)
-        seen = np.isfinite(error)
+        error = fit.problem.residuals_only(fit.model, fit.theta)
         self.count = problem.effective_size()
-        self.scale: float = self.count / float(np.sum(error[seen] ** 2))
-        jacobian = slopes[seen]
+        self.scale: float = self.count / float(np.sum(error**2))
         gram = self.scale * jacobian.T @ jacobian
-        score = -self.scale * jacobian.T @ error[seen]
+        score = -self.scale * jacobian.T @ error
         self.prior = np.array([p.prior_deviation for p in self.parameters])
         self.lower = np.array([p.lower for p in self.parameters])
         self.upper = np.array([p.upper for p in self.parameters])
@@ -317,17 +314,6 @@ class Screening:
         gain = -0.5 * self.count * np.log1p(-share) - 0.5 * pull - 0.5 * occam
         gain += np.log(2.0) * np.count_nonzero((self.lower[index] == 0.0) & (x > 0.0))
         return float(gain), share
-
-
-def _errors(problem: Problem, model: ReducedModel, theta: FloatArray) -> FloatArray:
-    """List all errors, shape (n_error,); NaN where nothing is measured."""
-    return np.concatenate([problem.errors(model, theta, runs, slopes=False)[0].ravel() for runs in problem.runs])
-
-
-def _slopes(problem: Problem, model: ReducedModel, theta: FloatArray) -> FloatArray:
-    """Differentiate all errors with respect to the parameters on the estimation scale, (n_error, n_parameter)."""
-    parts = [problem.errors(model, theta, runs, slopes=True)[1] for runs in problem.runs]
-    return np.concatenate([m.reshape(-1, m.shape[-1]) for m in parts if m is not None]) * problem.slopes(theta)
 
 
 def _worst_zones(fit: Fit) -> tuple[str, ...]:

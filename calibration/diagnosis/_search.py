@@ -11,7 +11,7 @@ import numpy as np
 from calibration._evaluate import Progress
 from calibration.diagnosis._bench import Bench, Fit
 from calibration.diagnosis._gain import Gain
-from calibration.diagnosis._held_out import HeldOut, held_out
+from calibration.diagnosis._held_out import HeldOut
 from calibration.diagnosis._levels import APART
 from calibration.diagnosis._pairs import Pair, nominate
 from calibration.diagnosis._refit import ACCEPTED, Refit, Work
@@ -100,7 +100,7 @@ class Round:
 
 
 def search(
-    bench: Bench, baseline: Fit, candidates: Sequence[str], progress: Progress | None = None
+    bench: Bench, baseline: Fit, errors: HeldOut, candidates: Sequence[str], progress: Progress | None = None
 ) -> tuple[Round, ...]:
     """Seek effects in rounds until none gains enough.
 
@@ -110,13 +110,15 @@ def search(
         The case.
     baseline : Fit
         The calibrated model without any effect.
+    errors : HeldOut
+        Its held-out errors.
     candidates : sequence of str
         Effects that the case can tell.
     progress : callable, optional
         Called with stage, done, total.
     """
     done: list[Round] = []
-    fit, errors, ahead = baseline, held_out(bench, baseline), None
+    fit, ahead = baseline, None
     while len(done) < ROUNDS:
         if progress is not None:
             progress("diagnose", len(done), ROUNDS)

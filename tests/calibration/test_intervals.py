@@ -27,11 +27,6 @@ from thermal import Case, Inputs, Telemetry, build_network, load_bundled_case, r
 from thermal.model import SPIN_UP
 
 
-def replace_stamps(stamps: pd.DatetimeIndex) -> Any:
-    """Something with stamps, which is all that intervals of a case need."""
-    return SimpleNamespace(stamps=stamps)
-
-
 def inputs_of(days: float = 6.0, step: float = 300.0, start: str = "2023-03-01T00:05:00-05:00", **given: Any) -> Inputs:
     """Telemetry of two zones without gaps."""
     n = round(days * 86400.0 / step)
@@ -243,7 +238,7 @@ def test_runs_that_take_turns_keep_to_their_days() -> None:
 
 def test_days_take_turns_from_midnight_to_midnight_where_clocks_change() -> None:
     stamps = pd.date_range("2023-03-09T00:05", periods=12 * 288, freq="5min", tz="America/New_York")
-    case = replace_stamps(stamps)
+    case: Any = SimpleNamespace(stamps=stamps)  # all that intervals of a case need
     tuning, held_out = alternating_intervals(case)
     assert {i.end.strftime("%H:%M") for i in tuning[:-1]} == {"00:00"}
     assert {i.start.strftime("%H:%M") for i in held_out} == {"00:05"}
