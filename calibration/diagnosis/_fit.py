@@ -31,6 +31,10 @@ _SHORTEST = 0.1
 #: descent to go on [-].
 _TOGETHER, _CONFIRMED = 2, 0.5
 
+#: Independent errors beyond which lengths and falls count in proportion: where evidence is in the hundreds, half a unit
+#: decides nothing and takes minutes [-].
+_MANY = 300.0
+
 #: Times that a step is halved before it is given up.
 _HALVINGS = 4
 
@@ -90,7 +94,7 @@ def settle(
     tuple
         The model that serves the estimate, and the estimate.
     """
-    model = model or reduced_model(grid, [theta])
+    model, enough = model or reduced_model(grid, [theta]), _CONFIRMED * _slack(problem)
     here, together = _descend(problem, model, problem.point(theta), 1), _TOGETHER
     while not here.settled and here.evaluations < evaluations:
         ahead = _descend(problem, model, here, min(together, evaluations - here.evaluations))
@@ -98,11 +102,14 @@ def settle(
         if ahead.cost == here.cost or model.drift(problem.theta(ahead.point)) <= DRIFT_TOLERANCE:
             here = ahead
             continue
+        if ahead.cost > here.cost - (enough - _CONFIRMED):  # never in a small building
+            return model, replace(here, settled=True)
         anew = reduced_model(grid, [problem.theta(ahead.point)])
         there = _descend(problem, anew, ahead.point, 1)
         there = replace(there, evaluations=ahead.evaluations + 1)
-        if there.cost > here.cost - _CONFIRMED:
-            return (model, replace(here, settled=True)) if here.cost <= there.cost else (anew, there)
+        if there.cost > here.cost - enough:
+            model, here = (model, here) if here.cost <= there.cost else (anew, there)
+            return model, replace(here, settled=True)
         model, here = anew, there
     return model, here
 
@@ -130,12 +137,12 @@ def _descend(problem: Problem, model: SymbolicModel, start: FloatArray | Found, 
         z, (cost, mean, residual, jacobian) = start, _at(problem, model, start)
         used, before = 1, 0
     settled, factor = False, 1.0
-    step = np.zeros_like(z)
+    step, shortest = np.zeros_like(z), _SHORTEST * _slack(problem) * np.sqrt(z.size)
     while used - before < evaluations:
         if factor == 1.0:
             low, high = np.maximum(lower - z, -reach), np.minimum(upper - z, reach)
             step = lsq_linear(jacobian, -residual, (np.minimum(low, -1e-12), np.maximum(high, 1e-12))).x
-            if np.linalg.norm(jacobian @ step) < _SHORTEST * np.sqrt(z.size):
+            if np.linalg.norm(jacobian @ step) < shortest:
                 settled = True
                 break
         trial = np.clip(z + factor * step, lower, upper)
@@ -190,6 +197,11 @@ def _at(problem: Problem, model: SymbolicModel, z: FloatArray) -> tuple[float, f
     residual = np.concatenate([weight * error, prior])
     jacobian = np.vstack([weight * slopes * problem.slopes(theta), whiten])
     return 0.5 * count * np.log(mean) + 0.5 * float(prior @ prior), mean, residual, jacobian
+
+
+def _slack(problem: Problem) -> float:
+    """How much more than in a small building a change of the cost must be to matter [-]."""
+    return max(1.0, problem.effective_size() / _MANY)
 
 
 def _log_inside(low: float, high: float) -> float:

@@ -18,7 +18,7 @@ FloatArray = NDArray[np.float64]
 
 @dataclass
 class Linear:
-    """What `_descend` asks of a problem, for errors ``A z - b`` and independent priors."""
+    """What a fit asks of a problem, for errors ``A z - b`` and independent priors."""
 
     matrix: FloatArray
     wanted: FloatArray
@@ -142,3 +142,24 @@ def test_a_descent_in_parts_comes_to_where_one_does() -> None:
         part = _descend(problem, problem, part, 3)
     np.testing.assert_array_equal(part.point, whole.point)
     assert part.evaluations == whole.evaluations
+
+
+def test_where_much_is_measured_a_fit_ends_within_a_share_of_its_evidence(monkeypatch: pytest.MonkeyPatch) -> None:
+    made: list[int] = []
+
+    def reduced(_: Any, thetas: list[FloatArray]) -> Basis:
+        made[-1] += 1
+        return Basis(np.array(thetas[0]))
+
+    monkeypatch.setattr("calibration.diagnosis._fit.reduced_model", reduced)
+    plain = linear(4.0, -4.0)
+    start, costs = np.array([-3.0, 3.0]), {}
+    for count in (300.0, 30000.0):  # as many errors, worth more days
+        problem: Any = Flattered(plain.matrix, plain.wanted, plain.parameters, count)
+        made.append(0)
+        _, found = settle(problem, problem, start, 60)
+        assert found.settled
+        costs[count] = 0.5 * count * np.log(found.mean_square)
+    best = np.mean(plain.residuals(None, np.linalg.lstsq(plain.matrix, plain.wanted, rcond=None)[0])[0] ** 2)
+    assert made[1] < made[0]
+    assert costs[30000.0] < 15000.0 * np.log(best) + 0.01 * 30000.0
