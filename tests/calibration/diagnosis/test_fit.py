@@ -113,14 +113,20 @@ class Flattered(Linear):
         return less * error, less * (slopes - np.outer(error, away))
 
 
-def test_a_fit_counts_what_the_next_basis_confirms(monkeypatch: pytest.MonkeyPatch) -> None:
-    made: list[Basis] = []
+@pytest.fixture
+def made(monkeypatch: pytest.MonkeyPatch) -> list[Basis]:
+    """Reduced models that a fit makes, in order."""
+    bases: list[Basis] = []
 
     def reduced(_: Any, thetas: list[FloatArray]) -> Basis:
-        made.append(Basis(np.array(thetas[0])))
-        return made[-1]
+        bases.append(Basis(np.array(thetas[0])))
+        return bases[-1]
 
     monkeypatch.setattr("calibration.diagnosis._fit.reduced_model", reduced)
+    return bases
+
+
+def test_a_fit_counts_what_the_next_basis_confirms(made: list[Basis]) -> None:
     plain = linear(4.0, -4.0)
     problem: Any = Flattered(plain.matrix, plain.wanted, plain.parameters, plain.count)
     start = np.array([-3.0, 3.0])
@@ -144,22 +150,15 @@ def test_a_descent_in_parts_comes_to_where_one_does() -> None:
     assert part.evaluations == whole.evaluations
 
 
-def test_where_much_is_measured_a_fit_ends_within_a_share_of_its_evidence(monkeypatch: pytest.MonkeyPatch) -> None:
-    made: list[int] = []
-
-    def reduced(_: Any, thetas: list[FloatArray]) -> Basis:
-        made[-1] += 1
-        return Basis(np.array(thetas[0]))
-
-    monkeypatch.setattr("calibration.diagnosis._fit.reduced_model", reduced)
+def test_where_much_is_measured_a_fit_ends_within_a_share_of_its_evidence(made: list[Basis]) -> None:
     plain = linear(4.0, -4.0)
-    start, costs = np.array([-3.0, 3.0]), {}
+    best = np.mean(plain.residuals(None, np.linalg.lstsq(plain.matrix, plain.wanted, rcond=None)[0])[0] ** 2)
+    needed = []
     for count in (300.0, 30000.0):  # as many errors, worth more days
         problem: Any = Flattered(plain.matrix, plain.wanted, plain.parameters, count)
-        made.append(0)
-        _, found = settle(problem, problem, start, 60)
+        made.clear()
+        _, found = settle(problem, problem, np.array([-3.0, 3.0]), 60)
+        needed.append(len(made))
         assert found.settled
-        costs[count] = 0.5 * count * np.log(found.mean_square)
-    best = np.mean(plain.residuals(None, np.linalg.lstsq(plain.matrix, plain.wanted, rcond=None)[0])[0] ** 2)
-    assert made[1] < made[0]
-    assert costs[30000.0] < 15000.0 * np.log(best) + 0.01 * 30000.0
+        assert 0.5 * count * np.log(found.mean_square / best) < 0.01 * count
+    assert needed[1] < needed[0]
