@@ -17,7 +17,7 @@ from scipy.special import log_ndtr
 from calibration._estimate import DRIFT_TOLERANCE
 from calibration._problem import Problem
 from thermal import SymbolicModel, reduced_model
-from thermal.model import ReducedModel
+from thermal.model import FEW_SHIFTS, ReducedModel
 
 FloatArray = NDArray[np.float64]
 
@@ -35,8 +35,11 @@ _TOGETHER, _CONFIRMED = 2, 0.5
 #: decides nothing and takes minutes [-].
 _MANY = 300.0
 
-#: Times that a step is halved before it is given up.
-_HALVINGS = 4
+#: Share of a step below which it is given up, and least share with which the next one begins [-].
+_GIVEN_UP, _LEAST_PACE = 1.0 / 16.0, 0.3
+
+#: Evaluations in which a step that is too long is shortened until it is given up.
+_SHORTENED = 6
 
 
 @dataclass(frozen=True)
@@ -57,6 +60,9 @@ class Found:
         Of the errors with their derivatives.
     settled : bool
         Whether it came to rest within the evaluations allowed.
+    pace : float
+        Share of the next step with which to begin [-]: where the cost along the last one was lowest. In directions
+        that hardly matter whole steps overshoot one after another.
     """
 
     point: FloatArray
@@ -66,6 +72,7 @@ class Found:
     jacobian: FloatArray
     evaluations: int
     settled: bool
+    pace: float = 1.0
 
 
 def settle(
@@ -94,19 +101,20 @@ def settle(
     tuple
         The model that serves the estimate, and the estimate.
     """
-    model, enough = model or reduced_model(grid, [theta]), _CONFIRMED * _slack(problem)
+    model = model or reduced_model(grid, [theta], shifts=FEW_SHIFTS)
+    enough = _CONFIRMED * _slack(problem)
     here, together = _descend(problem, model, problem.point(theta), 1), _TOGETHER
     while not here.settled and here.evaluations < evaluations:
         ahead = _descend(problem, model, here, min(together, evaluations - here.evaluations))
-        together = _TOGETHER if ahead.cost < here.cost else _HALVINGS + 2  # all halvings of a step that is too long
-        if ahead.cost == here.cost or model.drift(problem.theta(ahead.point)) <= DRIFT_TOLERANCE:
+        together = _TOGETHER if ahead.cost < here.cost else _SHORTENED
+        if ahead.cost == here.cost or model.serves(problem.theta(ahead.point), DRIFT_TOLERANCE):
             here = ahead
             continue
         if ahead.cost > here.cost - (enough - _CONFIRMED):  # never in a small building
             return model, replace(here, settled=True)
-        anew = reduced_model(grid, [problem.theta(ahead.point)])
+        anew = reduced_model(grid, [problem.theta(ahead.point)], shifts=FEW_SHIFTS)
         there = _descend(problem, anew, ahead.point, 1)
-        there = replace(there, evaluations=ahead.evaluations + 1)
+        there = replace(there, evaluations=ahead.evaluations + 1, pace=ahead.pace)
         if there.cost > here.cost - enough:
             model, here = (model, here) if here.cost <= there.cost else (anew, there)
             return model, replace(here, settled=True)
@@ -132,30 +140,39 @@ def _descend(problem: Problem, model: SymbolicModel, start: FloatArray | Found, 
     reach = _LONGEST * np.array([p.prior_deviation for p in problem.parameters])
     if isinstance(start, Found):
         z, cost, mean, residual, jacobian = start.point, start.cost, start.mean_square, start.residual, start.jacobian
-        used = before = start.evaluations
+        used, before, pace = start.evaluations, start.evaluations, start.pace
     else:
         z, (cost, mean, residual, jacobian) = start, _at(problem, model, start)
-        used, before = 1, 0
-    settled, factor = False, 1.0
+        used, before, pace = 1, 0, 1.0
+    settled, share = False, None
     step, shortest = np.zeros_like(z), _SHORTEST * _slack(problem) * np.sqrt(z.size)
     while used - before < evaluations:
-        if factor == 1.0:
+        if share is None:
             low, high = np.maximum(lower - z, -reach), np.minimum(upper - z, reach)
             step = lsq_linear(jacobian, -residual, (np.minimum(low, -1e-12), np.maximum(high, 1e-12))).x
             if np.linalg.norm(jacobian @ step) < shortest:
                 settled = True
                 break
-        trial = np.clip(z + factor * step, lower, upper)
+            share = pace
+        trial = np.clip(z + share * step, lower, upper)
         new = _at(problem, model, trial)
         used += 1
+        best = share * _lowest(float(residual @ jacobian @ step), (new[0] - cost) / share)
         if new[0] < cost:
-            z, (cost, mean, residual, jacobian), factor = trial, new, 1.0
-        elif factor <= 0.5**_HALVINGS:
+            z, (cost, mean, residual, jacobian) = trial, new
+            share, pace = None, float(np.clip(best, _LEAST_PACE, 1.0))
+        elif share <= _GIVEN_UP:
             settled = True
             break
         else:
-            factor *= 0.5
-    return Found(z, mean, cost, residual, jacobian, used, settled)
+            share = float(np.clip(best, 0.1 * share, 0.5 * share))
+    return Found(z, mean, cost, residual, jacobian, used, settled, pace)
+
+
+def _lowest(slope: float, secant: float) -> float:
+    """Where a parabola is lowest, in lengths of a secant from where it has a slope [-]."""
+    bend = secant - slope
+    return -slope / (2.0 * bend) if bend > 0.0 else np.inf
 
 
 def evidence_of(problem: Problem, found: Found) -> float:

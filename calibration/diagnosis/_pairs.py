@@ -26,11 +26,14 @@ class Pair:
         The two, with the strengths that they have together; the first gains more alone.
     gain : float
         Logarithm of the Bayes factor of both against neither, by tangents [-].
+    share : float
+        Of the squared error that both explain [-].
     """
 
     first: Gain
     second: Gain
     gain: float
+    share: float
 
 
 def nominate(made: Screening, gains: Sequence[Gain], least: float) -> list[Pair]:

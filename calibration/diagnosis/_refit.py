@@ -22,6 +22,10 @@ _EVALUATIONS = 10
 #: the mean where it is held out [K].
 MATTERS = 0.03
 
+#: Share of that fall which tangents must promise for a fit to be worth its time [-]: of a hundred zones a fit takes
+#: half a minute, and their evidence is in the tens for what no prediction shows.
+_PROMISING = 0.25
+
 #: By how much the mean of the held-out errors may grow [K], and by how many standard errors of that more [-]: what
 #: differs from day to day by chance disproves nothing.
 NO_WORSE, CHANCE = 0.005, 1.645
@@ -87,6 +91,16 @@ class Work:
         """Parameters of the effects that are in the model."""
         parameters = self.fit.built.network.parameters
         return {p.name: self.fit.values[p.name] for p in parameters if p.effect is not None}
+
+    def promising(self, share: float) -> bool:
+        """Whether tangents promise enough for a fit.
+
+        Parameters
+        ----------
+        share : float
+            Of the squared error that they would explain [-].
+        """
+        return float(np.sqrt(self.fit.found.mean_square) * (1.0 - np.sqrt(1.0 - share))) > _PROMISING * MATTERS
 
     def refit(self, gains: Sequence[Gain], start: Mapping[str, float]) -> Refit | None:
         """Fit with some effects more; None where the fit fails, which costs those effects only.

@@ -177,8 +177,8 @@ class Screening:
         hessian = self.gram[np.ix_(index, index)] + np.diag(self.prior[index] ** -2.0)
         return self._weigh(index, np.linalg.solve(hessian, self.score[index]))[0] - first.choice - second.choice
 
-    def together(self, first: Gain, second: Gain) -> tuple[Gain, Gain, float]:
-        """Two effects with the strengths that they have together, and what both gain.
+    def together(self, first: Gain, second: Gain) -> tuple[Gain, Gain, float, float]:
+        """Two effects with the strengths that they have together, what both gain and what they explain.
 
         Parameters
         ----------
@@ -186,14 +186,14 @@ class Screening:
             With their zones.
         """
         parts = first.index, second.index
-        x, gain, _ = self._solve(np.concatenate(parts))
+        x, gain, share = self._solve(np.concatenate(parts))
         found = []
         for one, index, strengths in zip((first, second), parts, np.split(x, [parts[0].size]), strict=True):
             direction = np.zeros(len(self.parameters))
             direction[index] = strengths
             named = self._named(one.effect, index, strengths, np.zeros((index.size, index.size)))[0]
             found.append(replace(one, strengths=named, direction=direction))
-        return found[0], found[1], gain - first.choice - second.choice
+        return found[0], found[1], gain - first.choice - second.choice, share
 
     def cosine(self, first: Gain, second: Gain) -> float:
         """Cosine of the projected signatures of two effects at their estimates [-].

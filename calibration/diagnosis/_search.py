@@ -181,7 +181,7 @@ def _refits(work: Work, gains: Sequence[Gain], ahead: Refit | None) -> list[Refi
     if ahead is not None:
         found.append(replace(work.weighed([ahead.screened], ahead.fit), counts=True))
 
-    for g in [g for g in gains if g.gain > LEAST_GAIN][:MOST_REFITS]:
+    for g in [g for g in gains if g.gain > LEAST_GAIN and work.promising(g.share)][:MOST_REFITS]:
         if g.gain < LEAST_SHARE * gains[0].gain and any(r.counts for r in found):
             break
         if ahead is None or ahead.screened.effect != g.effect:
@@ -224,7 +224,7 @@ def _best_pair(
     tuple of Refit, or None
         The member that gains more alone, fitted alone; and the other, fitted with it, with the gain of both.
     """
-    pairs = nominate(work.made, gains, LEAST_GAIN)
+    pairs = [p for p in nominate(work.made, gains, LEAST_GAIN) if work.promising(p.share)]
     if not pairs or (best is not None and _within(best, pairs[0])):
         return None
     single = max((r.gain for r in refits), default=0.0)

@@ -17,10 +17,10 @@ import pytest
 
 import calibration
 from calibration import Interval, evaluate_model
-from thermal import Building, Case
+from thermal import Case
 from thermal.model import SPIN_UP
 from thermal.network import BASELINE
-from thermal.pilot import MOUNTAIN_VIEW, devices, generate_office, generate_twin
+from thermal.pilot import generate_twin, pilot_building
 
 SCRIPTS = Path(__file__).parents[2] / "benchmarks"
 
@@ -40,8 +40,7 @@ def tables(study: ModuleType, script: Callable[[str], ModuleType]) -> ModuleType
 @pytest.fixture(scope="module")
 def case() -> Case:
     """Nine days of a twin with two zones, from a Friday on."""
-    plans = generate_office(1, floor_area=60.0, zones=2, floors=1)
-    building = Building("office", MOUNTAIN_VIEW, 0.0, plans, devices(plans))
+    building = pilot_building(1, floor_area=60.0, zones=2, floors=1, name="office")
     return generate_twin(building, 1, days=9.0, start="2023-01-13")[0]
 
 

@@ -15,7 +15,6 @@ from calibration._likelihood import InnovationsProblem
 from calibration._precision import precision, unexplained
 from calibration._problem import Objective
 from thermal import (
-    Building,
     Case,
     Inputs,
     SymbolicModel,
@@ -27,7 +26,7 @@ from thermal import (
     spin_up,
 )
 from thermal.model import ReducedModel
-from thermal.pilot import MOUNTAIN_VIEW, TwinTruth, devices, generate_office, generate_twin
+from thermal.pilot import TwinTruth, generate_twin, pilot_building
 
 FloatArray = NDArray[np.float64]
 
@@ -169,8 +168,7 @@ def test_precision_is_the_information_and_white_innovations_have_no_excess() -> 
 @cache
 def twin() -> tuple[Case, TwinTruth]:
     """Six days of a small office whose parameters are known."""
-    plans = generate_office(1, floor_area=80.0, zones=2, floors=1)
-    building = Building("office", MOUNTAIN_VIEW, 0.0, plans, devices(plans))
+    building = pilot_building(1, floor_area=80.0, zones=2, floors=1, name="office")
     return generate_twin(building, 1, days=6.0, dx=2.0, step_seconds=900.0, excitation="prbs")
 
 

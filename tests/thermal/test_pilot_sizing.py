@@ -8,14 +8,13 @@ import pytest
 from thermal import Building, Simulator, load_bundled_case
 from thermal.errors import HvacParameterError
 from thermal.hvac import Actions, Conditions, HvacPlant
-from thermal.pilot import MOUNTAIN_VIEW, DesignConditions, devices, generate_office, size_system
+from thermal.pilot import DesignConditions, pilot_building, size_system
 from thermal.units import AIR_HEAT_CAPACITY
 
 
 @pytest.fixture(scope="module")
 def office() -> Building:
-    plans = generate_office(1, floor_area=600.0, zones=12)
-    return Building("office", MOUNTAIN_VIEW, 0.0, plans, devices(plans))
+    return pilot_building(1, floor_area=600.0, zones=12, name="office")
 
 
 def test_the_design_day_is_held(office: Building) -> None:

@@ -26,7 +26,7 @@ from thermal import (
 )
 from thermal.case import Building, Location, ZoneTable, zone_floor_areas
 from thermal.model import Stepper
-from thermal.pilot import MOUNTAIN_VIEW, ClosedLoopError, TwinError, TwinRanges, TwinTruth, devices, generate_office
+from thermal.pilot import ClosedLoopError, TwinError, TwinRanges, TwinTruth, pilot_building
 from thermal.pilot import generate_twin as generate
 from thermal.pilot.twin import _draw_conditions, _draw_values
 
@@ -154,8 +154,7 @@ def innovations(case: Case, truth: TwinTruth, dx: float) -> np.ndarray:
 
 def test_a_filter_that_knows_the_truth_finds_nothing_else() -> None:
     """Heat, its process, its timing within the step, and the noise are what the truth says: innovations are white."""
-    plans = generate_office(1, floor_area=80.0, zones=2, floors=1)
-    office = Building("office", MOUNTAIN_VIEW, 0.0, plans, devices(plans))
+    office = pilot_building(1, floor_area=80.0, zones=2, floors=1, name="office")
     twin = generate(office, 1, days=6.0, spin_up_days=0.5, dx=2.0, ranges=LOUD, meter="exact")
     white = innovations(*twin, dx=2.0)
     assert np.mean(white**2) == pytest.approx(1.0, abs=4.0 * np.sqrt(2.0 / white.size))
@@ -264,8 +263,7 @@ def test_fixed_and_zone_parameters(building: Building, sensed: Twin) -> None:
 
 
 def test_a_twin_of_a_generated_office() -> None:
-    plans = generate_office(3, floor_area=300.0, zones=6, floors=1)
-    office = Building("office", MOUNTAIN_VIEW, 0.0, plans, devices(plans))
+    office = pilot_building(3, floor_area=300.0, zones=6, floors=1, name="office")
     case, truth = generate(office, 3, days=1.0, spin_up_days=0.5, dx=1.0, step_seconds=600.0)
     assert case.building.name == "office_twin_3"
     assert truth.heat.shape == (144, 6)

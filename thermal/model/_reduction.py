@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import cached_property
 
 import numpy as np
@@ -75,18 +75,33 @@ class ReducedModel(SymbolicModel):
         theta : ndarray, shape (n_parameter,)
             Parameter values [parameter units].
         """
+        return max(self._errors(theta))
+
+    def serves(self, theta: FloatArray, tolerance: float) -> bool:
+        """Whether the drift at another θ is within a tolerance; the rest is not looked at once it is not.
+
+        Parameters
+        ----------
+        theta : ndarray, shape (n_parameter,)
+            Parameter values [parameter units].
+        tolerance : float
+            Of `drift` [K].
+        """
+        return all(error <= tolerance for error in self._errors(theta))
+
+    def _errors(self, theta: FloatArray) -> Iterator[float]:
+        """Largest error of the responses at each probe, the slow one first [K]."""
         whole, small = self.grid.matrices(theta), self.matrices(theta)
         gain = np.diag(small.observation @ np.linalg.solve(_shifted(small, SHIFTS[0]), small.heating))
         signs = np.random.default_rng(0).choice([-1.0, 1.0], size=(gain.size, 4))
-        heat, worst = 5.0 * signs / gain[:, None], 0.0
+        heat = 5.0 * signs / gain[:, None]
         for shift in _PROBES:
             seen = []
             for m in (whole, small):
                 outside = -5.0 * (m.flow[:, m.n :] @ (np.arange(m.n_boundary) < m.n_boundary - m.n_signal)[:, None])
                 response = factorise(_shifted(m, shift), self.grid.elimination)(np.hstack([m.heating @ heat, outside]))
                 seen.append(m.output @ response)
-            worst = max(worst, float(np.abs(seen[0] - seen[1]).max()))
-        return worst
+            yield float(np.abs(seen[0] - seen[1]).max())
 
 
 def _shifted(m: Matrices, shift: float) -> Matrix:

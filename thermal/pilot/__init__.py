@@ -2,6 +2,7 @@
 
 from thermal.pilot._errors import ClosedLoopError, LayoutError, TwinError
 from thermal.pilot._truth import TwinRanges, TwinTruth
+from thermal.pilot.building import pilot_building
 from thermal.pilot.disturbance import draw_disturbance
 from thermal.pilot.layout import devices, generate_office
 from thermal.pilot.pilot import PlantFactory, generate_pilot
@@ -37,6 +38,7 @@ __all__ = [
     "generate_telemetry",
     "generate_twin",
     "generate_weather",
+    "pilot_building",
     "size_system",
     "size_terminals",
 ]

@@ -13,14 +13,14 @@ from numpy.typing import NDArray
 from calibration import case_model
 from mpc.errors import BoptestError
 from mpc.plants._building import BuildingModel
-from mpc.plants._make import pilot_building, pilot_weather
+from mpc.plants._make import pilot_weather
 from mpc.plants._reduced import ReducedBuilding
 from mpc.plants.boptest._case import BoptestCase
 from mpc.scenario import Weather, read_epw, read_tmy3, read_weather_csv, weather_of_case
 from thermal import Building, Case, SymbolicModel, build_network, reduced_model
 from thermal.case import Device
 from thermal.errors import describe
-from thermal.pilot import size_system
+from thermal.pilot import pilot_building, size_system
 
 FloatArray = NDArray[np.float64]
 

@@ -17,9 +17,9 @@ from calibration.diagnosis._refit import ACCEPTED, CHANCE, MATTERS, Refit, Work,
 from calibration.diagnosis._screen import Screening
 from calibration.diagnosis._search import _first
 from calibration.diagnosis._verdict import _left_over, judge
-from thermal import Building, Case, Telemetry
+from thermal import Case, Telemetry
 from thermal.effects import CATALOGUE
-from thermal.pilot import MOUNTAIN_VIEW, TwinRanges, devices, generate_office, generate_twin
+from thermal.pilot import TwinRanges, generate_twin, pilot_building
 
 #: Share by which the flow of one zone is under-reported [-].
 ERROR = 0.25
@@ -28,8 +28,7 @@ ERROR = 0.25
 @cache
 def twin() -> Case:
     """Three weeks of an office of four zones, quiet but for its thermostats."""
-    plans = generate_office(3, floor_area=120.0, zones=4, floors=1)
-    building = Building("office", MOUNTAIN_VIEW, 0.0, plans, devices(plans))
+    building = pilot_building(3, floor_area=120.0, zones=4, floors=1, name="office")
     quiet = TwinRanges(disturbance_deviation=(0.05, 0.1), noise=(0.005, 0.01))
     return generate_twin(building, 3, days=15.0, step_seconds=900.0, dx=1.0, meter="exact", ranges=quiet)[0]
 

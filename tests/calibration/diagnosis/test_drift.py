@@ -13,8 +13,7 @@ from calibration._settings import ModelSettings
 from calibration.diagnosis._bench import Bench
 from calibration.diagnosis._drift import DriftCurve, drift_of, drift_sentence
 from calibration.errors import NotEnoughDataError
-from thermal import Building
-from thermal.pilot import MOUNTAIN_VIEW, TwinRanges, devices, generate_office, generate_twin
+from thermal.pilot import TwinRanges, generate_twin, pilot_building
 
 FloatArray = NDArray[np.float64]
 
@@ -104,8 +103,7 @@ def test_the_sentence_tells_both_models() -> None:
 
 def test_a_zone_that_lacks_heat_drifts_in_proportion_to_time() -> None:
     """Free runs of a twin, and of the same with a meter that loses a constant heat: against the step response."""
-    plans = generate_office(3, floor_area=120.0, zones=4, floors=1)
-    building = Building("office", MOUNTAIN_VIEW, 0.0, plans, devices(plans))
+    building = pilot_building(3, floor_area=120.0, zones=4, floors=1, name="office")
     quiet = TwinRanges(disturbance_deviation=(0.05, 0.1), noise=(0.002, 0.004))
     case, _ = generate_twin(building, 3, days=9.0, step_seconds=300.0, dx=1.0, meter="exact", ranges=quiet)
     bench = Bench(case, ModelSettings(dx=1.0))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -101,8 +102,8 @@ class Basis:
 
     theta: FloatArray
 
-    def drift(self, theta: FloatArray) -> float:
-        return float(np.linalg.norm(theta - self.theta))
+    def serves(self, theta: FloatArray, tolerance: float) -> bool:
+        return bool(np.linalg.norm(theta - self.theta) <= tolerance)
 
 
 class Flattered(Linear):
@@ -118,7 +119,7 @@ def made(monkeypatch: pytest.MonkeyPatch) -> list[Basis]:
     """Reduced models that a fit makes, in order."""
     bases: list[Basis] = []
 
-    def reduced(_: Any, thetas: list[FloatArray]) -> Basis:
+    def reduced(_: Any, thetas: list[FloatArray], shifts: Sequence[float]) -> Basis:
         bases.append(Basis(np.array(thetas[0])))
         return bases[-1]
 

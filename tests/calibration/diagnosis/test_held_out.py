@@ -13,8 +13,8 @@ from calibration.diagnosis import baseline_gap, diagnose, gap_of
 from calibration.diagnosis._bench import Bench
 from calibration.diagnosis._held_out import HeldOut, growth, held_out
 from calibration.diagnosis._statistics import statistics_content
-from thermal import Building, Case, Telemetry
-from thermal.pilot import MOUNTAIN_VIEW, TwinRanges, devices, generate_office, generate_twin
+from thermal import Case, Telemetry
+from thermal.pilot import TwinRanges, generate_twin, pilot_building
 
 
 def errors(days: list[int], daily: list[float], weight: list[float]) -> HeldOut:
@@ -39,8 +39,7 @@ def test_days_with_few_runs_count_less_and_one_day_has_no_error() -> None:
 
 def late_heat() -> Case:
     """A twin of 15 days in which a meter of one zone misses half of the air in the last five."""
-    plans = generate_office(3, floor_area=120.0, zones=4, floors=1)
-    building = Building("office", MOUNTAIN_VIEW, 0.0, plans, devices(plans))
+    building = pilot_building(3, floor_area=120.0, zones=4, floors=1, name="office")
     quiet = TwinRanges(disturbance_deviation=(0.05, 0.1), noise=(0.005, 0.01))
     case = generate_twin(building, 3, days=15.0, step_seconds=900.0, dx=1.0, meter="exact", ranges=quiet)[0]
     frame = case.telemetry.frame.copy()

@@ -15,8 +15,8 @@ from calibration._settings import ModelSettings
 from calibration.diagnosis import _missing
 from calibration.diagnosis._bench import Bench, Fit
 from calibration.diagnosis._missing import Missing, at_start, missing_heat
-from thermal import Building, reduced_model
-from thermal.pilot import MOUNTAIN_VIEW, TwinRanges, TwinTruth, devices, generate_office, generate_twin
+from thermal import reduced_model
+from thermal.pilot import TwinRanges, TwinTruth, generate_twin, pilot_building
 
 FloatArray = NDArray[np.float64]
 
@@ -26,8 +26,7 @@ EXTRA, ZONE = 200.0, 1
 
 @cache
 def twin(seed: int, noise: float) -> tuple[Bench, TwinTruth]:
-    plans = generate_office(3, floor_area=120.0, zones=4, floors=1)
-    building = Building("office", MOUNTAIN_VIEW, 0.0, plans, devices(plans))
+    building = pilot_building(3, floor_area=120.0, zones=4, floors=1, name="office")
     ranges = TwinRanges(disturbance_deviation=(0.3, 1.0), noise=(noise, noise))
     case, truth = generate_twin(
         building, seed, days=15.0, step_seconds=900.0, dx=1.0, meter="exact", ranges=ranges

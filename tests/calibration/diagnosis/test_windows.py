@@ -15,8 +15,8 @@ from calibration.diagnosis._held_out import held_out
 from calibration.diagnosis._refit import Refit, Work
 from calibration.diagnosis._screen import screen
 from calibration.diagnosis._windows import WINDOWS, look_again
-from thermal import Building, Case, Telemetry
-from thermal.pilot import MOUNTAIN_VIEW, TwinRanges, devices, generate_office, generate_twin
+from thermal import Case, Telemetry
+from thermal.pilot import TwinRanges, generate_twin, pilot_building
 from thermal.signals import Drivers
 from thermal.units import AIR_HEAT_CAPACITY
 
@@ -29,8 +29,7 @@ AREA, STEP = 1.5, 900.0
 @cache
 def twin() -> Case:
     """Two weeks of an office of four zones whose thermostats hold it whatever a window lets out."""
-    plans = generate_office(3, floor_area=120.0, zones=4, floors=1)
-    building = Building("office", MOUNTAIN_VIEW, 0.0, plans, devices(plans))
+    building = pilot_building(3, floor_area=120.0, zones=4, floors=1, name="office")
     quiet = TwinRanges(disturbance_deviation=(0.05, 0.1), noise=(0.005, 0.01))
     return generate_twin(building, 3, days=15.0, step_seconds=STEP, dx=1.0, meter="exact", ranges=quiet)[0]
 
