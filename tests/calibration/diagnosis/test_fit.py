@@ -11,7 +11,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.integrate import trapezoid
 
-from calibration.diagnosis._fit import _descend, evidence_of, settle
+from calibration.diagnosis._fit import _descend, _lowest, evidence_of, settle
 from thermal import Parameter
 
 FloatArray = NDArray[np.float64]
@@ -67,6 +67,32 @@ def test_least_squares_are_found_from_afar() -> None:
     assert found.settled
     np.testing.assert_allclose(found.point, best, atol=2e-3)
     assert found.mean_square == pytest.approx(np.mean((problem.matrix @ best - problem.wanted) ** 2), rel=1e-4)
+
+
+def test_a_parabola_is_lowest_where_its_slope_ends() -> None:
+    for bottom, length in ((0.4, 1.0), (0.4, 0.3), (3.0, 0.5)):
+        slope, end = -2.0 * bottom, (length - bottom) ** 2 - bottom**2  # of (t - bottom)^2
+        assert length * _lowest(slope * length, end) == pytest.approx(bottom)
+    assert _lowest(-1.0, -1.5) == np.inf
+
+
+class Bent(Linear):
+    """Errors whose second derivatives Gauss and Newton do not see: whole steps overshoot again and again."""
+
+    def residuals(self, model: object, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
+        error = np.concatenate([theta - 1.0, 0.6 * theta**2 + 2.0])
+        return error, np.vstack([np.eye(2), 1.2 * np.diag(theta)])
+
+
+def test_a_fit_that_overshoots_slows_down(monkeypatch: pytest.MonkeyPatch) -> None:
+    plain = linear(4.0, -4.0)
+    problem: Any = Bent(plain.matrix, plain.wanted, plain.parameters, 400.0)
+    found = _descend(problem, problem, np.array([1.5, -1.0]), 60)
+    monkeypatch.setattr("calibration.diagnosis._fit._LEAST_PACE", 1.0)
+    hasty = _descend(problem, problem, np.array([1.5, -1.0]), 60)
+    assert found.settled and found.pace < 1.0 == hasty.pace
+    assert found.evaluations < hasty.evaluations
+    assert found.cost <= hasty.cost + 1e-3
 
 
 def test_a_strength_stays_in_its_range() -> None:
