@@ -92,16 +92,6 @@ class Work:
         parameters = self.fit.built.network.parameters
         return {p.name: self.fit.values[p.name] for p in parameters if p.effect is not None}
 
-    def promising(self, share: float) -> bool:
-        """Whether tangents promise enough for a fit.
-
-        Parameters
-        ----------
-        share : float
-            Of the squared error that they would explain [-].
-        """
-        return float(np.sqrt(self.fit.found.mean_square) * (1.0 - np.sqrt(1.0 - share))) > _PROMISING * MATTERS
-
     def refit(self, gains: Sequence[Gain], start: Mapping[str, float]) -> Refit | None:
         """Fit with some effects more; None where the fit fails, which costs those effects only.
 
@@ -138,6 +128,19 @@ class Work:
         counts = gain > ACCEPTED * len(gains) and not worse and max(fall, -grown) > MATTERS
         counts = counts and all(_beyond_a_step(anew, g.effect) for g in gains)
         return Refit(gains[-1], anew, gain, fall, errors, worse, counts)
+
+
+def promising(fit: Fit, share: float) -> bool:
+    """Whether what tangents promise is worth a fit.
+
+    Parameters
+    ----------
+    fit : Fit
+        The model so far.
+    share : float
+        Of its squared error that they would explain [-].
+    """
+    return float(np.sqrt(fit.found.mean_square) * (1.0 - np.sqrt(1.0 - share))) > _PROMISING * MATTERS
 
 
 def _beyond_a_step(fit: Fit, effect: str) -> bool:

@@ -14,7 +14,7 @@ from calibration.diagnosis._gain import Gain
 from calibration.diagnosis._held_out import HeldOut
 from calibration.diagnosis._levels import APART
 from calibration.diagnosis._pairs import Pair, nominate
-from calibration.diagnosis._refit import ACCEPTED, Refit, Work
+from calibration.diagnosis._refit import ACCEPTED, Refit, Work, promising
 from calibration.diagnosis._screen import Screening, screen
 from calibration.diagnosis._windows import WINDOWS, look_again
 from thermal.effects import CATALOGUE
@@ -181,7 +181,7 @@ def _refits(work: Work, gains: Sequence[Gain], ahead: Refit | None) -> list[Refi
     if ahead is not None:
         found.append(replace(work.weighed([ahead.screened], ahead.fit), counts=True))
 
-    for g in [g for g in gains if g.gain > LEAST_GAIN and work.promising(g.share)][:MOST_REFITS]:
+    for g in [g for g in gains if g.gain > LEAST_GAIN and promising(work.fit, g.share)][:MOST_REFITS]:
         if g.gain < LEAST_SHARE * gains[0].gain and any(r.counts for r in found):
             break
         if ahead is None or ahead.screened.effect != g.effect:
@@ -224,7 +224,7 @@ def _best_pair(
     tuple of Refit, or None
         The member that gains more alone, fitted alone; and the other, fitted with it, with the gain of both.
     """
-    pairs = [p for p in nominate(work.made, gains, LEAST_GAIN) if work.promising(p.share)]
+    pairs = [p for p in nominate(work.made, gains, LEAST_GAIN) if promising(work.fit, p.share)]
     if not pairs or (best is not None and _within(best, pairs[0])):
         return None
     single = max((r.gain for r in refits), default=0.0)

@@ -7,20 +7,22 @@ from collections.abc import Mapping
 import numpy as np
 
 from calibration.diagnosis._levels import DOUBTFUL, SMALL, TEMPERATURE, usual
-from calibration.diagnosis._refit import ACCEPTED, Refit
+from calibration.diagnosis._refit import ACCEPTED, Refit, promising
 from calibration.diagnosis._search import Round
 
 
 def gains_of(r: Round) -> dict[str, float]:
-    """Gain of every effect of a round: fitted where it was, by tangents otherwise; little where it does not count.
+    """Gain of every effect of a round: fitted where it was, by tangents otherwise.
+
+    It is little where it does not count, or promises little.
 
     Parameters
     ----------
     r : Round
         Of the search.
     """
-    gains = {g.effect: g.gain for g in r.gains} | {x.screened.effect: _worth(x) for x in r.refits}
-    return gains | _led(r)
+    gains = {g.effect: g.gain if promising(r.before, g.share) else min(g.gain, SMALL) for g in r.gains}
+    return gains | {x.screened.effect: _worth(x) for x in r.refits} | _led(r)
 
 
 def levelled(r: Round) -> dict[str, float]:

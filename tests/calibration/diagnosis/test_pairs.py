@@ -13,10 +13,12 @@ from calibration._settings import ModelSettings
 from calibration.diagnosis._bench import Bench
 from calibration.diagnosis._gain import Gain, choice_of
 from calibration.diagnosis._held_out import held_out
+from calibration.diagnosis._levels import SMALL
 from calibration.diagnosis._pairs import nominate
-from calibration.diagnosis._refit import ACCEPTED, MATTERS, Work
+from calibration.diagnosis._refit import ACCEPTED, MATTERS, Work, promising
 from calibration.diagnosis._screen import Screening
 from calibration.diagnosis._search import Round, _best_pair, _exchanged, _refits
+from calibration.diagnosis._worth import gains_of
 from thermal import Case, Telemetry
 from thermal.effects import CATALOGUE
 from thermal.pilot import TwinRanges, generate_twin, pilot_building
@@ -209,10 +211,13 @@ def test_what_promises_to_matter_little_is_not_fitted() -> None:
         found = replace(baseline.found, mean_square=rms**2)
         work = Work(bench, replace(baseline, found=found), held_out(bench, baseline), made)
         for share in (0.0, 0.01, 0.1, 0.5):
-            assert work.promising(share) == (rms - np.sqrt((1.0 - share) * rms**2) > 0.25 * MATTERS)
+            assert promising(work.fit, share) == (rms - np.sqrt((1.0 - share) * rms**2) > 0.25 * MATTERS)
         if rms == 0.005:
             assert _best_pair(work, gains, (), None) is None
-            assert _refits(work, [replace(g, gain=50.0) for g in gains], None) == []
+            surely = tuple(replace(g, gain=50.0) for g in gains)
+            assert _refits(work, surely, None) == []
+            told = Round(work.fit, work.held_out, made, surely, surely[0], (), None)
+            assert set(gains_of(told).values()) == {SMALL}
 
 
 def test_what_stood_for_another_effect_is_exchanged_once_the_second_is_in_the_model() -> None:
