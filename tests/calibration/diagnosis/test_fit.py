@@ -141,9 +141,9 @@ class Flattered(Linear):
 
 
 @pytest.fixture
-def made(monkeypatch: pytest.MonkeyPatch) -> list[Basis]:
+def made(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
     """Reduced models that a fit makes, in order."""
-    bases: list[Basis] = []
+    bases: list[Any] = []
 
     def reduced(_: Any, thetas: list[FloatArray], shifts: Sequence[float]) -> Basis:
         bases.append(Basis(np.array(thetas[0])))
@@ -153,7 +153,7 @@ def made(monkeypatch: pytest.MonkeyPatch) -> list[Basis]:
     return bases
 
 
-def test_a_fit_counts_what_the_next_basis_confirms(made: list[Basis]) -> None:
+def test_a_fit_counts_what_the_next_basis_confirms(made: list[Any]) -> None:
     plain = linear(4.0, -4.0)
     problem: Any = Flattered(plain.matrix, plain.wanted, plain.parameters, plain.count)
     start = np.array([-3.0, 3.0])
@@ -163,7 +163,8 @@ def test_a_fit_counts_what_the_next_basis_confirms(made: list[Basis]) -> None:
     assert model is made[-1] or model is made[-2]
     assert found.mean_square == pytest.approx(exact, rel=1e-9)
     assert exact < np.mean(plain.residuals(None, start)[0] ** 2) / 10.0
-    one = _descend(problem, Basis(start), start, 60)  # a single basis runs away
+    basis: Any = Basis(start)
+    one = _descend(problem, basis, start, 60)  # a single basis runs away
     assert np.mean(plain.residuals(None, one.point)[0] ** 2) > 10.0 * one.mean_square
 
 
