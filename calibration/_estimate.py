@@ -236,7 +236,7 @@ def _shrinkage(problem: Problem, z: FloatArray, solve: LeastSquaresResult | None
     """Spread of every group's members about their mean: what is seen and what is still open (empirical Bayes)."""
     groups: dict[str, list[int]] = {}
     for i, p in enumerate(problem.parameters):
-        if p.member is not None:
+        if p.grouped:
             groups.setdefault(p.base, []).append(i)
     if not groups or solve is None:
         return dict(problem.shrinkage)

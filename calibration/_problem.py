@@ -248,11 +248,11 @@ class Problem:
 
         A parameter's physical range is its 95 % interval. The members of a group, one parameter of several facades or
         zones, share that spread and have their own shrinkage about it (Gelman et al. 2013, Bayesian Data Analysis,
-        ch. 5).
+        ch. 5); strengths of an effect in several zones are independent.
         """
         parameters = self.parameters
         base = np.array([p.base for p in parameters])
-        grouped = np.array([p.member is not None for p in parameters])
+        grouped = np.array([p.grouped for p in parameters])
         spread = np.array([p.prior_deviation for p in parameters])
         together = (base[:, None] == base[None, :]) & (
             grouped[:, None] & grouped[None, :] | np.eye(base.size, dtype=bool)

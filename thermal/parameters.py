@@ -83,6 +83,14 @@ class Parameter:
         return self.name.partition("@")[0]
 
     @property
+    def grouped(self) -> bool:
+        """Whether it is one of a group whose members are alike: walls are, strengths of an effect are not.
+
+        What is wrong in one zone says nothing of the next, and may be of the other sign there.
+        """
+        return self.member is not None and self.scale != "linear"
+
+    @property
     def prior_deviation(self) -> float:
         """Standard deviation of the prior on the estimation scale [-]: the physical range is its 95 % interval.
 

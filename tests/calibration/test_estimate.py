@@ -13,6 +13,7 @@ from calibration import Interval, Problem, estimate, select_runs
 from calibration._estimate import compensated_start, draw_starts
 from calibration._problem import thin
 from thermal import SymbolicModel, build_network, free_runs, load_bundled_case, reduced_model, replay_inputs, spin_up
+from thermal.effects import chosen
 from thermal.model import TR_BDF2
 
 FloatArray = NDArray[np.float64]
@@ -222,3 +223,19 @@ def test_members_of_a_group_share_their_spread_and_shrink_towards_each_other() -
     own = found.point[members] - found.point[members].mean()
     assert 0.02 <= learnt <= 1.0
     assert np.sqrt(own @ own / 4) <= learnt + 1e-9  # what is seen, and what is still open
+
+
+def test_strengths_of_an_effect_in_several_zones_are_independent() -> None:
+    """One zone's sensor may read high where the next one's reads low; a slab's capacity is much like the next one's."""
+    case = load_bundled_case()
+    zones = tuple(case.building.zone_names[:3])
+    network = build_network(case.building, dx=1.5, effects=tuple(chosen({"sensor_bias": zones})))
+    p = replace(
+        problem(), grid=SymbolicModel(network), free=tuple(range(len(network.parameters))), start=network.start()
+    )
+    members = [i for i, q in enumerate(p.parameters) if q.effect == "sensor_bias"]
+    assert len(members) == 3
+    block = p.prior_covariance()[members]
+    deviations = np.array([p.parameters[i].prior_deviation for i in members])
+    np.testing.assert_allclose(block[:, members], np.diag(deviations**2))
+    np.testing.assert_allclose(np.delete(block, members, axis=1), 0.0)
