@@ -14,7 +14,7 @@ from _site import Site
 
 from mpc.environment import ActorNetwork, EconomicReward, PolicyController, ScenarioPlant
 from mpc.kpi import StageCost, measure_kpis
-from mpc.plants import Controller, Measurements, RecentSteps, run_closed_loop
+from mpc.loop import Controller, Measurements, RecentSteps, run_closed_loop
 from mpc.scenario import Forecast
 
 PEER_DAYS = 1  # of each week that the site's peers are run for

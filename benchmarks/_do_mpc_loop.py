@@ -26,7 +26,7 @@ import numpy as np
 from mpc.control import ControlProblem, HorizonData, MpcController, Rollout, Solution, Status
 from thermal.hvac import hvac_function
 from thermal.model import IMPLICIT_EULER
-from thermal.signals import REFERENCE_TEMPERATURE
+from thermal.inputs import REFERENCE_TEMPERATURE
 
 #: Ipopt's settings: quiet, a good first guess, tolerance, and when to give up. Of the barriers that were tried (1e-3 to
 #: 1e-5) this one solves most often and soonest.

@@ -11,8 +11,8 @@ import pandas as pd
 from _energyplus_offices import CONTROL_STEPS, ELECTRICITY, GAS, STEP
 
 from mpc.control import Action, Channel, ComfortOperation, ControllerSettings, Horizon, MpcController
-from mpc.plants import Measurements
-from mpc.plants.energyplus import EnergyPlusPlant, controller_system
+from mpc.loop import Measurements
+from mpc.adapters.energyplus import EnergyPlusPlant, controller_system
 from mpc.scenario import Forecast
 from mpc.studies import control_model, make_controller, site_points
 from thermal.effects import chosen

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from calibration.diagnosis import diagnose, write_diagnosis
-from mpc.plants import Measurements, SensorNoise, run_closed_loop
-from mpc.plants.energyplus import EnergyPlusPlant, energyplus_plant
+from mpc.loop import Measurements, SensorNoise, run_closed_loop
+from mpc.adapters.energyplus import EnergyPlusPlant, energyplus_plant
 from mpc.scenario import ConstantRate, Forecast, Tariff
 from thermal import Case, load_case, save_case
 

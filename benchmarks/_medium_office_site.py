@@ -24,8 +24,8 @@ from _site import POLICIES, Site, Week, World
 
 from mpc.baselines import OutdoorReset
 from mpc.environment import ScenarioPlant
-from mpc.plants import Controller, FixedSetpoints
-from mpc.plants.energyplus import EnergyPlusPlant, energyplus_building
+from mpc.loop import Controller, FixedSetpoints
+from mpc.adapters.energyplus import EnergyPlusPlant, energyplus_building
 from mpc.studies import control_model
 from thermal.effects import chosen
 from thermal.model import ReducedModel

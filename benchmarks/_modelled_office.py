@@ -11,7 +11,7 @@ from _energyplus_offices import ELECTRICITY, GAS
 from numpy.typing import NDArray
 
 from mpc.kpi import PlantRecord
-from mpc.plants import (
+from mpc.loop import (
     Measurements,
     PointLayout,
     RecentSteps,
@@ -20,7 +20,7 @@ from mpc.plants import (
     SimulatedPlant,
     scheduled_operation,
 )
-from mpc.plants.energyplus import EnergyPlusBuilding, EnergyPlusPlant, controller_system
+from mpc.adapters.energyplus import EnergyPlusBuilding, EnergyPlusPlant, controller_system
 from mpc.scenario import Forecast
 from thermal import Building
 from thermal.case import Device

@@ -19,7 +19,7 @@ import yaml
 from _table import ROOT
 
 from calibration import Interval, evaluate_case
-from mpc.plants import pilot_building
+from mpc.loop import pilot_building
 from thermal import load_case, save_case
 from thermal.pilot import MOUNTAIN_VIEW, TwinTruth, generate_twin
 

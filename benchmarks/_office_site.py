@@ -28,7 +28,7 @@ from calibration.diagnosis import diagnose, write_diagnosis
 from mpc.baselines import Guideline36, OutdoorReset, day_schedule
 from mpc.control import ControllerSettings, Horizon, Margin, MpcController
 from mpc.environment import SUPPLY_SETPOINTS, ScenarioPlant
-from mpc.plants import (
+from mpc.loop import (
     Controller,
     FixedSetpoints,
     ReducedBuilding,

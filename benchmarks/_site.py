@@ -9,7 +9,7 @@ from typing import ClassVar, Literal
 
 from mpc.environment import ControlEnvironment, EconomicReward, ScenarioPlant
 from mpc.kpi import StageCost
-from mpc.plants import Controller
+from mpc.loop import Controller
 
 POLICIES = Path(__file__).parent / "policies"
 

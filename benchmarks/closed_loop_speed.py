@@ -31,7 +31,7 @@ import numpy as np
 from _table import markdown, write
 from simulator_speed import use_one_thread
 
-from mpc.plants import SensorNoise, SimulatedPlant, pilot_building, pilot_weather, simulated_plant
+from mpc.loop import SensorNoise, SimulatedPlant, pilot_building, pilot_weather, simulated_plant
 from thermal import Building
 from thermal.hvac import HvacSystem
 from thermal.pilot import size_system

@@ -26,7 +26,7 @@ from pathlib import Path
 from _code import code
 from _table import markdown, write
 
-from mpc.plants import save_pilot
+from mpc.loop import save_pilot
 from thermal import load_case
 from thermal.effects import chosen
 

@@ -35,7 +35,7 @@ import pandas as pd
 from _table import markdown, publish, write
 from simulator_speed import use_one_thread
 
-from mpc.plants import SensorNoise, pilot_building, pilot_weather
+from mpc.loop import SensorNoise, pilot_building, pilot_weather
 from mpc.scenario import DAY_AHEAD_ERRORS
 from mpc.studies import Study, make_study, prediction_errors, run_controller
 from thermal import Building

@@ -38,8 +38,8 @@ from _table import markdown, write
 from mpc.baselines import OutdoorReset
 from mpc.errors import EnergyPlusError
 from mpc.kpi import measure_kpis
-from mpc.plants import run_closed_loop
-from mpc.plants.energyplus import EnergyPlusPlant
+from mpc.loop import run_closed_loop
+from mpc.adapters.energyplus import EnergyPlusPlant
 
 CONTROLLERS = {"own": "own control", "reset": "outdoor reset", "before": "MPC before diagnosis", "after": "MPC after"}
 COLUMNS = ("office", "week", "controller", "electricity, kWh", "gas, kWh", "cost, USD", "against own, %",

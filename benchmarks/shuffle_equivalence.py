@@ -37,7 +37,7 @@ from thermal.shuffle import (
     mean_square_reach,
     mixing_rate,
 )
-from thermal.shuffle._equivalent import MIXING_EXTENT
+from thermal.shuffle.equivalent import MIXING_EXTENT
 
 matplotlib.use("Agg")
 from matplotlib import pyplot as plt

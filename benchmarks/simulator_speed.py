@@ -37,7 +37,7 @@ from scipy.sparse.linalg import splu
 
 from thermal import Building, SymbolicModel, build_network
 from thermal.model import IMPLICIT_EULER, TR_BDF2, Matrices, Scheme, Stepper, factorise
-from thermal.model._factor import SparseSolver
+from thermal.model.factor import SparseSolver
 from thermal.network import ThermalNetwork
 from thermal.pilot import MOUNTAIN_VIEW, devices, generate_office
 from thermal.shuffle import RandomShuffle

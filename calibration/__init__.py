@@ -1,15 +1,15 @@
 """Fidelity: N-step prediction error, calibration by least squares, and what the data determine."""
 
-from calibration._calibrate import calibrate
-from calibration._case_model import CaseModel, case_model, check_on_grid, evaluate_case
-from calibration._corrected import evaluate_filter, filter_interval
-from calibration._cross_validation import CrossValidation, Fold, ParameterSpread, cross_validate
-from calibration._disturbance import DisturbanceModel, DisturbedSpace
-from calibration._estimate import Estimate, estimate
-from calibration._evaluate import HORIZONS, Evaluation, Metrics, Predictions, evaluate_model, spatial_metrics
-from calibration._gain import Gain
-from calibration._heat_balance import HeatBalance, HeatFit, heat_balance
-from calibration._information import (
+from calibration.fit.calibrate import calibrate
+from calibration.evaluation.case_model import CaseModel, case_model, check_on_grid, evaluate_case
+from calibration.estimation.filtered import evaluate_filter, filter_interval
+from calibration.fit.cross_validation import CrossValidation, Fold, ParameterSpread, cross_validate
+from calibration.estimation.disturbance import DisturbanceModel, DisturbedSpace
+from calibration.fit.estimate import Estimate, estimate
+from calibration.evaluation.n_step import HORIZONS, Evaluation, Metrics, Predictions, evaluate_model, spatial_metrics
+from calibration.estimation.gains import Gain
+from calibration.estimation.heat_balance import HeatBalance, HeatFit, heat_balance
+from calibration.identifiability.information import (
     Combination,
     Direction,
     Information,
@@ -17,18 +17,18 @@ from calibration._information import (
     fisher_information,
     information_of,
 )
-from calibration._innovations import DISTURBANCE_PRIORS, DisturbancePrior, TunedDisturbance, tune_disturbance
-from calibration._intervals import Interval, Runs, default_intervals, horizon_steps, parse_interval, select_runs
-from calibration._kalman import Filtered, KalmanFilter
-from calibration._least_squares import INTERRUPTED, LeastSquaresResult, solve_least_squares
-from calibration._many import calibrate_many, case_folders
-from calibration._many_cluster import ClusterExecutor
-from calibration._many_record import CaseOutcome
-from calibration._power import ParameterPower, Power, power_of_data, tuning_problem
-from calibration._problem import Problem
-from calibration._profile import Profile, ProfileInterval, profile_likelihood
-from calibration._report import calibration_verdict, write_calibration
-from calibration._report_case import (
+from calibration.estimation.innovations import DISTURBANCE_PRIORS, DisturbancePrior, TunedDisturbance, tune_disturbance
+from calibration.evaluation.intervals import Interval, Runs, default_intervals, horizon_steps, parse_interval, select_runs
+from calibration.estimation.kalman import Filtered, KalmanFilter
+from calibration.fit.least_squares import INTERRUPTED, LeastSquaresResult, solve_least_squares
+from calibration.fleet.run import calibrate_many, case_folders
+from calibration.fleet.cluster import ClusterExecutor
+from calibration.fleet.record import CaseOutcome
+from calibration.identifiability.power import ParameterPower, Power, power_of_data, tuning_problem
+from calibration.fit.problem import Problem
+from calibration.identifiability.profile import Profile, ProfileInterval, profile_likelihood
+from mpc.reports.calibration import calibration_verdict, write_calibration
+from mpc.reports.case import (
     check_verdict,
     quality_rows,
     simulation_summary,
@@ -36,15 +36,15 @@ from calibration._report_case import (
     write_check,
     write_simulation,
 )
-from calibration._report_evaluation import evaluation_verdict, predictions_table, write_evaluation
-from calibration._result import CalibrationResult, GridCheck, ParameterEstimate, SolverReport, load_parameters
-from calibration._results import check_results_folder, to_json, write_results
-from calibration._selection import select_structure
-from calibration._selection_verdict import Candidate, HeldOutDifference, LikelihoodRatio, Selection
-from calibration._settings import ModelSettings, read_settings
-from calibration._smoother import Smoothed, smooth
-from calibration._state_space import StateSpace, state_space
-from calibration._whiteness import Whiteness, ZoneWhiteness, whiteness
+from mpc.reports.evaluation import evaluation_verdict, predictions_table, write_evaluation
+from calibration.fit.result import CalibrationResult, GridCheck, ParameterEstimate, SolverReport, load_parameters
+from calibration.results import check_results_folder, to_json, write_results
+from calibration.fit.selection import select_structure
+from calibration.fit.selection_verdict import Candidate, HeldOutDifference, LikelihoodRatio, Selection
+from calibration.evaluation.settings import ModelSettings, read_settings
+from calibration.estimation.smoother import Smoothed, smooth
+from calibration.estimation.state_space import StateSpace, state_space
+from calibration.estimation.whiteness import Whiteness, ZoneWhiteness, whiteness
 from calibration.errors import CalibrationError
 
 __all__ = [

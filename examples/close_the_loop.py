@@ -1,7 +1,7 @@
 """Run a small office in closed loop for a winter day: fixed setpoints, noisy sensors, indicators at the end."""
 
 from mpc.kpi import Kpis, measure_kpis
-from mpc.plants import FixedSetpoints, SensorNoise, pilot_building, pilot_weather, run_closed_loop, simulated_plant
+from mpc.loop import FixedSetpoints, SensorNoise, pilot_building, pilot_weather, run_closed_loop, simulated_plant
 
 DAY, NEXT = "2023-01-09", "2023-01-10"
 

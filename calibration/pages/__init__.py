@@ -1,6 +1,6 @@
 """What reports of every package are made of: pages, pictures, and how numbers and times read."""
 
-from calibration._figures._style import (
+from mpc.reports.figures.style import (
     CELSIUS,
     INK,
     MEASURED,
@@ -13,7 +13,7 @@ from calibration._figures._style import (
     styled,
     time_axis,
 )
-from calibration._page import clock, counted, duration, render, significant
+from mpc.reports.page import clock, counted, duration, render, significant
 
 __all__ = [
     "CELSIUS",

@@ -1,10 +1,10 @@
 """Controllers by rule, which optimal control is compared with: schedule, outdoor reset, ASHRAE Guideline 36."""
 
-from mpc.baselines._guideline36 import Guideline36, Guideline36Settings
-from mpc.baselines._requests import HysteresisRequests, SuppressedRequests
-from mpc.baselines._reset import OutdoorReset
-from mpc.baselines._schedule import day_schedule
-from mpc.baselines._trim_respond import TrimRespond, TrimRespondLoop
+from mpc.baselines.guideline36 import Guideline36, Guideline36Settings
+from mpc.baselines.requests import HysteresisRequests, SuppressedRequests
+from mpc.baselines.reset import OutdoorReset
+from mpc.baselines.schedule import day_schedule
+from mpc.baselines.trim_respond import TrimRespond, TrimRespondLoop
 
 __all__ = [
     "Guideline36",

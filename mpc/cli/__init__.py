@@ -1,5 +1,5 @@
 """The console command ``buildingmpc``: each subcommand is a thin layer over a public function."""
 
-from mpc.cli._app import main
+from mpc.cli.app import main
 
 __all__ = ["main"]

@@ -9,14 +9,14 @@ except ImportError as _error:
         'learning environments need gymnasium, which the extra brings: pip install "buildingmpc[rl]"'
     ) from _error
 
-from mpc.environment._actions import SUPPLY_SETPOINTS, ActionLayout
-from mpc.environment._environment import ControlEnvironment, ScenarioPlant
-from mpc.environment._features import LARGEST, OBSERVED_RANGES, Feature
-from mpc.environment._observation import HISTOGRAM_EDGES, ObservationLayout
-from mpc.environment._outlook import BLOCK_ENDS, CLOCK_FEATURES, Outlook, clock
-from mpc.environment._policy import Activation, ActorNetwork, PolicyController
-from mpc.environment._register import ENVIRONMENT_ID, office_environment, register
-from mpc.environment._reward import REWARDS, EconomicReward, PaperStepReward, Reward
+from mpc.environment.actions import SUPPLY_SETPOINTS, ActionLayout
+from mpc.environment.environment import ControlEnvironment, ScenarioPlant
+from mpc.environment.features import LARGEST, OBSERVED_RANGES, Feature
+from mpc.environment.observation import HISTOGRAM_EDGES, ObservationLayout
+from mpc.environment.outlook import BLOCK_ENDS, CLOCK_FEATURES, Outlook, clock
+from mpc.environment.policy import Activation, ActorNetwork, PolicyController
+from mpc.environment.registration import ENVIRONMENT_ID, office_environment, register
+from mpc.environment.reward import REWARDS, EconomicReward, PaperStepReward, Reward
 
 register()
 

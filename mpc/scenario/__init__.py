@@ -1,20 +1,20 @@
 """What drives a closed loop: clock, weather, people, prices and carbon, and forecasts of them."""
 
-from mpc.scenario._carbon import GAS_CARBON, CarbonIntensity
-from mpc.scenario._comfort import ComfortBand
-from mpc.scenario._forecast import FORECAST_UNITS, Forecast, column_unit
-from mpc.scenario._forecaster import DAY_AHEAD_ERRORS, ErrorGrowth, Forecaster
-from mpc.scenario._gains import RADIANT_SHARES, InternalGains
-from mpc.scenario._grid import Calendar, StepGrid
-from mpc.scenario._occupancy import (
+from mpc.scenario.carbon import GAS_CARBON, CarbonIntensity
+from mpc.scenario.comfort import ComfortBand
+from mpc.scenario.forecast import FORECAST_UNITS, Forecast, column_unit
+from mpc.scenario.forecaster import DAY_AHEAD_ERRORS, ErrorGrowth, Forecaster
+from mpc.scenario.gains import RADIANT_SHARES, InternalGains
+from mpc.scenario.grid import Calendar, StepGrid
+from mpc.scenario.occupancy import (
     OFFICE_AREA_PER_PERSON,
     OFFICE_PRESENCE,
     Occupancy,
     RandomOccupancy,
     ScheduledOccupancy,
 )
-from mpc.scenario._paper import paper_carbon, paper_tariff
-from mpc.scenario._rates import (
+from mpc.scenario.paper import paper_carbon, paper_tariff
+from mpc.scenario.rates import (
     GAS_UNITS,
     KILOWATT_HOUR,
     ConstantRate,
@@ -24,11 +24,11 @@ from mpc.scenario._rates import (
     SeriesRate,
     gas_price,
 )
-from mpc.scenario._scenario import Scenario, build_scenario, zone_areas
-from mpc.scenario._tariff import DemandBuckets, DemandCharge, Tariff, window_means
-from mpc.scenario._urdb import read_urdb
-from mpc.scenario._weather import WEATHER_POINTS, Weather
-from mpc.scenario._weather_files import read_epw, read_tmy3, read_weather_csv, sky_radiation, weather_of_case
+from mpc.scenario.scenario import Scenario, build_scenario, zone_areas
+from mpc.scenario.tariff import DemandBuckets, DemandCharge, Tariff, window_means
+from mpc.scenario.urdb import read_urdb
+from mpc.scenario.weather import WEATHER_POINTS, Weather
+from mpc.scenario.weather_files import read_epw, read_tmy3, read_weather_csv, sky_radiation, weather_of_case
 
 __all__ = [
     "DAY_AHEAD_ERRORS",

@@ -1,13 +1,13 @@
 """Controllers put together, run on plants and compared: what the commands ``control`` and ``compare`` do."""
 
-from mpc.studies._bound import KnownState
-from mpc.studies._compare import Comparison, compare_controllers
-from mpc.studies._controller import default_horizon, held_space, make_controller, site_points
-from mpc.studies._demo import Demo, run_demo
-from mpc.studies._equip import equip
-from mpc.studies._model import ORDER, control_model
-from mpc.studies._report import write_comparison, write_control
-from mpc.studies._run import (
+from mpc.studies.bound import KnownState
+from mpc.studies.compare import Comparison, compare_controllers
+from mpc.studies.controller import default_horizon, held_space, make_controller, site_points
+from mpc.studies.demo import Demo, run_demo
+from mpc.studies.devices import equip
+from mpc.studies.model import ORDER, control_model
+from mpc.reports.control import write_comparison, write_control
+from mpc.studies.run import (
     ControllerName,
     ControlRun,
     Decision,
@@ -16,9 +16,9 @@ from mpc.studies._run import (
     prediction_errors,
     run_controller,
 )
-from mpc.studies._study import CONTROL_STEP, HORIZON_HOURS, PlantKind, Study, check_kind, make_study
-from mpc.studies._summaries import comparison_rows, comparison_summary, control_summary, trajectory
-from mpc.studies._verdicts import comparison_verdict, control_verdict
+from mpc.studies.study import CONTROL_STEP, HORIZON_HOURS, PlantKind, Study, check_kind, make_study
+from mpc.reports.control_tables import comparison_rows, comparison_summary, control_summary, trajectory
+from mpc.reports.control_words import comparison_verdict, control_verdict
 
 __all__ = [
     "CONTROL_STEP",

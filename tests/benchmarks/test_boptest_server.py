@@ -8,7 +8,7 @@ from types import ModuleType
 
 import pytest
 
-from mpc.plants.boptest import BoptestServer, pilot_to_serve
+from mpc.adapters.boptest import BoptestServer, pilot_to_serve
 
 
 @pytest.fixture(scope="module")

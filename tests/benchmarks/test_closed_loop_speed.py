@@ -8,7 +8,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from mpc.plants import pilot_building
+from mpc.loop import pilot_building
 from thermal.pilot import size_system
 
 

@@ -10,7 +10,7 @@ from types import ModuleType
 import pytest
 from typer.testing import CliRunner
 
-from mpc.cli._app import app
+from mpc.cli.app import app
 
 pytest.importorskip("skimage", reason="needs the extra [plan]")
 

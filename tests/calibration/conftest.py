@@ -20,7 +20,7 @@ import pytest
 from numpy.typing import NDArray
 
 from calibration import CaseOutcome, DisturbanceModel, StateSpace, state_space
-from calibration._many_record import RECORD
+from calibration.fleet.record import RECORD
 from thermal import Inputs
 from thermal.model import Matrices
 from thermal.pilot import generate_pilot

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-from mpc.cli._app import app
+from mpc.cli.app import app
 from thermal.data import bundled_case_path
 
 CASE = str(bundled_case_path())
@@ -231,7 +231,7 @@ def test_doctor_reports_what_is_broken(monkeypatch: pytest.MonkeyPatch) -> None:
     def broken() -> str:
         raise ImportError("no module named casadi")
 
-    monkeypatch.setattr("mpc.cli._doctor._ipopt", broken)
+    monkeypatch.setattr("mpc.cli.doctor._ipopt", broken)
     answer = run("doctor")
     assert answer.exit_code == 1
     assert "ImportError: no module named casadi" in answer.stdout and "FAILED" in answer.stdout

@@ -8,7 +8,7 @@ from typing import Any
 
 from typer.testing import CliRunner
 
-from mpc.cli._app import app
+from mpc.cli.app import app
 from thermal.data import bundled_case_path
 
 CASE = str(bundled_case_path())

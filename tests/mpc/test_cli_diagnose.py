@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-from mpc.cli._app import app
+from mpc.cli.app import app
 from thermal.data import bundled_case_path
 
 CASE = str(bundled_case_path())
@@ -37,7 +37,7 @@ def test_diagnose_writes_what_it_says(tmp_path: Path) -> None:
 
 def test_the_terminal_has_verdict_suspects_and_how_far(capsys: pytest.CaptureFixture[str]) -> None:
     from calibration.diagnosis import diagnose, diagnosis_verdict
-    from mpc.cli._diagnose import _show
+    from mpc.cli.diagnose import _show
     from thermal import load_bundled_case
 
     result = diagnose(load_bundled_case(), dx=2.0)

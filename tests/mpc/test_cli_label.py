@@ -17,8 +17,8 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from mpc.cli import _label
-from mpc.cli._app import app
+from mpc.cli import label as _label
+from mpc.cli.app import app
 
 pytest.importorskip("fastapi", reason="needs the extra [pages]")
 pytest.importorskip("skimage", reason="needs the extra [plan]")

@@ -20,7 +20,7 @@ from typer.testing import CliRunner
 
 import calibration
 from calibration import calibrate
-from mpc.cli._app import app
+from mpc.cli.app import app
 from thermal.pilot import generate_pilot
 
 OPTIONS = ("--horizon", "1h", "--starts", "1")
@@ -138,7 +138,7 @@ def test_a_solver_that_does_not_converge_fails_the_run_and_keeps_the_results(
         result = calibrate(*args, **settings)
         return replace(result, solver=replace(result.solver, success=False, status="Maximum_Iterations_Exceeded"))
 
-    monkeypatch.setattr("calibration._many_case.calibrate", stopped)
+    monkeypatch.setattr("calibration.fleet.case.calibrate", stopped)
     shutil.copytree(cases / NAMES[0], tmp_path / "cases" / NAMES[0])
     answer = run("calibrate", tmp_path / "cases", "--out", tmp_path / "out", "--scheduler", "x", *OPTIONS)
     assert answer.exit_code == 1

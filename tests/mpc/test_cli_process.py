@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from mpc.cli import _console
+from mpc.cli import console as _console
 from thermal.data import bundled_case_path
 
 HEAVY = ("casadi", "matplotlib", "pandas", "scipy", "thermal", "calibration")

@@ -15,7 +15,7 @@ from typing import Any
 import httpx
 import pytest
 
-from mpc.cli._serve import serve
+from mpc.cli.serve import serve
 from mpc.errors import BoptestError
 from thermal.data import bundled_case_path
 

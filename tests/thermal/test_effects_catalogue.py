@@ -14,7 +14,7 @@ from thermal import Case, FloorPlans, Telemetry, ZoneTable, build_network
 from thermal.effects import CATALOGUE, Chosen, catalogue_table, chosen
 from thermal.errors import EffectError
 from thermal.parameters import PARAMETERS
-from thermal.signals import INFRARED, IRRADIANCE, WIND, Drivers
+from thermal.inputs import INFRARED, IRRADIANCE, WIND, Drivers
 
 CaseOf = Callable[[str], Case]
 UNITS = pint.UnitRegistry()

@@ -12,7 +12,7 @@ from pvlib import irradiance, solarposition
 
 from thermal import Case, SymbolicModel, ThermalNetwork, build_network
 from thermal.effects import CATALOGUE, PAIR, chosen
-from thermal.signals import Drivers, incidence_modifier, signal_values
+from thermal.inputs import Drivers, incidence_modifier, signal_values
 from thermal.units import air_density
 
 FloatArray = NDArray[np.float64]

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from thermal import Case, Simulator, SymbolicModel, Telemetry, build_network, free_runs, replay_inputs, spin_up
 from thermal.effects import chosen
 from thermal.model import EXACT, ModalRuns, reduced_model
-from thermal.signals import Drivers, signal_values
+from thermal.inputs import Drivers, signal_values
 from thermal.units import AIR_HEAT_CAPACITY, air_density
 
 FloatArray = NDArray[np.float64]

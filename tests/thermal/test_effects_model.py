@@ -23,7 +23,7 @@ from thermal import (
 from thermal.effects import CATALOGUE, chosen
 from thermal.errors import InputShapeError
 from thermal.model import IMPLICIT_EULER, TR_BDF2, Inputs, RolloutData, Scheme, rollout
-from thermal.signals import REFERENCE_TEMPERATURE, Drivers, signal_values
+from thermal.inputs import REFERENCE_TEMPERATURE, Drivers, signal_values
 
 FloatArray = NDArray[np.float64]
 CaseOf = Callable[[str], Case]

@@ -10,8 +10,9 @@ import scipy.sparse.linalg as spl
 from thermal import SymbolicModel, build_network
 from thermal.data import load_bundled_case
 from thermal.errors import SingularModelError
-from thermal.model import _factor, factorise
-from thermal.model._factor import Elimination, SparseSolver
+from thermal.model import factor as _factor
+from thermal.model import factorise
+from thermal.model.factor import Elimination, SparseSolver
 
 
 @pytest.fixture(scope="module")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from thermal.model._modal_fading import all_fading_sums, fading_sums, rows_of
+from thermal.model.convolution import all_fading_sums, fading_sums, rows_of
 
 
 def test_they_are_the_recursion_that_forgets() -> None:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from thermal import ModelError, SymbolicModel, build_network, load_bundled_case, reduced_model
 from thermal.model import IMPLICIT_EULER, TR_BDF2, Scheme, Stepper, krylov_basis
-from thermal.model._certificate import closed_loop
+from thermal.model.certificate import closed_loop
 
 FloatArray = NDArray[np.float64]
 

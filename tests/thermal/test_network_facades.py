@@ -23,7 +23,7 @@ from thermal import (
 from thermal.case import Layer, Location, Surface, ZoneEntry
 from thermal.errors import ModelError, ScopeError
 from thermal.network import GraphBuilder, floor_grid
-from thermal.network._facades import facade_of, wall_facades
+from thermal.network.facades import facade_of, wall_facades
 from thermal.parameters import ENVELOPE_PARAMETERS, PARAMETERS, Scope
 from thermal.pilot import generate_office
 

@@ -11,7 +11,7 @@ from thermal import SymbolicModel
 from thermal.errors import ModelError
 from thermal.network import GraphBuilder, ThermalNetwork
 from thermal.parameters import PARAMETERS, Parameter
-from thermal.signals import Signal
+from thermal.inputs import Signal
 
 
 def three_nodes(scope: bool = False) -> ThermalNetwork:

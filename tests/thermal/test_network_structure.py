@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from calibration._settings import ModelSettings, read_settings
+from calibration.evaluation.settings import ModelSettings, read_settings
 from calibration.errors import CalibrationError, ParameterFileError
 from thermal import (
     Building,

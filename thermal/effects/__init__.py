@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
-from thermal.effects._air import INFILTRATION, THERMAL_BRIDGE, WINDOW_OPENING, ZONE_MIXING
-from thermal.effects._effect import CONSTANT, PAIR, Chosen, Effect, Joining, shape, strength
-from thermal.effects._metering import CAPACITY_LIMIT, DUCT_LOSS, FLOW_GAIN, SENSOR_BIAS, SENSOR_LAG, VALVE_LEAK
-from thermal.effects._next_door import GROUND_EXCHANGE, HIDDEN_MASS, INTERFLOOR_EXCHANGE, NEIGHBOUR, ROOF_EXCHANGE
-from thermal.effects._outside import LONGWAVE_SKY, WIND_FILM, WRONG_STATION
-from thermal.effects._people import CLOCK_SHIFT, INTERNAL_GAINS, LATENT_LOAD
-from thermal.effects._sun import BLINDS, SOLAR_GAIN, SOLAR_OPAQUE
-from thermal.effects._words import catalogue_table
+from thermal.effects.air import INFILTRATION, THERMAL_BRIDGE, WINDOW_OPENING, ZONE_MIXING
+from thermal.effects.effect import CONSTANT, PAIR, Chosen, Effect, Joining, shape, strength
+from thermal.effects.metering import CAPACITY_LIMIT, DUCT_LOSS, FLOW_GAIN, SENSOR_BIAS, SENSOR_LAG, VALVE_LEAK
+from thermal.effects.next_door import GROUND_EXCHANGE, HIDDEN_MASS, INTERFLOOR_EXCHANGE, NEIGHBOUR, ROOF_EXCHANGE
+from thermal.effects.outside import LONGWAVE_SKY, WIND_FILM, WRONG_STATION
+from thermal.effects.people import CLOCK_SHIFT, INTERNAL_GAINS, LATENT_LOAD
+from thermal.effects.sun import BLINDS, SOLAR_GAIN, SOLAR_OPAQUE
+from thermal.effects.words import catalogue_table
 from thermal.errors import EffectError, nearest
 
 #: Effects by id, in the order in which they join a network: what others look at comes first, sensors come last.

@@ -1,15 +1,15 @@
 """Control volumes and faces of a building, as one graph."""
 
-from thermal.network._anatomy import UPWARD, Anatomy, OuterFaces, Outlook, Room
-from thermal.network._blueprint import Blueprint
-from thermal.network._build import blueprint, build_network
-from thermal.network._extension import Extension
-from thermal.network._films import series, surface_mesh
-from thermal.network._graph import GraphBuilder
-from thermal.network._grid import FloorGrid, floor_grid
-from thermal.network._materials import RATED_OUTSIDE_FILM, SHUFFLE_STEP
-from thermal.network._network import CapacityClass, ConductanceClass, ThermalNetwork
-from thermal.network._structure import BASELINE, Structure
+from thermal.network.topology import UPWARD, Anatomy, OuterFaces, Outlook, Room
+from thermal.network.assembly import Blueprint
+from thermal.network.build import blueprint, build_network
+from thermal.network.extension import Extension
+from thermal.network.films import series, surface_mesh
+from thermal.network.graph import GraphBuilder
+from thermal.network.grid import FloorGrid, floor_grid
+from thermal.network.materials import RATED_OUTSIDE_FILM, SHUFFLE_STEP
+from thermal.network.network import CapacityClass, ConductanceClass, ThermalNetwork
+from thermal.network.structure import BASELINE, Structure
 
 __all__ = [
     "BASELINE",

@@ -1,7 +1,7 @@
 """Generated cases of the size of the paper's pilot building, and twins of any, from a seed."""
 
-from thermal.pilot._errors import ClosedLoopError, LayoutError, TwinError
-from thermal.pilot._truth import TwinRanges, TwinTruth
+from thermal.pilot.errors import ClosedLoopError, LayoutError, TwinError
+from thermal.pilot.truth import TwinRanges, TwinTruth
 from thermal.pilot.building import pilot_building
 from thermal.pilot.disturbance import draw_disturbance
 from thermal.pilot.layout import devices, generate_office

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.signal import lfilter
 
-from thermal.pilot._errors import TwinError
+from thermal.pilot.errors import TwinError
 
 Series = npt.NDArray[np.float64]
 

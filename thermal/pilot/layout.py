@@ -10,10 +10,10 @@ import numpy.typing as npt
 from thermal.case import Device, FloorPlan, FloorPlans
 from thermal.case.building import EXTERIOR_WALL, INTERIOR_WALL, OUTSIDE
 from thermal.case.schema import FACADES
-from thermal.pilot._errors import LayoutError
-from thermal.pilot._outline import Mask, draw_outline, exterior_ring
-from thermal.pilot._partition import partition
-from thermal.pilot._regions import Region
+from thermal.pilot.errors import LayoutError
+from thermal.pilot.outline import Mask, draw_outline, exterior_ring
+from thermal.pilot.partition import partition
+from thermal.pilot.regions import Region
 
 _OUTLINES = 6  # outlines to draw before a size is refused
 _NOTCHED_FROM = (1500.0, 20)  # m2 and zones a floor, from here on outlines may have notches

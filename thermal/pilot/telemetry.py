@@ -11,7 +11,7 @@ import pandas as pd
 
 from thermal.case import FloorPlans, Telemetry, zone_floor_areas
 from thermal.case.points import DISCHARGE_TEMPERATURE, OUTDOOR_TEMPERATURE, SUPPLY_FLOW, ZONE_TEMPERATURE
-from thermal.pilot._errors import ClosedLoopError
+from thermal.pilot.errors import ClosedLoopError
 from thermal.pilot.thermostat import Terminals, Thermostats, draw_thermostats, size_terminals
 from thermal.units import AIR_HEAT_CAPACITY
 

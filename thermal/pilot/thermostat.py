@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 import pandas as pd
 
-from thermal.pilot._errors import ClosedLoopError
+from thermal.pilot.errors import ClosedLoopError
 from thermal.units import AIR_HEAT_CAPACITY
 
 Series = npt.NDArray[np.float64]

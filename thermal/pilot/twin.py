@@ -17,8 +17,8 @@ from thermal.errors import nearest
 from thermal.model import Simulator
 from thermal.network import build_network
 from thermal.parameters import Parameter, Scope
-from thermal.pilot._errors import TwinError
-from thermal.pilot._truth import TwinRanges, TwinTruth
+from thermal.pilot.errors import TwinError
+from thermal.pilot.truth import TwinRanges, TwinTruth
 from thermal.pilot.disturbance import draw_disturbance
 from thermal.pilot.layout import devices
 from thermal.pilot.prbs import draw_prbs_thermostats

@@ -9,7 +9,7 @@ import pvlib
 from scipy.signal import lfilter
 
 from thermal.case import Location
-from thermal.pilot._errors import ClosedLoopError
+from thermal.pilot.errors import ClosedLoopError
 
 Series = npt.NDArray[np.float64]
 

@@ -1,6 +1,6 @@
 """The paper's randomized shuffling of air within zones, and the two terms of the model that equal its mean."""
 
-from thermal.shuffle._equivalent import (
+from thermal.shuffle.equivalent import (
     choose_equivalent,
     effective_diffusivity,
     exchange_rate,
@@ -8,9 +8,9 @@ from thermal.shuffle._equivalent import (
     mixing_factor,
     mixing_rate,
 )
-from thermal.shuffle._errors import ShuffleCellError, ShuffleError, ShuffleParameterError, ShuffleStateError
-from thermal.shuffle._random import RandomShuffle
-from thermal.shuffle._swaps import apply_swaps
+from thermal.shuffle.errors import ShuffleCellError, ShuffleError, ShuffleParameterError, ShuffleStateError
+from thermal.shuffle.random import RandomShuffle
+from thermal.shuffle.swaps import apply_swaps
 
 __all__ = [
     "RandomShuffle",

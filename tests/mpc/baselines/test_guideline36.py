@@ -9,7 +9,7 @@ import pytest
 from mpc.baselines import Guideline36, Guideline36Settings, HysteresisRequests, OutdoorReset, SuppressedRequests
 from mpc.control import SitePoints
 from mpc.errors import ControlError
-from mpc.plants import Actuator
+from mpc.loop import Actuator
 
 TERMINALS = ("A", "B", "C", "D")
 POINTS = SitePoints(TERMINALS, TERMINALS, ("AHU1", "AHU2"), "BOILER", "station")

@@ -20,7 +20,7 @@ from mpc.control import (
     heat_channels,
     outdoor_scenarios,
 )
-from mpc.control._scenarios import _Tree
+from mpc.control.solvers.scenarios import _Tree
 from mpc.errors import ControlError
 from mpc.scenario import ErrorGrowth
 

@@ -18,8 +18,8 @@ from mpc.control import (
     Solution,
     supply_channels,
 )  # fmt: skip
-from mpc.control._problem import CostTerms
-from mpc.control._second_start import CHEAPER, Starts
+from mpc.control.problem.problem import CostTerms
+from mpc.control.solvers.starts import CHEAPER, Starts
 from thermal.hvac import Heater, SmoothHvac
 
 NOW = pd.Timestamp("2023-01-16 10:00", tz="Etc/GMT+8")

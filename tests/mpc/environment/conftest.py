@@ -11,7 +11,7 @@ import pytest
 pytest.importorskip("gymnasium", reason="needs the extra [rl]")
 
 from mpc.environment import ControlEnvironment
-from mpc.plants import (
+from mpc.loop import (
     ReducedBuilding,
     SensorNoise,
     SimulatedPlant,

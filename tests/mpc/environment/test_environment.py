@@ -14,7 +14,7 @@ import mpc.environment  # registers
 from mpc.environment import ControlEnvironment, EconomicReward, PaperStepReward
 from mpc.errors import EnvironmentSetupError, PlantActionError
 from mpc.kpi import PaperReward, PlantRecord, StageCost
-from mpc.plants import SimulatedPlant
+from mpc.loop import SimulatedPlant
 
 Make = Callable[..., ControlEnvironment]
 

@@ -17,7 +17,7 @@ from mpc.environment import (
     Outlook,
     clock,
 )
-from mpc.plants import SimulatedPlant
+from mpc.loop import SimulatedPlant
 from thermal.case.points import POINT_TYPES
 
 Make = Callable[..., ControlEnvironment]

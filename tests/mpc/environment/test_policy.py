@@ -10,7 +10,7 @@ import pytest
 
 from mpc.environment import ActorNetwork, ControlEnvironment, PolicyController
 from mpc.errors import EnvironmentSetupError
-from mpc.plants import run_closed_loop
+from mpc.loop import run_closed_loop
 
 Make = Callable[..., ControlEnvironment]
 

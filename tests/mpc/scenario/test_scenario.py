@@ -23,7 +23,7 @@ from mpc.scenario import (
     zone_areas,
 )
 from thermal import Building, load_bundled_case
-from thermal.signals import Drivers
+from thermal.inputs import Drivers
 
 
 @pytest.fixture(scope="module")

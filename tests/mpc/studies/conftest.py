@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from mpc.plants import SensorNoise, SimulatedPlant, pilot_building, pilot_weather, simulated_plant
+from mpc.loop import SensorNoise, SimulatedPlant, pilot_building, pilot_weather, simulated_plant
 from mpc.studies import control_model
 from thermal import Building
 from thermal.hvac import HvacSystem

@@ -9,7 +9,7 @@ from calibration import state_space
 from mpc.control import Source
 from mpc.errors import ControlError
 from mpc.kpi import measure_kpis
-from mpc.plants import FixedSetpoints, run_closed_loop
+from mpc.loop import FixedSetpoints, run_closed_loop
 from mpc.studies import control_model, default_horizon, held_space, make_controller
 from thermal.effects import chosen
 from thermal.model import modal_model

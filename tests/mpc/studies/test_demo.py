@@ -13,10 +13,10 @@ from typer.testing import CliRunner
 
 from calibration import Interval
 from calibration.errors import ResultsExistError
-from mpc.cli._app import app
+from mpc.cli.app import app
 from mpc.errors import ControlError
 from mpc.studies import Demo, run_demo
-from mpc.studies._demo import _working_day
+from mpc.studies.demo import _working_day
 from thermal import Case, load_bundled_case
 
 STEPS = ["check", "calibrate", "diagnose", "evaluate", "compare"]
@@ -33,8 +33,8 @@ def demo(case: Case, tmp_path_factory: pytest.TempPathFactory) -> tuple[Demo, li
     """Of two controllers and one hour."""
     said: list[str] = []
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("mpc.studies._demo.CONTROLLERS", ("reset", "mpc"))
-        patch.setattr("mpc.studies._demo._working_day", lambda *_: ("2023-03-10T06:00", "2023-03-10T07:00"))
+        patch.setattr("mpc.studies.demo.CONTROLLERS", ("reset", "mpc"))
+        patch.setattr("mpc.studies.demo._working_day", lambda *_: ("2023-03-10T06:00", "2023-03-10T07:00"))
         out = tmp_path_factory.mktemp("demo") / "results"
         return run_demo(out, case=case, dx=1.0, told=lambda step, verdict: said.append(step)), said
 

@@ -13,7 +13,7 @@ import pytest
 
 from calibration.errors import ResultsExistError
 from mpc.errors import ControlError, PlantError
-from mpc.plants import SensorNoise, pilot_weather
+from mpc.loop import SensorNoise, pilot_weather
 from mpc.scenario import weather_of_case
 from mpc.studies import (
     Comparison,
@@ -33,7 +33,7 @@ from mpc.studies import (
     write_comparison,
     write_control,
 )
-from mpc.studies._reasons import reason_rows
+from mpc.reports.control_log import reason_rows
 from thermal import Building, load_bundled_case
 
 START, END = "2023-01-09T06:00", "2023-01-09T08:00"

@@ -77,7 +77,7 @@ def test_blocks_within_blocks_end(tmp_path: Path) -> None:
             block.add_blockref(f"B{level - 1}", (0, 0))
     document.modelspace().add_blockref("B6", (0, 0))
     document.saveas(tmp_path / "bomb.dxf")
-    import thermal.plan._vector as vector
+    import thermal.plan.vector as vector
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(vector, "_MOST_ENTITIES", 2000)  # so that the test is quick

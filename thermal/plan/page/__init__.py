@@ -3,14 +3,14 @@
 Needs the extra ``[pages]`` (``pip install "buildingmpc[pages]"``) beside ``[plan]``.
 """
 
-from thermal.plan.page._app import LabelDesk, create_app
-from thermal.plan.page._convert import building_of_draft, draft_of
-from thermal.plan.page._draft import Draft, DraftDevice, DraftFloor, Picture, Site
-from thermal.plan.page._findings import DraftFinding, find_faults
-from thermal.plan.page._reports import ReportMaker
-from thermal.plan.page._serve import serve_page
-from thermal.plan.page._start import import_list, import_sheet
-from thermal.plan.page._store import CaseStore
+from thermal.plan.page.app import LabelDesk, create_app
+from thermal.plan.page.convert import building_of_draft, draft_of
+from thermal.plan.page.draft import Draft, DraftDevice, DraftFloor, Picture, Site
+from thermal.plan.page.findings import DraftFinding, find_faults
+from thermal.plan.page.reports import ReportMaker
+from thermal.plan.page.serve import serve_page
+from thermal.plan.page.start import import_list, import_sheet
+from thermal.plan.page.store import CaseStore
 
 __all__ = [
     "CaseStore",

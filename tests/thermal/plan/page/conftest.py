@@ -18,7 +18,7 @@ with warnings.catch_warnings():
     from starlette.testclient import TestClient
 
 from thermal.plan.page import Draft, DraftDevice, LabelDesk, Site, create_app
-from thermal.plan.page._convert import encode_floor
+from thermal.plan.page.convert import encode_floor
 
 TOKEN = "t0ken"
 HOST = "http://127.0.0.1:8000"

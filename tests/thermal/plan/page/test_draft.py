@@ -15,7 +15,7 @@ from thermal import Building, ZoneTable
 from thermal.case import Location, ZoneEntry
 from thermal.errors import LabelledCaseError, MalformedRequestError
 from thermal.plan.page import Draft, building_of_draft, draft_of
-from thermal.plan.page._convert import encode_floor, parse_draft, zones_of
+from thermal.plan.page.convert import encode_floor, parse_draft, zones_of
 
 
 @given(

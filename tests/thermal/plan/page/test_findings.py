@@ -9,7 +9,7 @@ import pytest
 
 from thermal.case import Airflow
 from thermal.plan.page import Draft, DraftDevice, Site, find_faults
-from thermal.plan.page._findings import zone_facts
+from thermal.plan.page.findings import zone_facts
 
 Make = Callable[..., Draft]
 VAV = DraftDevice(name="VAV_A", type="vav", zone="A")

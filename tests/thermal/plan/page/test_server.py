@@ -18,8 +18,8 @@ import pytest
 from PIL import Image
 
 from thermal.plan.page import Draft, LabelDesk
-from thermal.plan.page import _routes as routes
-from thermal.plan.page import _uploads as uploads
+from thermal.plan.page import routes
+from thermal.plan.page import uploads
 
 Make = Callable[..., Draft]
 

@@ -1,0 +1,219 @@
+"""Drift: how the error of a free run grows with time, and what its slope on logarithmic axes says of its cause."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibration.evaluation.n_step import Wanted, predict_runs
+from calibration.evaluation.intervals import Interval, Runs, select_runs
+from mpc.reports.page import duration, kelvin
+from calibration.diagnosis.refit.comparison import Fit
+from calibration.errors import NotEnoughDataError
+from thermal import Inputs
+from thermal.model import IMPLICIT_EULER, SPIN_UP, Scheme
+
+FloatArray = NDArray[np.float64]
+
+Kind = Literal["sensors", "random", "persistent", "hump"]
+
+#: Length of the runs where the telemetry allows [s], and steps of them that are kept at most.
+_LENGTH, _KEPT = 86400.0, 48
+
+#: Time between starts beyond the hour's whole steps [steps]: runs that all start on the hour would have every switch of
+#: a schedule at the same place.
+_OFF_THE_HOUR = 1
+
+#: The curve grows until it is this share of its largest [-], or for so many points; what follows is the end of growth.
+_GROWN, _FEWEST = 0.6, 4
+
+#: Borders of the slopes 0, 1/2 and 1 [-]. The upper is below the middle: walls that warm after the air pull the slope
+#: of a persistent heat down, and nothing pulls that of a random one up.
+_HARDLY, _RANDOM = 0.25, 0.62
+
+#: Steepest slope that is sought [-]: no heat makes a temperature run ahead of time.
+_STEEPEST = 1.1
+
+#: Where a wrong mass or lag shows [s], and the least ratio to the smallest error of the six hours after [-].
+_HUMP, _HIGHER, _AFTER = (600.0, 3600.0), 1.1, 21600.0
+
+#: Share of the last value from which a curve counts as levelled off [-].
+_LEVEL = 0.8
+
+
+@dataclass(frozen=True)
+class DriftCurve:
+    """Root mean square error over runs and zones by time since the start.
+
+    Parameters
+    ----------
+    seconds : ndarray, shape (n_kept,)
+        Time since the start, ends of steps [s].
+    rms : ndarray, shape (n_kept,)
+        Error [K].
+
+    Examples
+    --------
+    >>> time = 300.0 * np.arange(1, 289)
+    >>> walk = DriftCurve(time, 0.1 * np.sqrt(time / 300.0))
+    >>> walk.kind, round(walk.slope, 2)
+    ('random', 0.5)
+    """
+
+    seconds: FloatArray
+    rms: FloatArray
+
+    @cached_property
+    def slope(self) -> float:
+        """Slope p on logarithmic axes while the error grows [-].
+
+        ``E² = s² + a² (1 - exp(-t/τ))^2p``: beside an error s that is there from the start, and before it levels off
+        with τ, it grows as t^p. s and τ are tried on a grid, a and p follow by least squares of log E.
+        """
+        time, error = self._growth()
+        best, slope = np.inf, 0.0
+        target = np.log(error)
+        for share in np.concatenate([[0.0], np.linspace(0.3, 0.95, 14)]):
+            floor = (share * float(error.min())) ** 2
+            grown = 0.5 * np.log(error**2 - floor)
+            for settling in [*(time[-1] * np.geomspace(0.3, 5.0, 12)), np.inf]:
+                x = np.log(time if np.isinf(settling) else -np.expm1(-time / settling))
+                p, a = np.polyfit(x, grown, 1)
+                misfit = float(np.mean((0.5 * np.log(floor + np.exp(2.0 * (a + p * x))) - target) ** 2))
+                if misfit < best and -0.1 <= p <= _STEEPEST:
+                    best, slope = misfit, float(p)
+        return slope
+
+    @cached_property
+    def hump(self) -> tuple[float, float, float] | None:
+        """When the error is largest in the first hour [s], how large [K], and to what it falls [K]; None without."""
+        inside = (self.seconds >= _HUMP[0]) & (self.seconds <= _HUMP[1])
+        if not inside.any():
+            return None
+        top = int(np.argmax(np.where(inside, self.rms, -np.inf)))
+        after = (self.seconds > self.seconds[top]) & (self.seconds <= self.seconds[top] + _AFTER)
+        if not after.any() or self.rms[top] < _HIGHER * max(float(self.rms[after].min()), float(self.rms[0])):
+            return None
+        return float(self.seconds[top]), float(self.rms[top]), float(self.rms[after].min())
+
+    @property
+    def kind(self) -> Kind:
+        """What such a curve comes from: slope 0 sensors, 1/2 random heat, 1 persistent heat, a hump mass or lag."""
+        if self.hump is not None:
+            return "hump"
+        if self.slope < _HARDLY:
+            return "sensors"
+        return "random" if self.slope < _RANDOM else "persistent"
+
+    @property
+    def words(self) -> str:
+        """Say how the error grows and what makes it so."""
+        how = f"slope {max(0.0, self.slope):.2f}"
+        if self.hump is not None:
+            at, top, low = self.hump
+            return (
+                f"is largest {duration(at)} after the start ({kelvin(top)} K) and then falls to {kelvin(low)} K, as "
+                "where the mass of air and furniture is wrong or a sensor lags"
+            )
+        if self.kind == "sensors":
+            cause = "as where readings are off, or air has yet to mix after a switch"
+            return f"is there from the first step and hardly grows ({how}), {cause}"
+        if self.kind == "random":
+            return f"grows with the square root of time at first ({how}), as where heat comes and goes at random"
+        return f"grows nearly in proportion to time at first ({how}), as where heat is missing for hours on end"
+
+    @property
+    def end(self) -> str:
+        """Say where the error ends, and how soon it is near that."""
+        last, span = float(self.rms[-1]), f"{self.seconds[-1] / 3600.0:g} hours"
+        near = float(self.seconds[int(np.argmax(self.rms >= _LEVEL * last))])
+        ends = f"{kelvin(last)} K after {span}"
+        if near <= self.seconds[0] or self.kind in ("sensors", "hump"):
+            return ends
+        if near > 0.5 * self.seconds[-1]:
+            return f"{ends}, and still grows there"
+        about = f"{near / 3600.0:.0f} hours" if near >= 5400.0 else duration(near)
+        return f"{ends}, four fifths of which it has after {about}"
+
+    def _growth(self) -> tuple[FloatArray, FloatArray]:
+        """Find times and errors while it grows; all of a curve that begins near its top."""
+        error = np.maximum(self.rms, 1e-9)
+        enough = _GROWN * float(error.max())
+        if error[0] >= enough:
+            return self.seconds, error
+        count = max(int(np.argmax(error >= enough)) + 1, _FEWEST)
+        return self.seconds[:count], error[:count]
+
+
+def drift_of(
+    fit: Fit, intervals: Sequence[Interval], scheme: Scheme = IMPLICIT_EULER, spin_up_seconds: float = SPIN_UP
+) -> DriftCurve:
+    """Error of a fitted model's free runs over a day, or as long as the telemetry allows.
+
+    Parameters
+    ----------
+    fit : Fit
+        The model.
+    intervals : sequence of Interval
+        Where the runs end.
+    scheme : Scheme
+        Time stepping of the free runs.
+    spin_up_seconds : float
+        Telemetry before an interval that the spin-up may use [s].
+
+    Raises
+    ------
+    NotEnoughDataError
+        When there is no room for a run of a single step.
+    """
+    inputs, matrices = fit.built.inputs, fit.model.matrices(fit.theta)
+    steps, runs = _longest(inputs, intervals, spin_up_seconds)
+    keep = np.unique(np.round(np.geomspace(1, steps, min(steps, _KEPT))).astype(np.int64))
+    squared = np.zeros(len(keep))
+    count = np.zeros(len(keep))
+    for interval, chosen in zip(intervals, runs, strict=True):
+        found = predict_runs(fit.model, matrices, inputs, interval, Wanted(chosen, keep), scheme)
+        error = (found.simulated - found.measured) ** 2
+        squared += np.nansum(error, axis=(0, 2))
+        count += np.isfinite(error).sum(axis=(0, 2))
+    return DriftCurve(np.asarray(keep * inputs.step, dtype=float), np.sqrt(squared / np.maximum(count, 1)))
+
+
+def _longest(inputs: Inputs, intervals: Sequence[Interval], spin_up_seconds: float) -> tuple[int, list[Runs]]:
+    """Count the steps of a day and find the runs of each interval; half as many until every interval has a run."""
+    steps = max(1, round(_LENGTH / inputs.step))
+    every = inputs.step * (max(1, round(3600.0 / inputs.step)) + _OFF_THE_HOUR)
+    while steps:
+        try:
+            runs = [select_runs(inputs, i, steps, every=every, spin_up=spin_up_seconds) for i in intervals]
+        except NotEnoughDataError:
+            runs = []
+        if runs and all(r.starts.size for r in runs):
+            return steps, runs
+        steps //= 2
+    raise NotEnoughDataError(f"drift: expected room for a run of one step in each of {len(intervals)} intervals")
+
+
+def drift_sentence(before: DriftCurve, after: DriftCurve | None, found: str) -> str:
+    """Say what the growth of the error tells.
+
+    Parameters
+    ----------
+    before : DriftCurve
+        Of the calibrated model.
+    after : DriftCurve or None
+        Of the final model, where it has an effect.
+    found : str
+        What the final model is called, such as ``with the effect found``.
+    """
+    text = f"Left to itself, the calibrated model's error {before.words}; it is {before.end}."
+    if after is None:
+        return text
+    if after.kind == before.kind != "hump":
+        return f"{text} {found.capitalize()} it grows alike (slope {max(0.0, after.slope):.2f}) and is {after.end}."
+    return f"{text} {found.capitalize()} it {after.words}; it is {after.end}."

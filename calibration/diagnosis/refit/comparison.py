@@ -1,0 +1,298 @@
+"""One case on the bench: models with some effects of the catalogue, fitted and compared on the same telemetry."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibration.evaluation.n_step import Predictions, evaluate_model
+from calibration.evaluation.intervals import Interval, alternating_intervals, default_intervals, horizon_steps, select_runs
+from calibration.fit.problem import Problem
+from calibration.evaluation.settings import ModelSettings
+from calibration.fit.starts import tuning_runs
+from calibration.diagnosis.refit.fit import Found, evidence_of, settle
+from calibration.diagnosis.screen.openings import seen_openings
+from calibration.errors import NotEnoughDataError
+from thermal import Case, Inputs, SymbolicModel, ThermalNetwork, replay_inputs
+from thermal.effects import CATALOGUE, chosen
+from thermal.model import ReducedModel
+from thermal.network import Anatomy, Blueprint, Extension, blueprint
+from thermal.inputs import Drivers
+
+FloatArray = NDArray[np.float64]
+
+#: Effects in a model, each with its zones; none is the whole building.
+Effects = Mapping[str, Sequence[str]]
+
+#: Share of its plausible range that the strength of an effect has where a fit begins [-].
+TYPICAL = 0.25
+
+#: Evaluations of a fit: models are compared by what they explain, which the last digits of θ do not change.
+EVALUATIONS = 18
+
+#: Fewest held-out days that may take turns with those that tune.
+_LEAST_DAYS = 3
+
+#: Parameters on the linear scale that are no strength: they act on one.
+_SHIFTS = ("internal_gain_delay",)
+
+
+@dataclass(frozen=True)
+class Built:
+    """A model with some effects, and the telemetry that drives it.
+
+    Parameters
+    ----------
+    network : ThermalNetwork
+        Control volumes, faces and sources.
+    grid : SymbolicModel
+        On the grid.
+    inputs : Inputs
+        The telemetry.
+    """
+
+    network: ThermalNetwork
+    grid: SymbolicModel
+    inputs: Inputs
+
+    def theta(self, known: Mapping[str, float], strength: float = 0.0) -> FloatArray:
+        """θ with known values by name; strengths of other effects at a share of their range [parameter units].
+
+        Parameters
+        ----------
+        known : mapping of str to float
+            Values [parameter units].
+        strength : float
+            Share of the upper end of the range [-].
+        """
+        parameters = self.network.parameters
+        at = [p.start + strength * (p.upper - p.start) * is_strength(p.name, p.effect) for p in parameters]
+        return np.array([known.get(p.name, start) for p, start in zip(parameters, at, strict=True)])
+
+
+def is_strength(name: str, effect: str | None) -> bool:
+    """Whether a parameter is the strength of an effect: absent at 0, and so at its start.
+
+    Parameters
+    ----------
+    name : str
+        Name of the parameter.
+    effect : str or None
+        Effect that it belongs to.
+    """
+    if effect is None:
+        return False
+    kinds = {p.name: p for p in CATALOGUE[effect].parameters} if effect in CATALOGUE else {}
+    kind = kinds.get(name.partition("@")[0])
+    return kind is None or (kind.scale == "linear" and kind.start == 0.0 and kind.name not in _SHIFTS)
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A model with some effects, fitted to the tuning intervals.
+
+    Parameters
+    ----------
+    effects : mapping of str to tuple of str
+        Effects with their zones.
+    built : Built
+        The model.
+    problem : Problem
+        What was fitted.
+    model : ReducedModel
+        That serves the estimate.
+    found : Found
+        The estimate.
+    evidence : float
+        Logarithm of the marginal likelihood of the tuning errors, but for a constant [-]; see `evidence_of`.
+    """
+
+    effects: Mapping[str, tuple[str, ...]]
+    built: Built
+    problem: Problem
+    model: ReducedModel
+    found: Found
+    evidence: float
+
+    @cached_property
+    def theta(self) -> FloatArray:
+        """Parameters, shape (n_parameter,) [parameter units]."""
+        return self.problem.theta(self.found.point)
+
+    @cached_property
+    def by_zone(self) -> FloatArray:
+        """Mean squared tuning error of each zone, shape (n_zone,) [K²]; 0 where nothing is measured."""
+        errors = [self.problem.errors(self.model, self.theta, r, slopes=False)[0] for r in self.problem.runs]
+        squared = np.concatenate([e.reshape(-1, e.shape[-1]) for e in errors]) ** 2
+        known = np.isfinite(squared)
+        return np.asarray(np.where(known, squared, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1))
+
+    @property
+    def change(self) -> float:
+        """Root mean square of how far measured zone temperatures change over the horizon [K]."""
+        zone, steps = self.built.inputs.zone, self.problem.steps
+        return float(np.sqrt(np.nanmean((zone[steps:] - zone[:-steps]) ** 2)))
+
+    @cached_property
+    def deviations(self) -> FloatArray:
+        """Standard errors of the parameters on the estimation scale, shape (n_parameter,) [-]."""
+        return np.asarray(np.sqrt(np.diag(np.linalg.inv(self.found.jacobian.T @ self.found.jacobian))))
+
+    @cached_property
+    def values(self) -> dict[str, float]:
+        """Parameters by name [parameter units]."""
+        names = (p.name for p in self.built.network.parameters)
+        return dict(zip(names, self.theta.tolist(), strict=True))
+
+
+@dataclass
+class Bench:
+    """A case with intervals and settings, on which models are built and fitted.
+
+    Parameters
+    ----------
+    case : Case
+        Building and telemetry.
+    settings : ModelSettings
+        Of the baseline.
+    tune, hold_out : sequence of Interval
+        As in `calibration.calibrate`.
+    horizon : str
+        Prediction horizon.
+    """
+
+    case: Case
+    settings: ModelSettings = field(default_factory=ModelSettings)
+    tune: Sequence[Interval] = ()
+    hold_out: Sequence[Interval] = ()
+    horizon: str = "6h"
+
+    def __post_init__(self) -> None:
+        self.tuned, self.judged = default_intervals(self.case, self.tune, self.hold_out)
+
+    def alternate(self, inputs: Inputs) -> bool:
+        """Let tuning and held-out days take turns where no intervals were given; whether they do now.
+
+        Parameters
+        ----------
+        inputs : Inputs
+            The telemetry; days without a run are left out, and too few of them leave the intervals as they were.
+        """
+        if self.tune or self.hold_out:
+            return False
+        steps, spin_up = horizon_steps(self.horizon, inputs.step), self.settings.spin_up_seconds
+        try:
+            tuned, judged = alternating_intervals(self.case)
+            tuning_runs(inputs, tuned, steps, spin_up)
+            judged = [i for i in judged if select_runs(inputs, i, steps, spin_up=spin_up).starts.size]
+        except NotEnoughDataError:
+            return False
+        if len(judged) < _LEAST_DAYS:
+            return False
+        self.tuned, self.judged = tuned, judged
+        return True
+
+    @cached_property
+    def drivers(self) -> Drivers:
+        """Sun, sky, wind and schedules of the case, and when windows are seen to stand open."""
+        drivers = Drivers(self.case)
+        drivers.openings = seen_openings(drivers, self.settings)
+        return drivers
+
+    @cached_property
+    def blueprint(self) -> Blueprint:
+        """The building without effects."""
+        s = self.settings
+        return blueprint(self.case.building, s.dx, s.reach, s.scopes, structure=s.structure)
+
+    @cached_property
+    def anatomy(self) -> Anatomy:
+        """What the building's volumes and faces are part of."""
+        return self.settings.network(self.case.building).anatomy
+
+    def untestable(self) -> dict[str, str]:
+        """Effects that the case cannot tell, with the reason."""
+        reasons = {e.id: e.untestable(self.drivers, self.anatomy) for e in CATALOGUE.values()}
+        return {name: reason for name, reason in reasons.items() if reason is not None}
+
+    def build(self, effects: Effects, further: Sequence[Extension] = ()) -> Built:
+        """Make a model with effects.
+
+        Parameters
+        ----------
+        effects : mapping of str to sequence of str
+            Effects with their zones.
+        further : sequence of Extension
+            What else to add.
+        """
+        network = self.blueprint.network((*chosen(effects), *further))
+        return Built(network, SymbolicModel(network), replay_inputs(self.case, network, self.drivers))
+
+    def problem(self, built: Built, theta: FloatArray) -> Problem:
+        """Least squares over the tuning intervals, of every parameter.
+
+        Parameters
+        ----------
+        built : Built
+            The model.
+        theta : ndarray, shape (n_parameter,)
+            Where it begins [parameter units].
+        """
+        steps = horizon_steps(self.horizon, built.inputs.step)
+        runs = tuning_runs(built.inputs, self.tuned, steps, self.settings.spin_up_seconds)
+        free = tuple(range(len(theta)))
+        return Problem(built.grid, built.inputs, runs, steps, free, theta, self.settings.stepping)
+
+    def fit(
+        self,
+        effects: Effects,
+        starts: Sequence[Mapping[str, float]],
+        built: Built | None = None,
+        evaluations: int = EVALUATIONS,
+    ) -> Fit:
+        """Fit a model with effects from several starts; the one of most evidence is kept.
+
+        Parameters
+        ----------
+        effects : mapping of str to sequence of str
+            Effects with their zones.
+        starts : sequence of mapping of str to float
+            Values by name; what they do not name starts at its prior, strengths at a quarter of their range.
+        built : Built, optional
+            The model, where it is at hand.
+        evaluations : int
+            Most evaluations of errors with derivatives from a start.
+        """
+        built = built or self.build(effects)
+        best: Fit | None = None
+        for known in starts:
+            theta = built.theta(known, TYPICAL)
+            problem = self.problem(built, theta)
+            model, found = settle(problem, built.grid, theta, evaluations)
+            value = evidence_of(problem, found)
+            if best is None or value > best.evidence:
+                best = Fit({e: tuple(z) for e, z in effects.items()}, built, problem, model, found, value)
+        if best is None:
+            raise ValueError("fit: expected at least one start")
+        return best
+
+    def predictions(self, fit: Fit, horizon: str | None = None) -> list[Predictions]:
+        """Hourly N-step predictions of a fitted model on the held-out intervals, one entry an interval.
+
+        Parameters
+        ----------
+        fit : Fit
+            The model.
+        horizon : str, optional
+            The bench's own by default.
+        """
+        s = self.settings
+        found = evaluate_model(
+            fit.model, fit.theta, fit.built.inputs, self.judged, horizon or self.horizon,
+            scheme=s.stepping, spin_up_seconds=s.spin_up_seconds,
+        )  # fmt: skip
+        return list(found.predictions)

@@ -1,0 +1,191 @@
+"""Heat that a fitted model lacks in every zone, hour by hour, with its band."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+from scipy.special import ndtri
+
+from calibration.estimation.filtered import filter_interval
+from calibration.estimation.disturbance import DisturbanceModel
+from calibration.estimation.gains import Covariance
+from calibration.estimation.heat_balance import HOUR, heat_balance, hourly_means
+from calibration.estimation.innovations import tune_disturbance
+from calibration.evaluation.intervals import Interval
+from calibration.estimation.smoother import averaged_deviation, smooth
+from calibration.estimation.tuner import air_volumes
+from calibration.diagnosis.refit.comparison import Fit
+from thermal import Inputs, reduced_model
+from thermal.model import IMPLICIT_EULER, SPIN_UP, ReducedModel, Scheme
+
+FloatArray = NDArray[np.float64]
+
+#: Telemetry that the size and the course of the missing heat are tuned on [s]: the last four days that were fitted,
+#: of which at most two are a weekend.
+_TUNED = 4 * 86400.0
+
+#: Zones beyond which gains are steady, the model is of a smaller order, the missing heat is in proportion to the zones'
+#: air, and a day is tuned on: the five hundred states of 123 zones are too many to smooth by.
+_MANY_ZONES, _ORDER, _TUNED_MANY = 40, 200, 86400.0
+
+#: Step of a parameter on the estimation scale for the slope of the missing heat [-].
+_SLOPE_STEP = 1e-3
+
+
+@dataclass(frozen=True)
+class Missing:
+    """Heat that a model needs beside the metered heat to follow the measured zone temperatures.
+
+    Parameters
+    ----------
+    watts, deviation : DataFrame, shape (n_hour, n_zone)
+        Mean over each hour by the stamp of its beginning, positive where the zone gets heat that the model does not
+        know of, and its standard deviation [W]; NaN where telemetry is missing in the hour.
+    disturbance : DisturbanceModel
+        Size and course of the missing heat, and noise of the sensors, that they follow from.
+    """
+
+    watts: pd.DataFrame
+    deviation: pd.DataFrame
+    disturbance: DisturbanceModel
+
+    def band(self, level: float = 0.9) -> tuple[pd.DataFrame, pd.DataFrame]:
+        """Lower and upper edge, each of shape (n_hour, n_zone) [W].
+
+        Parameters
+        ----------
+        level : float
+            Probability that the heat lies within [-], hour by hour, between 0 and 1.
+        """
+        half = float(ndtri(0.5 * (1.0 + level))) * self.deviation
+        return self.watts - half, self.watts + half
+
+    @property
+    def rms(self) -> FloatArray:
+        """Root mean square over the hours of each zone, shape (n_zone,) [W]; NaN where it is not measured."""
+        return np.asarray(np.sqrt((self.watts**2).mean()))
+
+
+def missing_heat(
+    fit: Fit,
+    intervals: Sequence[Interval],
+    scheme: Scheme = IMPLICIT_EULER,
+    spin_up_seconds: float = SPIN_UP,
+    fixed: bool = False,
+    near: DisturbanceModel | None = None,
+) -> Missing:
+    """Estimate the heat that a fitted model lacks on intervals of telemetry, by the hour.
+
+    A Kalman smoother holds the model to the measured temperatures by an autocorrelated heat in every zone
+    (`calibration.smooth`). How large that heat is in each zone, how long it lasts, and how noisy the readings are is
+    found by the likelihood of the innovations on the last four days of the last tuning interval. The band holds what
+    the noise leaves unknown of the heat, and what the fit leaves unknown of the parameters.
+
+    Parameters
+    ----------
+    fit : Fit
+        The model.
+    intervals : sequence of Interval
+        Less the 12 hours of the least spin-up where the telemetry does not begin before.
+    scheme : Scheme
+        Time stepping.
+    spin_up_seconds : float
+        Telemetry before an interval that the spin-up may use [s].
+    fixed : bool
+        Take the parameters as they are: the band is of the noise alone.
+    near : DisturbanceModel, optional
+        Size and course of the heat that a like model lacks, to begin with.
+
+    Raises
+    ------
+    FilterError
+        When an interval has no room after its spin-up.
+
+    Notes
+    -----
+    ``Var = r² V + D Σ D'``: V is the smoother's variance of a step, r from `averaged_deviation`, Σ the covariance of
+    the parameters, D the slopes of the heat that the measured temperatures ask for.
+    """
+    network, inputs, model = fit.built.network, fit.built.inputs, fit.model
+    many = len(network.zones) > _MANY_ZONES
+    if many and model.order > _ORDER:
+        model = reduced_model(fit.built.grid, [fit.theta], order=_ORDER)
+    covariance: Covariance = "steady" if many else "exact"
+    disturbance = _tuned(fit, model, near, scheme, spin_up_seconds)
+    parts = []
+    for interval in intervals:
+        filtered = filter_interval(
+            model, fit.theta, inputs, interval, disturbance,
+            scheme=scheme, covariance=covariance, spin_up_seconds=spin_up_seconds,
+        )  # fmt: skip
+        found = smooth(filtered)
+        rows = np.arange(filtered.begin + 1, filtered.begin + 1 + len(found.stamps))
+        known = _known(inputs, rows)
+        narrower = averaged_deviation(filtered, max(1, round(HOUR / inputs.step)))
+        values = (found.disturbance, (narrower * found.disturbance_deviation) ** 2)
+        parts.append(hourly_means(found.stamps, inputs.step, *(np.where(known, v, np.nan) for v in values)))
+    stamps = pd.DatetimeIndex(parts[0][0].append([p[0] for p in parts[1:]]))
+    watts, variance = (np.concatenate([p[i] for p in parts]) for i in (1, 2))
+    if not fixed:
+        variance = variance + _parameter_variance(fit, model, intervals, spin_up_seconds)
+    heat, deviation = (pd.DataFrame(v, stamps, list(network.zones)) for v in (watts, np.sqrt(variance)))
+    return Missing(heat, deviation, disturbance)
+
+
+def at_start(fit: Fit) -> Fit:
+    """Put every parameter of a model back to where its prior puts it.
+
+    Parameters
+    ----------
+    fit : Fit
+        The model.
+    """
+    parameters = fit.built.network.parameters
+    model = reduced_model(fit.built.grid, [np.array([p.start for p in parameters])])
+    point = np.array([p.transform(p.start) for p in fit.problem.parameters])
+    return replace(fit, model=model, found=replace(fit.found, point=point))
+
+
+def _tuned(
+    fit: Fit,
+    model: ReducedModel,
+    near: DisturbanceModel | None,
+    scheme: Scheme,
+    spin_up_seconds: float,
+) -> DisturbanceModel:
+    """Size and course of the missing heat and noise of the sensors, on the last of what was fitted."""
+    many, last = len(model.network.zones) > _MANY_ZONES, fit.problem.stretches[-1]
+    latest = last.end - pd.Timedelta(seconds=_TUNED_MANY if many else _TUNED)
+    stretch = Interval(max(last.start, latest), last.end)
+    return tune_disturbance(
+        model, fit.theta, fit.built.inputs, [stretch], per_zone=() if many else ("deviation",),
+        weights=air_volumes(model.network), start=near, scheme=scheme, covariance="steady",
+        spin_up_seconds=spin_up_seconds, curvature=False,
+    ).disturbance  # fmt: skip
+
+
+def _parameter_variance(
+    fit: Fit, model: ReducedModel, intervals: Sequence[Interval], spin_up_seconds: float
+) -> FloatArray:
+    """Variance of the missing heat that the parameters of a fit leave, shape (n_hour, n_zone) [W²]."""
+    point, jacobian, slopes = fit.found.point, fit.found.jacobian, []
+    for i, step in enumerate(_SLOPE_STEP * np.eye(point.size)):
+        # a strength at the end of its range is moved inwards only: beyond, heat would flow from cold to warm
+        ends = [np.clip(moved, *fit.problem.bounds) for moved in (point - step, point + step)]
+        low, high = (
+            heat_balance(model, fit.problem.theta(end), fit.built.inputs, intervals, spin_up_seconds).needed
+            for end in ends
+        )
+        slopes.append((high - low) / (ends[1] - ends[0])[i])
+    roots = np.tensordot(np.linalg.inv(np.linalg.cholesky(jacobian.T @ jacobian)), np.array(slopes), axes=1)
+    return np.asarray((roots**2).sum(axis=0))
+
+
+def _known(inputs: Inputs, rows: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Tell steps of zones whose temperature is measured before and after, and whose inputs are complete."""
+    measured = np.isfinite(inputs.zone)
+    return np.asarray(measured[rows] & measured[rows - 1] & inputs.complete[rows, None])

@@ -1,0 +1,342 @@
+"""Every effect of the catalogue at once: what each could explain of the errors, by their tangents at the estimate.
+
+Errors of the fitted model are ``e(p) = e + J_θ dθ + J_k p`` to first order, where J_k are the sensitivities to the
+strengths of an effect that is not there. With θ free to follow, held by its priors, what remains of an effect is its
+part that calibration cannot imitate; its gain in log-likelihood is a small quadratic programme in the Gram matrix of
+all, so that zones, pairs and generic heat are compared without another run of the model.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from copy import copy
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibration.diagnosis.refit.comparison import Bench, Fit, is_strength
+from calibration.diagnosis.screen.gains import Gain, choice_of
+from calibration.diagnosis.screen.generic import GENERIC, ZONE_HEAT
+from thermal import Parameter, reduced_model
+from thermal.effects import CATALOGUE, PAIR, Chosen
+from thermal.model import FEW_SHIFTS, SHIFTS
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
+
+#: Sweeps of the quadratic programme, and the change of an estimate in prior deviations that ends them [-].
+_SWEEPS, _TOLERANCE = 200, 1e-6
+
+#: Share of its range that a strength has where it is asked what a level changes [-].
+_LITTLE = 1e-3
+
+#: Order of the reduced model of a large building.
+_LARGEST_ORDER = 700
+
+#: Most zones in which effects of single zones are sought.
+_MOST_ZONES = 24
+
+#: Sizes that generic heat may have over its prior's [-]; the likeliest counts (empirical Bayes).
+_TIGHTNESS = (0.003, 0.01, 0.03, 0.1, 0.3)
+
+
+class Screening:
+    """Gram matrix of all strengths that a fitted model lacks, the fitted parameters projected out.
+
+    Parameters
+    ----------
+    bench : Bench
+        The case.
+    fit : Fit
+        The model.
+    candidates : sequence of str
+        Effects to screen.
+    """
+
+    def __init__(self, bench: Bench, fit: Fit, candidates: Sequence[str]) -> None:
+        here = _worst_zones(fit)
+        lacking = {e: here if CATALOGUE[e].zonal else () for e in candidates if e not in fit.effects}
+        built = bench.build({**fit.effects, **lacking}, (Chosen(GENERIC, here),))
+        self._elsewhere = len(built.network.zones) - len(here) if here else 0
+        own: tuple[Parameter, ...] = built.network.parameters
+        self._levels = {p.effect: p for p in own if p.effect in lacking and p.name == CATALOGUE[p.effect].level}
+        levels = {p.name: (p.lower, p.upper) for p in self._levels.values()}
+        theta, other = (built.theta({**fit.values, **{name: ends[k] for name, ends in levels.items()}}) for k in (0, 1))
+        # a Galerkin basis of a symmetric model serves its tangents too: gains are those of the grid within 0.02
+        shifts, order = (FEW_SHIFTS, _LARGEST_ORDER) if here else (SHIFTS, None)
+        model = reduced_model(built.grid, [theta], shifts=shifts, order=order)
+        problem = bench.problem(built, theta)
+        jacobian = problem.residuals(model, theta)[1] * problem.slopes(theta)
+        twice = [i for i, p in enumerate(own) if p.effect in self._levels and is_strength(p.name, p.effect)]
+        for i in twice:
+            little = _LITTLE * own[i].upper * (np.arange(len(own)) == i)
+            low, high = (problem.residuals_only(model, end + little) for end in (theta, other))
+            jacobian = np.column_stack([jacobian, jacobian[:, i] + (high - low) / little[i]])
+        self._twins = {len(own) + k: i for k, i in enumerate(twice)}
+        self.parameters = (*own, *(replace(own[i], name=f"{own[i].name} at the other end") for i in twice))
+        error = fit.problem.residuals_only(fit.model, fit.theta)
+        self.count = problem.effective_size()
+        self.scale: float = self.count / float(np.sum(error**2))
+        gram = self.scale * jacobian.T @ jacobian
+        score = -self.scale * jacobian.T @ error
+        self.prior = np.array([p.prior_deviation for p in self.parameters])
+        self.lower = np.array([p.lower for p in self.parameters])
+        self.upper = np.array([p.upper for p in self.parameters])
+        self._start = np.array([p.transform(p.start) for p in self.parameters])
+        self._point = np.concatenate([problem.point(theta), np.zeros(len(twice))])
+        self._whole, self._slope = gram, score
+        self._project(np.array([p.name in fit.values for p in self.parameters]))
+
+    def _project(self, known: BoolArray) -> None:
+        """Let the known parameters follow all others, held by their priors: (D2)."""
+        away = (self._point - self._start)[known]
+        hessian = self._whole[np.ix_(known, known)] + np.diag(self.prior[known] ** -2.0)
+        turn = np.linalg.solve(hessian, self._whole[known])
+        pull = self._slope[known] - away / self.prior[known] ** 2
+        self._known, self._turn, self._home = known, turn, np.linalg.solve(hessian, pull)
+        self.score = self._slope - turn.T @ pull
+        self.gram = self._whole - self._whole[:, known] @ turn
+
+    def without(self, effect: str) -> Screening:
+        """Screening of the model less one of its effects, by tangents: what is left in it makes up for that.
+
+        Parameters
+        ----------
+        effect : str
+            Id of one that the model has.
+        """
+        left = self._known & np.array([p.effect != effect for p in self.parameters])
+        move = np.zeros(len(self.parameters))
+        strengths = self._strengths(effect)
+        move[strengths] = -self._point[strengths]
+        away = (self._point - self._start)[left]
+        hessian = self._whole[np.ix_(left, left)] + np.diag(self.prior[left] ** -2.0)
+        move[left] = np.linalg.solve(
+            hessian, self._slope[left] - away / self.prior[left] ** 2 - self._whole[left] @ move
+        )
+        factor = self.count / float(self.count - 2.0 * self._slope @ move + move @ self._whole @ move)
+        less = copy(self)
+        less.scale = factor * self.scale
+        less._whole, less._slope = factor * self._whole, factor * (self._slope - self._whole @ move)
+        less._point = self._point + move
+        less._project(left)
+        return less
+
+    def of(self, effect: str) -> Gain:
+        """Gain of one effect: over the building, or in the zones where it explains most.
+
+        Parameters
+        ----------
+        effect : str
+            Its id.
+        """
+        index = self._strengths(effect)
+        if effect == GENERIC.id:
+            return self._likeliest(index)
+        if not CATALOGUE[effect].zonal:
+            return self._gain(effect, index, ())
+        members: dict[str, list[int]] = {}
+        for i in index:
+            members.setdefault(self.parameters[i].member or "", []).append(int(i))
+        everywhere = members.pop("", [])  # a strength that all zones share
+        silent = [name for name, mine in members.items() if not self._whole[mine, mine].any()]
+        members = {name: mine for name, mine in members.items() if name not in silent or len(silent) == len(members)}
+        found = [self._grow(effect, {name: np.array(i) for name, i in members.items()})] if members else []
+        if everywhere:
+            found.append(self._gain(effect, np.array(everywhere), ()))
+        return max(found, key=lambda g: g.gain)
+
+    def promised(self, *gains: Gain) -> dict[str, float]:
+        """Parameters where the tangents point: the effects' strengths, and what the fitted ones then would be.
+
+        Parameters
+        ----------
+        *gains : Gain
+            Of the effect, or of several together.
+        """
+        moved = self._point.copy()
+        moved[self._known] += self._home - self._turn @ np.sum([g.direction for g in gains], axis=0)
+        known = [p for p, k in zip(self.parameters, self._known, strict=True) if k]
+        values = {
+            p.name: float(np.clip(p.inverse(v), p.lower, p.upper))
+            for p, v in zip(known, moved[self._known], strict=True)
+        }
+        return values | {name: value for g in gains for name, value in g.strengths.items()}
+
+    def reach(self, first: Gain, second: Gain) -> float:
+        """Gain of two effects together were their strengths free of bounds [-].
+
+        Parameters
+        ----------
+        first, second : Gain
+            With their zones.
+        """
+        index = np.concatenate([first.index, second.index])
+        hessian = self.gram[np.ix_(index, index)] + np.diag(self.prior[index] ** -2.0)
+        return self._weigh(index, np.linalg.solve(hessian, self.score[index]))[0] - first.choice - second.choice
+
+    def together(self, first: Gain, second: Gain) -> tuple[Gain, Gain, float, float]:
+        """Two effects with the strengths that they have together, what both gain and what they explain.
+
+        Parameters
+        ----------
+        first, second : Gain
+            With their zones.
+        """
+        parts = first.index, second.index
+        x, gain, share = self._solve(np.concatenate(parts))
+        found = []
+        for one, index, strengths in zip((first, second), parts, np.split(x, [parts[0].size]), strict=True):
+            direction = np.zeros(len(self.parameters))
+            direction[index] = strengths
+            named = self._named(one.effect, index, strengths, np.zeros((index.size, index.size)))[0]
+            found.append(replace(one, strengths=named, direction=direction))
+        return found[0], found[1], gain - first.choice - second.choice, share
+
+    def cosine(self, first: Gain, second: Gain) -> float:
+        """Cosine of the projected signatures of two effects at their estimates [-].
+
+        Parameters
+        ----------
+        first, second : Gain
+            With their strengths.
+        """
+        a, b = first.direction, second.direction
+        size = np.sqrt((a @ self.gram @ a) * (b @ self.gram @ b))
+        return float(a @ self.gram @ b / size) if size > 0 else 0.0
+
+    def detectable(self, gain: float) -> dict[str, float]:
+        """Constant heat of each zone that would gain so much, by zone [W/m2].
+
+        Parameters
+        ----------
+        gain : float
+            Logarithm of a Bayes factor [-].
+        """
+        found = {}
+        for i, p in enumerate(self.parameters):
+            if p.base == ZONE_HEAT and p.member is not None:
+                information = max(float(self.gram[i, i]), 1e-12)
+                occam = 0.5 * np.log1p(information * self.prior[i] ** 2)
+                found[p.member] = float(np.sqrt(2.0 * (gain + occam) / information))
+        return found
+
+    def _likeliest(self, index: IntArray) -> Gain:
+        """Find the likeliest generic heat, of any size: by time, by zone, by outdoor temperature, or all of them."""
+        kinds = np.array([self.parameters[i].base for i in index])
+        families = [index, *(index[kinds == k] for k in np.unique(kinds) if not k.startswith("heat_from"))]
+        families.append(index[np.char.startswith(kinds, "heat_from")])
+        sizes = [self._gain(GENERIC.id, f, (), tightness=t) for f in families for t in _TIGHTNESS]
+        return max(sizes, key=lambda g: g.gain)
+
+    def _named(
+        self, effect: str, index: IntArray, x: FloatArray, covariance: FloatArray
+    ) -> tuple[dict[str, float], dict[str, float]]:
+        """Parameters by name and their standard errors: strengths, and the level between its ends that they weigh."""
+        own = np.array([self._twins.get(i, i) for i in index.tolist()])
+        rows = {self.parameters[i].name: (own == i).astype(float) for i in dict.fromkeys(own.tolist())}
+        most = {self.parameters[i].name: self.parameters[i].upper for i in own.tolist()}
+        values = {name: min(float(row @ x), most[name]) for name, row in rows.items()}
+        level, whole = self._levels.get(effect), float(x.sum())
+        if level is not None:
+            reach, upper = level.upper - level.lower, own != index
+            share = float(x[upper].sum()) / whole if whole > 0.0 else (level.start - level.lower) / reach
+            values[level.name] = level.lower + share * reach
+            rows[level.name] = reach * (upper - share) / whole if whole > 0.0 else np.zeros(len(x))
+        errors = {name: float(np.sqrt(row @ covariance @ row)) for name, row in rows.items()}
+        return values, errors
+
+    def _strengths(self, effect: str) -> IntArray:
+        own = ((i, self.parameters[self._twins.get(i, i)]) for i in range(len(self.parameters)))
+        return np.array([i for i, p in own if p.effect == effect and is_strength(p.name, effect)], dtype=np.int64)
+
+    def _grow(self, effect: str, members: Mapping[str, IntArray]) -> Gain:
+        """Add zones, or pairs of them, as long as each more than pays for having been chosen among all."""
+        places = len(members) + self._elsewhere
+        alone = {name: self._gain(effect, index, (name,)).gain for name, index in members.items()}
+        order = sorted(members, key=lambda name: -alone[name])
+        chosen: list[str] = []
+        best: Gain | None = None
+        for name in order:
+            trial = [*chosen, name]
+            index = np.concatenate([members[m] for m in trial])
+            zones = dict.fromkeys(z for m in trial for z in m.split(PAIR))
+            found = self._gain(effect, index, tuple(zones), choice_of(len(trial), places), places)
+            if best is None or found.gain > best.gain:
+                chosen, best = trial, found
+        if best is None:
+            raise ValueError(f"{effect}: expected at least one zone")
+        return best
+
+    def _gain(
+        self,
+        effect: str,
+        index: IntArray,
+        zones: tuple[str, ...],
+        choice: float = 0.0,
+        places: int = 0,
+        tightness: float = 1.0,
+    ) -> Gain:
+        x, gain, share = self._solve(index, tightness)
+        direction = np.zeros(len(self.parameters))
+        direction[index] = x
+        sharper = self.gram[np.ix_(index, index)] / (1.0 - share) + np.diag(self.prior[index] ** -2.0)
+        along = direction if np.any(direction) else np.isin(np.arange(len(direction)), index).astype(float)
+        whole = float(along @ self._whole @ along)
+        kept = float(along @ self.gram @ along) / whole if whole > 0.0 else 0.0
+        strengths, errors = self._named(effect, index, x, np.asarray(np.linalg.inv(sharper)))
+        return Gain(effect, zones, gain - choice, share, strengths, errors, kept, direction, index, places, choice)
+
+    def _solve(self, index: IntArray, tightness: float = 1.0) -> tuple[FloatArray, float, float]:
+        """Strengths, gain and share of the squared error: coordinate descent within the ranges."""
+        gram, score = self.gram[np.ix_(index, index)], self.score[index]
+        prior = tightness * self.prior[index]
+        hessian = gram + np.diag(prior**-2.0)
+        x = np.zeros(len(index))
+        for _ in range(_SWEEPS):
+            before = x.copy()
+            for j in range(len(index)):
+                step = (score[j] - hessian[j] @ x) / hessian[j, j]
+                x[j] = np.clip(x[j] + step, self.lower[index[j]], self.upper[index[j]])
+            if np.max(np.abs(x - before) / prior, initial=0.0) < _TOLERANCE:
+                break
+        return (x, *self._weigh(index, x, tightness))
+
+    def _weigh(self, index: IntArray, x: FloatArray, tightness: float = 1.0) -> tuple[float, float]:
+        """Gain of given strengths, and the share of the squared error that they explain."""
+        gram, score, prior = self.gram[np.ix_(index, index)], self.score[index], tightness * self.prior[index]
+        share = float(np.clip((2.0 * score @ x - x @ gram @ x) / self.count, 0.0, 0.999))
+        pull = float(np.sum((x / prior) ** 2))
+        sharper = gram / (1.0 - share) * np.outer(prior, prior)
+        occam = np.linalg.slogdet(np.eye(len(index)) + sharper)[1]
+        gain = -0.5 * self.count * np.log1p(-share) - 0.5 * pull - 0.5 * occam
+        gain += np.log(2.0) * np.count_nonzero((self.lower[index] == 0.0) & (x > 0.0))
+        return float(gain), share
+
+
+def _worst_zones(fit: Fit) -> tuple[str, ...]:
+    """Zones with the largest errors, in which effects of single zones are sought; none where that is all of them."""
+    zones = fit.built.network.zones
+    if len(zones) <= _MOST_ZONES:
+        return ()
+    worst = set(np.argsort(-fit.by_zone, kind="stable")[:_MOST_ZONES].tolist())
+    return tuple(z for k, z in enumerate(zones) if k in worst)
+
+
+def screen(bench: Bench, fit: Fit, candidates: Sequence[str]) -> tuple[Screening, list[Gain], Gain]:
+    """Screen all candidates; they come by what they gain, and the generic heat beside them.
+
+    Parameters
+    ----------
+    bench : Bench
+        The case.
+    fit : Fit
+        The model so far.
+    candidates : sequence of str
+        Effects that the case can tell.
+    """
+    made = Screening(bench, fit, candidates)
+    gains = [made.of(e) for e in candidates if e not in fit.effects]
+    return made, sorted(gains, key=lambda g: -g.gain), made.of(GENERIC.id)

@@ -1,0 +1,181 @@
+"""The estimation problem by the likelihood of innovations: errors of one long run, whitened by a Kalman filter.
+
+Under the disturbance the measurements are normal about the free run from the spin-up's state, ``y ~ N(μ(θ), Σ)``. For a
+given Σ the innovations' log-likelihood is ``-½ |Σ^-1/2 (y - μ(θ))|²`` but for a constant, least squares whose Jacobian
+``Σ^-1/2 dμ/dθ`` is exact and whose information is J'J. Σ is made anew at the θ of every round and with a disturbance
+tuned there: iterated generalised least squares (Carroll and Ruppert 1988, Transformation and Weighting in Regression,
+ch. 2). What Σ itself would tell of θ is left unused: how unmeasured heat fluctuates is an assumption, and no parameter
+of the building may rest on it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibration.estimation.disturbance import DisturbanceModel
+from calibration.estimation.gains import Covariance
+from calibration.estimation.innovations import DISTURBANCE_PRIORS
+from calibration.evaluation.intervals import Interval
+from calibration.fit.precision import Precision, precision, unexplained
+from calibration.fit.problem import Problem
+from calibration.estimation.whitening import Whitening, whitening
+from thermal import SymbolicModel, free_runs, spin_up
+from thermal.model import SPIN_UP
+
+FloatArray = NDArray[np.float64]
+
+#: Zones beyond which the gains are those of the steady covariance, as in the tuning of the disturbance.
+_MANY_ZONES = 40
+
+#: Stretch of telemetry whose gradients count as independent of those of the next [s]: innovations that are not white,
+#: as physics that is missing makes them, are correlated over the course of a day.
+_INDEPENDENT = 86400.0
+
+
+@dataclass(frozen=True)
+class InnovationsProblem(Problem):
+    """Least squares over whitened innovations of several tuning intervals.
+
+    Parameters
+    ----------
+    intervals : tuple of Interval
+        The tuning intervals.
+    whitenings : tuple of Whitening
+        Their filters; `at` makes them.
+    spin_up_seconds : float
+        Telemetry before an interval that its spin-up may use [s].
+    """
+
+    deviation: float = 1.0
+    intervals: tuple[Interval, ...] = ()
+    whitenings: tuple[Whitening, ...] = ()
+    spin_up_seconds: float = SPIN_UP
+
+    @property
+    def whitened(self) -> bool:
+        """Whether residuals are whitened, which takes a disturbance from the beginning."""
+        return True
+
+    @property
+    def stretches(self) -> tuple[Interval, ...]:
+        """Telemetry that is fitted: the tuning intervals."""
+        return self.intervals
+
+    @property
+    def disturbance(self) -> DisturbanceModel | None:
+        """What the innovations are whitened by, once `at` was called."""
+        return self.whitenings[0].whole.disturbance if self.whitenings else None
+
+    def at(
+        self, model: SymbolicModel, theta: FloatArray, disturbance: DisturbanceModel | None = None
+    ) -> InnovationsProblem:
+        """Whiten by the filter at θ.
+
+        Parameters
+        ----------
+        model : SymbolicModel
+            Reduced.
+        theta : ndarray, shape (n_parameter,)
+            Parameter values [parameter units].
+        disturbance : DisturbanceModel, optional
+            Unmeasured heat and sensors; the medians of their priors by default.
+        """
+        known = disturbance or DisturbanceModel(**{name: p.median for name, p in DISTURBANCE_PRIORS.items()})
+        covariance: Covariance = "steady" if self.inputs.zone.shape[1] > _MANY_ZONES else "exact"
+        made = (
+            whitening(model, theta, self.inputs, i, known, self.scheme, covariance, self.spin_up_seconds)
+            for i in self.intervals
+        )
+        return replace(self, whitenings=tuple(made))
+
+    def residuals(self, model: SymbolicModel, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Whitened innovations of all intervals [-] and their derivatives with respect to the estimated parameters.
+
+        Parameters
+        ----------
+        model : SymbolicModel
+            On the grid or reduced.
+        theta : ndarray, shape (n_parameter,)
+            Parameter values [parameter units].
+        """
+        parts = np.concatenate([self._whitened(model, theta, w, slopes=True) for w in self.whitenings])
+        return parts[:, 0], parts[:, 1:]
+
+    def residuals_only(self, model: SymbolicModel, theta: FloatArray) -> FloatArray:
+        """Whitened innovations of all intervals [-].
+
+        Parameters
+        ----------
+        model : SymbolicModel
+            On the grid or reduced.
+        theta : ndarray, shape (n_parameter,)
+            Parameter values [parameter units].
+        """
+        return np.concatenate([self._whitened(model, theta, w, slopes=False)[:, 0] for w in self.whitenings])
+
+    def _whitened(self, model: SymbolicModel, theta: FloatArray, white: Whitening, slopes: bool) -> FloatArray:
+        """Innovations of an interval and their derivatives as columns."""
+        matrices, inputs = model.matrices(theta, slopes), self.inputs
+        starts = np.array([white.at])
+        states, moved = spin_up(matrices, inputs, white.begin, starts)
+        means, mean_slopes = free_runs(
+            matrices, model.network, inputs, starts, white.stop - white.at, states, moved, self.scheme
+        )
+        columns = [(means[0] - inputs.zone[white.at + 1 : white.stop + 1])[..., None]]
+        if mean_slopes is not None:
+            columns.append(mean_slopes[0][..., list(self.free)])
+        return white(np.concatenate(columns, axis=-1))
+
+    def spread(self, error: FloatArray) -> float:
+        """Return the standard deviation of whitened innovations, 1 [-]: what they exceed it by is in the weight.
+
+        Parameters
+        ----------
+        error : ndarray, shape (n,)
+            Whitened innovations [-].
+        """
+        return 1.0
+
+    def effective_size(self) -> float:
+        """Independent observations in the tuning intervals [-]: every innovation, unless they were found worth less."""
+        return float(sum(w.measured.sum() for w in self.whitenings)) if self.effective is None else self.effective
+
+    def independent(self) -> NDArray[np.int64]:
+        """Tell which independent stretch of telemetry every residual belongs to, shape (n,)."""
+        steps = max(1, round(_INDEPENDENT / self.inputs.step))
+        rows = [np.broadcast_to(w.at + np.arange(len(w.measured))[:, None], w.measured.shape) for w in self.whitenings]
+        return np.concatenate([r[w.measured] // steps for r, w in zip(rows, self.whitenings, strict=True)])
+
+
+@precision.register
+def _(problem: InnovationsProblem, model: SymbolicModel, theta: FloatArray, disturbance: DisturbanceModel) -> Precision:
+    """Curvature of whitened innovations, which is their information too."""
+    jacobian = problem.turned(model, theta)[1]
+    curvature = jacobian.T @ jacobian
+    prior = np.asarray(np.linalg.inv(problem.prior_covariance()), dtype=float)
+    return Precision(curvature, curvature, prior, len(jacobian))
+
+
+@unexplained.register
+def _(
+    problem: InnovationsProblem, model: SymbolicModel, theta: FloatArray, disturbance: DisturbanceModel, seed: int = 0
+) -> float:
+    """Covariance of the gradient, day by day, over that of white innovations [-].
+
+    1 where the disturbance is right; above, innovations are larger than the filter says, or not white, so that they
+    repeat within the day what they pull at. Directions count as far as the data determine them.
+    """
+    residual, jacobian = problem.turned(model, theta)
+    stretches, index = np.unique(problem.independent(), return_inverse=True)
+    if len(stretches) < 2:
+        return float(np.mean(residual**2))
+    pulls = np.zeros((len(stretches), jacobian.shape[1]))
+    np.add.at(pulls, index, residual[:, None] * jacobian)
+    curvature = jacobian.T @ jacobian
+    # each stretch has pulled the estimate towards itself
+    score = pulls.T @ pulls * len(stretches) / (len(stretches) - 1)
+    prior = np.asarray(np.linalg.inv(problem.prior_covariance()), dtype=float)
+    return 1.0 / Precision(curvature, score, prior, residual.size).weight()

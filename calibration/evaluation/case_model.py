@@ -1,0 +1,231 @@
+"""A case with its model and parameters, ready to run: what calibration, evaluation and replay have in common."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from calibration.evaluation.n_step import HORIZONS, Evaluation, Progress, evaluate_model
+from calibration.evaluation.intervals import Interval, Runs, horizon_steps, merge, select_runs
+from calibration.fit.result import GridCheck, load_parameters
+from calibration.evaluation.settings import ModelSettings, read_settings
+from calibration.errors import NotEnoughDataError
+from thermal import (
+    Case,
+    Inputs,
+    SymbolicModel,
+    free_runs,
+    reduced_model,
+    replay_inputs,
+    spin_up,
+)
+from thermal.model import SPIN_UP, ReducedModel, Scheme
+
+FloatArray = NDArray[np.float64]
+
+#: Runs of the check of a reduced model on the grid, and the stretch of telemetry they are spread over [days].
+CHECK_RUNS, CHECK_DAYS = 6, 2.0
+
+#: Largest difference between reduced model and grid that reported errors may carry [K]; else they come from the grid.
+CHECK_TOLERANCE = 0.01
+
+
+@dataclass(frozen=True)
+class CaseModel:
+    """A case, its model on the grid, and one θ.
+
+    Parameters
+    ----------
+    case : Case
+        Building and telemetry.
+    settings : ModelSettings
+        How the model is built and run.
+    grid : SymbolicModel
+        On the grid.
+    inputs : Inputs
+        The telemetry as inputs of a replay.
+    theta : ndarray, shape (n_parameter,)
+        Parameter values [parameter units].
+    source : str
+        Where they come from, in a few words.
+    """
+
+    case: Case
+    settings: ModelSettings
+    grid: SymbolicModel
+    inputs: Inputs
+    theta: FloatArray
+    source: str
+
+    def certified(
+        self, interval: Interval, steps: int, reduced: ReducedModel | None = None
+    ) -> tuple[SymbolicModel, GridCheck]:
+        """Reduce the model where that is accurate enough, and return the grid where it is not.
+
+        Parameters
+        ----------
+        interval : Interval
+            Reduced model and grid are compared at its beginning.
+        steps : int
+            N of the runs that are compared.
+        reduced : ReducedModel, optional
+            That serves θ; made here by default.
+        """
+        reduced = reduced or reduced_model(self.grid, [self.theta])
+        s = self.settings
+        check = check_on_grid(
+            self.grid, reduced, self.theta, self.inputs, interval, steps, s.stepping, s.spin_up_seconds
+        )
+        return (reduced if check.max_difference <= CHECK_TOLERANCE else self.grid), check
+
+
+def case_model(
+    case: Case, parameters: str | Path | None = None, *, dx: float | None = None, scheme: str | None = None
+) -> CaseModel:
+    """Make a case's model with the parameters of a file, or those before calibration.
+
+    Parameters
+    ----------
+    case : Case
+        Building and telemetry.
+    parameters : str or Path, optional
+        A ``calibration.json``; its settings are taken over where the arguments say nothing.
+    dx : float, optional
+        Distance between control volumes of a plan [m].
+    scheme : str, optional
+        ``implicit_euler`` or ``tr_bdf2``.
+
+    Raises
+    ------
+    ParameterFileError
+        When the file cannot be read, or is of another building.
+    """
+    settings = read_settings(parameters) if parameters is not None else {}
+    settings |= {k: v for k, v in (("dx", dx), ("scheme", scheme)) if v is not None}
+    chosen = ModelSettings(**settings)
+    network = chosen.network(case.building)
+    theta = load_parameters(parameters, network) if parameters is not None else network.start()
+    source = Path(parameters).name if parameters is not None else "uncalibrated start values"
+    return CaseModel(case, chosen, SymbolicModel(network), replay_inputs(case, network), theta, source)
+
+
+def evaluate_case(
+    case: Case,
+    intervals: Sequence[Interval] = (),
+    *,
+    parameters: str | Path | None = None,
+    horizon: str = "6h",
+    dx: float | None = None,
+    scheme: str | None = None,
+    trajectories: bool = False,
+    progress: Progress | None = None,
+) -> Evaluation:
+    """N-step prediction error of a case's model, calibrated or not.
+
+    Parameters
+    ----------
+    case : Case
+        Building and telemetry.
+    intervals : sequence of Interval
+        Where the targets lie; all the telemetry by default.
+    parameters : str or Path, optional
+        A ``calibration.json`` of this case; start values by default.
+    horizon : str
+        Prediction horizon, such as ``6h``.
+    dx : float, optional
+        Distance between control volumes of a plan [m].
+    scheme : str, optional
+        ``implicit_euler`` or ``tr_bdf2``.
+    trajectories : bool
+        Keep every step of the runs instead of the last only.
+    progress : callable, optional
+        Called with stage, done, total.
+
+    Examples
+    --------
+    >>> from thermal import load_bundled_case
+    >>> evaluate_case(load_bundled_case(), dx=1.0).metrics.mae < 1.0
+    True
+    """
+    ready = case_model(case, parameters, dx=dx, scheme=scheme)
+    parts = merge(intervals) or [Interval(ready.inputs.stamps[0], ready.inputs.stamps[-1])]
+    model, _ = ready.certified(parts[0], horizon_steps(horizon, ready.inputs.step))
+    return evaluate_model(
+        model,
+        ready.theta,
+        ready.inputs,
+        parts,
+        horizon,
+        trajectories=trajectories,
+        horizons=HORIZONS,
+        scheme=ready.settings.stepping,
+        spin_up_seconds=ready.settings.spin_up_seconds,
+        progress=progress,
+    )
+
+
+def check_on_grid(
+    grid: SymbolicModel,
+    reduced: SymbolicModel,
+    theta: FloatArray,
+    inputs: Inputs,
+    interval: Interval,
+    steps: int,
+    scheme: Scheme,
+    spin_up_seconds: float = SPIN_UP,
+) -> GridCheck:
+    """Replay a few runs on the reduced model and on the grid and compare zone means.
+
+    Parameters
+    ----------
+    grid, reduced : SymbolicModel
+        The two models.
+    theta : ndarray, shape (n_parameter,)
+        Where they are compared [parameter units].
+    inputs : Inputs
+        The telemetry.
+    interval : Interval
+        The runs are spread over its first two days, or all of it where these have none.
+    steps : int
+        N.
+    scheme : Scheme
+        Time stepping of the runs.
+    spin_up_seconds : float
+        Length of the spin-up [s].
+
+    Raises
+    ------
+    NotEnoughDataError
+        When the interval has no usable run.
+    """
+    runs = _check_runs(inputs, interval, steps, spin_up_seconds)
+    starts = np.unique(runs.starts[np.linspace(0, runs.starts.size - 1, CHECK_RUNS).astype(int)])
+    means = []
+    for model in (grid, reduced):
+        matrices = model.matrices(theta)
+        states, _ = spin_up(matrices, inputs, runs.begin, starts)
+        means.append(free_runs(matrices, model.network, inputs, starts, steps, states, scheme=scheme)[0])
+    difference = np.abs(means[0] - means[1])
+    order = reduced.projection.shape[1] if reduced.projection is not None else reduced.network.n_node
+    return GridCheck(grid.network.n_node, order, starts.size, float(difference.max()), float(difference.mean()))
+
+
+def _check_runs(inputs: Inputs, interval: Interval, steps: int, spin_up_seconds: float) -> Runs:
+    """Choose the runs of a check: at the beginning of the interval where there are any."""
+    begin = max(interval.start, inputs.stamps[0])
+    length = pd.Timedelta(days=CHECK_DAYS) + steps * pd.Timedelta(seconds=inputs.step)
+    for part in (Interval(begin, min(interval.end, begin + length)), interval):
+        try:
+            runs = select_runs(inputs, part, steps, spin_up=spin_up_seconds)
+        except NotEnoughDataError:
+            if part is interval:
+                raise
+            continue
+        if runs.starts.size:
+            return runs
+    raise NotEnoughDataError(f"interval {interval.start} to {interval.end}: every run misses telemetry")

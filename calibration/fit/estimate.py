@@ -1,0 +1,289 @@
+"""Estimation from one start: rounds of solving on a reduced model, re-weighing the data, and reducing anew."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibration.estimation.disturbance import DisturbanceModel
+from calibration.evaluation.n_step import Progress
+from calibration.fit.least_squares import LeastSquaresResult, solve_least_squares
+from calibration.fit.precision import Precision, precision, unexplained
+from calibration.fit.problem import Problem
+from thermal import SymbolicModel, reduced_model
+from thermal.model import ReducedModel
+
+FloatArray = NDArray[np.float64]
+
+#: Most rounds, and the change of the estimate in standard errors that ends them [-].
+ROUNDS = 8
+ROUND_TOLERANCE = 0.05
+
+#: Drift of a reduced model beyond which it is made anew at the new θ [K].
+DRIFT_TOLERANCE = 0.005
+
+#: Change of the data's worth beyond which a round with the new one follows [-].
+_WORTH_TOLERANCE = 0.1
+
+#: Share by which numbers of the disturbance change in a round below which they are kept from there on [-].
+_SAME_DISTURBANCE = 0.05
+
+#: Times by which gradients of whitened residuals may be larger at convergence [-]: data that are worth a hundred times
+#: as much make them so at the same distance in standard errors.
+_WHITENED_SLACK = 10.0
+
+#: Least standard deviation of an error [K]: sensors do not resolve less.
+_LEAST_DEVIATION = 0.02
+
+#: Zones beyond which a basis is made at one θ: a building of more is large, and a basis of two twice as slow.
+_MOST_ZONES = 40
+
+#: Finds the unmeasured heat and the sensors' noise at θ.
+Tuner = Callable[[Problem, ReducedModel, FloatArray], DisturbanceModel]
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Outcome of one start.
+
+    Parameters
+    ----------
+    theta : ndarray, shape (n_parameter,)
+        θ found [parameter units].
+    solve : LeastSquaresResult
+        Last solve, on the estimation scale.
+    problem : Problem
+        With the deviation and the worth of the errors that were found.
+    model : ReducedModel
+        Reduced model that serves θ.
+    iterations : int
+        Ipopt iterations over all rounds.
+    evaluations : int
+        Evaluations of the errors with their derivatives, over all rounds.
+    covariance : ndarray, shape (n_free, n_free)
+        Of the estimate, on the estimation scale [-].
+    disturbance : DisturbanceModel or None
+        Unmeasured heat and sensor noise, where they were tuned.
+    excess : float
+        Mean square of the errors over that which the disturbance makes [-]; 1 where it was not tuned.
+    settled : bool
+        Whether the rounds ended because nothing moved any more.
+    """
+
+    theta: FloatArray
+    solve: LeastSquaresResult
+    problem: Problem
+    model: ReducedModel
+    iterations: int
+    evaluations: int
+    covariance: FloatArray
+    disturbance: DisturbanceModel | None
+    excess: float
+    settled: bool
+
+    @property
+    def point(self) -> FloatArray:
+        """The estimate on the estimation scale, (n_free,) [-]."""
+        return self.problem.point(self.theta)
+
+    def better_than(self, other: Estimate) -> bool:
+        """Whether its cost is less, errors weighed as the other has them.
+
+        Parameters
+        ----------
+        other : Estimate
+            From another start.
+        """
+        own, _ = other.problem.weighted(self.model, self.point)
+        return 0.5 * float(own @ own) < other.solve.cost
+
+
+def estimate(
+    problem: Problem,
+    z: FloatArray,
+    progress: Progress | None = None,
+    model: ReducedModel | None = None,
+    tuner: Tuner | None = None,
+) -> Estimate:
+    """Solve the problem from one start.
+
+    Each round solves by Ipopt on a reduced model, then takes the deviation of the errors (and, with a tuner, how many
+    independent observations they are worth) for the next, and reduces anew where θ has moved too far from the
+    basis; the rounds end when nothing moves.
+
+    Parameters
+    ----------
+    problem : Problem
+        What to fit.
+    z : ndarray, shape (n_free,)
+        Start on the estimation scale [-].
+    progress : callable, optional
+        Called with stage, done, total.
+    model : ReducedModel, optional
+        Made at the start; saves reducing there.
+    tuner : callable, optional
+        Finds the disturbance model that standard errors follow, and weights where it finds the errors worth less than
+        one a day and zone. It never makes them worth more: disturbances of zones are independent, while what a model
+        lacks is common to them, and priors must hold against it.
+
+    Returns
+    -------
+    Estimate
+        The best so far, with the solver's status, also after Ctrl-C.
+    """
+    rounds = _Rounds(problem, model or reduced_model(problem.grid, [problem.theta(z)]), tuner)
+    rounds.whiten(problem.theta(z))
+    for number in range(ROUNDS):
+        z = rounds.solve(z, 1e-2 if number == 0 else 1e-3)
+        if progress is not None:
+            progress("calibrate", number + 1, ROUNDS)
+        if rounds.interrupted or (rounds.next_round(z, number) and number):
+            break
+    return rounds.result(z)
+
+
+class _Rounds:
+    """State of the rounds: how errors are weighed, the reduced model in use, and what was counted."""
+
+    def __init__(self, problem: Problem, model: ReducedModel, tuner: Tuner | None) -> None:
+        self.problem, self.model, self.tuner = problem, model, tuner
+        self.iterations = self.evaluations = 0
+        self.moved, self.settled, self.interrupted = np.inf, False, False
+        self.disturbance: DisturbanceModel | None = None
+        self.excess, self.retune = 1.0, True
+        self.last: LeastSquaresResult | None = None
+        self.known: Precision | None = None  # at the θ of the last solve
+        self.large = problem.inputs.zone.shape[1] > _MOST_ZONES
+
+    def whiten(self, theta: FloatArray) -> None:
+        """Tune the disturbance at θ and whiten by it, where residuals are whitened."""
+        if not self.problem.whitened or self.tuner is None:
+            return
+        if self.disturbance is None or self.retune:
+            tuned = self.tuner(self.problem, self.model, theta)
+            self.retune = self.disturbance is None or not tuned.near(self.disturbance, _SAME_DISTURBANCE)
+            self.disturbance = tuned
+        self.problem = self.problem.at(self.model, theta, self.disturbance)
+
+    def solve(self, z: FloatArray, tolerance: float) -> FloatArray:
+        """One solve; returns the point found."""
+        problem, model = self.problem, self.model
+        self.known = None
+
+        def weighted(x: FloatArray) -> tuple[FloatArray, FloatArray]:
+            self.evaluations += 1
+            return problem.weighted(model, x)
+
+        slack = _WHITENED_SLACK if problem.whitened else 1.0
+        found = solve_least_squares(weighted, z, *problem.bounds, tolerance=slack * tolerance)
+        self.iterations += found.iterations
+        self.interrupted = found.interrupted
+        # in units of what the data leave open, so that flat directions do not keep the rounds going
+        self.moved = float(np.linalg.norm(found.jacobian @ (found.x - z)))
+        self.last = found
+        return found.x
+
+    def next_round(self, z: FloatArray, number: int) -> bool:
+        """Weigh and reduce anew; True when another round would change nothing."""
+        theta = self.problem.theta(z)
+        still = self.moved < ROUND_TOLERANCE * np.sqrt(z.size) and self.last is not None and self.last.success
+        if not self.model.serves(theta, DRIFT_TOLERANCE):
+            # both ends of a move where it does not come to rest: the optimum can jump to and fro between two bases
+            both = number > 2 and not self.large
+            self.model = reduced_model(self.problem.grid, [theta, self.model.theta] if both else [theta])
+            still = False
+        if not still:
+            self.whiten(theta)
+        error = self.problem.residuals_only(self.model, theta)
+        before = self.problem.effective_size()
+        deviation = max(_LEAST_DEVIATION, self.problem.spread(error))
+        self.problem = replace(self.problem, deviation=deviation, shrinkage=_shrinkage(self.problem, z, self.last))
+        if self.tuner is not None and (still or self.disturbance is not None):
+            if self.disturbance is None:
+                self.disturbance = self.tuner(self.problem, self.model, theta)
+            self.excess = max(1.0, unexplained(self.problem, self.model, theta, self.disturbance))
+            self.known = precision(self.problem, self.model, theta, self.disturbance)
+            most = replace(self.problem, effective=None).effective_size()
+            worth = min(most, self.known.effective(deviation) / self.excess)
+            self.problem = replace(self.problem, effective=worth)
+            still = still and abs(self.problem.effective_size() - before) < _WORTH_TOLERANCE * before
+        self.settled = bool(still)
+        return self.settled
+
+    def result(self, z: FloatArray) -> Estimate:
+        """Collect what was found, with its covariance."""
+        if self.last is None:  # pragma: no cover - there is at least one round
+            raise RuntimeError
+        if self.interrupted and not self.model.serves(self.problem.theta(z), DRIFT_TOLERANCE):
+            self.model = reduced_model(self.problem.grid, [self.problem.theta(z)])
+        jacobian = self.last.jacobian
+        covariance = np.asarray(np.linalg.inv(jacobian.T @ jacobian), dtype=float)
+        theta = self.problem.theta(z)
+        if self.disturbance is not None:
+            known = self.known or precision(self.problem, self.model, theta, self.disturbance)
+            weight = self.problem.effective_size() / (known.errors * self.problem.deviation**2)
+            covariance = replace(known, score=self.excess * known.score).covariance(weight)
+        return Estimate(
+            theta, self.last, self.problem, self.model, self.iterations, self.evaluations, covariance,
+            self.disturbance, self.excess, self.settled,
+        )  # fmt: skip
+
+
+def _shrinkage(problem: Problem, z: FloatArray, solve: LeastSquaresResult | None) -> dict[str, float]:
+    """Spread of every group's members about their mean: what is seen and what is still open (empirical Bayes)."""
+    groups: dict[str, list[int]] = {}
+    for i, p in enumerate(problem.parameters):
+        if p.grouped:
+            groups.setdefault(p.base, []).append(i)
+    if not groups or solve is None:
+        return dict(problem.shrinkage)
+    covariance = np.linalg.inv(solve.jacobian.T @ solve.jacobian)
+    found = {}
+    for base, members in groups.items():
+        own = z[members] - z[members].mean()
+        n = len(members)
+        centre = np.eye(n) - 1.0 / n
+        still_open = np.trace(centre @ covariance[np.ix_(members, members)] @ centre)
+        found[base] = float(np.sqrt(np.clip((own @ own + still_open) / max(1, n - 1), 0.02**2, 1.0)))
+    return found
+
+
+def draw_starts(problem: Problem, count: int, seed: int) -> list[FloatArray]:
+    """Draw starts on the estimation scale: the given θ, then draws from the prior at half its spread.
+
+    Parameters
+    ----------
+    problem : Problem
+        With priors.
+    count : int
+        Number of starts.
+    seed : int
+        Seed of the draws.
+    """
+    rng = np.random.default_rng(seed)
+    spread = np.array([p.prior_deviation for p in problem.parameters])
+    centre = np.array([p.transform(p.start) for p in problem.parameters])
+    further = [centre + 0.5 * spread * rng.standard_normal(spread.size) for _ in range(count - 1)]
+    return [problem.point(problem.start), *further]
+
+
+def compensated_start(problem: Problem, z: FloatArray, model: SymbolicModel) -> FloatArray:
+    """Where the data alone would go: a fit with priors a tenth as strong, from which a compensated optimum is seen.
+
+    Where physics is missing, parameters compensate for it, often as far as a bound (six of eight in the paper); a
+    second optimum with the priors may lie on the way back.
+
+    Parameters
+    ----------
+    problem : Problem
+        What to fit.
+    z : ndarray, shape (n_free,)
+        Start on the estimation scale [-].
+    model : SymbolicModel
+        Reduced there.
+    """
+    bold = replace(problem, effective=10.0 * problem.effective_size())
+    return solve_least_squares(lambda x: bold.weighted(model, x), z, *problem.bounds, tolerance=1e-1, iterations=15).x

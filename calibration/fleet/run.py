@@ -1,0 +1,286 @@
+"""Calibration of many cases at once, on any executor, so that nothing that is finished is ever lost."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import time
+import uuid
+from collections import Counter
+from collections.abc import Generator, Iterator, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, Future, wait
+from contextlib import closing, contextmanager
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from calibration.evaluation.n_step import Progress
+from calibration.fleet.case import CaseTask, calibrate_one
+from calibration.fleet.cluster import ClusterExecutor, killed_worker
+from calibration.fleet.local import LocalProcesses, available_cores
+from calibration.fleet.record import RECORD, CaseOutcome, check_settings, earlier_outcome
+from calibration.results import check_results_folder, to_json
+from calibration.errors import AnotherRunError, CalibrationError, CaseFoldersError, ResultsExistError, WorkerLostError
+from thermal.case.building_file import NAME
+
+#: File in the folder of results with an entry a case.
+SUMMARY = "summary.json"
+
+#: Folder beside the results that a run keeps while it lasts.
+RUNNING = ".running"
+
+#: Stage of the progress.
+STAGE = "cases"
+
+#: The executor is looked at this often while nothing happens [s].
+TICK = 1.0
+
+
+def case_folders(folder: str | Path) -> tuple[Path, ...]:
+    """Find the case folders in a folder, in the order of their names.
+
+    Parameters
+    ----------
+    folder : str or Path
+        Whose sub-folders with a ``building.yaml`` are cases; hidden ones are not.
+    """
+    found = (path.parent for path in Path(folder).glob(f"*/{NAME}"))
+    return tuple(sorted(path for path in found if not path.name.startswith(".")))
+
+
+def calibrate_many(
+    cases: Sequence[str | Path],
+    out: str | Path,
+    settings: Mapping[str, Any] | None = None,
+    *,
+    executor: Executor | None = None,
+    workers: int | None = None,
+    retries: int = 2,
+    force: bool = False,
+    progress: Progress | None = None,
+) -> tuple[CaseOutcome, ...]:
+    """Calibrate many cases side by side, each in a worker, which writes its results when it is done.
+
+    A case that fails is reported beside the others. A case whose worker dies is given to another; one that goes on to
+    end its workers is given up. Run again, it goes on with the cases that have no results yet: results are taken over
+    when settings, plans, telemetry and version are the same, and refused when they are not. After Ctrl-C what is
+    finished stays, and a summary is written before `KeyboardInterrupt` goes on.
+
+    Parameters
+    ----------
+    cases : sequence of str or Path
+        Case folders, such as `case_folders` finds; results are named after them.
+    out : str or Path
+        Folder of the results: one folder a case, as `write_calibration` makes it with a record ``case.json``, and
+        ``summary.json``. Workers elsewhere must see it, and the cases, under the same path.
+    settings : mapping of str to Any, optional
+        Keywords of `calibrate`, the same for each case; intervals are `Interval` or texts ``START/END``.
+    executor : Executor, optional
+        Where to calibrate, such as a `ClusterExecutor`; it is left open. One that breaks as a whole when a worker dies,
+        as `ProcessPoolExecutor`, cannot be mended from outside: its unfinished cases are lost. By default, processes of
+        this machine, each with one thread of linear algebra and replaced when it dies.
+    workers : int, optional
+        Number of these processes; by default one a core, and never more than cases.
+    retries : int
+        How often a case is given to another worker after its own died.
+    force : bool
+        Calibrate anew what has results; they are replaced one by one.
+    progress : callable, optional
+        Called with stage, done, total after each case.
+
+    Returns
+    -------
+    tuple of CaseOutcome
+        In the order of the cases.
+
+    Raises
+    ------
+    CaseFoldersError
+        When there are no cases, two have the same name, or results would land in a case.
+    ResultsExistError
+        When the folder holds results of other settings, or something else, and `force` is not set.
+    AnotherRunError
+        When another run writes to the folder.
+    CalibrationError
+        When a setting is unknown, or a number out of range.
+
+    Examples
+    --------
+    >>> outcomes = calibrate_many(case_folders("cases"), "results", {"dx": 1.0})  # doctest: +SKIP
+    >>> [o.case for o in outcomes if o.status != "calibrated"]  # doctest: +SKIP
+    []
+    """
+    began = time.perf_counter()
+    spelled = check_settings(settings or {})
+    for name, value, least in (("retries", retries, 0), ("workers", 1 if workers is None else workers, 1)):
+        if value < least:
+            raise CalibrationError(f"{name}: expected at least {least}, came {value}")
+    folder = _absolute(check_results_folder(out, force=True))
+    paths = _check_cases(cases, folder)
+    if not force:
+        _refuse_other_contents(folder)
+    with _claimed(folder) as running:
+        run = running.name
+        tasks = [CaseTask(p, folder / p.name, running, dict(settings or {}), run, 0, retries, force) for p in paths]
+        there = {} if force else {t.name: earlier_outcome(t.case, t.out, spelled) for t in tasks}
+        found = {name: outcome for name, outcome in there.items() if outcome is not None}
+        todo = [task for task in tasks if task.name not in found]
+        tell = progress or (lambda stage, done, total: None)
+        try:
+            tell(STAGE, len(found), len(tasks))
+            with closing(_outcomes(todo, executor, min(workers or available_cores(), len(todo)))) as coming:
+                for outcome in coming:
+                    found[outcome.case] = outcome
+                    tell(STAGE, len(found), len(tasks))
+        finally:
+            outcomes = tuple(found.get(t.name) or t.finished() or t.unfinished("interrupted") for t in tasks)
+            _write_summary(running, outcomes, spelled, time.perf_counter() - began)
+    return outcomes
+
+
+def _check_cases(cases: Sequence[str | Path], out: Path) -> list[Path]:
+    """Refuse cases whose results would get in each other's way; return their absolute paths."""
+    paths = [_absolute(case) for case in cases]
+    if not paths:
+        raise CaseFoldersError("cases: expected at least one case folder, came none")
+    for name, count in Counter(path.name for path in paths).items():
+        if count > 1:
+            both = ", ".join(str(path) for path in paths if path.name == name)
+            raise CaseFoldersError(
+                f"cases: expected each name once, came {both}; both would write to {out / name}: rename one, or "
+                "calibrate them into different folders"
+            )
+        if not name or name.startswith(".") or name == SUMMARY:
+            raise CaseFoldersError(f"cases: expected folders whose names results can take, came {name!r}; rename it")
+    real = out.resolve()
+    for path in paths:
+        if path.resolve() in (real, *real.parents, (real / path.name).resolve()):
+            raise CaseFoldersError(f"{out}: results would land in the case {path}; choose another --out")
+    return paths
+
+
+def _absolute(path: str | Path) -> Path:
+    """Spell a path for a worker with another working folder; links stay, for a case has the name of its link."""
+    return Path(os.path.abspath(path))
+
+
+def _refuse_other_contents(out: Path) -> None:
+    """Refuse a folder that holds anything but results of such a run; hidden files are nobody's results."""
+    held = sorted(path for path in out.iterdir() if not path.name.startswith(".")) if out.is_dir() else []
+    other = [path.name for path in held if path.name != SUMMARY and not (path / RECORD).is_file()]
+    if other:
+        shown = ", ".join(other[:4]) + (f" and {len(other) - 4} more" if len(other) > 4 else "")
+        raise ResultsExistError(
+            f"{out}: expected a new folder, or results of an earlier run to go on with, found {shown}; choose another, "
+            "or --force (force=True)"
+        )
+
+
+@contextmanager
+def _claimed(out: Path) -> Iterator[Path]:
+    """Make the run's own folder, which no other run may have at the same time.
+
+    The lock goes with the process that holds it, so what a killed run leaves behind does not stand in the way.
+    """
+    lock = out / RUNNING / "lock"
+    try:
+        lock.parent.mkdir(parents=True, exist_ok=True)
+        stream = lock.open("w")
+    except OSError as error:
+        raise CalibrationError(f"{out}: expected a place that can be written to: {error}; choose another") from error
+    with stream:
+        _lock(stream.fileno(), out)
+        for left in lock.parent.iterdir():
+            if left != lock:
+                shutil.rmtree(left, ignore_errors=True)
+        running = lock.parent / uuid.uuid4().hex[:12]
+        running.mkdir()
+        try:
+            yield running
+        finally:
+            shutil.rmtree(lock.parent, ignore_errors=True)
+
+
+def _lock(descriptor: int, out: Path) -> None:
+    try:
+        import fcntl
+    except ImportError:  # not on this system: two runs in one folder are not noticed
+        return
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError as error:
+        raise AnotherRunError(f"{out}: another run writes its results here; wait for it, or choose another") from error
+    except OSError:  # a file system without locks
+        return
+
+
+def _outcomes(tasks: Sequence[CaseTask], executor: Executor | None, workers: int) -> Generator[CaseOutcome, None, None]:
+    """Outcome of each case as it comes; whatever happens, no work is left behind."""
+    if not tasks:
+        return
+    pool = LocalProcesses(workers) if executor is None else executor
+    pending: dict[Future[CaseOutcome], CaseTask] = {}
+    try:
+        waiting = list(tasks)
+        while waiting or pending:
+            trouble = _hand_out(waiting, pool, pending)
+            if trouble is not None:
+                error = WorkerLostError(f"{trouble}; the same command goes on from here")
+                for task in (*pending.values(), *waiting):
+                    yield task.finished() or task.unfinished("lost", error)
+                return
+            for future in wait(pending, TICK, FIRST_COMPLETED).done:
+                task = pending.pop(future)
+                outcome = _outcome(future, task)
+                if outcome is None:
+                    waiting.append(task.again())
+                else:
+                    yield outcome
+    finally:
+        for future in pending:
+            future.cancel()
+        if executor is None:
+            pool.shutdown(wait=False, cancel_futures=True)
+
+
+def _hand_out(waiting: list[CaseTask], pool: Executor, pending: dict[Future[CaseOutcome], CaseTask]) -> str | None:
+    """Submit what waits; say what is wrong when the executor will never do it."""
+    trouble = pool.trouble() if isinstance(pool, ClusterExecutor) else None
+    while waiting and trouble is None:
+        try:
+            pending[pool.submit(calibrate_one, waiting[0])] = waiting[0]
+        except RuntimeError as error:  # broken or shut down
+            trouble = f"the executor takes no more cases: {error}"
+        else:
+            waiting.pop(0)
+    return trouble
+
+
+def _outcome(future: Future[CaseOutcome], task: CaseTask) -> CaseOutcome | None:
+    """Outcome of a future that is done; None when the case is worth another worker."""
+    try:
+        return future.result()
+    except (BrokenExecutor, CancelledError) as error:
+        reason: Exception = error
+    except Exception as error:
+        if not killed_worker(error):
+            return task.unfinished("failed", error)
+        reason = error
+    if task.attempt < task.retries:
+        return None
+    times = f"{task.attempt + 1} times, at last" if task.attempt else "once"
+    text = str(reason) or type(reason).__name__
+    return task.unfinished("lost", WorkerLostError(f"its worker was lost {times}: {text}"))
+
+
+def _write_summary(running: Path, outcomes: Sequence[CaseOutcome], settings: Mapping[str, Any], seconds: float) -> None:
+    """Write ``summary.json`` into the folder of the results, whole or not at all."""
+    content = {
+        "cases": {outcome.case: outcome.to_dict() for outcome in outcomes},
+        "settings": settings,
+        "seconds": seconds,
+        "version": version("buildingmpc"),
+    }
+    new = running / SUMMARY
+    new.write_text(to_json(content) + "\n", encoding="utf-8")
+    new.replace(running.parents[1] / SUMMARY)

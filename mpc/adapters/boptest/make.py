@@ -1,0 +1,194 @@
+"""Test cases of a user's building, and of the generated pilot."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibration import case_model
+from mpc.errors import BoptestError
+from mpc.loop.building import BuildingModel
+from mpc.loop.make import pilot_weather
+from mpc.loop.reduced import ReducedBuilding
+from mpc.adapters.boptest.case import BoptestCase
+from mpc.scenario import Weather, read_epw, read_tmy3, read_weather_csv, weather_of_case
+from thermal import Building, Case, SymbolicModel, build_network, reduced_model
+from thermal.case import Device
+from thermal.errors import describe
+from thermal.pilot import pilot_building, size_system
+
+FloatArray = NDArray[np.float64]
+
+_PILOT_STEP = 3600.0  # s, of a year of made weather
+
+
+def case_to_serve(
+    case: Case,
+    parameters: str | Path | None = None,
+    *,
+    weather: str | Path | None = None,
+    step_seconds: float = 300.0,
+    dx: float | None = None,
+    name: str | None = None,
+) -> BoptestCase:
+    """Make a test case of a case: its building as calibrated, under a plant sized for it.
+
+    Parameters
+    ----------
+    case : Case
+        Building and telemetry, whose weather drives the plant unless a file does.
+    parameters : str or Path, optional
+        A ``calibration.json`` of it, with its effects; before calibration by default.
+    weather : str or Path, optional
+        An EPW file, or a ``.csv`` in TMY3's format or with a column a weather point, so that tests may run at any time
+        of the year.
+    step_seconds : float
+        Step of the plant [s].
+    dx : float, optional
+        Distance between control volumes of a plan [m].
+    name : str, optional
+        Of the test case; the building's by default.
+
+    Returns
+    -------
+    BoptestCase
+        To be served.
+
+    Raises
+    ------
+    BoptestError
+        When the weather file is of no known kind.
+    """
+    settled = case_model(case, parameters, dx=dx)
+    building = with_plant(case.building)
+    boundaries = case.boundary_temperatures()
+    beside = {name: boundaries[name] for name in settled.grid.network.boundaries[1:]}
+    return BoptestCase(
+        _plain_name(name or building.name),
+        building,
+        weather_of_case(case) if weather is None else _weather(Path(weather), building),
+        _maker(settled.grid, settled.theta, step_seconds),
+        size_system(building),
+        step_seconds,
+        boundaries=beside,
+    )
+
+
+def pilot_to_serve(
+    seed: int = 0,
+    *,
+    floor_area: float = 6317.0,
+    zones: int = 123,
+    floors: int = 2,
+    step_seconds: float = 300.0,
+    dx: float = 0.5,
+    year: int = 2023,
+    days: float = 367.0,
+    name: str = "pilot",
+) -> BoptestCase:
+    """Make a test case of the generated pilot building, with a year of its weather and the first days of the next.
+
+    Parameters
+    ----------
+    seed : int
+        Of building and weather; 0 or more.
+    floor_area : float
+        Of all floors together [m2].
+    zones, floors : int
+        On all floors together; number of storeys.
+    step_seconds : float
+        Step of the plant [s].
+    dx : float
+        Distance between control volumes [m].
+    year : int
+        Of the weather.
+    days : float
+        How long the weather goes on from the begin of the year [d].
+    name : str
+        Of the test case.
+
+    Returns
+    -------
+    BoptestCase
+        To be served.
+
+    Examples
+    --------
+    >>> served = pilot_to_serve(1, floor_area=600.0, zones=12, dx=1.0)
+    >>> sorted(served.periods)[:2], served.covered[0]
+    (['mix_day', 'peak_cool_day'], 0.0)
+    """
+    building = pilot_building(seed, floor_area=floor_area, zones=zones, floors=floors)
+    network = build_network(building, dx=dx)
+    return BoptestCase(
+        _plain_name(name),
+        building,
+        pilot_weather(seed, f"{year}-01-01", days, _PILOT_STEP),
+        _maker(SymbolicModel(network), network.start(), step_seconds),
+        size_system(building),
+        step_seconds,
+    )
+
+
+def with_plant(building: Building) -> Building:
+    """Give a building the devices of a plant that it lacks: a terminal a zone, an air handler and a boiler.
+
+    Parameters
+    ----------
+    building : Building
+        Whose list may lack them, or name several terminals a zone.
+    """
+    kinds = ("vav", "ahu", "boiler", "chiller")
+    listed = {kind: [d for d in building.devices if d.type == kind] for kind in kinds}
+    terminals = [
+        next((d for d in listed["vav"] if d.zone == zone), Device(name=f"VAV_{zone}", type="vav", zone=zone))
+        for zone in building.zone_names
+    ]
+    central = [
+        *(listed["ahu"] or [Device(name="AHU", type="ahu")]),
+        *(listed["boiler"][:1] or [Device(name="BOILER", type="boiler")]),
+        *listed["chiller"][:1],
+    ]
+    others = [d for d in building.devices if d.type not in kinds]
+    return replace(building, devices=(*terminals, *central, *others))
+
+
+def _plain_name(name: str) -> str:
+    """Make the name of a test case, which stands in addresses.
+
+    Parameters
+    ----------
+    name : str
+        Of a building.
+
+    Examples
+    --------
+    >>> _plain_name("Town hall, 2nd floor")
+    'Town_hall_2nd_floor'
+    """
+    return re.sub(r"[^A-Za-z0-9_.-]+", "_", name).strip("_") or "building"
+
+
+def _maker(grid: SymbolicModel, theta: FloatArray, step: float) -> Callable[[], BuildingModel]:
+    """Reduce a building to its modes once, for all the tests that get one of their own."""
+    reduced = reduced_model(grid, [theta])
+    return lambda: ReducedBuilding(reduced, theta, step)
+
+
+def _weather(path: Path, building: Building) -> Weather:
+    """Read a weather file by its ending, and TMY3's by its second line."""
+    if path.suffix.lower() == ".epw":
+        return read_epw(path)
+    if path.suffix.lower() != ".csv":
+        raise BoptestError(describe(f"weather file {path.name}", "an ending .epw or .csv", repr(path.suffix)))
+    try:
+        with path.open(encoding="utf-8", errors="replace") as lines:
+            second = [next(lines, ""), next(lines, "")][1]
+    except OSError as error:
+        raise BoptestError(f"weather file {path}: {error.strerror or error}") from error
+    return read_tmy3(path) if second.startswith("Date (") else read_weather_csv(path, building.location)

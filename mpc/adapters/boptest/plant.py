@@ -1,0 +1,339 @@
+"""A plant behind BOPTEST's REST API, as a plant of ours."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Any
+from urllib.parse import quote
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from mpc.errors import BoptestAnswerError, BoptestError, PlantError
+from mpc.kpi import PlantRecord
+from mpc.loop.actuators import checked_actions
+from mpc.loop.conversion import conversion
+from mpc.loop.plant import Measurements, PointLayout, need_running
+from mpc.adapters.boptest.answers import actuator_of, check_step, regular, time_of
+from mpc.adapters.boptest.clock import DAY, YearClock
+from mpc.adapters.boptest.http import BoptestClient
+from mpc.adapters.boptest.mapping import BoptestSignals, own_signals
+from mpc.adapters.boptest.outlook import as_forecast, forecast_sources
+from mpc.adapters.boptest.periods import PERIOD_DAYS
+from mpc.adapters.boptest.prices import PRICE_POINTS
+from mpc.adapters.boptest.signals import activation
+from mpc.adapters.boptest.test import KPI_NAMES
+from mpc.scenario import Forecast
+from thermal.errors import describe, nearest
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class BoptestTime:
+    """When a test runs that is none of BOPTEST's time periods.
+
+    Parameters
+    ----------
+    start : float
+        Seconds of the year [s].
+    duration : float
+        How long it goes on [s].
+    warm_up : float
+        Time before the start that the server runs first [s].
+    """
+
+    start: float
+    duration: float
+    warm_up: float = 7 * DAY
+
+
+class BoptestPlant:
+    """A test case of a BOPTEST server as a `Plant`: the server's traps are errors here.
+
+    Setpoints out of range are refused by name before they are sent, since a server clips them and reports success. A
+    step is never sent twice: when its answer fails to come, the plant must be reset. A measurement of null is NaN. An
+    empty answer is the end of the test. Temperatures are in kelvin, and seconds of the year become local stamps.
+
+    Each plant is a test of its own on the server: `close` frees it, as does leaving a ``with`` block.
+
+    Parameters
+    ----------
+    url : str
+        Of the server, such as ``http://127.0.0.1:8000``.
+    testcase : str
+        Name of the test case.
+    period : str or BoptestTime
+        Time period of BOPTEST's scenario, such as ``peak_heat_day``, or a time of one's own.
+    control_step : float
+        Time between two actions [s].
+    electricity_price : str
+        ``constant``, ``dynamic`` or ``highly_dynamic``.
+    signals : BoptestSignals, optional
+        What the server's signals are; those of a `BoptestServer` say it themselves.
+    horizon : int
+        Control steps of a forecast.
+    uncertainty : mapping of str to str, optional
+        ``temperature_uncertainty`` and ``solar_uncertainty`` of forecasts, ``low``, ``medium`` or ``high``.
+    year, timezone : int, str, optional
+        Of the stamps; those that the server says, else 2023 and UTC.
+    timeout : float
+        How long to wait for an answer [s]; a warm-up takes minutes on some servers.
+    repeats : int
+        How often requests are sent again that do no harm.
+
+    Raises
+    ------
+    BoptestError
+        When the server has no such test case or signals.
+    """
+
+    def __init__(
+        self,
+        url: str,
+        testcase: str,
+        period: str | BoptestTime,
+        control_step: float,
+        *,
+        electricity_price: str = "constant",
+        signals: BoptestSignals | None = None,
+        horizon: int = 24,
+        uncertainty: Mapping[str, str] | None = None,
+        year: int | None = None,
+        timezone: str | None = None,
+        timeout: float = 600.0,
+        repeats: int = 2,
+    ) -> None:
+        if electricity_price not in PRICE_POINTS:
+            advice = nearest(electricity_price, PRICE_POINTS)
+            raise BoptestError(describe("electricity_price", "a known one", repr(electricity_price), advice))
+        if not (control_step > 0 and horizon >= 1):
+            raise BoptestError(describe("plant", "a positive control step and a horizon", f"{control_step}, {horizon}"))
+        self._period, self._price, self._horizon = period, electricity_price, horizon
+        self._uncertainty, self._seed = dict(uncertainty or {}), 0
+        self._client = BoptestClient(url, timeout, repeats)
+        self._testid = ""
+        try:
+            self.server_version = self._client.check_version()
+            self._testid = self._select(testcase)
+            self._look_around(signals, year, timezone)
+            self.control_step = self._set_step(control_step)
+        except BaseException:
+            self.close()
+            raise
+        self._time, self._end, self._start = math.nan, math.nan, math.nan
+        self._broken = ""
+
+    def __enter__(self) -> BoptestPlant:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Stop the test, so that the server has room for another."""
+        if self._testid:
+            self._client.stop(self._testid)
+        self._client.close()
+
+    @property
+    def zone_names(self) -> tuple[str, ...]:
+        """Names of the zones, in the order of records."""
+        return tuple(self.signals.zones)
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of the measurements."""
+        return self._layout.columns
+
+    @property
+    def finished(self) -> bool:
+        """Whether less than a control step of the test is left."""
+        return not math.isnan(self._time) and self._time + self.control_step > self._end + 1e-6
+
+    def reset(self, seed: int | None = None) -> Measurements:
+        """Start anew: the server runs the warm-up under the building's own control.
+
+        Parameters
+        ----------
+        seed : int, optional
+            Of uncertain forecasts; the rest of a BOPTEST server repeats anyway.
+
+        Returns
+        -------
+        Measurements
+            At the start.
+        """
+        self._seed = self._seed if seed is None else seed
+        scenario: dict[str, Any] = {"electricity_price": self._price, **self._uncertainty}
+        if self._uncertainty:
+            scenario["seed"] = self._seed
+        if isinstance(self._period, BoptestTime):
+            self._ask("PUT", "scenario", scenario)
+            at = {"start_time": self._period.start, "warmup_period": self._period.warm_up}
+            values = self._ask("PUT", "initialize", at).payload
+        else:
+            answer = self._ask("PUT", "scenario", {**scenario, "time_period": self._period}).payload
+            values = answer.get("time_period") if isinstance(answer, dict) else None
+        self._broken = ""
+        self._start = self._time = time_of(values, "the start")
+        self._end = self._find_end()
+        return self._seen(values)
+
+    def step(self, actions: Mapping[str, float]) -> Measurements:
+        """Hold setpoints for a control step.
+
+        Parameters
+        ----------
+        actions : mapping of str to float
+            Setpoints by ``ENTITY/POINT`` [unit of the actuator]; what is left out stays as the building has it.
+
+        Returns
+        -------
+        Measurements
+            As the server has them at the end of the step.
+
+        Raises
+        ------
+        PlantActionError
+            When a setpoint is unknown, no finite number or outside its range.
+        PlantError
+            When the test is over, or `reset` was not called.
+        BoptestTimeoutError
+            When the server does not answer; the plant must then be reset.
+        BoptestAnswerError
+            When the server refuses, changed a setpoint, or its clock is not where it should be.
+        """
+        need_running(not math.isnan(self._time))
+        given = checked_actions(actions, self._by_name)
+        if self._broken:
+            raise PlantError(describe("plant", "a reset after a step went wrong", self._broken))
+        if self.finished:
+            left = self._end - self._time
+            raise PlantError(describe("test", f"{self.control_step:g} s more", f"{left:g} s", "reset the plant"))
+        sent: dict[str, float] = {}
+        for name, value in given.items():
+            signal = self.signals.actuators[name]
+            sent |= {signal: value, activation(signal): 1.0}
+        try:
+            message, values = self._ask("POST", "advance", sent, repeat=False)
+            if isinstance(values, dict) and not values:
+                self._end = self._time
+                raise BoptestAnswerError(f"the test is over at {self._time:g} s of the year: {message}")
+            check_step(sent, message, values, self._time + self.control_step)
+        except BoptestError as error:
+            self._broken = str(error)
+            raise
+        self._time = time_of(values, "a step")
+        return self._seen(values)
+
+    def forecast(self) -> Forecast:
+        """Forecast the control steps from now on: weather, prices, emissions, people and comfort bands.
+
+        Raises
+        ------
+        BoptestAnswerError
+            When the answer is not whole.
+        """
+        need_running(not math.isnan(self._time))
+        span = self._horizon * self.control_step
+        points = sorted({source.point for source in self._sources.values()})
+        body = {"point_names": points, "horizon": span, "interval": self.control_step}
+        payload = self._ask("PUT", "forecast", body).payload
+        ends = self._clock.zero + np.rint(self._time + self.control_step * np.arange(1, self._horizon + 1)).astype(int)
+        stamps = pd.to_datetime(ends, unit="s", utc=True).tz_convert(self._clock.timezone)
+        return as_forecast(payload, self._sources, stamps, means=self.signals.means)
+
+    def record(self) -> PlantRecord:
+        """Give the run since the reset from the server's results, for indicators and rewards.
+
+        Raises
+        ------
+        PlantError
+            When there was no step yet.
+        """
+        if math.isnan(self._time) or self._time <= self._start:
+            raise PlantError(describe("run", "a step at least", "none since the reset"))
+        powers = self.signals.powers
+        points = list(dict.fromkeys([*self.signals.zones.values(), *(n for names in powers.values() for n in names)]))
+        body = {"point_names": points, "start_time": self._start, "final_time": self._time}
+        times, columns = regular(self._ask("PUT", "results", body).payload, points)
+        sums = {kind: np.sum([columns[name] for name in names], axis=0) for kind, names in powers.items()}
+        means = {kind: p[1:] if self.signals.means else 0.5 * (p[1:] + p[:-1]) for kind, p in sums.items()}
+        zones = np.column_stack([columns[name] for name in self.signals.zones.values()])
+        means.setdefault("electricity", np.zeros(len(times) - 1))
+        return PlantRecord(float(times[1] - times[0]), zones, **means)
+
+    def kpis(self) -> dict[str, float | None]:
+        """Ask the server for its indicators; what it has none of is None.
+
+        Raises
+        ------
+        BoptestAnswerError
+            When one is neither a number nor null.
+        """
+        payload = self._ask("GET", "kpi").payload
+        if not isinstance(payload, dict):
+            raise BoptestAnswerError(describe("indicators", "a number or null each", repr(payload)[:100]))
+        found = {name: payload.get(name) for name in KPI_NAMES}
+        for name, value in found.items():
+            if value is not None and (isinstance(value, bool) or not isinstance(value, int | float)):
+                raise BoptestAnswerError(describe(f"indicator {name}", "a number or null", repr(value)[:100]))
+        return {name: None if value is None else float(value) for name, value in found.items()}
+
+    def _ask(self, method: str, what: str, body: dict[str, Any] | None = None, *, repeat: bool = True) -> Any:
+        return self._client.ask(method, f"{what}/{self._testid}", body, repeat=repeat)
+
+    def _select(self, testcase: str) -> str:
+        path = f"testcases/{quote(testcase, safe='')}/select"
+        answer = self._client.plain("POST", path, {}, repeat=False)
+        testid = answer.get("testid") if isinstance(answer, dict) else None
+        if not isinstance(testid, str) or not testid:
+            raise BoptestAnswerError(describe(f"POST /{path}", "a testid", repr(answer)[:200]))
+        return quote(testid, safe="")
+
+    def _look_around(self, signals: BoptestSignals | None, year: int | None, timezone: str | None) -> None:
+        """Learn what the test case has."""
+        inputs, outputs, points = (
+            self._ask("GET", what).payload for what in ("inputs", "measurements", "forecast_points")
+        )
+        if not all(isinstance(found, dict) for found in (inputs, outputs, points)):
+            raise BoptestAnswerError(describe("test case", "signals by name", "something else"))
+        self.signals = own_signals(inputs, outputs) if signals is None else signals
+        self.signals.check(inputs, outputs)
+        about = self._ask("GET", "name").payload or {}
+        self._clock = YearClock(year or int(about.get("year", 2023)), timezone or str(about.get("timezone", "UTC")))
+        self._layout = PointLayout(tuple(self.signals.measurements), self._clock.timezone)
+        named = self.signals.measurements.items()
+        self._read = [(n, conversion(column.rpartition("/")[2], n, outputs[n].get("Unit"))) for column, n in named]
+        self.actuators = tuple(actuator_of(name, inputs[u]) for name, u in self.signals.actuators.items())
+        self._by_name = {a.name: a for a in self.actuators}
+        self._sources = forecast_sources(points, self.signals, self._price)
+
+    def _set_step(self, control_step: float) -> float:
+        self._ask("PUT", "step", {"step": control_step})
+        found = self._ask("GET", "step").payload
+        if not isinstance(found, int | float) or abs(found - control_step) > 1e-6:
+            raise BoptestAnswerError(describe("control step", f"{control_step:g} s", repr(found)))
+        return float(found)
+
+    def _find_end(self) -> float:
+        """When the test ends: as told, as a server of ours says, else after BOPTEST's two weeks."""
+        own = self._period.duration if isinstance(self._period, BoptestTime) else PERIOD_DAYS * DAY
+        scenario = self._ask("GET", "scenario").payload
+        told = scenario.get("end_time") if isinstance(scenario, dict) else None
+        return min(self._start + own, math.inf if told is None else float(told))
+
+    def _seen(self, values: Mapping[str, Any]) -> Measurements:
+        numbers = np.full(len(self._read), np.nan)
+        for k, (name, line) in enumerate(self._read):
+            value = values.get(name)
+            if isinstance(value, int | float) and not isinstance(value, bool):
+                numbers[k] = line.into(value)
+        return Measurements(self._layout, self._clock.zero + round(self._time), numbers)

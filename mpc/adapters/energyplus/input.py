@@ -1,0 +1,157 @@
+"""Input files as EnergyPlus' own JSON: named fields, looked up as EnergyPlus does, without regard to case."""
+
+from __future__ import annotations
+
+import copy
+import json
+from collections.abc import Iterator, Mapping
+from datetime import date, timedelta
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from mpc.errors import EnergyPlusError
+from mpc.adapters.energyplus.install import CHICAGO, weather_path
+from mpc.adapters.energyplus.process import Job, run_energyplus
+from thermal.errors import describe, nearest
+
+_REPORTS = (
+    "Output:Variable", "Output:Meter", "Output:Meter:MeterFileOnly", "Output:Table:Monthly", "Output:Table:TimeBins",
+    "Output:Table:SummaryReports", "Output:SQLite", "Output:EnvironmentalImpactFactors", "Output:Surfaces:Drawing",
+    "Output:Surfaces:List", "Output:Constructions", "Output:JSON", "Output:Schedules",
+)  # fmt: skip
+_CLOCK = ("RunPeriod", "Timestep", "RunPeriodControl:DaylightSavingTime")
+
+
+class InputFile:
+    """A building as EnergyPlus reads it.
+
+    Parameters
+    ----------
+    content : mapping
+        Object type to name to fields.
+    name : str
+        For error messages.
+    """
+
+    def __init__(self, content: Mapping[str, Mapping[str, Mapping[str, Any]]], name: str) -> None:
+        self.content, self.name = content, name
+
+    def of_type(self, kind: str) -> Mapping[str, Mapping[str, Any]]:
+        """Give the objects of a type by name; none where there are none.
+
+        Parameters
+        ----------
+        kind : str
+            Object type.
+        """
+        return self.content.get(kind, {})
+
+    def find(self, kind: str, name: str) -> Mapping[str, Any]:
+        """Look an object up.
+
+        Parameters
+        ----------
+        kind, name : str
+            Type and name.
+
+        Raises
+        ------
+        EnergyPlusError
+            When there is none.
+        """
+        objects = self.of_type(kind)
+        found = objects.get(name) or next((v for k, v in objects.items() if k.lower() == name.lower()), None)
+        if found is None:
+            raise EnergyPlusError(describe(f"{self.name}: {kind}", repr(name), "none", nearest(name, objects)))
+        return found
+
+    def begins(self, prefix: str) -> Iterator[tuple[str, str, Mapping[str, Any]]]:
+        """Give type, name and fields of the objects of all types that begin so.
+
+        Parameters
+        ----------
+        prefix : str
+            Such as ``SetpointManager:``.
+        """
+        for kind, objects in self.content.items():
+            if kind.startswith(prefix):
+                for name, fields in objects.items():
+                    yield kind, name, fields
+
+    def nodes(self, name: str) -> tuple[str, ...]:
+        """Give the nodes that a name stands for, a node or a list of nodes.
+
+        Parameters
+        ----------
+        name : str
+            Of either.
+        """
+        for title, fields in self.of_type("NodeList").items():
+            if title.lower() == name.lower():
+                return tuple(str(entry["node_name"]) for entry in fields["nodes"])
+        return (name,)
+
+
+@cache
+def read_input(path: Path) -> InputFile:
+    """Read an input file through EnergyPlus' own conversion.
+
+    Parameters
+    ----------
+    path : Path
+        An ``.idf`` file.
+
+    Raises
+    ------
+    EnergyPlusError
+        When EnergyPlus cannot read it.
+    """
+    job = Job(
+        path.read_text(encoding="latin-1"), "in.idf", weather_path(CHICAGO), options=("--convert-only",), stepped=False
+    )
+    text = run_energyplus(job, ["in.epJSON"])["in.epJSON"]
+    return InputFile(json.loads(text), path.stem)
+
+
+def with_period(source: InputFile, start: date, days: int, steps_per_hour: int) -> dict[str, Any]:
+    """Copy an input file with its clock and reports replaced.
+
+    Reports of its own are left out, daylight saving time too: the building's clock is that of its weather file.
+    Holidays stay.
+
+    Parameters
+    ----------
+    source : InputFile
+        The building.
+    start : date
+        First day; its day of the week counts.
+    days : int
+        Number of days.
+    steps_per_hour : int
+        Of zones and weather.
+
+    Returns
+    -------
+    dict
+        Content of an input file, to be written as JSON.
+    """
+    last = start + timedelta(days=days - 1)
+    content = {k: copy.deepcopy(dict(v)) for k, v in source.content.items() if k not in (*_REPORTS, *_CLOCK)}
+    content["Timestep"] = {"Timestep 1": {"number_of_timesteps_per_hour": steps_per_hour}}
+    control: dict[str, Any] = dict(next(iter(content.get("SimulationControl", {"": {}}).values())))
+    control |= {
+        "run_simulation_for_sizing_periods": "No",
+        "run_simulation_for_weather_file_run_periods": "Yes",
+    }
+    content["SimulationControl"] = {"SimulationControl 1": control}
+    content["RunPeriod"] = {
+        "run": {
+            "begin_month": start.month, "begin_day_of_month": start.day, "begin_year": start.year,
+            "end_month": last.month, "end_day_of_month": last.day, "end_year": last.year,
+            "day_of_week_for_start_day": start.strftime("%A"), "use_weather_file_holidays_and_special_days": "No",
+            "use_weather_file_daylight_saving_period": "No", "apply_weekend_holiday_rule": "No",
+            "use_weather_file_rain_indicators": "Yes", "use_weather_file_snow_indicators": "Yes",
+        }
+    }  # fmt: skip
+    return content

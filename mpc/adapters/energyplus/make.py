@@ -1,0 +1,157 @@
+"""EnergyPlus as a plant in one call."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import pandas as pd
+
+from mpc.loop.noise import SensorNoise
+from mpc.adapters.energyplus.building import EnergyPlusBuilding, energyplus_building
+from mpc.adapters.energyplus.holidays import holidays
+from mpc.adapters.energyplus.install import CHICAGO
+from mpc.adapters.energyplus.plant import EnergyPlusPlant
+from mpc.scenario import (
+    Calendar,
+    CarbonIntensity,
+    ComfortBand,
+    ErrorGrowth,
+    Forecaster,
+    InternalGains,
+    Scenario,
+    StepGrid,
+    Tariff,
+    build_scenario,
+    paper_tariff,
+    read_epw,
+)
+
+#: Thermostats of the reference offices, 21 and 24 degC while they run, half a kelvin wider; an hour to get there.
+OFFICE_COMFORT = ComfortBand((293.65, 297.65), (288.25, 300.35), weekday=(7.0, 22.0), saturday=(7.0, 18.0))
+#: No heat of people and equipment: who predicts is not told what the building's schedules hold.
+_UNKNOWN_GAINS = InternalGains(0.0, 0.0, 0.0, 0.0)
+
+
+def energyplus_scenario(
+    source: EnergyPlusBuilding,
+    start: str,
+    days: int,
+    *,
+    step_seconds: float = 300.0,
+    horizon: int = 0,
+    tariff: Tariff | None = None,
+    carbon: CarbonIntensity | None = None,
+    comfort: ComfortBand | None = None,
+    gains: InternalGains | None = None,
+) -> Scenario:
+    """Make the scenario of a run: its weather file's weather, comfort bands and prices.
+
+    Parameters
+    ----------
+    source : EnergyPlusBuilding
+        The building.
+    start : str
+        First day, ISO 8601; its day of the week counts.
+    days : int
+        Length of the run [d].
+    step_seconds : float
+        Step of the plant [s].
+    horizon : int
+        Steps that forecasts reach beyond the end.
+    tariff : Tariff, optional
+        Prices; those of the paper's simulator by default.
+    carbon : CarbonIntensity, optional
+        Emissions; not counted by default.
+    comfort : ComfortBand, optional
+        Of all zones; `OFFICE_COMFORT` with the holidays of the building by default.
+    gains : InternalGains, optional
+        What forecasts say of people and equipment; nothing by default.
+
+    Returns
+    -------
+    Scenario
+        From midnight on.
+    """
+    zone = source.building.location.timezone
+    grid = StepGrid(pd.Timestamp(start, tz=zone), step_seconds, round(days * 86_400 / step_seconds) + horizon)
+    free = holidays(source.source, range(grid.start.year, grid.start.year + 2))
+    return build_scenario(
+        source.building, grid, read_epw(source.weather), tariff or paper_tariff(), carbon=carbon,
+        comfort=comfort or replace(OFFICE_COMFORT, calendar=Calendar(free)), gains=gains or _UNKNOWN_GAINS,
+    )  # fmt: skip
+
+
+def energyplus_plant(
+    name: str | Path,
+    start: str,
+    days: int,
+    *,
+    weather: str | Path = CHICAGO,
+    step_seconds: float = 300.0,
+    control_steps: int = 1,
+    horizon: int | None = None,
+    errors: Mapping[str, ErrorGrowth] | None = None,
+    tariff: Tariff | None = None,
+    carbon: CarbonIntensity | None = None,
+    comfort: ComfortBand | None = None,
+    noise: SensorNoise | None = None,
+    lead_days: int = 1,
+) -> EnergyPlusPlant:
+    """Make a plant of one of EnergyPlus' buildings; `EnergyPlusPlant` has every choice.
+
+    Parameters
+    ----------
+    name : str or Path
+        An ``.idf`` file, or one of `reference_buildings`.
+    start : str
+        First day, ISO 8601; its day of the week counts.
+    days : int
+        Length of the run [d].
+    weather : str or Path
+        An ``.epw`` file, or one of `weather_files`.
+    step_seconds : float
+        Step of the plant [s], an hour divided by a whole number.
+    control_steps : int
+        Steps of the plant in a control step.
+    horizon : int, optional
+        Steps of the forecasts; none by default.
+    errors : mapping of str to ErrorGrowth, optional
+        Of the forecasts' weather; perfect by default.
+    tariff : Tariff, optional
+        Prices; those of the paper's simulator by default.
+    carbon : CarbonIntensity, optional
+        Emissions; not counted by default.
+    comfort : ComfortBand, optional
+        Of all zones; `OFFICE_COMFORT` with the holidays of the building by default.
+    noise : SensorNoise, optional
+        Errors of what is measured; none by default.
+    lead_days : int
+        Days under the building's own control before the run [d].
+
+    Returns
+    -------
+    EnergyPlusPlant
+        To be reset.
+
+    Raises
+    ------
+    EnergyPlusError
+        When EnergyPlus or a file is missing, or the building's plant is of another kind.
+    PlantError
+        When the parts do not fit each other.
+
+    Examples
+    --------
+    >>> plant = energyplus_plant("RefBldgMediumOfficeNew2004_Chicago", "2023-01-09", 7)  # doctest: +SKIP
+    """
+    source = energyplus_building(name, weather)
+    scenario = energyplus_scenario(
+        source, start, days, step_seconds=step_seconds, horizon=horizon or 0, tariff=tariff, carbon=carbon,
+        comfort=comfort,
+    )  # fmt: skip
+    forecaster = None if horizon is None else Forecaster(scenario, horizon, errors)
+    return EnergyPlusPlant(
+        source, scenario, days, control_steps=control_steps, forecaster=forecaster, lead_days=lead_days, noise=noise
+    )

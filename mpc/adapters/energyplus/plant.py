@@ -1,0 +1,324 @@
+"""EnergyPlus as a plant: setpoints in, measurements out, by its runtime interface in a process of its own."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from datetime import timedelta
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from mpc.errors import PlantError
+from mpc.kpi import PlantRecord
+from mpc.loop.actuators import checked_actions
+from mpc.loop.history import RecentSteps
+from mpc.loop.noise import NoiseSource, SensorNoise
+from mpc.loop.plant import Measurements, PointLayout, need_running
+from mpc.adapters.energyplus.building import EnergyPlusBuilding
+from mpc.adapters.energyplus.points import Reader, columns_of, meters
+from mpc.adapters.energyplus.process import EnergyPlusProcess, Job
+from mpc.adapters.energyplus.setpoints import actuators_of, prepared
+from mpc.scenario import Forecast, Forecaster, Scenario
+from thermal import Case, Telemetry
+from thermal.errors import describe
+
+FloatArray = NDArray[np.float64]
+
+_FREEZING = 273.15  # K
+_DAY, _HOUR = 86_400, 3_600  # s
+
+
+class EnergyPlusPlant:
+    """A building of EnergyPlus in closed loop.
+
+    Every run has a process of its own, which waits at each control step. What an action leaves out stays as the
+    building has it, so that ``step({})`` is the building's own control.
+
+    Parameters
+    ----------
+    source : EnergyPlusBuilding
+        The building, of `energyplus_building`.
+    scenario : Scenario
+        Its grid begins at midnight by the clock of the weather file, with a step of an hour divided by a whole number;
+        it may be longer than the run, for forecasts. Bands and prices are those of indicators and forecasts: the
+        building has its own schedules, people and weather.
+    days : int
+        Length of the run [d].
+    control_steps : int
+        Steps of the plant in a control step.
+    forecaster : Forecaster, optional
+        Forecasts of the scenario; none by default.
+    lead_days : int
+        Days under the building's own control before the run [d], at least 1, after EnergyPlus' warm-up.
+    limits : mapping of str to tuple of float, optional
+        Ranges by kind of action in the place of the default ones [K].
+    noise : SensorNoise, optional
+        Errors of what is measured; none by default.
+    seed : int
+        Of the noise.
+    patience : float
+        Longest time for an answer of EnergyPlus [s]; then its process is ended.
+
+    Raises
+    ------
+    PlantError
+        When the parts do not fit each other.
+    EnergyPlusError
+        When EnergyPlus is not installed.
+    """
+
+    def __init__(
+        self,
+        source: EnergyPlusBuilding,
+        scenario: Scenario,
+        days: int,
+        *,
+        control_steps: int = 1,
+        forecaster: Forecaster | None = None,
+        lead_days: int = 1,
+        limits: Mapping[str, tuple[float, float]] | None = None,
+        noise: SensorNoise | None = None,
+        seed: int = 0,
+        patience: float = 600.0,
+    ) -> None:
+        self.source, self.scenario, self.forecaster, self.control_steps = source, scenario, forecaster, control_steps
+        self._days, self._lead, self._patience = days, lead_days, patience
+        self._check()
+        self._per_day = round(_DAY / scenario.grid.step)
+        self.actuators, self._handles = actuators_of(source, limits or {})
+        self._by_name = {a.name: a for a in self.actuators}
+        columns = columns_of(source.layout, source.building.weather_station, source.full_water_flow)
+        self._reader = Reader(columns, source.layout)
+        self._layout = PointLayout(self._reader.names, source.building.location.timezone)
+        self._noise, self._seed = None if noise is None else NoiseSource(self._layout, noise), seed
+        self._meters = tuple(meters(source.meters, kind) for kind in ("Electricity", "NaturalGas"))
+        self._process: EnergyPlusProcess | None = None
+        self._number = -1
+        self._clear()
+
+    @property
+    def control_step(self) -> float:
+        """Time between two actions [s]."""
+        return self.control_steps * float(self.scenario.grid.step)
+
+    @property
+    def zone_names(self) -> tuple[str, ...]:
+        """Names of the zones, in the order of records."""
+        return self.scenario.zones
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of the measurements."""
+        return self._layout.columns
+
+    @property
+    def steps(self) -> int:
+        """Steps of the run."""
+        return self._days * self._per_day
+
+    @property
+    def finished(self) -> bool:
+        """Whether less than a control step of the run is left."""
+        return self._number + self.control_steps > self.steps
+
+    @property
+    def now(self) -> int:
+        """Number of the scenario's step that comes next."""
+        return max(self._number, 0)
+
+    def job(self) -> Job:
+        """Give what EnergyPlus is run with."""
+        start = self.scenario.grid.start.date() - timedelta(days=self._lead)
+        content = prepared(self.source, start, self._days + self._lead, round(_HOUR / self.scenario.grid.step))
+        return Job(
+            json.dumps(content), "in.epJSON", self.source.weather, self._reader.outputs, self._reader.products,
+            (*self._meters[0], *self._meters[1]), self._handles,
+        )  # fmt: skip
+
+    def reset(self, seed: int | None = None) -> Measurements:
+        """Start EnergyPlus anew, and run the days before.
+
+        Parameters
+        ----------
+        seed : int, optional
+            Of the sensors' noise, all that is random; as before by default.
+
+        Returns
+        -------
+        Measurements
+            Of the last control step before the run.
+        """
+        self.close()
+        self._seed = self._seed if seed is None else seed
+        self._process, self._number = EnergyPlusProcess(self.job(), self._patience), 0
+        self._clear()
+        steps = self._lead * self._per_day
+        rows, ends, _ = self._ask(steps, {})
+        self._first = self._reader.rooms(ends[-1])
+        return self._seen(self._read(rows[-self.control_steps :], 0))
+
+    def step(self, actions: Mapping[str, float]) -> Measurements:
+        """Hold setpoints for a control step.
+
+        Parameters
+        ----------
+        actions : mapping of str to float
+            Setpoints by ``ENTITY/POINT`` [K]; what is left out stays as the building has it.
+
+        Returns
+        -------
+        Measurements
+            Means over the control step.
+
+        Raises
+        ------
+        PlantActionError
+            When a setpoint is unknown, no finite number or outside its range.
+        PlantError
+            When the run is over, or `reset` was not called.
+        EnergyPlusError
+            When EnergyPlus breaks off or ends with severe errors.
+        EnergyPlusTimeoutError
+            When it does not answer.
+        """
+        need_running(self._number >= 0)
+        given = checked_actions(actions, self._by_name)
+        if self.finished:
+            found = f"{self.steps - self._number} of its {self.steps}"
+            raise PlantError(describe("run", f"{self.control_steps} more steps", found, "make it longer"))
+        rows, ends, energy = self._ask(self.control_steps, given)
+        fresh = self._read(rows, self._number)
+        self._rows.append(fresh)
+        self._rooms += [self._reader.rooms(end) for end in ends]
+        self._energy.append(energy)
+        self._number += self.control_steps
+        if self._number == self.steps and self._process is not None:
+            self._process.finish()
+            self.close()
+        return self._seen(fresh)
+
+    def forecast(self) -> Forecast:
+        """Forecast the steps from now on.
+
+        Raises
+        ------
+        PlantError
+            When the plant has no forecaster.
+        """
+        if self.forecaster is None:
+            raise PlantError(describe("forecast", "a plant with a forecaster", "none", "pass `forecaster`"))
+        return self.forecaster.table(self.now)
+
+    def record(self) -> PlantRecord:
+        """Give the run since the reset, for indicators: meters of the end uses for heating and air conditioning.
+
+        Raises
+        ------
+        PlantError
+            When there was no step yet.
+        """
+        step, temperature, electricity, gas = self.recent(len(self._rooms))
+        return PlantRecord(step, np.array(temperature), np.array(electricity), np.array(gas))
+
+    def recent(self, steps: int) -> RecentSteps:
+        """Give the last steps of `record`, at a cost that does not grow with the run.
+
+        Parameters
+        ----------
+        steps : int
+            How many of the plant's own steps, 1 or more.
+
+        Raises
+        ------
+        PlantError
+            When there was no step yet.
+        """
+        last, count = self._kept(self._energy)[-steps // self.control_steps :], len(self._meters[0])
+        power = np.concatenate(last)[-steps:] / self.scenario.grid.step
+        before = len(self._rooms) - steps
+        zones = [self._rooms[before - 1] if before > 0 else self._first, *self._rooms[-steps:]]
+        electricity, gas = power[:, :count].sum(axis=1), power[:, count:].sum(axis=1)
+        return RecentSteps(float(self.scenario.grid.step), zones, electricity.tolist(), gas.tolist())
+
+    def metered(self) -> dict[str, float]:
+        """Add up the meters over the run since the reset [J].
+
+        Raises
+        ------
+        PlantError
+            When there was no step yet.
+        """
+        total = np.concatenate(self._kept(self._energy)).sum(axis=0)
+        return dict(zip((*self._meters[0], *self._meters[1]), map(float, total), strict=True))
+
+    def telemetry(self) -> pd.DataFrame:
+        """Give what was measured in the run since the reset, shape (n_steps, n_column) [library's units].
+
+        Raises
+        ------
+        PlantError
+            When there was no step yet.
+        """
+        rows = np.concatenate(self._kept(self._rows))
+        index = self.scenario.grid.stamps[: len(rows)].rename("timestamp")
+        return pd.DataFrame(rows, index=index, columns=list(self.columns))
+
+    def case(self) -> Case:
+        """Give the run as a case, which `thermal.save_case` saves and calibration and diagnosis take."""
+        return Case(self.source.building, Telemetry.from_frame(self.telemetry(), where="EnergyPlus"))
+
+    def close(self) -> None:
+        """End EnergyPlus' process and remove its folder; what was measured stays."""
+        if self._process is not None:
+            self._process.close()
+            self._process = None
+
+    def _clear(self) -> None:
+        self._rows: list[FloatArray] = []
+        self._energy: list[FloatArray] = []
+        self._rooms: list[FloatArray] = []
+        self._first = np.zeros(len(self.zone_names))
+
+    def _kept(self, parts: list[FloatArray]) -> list[FloatArray]:
+        if not parts:
+            raise PlantError(describe("run", "a step at least", "none since the reset"))
+        return parts
+
+    def _ask(self, steps: int, given: Mapping[str, float]) -> tuple[FloatArray, FloatArray, FloatArray]:
+        if self._process is None:
+            raise PlantError("plant: it was closed; call reset() before the next step")
+        values = [given[a.name] - _FREEZING if a.name in given else None for a in self.actuators]
+        try:
+            answer = self._process.ask(steps, values)
+        except PlantError:
+            self._process = None
+            raise
+        rows, ends, energy = (np.array(answer[kind], dtype=float) for kind in ("rows", "ends", "energy"))
+        return rows, ends, energy
+
+    def _read(self, rows: FloatArray, first: int) -> FloatArray:
+        values = self._reader.read(rows)
+        if self._noise is None:
+            return values
+        return np.stack([self._noise.disturb(first + k, row, self._seed) for k, row in enumerate(values)])
+
+    def _seen(self, rows: FloatArray) -> Measurements:
+        return Measurements(self._layout, int(self.scenario.grid.edges[self.now]), rows.mean(axis=0))
+
+    def _check(self) -> None:
+        grid, step = self.scenario.grid, self.scenario.grid.step
+        if self.scenario.zones != self.source.building.zone_names:
+            expected = f"a scenario of the {len(self.source.building.zone_names)} zones of {self.source.building.name}"
+            raise PlantError(describe("plant", expected, f"one of {len(self.scenario.zones)} zones"))
+        if grid.start.tz_convert(self.source.building.location.timezone).time() != pd.Timestamp(0).time():
+            raise PlantError(describe("scenario", "a start at midnight", str(grid.start)))
+        if _HOUR % step or not 60.0 <= step <= 3600.0:
+            raise PlantError(describe("scenario", "a step of an hour divided by 1 to 60", f"{step:g} s"))
+        if self._days < 1 or self._lead < 1 or self._days * _DAY > grid.n_steps * step:
+            found = f"{self._days} and {self._lead} days on a grid of {grid.n_steps * step / _DAY:g}"
+            raise PlantError(describe("plant", "days that the scenario covers", found))
+        if self.control_steps < 1 or round(self._days * _DAY / step) % self.control_steps:
+            expected = "control steps of which the run has a whole number"
+            raise PlantError(describe("control_steps", expected, repr(self.control_steps)))

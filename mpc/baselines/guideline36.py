@@ -1,0 +1,181 @@
+"""ASHRAE Guideline 36-2021: supply air and hot water by the requests of zones and reheat valves."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from mpc.baselines.requests import HysteresisRequests, SuppressedRequests
+from mpc.baselines.trim_respond import TrimRespond, TrimRespondLoop
+from mpc.control import SitePoints
+from mpc.errors import ControlError
+from mpc.loop import Actuator, Measurements
+from mpc.scenario import Forecast
+from thermal.case.points import OUTDOOR_TEMPERATURE, ZONE_TEMPERATURE
+from thermal.errors import describe
+
+FloatArray = NDArray[np.float64]
+
+_AIR, _WATER = "supply_air_temperature_setpoint", "supply_water_temperature_setpoint"
+
+
+@dataclass(frozen=True)
+class Guideline36Settings:
+    """Parameters of the guideline's two resets, each with its section; the defaults are the guideline's.
+
+    Parameters
+    ----------
+    air : TrimRespond
+        T-max of the supply air, by cooling requests (5.16.2.2): 18 degC and down to 12 degC, +0.1 K every 2 minutes,
+        -0.2 K a request above two, -0.6 K at most.
+    coldest_air : float
+        Min_ClgSAT [K] (5.16.2.2).
+    outdoor : tuple of float
+        OAT_Min and OAT_Max [K]: from T-max at the former down to Min_ClgSAT at the latter, in a line (5.16.2.2).
+    water : TrimRespond
+        Hot water, by reset requests of the coils (5.21.4): 80 degC and down to 32 degC for condensing boilers, -1.1 K
+        every 5 minutes, +1.7 K a request above two, +3.9 K at most.
+    two_cooling, three_cooling : float
+        Excess of a zone over its cooling setpoint that is worth two and three requests [K] (5.6.8.1).
+    cooling_lasting : float
+        How long that must last [s] (5.6.8.1).
+    two_water, three_water : float
+        What discharge air lacks of its setpoint that is worth two and three requests [K] (5.6.8.3).
+    water_lasting : float
+        How long that must last [s] (5.6.8.3).
+    throttling_range : float
+        Distance from the setpoint at which a zone's loop counts as at its end [K]. The guideline's loops are integral
+        and hold a zone at its setpoint until then; a proportional one lets it drift. The default is half of the
+        thermostats' range, by which setpoints lie inside of the comfort band (`mpc.loop.scheduled_operation`): zones
+        ask when they reach the band's edge, and not half a kelvin beyond it.
+    discharge_rise : float
+        Warmest discharge air above the zone's heating setpoint [K] (5.6.5); the reheat reaches it at half of the
+        heating loop.
+    """
+
+    air: TrimRespond = field(default_factory=lambda: TrimRespond(291.15, 285.15, 291.15, 0.1, -0.2, -0.6))
+    coldest_air: float = 285.15
+    outdoor: tuple[float, float] = (289.15, 294.15)
+    water: TrimRespond = field(
+        default_factory=lambda: TrimRespond(353.15, 305.37, 353.15, -1.1, 1.7, 3.9, time_step=300.0)
+    )
+    two_cooling: float = 2.0
+    three_cooling: float = 3.0
+    cooling_lasting: float = 120.0
+    two_water: float = 8.0
+    three_water: float = 17.0
+    water_lasting: float = 300.0
+    throttling_range: float = 0.5
+    discharge_rise: float = 11.0
+
+    def __post_init__(self) -> None:
+        if not self.outdoor[0] < self.outdoor[1]:
+            raise ControlError(describe("Guideline 36: outdoor", "rising temperatures", f"{self.outdoor} K"))
+
+
+class Guideline36:
+    """Trim and respond of supply air, one loop an air handler, and of hot water; from measured points only.
+
+    Parameters
+    ----------
+    points : SitePoints
+        Names of zones and devices.
+    serving : sequence of int, shape (n_terminal,)
+        Position of the air handler that supplies each terminal.
+    actuators : sequence of Actuator
+        Of the plant: those of supply air and supply water are set, within their ranges.
+    settings : Guideline36Settings, optional
+        Those of the guideline by default.
+
+    Notes
+    -----
+    Fans and pumps count as proven on while their power is above zero, or not measured; off, setpoints return to SP0.
+    Between two calls requests stay, and the loops take as many of their time steps as fit. Modes are those of occupied
+    hours whenever a fan runs: the warm-up's 35 degC (5.16.2.2) are left out. Zones have one importance (5.1.14.2).
+    Outputs of the zones' loops follow from temperature and setpoints.
+    """
+
+    def __init__(
+        self,
+        points: SitePoints,
+        serving: Sequence[int],
+        actuators: Sequence[Actuator],
+        settings: Guideline36Settings | None = None,
+    ) -> None:
+        if len(serving) != len(points.terminals):
+            expected = f"an air handler for each of {len(points.terminals)} terminals"
+            raise ControlError(describe("Guideline 36", expected, f"{len(serving)}"))
+        self.points, self.settings = points, settings or Guideline36Settings()
+        self._serving, n = np.asarray(serving, dtype=int), len(points.terminals)
+        self._range = {a.name: (a.lowest, a.highest) for a in actuators}
+        s = self.settings
+        self._cooling = HysteresisRequests(n, s.two_cooling, s.three_cooling, s.cooling_lasting)
+        self._heating = HysteresisRequests(n, s.two_water, s.three_water, s.water_lasting)
+        self._suppressed = SuppressedRequests(n)
+        self._air = [TrimRespondLoop(s.air) for _ in points.air_handlers]
+        self._water = TrimRespondLoop(s.water)
+        self._last: pd.Timestamp | None = None
+
+    def step(self, measurements: Measurements, forecast: Forecast | None) -> dict[str, float]:
+        """Choose setpoints for the next control step [K].
+
+        Parameters
+        ----------
+        measurements : Measurements
+            Of the control step that has just ended.
+        forecast : Forecast or None
+            Without effect.
+        """
+        seconds = 0.0 if self._last is None else (measurements.stamp - self._last).total_seconds()
+        self._last = measurements.stamp
+        cooling, heating = self.requests(measurements, seconds)
+        chosen: dict[str, float] = {}
+        outdoor = self._values(measurements, [self.points.weather_station], OUTDOOR_TEMPERATURE)[0]
+        for k, name in enumerate(self.points.air_handlers):
+            on = not self._values(measurements, [name], "supply_fan_power_sensor")[0] <= 0.0
+            warmest = self._air[k].advance(on, int(cooling[self._serving == k].sum()), seconds)
+            chosen[f"{name}/{_AIR}"] = self._by_outdoor(warmest, float(outdoor))
+        on = not self._values(measurements, [self.points.boiler], "pump_power_sensor")[0] <= 0.0
+        chosen[f"{self.points.boiler}/{_WATER}"] = self._water.advance(on, int(heating.sum()), seconds)
+        held = {name: self._range[name] for name in chosen if name in self._range}
+        return {name: float(np.clip(chosen[name], *ends)) for name, ends in held.items()}
+
+    def requests(self, measurements: Mapping[str, float], seconds: float) -> tuple[NDArray[np.int64], ...]:
+        """Count requests for cooler air and for warmer water, shape (n_terminal,) each.
+
+        Parameters
+        ----------
+        measurements : mapping of str to float
+            By ``ENTITY/POINT`` [library's units].
+        seconds : float
+            Time since the last call [s].
+        """
+        s, terminals = self.settings, self.points.terminals
+        zone, low, high, discharge, valve = (
+            self._values(measurements, terminals, point)
+            for point in (
+                ZONE_TEMPERATURE, "zone_air_heating_temperature_setpoint", "zone_air_cooling_temperature_setpoint",
+                "discharge_air_temperature_sensor", "heating_water_valve_percentage_command",
+            )
+        )  # fmt: skip
+        excess = self._suppressed.distance(zone - high, high, seconds)
+        cooling = self._cooling.count((zone - high) / s.throttling_range, excess, seconds)
+        supply = self._values(measurements, self.points.air_handlers, "supply_air_temperature_setpoint")[self._serving]
+        call = np.clip((low - zone) / s.throttling_range, 0.0, 1.0)
+        wanted = supply + np.minimum(2.0 * call, 1.0) * np.maximum(low + s.discharge_rise - supply, 0.0)
+        heating = self._heating.count(valve, np.where(call > 0.0, wanted - discharge, 0.0), seconds)
+        return cooling, heating
+
+    def _by_outdoor(self, warmest: float, outdoor: float) -> float:
+        """Setpoint of the supply air at an outdoor temperature [K]; not known counts as cold."""
+        low, high = self.settings.outdoor
+        share = float(np.clip((outdoor - low) / (high - low), 0.0, 1.0)) if np.isfinite(outdoor) else 0.0
+        return warmest + share * (self.settings.coldest_air - warmest)
+
+    def _values(self, measurements: Mapping[str, float], entities: Sequence[str], point: str) -> FloatArray:
+        names = (f"{entity}/{point}" for entity in entities)
+        return np.array([measurements[n] if n in measurements else np.nan for n in names], dtype=float)

@@ -1,0 +1,167 @@
+"""``buildingmpc label``."""
+
+from __future__ import annotations
+
+import multiprocessing
+import webbrowser
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from mpc.cli.console import say
+
+if TYPE_CHECKING:
+    from multiprocessing.connection import Connection
+
+    from thermal.plan.page import LabelDesk
+
+#: Folder of a new case, where the command names none.
+_NEW = Path("case")
+_LISTS = (".yaml", ".yml")
+
+Progress = Callable[[str, int, int], None]
+
+
+def label(
+    target: Annotated[
+        Path | None,
+        typer.Argument(
+            metavar="CASE|PLAN", help="Case folder, or a drawing, or the YAML list of the floors' drawings."
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Case folder to make of a drawing; default: named after it.")
+    ] = None,
+    results: Annotated[
+        list[Path] | None, typer.Option(metavar="DIR", help="Folder of results whose reports are shown; repeatable.")
+    ] = None,
+    port: Annotated[int, typer.Option(metavar="N", min=0, max=65535, help="Port; default: any that is free.")] = 0,
+    browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")] = True,
+    take_over: Annotated[
+        bool, typer.Option("--take-over", help="Take the case from a program that has it open.")
+    ] = False,
+) -> int:
+    """Open the labelling page of a case until Ctrl-C."""
+    from thermal.plan.page import LabelDesk, serve_page
+
+    case, drawings = _case_of(target, out)
+    makers = {name: partial(_make_apart, name) for name in ("check", "calibrate", "diagnose")}
+    desk = LabelDesk(case, reports=results or (), makers=makers, take_over=take_over)
+    try:
+        if drawings is not None:
+            _prepare(desk, drawings)
+    except BaseException:
+        desk.end()
+        raise
+
+    def ready(address: str) -> None:
+        say(f"Labelling {case}   Ctrl-C ends it, everything is saved")
+        say(address)
+        if browser and not webbrowser.open(address):
+            say("No browser could be opened: open this address in one on this machine.")
+
+    serve_page(desk, port=port, ready=ready)
+    say(f"Case: {case}   Next: buildingmpc check {case}")
+    return 0
+
+
+def _case_of(target: Path | None, out: Path | None) -> tuple[Path, Path | None]:
+    """Case folder to label, and the drawing or list to begin with."""
+    from thermal.errors import LabelError, describe
+
+    if target is None or target.is_dir() or not target.suffix:
+        if target is not None and out is not None:
+            raise LabelError(describe("--out", "a drawing beside it", f"the case folder {target}", "drop --out"))
+        return target or out or _NEW, None
+    if not target.is_file():
+        raise LabelError(describe(str(target), "a case folder, a drawing or a list of drawings", "nothing"))
+    return out or target.with_suffix(""), target
+
+
+def _prepare(desk: LabelDesk, drawings: Path) -> None:
+    """Put a drawing, or all floors of a list, on the page of a new case."""
+    from mpc.cli.console import Waiting
+    from thermal.errors import LabelError, describe
+    from thermal.plan.page import import_list, import_sheet
+
+    if desk.store.draft.floors:
+        advice = "open the case itself, and import the drawing on the page"
+        raise LabelError(describe(str(desk.store.folder), "a new case folder", "a case with floors", advice))
+    if drawings.suffix.lower() in _LISTS:
+        with Waiting(f"import {drawings.name}") as progress:
+            import_list(desk, drawings, progress)
+    else:
+        import_sheet(desk, drawings)
+
+
+def _make_apart(kind: str, case: Path, out: Path, progress: Progress) -> None:
+    """Make a report in a process of its own, so that the page stays quick, and stop it with the job."""
+    from mpc.errors import ReportProcessError
+
+    context = multiprocessing.get_context("spawn")
+    here, there = context.Pipe(duplex=False)
+    process = context.Process(target=_make, args=(kind, case, out, there), daemon=True)
+    process.start()
+    there.close()
+    try:
+        last: tuple[str, int, int] = ("", 0, 0)
+        while True:
+            if here.poll(0.5):
+                try:
+                    message = here.recv()
+                except EOFError:
+                    break
+                if message[0] == "error":
+                    raise ReportProcessError(message[1])
+                last = message
+            progress(*last)
+        process.join()
+    finally:
+        if process.is_alive():
+            process.terminate()
+        process.join()
+    if process.exitcode:
+        raise ReportProcessError(f"the process that makes the report ended with code {process.exitcode}")
+
+
+def _make(kind: str, case: Path, out: Path, connection: Connection[Any, Any]) -> None:
+    """Make a report; what goes wrong is told in a sentence."""
+
+    def progress(stage: str, done: int, total: int) -> None:
+        connection.send((stage, done, total))
+
+    try:
+        {"check": _check, "calibrate": _calibrate, "diagnose": _diagnose}[kind](case, out, progress)
+    except Exception as error:
+        connection.send(("error", f"{type(error).__name__}: {error}"))
+    finally:
+        connection.close()
+
+
+def _check(case: Path, out: Path, progress: Progress) -> None:
+    from calibration import write_check
+    from thermal.case import check_case
+
+    progress("check", 0, 1)
+    write_check(check_case(case), out, force=True)
+
+
+def _calibrate(case: Path, out: Path, progress: Progress) -> None:
+    import calibration
+    from thermal import load_case
+
+    loaded = load_case(case)
+    result = calibration.calibrate(loaded, progress=progress)
+    calibration.write_calibration(result, loaded, out, force=True)
+
+
+def _diagnose(case: Path, out: Path, progress: Progress) -> None:
+    from calibration import diagnosis
+    from thermal import load_case
+
+    loaded = load_case(case)
+    result = diagnosis.diagnose(loaded, progress=progress)
+    diagnosis.write_diagnosis(result, loaded, out, force=True)

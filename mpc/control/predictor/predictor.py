@@ -1,0 +1,363 @@
+"""Building and plant over a horizon, thermostats and terminals inside: roll-outs and their exact slopes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mpc.control.problem.channels import Channel
+from mpc.control.problem.data import HorizonData
+from mpc.control.problem.horizon import Horizon
+from mpc.errors import ControlError
+from thermal.errors import describe
+from thermal.hvac import SmoothHvac
+from thermal.model import IMPLICIT_EULER, ModalModel, Scheme
+from thermal.inputs import REFERENCE_TEMPERATURE
+
+FloatArray = NDArray[np.float64]
+
+_SETTLED = 1e-5  # K: what thermostats go by is found to within this
+_NARROW = 0.02  # K: width of a bracket from which on Newton's method is left alone
+_MOST_TRIES = 30  # of Newton's method in a step; two or three are usual
+
+
+@dataclass(frozen=True, eq=False)
+class Rollout:
+    """What a plan leads to.
+
+    Parameters
+    ----------
+    plan : ndarray, shape (n_block, n_channel)
+        Setpoints [unit of the channel].
+    zone : ndarray, shape (N + 1, n_zone)
+        Temperatures at the edges of the steps [K].
+    seen : ndarray, shape (N, n_zone)
+        What the thermostats go by [K].
+    electric, fuel : ndarray, shape (N,)
+        Powers, means over the steps [W].
+    end_state : ndarray, shape (r,)
+        Of the modes at the end [(W K)^0.5].
+    knobs : ndarray, shape (N, n_knob)
+        Water at the starts, and setpoints [K or Pa].
+    sums : ndarray, shape (N, m)
+        Of the plant, where its slopes are taken [as in `thermal.hvac.HvacSlopes`].
+    heat : ndarray, shape (N, n_zone)
+        From the plant into the zones [W].
+    air : ndarray, shape (N, n_air_handler)
+        Supply air as it leaves each air handler [K].
+    water : ndarray, shape (N,)
+        Supply water at the ends of the steps [K].
+    """
+
+    plan: FloatArray
+    zone: FloatArray
+    seen: FloatArray
+    electric: FloatArray
+    fuel: FloatArray
+    end_state: FloatArray
+    knobs: FloatArray
+    sums: FloatArray
+    heat: FloatArray
+    air: FloatArray
+    water: FloatArray
+
+    @property
+    def finite(self) -> bool:
+        """Whether nothing overflowed."""
+        return bool(np.isfinite(self.zone).all() and np.isfinite(self.electric).all() and np.isfinite(self.fuel).all())
+
+
+@dataclass(frozen=True, eq=False)
+class Sensitivity:
+    """Derivatives of a roll-out by its plan; D = n_block n_channel, blocks first.
+
+    Parameters
+    ----------
+    zone : ndarray, shape (N + 1, n_zone, D)
+        Of the temperatures [K per unit of the channel].
+    electric, fuel : ndarray, shape (N, D)
+        Of the powers [W per unit of the channel].
+    end_state : ndarray, shape (r, D)
+        Of the modes at the end [(W K)^0.5 per unit of the channel].
+    """
+
+    zone: FloatArray
+    electric: FloatArray
+    fuel: FloatArray
+    end_state: FloatArray
+
+
+class Predictor:
+    """A building's modes and its smooth plant, step by step, with the local thermostats and terminals inside.
+
+    Parameters
+    ----------
+    modes : ModalModel
+        Of a reduced model, at one θ.
+    hvac : SmoothHvac
+        The plant.
+    horizon : Horizon
+        Steps and blocks.
+    channels : sequence of Channel
+        What is decided; what is not stays at its design value.
+    disturbance_time : float
+        Time constant with which the unmeasured heat fades [s]; infinite by default: it stays.
+    scheme : Scheme
+        Of time; by default implicit Euler, as the model is calibrated, filtered and stepped as a plant.
+
+    Raises
+    ------
+    ControlError
+        When plant and building have not the same zones, or two channels set the same.
+
+    Notes
+    -----
+    Thermostats are faster than a step. What they and the terminals go by is the zone's temperature at the *end* of the
+    step, as far as the zone's own heat changes it over the step:
+
+    ``T_seen = T_free + g Q(T_seen)``
+
+    with T_free the end of the step without heat from the plant and g the response of a zone to its own heat. Taken at
+    the start of the step instead, proportional thermostats of 1 K swing from step to step at 5 minutes already. The
+    equations are solved by Newton's method with the zones' own slopes, each zone within a bracket. Slopes are forward
+    sensitivities of the single shooting, exact by the implicit function theorem: one column a decision, through the
+    modes (diagonal) and the plant (diagonal and low rank, `thermal.hvac.SmoothHvac`).
+    """
+
+    def __init__(
+        self,
+        modes: ModalModel,
+        hvac: SmoothHvac,
+        horizon: Horizon,
+        channels: Sequence[Channel],
+        disturbance_time: float = np.inf,
+        scheme: Scheme = IMPLICIT_EULER,
+    ) -> None:
+        n_zone = modes.output.shape[0]
+        if hvac.n_zone != n_zone:
+            raise ControlError(describe("predictor", f"a plant of {n_zone} zones", f"one of {hvac.n_zone}"))
+        self.hvac, self.channels = hvac, tuple(channels)
+        self.at = [channel.knobs(hvac) for channel in self.channels]
+        used = np.concatenate(self.at) if self.at else np.zeros(0, dtype=np.intp)
+        if not used.size or len(np.unique(used)) != used.size:
+            expected = "at least one channel, and one for each setpoint"
+            raise ControlError(describe("predictor", expected, f"{[c.name for c in self.channels]}"))
+        self._prepare(modes, horizon, disturbance_time, scheme)
+        self._design, self._scheduled = self._design_knobs(), self._undecided_setpoints(used)
+        self._stepper = hvac.stepper()
+        self._known: tuple[HorizonData | None, FloatArray, FloatArray] = (None, np.zeros(0), np.zeros(0))
+
+    def _prepare(self, modes: ModalModel, horizon: Horizon, disturbance_time: float, scheme: Scheme) -> None:
+        """Discretise the building on the horizon's steps."""
+        self.modes, self.horizon, self.n_zone = modes, horizon, modes.output.shape[0]
+        self.n_decision = horizon.n_block * len(self.channels)
+        self._output = np.ascontiguousarray(modes.output)
+        parts = {dt: modes.propagator(float(dt), scheme) for dt in np.unique(horizon.steps)}
+        self._end = {dt: p.end for dt, p in parts.items()}
+        self._push = {dt: np.ascontiguousarray(p.end_gain[:, None] * modes.heating) for dt, p in parts.items()}
+        self._drive = {dt: p.end_gain[:, None] * modes.boundary for dt, p in parts.items()}
+        self._response = {dt: np.ascontiguousarray(self._output @ push) for dt, push in self._push.items()}
+        self._own = {dt: np.ascontiguousarray(np.diag(response)) for dt, response in self._response.items()}
+        self._fading = np.exp(-horizon.edges[:-1] / disturbance_time)
+
+    def _design_knobs(self) -> FloatArray:
+        at, system = self.hvac.knobs, self.hvac.system
+        knobs = np.zeros(at.size)
+        knobs[at.supply_air], knobs[at.supply_water] = 288.15, 333.15
+        if at.differential_pressure is not None:
+            knobs[at.static_pressure] = system.static_pressures
+            knobs[at.differential_pressure] = system.loop.pump.differential_pressure
+        return knobs
+
+    def _undecided_setpoints(self, used: NDArray[np.intp]) -> NDArray[np.intp]:
+        """Thermostats' setpoints among the knobs that no channel sets: they follow their schedule."""
+        at = self.hvac.knobs
+        heating, cooling = (np.arange(s.start, s.stop) for s in (at.heating_setpoint, at.cooling_setpoint))
+        highest, lowest = np.full(at.size, -np.inf), np.full(at.size, np.inf)
+        for channel, mine in zip(self.channels, self.at, strict=True):
+            highest[mine], lowest[mine] = channel.upper, channel.lower
+        if (highest[heating] > lowest[cooling]).any():
+            found = f"{highest[heating].max():g} and {lowest[cooling].min():g} K"
+            expected = "ranges of heating setpoints below those of cooling setpoints"
+            raise ControlError(describe("predictor", expected, found))
+        return np.setdiff1d(np.concatenate([heating, cooling]), used)
+
+    def _given(self, data: HorizonData) -> tuple[FloatArray, FloatArray]:
+        """Give what no plan changes: surroundings of the plant, and drive of the modes; kept for one horizon."""
+        if self._known[0] is not data:
+            around = self.hvac.around(
+                data.heating_setpoint, data.cooling_setpoint, data.outdoor_temperature, data.outdoor_humidity,
+                data.running, data.boiler, data.ventilation, self.horizon.steps,
+            )  # fmt: skip
+            self._known = (data, around, self._undecided(data))
+        return self._known[1], self._known[2]
+
+    def _undecided(self, data: HorizonData) -> FloatArray:
+        """Give the drive of the modes by boundaries, gains and unmeasured heat, shape (N, r) [(W K)^0.5]."""
+        free = data.gains + self._fading[:, None] * data.disturbance
+        outside = data.boundary.copy()
+        outside[:, : outside.shape[1] - self.modes.n_signal] -= REFERENCE_TEMPERATURE
+        steps = zip(self.horizon.steps, outside, free, strict=True)
+        return np.stack([self._drive[dt] @ o + self._push[dt] @ f for dt, o, f in steps])
+
+    def knobs(self, plan: FloatArray) -> FloatArray:
+        """Spread a plan over the steps, shape (N, n_knob) [K or Pa]; water and schedules are left for the roll-out.
+
+        Parameters
+        ----------
+        plan : ndarray, shape (n_block, n_channel)
+            Setpoints [unit of the channel].
+        """
+        knobs = np.tile(self._design, (len(self.horizon), 1))
+        for c, at in enumerate(self.at):
+            knobs[:, at] = plan[self.horizon.block_of, c][:, None]
+        return knobs
+
+    def rollout(self, data: HorizonData, plan: FloatArray, near: Rollout | None = None) -> Rollout:
+        """Follow a plan.
+
+        Parameters
+        ----------
+        data : HorizonData
+            Of the horizon.
+        plan : ndarray, shape (n_block, n_channel)
+            Setpoints [unit of the channel].
+        near : Rollout, optional
+            One that is likely to be like this, to start from.
+        """
+        n, count, stepper, water_at = self.n_zone, len(self.horizon), self._stepper, self.hvac.knobs.water
+        around, drive = self._given(data)
+        knobs, x, water = self.knobs(plan), data.state, data.water
+        if self._scheduled.size:
+            first = self.hvac.knobs.heating_setpoint.start
+            knobs[:, self._scheduled] = np.hstack([data.heating_setpoint, data.cooling_setpoint])[
+                :, self._scheduled - first
+            ]
+        zone, seen, done = np.empty((count + 1, n)), np.empty((count, n)), np.empty((count, stepper.output.size))
+        zone[0], ahead = self._output @ x + REFERENCE_TEMPERATURE, np.zeros(n)
+        for k, dt in enumerate(self.horizon.steps):
+            knobs[k, water_at] = water
+            stepper.knobs[:], stepper.around[:] = knobs[k], around[k]
+            left = self._end[dt] * x + drive[k]
+            free = self._output @ left + REFERENCE_TEMPERATURE
+            if near is not None:
+                ahead = near.seen[k] - near.zone[k]
+            seen[k] = self._settle(free, self._own[dt], zone[k] + ahead)
+            ahead = seen[k] - zone[k]
+            done[k] = stepper.output
+            water = done[k, n + 2]
+            x = left + self._push[dt] @ done[k, :n]
+            zone[k + 1] = free + self._response[dt] @ done[k, :n]
+        sums, air = np.split(done[:, n + 3 : -n], [self.hvac.n_sum], axis=1)
+        return Rollout(
+            plan, zone, seen, done[:, n], done[:, n + 1], x, knobs, np.ascontiguousarray(sums), done[:, :n], air,
+            done[:, n + 2],
+        )  # fmt: skip
+
+    def reached(self, data: HorizonData, rollout: Rollout) -> FloatArray:
+        """Plan with each supply temperature moved to where its device comes nearest to it, (n_block, n_channel).
+
+        A setpoint beyond what a coil or the boiler reaches leads to the same, and has no slope; where it is reached, it
+        has one. Every other decision stays as it is.
+
+        Parameters
+        ----------
+        data : HorizonData
+            Of the horizon.
+        rollout : Rollout
+            Of a plan, with the same data.
+        """
+        plan = rollout.plan.copy()
+        for c, channel in enumerate(self.channels):
+            if channel.quantity == "supply_air_temperature":
+                which = self.at[c] - self.hvac.knobs.supply_air.start
+                found, there = rollout.air[:, which], data.running[:, which] > 0.0
+            elif channel.quantity == "supply_water_temperature":
+                found, there = rollout.water[:, None], data.boiler[:, None] > 0.0
+            else:
+                continue
+            least, most = np.full(len(plan), np.inf), np.full(len(plan), -np.inf)
+            np.minimum.at(least, self.horizon.block_of, np.where(there, found, np.inf).min(axis=1))
+            np.maximum.at(most, self.horizon.block_of, np.where(there, found, -np.inf).max(axis=1))
+            used = np.isfinite(least)
+            near = np.clip(plan[used, c], least[used], most[used])
+            plan[used, c] = np.clip(near, channel.lower, channel.upper)
+        return plan
+
+    def _settle(self, free: FloatArray, own: FloatArray, guess: FloatArray) -> FloatArray:
+        """Solve ``T = T_free + g Q(T)``; the stepper is left with the step at T."""
+        stepper, n = self._stepper, self.n_zone
+        least, most = np.full(n, -np.inf), np.full(n, np.inf)
+        seen = guess.copy()
+        for _ in range(_MOST_TRIES):
+            stepper.zone[:] = seen
+            done = stepper.step()
+            miss = seen - free - own * done[:n]
+            worst = np.abs(miss).max()
+            if not worst > _SETTLED:  # also where it is not a number: the caller looks at what comes out
+                break
+            above = miss > 0.0
+            most, least = np.where(above, seen, most), np.where(above, least, seen)
+            new = seen - miss / (1.0 - own * np.minimum(done[-n:], 0.0))
+            # close to the root the bracket is let go: the other zones have moved it a little
+            inside = ((new > least) & (new < most)) | (most - least < _NARROW)
+            seen = np.where(inside, new, np.where(np.isfinite(least + most), 0.5 * (least + most), new))
+        return seen
+
+    def sensitivity(self, data: HorizonData, rollout: Rollout) -> Sensitivity:
+        """Differentiate a roll-out by all decisions.
+
+        Parameters
+        ----------
+        data : HorizonData
+            Of the horizon.
+        rollout : Rollout
+            Of `rollout`, with the same data.
+        """
+        around, _ = self._given(data)
+        count, n_channel, water_at = len(self.horizon), len(self.channels), self.hvac.knobs.water
+        slopes = self.hvac.slopes(rollout.seen, rollout.knobs, around, rollout.sums)
+        heat_by = np.stack([slopes.heat_by_knobs[:, :, at].sum(axis=2) for at in self.at], axis=2)
+        total_by = np.stack([slopes.totals_by_knobs[:, :, at].sum(axis=2) for at in self.at], axis=2)
+        own = np.stack([self._own[dt] for dt in self.horizon.steps])
+        # (I - g (local + reach pull))^-1 by the matrix inversion lemma: diagonal and rank m
+        diagonal = 1.0 - own * slopes.local
+        spread = (own / diagonal)[:, :, None] * slopes.reach
+        core = spread @ np.linalg.inv(np.eye(self.hvac.n_sum) - slopes.pull @ spread)
+        zone, totals = np.zeros((count + 1, self.n_zone, self.n_decision)), np.zeros((count, 3, self.n_decision))
+        states, water = np.zeros((self._output.shape[1], self.n_decision)), np.zeros(self.n_decision)
+        for k, dt in enumerate(self.horizon.steps):
+            block = self.horizon.block_of[k]
+            mine = slice(block * n_channel, (block + 1) * n_channel)
+            acted = slice(0, mine.stop)  # later blocks have had no effect yet
+            left = self._end[dt][:, None] * states[:, acted]
+            free = self._output @ left
+            moved = free + np.outer(own[k] * slopes.heat_by_knobs[k, :, water_at], water[acted])
+            moved[:, mine] += own[k][:, None] * heat_by[k]
+            moved /= diagonal[k][:, None]
+            moved += core[k] @ (slopes.pull[k] @ moved)
+            heat = (moved - free) / own[k][:, None]
+            total = slopes.totals_by_zone[k] @ moved + np.outer(slopes.totals_by_knobs[k, :, water_at], water[acted])
+            total[:, mine] += total_by[k]
+            totals[k, :, acted], water[acted] = total, total[2]
+            states[:, acted] = left + self._push[dt] @ heat
+            zone[k + 1, :, acted] = free + self._response[dt] @ heat
+        return Sensitivity(zone, totals[:, 0], totals[:, 1], states)
+
+    def heat_content(self, state: FloatArray) -> float:
+        """Heat that the building holds above `thermal.inputs.REFERENCE_TEMPERATURE` [J].
+
+        Parameters
+        ----------
+        state : ndarray, shape (r,)
+            Of the modes [(W K)^0.5].
+        """
+        return float(self.heat_row @ state)
+
+    @property
+    def heat_row(self) -> FloatArray:
+        """Heat per modal state, shape (r,) [J per (W K)^0.5]."""
+        return np.asarray(self.modes.uniform * self.modes.capacity)

@@ -1,0 +1,235 @@
+"""From a forecast, a tariff and a building's schedules to the data of a horizon."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from mpc.control.problem.data import PeakData
+from mpc.control.problem.horizon import Horizon
+from mpc.errors import ForecastError
+from mpc.scenario import DemandCharge, Forecast, StepGrid
+from thermal.case.points import OUTDOOR_TEMPERATURE
+from thermal.errors import describe
+
+FloatArray = NDArray[np.float64]
+
+_HOUR = 3600.0  # s
+
+
+class Expected(NamedTuple):
+    """A forecast on the steps of a horizon.
+
+    Parameters
+    ----------
+    outdoor_temperature : ndarray, shape (N,)
+        [K].
+    gains : ndarray, shape (N, n_zone)
+        [W].
+    lower, upper : ndarray, shape (N, n_zone)
+        Bands at the ends of the steps: the narrower of the step and the next [K].
+    band : tuple of ndarray, shape (N, n_zone)
+        Lower and upper edge of the steps themselves, the narrowest within each [K].
+    electricity_price, gas_price : ndarray, shape (N,)
+        Emissions included, at their price [currency/kWh].
+    """
+
+    outdoor_temperature: FloatArray
+    gains: FloatArray
+    lower: FloatArray
+    upper: FloatArray
+    band: tuple[FloatArray, FloatArray]
+    electricity_price: FloatArray
+    gas_price: FloatArray
+
+
+def expect(
+    forecast: Forecast,
+    horizon: Horizon,
+    now: pd.Timestamp,
+    zones: Sequence[str],
+    carbon_price: float = 0.0,
+    fill: Literal["hold"] | None = None,
+) -> Expected:
+    """Put a forecast on the steps of a horizon: means of what flows, the narrowest of the bands.
+
+    Parameters
+    ----------
+    forecast : Forecast
+        On regular steps.
+    horizon : Horizon
+        Steps.
+    now : pandas.Timestamp
+        Start of the horizon.
+    zones : sequence of str
+        Names of the zones.
+    carbon_price : float
+        Of emissions [currency/kg].
+    fill : str
+        ``hold`` carries the last known values on where the forecast has gaps or ends early.
+
+    Raises
+    ------
+    ForecastError
+        Which column is missing, for how many steps and when first, or where the forecast ends.
+    """
+    per_zone = [f"{zone}/{name}" for name in ("internal_gain", "comfort_lower_temperature", "comfort_upper_temperature")
+                for zone in zones]  # fmt: skip
+    prices = ["electricity_price", "gas_price"]
+    carbon = ["electricity_carbon_intensity", "gas_carbon_intensity"] if carbon_price else []
+    columns = [OUTDOOR_TEMPERATURE, *prices, *carbon, *per_zone]
+    index = pd.DatetimeIndex(forecast.table.index)
+    ends = (index - now).total_seconds().to_numpy()
+    step = float(np.median(np.diff(ends))) if len(ends) > 1 else float(horizon.control_step)
+    edges = np.concatenate([[ends[0] - step], ends])
+    if fill is None and (edges[-1] < horizon.edges[-1] - 1e-6 or edges[0] > 1e-6):
+        last = now + pd.Timedelta(seconds=horizon.edges[-1])
+        found = f"{now + pd.Timedelta(seconds=edges[0])} to {index[-1]}"
+        raise ForecastError(describe("forecast", f"steps from {now} to {last}", found, 'pass fill="hold"'))
+    values = forecast.values(columns, fill=fill)
+    edges[0], edges[-1] = min(edges[0], 0.0), max(edges[-1], horizon.edges[-1])
+    n_single, n = 3 + len(carbon), len(zones)
+    flowing = _means(edges, values[:, : n_single + n], horizon.edges)
+    lower = _extremes(edges, values[:, n_single + n : n_single + 2 * n], horizon.edges, np.maximum)
+    upper = _extremes(edges, values[:, n_single + 2 * n :], horizon.edges, np.minimum)
+    emitted = flowing[:, 3:n_single] * carbon_price if carbon else np.zeros((len(horizon), 2))
+    return Expected(
+        flowing[:, 0], flowing[:, n_single:], np.maximum(lower, np.vstack([lower[1:], lower[-1:]])),
+        np.minimum(upper, np.vstack([upper[1:], upper[-1:]])), (lower, upper), flowing[:, 1] + emitted[:, 0],
+        flowing[:, 2] + emitted[:, 1],
+    )  # fmt: skip
+
+
+def _means(edges: FloatArray, values: FloatArray, steps: FloatArray) -> FloatArray:
+    """Means over steps of what is constant between edges."""
+    total = np.vstack([np.zeros(values.shape[1]), np.cumsum(values * np.diff(edges)[:, None], axis=0)])
+    k = np.clip(np.searchsorted(edges, steps, side="right") - 1, 0, len(values) - 1)
+    at = total[k] + values[k] * (steps - edges[k])[:, None]
+    return np.asarray(np.diff(at, axis=0) / np.diff(steps)[:, None])
+
+
+def _extremes(edges: FloatArray, values: FloatArray, steps: FloatArray, of: np.ufunc) -> FloatArray:
+    """Largest or smallest value that each step touches."""
+    first = np.clip(np.searchsorted(edges, steps[:-1] + 1e-6, side="right") - 1, 0, len(values) - 1)
+    last = np.clip(np.searchsorted(edges, steps[1:] - 1e-6, side="left"), first + 1, len(values))
+    return np.stack([of.reduce(values[a:b], axis=0) for a, b in zip(first, last, strict=True)])
+
+
+@dataclass(frozen=True)
+class ComfortOperation:
+    """Schedules of a building's automation as they follow from its comfort bands.
+
+    Parameters
+    ----------
+    margin : float
+        Setpoints of the thermostats lie this far inside of the band [K].
+    lead_hours : float
+        By how much setpoints and plant come before the occupied hours [h].
+    widest_occupied : float
+        Bands up to this width are those of occupied hours [K].
+    always : bool
+        Whether plant and fans run around the clock.
+    """
+
+    margin: float = 0.5
+    lead_hours: float = 1.5
+    widest_occupied: float = 8.0
+    always: bool = False
+
+    def schedule(self, band: tuple[FloatArray, FloatArray], edges: FloatArray) -> Schedule:
+        """Schedule a horizon.
+
+        Parameters
+        ----------
+        band : tuple of ndarray, shape (N, n_zone)
+            Lower and upper edge of the band over each step [K].
+        edges : ndarray, shape (N + 1,)
+            Edges of the steps [s].
+        """
+        lower, upper = band[0].copy(), band[1].copy()
+        occupied = upper - lower <= self.widest_occupied
+        soon = occupied.copy()
+        for k in range(len(lower) - 2, -1, -1):
+            stop = int(np.searchsorted(edges[:-1], edges[k] + self.lead_hours * _HOUR + 1e-6))
+            ahead = occupied[k:stop]
+            lead = ~occupied[k] & ahead.any(axis=0)
+            first = k + ahead.argmax(axis=0)
+            zone = np.flatnonzero(lead)
+            lower[k, zone], upper[k, zone] = band[0][first[zone], zone], band[1][first[zone], zone]
+            soon[k] |= lead
+        inside = np.minimum(self.margin, 0.5 * (upper - lower))
+        running = np.ones(len(lower)) if self.always else soon.any(axis=1).astype(float)
+        return Schedule(lower + inside, upper - inside, running, occupied.any(axis=1).astype(float))
+
+
+class Schedule(NamedTuple):
+    """Schedules of a building's automation over a horizon.
+
+    Parameters
+    ----------
+    heating, cooling : ndarray, shape (N, n_zone)
+        Setpoints of the thermostats [K].
+    running, ventilation : ndarray, shape (N,)
+        Of all air handlers, 0 to 1 [-].
+    """
+
+    heating: FloatArray
+    cooling: FloatArray
+    running: FloatArray
+    ventilation: FloatArray
+
+
+def peak_data(
+    charges: Sequence[DemandCharge],
+    horizon: Horizon,
+    now: pd.Timestamp,
+    so_far: Mapping[str, float] | None = None,
+    used: Sequence[float] = (),
+) -> PeakData:
+    """Windows of demand charges over a horizon.
+
+    Parameters
+    ----------
+    charges : sequence of DemandCharge
+        Of the tariff.
+    horizon : Horizon
+        Steps.
+    now : pandas.Timestamp
+        Start of the horizon, in the building's time zone.
+    so_far : mapping of str to float
+        Highest mean of each peak until now, by the names of `mpc.scenario.DemandBuckets` [W]; default none.
+    used : sequence of float
+        Mean power since the window of now began, of each charge [W]; default none.
+    """
+    parts: list[PeakData] = []
+    seconds = horizon.edges
+    for charge, power in zip(charges, used or [0.0] * len(charges), strict=True):
+        begin = now.timestamp()
+        first = np.floor(begin / charge.window) * charge.window - begin
+        bounds = np.arange(first, seconds[-1], charge.window)
+        overlap = np.minimum(seconds[1:], bounds[:, None] + charge.window) - np.maximum(seconds[:-1], bounds[:, None])
+        weights = np.maximum(overlap, 0.0)
+        offset = np.zeros(len(bounds))
+        offset[0] = power * -first / charge.window
+        # windows that the horizon's end cuts count with the mean of their part
+        whole = np.where(np.arange(len(bounds)) == 0, charge.window, np.maximum(weights.sum(axis=1), 1e-9))
+        grid = StepGrid(now + pd.Timedelta(seconds=float(first)), charge.window, len(bounds))
+        buckets = charge.on(grid)
+        kept = buckets.bucket >= 0
+        before = np.array([(so_far or {}).get(name, 0.0) for name in buckets.names])
+        parts.append(
+            PeakData(weights[kept] / whole[kept, None], offset[kept], buckets.bucket[kept], buckets.rate, before)
+        )
+    if not parts:
+        return PeakData.none(len(horizon))
+    shift = np.cumsum([0, *(len(p.rate) for p in parts[:-1])])
+    return PeakData(
+        np.vstack([p.weights for p in parts]), np.concatenate([p.offset for p in parts]),
+        np.concatenate([p.bucket + s for p, s in zip(parts, shift, strict=True)]).astype(np.int64),
+        np.concatenate([p.rate for p in parts]), np.concatenate([p.so_far for p in parts]),
+    )  # fmt: skip

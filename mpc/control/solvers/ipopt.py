@@ -1,0 +1,243 @@
+"""The reference: the same single shooting by Ipopt, with exact gradients and a limited-memory Hessian."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from mpc.control.problem.data import HorizonData
+from mpc.control.predictor.predictor import Rollout
+from mpc.control.problem.problem import ControlProblem
+from mpc.control.solvers.solution import Solution, Status
+from mpc.errors import MpcError
+
+FloatArray = NDArray[np.float64]
+
+_KILOWATT = 1000.0  # W
+_QUIET = {
+    "print_time": False,
+    "ipopt.print_level": 0,
+    "ipopt.sb": "yes",
+    "ipopt.hessian_approximation": "limited-memory",
+}
+_TUNED = {
+    "ipopt.mu_init": 1e-3, "ipopt.bound_push": 1e-6, "ipopt.bound_frac": 1e-6,
+    "ipopt.limited_memory_max_history": 20, "ipopt.nlp_scaling_method": "none",
+}  # fmt: skip
+
+
+class _OutOfTimeError(MpcError):
+    """Ends a solve from within its callback."""
+
+
+class _Evaluation:
+    """Cost without demand charges, mean powers of the windows in kW, and their slopes, of the last few points."""
+
+    def __init__(self, problem: ControlProblem) -> None:
+        self.problem = problem
+        self.data: HorizonData | None = None
+        self.deadline = np.inf
+        self.best: tuple[float, FloatArray, Rollout] | None = None
+        self.error: BaseException | None = None
+        self._rollouts: dict[bytes, Rollout] = {}
+
+    def begin(self, data: HorizonData, deadline: float) -> None:
+        """Take up a horizon."""
+        self.data, self.deadline, self.best, self.error = data, deadline, None, None
+        self._rollouts.clear()
+
+    def rollout(self, shares: FloatArray) -> Rollout:
+        """Follow decisions, once."""
+        key = shares.tobytes()
+        if key not in self._rollouts:
+            if time.perf_counter() > self.deadline:
+                self.error = _OutOfTimeError()
+                raise self.error
+            if len(self._rollouts) > 3:
+                self._rollouts.pop(next(iter(self._rollouts)))
+            near = next(reversed(self._rollouts.values()), None)
+            rollout = self.problem.predictor.rollout(self._given, self.problem.plan(shares), near)
+            self._rollouts[key] = rollout
+        return self._rollouts[key]
+
+    @property
+    def _given(self) -> HorizonData:
+        if self.data is None:
+            raise RuntimeError("no horizon was taken up")
+        return self.data
+
+    def values(self, shares: FloatArray) -> FloatArray:
+        """Cost, then means over the windows [kW], shape (1 + n_window,)."""
+        rollout = self.rollout(shares)
+        terms = self.problem.terms(self._given, rollout)
+        if np.isfinite(terms.total) and (self.best is None or terms.total < self.best[0]):
+            self.best = (terms.total, shares.copy(), rollout)
+        means = self._given.peaks.means(rollout.electric) / _KILOWATT
+        return np.concatenate([[terms.total - terms.demand], means])
+
+    def slopes(self, shares: FloatArray) -> FloatArray:
+        """Their derivatives, shape (1 + n_window, D)."""
+        rollout = self.rollout(shares)
+        slopes = self.problem.predictor.sensitivity(self._given, rollout)
+        means = self._given.peaks.weights @ slopes.electric * self.problem.span / _KILOWATT
+        return np.vstack([self.problem.gradient(self._given, rollout, slopes), means])
+
+
+class _Callback(ca.Callback):
+    """The evaluation as CasADi sees it: values, or their Jacobian."""
+
+    def __init__(self, evaluation: _Evaluation, n_window: int, order: int = 0) -> None:
+        ca.Callback.__init__(self)
+        self._evaluation, self._n, self._m, self._order = evaluation, evaluation.problem.span.size, 1 + n_window, order
+        self._kept: list[ca.Callback] = []  # CasADi holds no reference to the derivatives it is handed
+        self.construct(f"control_{order}", {})
+
+    def get_n_in(self) -> int:
+        return 1 + self._order
+
+    def get_n_out(self) -> int:
+        return 1
+
+    def get_sparsity_in(self, i: int) -> ca.Sparsity:
+        return ca.Sparsity.dense(self._n, 1) if i == 0 else ca.Sparsity(self._m, 1)
+
+    def get_sparsity_out(self, i: int) -> ca.Sparsity:
+        return ca.Sparsity.dense(self._m, self._n if self._order else 1)
+
+    def eval(self, arg: Sequence[ca.DM]) -> list[ca.DM]:
+        shares = np.array(arg[0], dtype=float).ravel()
+        of = self._evaluation.slopes if self._order else self._evaluation.values
+        try:
+            return [ca.DM(of(shares))]
+        except BaseException as error:  # kept: CasADi reports only that a callback failed
+            self._evaluation.error = error
+            raise
+
+    def has_jacobian(self) -> bool:
+        return self._order == 0
+
+    def get_jacobian(
+        self, name: str, inames: Sequence[str], onames: Sequence[str], opts: Mapping[str, object]
+    ) -> ca.Function:
+        self._kept.append(_Callback(self._evaluation, self._m - 1, 1))
+        return self._kept[-1]
+
+
+class IpoptSolver:
+    """Ipopt on the single shooting: the reference for faster solvers.
+
+    Parameters
+    ----------
+    problem : ControlProblem
+        What is solved.
+    tolerance : float
+        Ipopt's [-].
+    iterations : int
+        Most of them.
+
+    Notes
+    -----
+    The barrier starts small and close to the bounds, since the first guess is good; where that fails a second solver
+    with Ipopt's defaults takes over. Peaks are variables above the mean powers of their windows. Solvers are kept for
+    each number of windows: forecasts, prices, bands and states are parameters.
+    """
+
+    def __init__(self, problem: ControlProblem, tolerance: float = 1e-5, iterations: int = 200) -> None:
+        self.problem, self.tolerance, self.iterations = problem, tolerance, iterations
+        self._evaluation = _Evaluation(problem)
+        self.memory: FloatArray | None = None  # nothing is kept between solves
+        self._built: dict[tuple[int, int, bool], tuple[Any, Any]] = {}
+
+    def forget(self) -> None:
+        """Nothing is kept between solves."""
+        self.memory = None
+
+    def solve(self, data: HorizonData, plan: FloatArray, time_limit: float | None = None) -> Solution:
+        """Solve for one horizon; see `Solver`.
+
+        Parameters
+        ----------
+        data : HorizonData
+            Its parameters.
+        plan : ndarray, shape (n_block, n_channel)
+            Where to start [unit of the channel].
+        time_limit : float, optional
+            Wall time after which the best plan so far is returned [s].
+        """
+        begin, problem = time.perf_counter(), self.problem
+        shares = problem.shares(plan)
+        first = problem.predictor.rollout(data, problem.plan(shares))
+        start = problem.terms(data, first)
+        self._evaluation.begin(data, np.inf if time_limit is None else begin + time_limit)
+        status, message, steps = self._run(data, shares, True)
+        if status is Status.FAILED:
+            status, again, more = self._run(data, shares, False)
+            message, steps = f"tuned solver: {message}; default solver: {again}", steps + more
+        best = self._evaluation.best
+        if best is None:
+            best, status = (start.total, shares, first), Status.FAILED
+        terms = problem.terms(data, best[2])
+        return Solution(
+            problem.plan(best[1]), best[2], terms, start.total, status, message, steps, time.perf_counter() - begin,
+            "ipopt",
+        )  # fmt: skip
+
+    def _run(self, data: HorizonData, shares: FloatArray, tuned: bool) -> tuple[Status, str, int]:
+        n_window, n_peak, problem = len(data.peaks.offset), data.peaks.rate.size, self.problem
+        solver = self._solver(n_window, n_peak, tuned)
+        limited = np.flatnonzero(np.isfinite(problem.most_change))
+        most, before = problem.most_change[limited], problem.standing(data)[limited]
+        peaks = data.peaks.so_far / _KILOWATT
+        no_lower = np.full(n_window, -np.inf)
+        try:
+            found = solver(
+                x0=np.concatenate([shares, peaks]),
+                p=np.concatenate([data.peaks.rate, data.peaks.bucket.astype(float)]),
+                lbx=np.concatenate([np.zeros(shares.size), peaks]),
+                ubx=np.concatenate([np.ones(shares.size), np.full(n_peak, np.inf)]),
+                lbg=np.concatenate([no_lower, before - most]),
+                ubg=np.concatenate([np.zeros(n_window), before + most]),
+            )
+        except RuntimeError:
+            found = None
+        error = self._evaluation.error
+        if isinstance(error, _OutOfTimeError):
+            return Status.TIME_LIMIT, "out of time", 0
+        if error is not None:
+            raise error
+        stats = solver.stats()
+        word, count = str(stats["return_status"]), int(stats.get("iter_count", 0))
+        if found is not None and stats["success"]:
+            shares_found = np.clip(np.array(found["x"]).ravel()[: shares.size], 0.0, 1.0)
+            self._evaluation.best = None  # the point of convergence: a better one may break a limit
+            self._evaluation.values(shares_found)
+            return Status.CONVERGED, word, count
+        if word == "Maximum_Iterations_Exceeded":
+            return Status.ITERATION_LIMIT, word, count
+        return Status.FAILED, word, count
+
+    def _solver(self, n_window: int, n_peak: int, tuned: bool) -> Any:
+        key = (n_window, n_peak, tuned)
+        if key not in self._built:
+            problem, n = self.problem, self.problem.span.size
+            callback = _Callback(self._evaluation, n_window)
+            x, p = ca.MX.sym("x", n + n_peak), ca.MX.sym("p", n_peak + n_window)
+            values = callback(x[:n])
+            # a product with 0 and 1 picks the peak of each window, so that which belongs where is a parameter too
+            owners = [ca.sum1((p[n_peak + j] == ca.DM(range(n_peak))) * x[n:]) for j in range(n_window)]
+            above = [values[1 + j] - owner for j, owner in enumerate(owners)]
+            limited = np.flatnonzero(np.isfinite(problem.most_change))
+            nlp: Any = {
+                "x": x,
+                "p": p,
+                "f": values[0] + ca.dot(p[:n_peak], x[n:]),
+                "g": ca.vertcat(*above, ca.mtimes(ca.DM(problem.differences[limited]), x[:n])),
+            }
+            options: Any = {"ipopt.tol": self.tolerance, "ipopt.max_iter": self.iterations, **_QUIET}
+            self._built[key] = (ca.nlpsol("control", "ipopt", nlp, options | (_TUNED if tuned else {})), callback)
+        return self._built[key][0]

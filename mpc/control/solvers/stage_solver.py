@@ -1,0 +1,218 @@
+"""Optimal control in stages: states and decisions of every step are variables, as interior points like it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Literal, get_args
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from mpc.control.solvers.solution import Status
+from mpc.control.problem.stages import StageData, StageProblem
+from mpc.errors import ControlError
+from thermal.errors import describe, nearest
+
+FloatArray = NDArray[np.float64]
+
+#: Interior points that solve problems in stages.
+StageMethod = Literal["fatrop", "ipopt"]
+
+# a small barrier, as the first guess is a plan that was optimal a step ago; nearer to the bounds takes more iterations
+_NEAR = {"mu_init": 3e-4, "bound_push": 1e-2, "bound_frac": 1e-2}
+_QUIET: dict[str, dict[str, object]] = {
+    "fatrop": {"fatrop.print_level": 0},
+    "ipopt": {"ipopt.print_level": 0, "ipopt.sb": "yes"},
+}
+
+
+# the solvers' own words; fatrop counts: most iterations reached, step too short
+_ENDS = {
+    "Maximum_Iterations_Exceeded": Status.ITERATION_LIMIT,
+    "1": Status.ITERATION_LIMIT,
+    "2": Status.STALLED,
+    "Search_Direction_Becomes_Too_Small": Status.STALLED,
+}
+
+
+@dataclass(frozen=True, eq=False)
+class StageSolution:
+    """Outcome of a solve in stages.
+
+    Parameters
+    ----------
+    states : ndarray, shape (N + 1, n)
+        At the edges of the steps [as the state].
+    decisions : ndarray, shape (N, m)
+        Of the steps [as the decisions].
+    cost : float
+        Bands at their price included [currency].
+    status : Status
+        How the solve ended.
+    message : str
+        The solver's own word.
+    iterations : int
+        Of the solver.
+    seconds : float
+        Wall time [s].
+    solver : str
+        Which one.
+    """
+
+    states: FloatArray
+    decisions: FloatArray
+    cost: float
+    status: Status
+    message: str
+    iterations: int
+    seconds: float
+    solver: str
+
+    def shifted(self) -> tuple[FloatArray, FloatArray]:
+        """States and decisions a step later, the last ones held: where the next solve begins."""
+        return np.vstack([self.states[1:], self.states[-1:]]), np.vstack([self.decisions[1:], self.decisions[-1:]])
+
+
+class StageSolver:
+    """An interior point on a problem in stages, built once for a horizon.
+
+    Parameters
+    ----------
+    problem : StageProblem
+        What is solved.
+    n_steps : int
+        N.
+    method : str
+        ``fatrop`` factorises stage by stage (Vanroye, Sathya, De Schutter and Decré 2023,
+        doi:10.1109/IROS55552.2023.10342336), ``ipopt`` the whole with a general sparse solver.
+    tolerance : float
+        Of the optimality conditions [-].
+    iterations : int
+        Most of them.
+
+    Raises
+    ------
+    ControlError
+        When the method is not known.
+
+    Notes
+    -----
+    Bands are soft: one slack a band and edge, at the price of `StageData`. Hessians are exact. All functions are
+    expanded to scalar operations, which halves the time of their evaluation. Holding decisions over several steps does
+    not pay here: it makes fewer stages, but their Hessians dense.
+    """
+
+    def __init__(
+        self,
+        problem: StageProblem,
+        n_steps: int,
+        method: StageMethod = "fatrop",
+        tolerance: float = 1e-4,
+        iterations: int = 300,
+    ) -> None:
+        if method not in get_args(StageMethod):
+            advice = nearest(method, get_args(StageMethod))
+            raise ControlError(describe("stage solver: method", "an interior point", repr(method), advice))
+        self.problem, self.n_steps, self.method = problem, n_steps, method
+        self._sizes = problem.state.numel(), problem.decision.numel(), problem.banded.numel()
+        self._solver = self._build(tolerance, iterations)
+
+    def _build(self, tolerance: float, iterations: int) -> Any:
+        (n, m, b), count, problem = self._sizes, self.n_steps, self.problem
+        x = [ca.MX.sym(f"x_{k}", n) for k in range(count + 1)]
+        u = [ca.MX.sym(f"u_{k}", m) for k in range(count)]
+        slack = [ca.MX.sym(f"s_{k}", b) for k in range(count + 1)]
+        start, p = ca.MX.sym("start", n), ca.MX.sym("p", problem.parameter.numel(), count)
+        price = ca.MX.sym("price", b, count + 1)
+        cost, variables = ca.MX(0), []
+        rows: list[ca.MX] = []
+        equal: list[bool] = []
+        for k in range(count + 1):
+            end_cost, banded = problem.end(x[k])
+            variables += [x[k], u[k], slack[k]] if k < count else [x[k], slack[k]]
+            cost += ca.dot(price[:, k], slack[k])
+            if k < count:
+                following, added = problem.step(x[k], u[k], p[:, k])
+                cost, rows, equal = cost + added, [*rows, x[k + 1] - following], equal + [True] * n
+            else:
+                cost += end_cost
+            if k == 0:  # dynamics come first in a stage, then what holds within it
+                rows, equal = [*rows, x[0] - start], equal + [True] * n
+            rows, equal = [*rows, banded + slack[k], banded - slack[k]], equal + [False] * (2 * b)
+        nlp = {"x": ca.vertcat(*variables), "p": ca.vertcat(start, ca.vec(p), ca.vec(price)), "f": cost,
+               "g": ca.vertcat(*rows)}  # fmt: skip
+        options: dict[str, Any] = {"print_time": False, "expand": True, **_QUIET[self.method]}
+        options |= {f"{self.method}.{name}": value for name, value in _NEAR.items()}
+        options |= {f"{self.method}.tol": tolerance, f"{self.method}.max_iter": iterations}
+        if self.method == "fatrop":
+            options |= {"structure_detection": "auto", "equality": equal}
+        return ca.nlpsol("stages", self.method, nlp, options)
+
+    def _limits(self, data: StageData) -> Mapping[str, FloatArray]:
+        (n, m, b), count = self._sizes, self.n_steps
+        lower, upper = np.full((count + 1, n + m + b), -np.inf), np.full((count + 1, n + m + b), np.inf)
+        lower[:, n : n + m], upper[:, n : n + m], lower[:, n + m :] = self.problem.lower, self.problem.upper, 0.0
+        least, most = np.zeros((count + 1, n + 2 * b)), np.zeros((count + 1, n + 2 * b))
+        least[:, n : n + b], least[:, n + b :] = data.lower, -np.inf
+        most[:, n : n + b], most[:, n + b :] = np.inf, data.upper
+        zeros = np.zeros(n)  # rows of a stage: next state, at the start the state itself, then bands
+        first_least, first_most = (np.concatenate([a[0, :n], zeros, a[0, n:]]) for a in (least, most))
+        return {
+            "lbx": _packed(lower, n, m), "ubx": _packed(upper, n, m),
+            "lbg": np.concatenate([first_least, least[1:-1].ravel(), least[-1, n:]]),
+            "ubg": np.concatenate([first_most, most[1:-1].ravel(), most[-1, n:]]),
+        }  # fmt: skip
+
+    def solve(self, data: StageData, states: FloatArray, decisions: FloatArray) -> StageSolution:
+        """Solve for one horizon.
+
+        Parameters
+        ----------
+        data : StageData
+            Its parameters.
+        states : ndarray, shape (N + 1, n)
+            Where to start [as the state]; of `StageProblem.follow` or `StageSolution.shifted`.
+        decisions : ndarray, shape (N, m)
+            Where to start [as the decisions].
+
+        Raises
+        ------
+        ControlError
+            When the data are of another number of steps.
+        """
+        if len(data.parameters) != self.n_steps:
+            raise ControlError(describe("stage data", f"{self.n_steps} steps", f"{len(data.parameters)}"))
+        (n, m, b), count, begin = self._sizes, self.n_steps, time.perf_counter()
+        guess = np.zeros((count + 1, n + m + b))
+        guess[:, :n], guess[:-1, n : n + m] = states, np.clip(decisions, self.problem.lower, self.problem.upper)
+        guess[:, n + m :] = self.problem.outside(data, states)
+        given = np.concatenate([data.start, data.parameters.ravel(), data.price.ravel()])
+        try:
+            found = self._solver(x0=_packed(guess, n, m), p=given, **self._limits(data))
+            values = np.array(found["x"]).ravel()
+        except RuntimeError as error:
+            values, word, status, steps = _packed(guess, n, m), str(error), Status.FAILED, 0
+        else:
+            stats = self._solver.stats()
+            word, steps = str(stats["return_status"]), int(stats.get("iter_count", 0))
+            status = _status(word, bool(stats["success"]), np.isfinite(values).all())
+        whole = np.insert(values, values.size - b, np.zeros(m)).reshape(count + 1, -1)
+        plan = whole[:-1, n : n + m]
+        followed = self.problem.follow(data, plan)
+        cost = self.problem.cost_along(data, followed, plan) if np.isfinite(followed).all() else np.inf
+        status = status if np.isfinite(cost) else Status.FAILED
+        return StageSolution(followed, plan, cost, status, word, steps, time.perf_counter() - begin, self.method)
+
+
+def _packed(whole: FloatArray, n: int, m: int) -> FloatArray:
+    """Flatten by stages; the last stage has no decisions."""
+    return np.concatenate([whole[:-1].ravel(), whole[-1, :n], whole[-1, n + m :]])
+
+
+def _status(word: str, success: bool, finite: bool) -> Status:
+    if not finite:
+        return Status.FAILED
+    return Status.CONVERGED if success else _ENDS.get(word, Status.FAILED)

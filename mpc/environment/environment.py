@@ -1,0 +1,274 @@
+"""The closed loop as a Gymnasium environment."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from typing import Any, Protocol, runtime_checkable
+
+import gymnasium
+import numpy as np
+from numpy.typing import NDArray
+
+from mpc.environment.actions import SUPPLY_SETPOINTS, ActionLayout
+from mpc.environment.features import LARGEST
+from mpc.environment.observation import Observation, ObservationLayout
+from mpc.environment.outlook import BLOCK_ENDS, Outlook, clock
+from mpc.environment.reward import REWARDS, Reward
+from mpc.errors import EnvironmentSetupError
+from mpc.kpi import measure_kpis
+from mpc.loop import Measurements, Plant, RecentSteps
+from mpc.scenario import Forecaster, Scenario
+from thermal.errors import describe, nearest
+
+FloatArray = NDArray[np.float64]
+
+
+@runtime_checkable
+class ScenarioPlant(Plant, Protocol):
+    """A plant that says which scenario drives it; rewards and indicators need its prices, bands and people."""
+
+    scenario: Scenario
+
+
+@runtime_checkable
+class _RecordingPlant(Plant, Protocol):
+    """A plant that gives its last steps at a cost that does not grow with the run."""
+
+    def recent(self, steps: int) -> RecentSteps:
+        """Give the last steps of the record.
+
+        Parameters
+        ----------
+        steps : int
+            How many of the plant's own steps, 1 or more.
+        """
+
+
+class _Course:
+    """What is known of a plant's time: where an episode ends, the clock, and forecasts where there are some.
+
+    Forecasts are known functions of the step, so they are reduced once and a step reads a row.
+    """
+
+    def __init__(self, plant: ScenarioPlant, block_ends: Sequence[float] | None) -> None:
+        scenario, grid = plant.scenario, plant.scenario.grid
+        self.timezone = scenario.building.location.timezone
+        self.each = round(plant.control_step / grid.step)
+        self.recording = isinstance(plant, _RecordingPlant)  # asked once: such a check is slow
+        forecaster = getattr(plant, "forecaster", None)
+        self.forecaster: Forecaster | None = forecaster if isinstance(forecaster, Forecaster) else None
+        self.outlook: Outlook | None = None
+        self.last, self._clocks = grid.n_steps, dict[int, FloatArray]()
+        if block_ends is not None:
+            columns = plant.forecast().table.columns if self.forecaster is None else self.forecaster.columns
+            area = scenario.floor_area
+            self.outlook = Outlook([str(c) for c in columns], scenario.zones, grid.step, area, block_ends)
+            if self.forecaster is not None:
+                self.last = grid.n_steps - self.forecaster.horizon
+
+    @cached_property
+    def ahead(self) -> FloatArray | None:
+        """Observed forecasts, a row a step of the scenario; None where they are asked for one by one."""
+        return None if self.outlook is None or self.forecaster is None else self.outlook.table(self.forecaster)
+
+    def now(self, seconds: int) -> FloatArray:
+        """Observe the clock, each time once."""
+        known = self._clocks.get(seconds)
+        if known is None:
+            known = self._clocks[seconds] = clock(seconds, self.timezone)
+        return known
+
+
+class ControlEnvironment(gymnasium.Env[Observation, NDArray[np.float32]]):
+    """A plant in closed loop as a Gymnasium environment: an action is held for a control step.
+
+    Actions are numbers from -1 to 1 for the setpoints, by default the paper's two: supply water and supply air, in the
+    ranges of the actuators. Observations are measurements, forecast and clock, scaled by fixed physical ranges. The
+    weather of a plant is its scenario's; with several plants each episode takes one. Nothing ever terminates: an
+    episode is truncated where the scenario, its forecasts or `episode_steps` end.
+
+    Parameters
+    ----------
+    plants : Plant or sequence of Plant
+        With a scenario; several with the same measurements, actuators and control step. They are stepped one at a
+        time, each from its reset on, so they may share a building model; two environments may share neither.
+    reward : str or Reward
+        ``economic`` (default), ``paper``, or one's own.
+    actions : sequence of str
+        As in `ActionLayout`.
+    histograms : bool
+        Whether zones and terminals are observed as histograms.
+    block_ends : sequence of float or None
+        Blocks of the forecast that is observed [h], as in `Outlook`; None observes none. Plants need a forecaster.
+    episode_steps : int, optional
+        Control steps after which an episode is truncated; by default it lasts as long as the scenario.
+    ranges : mapping of str to tuple of float, optional
+        Ranges of measurements in the place of `OBSERVED_RANGES` [library's units].
+
+    Raises
+    ------
+    EnvironmentSetupError
+        When plants do not fit each other, have no scenario or no forecasts, or an option is not known.
+
+    Notes
+    -----
+    ``reset(seed=...)`` makes everything that follows repeat bit for bit: which plant each episode takes, and the seed
+    of its people, noise and shuffle. ``options={"plant": 0, "plant_seed": 7}`` chooses them. At the end of an episode
+    ``info["kpis"]`` has its indicators.
+    """
+
+    metadata = {"render_modes": []}  # noqa: RUF012 - Gymnasium's own form
+
+    def __init__(
+        self,
+        plants: Plant | Sequence[Plant],
+        *,
+        reward: str | Reward = "economic",
+        actions: Sequence[str] = SUPPLY_SETPOINTS,
+        histograms: bool = False,
+        block_ends: Sequence[float] | None = BLOCK_ENDS,
+        episode_steps: int | None = None,
+        ranges: Mapping[str, tuple[float, float]] | None = None,
+    ) -> None:
+        self.plants = _checked(plants)
+        self.reward = _reward_of(reward)
+        if episode_steps is not None and episode_steps < 1:
+            raise EnvironmentSetupError(describe("episode_steps", "1 or more", repr(episode_steps)))
+        self.episode_steps = episode_steps
+        first = self.plants[0]
+        self._courses = [_Course(plant, block_ends) for plant in self.plants]
+        self.actions = ActionLayout(first.actuators, actions)
+        area, outlook = first.scenario.floor_area, self._courses[0].outlook
+        self.layout = ObservationLayout(
+            first.columns, first.actuators, area, outlook, histograms=histograms, ranges=ranges
+        )
+        self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (len(self.actions),), np.float32)
+        self.observation_space = gymnasium.spaces.Box(-LARGEST, LARGEST, (len(self.layout),), np.float32)
+        self._plant, self._course = first, self._courses[0]
+        self._step, self._done = 0, 0
+        self._ahead: FloatArray | None = None
+
+    @property
+    def plant(self) -> ScenarioPlant:
+        """The plant of this episode."""
+        return self._plant
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        """Begin an episode.
+
+        Parameters
+        ----------
+        seed : int, optional
+            Of all that is random from now on; without it the sequence goes on.
+        options : dict, optional
+            ``plant``, number of the plant; ``plant_seed``, seed of its people and noise.
+
+        Returns
+        -------
+        tuple
+            First observation, and which plant and seed were taken.
+
+        Raises
+        ------
+        EnvironmentSetupError
+            When an option is not known.
+        """
+        super().reset(seed=seed)
+        drawn = {"plant": int(self.np_random.integers(len(self.plants))),
+                 "plant_seed": int(self.np_random.integers(2**31))}  # fmt: skip
+        for name in options or {}:
+            if name not in drawn:
+                raise EnvironmentSetupError(describe("options", "a known one", repr(name), nearest(name, drawn)))
+        info: dict[str, Any] = {**drawn, **(options or {})}
+        if info["plant"] not in range(len(self.plants)):
+            expected = f"a plant from 0 to {len(self.plants) - 1}"
+            raise EnvironmentSetupError(describe("options: plant", expected, repr(info["plant"])))
+        self._plant, self._course = self.plants[info["plant"]], self._courses[info["plant"]]
+        self._step = self._done = 0
+        return self._observe(self._plant.reset(info["plant_seed"])), info
+
+    def step(self, action: NDArray[np.float32]) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+        """Hold an action for a control step.
+
+        Parameters
+        ----------
+        action : ndarray, shape (n_action,)
+            From -1 to 1 [-].
+
+        Returns
+        -------
+        tuple
+            Observation, reward, whether the episode terminated (never) and was truncated, and its indicators at the
+            end.
+        """
+        plant, course, begin = self._plant, self._course, self._step
+        seen = plant.step(self.actions.setpoints(action))
+        self._step, self._done = begin + course.each, self._done + 1
+        reward = self.reward.of_steps(_last_steps(plant, course), plant.scenario, begin)
+        truncated = plant.finished or self._step + course.each > course.last or self._done == self.episode_steps
+        info: dict[str, Any] = {}
+        if truncated:
+            info["kpis"] = measure_kpis(plant.record(), plant.scenario, control_step=plant.control_step).to_dict()
+        return self._observe(seen, truncated), reward, False, truncated, info
+
+    def close(self) -> None:
+        """Close the plants that hold something open, such as a process of EnergyPlus."""
+        for plant in self.plants:
+            close = getattr(plant, "close", None)
+            if close is not None:
+                close()
+
+    def _observe(self, seen: Measurements, ended: bool = False) -> Observation:
+        course = self._course
+        if course.ahead is not None:
+            self._ahead = course.ahead[min(self._step, len(course.ahead) - 1)]
+        elif course.outlook is not None and not ended:  # at its end a plant may have nothing left to forecast
+            self._ahead = course.outlook.of_forecast(self._plant.forecast())
+        return self.layout.observe(seen.values_array, self._ahead, course.now(seen.seconds))
+
+
+def _checked(plants: Plant | Sequence[Plant]) -> tuple[ScenarioPlant, ...]:
+    """Plants that have scenarios and fit each other."""
+    several = tuple(plants) if isinstance(plants, Sequence) else (plants,)
+    if not several:
+        raise EnvironmentSetupError(describe("environment", "a plant or more", "none"))
+    checked: list[ScenarioPlant] = []
+    for plant in several:
+        if not isinstance(plant, ScenarioPlant):
+            raise EnvironmentSetupError(describe("environment", "plants with a scenario", type(plant).__name__))
+        checked.append(plant)
+    first = checked[0]
+    for k, plant in enumerate(checked):
+        for what in ("columns", "actuators", "control_step"):
+            if getattr(plant, what) != getattr(first, what):
+                expected = f"the same {what.replace('_', ' ')} as plant 0"
+                raise EnvironmentSetupError(describe(f"environment: plant {k}", expected, "others"))
+        if plant.control_step % plant.scenario.grid.step:
+            expected = f"a control step of whole steps of {plant.scenario.grid.step:g} s"
+            raise EnvironmentSetupError(describe(f"environment: plant {k}", expected, f"{plant.control_step:g} s"))
+    return tuple(checked)
+
+
+def _reward_of(reward: str | Reward) -> Reward:
+    if not isinstance(reward, str):
+        return reward
+    if reward not in REWARDS:
+        raise EnvironmentSetupError(describe("reward", "a known one", repr(reward), nearest(reward, REWARDS)))
+    return REWARDS[reward]
+
+
+def _last_steps(plant: Any, course: _Course) -> RecentSteps:
+    """Read what a plant did in its last control step."""
+    if course.recording:
+        recent: RecentSteps = plant.recent(course.each)
+        return recent
+    whole = plant.record()
+    if whole.district_heating is not None:
+        raise EnvironmentSetupError(describe("reward: plant", "electricity and gas", "district heating too"))
+    n = round(plant.control_step / whole.step)
+    gas = np.zeros(n) if whole.gas is None else whole.gas[-n:]
+    temperature, electricity = list(whole.zone_temperature[-n - 1 :]), whole.electricity[-n:].tolist()
+    return RecentSteps(whole.step, temperature, electricity, gas.tolist())

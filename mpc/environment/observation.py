@@ -1,0 +1,126 @@
+"""Observations: measurements, forecast and clock as one vector of fixed length."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mpc.environment.features import LARGEST, Feature, measured_features, scaling
+from mpc.environment.outlook import CLOCK_FEATURES, Outlook
+from mpc.loop import Actuator
+from thermal.case.points import split_column
+
+FloatArray = NDArray[np.float64]
+Observation = NDArray[np.float32]
+
+#: Points that a histogram can stand for, with the edges of its bins [library's units]: those of google/sbsim's
+#: HistogramReducer, its flow setpoint taken for the flow.
+HISTOGRAM_EDGES: Mapping[str, tuple[float, ...]] = {
+    "zone_air_temperature_sensor": tuple(float(t) for t in range(285, 304)),
+    "supply_air_damper_percentage_command": (0.0, 0.2, 0.4, 0.6, 0.8, 1.0),
+    "supply_air_flowrate_sensor": (0.0, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.7, 0.9),
+}
+
+
+class ObservationLayout:
+    """What an agent sees: each entry scaled by a range that is known before the first step.
+
+    Measurements come first, then histograms where they are wanted, the forecast and the clock. No entry depends on
+    what was seen before: there are no running statistics. A measurement that is missing counts as the middle of its
+    range.
+
+    Parameters
+    ----------
+    columns : sequence of str
+        Of the plant's measurements.
+    actuators : sequence of Actuator
+        Of the plant.
+    floor_area : float
+        Of the building [m2].
+    outlook : Outlook, optional
+        Of forecasts; none are observed by default.
+    histograms : bool
+        Whether the points of `HISTOGRAM_EDGES` are observed as shares of the devices in bins, so that the length does
+        not depend on how many there are.
+    ranges : mapping of str to tuple of float, optional
+        In the place of `OBSERVED_RANGES` and as there [library's units].
+
+    Attributes
+    ----------
+    features : tuple of Feature
+        Entries in order.
+
+    Examples
+    --------
+    >>> air = Actuator("AHU/supply_air_temperature_setpoint", "K", 285.0, 300.0)
+    >>> layout = ObservationLayout(["AHU/supply_air_temperature_setpoint"], [air], 100.0)
+    >>> layout.observe(np.array([300.0]), None, np.zeros(6)).tolist()
+    [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
+    """
+
+    def __init__(
+        self,
+        columns: Sequence[str],
+        actuators: Sequence[Actuator],
+        floor_area: float,
+        outlook: Outlook | None = None,
+        *,
+        histograms: bool = False,
+        ranges: Mapping[str, tuple[float, float]] | None = None,
+    ) -> None:
+        kept, features = measured_features(columns, actuators, floor_area, ranges)
+        self.outlook, self._histograms = outlook, list[tuple[NDArray[np.intp], FloatArray]]()
+        counted: list[Feature] = []
+        if histograms:
+            points = [split_column(column, "plant")[1] for column in columns]
+            for point, edges in HISTOGRAM_EDGES.items():
+                at = np.array([k for k, name in enumerate(points) if name == point], dtype=np.intp)
+                if at.size:
+                    self._histograms.append((at, np.asarray(edges[1:-1])))
+                    counted += [Feature(f"share of {point} in {a:g} to {b:g}", "-", -1.0, 1.0)
+                                for a, b in pairwise(edges)]  # fmt: skip
+            pairs = [(k, f) for k, f in zip(kept, features, strict=True) if points[k] not in HISTOGRAM_EDGES]
+            kept, features = tuple(k for k, _ in pairs), tuple(f for _, f in pairs)
+        self._kept = np.array(kept, dtype=np.intp)
+        self._factor, self._offset = scaling(features)
+        ahead = () if outlook is None else outlook.features
+        self.features: tuple[Feature, ...] = (*features, *counted, *ahead, *CLOCK_FEATURES)
+        self._ends = len(features), len(features) + len(counted), len(features) + len(counted) + len(ahead)
+
+    def __len__(self) -> int:
+        return len(self.features)
+
+    def observe(self, values: FloatArray, ahead: FloatArray | None, now: FloatArray) -> Observation:
+        """Observe.
+
+        Parameters
+        ----------
+        values : ndarray, shape (n_column,)
+            Measurements [library's units].
+        ahead : ndarray or None
+            Of the outlook [-]; None where there is none.
+        now : ndarray, shape (6,)
+            Of `clock` [-].
+
+        Returns
+        -------
+        ndarray of float32, shape (n_feature,)
+            Within `LARGEST` of 0 [-].
+        """
+        seen = np.empty(len(self.features), dtype=np.float32)
+        measured, counted, forecast = self._ends
+        seen[:measured] = values[self._kept] * self._factor + self._offset
+        begin = measured
+        for at, edges in self._histograms:
+            bins = np.searchsorted(edges, values[at], side="right")
+            seen[begin : begin + len(edges) + 1] = np.bincount(bins, minlength=len(edges) + 1) / at.size
+            begin += len(edges) + 1
+        if ahead is not None:
+            seen[counted:forecast] = ahead
+        seen[forecast:] = now
+        if not np.isfinite(seen.sum()):
+            seen[~np.isfinite(seen)] = 0.0
+        return np.minimum(np.maximum(seen, -LARGEST, out=seen), LARGEST, out=seen)

@@ -1,0 +1,188 @@
+"""What an observation says of the forecast and of the clock."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from datetime import datetime
+from itertools import pairwise
+from zoneinfo import ZoneInfo
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mpc.environment.features import OBSERVED_RANGES, Feature, scaling
+from mpc.errors import EnvironmentSetupError
+from mpc.scenario import Forecast, Forecaster, column_unit
+from thermal.errors import describe
+
+FloatArray = NDArray[np.float64]
+
+#: Ends of the blocks over which a forecast is averaged, from now on [h]: the horizon of the paper's predictions, six
+#: hours, fine at first as its beginning matters most.
+BLOCK_ENDS = (0.5, 1.0, 2.0, 3.0, 4.5, 6.0)
+
+_HOUR = 3600.0  # s
+_OF_ALL = ("electricity_price", "gas_price", "electricity_carbon_intensity", "gas_carbon_intensity")
+_OF_ZONES = ("internal_gain", "comfort_lower_temperature", "comfort_upper_temperature")
+
+
+class Outlook:
+    """Means of a forecast over blocks of time: weather, prices, emissions, and of the zones' gains and bands.
+
+    It takes from a forecast all that an optimal controller gets: every column of weather but the wind's direction,
+    prices, emissions, the sum of the zones' gains and the means of the ends of their bands. Beyond the end of a
+    forecast its last values hold.
+
+    Parameters
+    ----------
+    columns : sequence of str
+        That forecasts have.
+    zones : sequence of str
+        Names of the zones.
+    step : float
+        Of forecasts [s].
+    floor_area : float
+        Of the building [m2].
+    block_ends : sequence of float
+        Ends of the blocks from now on [h], rising, whole numbers of steps.
+
+    Raises
+    ------
+    EnvironmentSetupError
+        When the blocks are not whole numbers of steps that rise, or forecasts lack a zone.
+    """
+
+    def __init__(
+        self,
+        columns: Sequence[str],
+        zones: Sequence[str],
+        step: float,
+        floor_area: float,
+        block_ends: Sequence[float] = BLOCK_ENDS,
+    ) -> None:
+        ends = np.asarray(block_ends, dtype=float) * _HOUR / step
+        edges = np.concatenate([[0], np.round(ends).astype(int)])
+        if not len(ends) or (np.diff(edges) < 1).any() or not np.allclose(edges[1:], ends):
+            expected = f"ends that rise, whole numbers of steps of {step:g} s"
+            raise EnvironmentSetupError(describe("outlook: block_ends", expected, repr(tuple(block_ends))))
+        lacking = [f"{zone}/{name}" for name in _OF_ZONES for zone in zones if f"{zone}/{name}" not in columns]
+        if lacking:
+            raise EnvironmentSetupError(
+                describe("outlook", f"forecasts with {lacking[0]!r}", "none", "use a Forecaster")
+            )
+        weather = [c for c in columns if "/" not in c and c.endswith("_sensor") and "direction" not in c]
+        single = [*weather, *(c for c in _OF_ALL if c in columns)]
+        self.columns = (*single, *(f"{zone}/{name}" for name in _OF_ZONES for zone in zones))
+        self._position = {column: k for k, column in enumerate(self.columns)}
+        self._weights = np.zeros((len(ends), int(edges[-1])))
+        for k, (first, last) in enumerate(pairwise(edges.tolist())):
+            self._weights[k, first:last] = 1.0 / (last - first)
+        self._zones = np.zeros((len(self.columns), len(single) + len(_OF_ZONES)))
+        self._zones[: len(single), : len(single)] = np.eye(len(single))
+        for k, name in enumerate(_OF_ZONES):
+            rows = [self._position[f"{zone}/{name}"] for zone in zones]
+            self._zones[rows, len(single) + k] = 1.0 if name == "internal_gain" else 1.0 / len(zones)
+        #: What is observed, block by block.
+        self.features = tuple(
+            _feature(name, f"{begin:g} to {end:g} h", floor_area)
+            for begin, end in zip((0.0, *block_ends[:-1]), block_ends, strict=True)
+            for name in (*single, *_OF_ZONES)
+        )
+        self._factor, self._offset = scaling(self.features)
+
+    @property
+    def steps(self) -> int:
+        """Steps of a forecast that are looked at."""
+        return int(self._weights.shape[1])
+
+    def of_values(self, values: FloatArray) -> FloatArray:
+        """Observe a forecast given as an array.
+
+        Parameters
+        ----------
+        values : ndarray, shape (n_steps, n_column)
+            Columns as `columns` [library's units].
+
+        Returns
+        -------
+        ndarray, shape (n_feature,)
+            Scaled [-].
+        """
+        if len(values) < self.steps:
+            values = np.vstack([values, np.repeat(values[-1:], self.steps - len(values), axis=0)])
+        means = self._weights @ (values[: self.steps] @ self._zones)
+        return np.asarray(self._factor * means.ravel() + self._offset)
+
+    def of_forecast(self, forecast: Forecast) -> FloatArray:
+        """Observe a forecast.
+
+        Parameters
+        ----------
+        forecast : Forecast
+            On regular steps, from now on.
+
+        Returns
+        -------
+        ndarray, shape (n_feature,)
+            Scaled [-].
+        """
+        return self.of_values(forecast.values(self.columns, fill="hold"))
+
+    def table(self, forecaster: Forecaster) -> FloatArray:
+        """Observe all forecasts that a forecaster can give.
+
+        Parameters
+        ----------
+        forecaster : Forecaster
+            Of the scenario.
+
+        Returns
+        -------
+        ndarray, shape (n, n_feature)
+            One row for each step that a forecast begins at, scaled [-].
+        """
+        at = [forecaster.columns.index(column) for column in self.columns]
+        count = forecaster.scenario.grid.n_steps - forecaster.horizon + 1
+        return np.stack([self.of_values(forecaster.values(k)[:, at]) for k in range(count)])
+
+
+def _feature(name: str, when: str, floor_area: float) -> Feature:
+    unit = column_unit(f"zone/{name}") if name in _OF_ZONES else column_unit(name)
+    share = floor_area if name == "internal_gain" else 1.0
+    lowest, highest = (share * end for end in OBSERVED_RANGES[name])
+    return Feature(f"{name}, {when}", unit, lowest, highest)
+
+
+#: Entries of the clock: the local hour of the day, the day of the week and the day of the year as points on circles.
+CLOCK_FEATURES = tuple(
+    Feature(f"{part} of the {whole}", "-", -1.0, 1.0)
+    for whole in ("day", "week", "year")
+    for part in ("sine", "cosine")
+)
+
+
+def clock(seconds: int, timezone: str) -> FloatArray:
+    """Observe the local clock.
+
+    Parameters
+    ----------
+    seconds : int
+        Since 1970 in UTC [s].
+    timezone : str
+        IANA name.
+
+    Returns
+    -------
+    ndarray, shape (6,)
+        Sine and cosine of the time of day, of week and of year, as `CLOCK_FEATURES` [-].
+
+    Examples
+    --------
+    >>> clock(6 * 3600, "UTC")[:2].round(3).tolist()  # six in the morning
+    [1.0, 0.0]
+    """
+    now = datetime.fromtimestamp(seconds, ZoneInfo(timezone))
+    day = (now.hour + now.minute / 60.0 + now.second / 3600.0) / 24.0
+    shares = day, (now.weekday() + day) / 7.0, (now.timetuple().tm_yday - 1 + day) / 365.25
+    return np.array([f(2.0 * math.pi * share) for share in shares for f in (math.sin, math.cos)])

@@ -1,0 +1,108 @@
+"""Rewards of a control step, from what the plant did on its own steps."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Protocol
+
+from mpc.errors import EnvironmentSetupError
+from mpc.kpi import PaperReward, StageCost
+from mpc.loop import RecentSteps
+from mpc.scenario import Scenario
+from thermal.errors import describe
+
+
+class Reward(Protocol):
+    """What an agent is rewarded for."""
+
+    def of_steps(self, done: RecentSteps, scenario: Scenario, first_step: int) -> float:
+        """Reward a control step.
+
+        Parameters
+        ----------
+        done : RecentSteps
+            What the plant did in its steps.
+        scenario : Scenario
+            Bands, people, prices and emissions.
+        first_step : int
+            Step of the scenario in which it began.
+        """
+
+
+@dataclass(frozen=True)
+class EconomicReward:
+    """Minus the stage cost of optimal control: energy, emissions at their price, discomfort [currency].
+
+    Summed over a run it is minus ``A cost_tot + p_c A emis_tot + p_d n_zone tdis_tot`` of `measure_kpis`, to round-off.
+
+    Parameters
+    ----------
+    stage : StageCost
+        Prices of discomfort and of emissions.
+    """
+
+    stage: StageCost = field(default_factory=StageCost)
+
+    def of_steps(self, done: RecentSteps, scenario: Scenario, first_step: int) -> float:
+        """Reward a control step [currency].
+
+        Parameters
+        ----------
+        done : RecentSteps
+            What the plant did in its steps.
+        scenario : Scenario
+            Bands, prices and emissions.
+        first_step : int
+            Step of the scenario in which it began.
+        """
+        each, temperature = _steps_each(done, scenario), done.zone_temperature
+        costs = [
+            float(self.stage.of_step(scenario, first_step + k // each, temperature[k], temperature[k + 1], *powers))
+            for k, powers in enumerate(zip(done.electricity, done.gas, strict=True))
+        ]
+        return -sum(costs) / each
+
+
+@dataclass(frozen=True)
+class PaperStepReward:
+    """The paper's weighted sum of regrets, mean over the plant's steps of a control step [-].
+
+    Parameters
+    ----------
+    terms : PaperReward
+        Weights and scales.
+    """
+
+    terms: PaperReward = field(default_factory=PaperReward)
+
+    def of_steps(self, done: RecentSteps, scenario: Scenario, first_step: int) -> float:
+        """Reward a control step, -1 to 0 [-].
+
+        Parameters
+        ----------
+        done : RecentSteps
+            What the plant did in its steps.
+        scenario : Scenario
+            Bands, people, prices and emissions.
+        first_step : int
+            Step of the scenario in which it began.
+        """
+        each, ends = _steps_each(done, scenario), done.zone_temperature[1:]
+        rewards = [
+            float(self.terms.of_step(scenario, first_step + k // each, ends[k], *powers).reward)
+            for k, powers in enumerate(zip(done.electricity, done.gas, strict=True))
+        ]
+        return sum(rewards) / len(rewards)
+
+
+#: Rewards by name.
+REWARDS: dict[str, Reward] = {"economic": EconomicReward(), "paper": PaperStepReward()}
+
+
+def _steps_each(done: RecentSteps, scenario: Scenario) -> int:
+    """Count the steps of the plant in a step of the scenario."""
+    each = round(scenario.grid.step / done.step)
+    if abs(each * done.step - scenario.grid.step) > 1e-6:
+        expected = f"steps that divide the scenario's {scenario.grid.step:g} s"
+        raise EnvironmentSetupError(describe("reward: plant", expected, f"{done.step:g} s"))
+    return each

@@ -1,0 +1,253 @@
+"""Rewards of a step: the paper's weighted regret, and minus the cost of the step."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.special import expit
+
+from mpc.errors import KpiError
+from mpc.kpi.integrals import excess
+from mpc.scenario import KILOWATT_HOUR, Scenario
+from thermal.errors import describe, nearest
+
+FloatArray = NDArray[np.float64]
+
+_HOUR = 3600.0  # s
+
+
+class RewardTerms(NamedTuple):
+    """Reward of a step and what it is made of.
+
+    Parameters
+    ----------
+    reward : ndarray, shape (...,)
+        Weighted mean of the terms, -1 to 0 [-].
+    comfort : ndarray, shape (...,)
+        Regret of productivity, or of setpoint deviation, -1 to 0 [-].
+    cost : ndarray, shape (...,)
+        Minus cost over the highest cost, -1 to 0 [-].
+    carbon : ndarray, shape (...,)
+        Minus emissions over the highest emissions, -1 to 0 [-].
+    """
+
+    reward: FloatArray
+    comfort: FloatArray
+    cost: FloatArray
+    carbon: FloatArray
+
+
+@dataclass(frozen=True)
+class PaperReward:
+    """Weighted sum of negative cost functions for comfort, energy cost and carbon, as the paper defines its reward.
+
+    ``r = (u c - v f / f_max - w g / g_max) / (u + v + w)``, each term between -1 and 0. The paper gives the sum; how
+    each term is normalised is that of its simulator (google/sbsim, SetpointEnergyCarbonRegretFunction):
+
+    - **comfort** c, ``productivity``: a person earns P_max an hour within the band, and
+      ``P_max / (1 + e^{-s (m - d)})`` at a distance d outside of it: half at d = m. The sum over zones, weighed with
+      their people, is at least P_min for each, and ``c = (P - P_min) / (P_max - P_min) - 1``; 0 when nobody is in. (At
+      the edge itself the curve jumps from 1 to ``1 / (1 + e^{-s m})``, 0.90 with the defaults, in the simulator too.)
+    - **comfort** c, ``setpoint_deviation``: the paper's words instead: minus the mean over zones of d, occupied or not,
+      as a share of `deviation_scale`, at most 1.
+    - **cost** f: energy prices times powers, powers capped at their highest; f_max with the highest powers.
+    - **carbon** g: emissions, in the same way.
+
+    Parameters
+    ----------
+    comfort : str
+        ``productivity`` (default) or ``setpoint_deviation``.
+    comfort_weight, cost_weight, carbon_weight : float
+        u, v, w [-], not negative; defaults of the simulator's configuration.
+    highest_electricity, highest_gas : float
+        Powers that normalise [W]; defaults are those of the simulator's pilot building.
+    highest_productivity, lowest_productivity : float
+        P_max and P_min [USD/h] of a person; defaults of the simulator.
+    half_distance : float
+        m [K]; default of the simulator.
+    stiffness : float
+        s [1/K]; default of the simulator.
+    deviation_scale : float
+        Distance that counts as the worst [K]; an assumption: the paper has none.
+
+    Raises
+    ------
+    KpiError
+        When a number is out of range or the comfort term is not known.
+    """
+
+    comfort: Literal["productivity", "setpoint_deviation"] = "productivity"
+    comfort_weight: float = 0.2
+    cost_weight: float = 0.4
+    carbon_weight: float = 0.4
+    highest_electricity: float = 160e3
+    highest_gas: float = 400e3
+    highest_productivity: float = 300.0
+    lowest_productivity: float = 100.0
+    half_distance: float = 0.5
+    stiffness: float = 4.3
+    deviation_scale: float = 3.0
+
+    def __post_init__(self) -> None:
+        terms = ("productivity", "setpoint_deviation")
+        if self.comfort not in terms:
+            raise KpiError(
+                describe("reward: comfort", "a known term", repr(self.comfort), nearest(self.comfort, terms))
+            )
+        weights = (self.comfort_weight, self.cost_weight, self.carbon_weight)
+        if min(weights) < 0 or not sum(weights) > 0:
+            raise KpiError(describe("reward: weights", "numbers of 0 or more, not all 0", repr(weights)))
+        scales = (self.highest_electricity, self.highest_gas, self.stiffness, self.half_distance, self.deviation_scale)
+        if min(scales) <= 0 or not 0 <= self.lowest_productivity < self.highest_productivity:
+            found = f"{scales}, productivity {self.lowest_productivity} to {self.highest_productivity}"
+            raise KpiError(describe("reward: scales", "positive numbers, a productivity that rises", found))
+
+    def of_step(
+        self, scenario: Scenario, k: int, temperature: ArrayLike, electricity: ArrayLike, gas: ArrayLike
+    ) -> RewardTerms:
+        """Reward of a step of a scenario, of one run or of many at once.
+
+        Parameters
+        ----------
+        scenario : Scenario
+            Bands, people, prices and emissions.
+        k : int
+            Number of the step.
+        temperature : array_like, shape (..., n_zone)
+            Of the zones, means over the step or at its end [K].
+        electricity, gas : array_like, shape (...,)
+            Powers, means over the step [W].
+
+        Returns
+        -------
+        RewardTerms
+            Reward and terms, shape (...,) each.
+        """
+        prices = (scenario.electricity_price[k], scenario.gas_price[k])
+        carbons = (scenario.electricity_carbon[k], scenario.gas_carbon[k])
+        band = (scenario.lower[k], scenario.upper[k])
+        return self.of_values(temperature, band, scenario.occupancy[k], (electricity, gas), prices, carbons)
+
+    def of_values(
+        self,
+        temperature: ArrayLike,
+        band: tuple[ArrayLike, ArrayLike],
+        occupancy: ArrayLike,
+        powers: tuple[ArrayLike, ArrayLike],
+        prices: tuple[float, float],
+        carbons: tuple[float, float],
+    ) -> RewardTerms:
+        """Reward of a step from plain values.
+
+        Parameters
+        ----------
+        temperature : array_like, shape (..., n_zone)
+            Of the zones [K].
+        band : tuple of array_like, shape (n_zone,)
+            Lower and upper edge [K].
+        occupancy : array_like, shape (n_zone,)
+            People in the zones [-].
+        powers : tuple of array_like, shape (...,)
+            Electricity and gas [W].
+        prices, carbons : tuple of float
+            Price [currency/kWh] and emissions [kg/kWh] of electricity and of gas.
+
+        Returns
+        -------
+        RewardTerms
+            Reward and terms, shape (...,) each.
+        """
+        zones = np.asarray(temperature, dtype=float)
+        outside = np.maximum(np.asarray(band[0]) - zones, zones - np.asarray(band[1]))
+        comfort = self._productivity(outside, np.asarray(occupancy, dtype=float))
+        if self.comfort == "setpoint_deviation":
+            comfort = -np.clip(outside / self.deviation_scale, 0.0, 1.0).mean(axis=-1)
+        electricity = np.minimum(np.asarray(powers[0], dtype=float), self.highest_electricity)
+        gas = np.minimum(np.asarray(powers[1], dtype=float), self.highest_gas)
+        cost, carbon = (self._share(electricity, gas, factors) for factors in (prices, carbons))
+        weights = (self.comfort_weight, self.cost_weight, self.carbon_weight)
+        total = (weights[0] * comfort - weights[1] * cost - weights[2] * carbon) / sum(weights)
+        return RewardTerms(total, comfort, -cost, -carbon)
+
+    def _productivity(self, outside: FloatArray, people: FloatArray) -> FloatArray:
+        count = people.sum()
+        if count <= 0.0:
+            return np.zeros(outside.shape[:-1])
+        share = np.where(outside > 0.0, expit(self.stiffness * (self.half_distance - outside)), 1.0)
+        lowest = self.lowest_productivity / self.highest_productivity
+        mean = np.maximum(share @ people / count, lowest)
+        return np.asarray((mean - lowest) / (1.0 - lowest) - 1.0)
+
+    def _share(self, electricity: FloatArray, gas: FloatArray, factors: tuple[float, float]) -> FloatArray:
+        highest = self.highest_electricity * factors[0] + self.highest_gas * factors[1]
+        return np.asarray((electricity * factors[0] + gas * factors[1]) / highest if highest > 0 else 0.0 * electricity)
+
+
+#: What a zone's kelvin outside of its band for an hour counts [currency/K/h], unless told otherwise: so much that
+#: optimal control of the pilot building leaves its bands by no more than hundredths of a kelvin hour a day.
+DISCOMFORT_PRICE = 1.0
+
+
+@dataclass(frozen=True)
+class StageCost:
+    """Cost of a step: energy, carbon and discomfort in one currency; a reward is minus it.
+
+    ``(p_e P_e + p_g P_g) Δt + p_c (e_e P_e + e_g P_g) Δt + p_d Σ_zones ∫ (lack + excess) dt``. Summed over a run it is
+    what `measure_kpis` says: ``cost_tot A + p_c emis_tot A + p_d n_zone tdis_tot``. Demand charges belong to no single
+    step and are left out.
+
+    Parameters
+    ----------
+    discomfort_price : float
+        p_d [currency/K/h] of a zone; default `DISCOMFORT_PRICE`, which is that of optimal control.
+    carbon_price : float
+        p_c [currency/kg]; default 0.
+
+    Raises
+    ------
+    KpiError
+        When a price is negative.
+    """
+
+    discomfort_price: float = DISCOMFORT_PRICE
+    carbon_price: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not (self.discomfort_price >= 0 and self.carbon_price >= 0):
+            raise KpiError(describe("stage cost", "prices of 0 or more", repr(self)))
+
+    def of_step(
+        self, scenario: Scenario, k: int, start: ArrayLike, end: ArrayLike, electricity: ArrayLike, gas: ArrayLike
+    ) -> FloatArray:
+        """Cost of a step of a scenario, of one run or of many at once.
+
+        Parameters
+        ----------
+        scenario : Scenario
+            Bands, prices and emissions.
+        k : int
+            Number of the step.
+        start, end : array_like, shape (..., n_zone)
+            Temperatures of the zones at its start and end, a straight line in between [K].
+        electricity, gas : array_like, shape (...,)
+            Powers, means over the step [W].
+
+        Returns
+        -------
+        ndarray, shape (...,)
+            Cost [currency].
+        """
+        first, last = np.asarray(start, dtype=float), np.asarray(end, dtype=float)
+        lower, upper = scenario.lower[k], scenario.upper[k]
+        power_e, power_g = np.asarray(electricity, dtype=float), np.asarray(gas, dtype=float)
+        price_e = scenario.electricity_price[k] + self.carbon_price * scenario.electricity_carbon[k]
+        price_g = scenario.gas_price[k] + self.carbon_price * scenario.gas_carbon[k]
+        step = scenario.grid.step
+        energy = (price_e * power_e + price_g * power_g) * step / KILOWATT_HOUR
+        if (np.minimum(first, last) >= lower).all() and (np.maximum(first, last) <= upper).all():
+            return np.asarray(energy)
+        discomfort = excess(lower - first, lower - last)[0] + excess(first - upper, last - upper)[0]
+        return np.asarray(energy + self.discomfort_price * discomfort.sum(axis=-1) * step / _HOUR)

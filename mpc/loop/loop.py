@@ -1,0 +1,156 @@
+"""The loop of a plant, step by step: schedules, thermostats, devices and building, each with the state that it has."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mpc.loop.building import BuildingModel, zone_response
+from mpc.loop.history import PlantStep
+from mpc.loop.inputs import sensor_offset
+from mpc.loop.local import LocalControl
+from mpc.loop.operation import Operation
+from mpc.loop.schedule import Schedule
+from mpc.loop.sensors import PlantDevices
+from mpc.loop.signals import EffectSignals
+from mpc.loop.supply import SupplySetpoints
+from mpc.scenario import Scenario
+from thermal.hvac import Conditions, HvacPlant, HvacState, HvacSystem
+
+FloatArray = NDArray[np.float64]
+
+_WATER = 320.0  # K, of the loop at a start
+_ZONES = 293.15  # K, of the zones at a start
+
+
+class LoopState(NamedTuple):
+    """Everything that the next steps of a loop depend on.
+
+    Parameters
+    ----------
+    building : object
+        Of the building's model.
+    hvac : HvacState
+        Of the devices.
+    cycling : tuple of bool
+        Which air handlers run since a zone has drifted.
+    reading : ndarray, shape (n_zone,)
+        What the zones' sensors read at the end of the last step [K].
+    missed : ndarray, shape (n_zone,)
+        What local control missed [K].
+    """
+
+    building: Any
+    hvac: HvacState
+    cycling: tuple[bool, ...]
+    reading: FloatArray
+    missed: FloatArray
+
+
+class PlantLoop:
+    """Steps building and plant together.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Steps and outdoor temperature.
+    system : HvacSystem
+        Air handlers, hot water and terminals.
+    model : BuildingModel
+        The building.
+    operation : Operation
+        Schedules.
+    devices : PlantDevices
+        Names of the devices.
+    boundary : ndarray, shape (n_steps, n_boundary)
+        Boundary temperatures [K].
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        system: HvacSystem,
+        model: BuildingModel,
+        operation: Operation,
+        devices: PlantDevices,
+        boundary: FloatArray,
+    ) -> None:
+        self.hvac, self._model, self._operation = HvacPlant(system), model, operation
+        self._seconds, self._boundary = float(scenario.grid.step), boundary
+        self._outdoor = [float(v) for v in scenario.outdoor]
+        self._supply, self._schedule = SupplySetpoints(devices, system), Schedule(operation, system, scenario.zones)
+        rated = system.rooms.T @ system.terminals.design_flow
+        self._local = LocalControl(system, zone_response(model, 1e4 * rated))
+        self._off = (False,) * len(system.air_handlers)
+        self._offset = sensor_offset(model)
+        self._biased = bool(self._offset.any())
+        self._reading = np.zeros(len(scenario.zones))
+        self._state, self._cycling = self.hvac.start(_WATER), self._off
+
+    @property
+    def air(self) -> FloatArray:
+        """Air of the zones, which biased sensors do not say, shape (n_zone,) [K]."""
+        return self._reading - self._offset
+
+    def start(self, signals: FloatArray) -> None:
+        """Start from a steady state at usual temperatures.
+
+        Parameters
+        ----------
+        signals : ndarray, shape (n_signal,)
+            Of the effects [signal unit].
+        """
+        zones = np.clip(_ZONES, self._operation.heating[0], self._operation.cooling[0])
+        self._reading = self._model.reset(zones, self._boundary[0], signals)
+        self._model.reseed(0)
+        self._state, self._cycling = self.hvac.start(_WATER), self._off
+        self._local.missed = np.zeros_like(self._reading)
+
+    def save(self) -> LoopState:
+        """Keep the state."""
+        return LoopState(
+            self._model.save_state(), self._state, self._cycling, self._reading, self._local.missed
+        )  # fmt: skip
+
+    def restore(self, state: LoopState) -> None:
+        """Return to a state.
+
+        Parameters
+        ----------
+        state : LoopState
+            Of `save`.
+        """
+        building, self._state, self._cycling, self._reading, self._local.missed = state
+        self._model.restore_state(building)
+
+    def advance(self, k: int, given: Mapping[str, float], gains: FloatArray, effects: EffectSignals) -> PlantStep:
+        """Take a step of the scenario.
+
+        Parameters
+        ----------
+        k : int
+            Its number.
+        given : mapping of str to float
+            Setpoints, checked [K] or [Pa].
+        gains : ndarray, shape (n_zone,)
+            Heat of people, light and equipment [W].
+        effects : EffectSignals
+            Signals of the effects.
+        """
+        heating, cooling = self._schedule.setpoints(k, given)
+        runs, self._cycling = self._schedule.runs(k, self._reading, heating, cooling, self._cycling)
+        free = self._model.begin(gains, self._boundary[k], effects.known(k))
+        actions, reach = self._supply.actions(given, runs, self._schedule.ventilation[k])
+        zone = self._reading
+        if self._local.settles:
+            zone = self._local.settle(free, heating, cooling, actions.supply_air_temperature, reach)
+        conditions = Conditions(zone, heating, cooling, self._outdoor[k])
+        set_back = self._schedule.set_back[k]
+        self._state, done = self.hvac.step(self._state, conditions, actions, self._seconds, set_back)
+        heat = self.hvac.heat(done)
+        mean, self._reading = self._model.finish(heat, effects.at(k, done.airflow, heat))
+        self._local.learn(self._reading)
+        return PlantStep(k, conditions, actions, done, mean, self.air if self._biased else self._reading)

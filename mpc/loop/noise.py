@@ -1,0 +1,114 @@
+"""Errors of sensors and meters: white, drawn from seed and step alone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mpc.errors import PlantError
+from mpc.loop.plant import PointLayout
+from thermal.case.points import POINT_TYPES, split_column
+from thermal.errors import describe
+
+FloatArray = NDArray[np.float64]
+
+_STREAM = 7  # of random numbers of a seed, apart from those of people, forecasts and the shuffle
+_BLOCK = 64  # steps whose noise is drawn together
+_FREEZING = 273.15  # K: sensors count their resolution from here
+
+
+@dataclass(frozen=True)
+class SensorNoise:
+    """Errors of sensors and meters, independent from step to step.
+
+    Parameters
+    ----------
+    temperature : float
+        Standard deviation of temperature sensors [K]; the default is that of the shared practice cases.
+    resolution : float
+        Steps of temperature sensors [K]; 0 reports every digit.
+    flow : float
+        Standard deviation of air flow stations as a share of the flow [-]; the default is that of new ones (ASHRAE
+        Handbook, Fundamentals 2017, ch. 37).
+    power : float
+        Standard deviation of meters as a share of the power [-]; the default is a class 1 meter's (IEC 62053-21).
+    pressure : float
+        Standard deviation of pressure transmitters as a share of the pressure [-]; the default is usual for those of
+        ducts and pumps (accuracy of 1 %).
+
+    Raises
+    ------
+    PlantError
+        When one is negative or no number.
+    """
+
+    temperature: float = 0.03
+    resolution: float = 0.02
+    flow: float = 0.02
+    power: float = 0.01
+    pressure: float = 0.01
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if not 0.0 <= value < np.inf:
+                raise PlantError(describe(f"sensor noise: {field.name}", "0 or more", repr(value)))
+
+
+class NoiseSource:
+    """Noise of the columns of a plant.
+
+    Parameters
+    ----------
+    layout : PointLayout
+        Columns; setpoints, commands and weather have none.
+    noise : SensorNoise
+        How much.
+    """
+
+    def __init__(self, layout: PointLayout, noise: SensorNoise) -> None:
+        self.layout, self.noise = layout, noise
+        self._block: tuple[tuple[int, int], FloatArray] = ((-1, -1), np.zeros((0, 0)))
+
+    @cached_property
+    def _scales(self) -> tuple[NDArray[np.intp], FloatArray, FloatArray, NDArray[np.bool_]]:
+        """Columns with noise, their absolute and relative deviations, and which count in steps."""
+        noise = self.noise
+        rows = []
+        for k, column in enumerate(self.layout.columns):
+            point = split_column(column, "plant")[1]
+            quantity = POINT_TYPES[point].quantity
+            by = {"temperature": (noise.temperature, 0.0), "air_flow": (0.0, noise.flow), "power": (0.0, noise.power),
+                  "pressure": (0.0, noise.pressure)}  # fmt: skip
+            if point.endswith("_sensor") and quantity in by:
+                rows.append((k, *by[quantity], quantity == "temperature"))
+        index, absolute, relative, stepped = (np.array(v) for v in zip(*rows, strict=True))
+        return index.astype(np.intp), absolute.astype(float), relative.astype(float), stepped.astype(bool)
+
+    def disturb(self, k: int, values: FloatArray, seed: int) -> FloatArray:
+        """Add the noise of a step to its values, which depends on seed and step only.
+
+        Parameters
+        ----------
+        k : int
+            Number of the step, 0 or more.
+        values : ndarray, shape (n_column,)
+            Exact values [library's units]; written to.
+        seed : int
+            0 or more.
+        """
+        index, absolute, relative, stepped = self._scales
+        number, row = divmod(k, _BLOCK)
+        if self._block[0] != (seed, number):
+            rng = np.random.default_rng([seed, _STREAM, number])
+            self._block = ((seed, number), rng.standard_normal((_BLOCK, index.size)))
+        exact = values[index]
+        seen = exact + (absolute + relative * np.abs(exact)) * self._block[1][row]
+        if self.noise.resolution > 0.0:
+            counted = _FREEZING + self.noise.resolution * np.round((seen - _FREEZING) / self.noise.resolution)
+            seen = np.where(stepped, counted, seen)
+        values[index] = seen
+        return values

@@ -1,0 +1,101 @@
+"""The schedules of a building's automation as a plant steps through them, with its night cycle."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mpc.loop.actuators import COOLING_SETPOINT, HEATING_SETPOINT
+from mpc.loop.operation import Operation, shared_rows
+from thermal.hvac import HvacSystem
+
+FloatArray = NDArray[np.float64]
+
+
+class Schedule:
+    """Schedules laid out as a plant takes them: rows, floats and tuples.
+
+    Parameters
+    ----------
+    operation : Operation
+        The schedules.
+    system : HvacSystem
+        Which air handler serves which zones.
+    zones : tuple of str
+        Their names.
+
+    Attributes
+    ----------
+    ventilation : list of float
+        Share of the minimum of outdoor air, one a step [-].
+    set_back : list of ndarray of bool, shape (n_zone,)
+        Whether setpoints are those of set-back, one a step.
+    """
+
+    def __init__(self, operation: Operation, system: HvacSystem, zones: tuple[str, ...]) -> None:
+        self._heating, self._cooling = shared_rows(operation.heating), shared_rows(operation.cooling)
+        self._running = [tuple(map(float, row)) for row in operation.running]
+        self._limit = operation.night_cycle
+        self.ventilation = [float(v) for v in operation.ventilation]
+        self.set_back = list(operation.set_back)
+        count, terminals = len(system.air_handlers), system.terminals
+        self._served = [terminals.zone[terminals.air_handler == k] for k in range(count)]
+        kinds = (HEATING_SETPOINT, COOLING_SETPOINT)
+        self._given = {f"{zone}/{kind}": (i, k) for k, zone in enumerate(zones) for i, kind in enumerate(kinds)}
+
+    def setpoints(self, k: int, given: Mapping[str, float]) -> tuple[FloatArray, FloatArray]:
+        """Give the thermostats' setpoints: the schedule's, but for those that an action has.
+
+        Parameters
+        ----------
+        k : int
+            Number of the step.
+        given : mapping of str to float
+            The action, checked [K] or [Pa].
+
+        Returns
+        -------
+        tuple of ndarray, shape (n_zone,)
+            Heating and cooling setpoints [K]; where an action crosses them, the heating one gives way.
+        """
+        both = self._heating[k], self._cooling[k]
+        if len(given) == len(self._served) + 1:  # the required ones alone
+            return both
+        asked = [(place, value) for name, value in given.items() if (place := self._given.get(name)) is not None]
+        if asked:
+            both = both[0].copy(), both[1].copy()
+            for (side, zone), value in asked:
+                both[side][zone] = value
+            np.minimum(*both, out=both[0])
+        return both
+
+    def runs(
+        self, k: int, zone: FloatArray, heating: FloatArray, cooling: FloatArray, cycling: tuple[bool, ...]
+    ) -> tuple[tuple[float, ...], tuple[bool, ...]]:
+        """Tell which air handlers run: by schedule, or since a zone has drifted too far.
+
+        Parameters
+        ----------
+        k : int
+            Number of the step.
+        zone, heating, cooling : ndarray, shape (n_zone,)
+            Temperatures and setpoints [K].
+        cycling : tuple of bool
+            Which ran for the latter reason in the step before.
+
+        Returns
+        -------
+        tuple
+            1 or 0 for each air handler [-], and which cycle now.
+        """
+        scheduled = self._running[k]
+        if self._limit is None or min(scheduled) == 1.0:
+            return scheduled, (False,) * len(scheduled)
+        beyond = np.maximum(heating - zone, zone - cooling)
+        if beyond[beyond.argmax()] <= 0.0:  # none has drifted at all
+            return scheduled, (False,) * len(scheduled)
+        worst = [float(beyond[zones].max()) for zones in self._served]
+        now = tuple(w > (0.0 if was else self._limit) for w, was in zip(worst, cycling, strict=True))
+        return tuple(max(s, float(c)) for s, c in zip(scheduled, now, strict=True)), now

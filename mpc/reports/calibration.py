@@ -1,0 +1,241 @@
+"""What a calibration leaves behind: its numbers as JSON, its predictions as a table, and a page to read."""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from calibration import _figures as figures
+from calibration.evaluation.case_model import CHECK_TOLERANCE
+from mpc.reports.identifiability import in_words
+from mpc.reports.page import clock, counted, duration, kelvin, plain, render, signed, significant, unit
+from mpc.reports.residuals import diagnostics_content
+from mpc.reports.evaluation import (
+    evaluation_figures,
+    interval_rows,
+    predictions_table,
+    subtitle,
+    unchanged_error,
+    zone_rows,
+)
+from calibration.fit.result import CalibrationResult, ParameterEstimate
+from calibration.results import check_results_folder, write_results
+from thermal import Case, Inputs, SymbolicModel, replay_inputs
+
+#: The heat map shows every cell of the grid up to this many control volumes; beyond, one colour a zone.
+MOST_VOLUMES = 40_000
+
+
+def write_calibration(result: CalibrationResult, case: Case, out: str | Path, *, force: bool = False) -> Path:
+    """Write ``calibration.json``, ``evaluation.json``, ``predictions.parquet`` and ``report.html``.
+
+    The last three are of the calibrated model on the held-out intervals.
+
+    Parameters
+    ----------
+    result : CalibrationResult
+        From `calibrate`.
+    case : Case
+        The case it was calibrated on.
+    out : str or Path
+        Folder, made if need be.
+    force : bool
+        Replace earlier results.
+
+    Returns
+    -------
+    Path
+        The page.
+
+    Raises
+    ------
+    ResultsExistError
+        When the folder holds something and ``force`` is not set.
+    """
+    check_results_folder(out, force)
+    grid = SymbolicModel(result.settings.network(case.building))
+    inputs = replay_inputs(case, grid.network)
+    held_out = result.calibrated["held_out"]
+    page = render("calibration", _content(result, case, grid, inputs))
+    folder = write_results(
+        out,
+        {
+            "calibration.json": result.to_dict(),
+            "evaluation.json": held_out.to_dict(),
+            "predictions.parquet": predictions_table(held_out),
+            "report.html": page,
+        },
+        force,
+    )
+    return folder / "report.html"
+
+
+def calibration_verdict(result: CalibrationResult) -> str:
+    """Say in plain words what a calibration achieved.
+
+    Parameters
+    ----------
+    result : CalibrationResult
+        From `calibrate`.
+    """
+    evaluation = result.calibrated["held_out"]
+    before, after = result.uncalibrated["held_out"].metrics.mae, evaluation.metrics.mae
+    rest = unchanged_error(evaluation)
+    ahead = duration(evaluation.steps * evaluation.step_seconds).capitalize()
+    sentences = [
+        f"{ahead} ahead, on data it was not fitted to, the calibrated model misses the measured zone temperatures by",
+        f"{kelvin(after)} K on average. Before calibration it was {kelvin(before)} K" + _change(before, after),
+        f"Assuming that nothing changes misses by {kelvin(rest)} K"
+        + ("." if rest > after else ", less than the model."),
+        _parameter_sentence(result.parameters),
+    ]
+    if not result.solver.success:
+        status = result.solver.status
+        sentences.insert(0, f"The solver stopped before it converged ({status}): do not rely on these numbers.")
+    return " ".join(sentences)
+
+
+def _change(before: float, after: float) -> str:
+    if after < before:
+        return f", so the error fell by {100 * (1 - after / before):.0f} %."
+    return ": on these data calibration did not help."
+
+
+def _parameter_sentence(parameters: Sequence[ParameterEstimate]) -> str:
+    estimated = [p for p in parameters if p.standard_error is not None]
+    told = sum(p.identifiable for p in estimated)
+    bound = [in_words(p.name) for p in estimated if p.at_bound]
+    free = len(estimated) - told - len(bound)
+    parts = [f"Of {counted(len(estimated), 'estimated parameter')} the data determine {told or 'none'}"]
+    if free:
+        parts.append(f"{free} stay{'s' if free == 1 else ''} open within the physical range")
+    if not bound:
+        return "; ".join([*parts, "none lies on a bound."])
+    names = f" ({', '.join(bound)})" if len(bound) < 4 else ""
+    lie = "lies" if len(bound) == 1 else "lie"
+    return "; ".join([*parts, f"{len(bound)} {lie} on a bound{names}, which hints at physics that the model lacks."])
+
+
+def _content(result: CalibrationResult, case: Case, grid: SymbolicModel, inputs: Inputs) -> dict[str, Any]:
+    before, after = result.uncalibrated["held_out"], result.calibrated["held_out"]
+    field = None
+    if grid.network.n_node <= MOST_VOLUMES and (grid.network.place >= 0).any():
+        which, run = figures.median_run(after)
+        start = after.predictions[which].start[run]
+        field = figures.spatial_field(
+            grid, result.theta, inputs, start, after.steps, result.settings.dx, result.settings.stepping
+        )
+    band = figures.error_band(result.calibrated["tuning"])
+    drawn = evaluation_figures(after, case, before=before, field=field, band=band)
+    drawn["growth"] = figures.error_growth(
+        {
+            "held out": {"before": before, "after": after},
+            "tuning": {"before": result.uncalibrated["tuning"], "after": result.calibrated["tuning"]},
+        }
+    )
+    estimated = [p for p in result.parameters if p.standard_error is not None]
+    told = sum(p.identifiable for p in estimated)
+    return {
+        "case": result.case,
+        "subtitle": subtitle(case, after),
+        "verdict": calibration_verdict(result),
+        "fine": result.solver.success and after.metrics.mae < before.metrics.mae,
+        "cards": [
+            (f"{kelvin(after.metrics.mae)} K", "held-out error of the calibrated model"),
+            (f"{kelvin(before.metrics.mae)} K", "before calibration"),
+            (f"{kelvin(unchanged_error(after))} K", "assuming that nothing changes"),
+            (f"{told} of {len(estimated)}", "parameters determined by the data"),
+            (f"{sum(p.at_bound for p in estimated)}", "parameters on a bound"),
+        ],
+        "errors": _error_rows(result),
+        "steps": after.steps,
+        "step": duration(after.step_seconds),
+        "figures": drawn,
+        "parameters": _parameter_rows(result.parameters),
+        "parameter_figure": figures.parameter_ranges(result.parameters),
+        "told": result.information.sentences,
+        "zones": zone_rows(after.by_zone()),
+        "intervals": [["tuning", *r] for r in interval_rows(result.calibrated["tuning"])]
+        + [["held out", *r] for r in interval_rows(after)],
+        **diagnostics_content(result, grid, inputs),
+        **_solver_content(result),
+        "reproduce": _reproduce(result, case),
+    }
+
+
+def _error_rows(result: CalibrationResult) -> list[list[str]]:
+    rows = []
+    for key, name in (("held_out", "held out"), ("tuning", "tuning")):
+        for model, evaluations in (("before", result.uncalibrated), ("after", result.calibrated)):
+            e = evaluations[key].metrics
+            rows.append([f"{name}, {model} calibration", f"{e.mae:.3f}", signed(e.median), signed(e.bias)])
+        rows.append([f"{name}, nothing changes", f"{unchanged_error(result.calibrated[key]):.3f}", "–", "–"])
+    return rows
+
+
+def _parameter_rows(parameters: Sequence[ParameterEstimate]) -> list[dict[str, str]]:
+    paper = figures.paper_values(parameters)
+    return [_parameter_row(p, paper.get(p.name)) for p in parameters]
+
+
+def _parameter_row(p: ParameterEstimate, paper: float | None) -> dict[str, str]:
+    if p.standard_error is None:
+        told, kind = "not estimated", "soft"
+    elif p.at_bound:
+        told, kind = "on a bound", "bad"
+    else:
+        told, kind = ("yes", "good") if p.identifiable else ("no", "soft")
+    return {
+        "name": in_words(p.name),
+        "value": significant(p.value),
+        "unit": unit(p.unit),
+        "error": significant(p.standard_error, 2),
+        "interval": " to ".join(significant(end) for end in p.interval90) if p.interval90 else "–",
+        "paper": significant(paper),
+        "range": f"{plain(p.lower)} to {plain(p.upper)}" if p.lower is not None and p.upper is not None else "–",
+        "told": told,
+        "kind": kind,
+        "source": p.source,
+    }
+
+
+def _solver_content(result: CalibrationResult) -> dict[str, Any]:
+    solver, check = result.solver, result.grid_check
+    end = "converged" if solver.success else "did not converge"
+    starts = f"the best of {solver.starts} starts" if solver.starts > 1 else "from one start"
+    settled = (
+        "Its rounds of weighing the data and reducing the model ended because nothing moved any more."
+        if solver.settled
+        else "Its rounds of weighing the data and reducing the model were still moving the estimate when they ended."
+    )
+    return {
+        "solver": f"{solver.name.capitalize()} {end} ({solver.status}): {solver.iterations} iterations with "
+        f"{solver.evaluations} evaluations of the errors and their derivatives, {starts}; "
+        f"{solver.seconds:.1f} s in all. {settled}",
+        "failures": solver.failures,
+        "check": check,
+        "trusted": check.max_difference <= CHECK_TOLERANCE,
+    }
+
+
+def _reproduce(result: CalibrationResult, case: Case) -> list[tuple[str, str]]:
+    parts = ["buildingmpc calibrate CASE --out RESULTS"]
+    parts += [f"--tune {i.start.isoformat()}/{i.end.isoformat()}" for i in result.tuning]
+    parts += [f"--hold-out {i.start.isoformat()}/{i.end.isoformat()}" for i in result.held_out]
+    parts += [f"--horizon {result.horizon} --scheme {result.settings.scheme}"]
+    parts += [f"--objective {result.objective}"] if result.objective != "multi_step" else []
+    parts += [f"--starts {result.solver.starts} --seed {result.seed}"]
+    parts += [f"--dx {result.settings.dx:g}"] if result.settings.dx is not None else []
+    return [
+        (
+            "case",
+            f"{result.case}, {clock(case.stamps[0])} to {clock(case.stamps[-1])} every {duration(case.step)}",
+        ),
+        ("version", f"buildingmpc {result.version}, Python {platform.python_version()}, pandas {pd.__version__}"),
+        ("seed", str(result.seed)),
+        ("command", " ".join(parts)),
+    ]

@@ -1,0 +1,286 @@
+"""A diagnosis in plain words: the verdict, effects and where they are, and what would tell them apart."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from mpc.reports.page import duration, kelvin, watts
+from calibration.diagnosis.diagnosis import Diagnosis
+from calibration.diagnosis.decide.levels import LARGEST_GROUP
+from calibration.diagnosis.refit.refit import Refit
+from calibration.diagnosis.decide.verdict import Suspect, group_of
+from thermal.effects import CATALOGUE
+
+#: What an effect is called where its title would read oddly after "leaves out".
+_CALLED = {"hidden_mass": "mass that stores heat"}
+
+#: Probability from which an effect is said to be left out, rather than perhaps [-].
+_LIKELY = 0.5
+
+#: Probability from which another effect of a group is worth telling from the likeliest [-].
+_RIVAL = 0.05
+
+#: More zones than this are counted, not named.
+_MOST_NAMED = 4
+
+
+def diagnosis_verdict(result: Diagnosis) -> str:
+    """Say in plain words what a diagnosis found.
+
+    Parameters
+    ----------
+    result : Diagnosis
+        From `diagnose`.
+    """
+    if result.verdict.name == "no_gap":
+        return _no_gap(result)
+    if result.verdict.name == "unexplained":
+        return _unexplained(result)
+    found = accepted(result)
+    if result.verdict.name == "group":
+        first, *others = found
+        text = _either(result, first)
+        if others:
+            text += f" {_named(result, others, 'Besides, it leaves out', 'Perhaps it also leaves out')}"
+    else:
+        text = _named(result, found, "The model leaves out", "Most likely the model leaves out")
+    return f"{text} {_how_far(result, len(found))}"
+
+
+def accepted(result: Diagnosis) -> list[Refit]:
+    """Effects that the rounds accepted, in order.
+
+    Parameters
+    ----------
+    result : Diagnosis
+        From `diagnose`.
+    """
+    return [r.accepted for r in result.rounds if r.accepted is not None]
+
+
+def rivals(result: Diagnosis, effect: str) -> tuple[str, ...]:
+    """Effects that could be there in place of an accepted one, itself first.
+
+    As `alike`, but for what is unlikely, or was accepted as well.
+
+    Parameters
+    ----------
+    result : Diagnosis
+        From `diagnose`.
+    effect : str
+        Its id.
+    """
+    inside = {r.screened.effect for r in accepted(result)}
+    others = (e for e in alike(result, effect) if e not in inside and suspect(result, e).probability >= _RIVAL)
+    return (effect, *others)
+
+
+def suspect(result: Diagnosis, effect: str) -> Suspect:
+    """Suspect of an id.
+
+    Parameters
+    ----------
+    result : Diagnosis
+        From `diagnose`.
+    effect : str
+        Its id.
+    """
+    return next(s for s in result.verdict.suspects if s.effect == effect)
+
+
+def alike(result: Diagnosis, effect: str) -> tuple[str, ...]:
+    """Effects that the data cannot tell from an accepted one, itself first; or what its suspect says of another.
+
+    Parameters
+    ----------
+    result : Diagnosis
+        From `diagnose`.
+    effect : str
+        Its id.
+    """
+    for r in result.rounds:
+        if r.accepted is not None and r.accepted.screened.effect == effect:
+            return group_of(r, effect)
+    return suspect(result, effect).group
+
+
+def called(effect: str, zones: Sequence[str] = ()) -> str:
+    """Call an effect by what it is, and where.
+
+    Parameters
+    ----------
+    effect : str
+        Its id.
+    zones : sequence of str
+        Where; none is the whole building.
+
+    Examples
+    --------
+    >>> called("sensor_bias", ["F1_N"])
+    'a zone sensor that reads wrong, in zone F1_N'
+    """
+    name = _CALLED.get(effect, CATALOGUE[effect].title)
+    return f"{name}, {in_zones(zones)}" if zones else name
+
+
+def in_zones(zones: Sequence[str]) -> str:
+    """Say where an effect is.
+
+    Parameters
+    ----------
+    zones : sequence of str
+        Zones; none is the whole building.
+
+    Examples
+    --------
+    >>> in_zones([]), in_zones(["A", "B"]), in_zones(list("ABCDE"))
+    ('the whole building', 'in zones A and B', 'in 5 zones')
+    """
+    if not zones:
+        return "the whole building"
+    if len(zones) > _MOST_NAMED:
+        return f"in {len(zones)} zones"
+    return f"in zone{'s' if len(zones) > 1 else ''} {listed(zones)}"
+
+
+def listed(names: Sequence[str], last: str = "and") -> str:
+    """Join names to a sentence's list.
+
+    Parameters
+    ----------
+    names : sequence of str
+        At least one.
+    last : str
+        Word before the last.
+
+    Examples
+    --------
+    >>> listed(["sun", "wind", "rain"], "or")
+    'sun, wind or rain'
+    """
+    return f" {last} ".join(filter(None, [", ".join(names[:-1]), names[-1]]))
+
+
+def sure(probability: float) -> str:
+    """Spell a probability, never as certainty.
+
+    Parameters
+    ----------
+    probability : float
+        In [0, 1] [-].
+
+    Examples
+    --------
+    >>> sure(0.937), sure(0.9999), sure(0.001)
+    ('94 %', 'over 99 %', 'under 1 %')
+    """
+    if probability > 0.99:
+        return "over 99 %"
+    return f"{100 * probability:.0f} %" if probability >= 0.01 else "under 1 %"
+
+
+def ahead(result: Diagnosis) -> str:
+    """Spell how far ahead predictions are judged, such as ``6 hours ahead``.
+
+    Parameters
+    ----------
+    result : Diagnosis
+        From `diagnose`.
+    """
+    problem = result.rounds[0].before.problem
+    return f"{duration(problem.steps * problem.inputs.step)} ahead"
+
+
+def _named(result: Diagnosis, found: Sequence[Refit], begin: str, doubt: str) -> str:
+    """Name effects: those more likely there than not, and what may be there besides."""
+    likely = [r for r in found if suspect(result, r.screened.effect).probability >= _LIKELY]
+    rest = [r for r in found if r not in likely]
+    if not likely:
+        begin, likely, rest = doubt, rest[:1], rest[1:]
+    text = f"{begin} {listed([_found(result, r) for r in likely])}"
+    return text + (f", and perhaps {listed([_found(result, r) for r in rest])}." if rest else ".")
+
+
+def _either(result: Diagnosis, first: Refit) -> str:
+    """Say what is left out where other effects look alike: a choice only where another is likely enough."""
+    effect = first.screened.effect
+    likely = rivals(result, effect)
+    if len(likely) > 1:
+        named = listed([f"{called(e)} ({sure(suspect(result, e).probability)})" for e in likely], "or")
+        either = "either " if len(likely) == 2 else ""
+        told = CATALOGUE[effect].separated_by
+        text = f"The model leaves out {either}{named}: these data cannot tell them apart."
+        return f"{text} What would: {told}." if told else text
+    inside = {r.screened.effect for r in accepted(result)}
+    rest = [suspect(result, e) for e in alike(result, effect) if e not in inside]
+    others = [f"{called(s.effect)} ({sure(s.probability)})" for s in rest]
+    text = _named(result, [first], "The model leaves out", "Most likely the model leaves out")
+    if not others:
+        return text
+    are = "is" if len(others) == 1 else "are"
+    return f"{text} In these data {listed(others)} would look much the same, but {are} far less likely."
+
+
+def _found(result: Diagnosis, fitted: Refit) -> str:
+    gain = fitted.screened
+    return f"{called(gain.effect, gain.zones)} ({sure(suspect(result, gain.effect).probability)} sure)"
+
+
+def _how_far(result: Diagnosis, found: int) -> str:
+    """Say what the error becomes; a share of the gap only where there is one."""
+    if not result.steps:
+        return ""
+    step = result.steps[-1]
+    them = "With it" if found == 1 else "With them"
+    if result.verdict.name == "group" and len(rivals(result, accepted(result)[0].screened.effect)) > 1:
+        them = "With the likeliest" + (" and the others" if found > 1 else "")
+    there = f"{them} in the model, its error {ahead(result)}, on days that it was not fitted to,"
+    if step.after >= step.before:
+        return (
+            f"{there} does not fall: {kelvin(step.before)} K before, {kelvin(step.after)} K after. What the tuning "
+            "days say does not carry over, so do not rely on it yet."
+        )
+    text = f"{there} falls from {kelvin(step.before)} to {kelvin(step.after)} K"
+    if step.share_closed is None:
+        return f"{text}; the gap is too small beside its own scatter to state a share of it."
+    return f"{text}, {min(100.0, 100 * step.share_closed):.0f} % of what could be closed."
+
+
+def _no_gap(result: Diagnosis) -> str:
+    text = (
+        f"These data show nothing that the model leaves out. {ahead(result).capitalize()}, on days that it was not "
+        f"fitted to, the calibrated model misses the measured zone temperatures by {kelvin(result.gap)} K on average."
+    )
+    if found := accepted(result):
+        names = listed([called(r.screened.effect, r.screened.zones) for r in found])
+        text += f" A trace of {names} explains too little of the error to be named."
+    sizes = [w for w in result.detectable.values() if np.isfinite(w)]
+    if not sizes:
+        return text
+    between = watts(min(sizes)) + (f" to {watts(max(sizes))}" if len(sizes) > 1 else "")
+    return f"{text} Steady heat that is missing in one zone would have been noticed from {between} on, by zone."
+
+
+def _unexplained(result: Diagnosis) -> str:
+    found = accepted(result)
+    error = (
+        f"{ahead(result).capitalize()} it misses the measured zone temperatures by {kelvin(result.gap)} K on average"
+    )
+    best = result.verdict.suspects[0]
+    if found:
+        group = alike(result, found[0].screened.effect)
+        if len(group) > LARGEST_GROUP:
+            names = listed([called(e) for e in group[:LARGEST_GROUP]])
+            return (
+                f"The model leaves something out, but these data cannot tell what: {len(group)} effects explain it "
+                f"about equally well, among them {names}. {error}."
+            )
+        part = f"{listed([called(r.screened.effect) for r in found])} would be a part of it, and not enough"
+        how_far = _how_far(result, len(found))
+        return f"The model leaves something out that no effect we know of explains: {part}. {how_far}"
+    text = f"The model leaves something out that no effect we know of explains. {error}"
+    if result.floor < result.gap:
+        text += f", and {kelvin(result.gap - result.floor)} K of it follow time of day, zone or outdoor temperature"
+    return f"{text}. The best single guess is {called(best.effect)} ({sure(best.probability)}): not enough to name it."

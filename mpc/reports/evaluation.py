@@ -1,0 +1,245 @@
+"""What an evaluation leaves behind, and the figures that it shares with a calibration."""
+
+from __future__ import annotations
+
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from calibration import _figures as figures
+from calibration.evaluation.n_step import Evaluation, spatial_metrics
+from mpc.reports.page import clock, counted, duration, kelvin, render, signed
+from calibration.results import check_results_folder, write_results
+from thermal import Case, FloorPlans
+
+FloatArray = NDArray[np.float64]
+
+#: Zero of the Celsius scale [K].
+CELSIUS = 273.15
+
+
+def write_evaluation(
+    evaluation: Evaluation, case: Case, out: str | Path, *, parameters: str = "uncalibrated", force: bool = False
+) -> Path:
+    """Write ``evaluation.json``, ``predictions.parquet`` and ``report.html``.
+
+    Parameters
+    ----------
+    evaluation : Evaluation
+        From `evaluate_model`, with its trajectories.
+    case : Case
+        The case it was made on.
+    out : str or Path
+        Folder, made if need be.
+    parameters : str
+        Where the parameters come from, for the page.
+    force : bool
+        Replace earlier results.
+
+    Returns
+    -------
+    Path
+        The page.
+
+    Raises
+    ------
+    ResultsExistError
+        When the folder holds something and ``force`` is not set.
+    """
+    check_results_folder(out, force)
+    drawn = evaluation_figures(evaluation, case)
+    drawn["growth"] = figures.error_growth({"all runs": {"model": evaluation}})
+    metrics, rest = evaluation.metrics, unchanged_error(evaluation)
+    content = {
+        "case": case.building.name,
+        "subtitle": subtitle(case, evaluation),
+        "verdict": evaluation_verdict(evaluation),
+        "cards": [
+            (f"{kelvin(metrics.mae)} K", "mean absolute error (MAE)"),
+            (f"{kelvin(rest)} K", "assuming that nothing changes"),
+            (f"{signed(metrics.bias)} K", "bias, simulated minus measured"),
+            (str(sum(len(p.start) for p in evaluation.predictions)), "runs"),
+        ],
+        "intervals": [
+            [*r, signed(m.median), signed(m.bias)]
+            for r, m in zip(interval_rows(evaluation), _metrics(evaluation), strict=True)
+        ],
+        "horizons": [[h, f"{mae:.3f}"] for h, mae in evaluation.by_horizon.items()],
+        "figures": drawn,
+        "zones": zone_rows(evaluation.by_zone()),
+        "reproduce": [("version", f"buildingmpc {version('buildingmpc')}"), ("parameters", parameters)],
+    }
+    files: dict[str, Any] = {
+        "evaluation.json": evaluation.to_dict(),
+        "predictions.parquet": predictions_table(evaluation),
+        "report.html": render("evaluation", content),
+    }
+    return write_results(out, files, force) / "report.html"
+
+
+def evaluation_verdict(evaluation: Evaluation) -> str:
+    """Say in plain words how far a model is off.
+
+    Parameters
+    ----------
+    evaluation : Evaluation
+        From `evaluate_model`.
+    """
+    metrics, rest = evaluation.metrics, unchanged_error(evaluation)
+    ahead = duration(evaluation.steps * evaluation.step_seconds).capitalize()
+    lean = "too warm" if metrics.bias > 0 else "too cold"
+    text = f"{ahead} ahead, the model misses the measured zone temperatures by {kelvin(metrics.mae)} K on average"
+    text += f" and is {lean} by {kelvin(abs(metrics.bias))} K."
+    compared = "less" if rest < metrics.mae else "more"
+    return f"{text} Assuming that nothing changes misses by {kelvin(rest)} K, {compared} than the model."
+
+
+def unchanged_error(evaluation: Evaluation) -> float:
+    """Error of assuming that every zone keeps the temperature of its start [K], averaged as the model's is.
+
+    Parameters
+    ----------
+    evaluation : Evaluation
+        Whose runs are compared.
+    """
+    return spatial_metrics(np.concatenate([p.initial - p.measured[:, -1] for p in evaluation.predictions])).mae
+
+
+def predictions_table(evaluation: Evaluation) -> pd.DataFrame:
+    """Predictions in tidy form: one row a run, step and measured zone.
+
+    Parameters
+    ----------
+    evaluation : Evaluation
+        From `evaluate_model`.
+
+    Returns
+    -------
+    DataFrame
+        Index ``timestamp``; columns ``run_start``, ``zone``, ``simulated`` and ``measured`` [degC].
+    """
+    parts = []
+    for p in evaluation.predictions:
+        lags = pd.to_timedelta(p.steps * evaluation.step_seconds, unit="s")
+        stamps = pd.DatetimeIndex(np.repeat(p.start, len(lags)) + np.tile(lags, len(p.start)))
+        shape = (len(stamps), len(evaluation.zones))
+        values = {"simulated": p.simulated.reshape(shape) - CELSIUS, "measured": p.measured.reshape(shape) - CELSIUS}
+        frame = tidy(stamps, evaluation.zones, values)
+        frame.insert(0, "run_start", np.repeat(p.start, len(lags) * shape[1]))
+        parts.append(frame[frame["measured"].notna()])
+    table = pd.concat(parts)
+    table.attrs["units"] = {"simulated": "degC", "measured": "degC"}
+    return table
+
+
+def tidy(stamps: pd.DatetimeIndex, zones: tuple[str, ...], values: dict[str, FloatArray]) -> pd.DataFrame:
+    """Tabulate values by time and zone with one row a stamp and zone.
+
+    Parameters
+    ----------
+    stamps : DatetimeIndex, length n_time
+        May repeat.
+    zones : tuple of str
+        Zone names.
+    values : dict of str to ndarray, shape (n_time, n_zone)
+        By column, in the columns' units.
+
+    Returns
+    -------
+    DataFrame
+        Index ``timestamp``; ``zone`` and the columns.
+    """
+    names = pd.Categorical(np.tile(np.array(zones, dtype=object), len(stamps)), categories=list(zones))
+    columns = {"zone": names, **{name: value.ravel() for name, value in values.items()}}
+    return pd.DataFrame(columns, index=pd.DatetimeIndex(np.repeat(stamps, len(zones)), name="timestamp"))
+
+
+def evaluation_figures(
+    evaluation: Evaluation,
+    case: Case,
+    before: Evaluation | None = None,
+    field: figures.Field | None = None,
+    band: figures.Band | None = None,
+) -> dict[str, Any]:
+    """Figures of the runs of an evaluation: drift, maps and zones.
+
+    Parameters
+    ----------
+    evaluation : Evaluation
+        With its trajectories.
+    case : Case
+        For the plans.
+    before : Evaluation, optional
+        The same runs before calibration.
+    field : Field, optional
+        Last state of the median run on the grid.
+    band : Band, optional
+        About the predictions, from other runs.
+    """
+    which, run = figures.median_run(evaluation)
+    p = evaluation.predictions[which]
+    ahead = duration(evaluation.steps * evaluation.step_seconds)
+    shown = [("after calibration" if before else "the model", p, run)]
+    if before is not None:
+        shown.insert(0, ("before calibration", before.predictions[which], run))
+    runs = sum(len(x.start) for x in evaluation.predictions)
+    errors = evaluation.by_zone()
+    mean = np.array([errors[z]["bias"] if z in errors else np.nan for z in evaluation.zones])
+    series = figures.series_of_runs(evaluation, band)
+    inside = band.coverage(evaluation) if band is not None else np.nan
+    return {
+        "drift": figures.drift_boxes(shown, evaluation.step_seconds),
+        "run_start": clock(p.start[run]),
+        "runs": runs,
+        "maps": [
+            *error_maps(case, evaluation.zones, p.error[run], f"{ahead} after {clock(p.start[run])}", field),
+            *error_maps(case, evaluation.zones, mean, f"mean over {runs} runs"),
+        ],
+        "plan": isinstance(case.building.geometry, FloorPlans),
+        "cells": field is not None,
+        "zones": figures.zone_panels(series, evaluation.zones, {z: e["mae"] for z, e in errors.items()}),
+        "inside": f"{100 * inside:.0f} %" if np.isfinite(inside) else "",
+        "zone_count": len(errors),
+        "ahead": ahead,
+    }
+
+
+def error_maps(
+    case: Case, zones: tuple[str, ...], error: FloatArray, title: str, field: figures.Field | None = None
+) -> list[figures.Picture]:
+    """Map the error of the zones on the plans, or on tiles where there is no plan."""
+    geometry = case.building.geometry
+    if isinstance(geometry, FloorPlans):
+        return figures.floor_maps(geometry, case.building.orientation, zones, error, title, field)
+    areas = np.array([zone.floor_area for zone in geometry.zones])
+    return figures.tile_map(zones, areas, error, title)
+
+
+def interval_rows(evaluation: Evaluation) -> list[list[str]]:
+    """Rows of the table of intervals: start, end, runs, skipped, error."""
+    return [
+        [clock(p.interval.start), clock(p.interval.end), str(len(p.start)), str(p.skipped), f"{m.mae:.3f}"]
+        for p, m in zip(evaluation.predictions, _metrics(evaluation), strict=True)
+    ]
+
+
+def zone_rows(errors: dict[str, dict[str, float]]) -> list[list[str]]:
+    """Rows of the table of zones, the largest error first."""
+    return [
+        [z, f"{e['mae']:.3f}", signed(e["bias"])] for z, e in sorted(errors.items(), key=lambda item: -item[1]["mae"])
+    ]
+
+
+def subtitle(case: Case, evaluation: Evaluation) -> str:
+    """Line under a page's title."""
+    zones, measured = len(evaluation.zones), len(evaluation.by_zone())
+    seen = counted(zones, "zone") + ("" if measured == zones else f", {measured} of them measured")
+    return f"{seen}; times are local ({case.building.location.timezone})"
+
+
+def _metrics(evaluation: Evaluation) -> list[Any]:
+    return [spatial_metrics(p.error) for p in evaluation.predictions]

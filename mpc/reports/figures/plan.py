@@ -1,0 +1,234 @@
+"""Floor plans: the building as drawn, and the paper's heat map of the spatial error on it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize, to_rgb
+from matplotlib.figure import Figure
+from matplotlib.text import OffsetFrom
+from numpy.typing import NDArray
+from scipy.ndimage import distance_transform_edt
+
+from mpc.reports.figures.field import Field
+from mpc.reports.figures.style import INK, FloatArray, Picture, picture, styled
+from thermal import FloorPlan, FloorPlans
+
+#: Red is a simulation that is too warm, blue one that is too cold, white none, as in the paper.
+ERROR_COLOURS = colormaps["RdBu_r"]
+
+#: Labels below this size are left out [pt].
+SMALLEST_LABEL = 4.6
+
+#: Colours of what is drawn in a plan beside its zones, and of what is not measured.
+WALLS = {"#": to_rgb("#3A3F45"), "+": to_rgb("#8E949B"), ".": to_rgb("white")}
+UNMEASURED = to_rgb("#E3E5E8")
+_ZONES = [to_rgb(c) for c in ("#D7E8F5", "#FBE3D0", "#DDEFDC", "#F3E6F3", "#FFF3C9", "#DDEFEF", "#F0E4DA", "#E5E6F4")]
+
+
+def error_scale(values: FloatArray) -> float:
+    """Choose the ends of a symmetric colour scale [K]: what 98 % of the values stay within, rounded up."""
+    finite = np.abs(values[np.isfinite(values)])
+    top = float(np.quantile(finite, 0.98)) if finite.size else 0.0
+    step = next((step for limit, step in ((0.2, 0.1), (1.0, 0.2), (4.0, 0.4)) if top <= limit), 1.0)
+    return float(max(1.0, np.ceil(round(top / step, 6))) * step)
+
+
+def colour_bar(figure: Figure, axes: Axes, scale: float) -> None:
+    """Add a horizontal bar of the error's colours below the axes."""
+    colours = ScalarMappable(Normalize(-scale, scale), ERROR_COLOURS)
+    bar = figure.colorbar(colours, ax=axes, orientation="horizontal", aspect=40, shrink=0.8, pad=0.02, extend="both")
+    bar.set_label("simulated minus measured [K]: red too warm, blue too cold", fontsize=8)
+    bar.set_ticks([-scale, -0.5 * scale, 0.0, 0.5 * scale, scale])
+    bar.ax.tick_params(labelsize=8)
+
+
+def error_colour(value: float, scale: float) -> tuple[float, float, float]:
+    """Colour of an error; grey where nothing is measured."""
+    if not np.isfinite(value):
+        return UNMEASURED
+    red, green, blue, _ = ERROR_COLOURS(0.5 + 0.5 * value / scale)
+    return red, green, blue
+
+
+def ink_on(colour: tuple[float, float, float]) -> str:
+    """Dark or white text, whichever reads better on a colour."""
+    return "white" if 0.299 * colour[0] + 0.587 * colour[1] + 0.114 * colour[2] < 0.5 else INK
+
+
+@styled
+def plan_drawings(plans: FloorPlans, orientation: float) -> list[Picture]:
+    """Draw each floor with its zones and walls.
+
+    Parameters
+    ----------
+    plans : FloorPlans
+        The floors.
+    orientation : float
+        Clockwise from true north to the plan's up [deg].
+    """
+    drawn = []
+    for floor in plans.floors:
+        colours = {zone: _ZONES[i % len(_ZONES)] for i, zone in enumerate(floor.zone_names)}
+        image = np.array([[WALLS.get(str(t)) or colours[str(t)] for t in row] for row in floor.tokens])
+        labels = {zone: (zone, colours[zone]) for zone in floor.zone_names}
+        figure, _ = canvas(floor, plans.cell_size, orientation, image, f"floor {floor.name}", labels)
+        drawn.append(picture(figure, f"Plan of floor {floor.name} with {len(labels)} zones"))
+    return drawn
+
+
+@styled
+def floor_maps(
+    plans: FloorPlans,
+    orientation: float,
+    zones: tuple[str, ...],
+    error: FloatArray,
+    title: str,
+    field: Field | None = None,
+) -> list[Picture]:
+    """Draw the error of each zone on the plan of each floor, or of each cell where the field of the grid is given.
+
+    Parameters
+    ----------
+    plans : FloorPlans
+        The floors.
+    orientation : float
+        Clockwise from true north to the plan's up [deg].
+    zones : tuple of str
+        Zone names.
+    error : ndarray, shape (n_zone,)
+        Simulated minus measured [K], NaN where not measured; the numbers on the map.
+    title : str
+        Follows the floor's name.
+    field : Field, optional
+        Temperatures of the grid's control volumes.
+    """
+    values = [
+        _cell_errors(floor, number, plans.cell_size, zones, error, field) for number, floor in enumerate(plans.floors)
+    ]
+    scale = error_scale(np.concatenate([v.ravel() for v in values]))
+    by_zone = dict(zip(zones, error, strict=True))
+    drawn = []
+    for floor, cells in zip(plans.floors, values, strict=True):
+        image = ERROR_COLOURS(0.5 + 0.5 * cells / scale)[..., :3]
+        image[~np.isfinite(cells)] = UNMEASURED
+        split = cells.shape[0] // floor.tokens.shape[0]
+        tokens = np.repeat(np.repeat(floor.tokens, split, axis=0), split, axis=1)
+        for token, colour in WALLS.items():
+            image[tokens == token] = colour
+        labels = {
+            z: (f"{z}\n{signed_kelvin(by_zone[z])}", error_colour(float(np.median(cells[tokens == z])), scale))
+            for z in floor.zone_names
+        }
+        figure, axes = canvas(floor, plans.cell_size, orientation, image, f"floor {floor.name}, {title}", labels)
+        colour_bar(figure, axes, scale)
+        worst = max(floor.zone_names, key=lambda z: np.nan_to_num(abs(by_zone[z]), nan=-1.0))
+        alt = f"Error on floor {floor.name}, {title}; largest in zone {worst}: {signed_kelvin(by_zone[worst])}"
+        drawn.append(picture(figure, alt))
+    return drawn
+
+
+def signed_kelvin(value: float) -> str:
+    """Spell an error of a zone."""
+    if not np.isfinite(value):
+        return "not measured"
+    return f"{value:+.2f} K".replace("-", "−") if abs(value) >= 0.005 else "0.00 K"
+
+
+def _cell_errors(
+    floor: FloorPlan, number: int, cell: float, zones: tuple[str, ...], error: FloatArray, field: Field | None
+) -> FloatArray:
+    """Error of each pixel of a floor [K]; NaN in walls, outside, and where nothing is measured."""
+    code = np.full(floor.tokens.shape, -1)
+    for name in floor.zone_names:
+        code[floor.tokens == name] = zones.index(name)
+    if field is None:
+        return np.where(code >= 0, error[code], np.nan)
+    spacing = cell if field.dx is None else field.dx
+    split, merge = max(1, round(cell / spacing)), max(1.0, spacing / cell)
+    code = np.repeat(np.repeat(code, split, axis=0), split, axis=1)
+    mine = np.flatnonzero((field.network.kind == "air") & (field.network.place[:, 0] == number))
+    places = zip(*field.network.place[mine, 1:].T, field.network.zone[mine], strict=True)
+    temperature = {(int(r), int(c), int(z)): t for (r, c, z), t in zip(places, field.temperatures[mine], strict=True)}
+    out = np.full(code.shape, np.nan)
+    for row, column in np.argwhere(code >= 0):
+        zone = int(code[row, column])
+        out[row, column] = (
+            temperature[int((row + 0.5) / merge), int((column + 0.5) / merge), zone] - field.measured[zone]
+        )
+    return out
+
+
+def canvas(
+    floor: FloorPlan,
+    cell: float,
+    orientation: float,
+    image: FloatArray,
+    title: str,
+    labels: Mapping[str, tuple[str, tuple[float, float, float]]],
+) -> tuple[Figure, Axes]:
+    """Axes in metres with the image of a floor, labels where they fit, and an arrow to the north."""
+    rows, columns = floor.tokens.shape
+    width = 6.4
+    shown = width - 0.8
+    figure = Figure(figsize=(width, min(7.5, shown * rows / columns + 1.35)))
+    axes = figure.subplots()
+    axes.imshow(image, extent=(0, columns * cell, rows * cell, 0), interpolation="nearest")
+    axes.grid(visible=False)
+    axes.spines[["left", "bottom"]].set_visible(False)
+    axes.set_title(title)
+    axes.tick_params(labelsize=8)
+    axes.set_xlabel("[m]", fontsize=8)
+    scale = 72.0 * min(shown / columns, 6.0 / rows)  # points a cell
+    for zone, (text, colour) in labels.items():
+        _label(axes, floor.tokens == zone, cell, scale, text, ink_on(colour), 8.0 if len(labels) < 30 else 6.5)
+    _north(axes, orientation)
+    return figure, axes
+
+
+def _north(axes: Axes, orientation: float) -> None:
+    """Draw an arrow to true north, above the right corner."""
+    x, y = -np.sin(np.deg2rad(orientation)), np.cos(np.deg2rad(orientation))
+    corner = OffsetFrom(axes, (1.0, 1.0), "points")
+
+    def along(points: float) -> tuple[float, float]:
+        return float(-14.0 + points * x), float(14.0 + points * y)
+
+    style = {"arrowstyle": "-|>", "color": INK, "shrinkA": 0, "shrinkB": 0, "linewidth": 1.0}
+    tip, foot = along(9.0), along(-9.0)
+    axes.annotate("", tip, foot, xycoords=corner, textcoords=corner, annotation_clip=False, arrowprops=style)
+    axes.annotate("N", along(16.0), xycoords=corner, fontsize=7, ha="center", va="center", annotation_clip=False)
+
+
+def _label(axes: Axes, mine: NDArray[np.bool_], cell: float, scale: float, text: str, ink: str, largest: float) -> None:
+    """Write into the roomiest place of a zone; the number alone, or nothing, where more does not fit."""
+    depth = distance_transform_edt(np.pad(mine, 1))[1:-1, 1:-1]
+    deepest = depth.max()
+    centre = np.argwhere(mine).mean(axis=0)
+    best = (-np.inf, 0.0, 0.0, 0, "")
+    for row in np.flatnonzero(depth.max(axis=1) >= 0.6 * deepest):
+        for first, last in _runs(mine[row] & (depth[row] >= 0.5 * deepest)):
+            column = 0.5 * (first + last)
+            far = abs(row - centre[0]) + abs(column - centre[1])
+            height = 2.0 * float(depth[row, first : last + 1].max()) * scale
+            for lines in (text, text.rpartition("\n")[2]):
+                width = 0.66 * max(map(len, lines.split("\n")))
+                size = min(largest, (last - first + 1.3) * scale / width, height / (1.3 * (lines.count("\n") + 1)))
+                better = size - 0.05 * far + (1.0 if lines == text else 0.0)
+                if size >= SMALLEST_LABEL and better > best[0]:
+                    best = (better, size, column, int(row), lines)
+    _, size, column, at, lines = best
+    if lines:
+        above, below = next(r for r in _runs(depth[:, int(column)] >= depth[at, int(column)]) if r[0] <= at <= r[1])
+        x, y = (column + 0.5) * cell, 0.5 * (above + below + 1) * cell
+        axes.text(x, y, lines, fontsize=size, color=ink, ha="center", va="center", linespacing=1.15)
+
+
+def _runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """First and last position of each stretch of True."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(np.int8), [0]])))
+    return [(int(a), int(b) - 1) for a, b in zip(edges[::2], edges[1::2], strict=True)]

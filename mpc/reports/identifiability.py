@@ -1,0 +1,211 @@
+"""What the data determine, in words that are true on the estimation scale: products, ratios, odds."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from mpc.reports.page import unit
+from thermal import Parameter
+from thermal.parameters import FACADE_PREFIX
+
+#: Relative deviations up to this one are told in per cent, larger ones as a factor [-].
+MOST_PER_CENT = 0.5
+
+#: Members of one group that are named one by one; of more, how many there are and the ends of what they have.
+MOST_NAMED = 3
+
+#: End of the names of nominal values, and of the parameters with which they enter as a product.
+_DENSITY, _CAPACITY = "_density", "_heat_capacity"
+
+
+def in_words(name: str) -> str:
+    """Spell the name of a parameter as people write it.
+
+    Parameters
+    ----------
+    name : str
+        Such as ``window_u_value``.
+
+    Examples
+    --------
+    >>> in_words("window_u_value")
+    'window U-value'
+    """
+    return name.replace("_u_value", "_U-value").replace("_", " ")
+
+
+def spoken(parameter: Parameter) -> str:
+    """Name a parameter as one says it.
+
+    Parameters
+    ----------
+    parameter : Parameter
+        Of the building, a facade or a zone.
+    """
+    name = in_words(parameter.base)
+    if parameter.scope == "facade":
+        return f"{name} of the {str(parameter.member).removeprefix(FACADE_PREFIX)} facade"
+    return f"{name} of zone {parameter.member}" if parameter.scope == "zone" else name
+
+
+def _precision_words(parameter: Parameter | None, deviation: float) -> str:
+    """Say a standard deviation of a logarithm.
+
+    Parameters
+    ----------
+    parameter : Parameter or None
+        Whose it is; for a probability it is that of its odds.
+    deviation : float
+        On the estimation scale [-].
+    """
+    size = f"{100 * deviation:.2g} %" if deviation < MOST_PER_CENT else f"a factor of {np.exp(deviation):.2g}"
+    return f"its odds to {size}" if parameter is not None and parameter.scale == "logit" else f"to {size}"
+
+
+def combination_words(parameters: Mapping[str, Parameter], exponents: Mapping[str, float]) -> str:
+    """Name a product of powers: a product, a ratio, or a combination.
+
+    Parameters
+    ----------
+    parameters : mapping of str to Parameter
+        By name.
+    exponents : mapping of str to float
+        By name, not zero; those of a probability are on its odds [-].
+
+    Examples
+    --------
+    >>> from thermal import PARAMETERS
+    >>> combination_words(PARAMETERS, {"slab_heat_capacity": 1.0, "slab_coupling": -1.0})
+    'ratio slab heat capacity / slab coupling'
+    """
+    names = {
+        name: ("odds of the " if parameters[name].scale == "logit" else "") + spoken(parameters[name])
+        for name in exponents
+    }
+    if any(abs(abs(e) - 1.0) > 1e-9 for e in exponents.values()):
+        powers = (names[n] if e == 1.0 else f"({names[n]})^{e:.2g}" for n, e in exponents.items())
+        return f"combination {' × '.join(powers)}"
+    above, below = ([names[n] for n, e in exponents.items() if e * sign > 0] for sign in (1.0, -1.0))
+    if not below:
+        return f"product {' × '.join(above)}"
+    kind = "ratio" if len(exponents) == 2 else "combination"
+    under = below[0] if len(below) == 1 else f"({' × '.join(below)})"
+    return f"{kind} {' × '.join(above) or '1'} / {under}"
+
+
+def listed(words: Iterable[str], last: str = "and") -> str:
+    """Join words as a sentence does.
+
+    Parameters
+    ----------
+    words : iterable of str
+        At least one.
+    last : str
+        What stands before the last.
+    """
+    *first, end = words
+    return f"{', '.join(first)} {last} {end}" if first else end
+
+
+def describe(
+    parameters: Sequence[Parameter],
+    known: Sequence[Any],
+    combinations: Sequence[Any],
+    correlations: Sequence[tuple[str, str, float]],
+    nominal: Mapping[str, tuple[float, str]],
+) -> tuple[str, ...]:
+    """Say all that is known of the parameters.
+
+    Parameters
+    ----------
+    parameters : sequence of Parameter
+        The estimated ones.
+    known : sequence of ParameterInformation
+        One a parameter.
+    combinations : sequence of Combination
+        What is determined although its factors are not.
+    correlations : sequence of (str, str, float)
+        Pairs that go together.
+    nominal : mapping of str to (float, str)
+        Values that enter only as a product, with unit [that unit].
+    """
+    named = {p.name: p for p in parameters}
+    told = {k.name: k for k in known if k.status == "determined"}
+    sentences = [_summary(len(told), len(known), len(combinations))]
+    if told:
+        each = _gathered([(named[n], k.posterior_deviation) for n, k in told.items()], _precision_words)
+        sentences.append(f"Determined: {', '.join(each)}.")
+    sentences += [_combination(named, set(told), c) for c in combinations]
+    members = {name for c in combinations for name in c.exponents}
+    sentences += _open(named, [k for k in known if k.name not in members | set(told)])
+    sentences += [_nominal(named, set(told), name, *value) for name, value in nominal.items()]
+    sentences += [
+        f"The errors of {spoken(named[a])} and {spoken(named[b])} go together: correlation {r:.2f}."
+        for a, b, r in correlations
+    ]
+    return tuple(sentences)
+
+
+def _summary(told: int, count: int, combinations: int) -> str:
+    alone = "none" if not told else "all" if told == count else str(told)
+    beside = f", and {combinations} combination{'s' if combinations > 1 else ''} of others" if combinations else ""
+    return f"The data determine {alone} of {count} parameters by themselves{beside}."
+
+
+def _combination(named: Mapping[str, Parameter], told: set[str], combination: Any) -> str:
+    apart = [spoken(named[name]) for name in combination.exponents if name not in told]
+    kept = "by themselves" if len(apart) > 1 else "by itself"
+    precise = _precision_words(None, combination.deviation)
+    return f"Only the {combination.words} is determined ({precise}), not {listed(apart, 'or')} {kept}."
+
+
+def _open(named: Mapping[str, Parameter], known: Sequence[Any]) -> list[str]:
+    def having(status: str, words: Callable[[Parameter, float], str]) -> list[str]:
+        return _gathered([(named[k.name], k.ratio) for k in known if k.status == status], words)
+
+    def left(parameter: Parameter, ratio: float) -> str:
+        return f"{100 * ratio:.0f} %"
+
+    sentences = []
+    if partly := having("partly", left):
+        sentences.append(f"Partly determined (share of the prior's deviation that is left): {', '.join(partly)}.")
+    if held := having("through_priors", left):
+        sentences.append(f"Known only because priors hold the others (share that is left): {', '.join(held)}.")
+    if none := having("not", lambda parameter, ratio: ""):
+        are = "is" if sum(k.status == "not" for k in known) == 1 else "are"
+        sentences.append(f"{listed(none)} {are} not determined by these data.")
+    return [s[0].upper() + s[1:] for s in sentences]
+
+
+def _gathered(parameters: Sequence[tuple[Parameter, float]], words: Callable[[Parameter, float], str]) -> list[str]:
+    """Name parameters, each with what is said of its number; many of one kind are named together."""
+    groups: dict[str, list[tuple[Parameter, float]]] = {}
+    for p, number in parameters:
+        groups.setdefault(f"{p.base} {p.scope}", []).append((p, number))
+    named = []
+    for group in groups.values():
+        first, count = group[0][0], len(group)
+        parts = [(spoken(p), words(p, number)) for p, number in group]
+        if count > MOST_NAMED:
+            best, worst = (words(first, end) for end in (min(n for _, n in group), max(n for _, n in group)))
+            name = f"{spoken(replace(first, scope='global', member=None))} of {count} {first.scope}s"
+            parts = [(name, best if best == worst else f"{best} at best, {worst} at worst")]
+        named += [f"{name} ({said})" if said else name for name, said in parts]
+    return named
+
+
+def _nominal(named: Mapping[str, Parameter], told: set[str], name: str, value: float, of: str) -> str:
+    """Say what a nominal value hides: a density, that only its product with the heat capacity counts."""
+    base = name.removesuffix(_DENSITY)
+    partners = [p.name for p in named.values() if p.base == base + _CAPACITY]
+    thing, number = base.replace("_", " "), f"{value:g}" if of == "1" else f"{value:g} {unit(of)}"
+    stays = f"the density stays at its nominal {number}"
+    if name.endswith(_DENSITY) and partners and set(partners) <= told:
+        return f"Only the product density × heat capacity of the {thing} is determined: {stays}."
+    if name.endswith(_DENSITY):
+        return f"Density and heat capacity of the {thing} enter only as a product: {stays}."
+    return f"{name.replace('_', ' ').capitalize()} enters only as a product and stays at its nominal {number}."

@@ -1,0 +1,261 @@
+"""What a kilowatt-hour costs or emits: constant, by the local hour, or as a series of published values."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Literal, Protocol
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike, NDArray
+
+from mpc.errors import TariffError
+from mpc.scenario.grid import WEEKDAY, Calendar, StepGrid, index_seconds
+from thermal.errors import describe
+
+FloatArray = NDArray[np.float64]
+
+#: Energy of a kilowatt-hour [J].
+KILOWATT_HOUR = 3.6e6
+
+#: Energy of the units that gas is sold by [kWh]: 10^5 and 10^6 Btu (IT); a thousand cubic feet at 1,036 Btu each,
+#: upper heating value (U.S. EIA, Monthly Energy Review, table A4, 2023).
+GAS_UNITS = {"kWh": 1.0, "therm": 29.30711, "mmBtu": 293.0711, "kcf": 303.6216, "MWh": 1000.0, "GJ": 277.7778}
+
+
+class Rate(Protocol):
+    """A price or an emission factor per kilowatt-hour over time."""
+
+    def on(self, grid: StepGrid) -> FloatArray:
+        """Average over each step of a grid, shape (n_steps,) [per kWh].
+
+        Parameters
+        ----------
+        grid : StepGrid
+            Steps in the building's time zone.
+        """
+        ...
+
+
+@dataclass(frozen=True)
+class ConstantRate:
+    """The same at all times.
+
+    Parameters
+    ----------
+    value : float
+        Price or factor [1/kWh of the currency or of kg].
+    """
+
+    value: float
+
+    def __post_init__(self) -> None:
+        if not np.isfinite(self.value):
+            raise TariffError(describe("rate", "a finite number per kWh", repr(self.value)))
+
+    def on(self, grid: StepGrid) -> FloatArray:
+        """Average over each step of a grid, shape (n_steps,) [per kWh].
+
+        Parameters
+        ----------
+        grid : StepGrid
+            Its number of steps counts.
+        """
+        return np.full(grid.n_steps, float(self.value))
+
+
+@dataclass(frozen=True, eq=False)
+class HourlyRate:
+    """A rate that follows the local clock: time of use.
+
+    The local hour decides, so that the 23 and 25 hours of the days on which clocks change are right: the hour that is
+    skipped costs nothing, the hour that comes twice costs twice what it says. A step that straddles a change of the
+    rate has the mean over it.
+
+    Parameters
+    ----------
+    weekday : ndarray, shape (24,) or (12, 24)
+        For each local hour from midnight, or each month and hour [1/kWh].
+    weekend : ndarray, shape (24,) or (12, 24)
+        On Saturdays, Sundays and holidays [1/kWh]; default as on weekdays.
+    calendar : Calendar
+        Which days are holidays; default none.
+
+    Raises
+    ------
+    TariffError
+        When a table has another shape or a value is not finite.
+
+    Examples
+    --------
+    >>> from datetime import date
+    >>> rate = HourlyRate([0.1] * 16 + [0.3] * 4 + [0.1] * 4, [0.1] * 24)
+    >>> monday = StepGrid(pd.Timestamp("2023-07-03", tz="America/Los_Angeles"), 3600.0, 24)
+    >>> rate.on(monday)[15:18].tolist()
+    [0.1, 0.3, 0.3]
+    """
+
+    weekday: ArrayLike
+    weekend: ArrayLike | None = None
+    calendar: Calendar = field(default_factory=Calendar)
+
+    def __post_init__(self) -> None:
+        weekday = _month_hours(self.weekday, "weekday")
+        weekend = weekday if self.weekend is None else _month_hours(self.weekend, "weekend")
+        object.__setattr__(self, "weekday", weekday)
+        object.__setattr__(self, "weekend", weekend)
+
+    def on(self, grid: StepGrid) -> FloatArray:
+        """Average over each step of a grid, shape (n_steps,) [per kWh].
+
+        Parameters
+        ----------
+        grid : StepGrid
+            Steps in the building's time zone.
+        """
+        return grid.mean(by_month_and_hour(np.asarray(self.weekday), np.asarray(self.weekend), self.calendar, grid))
+
+
+def by_month_and_hour(weekday: FloatArray, weekend: FloatArray, calendar: Calendar, grid: StepGrid) -> FloatArray:
+    """Look tables of months and hours up at the pieces of a grid, shape (n_steps * per_step,).
+
+    Parameters
+    ----------
+    weekday, weekend : ndarray, shape (12, 24)
+        What they hold [any].
+    calendar : Calendar
+        Which days are holidays.
+    grid : StepGrid
+        Steps in the building's time zone.
+    """
+    times = grid.middles
+    month, hour = np.asarray(times.month) - 1, np.asarray(times.hour)
+    return np.asarray(np.where(calendar.kinds_on(times) == WEEKDAY, weekday[month, hour], weekend[month, hour]))
+
+
+def _month_hours(values: ArrayLike, name: str) -> FloatArray:
+    table = np.asarray(values, dtype=float)
+    if table.shape not in ((24,), (12, 24)) or not np.isfinite(table).all():
+        expected = "24 finite numbers, or 12 rows of 24, one an hour of the local day"
+        raise TariffError(describe(f"hourly rate: {name}", expected, f"shape {table.shape}"))
+    return np.array(np.broadcast_to(table, (12, 24)))
+
+
+@dataclass(frozen=True, eq=False)
+class MonthlyRate:
+    """A rate that changes with the local month.
+
+    Parameters
+    ----------
+    values : sequence of float
+        January to December [1/kWh].
+
+    Raises
+    ------
+    TariffError
+        When there are not 12 finite numbers.
+    """
+
+    values: Sequence[float]
+
+    def __post_init__(self) -> None:
+        if np.shape(self.values) != (12,) or not np.isfinite(self.values).all():
+            raise TariffError(describe("monthly rate", "12 finite numbers", repr(self.values)))
+
+    def on(self, grid: StepGrid) -> FloatArray:
+        """Average over each step of a grid, shape (n_steps,) [per kWh].
+
+        Parameters
+        ----------
+        grid : StepGrid
+            Steps in the building's time zone.
+        """
+        return grid.mean(np.asarray(self.values, dtype=float)[np.asarray(grid.middles.month) - 1])
+
+
+@dataclass(frozen=True, eq=False)
+class SeriesRate:
+    """A rate as a market or an operator publishes it.
+
+    Parameters
+    ----------
+    series : pandas.Series
+        Values at regular stamps with a time zone [1/kWh], without gaps; constant over each interval.
+    stamped : str
+        Where in its interval a stamp stands: ``start`` as most markets write it, or ``end``. There is no default,
+        since the wrong one is an hour off.
+
+    Raises
+    ------
+    TariffError
+        When the stamps have no time zone or are irregular, or a value is missing.
+    """
+
+    series: pd.Series
+    stamped: Literal["start", "end"]
+
+    def __post_init__(self) -> None:
+        index = self.series.index
+        if self.stamped not in ("start", "end"):
+            raise TariffError(describe("series: stamped", "'start' or 'end'", repr(self.stamped)))
+        if not isinstance(index, pd.DatetimeIndex) or index.tz is None or len(index) < 2:
+            raise TariffError(describe("series", "at least two stamps with a time zone", f"an index of {index.dtype}"))
+        gaps = np.diff(index_seconds(index))
+        if (gaps != gaps[0]).any() or gaps[0] <= 0:
+            row = int(np.flatnonzero((gaps != gaps[0]) | (gaps <= 0))[0])
+            expected = f"a stamp {gaps[0]} s after {index[row]}"
+            raise TariffError(describe("series", expected, str(index[row + 1]), "fill gaps, and sort the stamps"))
+        empty = self.series.isna().to_numpy()
+        if empty.any():
+            found = f"{empty.sum()} missing of {len(empty)}, first {index[int(np.argmax(empty))]}"
+            raise TariffError(describe("series", "a value at each stamp", found))
+
+    def on(self, grid: StepGrid) -> FloatArray:
+        """Average over each step of a grid, shape (n_steps,) [per kWh].
+
+        Parameters
+        ----------
+        grid : StepGrid
+            Within the time that the series covers.
+
+        Raises
+        ------
+        TariffError
+            When the series does not cover the grid.
+        """
+        stamps = index_seconds(pd.DatetimeIndex(self.series.index))
+        length = stamps[1] - stamps[0]
+        edges = np.append(stamps, stamps[-1] + length) - (length if self.stamped == "end" else 0)
+        if grid.edges[0] < edges[0] or grid.edges[-1] > edges[-1]:
+            zone = grid.start.tz
+            first, last = (pd.Timestamp(int(e), unit="s", tz=zone) for e in (edges[0], edges[-1]))
+            found = f"{first} to {last}"
+            raise TariffError(describe("series", f"values from {grid.start} to {grid.stamps[-1]}", found))
+        total = np.concatenate([[0.0], np.cumsum(self.series.to_numpy(dtype=float))]) * length
+        return np.asarray(np.diff(np.interp(grid.edges, edges, total)) / grid.step)
+
+
+def gas_price(value: float, unit: str) -> ConstantRate:
+    """Price of gas by the unit that it is sold in.
+
+    Parameters
+    ----------
+    value : float
+        Price [1/unit in the currency].
+    unit : str
+        A key of `GAS_UNITS`: ``kWh``, ``MWh``, ``GJ``, ``therm``, ``mmBtu`` or ``kcf`` (a thousand cubic feet).
+
+    Raises
+    ------
+    TariffError
+        When the unit is not known.
+
+    Examples
+    --------
+    >>> round(gas_price(1.2, "therm").value, 4)
+    0.0409
+    """
+    if unit not in GAS_UNITS:
+        raise TariffError(describe("gas price", f"a price per {', '.join(GAS_UNITS)}", repr(unit)))
+    return ConstantRate(value / GAS_UNITS[unit])

@@ -1,0 +1,230 @@
+"""What energy costs: energy prices, and charges for the highest demand of a month."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mpc.errors import TariffError
+from mpc.scenario.grid import Calendar, StepGrid
+from mpc.scenario.rates import Rate, by_month_and_hour
+from thermal.errors import describe
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+
+def window_means(power: ArrayLike, starts: ArrayLike, step: float, window: float) -> tuple[FloatArray, FloatArray]:
+    """Average power over the demand windows of the clock.
+
+    Power is constant over each step, so that its integral is known at any time: windows need not be whole steps.
+
+    Parameters
+    ----------
+    power : array_like, shape (n_steps,)
+        Means over the steps [W].
+    starts : array_like, shape (n_steps,)
+        Starts of the steps, seconds since 1970 [s].
+    step : float
+        Length of a step [s].
+    window : float
+        Length of a window [s]; windows begin at its multiples. The first and the last have the mean of the part that
+        lies within the steps.
+
+    Returns
+    -------
+    mean : ndarray, shape (n_window,)
+        Means [W].
+    begin : ndarray, shape (n_window,)
+        When each window begins [s].
+    """
+    values, first = np.asarray(power, dtype=float), np.asarray(starts, dtype=float)
+    edges = np.append(first, first[-1] + step)
+    inner = np.arange(np.floor(edges[0] / window) + 1, np.ceil(edges[-1] / window)) * window
+    bounds = np.concatenate([edges[:1], inner, edges[-1:]])
+    energy = np.concatenate([[0.0], np.cumsum(values) * step])
+    mean = np.diff(np.interp(bounds, edges, energy)) / np.diff(bounds)
+    return np.asarray(mean), bounds[:-1]
+
+
+@dataclass(frozen=True, eq=False)
+class DemandBuckets:
+    """Which peaks a demand charge counts apart on a grid.
+
+    Parameters
+    ----------
+    grid : StepGrid
+        Steps.
+    bucket : ndarray, shape (n_steps,)
+        Number of the peak that each step belongs to; -1 for none.
+    rate : ndarray, shape (n_bucket,)
+        Charge for each [currency/kW].
+    names : tuple of str
+        Month, charge and period of each.
+    window : float
+        Length of the mean whose highest value counts [s].
+    """
+
+    grid: StepGrid
+    bucket: IntArray
+    rate: FloatArray
+    names: tuple[str, ...]
+    window: float
+
+    def peaks(self, power: ArrayLike, step: float | None = None, first_step: int = 0) -> FloatArray:
+        """Highest mean power over a window, of each peak.
+
+        Parameters
+        ----------
+        power : array_like, shape (n,)
+            Means over steps of a run [W].
+        step : float
+            Length of those steps [s]; default the grid's.
+        first_step : int
+            Step of the grid in which the run began.
+
+        Returns
+        -------
+        ndarray, shape (n_bucket,)
+            0 or more [W].
+
+        Raises
+        ------
+        TariffError
+            When the run is not within the grid.
+        """
+        values, length = np.asarray(power, dtype=float), self.grid.step if step is None else step
+        starts = self.grid.edges[first_step] + np.arange(len(values)) * length
+        if values.ndim != 1 or not len(values) or starts[-1] + length > self.grid.edges[-1]:
+            expected = f"means over steps within {self.grid.start} to {self.grid.stamps[-1]}"
+            raise TariffError(describe("power", expected, f"shape {values.shape}, steps of {length:g} s"))
+        mean, begin = window_means(values, starts, length, self.window)
+        owner = self.bucket[np.searchsorted(self.grid.edges, begin, side="right") - 1]
+        peak = np.zeros(len(self.rate))
+        np.maximum.at(peak, owner[owner >= 0], mean[owner >= 0])
+        return peak
+
+    def cost(self, power: ArrayLike, step: float | None = None, first_step: int = 0) -> float:
+        """Charge for the peaks, each as if it were that of its whole month [currency].
+
+        Parameters
+        ----------
+        power : array_like, shape (n,)
+            Means over steps of a run [W].
+        step : float
+            Length of those steps [s]; default the grid's.
+        first_step : int
+            Step of the grid in which the run began.
+        """
+        return float(self.peaks(power, step, first_step) @ self.rate / 1000.0)
+
+
+@dataclass(frozen=True, eq=False)
+class DemandCharge:
+    """A charge for the highest mean power in each month, in each period of the day that has one.
+
+    Parameters
+    ----------
+    rates : sequence of float
+        Charge of each period [currency/kW].
+    weekday : array_like of int, shape (12, 24)
+        Period of each month and local hour [-], numbers into `rates`; -1 is free. Default: period 0 always, a flat
+        charge.
+    weekend : array_like of int, shape (12, 24)
+        The same for Saturdays, Sundays and holidays [-]; default as on weekdays.
+    window : float
+        Length of the mean [s]; default a quarter of an hour, as BOPTEST's peaks and most tariffs have it.
+    name : str
+        For reports.
+    calendar : Calendar
+        Which days are holidays; default none.
+
+    Raises
+    ------
+    TariffError
+        When a table has another shape or names a period that has no rate.
+
+    Examples
+    --------
+    >>> import pandas as pd
+    >>> flat = DemandCharge([12.5])
+    >>> hours = StepGrid(pd.Timestamp("2023-07-31 22:00", tz="America/Chicago"), 3600.0, 4)
+    >>> flat.on(hours).names, flat.on(hours).cost([5000.0, 3000.0, 1000.0, 2000.0])
+    (('2023-07 flat', '2023-08 flat'), 87.5)
+    """
+
+    rates: Sequence[float]
+    weekday: ArrayLike | None = None
+    weekend: ArrayLike | None = None
+    window: float = 900.0
+    name: str = "flat"
+    calendar: Calendar = field(default_factory=Calendar)
+
+    def __post_init__(self) -> None:
+        rates = np.asarray(self.rates, dtype=float)
+        if rates.ndim != 1 or not len(rates) or not (np.isfinite(rates) & (rates >= 0)).all():
+            raise TariffError(describe("demand charge: rates", "numbers of 0 or more", repr(self.rates)))
+        if self.window <= 0:
+            raise TariffError(describe("demand charge: window", "seconds above 0", repr(self.window)))
+        weekday = np.zeros((12, 24)) if self.weekday is None else np.asarray(self.weekday)
+        weekend = weekday if self.weekend is None else np.asarray(self.weekend)
+        for key, table in (("weekday", weekday), ("weekend", weekend)):
+            if table.shape != (12, 24) or not np.isin(table, np.arange(-1, len(rates))).all():
+                expected = f"12 rows of 24 periods from -1 to {len(rates) - 1}"
+                raise TariffError(describe(f"demand charge: {key}", expected, f"shape {table.shape}"))
+            object.__setattr__(self, key, table.astype(float))
+
+    def on(self, grid: StepGrid) -> DemandBuckets:
+        """Tell which peak each step of a grid belongs to; a step belongs where it begins.
+
+        Parameters
+        ----------
+        grid : StepGrid
+            Steps in the building's time zone.
+        """
+        period = by_month_and_hour(np.asarray(self.weekday), np.asarray(self.weekend), self.calendar, grid)
+        first = grid.middles[:: grid.per_step]
+        number = np.asarray(period[:: grid.per_step], dtype=np.int64)
+        keys = (np.asarray(first.year) * 12 + np.asarray(first.month) - 1) * len(self.rates) + number
+        keys[number < 0] = -1
+        known = np.unique(keys[keys >= 0])
+        bucket = np.where(keys < 0, -1, np.searchsorted(known, keys))
+        months, periods = np.divmod(known, len(self.rates))
+        label = [self.name if len(self.rates) == 1 else f"{self.name} {p}" for p in periods]
+        names = tuple(f"{m // 12}-{m % 12 + 1:02d} {text}" for m, text in zip(months, label, strict=True))
+        rates = np.asarray(self.rates, dtype=float)
+        return DemandBuckets(grid, bucket.astype(np.int64), rates[periods], names, float(self.window))
+
+
+@dataclass(frozen=True, eq=False)
+class Tariff:
+    """What electricity and gas cost.
+
+    Fixed and minimum charges are left out: no controller changes them.
+
+    Parameters
+    ----------
+    electricity, gas : Rate
+        Price of a kilowatt-hour [currency/kWh]; gas by its upper heating value.
+    demand : sequence of DemandCharge
+        For electricity; default none.
+    currency : str
+        For reports.
+    name : str
+        For reports.
+    """
+
+    electricity: Rate
+    gas: Rate
+    demand: Sequence[DemandCharge] = ()
+    currency: str = "USD"
+    name: str = ""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Give what a report says of the tariff, as plain types."""
+        charges = [{"name": d.name, "rates": [float(r) for r in d.rates], "window": d.window} for d in self.demand]
+        return {"name": self.name, "currency": self.currency, "demand_charges": charges}

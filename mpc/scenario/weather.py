@@ -1,0 +1,274 @@
+"""Weather at the building: readings or means at regular stamps, on any grid of steps."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from mpc.errors import WeatherError
+from mpc.scenario.averages import means_by_shape, means_of_means, means_of_readings
+from mpc.scenario.grid import StepGrid, index_seconds
+from thermal.case import Location
+from thermal.case.points import OUTDOOR_TEMPERATURE, POINT_TYPES
+from thermal.errors import describe, nearest
+from thermal.inputs import Sun, sun_of
+
+FloatArray = NDArray[np.float64]
+
+DIRECTION = "wind_direction_sensor"
+SUN_POINTS = (
+    "direct_normal_irradiance_sensor",
+    "diffuse_horizontal_irradiance_sensor",
+    "global_horizontal_irradiance_sensor",
+)
+SKY = "horizontal_infrared_irradiance_sensor"
+
+#: Points of the weather station, as the case format names them.
+WEATHER_POINTS = (OUTDOOR_TEMPERATURE, "wind_speed_sensor", DIRECTION, *SUN_POINTS, SKY)
+
+_LONGEST_STEP = 3600.0  # s
+_SHORTEST_PIECE = 60  # s: sub-steps of the sun's spread over an hour
+_DAY = 86400
+
+
+@dataclass(frozen=True, eq=False)
+class Weather:
+    """Weather of a stretch of time at one place.
+
+    Parameters
+    ----------
+    frame : DataFrame, shape (n_time, n_point)
+        Columns are `WEATHER_POINTS`, as far as known, in the library's units [K, m/s, deg, W/m2]. Regular local
+        stamps. A value stands for the step that ends at its stamp. NaN is missing.
+    location : Location
+        Where.
+    readings : bool
+        True when temperature and wind are readings at the stamps, as in EPW and TMY3 files, rather than means over the
+        step. Irradiances are means over the step always.
+    typical : bool
+        True for a year of hours that stands for any year: it repeats, and 29 February is like the day before.
+    step : float
+        Length of a step [s]; default 0: the time between stamps, which a single row does not tell.
+
+    Raises
+    ------
+    WeatherError
+        When stamps are irregular or have no zone, a column is no weather point, or a typical year has not 8760 hours.
+    """
+
+    frame: pd.DataFrame
+    location: Location
+    readings: bool = False
+    typical: bool = False
+    step: float = 0.0
+
+    def __post_init__(self) -> None:
+        index = self.frame.index
+        if not isinstance(index, pd.DatetimeIndex) or index.tz is None or len(index) < 1 + (not self.step):
+            found = f"{len(index)} of {index.dtype}"
+            raise WeatherError(describe("weather", "at least two stamps with a time zone", found))
+        gaps = np.diff(index_seconds(index)) if len(index) > 1 else np.array([int(self.step)])
+        uneven = (gaps != (self.step or gaps[0])) | (gaps <= 0) | (gaps > max(_LONGEST_STEP, self.step))
+        if uneven.any():
+            row = int(np.argmax(uneven))
+            found = f"{index[row + 1]} after {index[row]}"
+            raise WeatherError(describe("weather", f"one step of up to {_LONGEST_STEP:g} s", found, "fill the gap"))
+        for column in self.frame.columns:
+            if column not in WEATHER_POINTS:
+                advice = nearest(column, WEATHER_POINTS)
+                raise WeatherError(describe("weather: column", "a weather point", repr(column), advice))
+        if self.typical and (len(index) != 8760 or gaps[0] != 3600):
+            found = f"{len(index)} rows, a step of {gaps[0]} s"
+            raise WeatherError(describe("typical year", "8760 hours", found))
+        object.__setattr__(self, "step", float(gaps[0]))
+
+    @property
+    def stamps(self) -> pd.DatetimeIndex:
+        """Ends of the steps, shape (n_time,), local."""
+        return pd.DatetimeIndex(self.frame.index)
+
+    def values(self, point: str) -> FloatArray:
+        """Look a point up.
+
+        Parameters
+        ----------
+        point : str
+            One of `WEATHER_POINTS`.
+
+        Returns
+        -------
+        ndarray, shape (n_time,)
+            Without gaps [K, m/s, deg or W/m2].
+
+        Raises
+        ------
+        WeatherError
+            When the point is missing at any time.
+        """
+        self.require([point])
+        return self.frame[point].to_numpy(dtype=float)
+
+    def require(self, points: Sequence[str]) -> None:
+        """Refuse weather that lacks something.
+
+        Parameters
+        ----------
+        points : sequence of str
+            Of `WEATHER_POINTS`.
+
+        Raises
+        ------
+        WeatherError
+            Which point is missing, how often, and when first.
+        """
+        for point in points:
+            if point not in POINT_TYPES or point not in WEATHER_POINTS:
+                advice = nearest(point, WEATHER_POINTS)
+                raise WeatherError(describe("weather", "a weather point", repr(point), advice))
+            empty = self.frame[point].isna().to_numpy() if point in self.frame else np.ones(len(self.frame), dtype=bool)
+            if empty.any():
+                first = self.stamps[int(np.argmax(empty))]
+                raise WeatherError(
+                    f"weather lacks {point!r} for {empty.sum()} of {len(empty)} steps (first {first}); supply it, or "
+                    "fill the gap"
+                )
+
+    @cached_property
+    def outdoor(self) -> FloatArray:
+        """Outdoor air temperature, shape (n_time,) [K]."""
+        return self.values(OUTDOOR_TEMPERATURE)
+
+    @cached_property
+    def sun(self) -> Sun:
+        """Sun's place at the middle of the steps, and irradiances; what is not known is derived where that is possible.
+
+        Raises
+        ------
+        EffectError
+            When beam and diffuse irradiance are neither known nor derivable.
+        """
+        return sun_of(self.location, self.stamps, self.step, self.frame)
+
+    def on(self, grid: StepGrid) -> Weather:
+        """Average over the steps of a grid.
+
+        Readings lie on straight lines. Means over longer steps than the grid's are kept exactly: irradiances are spread
+        in proportion to the sine of the sun's altitude at the middle of each piece (the beam evenly over the time that
+        the sun is up), other means by a monotone cubic of their integral. Where the steps agree, values pass unchanged.
+
+        Parameters
+        ----------
+        grid : StepGrid
+            Within the time that the weather covers; a typical year covers any.
+
+        Returns
+        -------
+        Weather
+            One row a step, means.
+
+        Raises
+        ------
+        WeatherError
+            When the weather does not cover the grid, or the two clocks have no common whole minutes.
+        """
+        source = self._around(grid)
+        known = source.frame.columns[source.frame.notna().any()]
+        sun = source._pieces(grid)
+        columns: dict[str, FloatArray] = {}
+        for point in known:
+            whole = source.frame[point].notna().to_numpy()
+            values = source.frame[point].interpolate(limit_direction="both").to_numpy(dtype=float)
+            mean = source._means(str(point), values, grid, sun)
+            columns[str(point)] = mean if whole.all() else np.where(_covered(source, whole, grid), mean, np.nan)
+        return Weather(pd.DataFrame(columns, index=grid.stamps), self.location, step=grid.step)
+
+    def _means(self, point: str, values: FloatArray, grid: StepGrid, sun: _Pieces | None) -> FloatArray:
+        stamps, edges = index_seconds(self.stamps).astype(float), grid.edges.astype(float)
+        bounds = np.concatenate([[stamps[0] - self.step], stamps])
+        if point in SUN_POINTS and sun is not None:
+            # The beam does not know how high the sun is, only whether it is up.
+            shape = np.sign(sun.sine) if point == SUN_POINTS[0] else sun.sine
+            fine = means_by_shape(bounds, values, sun.edges, shape)
+            start = np.searchsorted(sun.edges, edges[0])
+            count = round(grid.step / (sun.edges[1] - sun.edges[0]))
+            return np.asarray(fine[start : start + grid.n_steps * count].reshape(grid.n_steps, count).mean(axis=1))
+        if point == DIRECTION:
+            angle = np.radians(values)
+            # 2 is added since a monotone cubic stands still where what it integrates changes its sign.
+            east, north = (self._plain(part + 2.0, bounds, edges) - 2.0 for part in (np.sin(angle), np.cos(angle)))
+            return np.asarray(np.degrees(np.arctan2(east, north)) % 360.0)
+        if point in SUN_POINTS or point == SKY:
+            return means_of_means(bounds, values, edges)
+        return self._plain(values, bounds, edges)
+
+    def _plain(self, values: FloatArray, bounds: FloatArray, edges: FloatArray) -> FloatArray:
+        if self.readings:
+            return means_of_readings(bounds, np.concatenate([values[:1], values]), edges)
+        return means_of_means(bounds, values, edges)
+
+    def _pieces(self, grid: StepGrid) -> _Pieces | None:
+        """Pieces that both clocks consist of, for a grid that is finer than this weather."""
+        if grid.step >= self.step or not set(SUN_POINTS) & set(self.frame.columns):
+            return None
+        from pvlib.solarposition import get_solarposition  # here: pvlib takes a second to import
+
+        stamps = index_seconds(self.stamps)
+        first = int(stamps[0] - self.step)
+        piece = math.gcd(int(self.step), int(grid.step), int(grid.edges[0]) - first)
+        if piece < _SHORTEST_PIECE:
+            expected = "clocks of weather and grid that differ by whole minutes"
+            raise WeatherError(describe("weather", expected, f"{piece} s"))
+        edges = np.arange(first, stamps[-1] + piece, piece)
+        middles = pd.to_datetime(edges[:-1] + piece / 2.0, unit="s", utc=True)
+        place = self.location
+        altitude = get_solarposition(middles, place.latitude, place.longitude, place.elevation)["elevation"].to_numpy()
+        return _Pieces(edges.astype(float), np.maximum(np.sin(np.radians(altitude)), 0.0))
+
+    def _around(self, grid: StepGrid) -> Weather:
+        """Cut this weather to a day around a grid, after a typical year has been repeated as often as needed."""
+        whole = self._repeated(grid) if self.typical else self
+        seconds = index_seconds(whole.stamps)
+        if grid.edges[0] < seconds[0] - self.step or grid.edges[-1] > seconds[-1]:
+            first = self.stamps[0] - pd.Timedelta(seconds=self.step)
+            expected = f"weather from {grid.start} to {grid.stamps[-1]}"
+            raise WeatherError(describe("weather", expected, f"{first} to {self.stamps[-1]}"))
+        near = (seconds > grid.edges[0] - _DAY) & (seconds < grid.edges[-1] + _DAY)
+        return Weather(whole.frame[near], self.location, self.readings)
+
+    def _repeated(self, grid: StepGrid) -> Weather:
+        zone = self.stamps.tz
+        years = range(grid.start.tz_convert(zone).year - 1, grid.stamps[-1].tz_convert(zone).year + 2)
+        # The year begins where its stamps say, whatever year they carry.
+        ordered = self.frame.iloc[np.argsort((self.stamps - pd.Timedelta(hours=1)).day_of_year, kind="stable")]
+        values = ordered.to_numpy(dtype=float)
+        february = slice(58 * 24, 59 * 24)
+        leap = np.concatenate([values[: 59 * 24], values[february], values[59 * 24 :]])
+        rows = np.concatenate([leap if pd.Timestamp(year, 1, 1).is_leap_year else values for year in years])
+        start = pd.Timestamp(years[0], 1, 1, 1).tz_localize(zone)
+        index = pd.date_range(start, periods=len(rows), freq="h", name="timestamp")
+        return Weather(pd.DataFrame(rows, index=index, columns=ordered.columns), self.location, self.readings)
+
+
+class _Pieces(NamedTuple):
+    """Edges of the pieces that two clocks share [s], and sine of the sun's altitude at their middles, 0 at night."""
+
+    edges: FloatArray
+    sine: FloatArray
+
+
+def _covered(source: Weather, known: NDArray[np.bool_], grid: StepGrid) -> NDArray[np.bool_]:
+    """Find the steps of a grid that lie wholly within known intervals of the source."""
+    stamps = index_seconds(source.stamps)
+    gap = np.concatenate([[0], np.cumsum(~known)])
+    first = np.clip(np.searchsorted(stamps, grid.edges[:-1], side="right"), 0, len(known))
+    last = np.clip(np.searchsorted(stamps, grid.edges[1:], side="left") + 1, 0, len(known))
+    if source.readings:  # a straight line needs the reading before, too
+        first = np.maximum(first - 1, 0)
+    return np.asarray(gap[last] == gap[first])

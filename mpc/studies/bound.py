@@ -1,0 +1,88 @@
+"""The perfect bound: optimal control that knows model, state, weather and people."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibration import DisturbanceModel, KalmanFilter
+from mpc.control import Observer
+from mpc.loop import ReducedBuilding, SimulatedPlant
+from mpc.studies.controller import LASTING, SENSOR_NOISE, UNMEASURED, held_space
+from thermal.model import ModalModel, ReducedModel, modal_model
+
+FloatArray = NDArray[np.float64]
+
+#: Unmeasured heat of a plant that is known, but for the random shuffle of its air [W/m2].
+SHUFFLED = 1.0
+
+
+def knowing_observer(model: ReducedModel, plant: SimulatedPlant) -> Observer:
+    """Make the observer of a controller that has the plant's own parameters.
+
+    Parameters
+    ----------
+    model : ReducedModel
+        With the parameters of the plant's building.
+    plant : SimulatedPlant
+        To be controlled.
+
+    Returns
+    -------
+    Observer
+        `KnownState` where the plant's building is such a model, else a filter that hardly expects unmeasured heat.
+    """
+    if isinstance(plant.model, ReducedBuilding):
+        return KnownState(model, plant)
+    return Observer(*_filter(model, plant, SHUFFLED))
+
+
+def _filter(model: ReducedModel, plant: SimulatedPlant, unmeasured: float) -> tuple[KalmanFilter, ModalModel]:
+    """Make a filter over the plant's control step that expects so much unmeasured heat [W/m2], and its modes."""
+    modes = modal_model(model.matrices(model.theta))
+    expected = DisturbanceModel(unmeasured * plant.scenario.areas, LASTING, SENSOR_NOISE)
+    return KalmanFilter(held_space(modes, plant.control_step), expected), modes
+
+
+class KnownState(Observer):
+    """Reads the state off the plant's building in the place of estimating it; there is no unmeasured heat.
+
+    Parameters
+    ----------
+    model : ReducedModel
+        That the plant's building was made of.
+    plant : SimulatedPlant
+        Whose building is a `ReducedBuilding` of that model.
+    """
+
+    def __init__(self, model: ReducedModel, plant: SimulatedPlant) -> None:
+        super().__init__(*_filter(model, plant, UNMEASURED))
+        self._plant = plant
+
+    def start(self, zone: FloatArray, boundary: FloatArray) -> None:
+        """Take the state.
+
+        Parameters
+        ----------
+        zone, boundary : ndarray
+            Without effect [K].
+        """
+        building = self._plant.model
+        if isinstance(building, ReducedBuilding):
+            self.state[: self.order] = building.modal_state
+
+    def update(self, zone: FloatArray, heat: FloatArray, boundary: FloatArray) -> FloatArray:
+        """Take the state.
+
+        Parameters
+        ----------
+        zone, heat, boundary : ndarray
+            Without effect [K], [W], [K].
+
+        Returns
+        -------
+        ndarray, shape (n_zone,)
+            Innovations: none [K].
+        """
+        self.start(zone, boundary)
+        return np.zeros(len(zone))

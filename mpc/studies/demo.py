@@ -1,0 +1,227 @@
+"""The main job from beginning to end: check, calibrate, evaluate, diagnose and control a case, with a page a step."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+import calibration
+from calibration import (
+    CalibrationResult,
+    Evaluation,
+    Interval,
+    calibration_verdict,
+    check_results_folder,
+    check_verdict,
+    default_intervals,
+    evaluate_case,
+    evaluation_verdict,
+    write_calibration,
+    write_check,
+    write_evaluation,
+    write_results,
+)
+from calibration.diagnosis import Diagnosis, diagnose, diagnosis_verdict, write_diagnosis
+from mpc.errors import ControlError
+from mpc.loop import SensorNoise
+from mpc.scenario import DAY_AHEAD_ERRORS, weather_of_case
+from mpc.studies.compare import Comparison, compare_controllers
+from mpc.reports.demo import render_demo
+from mpc.reports.control import write_comparison
+from mpc.studies.run import Progress
+from mpc.studies.study import make_study
+from mpc.reports.control_words import comparison_verdict
+from thermal import Case, load_bundled_case
+from thermal.case import CaseCheck, describe_case
+from thermal.errors import describe
+
+#: Controllers of the day, rules first.
+CONTROLLERS = ("schedule", "reset", "guideline36", "mpc")
+
+Told = Callable[[str, str], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Demo:
+    """What each step of the main job found.
+
+    Parameters
+    ----------
+    case : Case
+        What it was done on.
+    check : CaseCheck
+        What was understood of the case.
+    calibration : CalibrationResult
+        Of the baseline.
+    diagnosis : Diagnosis
+        Why the calibrated baseline is still wrong.
+    evaluation : Evaluation
+        On held-out days, of the model with the effects that the diagnosis found.
+    comparison : Comparison
+        A day of rules and of optimal control, on a plant that is this model.
+    pages : mapping of str to Path
+        Report by step.
+    verdicts : mapping of str to str
+        What was found, in plain words, by step.
+    """
+
+    case: Case
+    check: CaseCheck
+    calibration: CalibrationResult
+    diagnosis: Diagnosis
+    evaluation: Evaluation
+    comparison: Comparison
+    pages: dict[str, Path] = field(default_factory=dict)
+    verdicts: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def effects(self) -> list[str]:
+        """Effects that the diagnosis put into the model, in the order in which they were accepted."""
+        return list(self.diagnosis.steps[-1].effects) if self.diagnosis.steps else []
+
+    @property
+    def fine(self) -> bool:
+        """Whether the solver of the calibration ended well, and optimal control had plans of its own."""
+        controlled = self.comparison.of("mpc")
+        planned = controlled is not None and controlled.sources.get("optimal plan", 0) > 0
+        return self.calibration.solver.success and planned
+
+    def to_dict(self) -> dict[str, Any]:
+        """Contents of ``demo.json``."""
+        mpc, best = self.comparison.of("mpc"), self.comparison.best_rule
+        study, result = self.comparison.study, self.calibration
+        costs = {run.controller: run.cost for run in self.comparison.runs}
+        return {
+            "held_out_mae": {
+                "uncalibrated": result.uncalibrated["held_out"].metrics.mae,
+                "calibrated": result.calibrated["held_out"].metrics.mae,
+                "with_effects": self.evaluation.metrics.mae,
+            },
+            "diagnosis": {"verdict": self.diagnosis.verdict.name, "effects": self.effects},
+            "control": {
+                "start": study.scenario.grid.start.isoformat(),
+                "end": study.stamps[-1].isoformat(),
+                "costs": costs,
+                "discomfort": {run.controller: run.kpis.tdis_tot for run in self.comparison.runs},
+                "best_rule": None if best is None else best.controller,
+                "saving": None if mpc is None else self.comparison.saving(mpc),
+            },
+            "verdicts": dict(self.verdicts),
+            "reports": {step: f"{page.parent.name}/{page.name}" for step, page in self.pages.items()},
+            "fine": self.fine,
+            "case": self.case.building.name, "version": version("buildingmpc"), "seed": result.seed,
+        }  # fmt: skip
+
+
+def run_demo(
+    out: str | Path,
+    *,
+    case: Case | None = None,
+    dx: float | None = None,
+    force: bool = False,
+    progress: Progress | None = None,
+    told: Told | None = None,
+) -> Demo:
+    """Check, calibrate, diagnose, evaluate and control a case, and write a page of each step and one of all.
+
+    Parameters
+    ----------
+    out : str or Path
+        Folder, made if need be: ``demo.json``, ``report.html`` that leads to the others, and a folder a step.
+    case : Case, optional
+        With a working day of telemetry after those that it is calibrated on; the bundled case by default.
+    dx : float, optional
+        Distance between control volumes of a plan [m]; default: its cell size.
+    force : bool
+        Replace earlier results.
+    progress : callable, optional
+        Called with stage, done, total.
+    told : callable, optional
+        Called with the name of a step and what it found, when it is done.
+
+    Returns
+    -------
+    Demo
+        What was found.
+
+    Raises
+    ------
+    ResultsExistError
+        When the folder holds something and ``force`` is not set.
+    ControlError
+        When no whole working day is left to control.
+    """
+    folder, done = check_results_folder(out, force), progress or _silent
+    case = case or load_bundled_case()
+    judged = default_intervals(case)[1]
+    first, last = _working_day(case, judged[-1])
+    pages: dict[str, Path] = {}
+    verdicts: dict[str, str] = {}
+
+    def end(step: str, page: Path, verdict: str) -> None:
+        pages[step], verdicts[step] = page, verdict
+        if told is not None:
+            told(step, verdict)
+
+    checked = describe_case(case)
+    end("check", write_check(checked, folder / "check", force=force), check_verdict(checked))
+    fitted = calibration.calibrate(case, dx=dx, progress=_staged(done, "calibrate"))
+    end("calibrate", write_calibration(fitted, case, folder / "calibrate", force=force), calibration_verdict(fitted))
+    found = diagnose(case, dx=dx, progress=_staged(done, "diagnose"))
+    end("diagnose", write_diagnosis(found, case, folder / "diagnose", force), diagnosis_verdict(found))
+    model = folder / "diagnose" / "calibration.json"
+    errors = evaluate_case(case, judged, parameters=model, dx=dx, trajectories=True, progress=_staged(done, "evaluate"))
+    name = "calibration.json of the diagnosis"
+    page = write_evaluation(errors, case, folder / "evaluate", parameters=name, force=force)
+    end("evaluate", page, evaluation_verdict(errors))
+    done("compare controllers: put the plant together", 0, 1)
+    study = make_study(
+        case.building,
+        weather_of_case(case),
+        first,
+        last,
+        parameters=model,
+        noise=SensorNoise(),
+        errors=DAY_AHEAD_ERRORS,
+    )
+    compared = compare_controllers(study, CONTROLLERS, _staged(done, "compare controllers"))
+    end("compare", write_comparison(compared, folder / "compare", force=force), comparison_verdict(compared))
+    demo = Demo(case, checked, fitted, found, errors, compared, pages, verdicts)
+    write_results(folder, {"demo.json": demo.to_dict(), "report.html": _page(demo)}, force=True)
+    return demo
+
+
+def _page(demo: Demo) -> str:
+    """Lay out the page that leads to the others."""
+    result, links = demo.calibration, {step: f"{page.parent.name}/{page.name}" for step, page in demo.pages.items()}
+    errors = {
+        "as it was drawn": result.uncalibrated["held_out"],
+        "calibrated": result.calibrated["held_out"],
+        "with what the diagnosis found": demo.evaluation,
+    }
+    return render_demo(demo.case.building.name, demo.verdicts, links, errors, demo.effects, demo.comparison, demo.fine)
+
+
+def _working_day(case: Case, interval: Interval) -> tuple[str, str]:
+    """Begin and end of the last whole working day of an interval, ISO 8601."""
+    zone = case.building.location.timezone
+    days = pd.date_range(interval.start.tz_convert(zone).ceil("D"), interval.end.tz_convert(zone), freq="D")
+    whole = [day for day in days[:-1] if day.weekday() < 5]
+    if not whole:
+        span = f"{interval.start.isoformat()} to {interval.end.isoformat()}"
+        raise ControlError(describe("day to control", "a whole working day of held-out telemetry", span))
+    return whole[-1].isoformat(), (whole[-1] + pd.DateOffset(days=1)).isoformat()
+
+
+def _staged(progress: Progress, step: str) -> Progress:
+    """Say which step the stage belongs to."""
+    return lambda stage, done, total: progress(f"{step}: {stage}", done, total)
+
+
+def _silent(stage: str, done: int, total: int) -> None:
+    """Tell nobody."""

@@ -1,0 +1,266 @@
+"""A study run with one controller: what it did, why, and what came of it."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Literal, NamedTuple, cast, get_args
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from mpc.baselines import Guideline36, OutdoorReset, day_schedule
+from mpc.control import Action, MpcController
+from mpc.errors import ControlError
+from mpc.kpi import Kpis, measure_kpis
+from mpc.loop import ClosedLoopRun, Controller, Measurements, SimulatedPlant, run_closed_loop
+from mpc.scenario import Forecast
+from mpc.studies.bound import knowing_observer
+from mpc.studies.controller import MODEL_STEP, default_horizon, make_controller, site_points
+from mpc.studies.study import HORIZON_HOURS, Study
+from thermal.errors import describe, nearest
+
+FloatArray = NDArray[np.float64]
+Progress = Callable[[str, int, int], None]
+
+#: Controllers by name: optimal control, three rules, and optimal control that knows everything.
+ControllerName = Literal["mpc", "schedule", "reset", "guideline36", "bound"]
+
+#: How far ahead predictions are kept to be compared with what came [s].
+AHEAD = 3600.0
+
+
+class Decision(NamedTuple):
+    """An action of optimal control and what it expected.
+
+    Parameters
+    ----------
+    stamp : pandas.Timestamp
+        When it began, local.
+    source : str
+        ``optimal plan``, ``previous plan`` or ``rules``.
+    status : str
+        Of the solver; empty where it did not run.
+    reasons : tuple of str
+        In words.
+    zone : ndarray, shape (n_zone,)
+        Temperatures expected after `AHEAD` [K]; NaN without a plan.
+    power : tuple of float
+        Electricity and gas expected over the time until then [W].
+    seconds : float
+        That the solver took [s].
+    """
+
+    stamp: pd.Timestamp
+    source: str
+    status: str
+    reasons: tuple[str, ...]
+    zone: FloatArray
+    power: tuple[float, float]
+    seconds: float
+
+
+@dataclass(frozen=True, eq=False)
+class ControlRun:
+    """A study run with a controller.
+
+    Parameters
+    ----------
+    controller : str
+        Which one, a `ControllerName`.
+    study : Study
+        What it was run on.
+    loop : ClosedLoopRun
+        Record, measurements and actions.
+    kpis : Kpis
+        Indicators.
+    decisions : tuple of Decision
+        Of optimal control; () for rules.
+    plant : SimulatedPlant
+        As the run left it, with its telemetry.
+    """
+
+    controller: str
+    study: Study
+    loop: ClosedLoopRun
+    kpis: Kpis
+    decisions: tuple[Decision, ...]
+    plant: SimulatedPlant
+
+    @property
+    def cost(self) -> float:
+        """Of energy, and demand charges where the tariff has any [currency]."""
+        return (self.kpis.cost_tot + self.kpis.demand_cost) * self.kpis.floor_area
+
+    @property
+    def objective(self) -> float:
+        """Cost with discomfort at the price that optimal control has for it [currency]."""
+        return self.cost + self.study.settings.comfort_price * len(self.study.scenario.zones) * self.kpis.tdis_tot
+
+    @property
+    def sources(self) -> Mapping[str, int]:
+        """How often actions came from a plan, the plan before, or rules."""
+        return Counter(decision.source for decision in self.decisions)
+
+
+def check_controller(name: str) -> ControllerName:
+    """Refuse a controller that is not known.
+
+    Parameters
+    ----------
+    name : str
+        One of `ControllerName`.
+
+    Raises
+    ------
+    ControlError
+        With the nearest one.
+    """
+    known = get_args(ControllerName)
+    if name not in known:
+        raise ControlError(describe("controller", f"one of {', '.join(known)}", repr(name), nearest(name, known)))
+    return cast(ControllerName, name)
+
+
+def run_controller(study: Study, name: str, progress: Progress | None = None) -> ControlRun:
+    """Run a study with a controller.
+
+    Parameters
+    ----------
+    study : Study
+        What it is run on.
+    name : str
+        ``mpc``, ``schedule``, ``reset``, ``guideline36``, or ``bound``: optimal control with the plant's own parameters
+        and exact sensors, that knows the weather and the people. Where the plant is its own model it knows the state;
+        the state of a grid it estimates.
+    progress : callable, optional
+        Called with stage, done, total.
+
+    Raises
+    ------
+    ControlError
+        When the controller is not known.
+
+    Examples
+    --------
+    >>> run_controller(study, "guideline36").kpis.cost_tot  # doctest: +SKIP
+    """
+    known = check_controller(name)
+    optimal = known in ("mpc", "bound")
+    step = study.control_step if optimal else MODEL_STEP
+    plant = study.plant(step, bound=known == "bound")
+    chosen, log = controller_of(study, plant, known), _Log()
+    watched = _Watched(chosen, log) if isinstance(chosen, MpcController) else chosen
+    count = int(study.steps * MODEL_STEP / step)
+    report = None if progress is None else (lambda done, _: progress(known, done, count))
+    loop = run_closed_loop(plant, watched, steps=count, seed=study.seed, forecasts=optimal, progress=report)
+    kpis = measure_kpis(loop.record, plant.scenario, control_step=step)
+    return ControlRun(known, study, loop, kpis, tuple(log.decisions), plant)
+
+
+def controller_of(study: Study, plant: SimulatedPlant, name: ControllerName) -> Controller:
+    """Make a controller of a study by name.
+
+    Parameters
+    ----------
+    study : Study
+        Knows its settings.
+    plant : SimulatedPlant
+        Of the study.
+    name : str
+        Which one.
+    """
+    required = tuple(a for a in plant.actuators if a.required)
+    points = site_points(study.building, plant.devices)
+    if name == "schedule":
+        return day_schedule(required)
+    if name == "reset":
+        return OutdoorReset(required, points.weather_station)
+    if name == "guideline36":
+        return Guideline36(points, plant.system.terminals.air_handler.tolist(), required)
+    model = study.truth if name == "bound" else study.model
+    return make_controller(
+        model, plant, settings=study.settings, horizon=default_horizon(study.control_step, HORIZON_HOURS),
+        observer=knowing_observer(model, plant) if name == "bound" else None,
+    )  # fmt: skip
+
+
+class _Log:
+    """Decisions of a run."""
+
+    def __init__(self) -> None:
+        self.decisions: list[Decision] = []
+
+    def take(self, action: Action, controller: MpcController) -> None:
+        """Keep what an action expected."""
+        horizon, solution = controller.problem.predictor.horizon, action.solution
+        zone, power = np.full(controller.problem.predictor.n_zone, np.nan), (np.nan, np.nan)
+        if solution is not None and solution.usable:
+            row = int(np.searchsorted(horizon.edges, AHEAD - 1e-6))
+            share = horizon.steps[:row] / horizon.edges[row]
+            zone = solution.rollout.zone[row].copy()
+            power = float(share @ solution.rollout.electric[:row]), float(share @ solution.rollout.fuel[:row])
+        status = "" if solution is None else str(solution.status)
+        seconds = 0.0 if solution is None else solution.seconds
+        self.decisions.append(Decision(action.stamp, str(action.source), status, action.reasons, zone, power, seconds))
+
+
+class _Watched:
+    """Optimal control whose decisions are written down."""
+
+    def __init__(self, controller: MpcController, log: _Log) -> None:
+        self._controller, self._log = controller, log
+
+    def step(self, measurements: Measurements, forecast: Forecast | None) -> Mapping[str, float]:
+        action = self._controller.step(measurements, forecast)
+        self._log.take(action, self._controller)
+        return action
+
+
+def prediction_errors(run: ControlRun) -> dict[str, Any]:
+    """Compare what optimal control expected after an hour with what came.
+
+    Parameters
+    ----------
+    run : ControlRun
+        Of a study.
+
+    Returns
+    -------
+    dict
+        ``zone_mae`` and ``zone_bias`` [K], ``cost_error`` (expected over realised energy cost, less 1) [-], ``count``;
+        empty for rules and runs shorter than an hour.
+    """
+    rows = compared_decisions(run)
+    if not rows:
+        return {}
+    record, scenario = run.loop.record, run.study.scenario
+    ahead = round(AHEAD / record.step)
+    error, expected, came = [], 0.0, 0.0
+    for first, decision in rows:
+        error.append(decision.zone - record.zone_temperature[first + ahead])
+        part = slice(first, first + ahead)
+        prices = scenario.electricity_price[part], scenario.gas_price[part]
+        gas = np.zeros(ahead) if record.gas is None else record.gas[part]
+        came += float(prices[0] @ record.electricity[part] + prices[1] @ gas)
+        expected += float(prices[0].sum() * decision.power[0] + prices[1].sum() * decision.power[1])
+    return {
+        "zone_mae": float(np.mean(np.abs(error))), "zone_bias": float(np.mean(error)),
+        "cost_error": expected / came - 1.0 if came > 0.0 else 0.0, "count": len(rows),
+    }  # fmt: skip
+
+
+def compared_decisions(run: ControlRun) -> list[tuple[int, Decision]]:
+    """Give the decisions with a plan whose hour ends within the run, with the step that they began at.
+
+    Parameters
+    ----------
+    run : ControlRun
+        Of a study.
+    """
+    step, start = run.loop.record.step, run.study.scenario.grid.start
+    rows = ((round((d.stamp - start).total_seconds() / step), d) for d in run.decisions)
+    last = run.loop.record.n_steps - round(AHEAD / step)
+    return [(first, d) for first, d in rows if first <= last and np.isfinite(d.zone).all()]

@@ -1,0 +1,103 @@
+"""Open windows sought again: found where another effect has won that takes heat at like times, and left alone else."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from calibration.evaluation.settings import ModelSettings
+from calibration.diagnosis.refit.comparison import Bench, Fit
+from calibration.diagnosis.screen.gains import Gain
+from calibration.diagnosis.refit.held_out import held_out
+from calibration.diagnosis.refit.refit import Refit, Work
+from calibration.diagnosis.screen.screen import screen
+from calibration.diagnosis.screen.windows import WINDOWS, look_again
+from thermal import Case, Telemetry
+from thermal.pilot import TwinRanges, generate_twin, pilot_building
+from thermal.inputs import Drivers
+from thermal.units import AIR_HEAT_CAPACITY
+
+FloatArray = NDArray[np.float64]
+
+#: Window [m2], and the step of the telemetry [s].
+AREA, STEP = 1.5, 900.0
+
+
+@cache
+def twin() -> Case:
+    """Two weeks of an office of four zones whose thermostats hold it whatever a window lets out."""
+    building = pilot_building(3, floor_area=120.0, zones=4, floors=1, name="office")
+    quiet = TwinRanges(disturbance_deviation=(0.05, 0.1), noise=(0.005, 0.01))
+    return generate_twin(building, 3, days=15.0, step_seconds=STEP, dx=1.0, meter="exact", ranges=quiet)[0]
+
+
+@cache
+def planted() -> tuple[Case, str, FloatArray]:
+    """The twin with a window of its first zone opened once a working day; the zone, and when."""
+    case, drivers, rng = twin(), Drivers(twin()), np.random.default_rng(2)
+    zone = case.building.zone_names[0]
+    there = np.flatnonzero(np.diff((drivers.occupancy > 0.5).astype(int)) == 1) + 1
+    opened = np.zeros(len(drivers.stamps))
+    for begin in there:
+        first = begin + int(rng.integers(0, 20))
+        opened[first : first + int(rng.integers(2, 8))] = 1.0
+    unit = -AIR_HEAT_CAPACITY * 1.2 * drivers.through_windows[:, 0]  # 1.2 kg of air a cubic metre
+    frame, (device,) = case.telemetry.frame.copy(), case.building.devices_of(zone)
+    flow = frame[f"{device.name}/supply_air_flowrate_sensor"].to_numpy()
+    assert (flow > 0.0).all()
+    frame[f"{device.name}/discharge_air_temperature_sensor"] += AREA * opened * unit / (AIR_HEAT_CAPACITY * flow)
+    return Case(case.building, Telemetry.from_frame(frame)), zone, opened
+
+
+@cache
+def at_work() -> tuple[Bench, Fit, Work, tuple[Gain, ...]]:
+    bench = Bench(planted()[0], ModelSettings(dx=1.0))
+    bench.drivers.openings = np.zeros_like(bench.drivers.openings)  # nothing was seen at the start
+    fit = bench.fit({}, [{}])
+    made, gains, _ = screen(bench, fit, [WINDOWS, "capacity_limit", "flow_gain"])
+    return bench, fit, Work(bench, fit, held_out(bench, fit), made), tuple(gains)
+
+
+def refit(effect: str) -> Refit:
+    _, _, work, gains = at_work()
+    gain = next(g for g in gains if g.effect == effect)
+    found = work.refit([Gain(**{**vars(gain), "zones": (planted()[1],)})], {})
+    assert found is not None
+    return found
+
+
+def test_windows_are_found_behind_the_effect_that_won() -> None:
+    bench, _, work, gains = at_work()
+    bench.drivers.openings = np.zeros_like(bench.drivers.openings)
+    won = refit("capacity_limit")
+    first, *others = look_again(work, gains, [won], won)
+    assert first.screened.effect == WINDOWS
+    assert others == [won]
+    assert first.gain > won.gain
+    _, zone, opened = planted()
+    assert first.screened.zones == (zone,)
+    seen = bench.drivers.openings
+    assert (seen[:, 0] * opened).sum() > 0.8 * max(opened.sum(), seen[:, 0].sum())
+    assert not seen[:, 1:].any()
+    assert first.fit.values[f"opened_window_area@{zone}"] == pytest.approx(AREA, rel=0.15)
+
+
+def test_the_old_openings_stay_where_the_new_ones_gain_less() -> None:
+    bench, _, work, gains = at_work()
+    won, before = refit("capacity_limit"), np.eye(*bench.drivers.openings.shape)
+    bench.drivers.openings = before
+    better = Refit(**{**vars(refit(WINDOWS)), "gain": 1e6})
+    assert look_again(work, gains, [better, won], won) == [better, won]
+    assert bench.drivers.openings is before
+
+
+def test_nobody_looks_where_windows_are_no_rival() -> None:
+    bench, _, work, gains = at_work()
+    before, won = bench.drivers.openings, refit("flow_gain")
+    assert look_again(work, gains, [won], won) == [won]
+    assert look_again(work, gains, [won], None) == [won]
+    assert look_again(work, [g for g in gains if g.effect != WINDOWS], [won], refit("capacity_limit")) == [won]
+    assert bench.drivers.openings is before

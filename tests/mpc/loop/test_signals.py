@@ -1,0 +1,77 @@
+"""Effects in a plant get their signals: of the weather in advance, of air and heat as the loop runs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from mpc.errors import PlantError
+from mpc.loop import SimulatedPlant, reduced_building
+from mpc.loop.signals import EffectSignals
+from mpc.scenario import Scenario
+from thermal import Building, build_network
+from thermal.effects import chosen
+from thermal.hvac import HvacSystem
+from thermal.inputs import Drivers, signal_values
+from thermal.units import AIR_HEAT_CAPACITY
+
+
+def test_what_the_weather_drives_is_known_in_advance(
+    building: Building, system: HvacSystem, scenario: Callable[..., Scenario]
+) -> None:
+    effects, sc = chosen(["solar_gain", "infiltration"]), scenario()
+    network = build_network(building, dx=1.0, effects=effects)
+    signals = EffectSignals(network, sc, system)
+    expected = signal_values(network.signals, Drivers(sc.driving_case()))
+    found = [signals.at(k, np.ones(12), np.ones(12)) for k in (0, 100, 150)]
+    np.testing.assert_array_equal(found, expected[[0, 100, 150]])
+
+
+def test_what_the_air_drives_is_of_the_step(
+    building: Building, system: HvacSystem, scenario: Callable[..., Scenario]
+) -> None:
+    """A meter's gain has the step's heat, a biased sensor the step's air, a leak whether there is air."""
+    zone = building.zone_names[2]
+    effects = chosen({"flow_gain": (zone,), "sensor_bias": (zone,), "valve_leak": (zone,)})
+    network = build_network(building, dx=1.0, effects=effects)
+    signals = EffectSignals(network, scenario(), system)
+    by_name = dict(
+        zip([s.name for s in network.signals], signals.at(9, np.full(12, 0.2), np.full(12, 700.0)), strict=True)
+    )
+    assert by_name[f"heat of {zone}"] == 700.0
+    assert by_name[f"supply air of {zone}"] == pytest.approx(0.2 * AIR_HEAT_CAPACITY)
+    assert sorted(by_name.values())[0] == 1.0
+    still = signals.at(9, np.zeros(12), np.zeros(12))
+    assert np.count_nonzero(still) <= 1  # what is constant stays
+
+
+def test_a_wrong_clock_is_refused(building: Building, system: HvacSystem, scenario: Callable[..., Scenario]) -> None:
+    network = build_network(building, dx=1.0, effects=chosen(["clock_shift"]))
+    with pytest.raises(PlantError, match="change of heat in .* leave that effect out"):
+        EffectSignals(network, scenario(), system)
+
+
+def test_a_meter_that_reads_too_little_warms_the_zone(
+    building: Building, make_plant: Callable[..., SimulatedPlant], drive: Callable[..., SimulatedPlant]
+) -> None:
+    """True heat is 1.3 times the metered: the thermostats call for less, and the balance still closes."""
+    names = {f"flow_gain@{zone}": 0.3 for zone in building.zone_names}
+    model = reduced_building(building, names, dx=1.0, effects=chosen(["flow_gain"]))
+    plain, leaky = drive(make_plant(), 90), drive(make_plant(model=model), 90)
+    assert plain.case().zone_heat().iloc[60:].sum().sum() > leaky.case().zone_heat().iloc[60:].sum().sum()
+    balance = leaky.balance()
+    assert balance.flows.effects == pytest.approx(0.3 * balance.plant.zones)
+    assert abs(balance.residual) < 1e-6 * balance.turnover
+
+
+def test_a_biased_sensor_is_not_in_the_record(
+    building: Building, make_plant: Callable[..., SimulatedPlant], drive: Callable[..., SimulatedPlant]
+) -> None:
+    """It says 1 K too much: the zone is kept 1 K too cold, and the record says so."""
+    zone = building.zone_names[0]
+    model = reduced_building(building, {f"sensor_bias@{zone}": 1.0}, dx=1.0, effects=chosen({"sensor_bias": (zone,)}))
+    plant = drive(make_plant(model=model), 120)
+    said = plant.telemetry()[f"VAV_{zone}/zone_air_temperature_sensor"].iloc[-1]
+    assert said - plant.record().zone_temperature[-1, 0] == pytest.approx(1.0, abs=0.05)

@@ -1,0 +1,120 @@
+"""Drivers: what a case's telemetry says, in the building's time, and what it does not say."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from thermal import Case, Telemetry
+from thermal.errors import EffectError
+from thermal.inputs import INFRARED, IRRADIANCE, WIND, Drivers, Signal, signal_values
+
+CaseOf = Callable[[str], Case]
+
+
+def changed(case: Case, **columns: object) -> Case:
+    """The case with columns of its telemetry changed or, where None, taken away."""
+    frame = case.telemetry.frame.copy()
+    for name, values in columns.items():
+        if values is None:
+            frame = frame.drop(columns=name)
+        else:
+            frame[name] = values
+    return replace(case, telemetry=Telemetry.from_frame(frame), judged=None)
+
+
+def test_sky_is_colder_than_air(lively_case: CaseOf) -> None:
+    case = lively_case("plan")
+    drivers = Drivers(case)
+    frame = case.telemetry.frame
+    expected = (
+        frame[f"weather_station/{INFRARED}"]
+        - 5.670374419e-8 * frame["weather_station/outside_air_temperature_sensor"] ** 4
+    )
+    assert drivers.sky == pytest.approx(expected.to_numpy(), rel=1e-12)
+    assert drivers.sky.mean() < 0.0
+
+
+def test_gaps_are_bridged(lively_case: CaseOf) -> None:
+    case = lively_case("plan")
+    values = case.telemetry.frame[f"weather_station/{WIND}"].copy()
+    values.iloc[10:13] = np.nan
+    gap = Drivers(changed(case, **{f"weather_station/{WIND}": values})).wind
+    assert gap[9:14] == pytest.approx(np.linspace(values.iloc[9], values.iloc[13], 5))
+
+
+def test_presence_follows_the_clock_of_the_building(lively_case: CaseOf) -> None:
+    # Friday 24 March to Monday 27 March 2023; clocks go forward on the Sunday
+    drivers = Drivers(lively_case("plan"))
+    middle = drivers.stamps - pd.Timedelta(minutes=5)
+    weekend = middle.day_of_week >= 5
+    assert (drivers.occupancy[weekend] == 0.0).all()
+    friday = ~weekend & (middle.day == 24)
+    hours = np.asarray(middle.hour + middle.minute / 60.0)
+    assert (drivers.occupancy[friday & (hours > 8.6) & (hours < 17.4)] == 1.0).all()
+    assert (drivers.occupancy[friday & ((hours < 7.4) | (hours > 18.6))] == 0.0).all()
+    # half are there at eight and at eighteen, so that a working day has ten hours
+    assert drivers.occupancy[friday].sum() / 6.0 == pytest.approx(10.0, abs=1e-9)
+
+
+def test_counted_people_go_before_office_hours(lively_case: CaseOf) -> None:
+    case = lively_case("plan")
+    n = len(case.stamps)
+    people = {"A/occupancy_count_sensor": np.arange(n) % 4.0, "B/occupancy_count_sensor": np.full(n, 1.0)}
+    drivers = Drivers(changed(case, **people))
+    assert drivers.occupancy == pytest.approx((np.arange(n) % 4.0 + 1.0) / 4.0)
+
+
+def test_usual_temperature_knows_the_hour_and_not_the_stamp(lively_case: CaseOf) -> None:
+    case = lively_case("plan")
+    drivers, zone = Drivers(case), case.zone_temperatures()
+    slots = zone.groupby([zone.index.day_of_week < 5, zone.index.hour])
+    assert drivers.usual == pytest.approx(slots.transform("mean").to_numpy())
+    blank = changed(case, **{"A/zone_air_temperature_sensor": np.nan})
+    assert np.isfinite(Drivers(blank).usual).all()
+
+
+def test_supply_air_is_flow_and_heat_above_the_zone(lively_case: CaseOf) -> None:
+    case = lively_case("table")
+    flow, heat = Drivers(case).supply
+    metered = case.zone_heat().to_numpy()
+    assert heat[:, 0] == pytest.approx(metered[:, 0])
+    assert (flow[:, 1] == 0.0).all() and (heat[:, 1] == 0.0).all()  # an electric heater has no air
+    assert Drivers(case).heat == pytest.approx(metered)
+    assert Drivers(case).airflow == pytest.approx(0.5 * flow[:, [0]])
+
+
+@pytest.mark.parametrize(
+    ("point", "use"),
+    [(WIND, lambda d: d.wind), (INFRARED, lambda d: d.sky), (IRRADIANCE, lambda d: d.sun)],
+)
+def test_what_is_not_measured_is_said_by_name(
+    lively_case: CaseOf, point: str, use: Callable[[Drivers], object]
+) -> None:
+    drivers = Drivers(changed(lively_case("plan"), **{f"weather_station/{point}": None}))
+    assert not drivers.measured(point)
+    with pytest.raises(EffectError, match=f"expected {point}"):
+        use(drivers)
+
+
+def test_beam_follows_from_global_and_diffuse(lively_case: CaseOf) -> None:
+    case = lively_case("plan")
+    swapped = changed(
+        case,
+        **{f"weather_station/{IRRADIANCE}": None, "weather_station/global_horizontal_irradiance_sensor": 300.0},
+    )
+    assert Drivers(swapped).measured(IRRADIANCE)
+    assert Drivers(swapped).sun.normal.max() > 0.0
+
+
+def test_signals_are_columns(lively_case: CaseOf) -> None:
+    drivers = Drivers(lively_case("plan"))
+    signals = [Signal("one", "1", lambda d: np.ones(len(d.stamps))), Signal("wind", "m/s", lambda d: d.wind)]
+    assert signal_values(signals, drivers) == pytest.approx(
+        np.column_stack([np.ones(len(drivers.stamps)), drivers.wind])
+    )
+    assert signal_values([], drivers).shape == (len(drivers.stamps), 0)

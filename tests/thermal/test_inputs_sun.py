@@ -1,0 +1,129 @@
+"""Sun: against pvlib called directly, a noon worked by hand, and every set of irradiances that a station may report."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+from pvlib import irradiance, solarposition
+
+from thermal.case import Location
+from thermal.errors import EffectError
+from thermal.inputs import Sun, incidence_modifier, sun_of
+
+MUNICH = Location(latitude=48.0, longitude=12.0, elevation=690.0, timezone="Europe/Berlin")
+NORMAL, DIFFUSE, GLOBAL = (
+    f"{name}_irradiance_sensor" for name in ("direct_normal", "diffuse_horizontal", "global_horizontal")
+)
+
+
+def days(start: str = "2023-06-20", n: int = 48, step: str = "1h", zone: str = "Europe/Berlin") -> pd.DatetimeIndex:
+    return pd.date_range(pd.Timestamp(start, tz=zone) + pd.Timedelta(step), periods=n, freq=step)
+
+
+def clear_sky(stamps: pd.DatetimeIndex, step: float) -> pd.DataFrame:
+    """A consistent set of irradiances: G = N sin h + D at the middle of the steps, W/m2."""
+    middle = stamps - pd.Timedelta(seconds=step / 2)
+    place = solarposition.get_solarposition(middle, 48.0, 12.0, 690.0)
+    rise = np.sin(np.radians(place["elevation"].to_numpy()))
+    normal = np.where(rise > 0.06, 850.0 * np.maximum(rise, 0.0) ** 0.3, 0.0)
+    diffuse = 120.0 * np.maximum(rise, 0.0)
+    return pd.DataFrame(
+        {NORMAL: normal, DIFFUSE: diffuse, GLOBAL: normal * np.maximum(rise, 0) + diffuse}, index=stamps
+    )
+
+
+def test_planes_are_those_of_pvlib() -> None:
+    stamps = days(n=96)
+    weather = clear_sky(stamps, 3600.0)
+    sun = sun_of(MUNICH, stamps, 3600.0, weather)
+    place = solarposition.get_solarposition(stamps - pd.Timedelta("30min"), 48.0, 12.0, 690.0)
+    for tilt, azimuth in ((90.0, 180.0), (90.0, 247.5), (0.0, 0.0), (30.0, 135.0), (180.0, 0.0)):
+        total = irradiance.get_total_irradiance(
+            tilt, azimuth, 90.0 - place["elevation"], place["azimuth"], weather[NORMAL].to_numpy(),
+            weather[GLOBAL].to_numpy(), weather[DIFFUSE].to_numpy(), albedo=0.2, model="isotropic",
+        )  # fmt: skip
+        beam, diffuse = sun.plane(azimuth, tilt)
+        assert beam == pytest.approx(total["poa_direct"].to_numpy(), abs=1e-9)
+        assert diffuse == pytest.approx(total["poa_diffuse"].to_numpy(), abs=1e-9)
+
+
+def test_noon_at_the_equinox_by_hand() -> None:
+    # 12 deg east at an equinox: the sun culminates 12:00 UTC less 48 min less the equation of time (-7.5 min), 12:20
+    # in Berlin; it then stands 90 - 48 = 42 deg over the south
+    stamps = pd.DatetimeIndex([pd.Timestamp("2023-03-20 12:24:30", tz="Europe/Berlin")])  # end of a ten-minute step
+    weather = pd.DataFrame({NORMAL: [800.0], DIFFUSE: [100.0]}, index=stamps)
+    sun = sun_of(MUNICH, stamps, 600.0, weather)
+    assert sun.altitude[0] == pytest.approx(42.0, abs=0.2)
+    assert sun.azimuth[0] == pytest.approx(180.0, abs=0.6)
+    height = np.radians(sun.altitude[0])
+    beam, diffuse = sun.plane(180.0, 90.0)
+    assert beam[0] == pytest.approx(800.0 * np.cos(height), rel=1e-4)
+    assert sun.horizontal[0] == pytest.approx(800.0 * np.sin(height) + 100.0, rel=1e-12)
+    assert diffuse[0] == pytest.approx(50.0 + 0.1 * sun.horizontal[0], rel=1e-12)
+    # 1 - 0.13 (1 / cos 42 deg - 1) = 0.955
+    assert sun.through_glass(180.0, 90.0)[0] == pytest.approx(0.955 * beam[0] + 0.86 * diffuse[0], rel=1e-3)
+    assert sun.plane(0.0, 90.0)[0][0] == 0.0  # behind a wall to the north
+
+
+def test_stamps_end_their_steps() -> None:
+    # the same hour told as one step, and as the middle one of three steps of 20 minutes
+    hour = sun_of(MUNICH, days(n=24), 3600.0, clear_sky(days(n=24), 3600.0))
+    fine = days(n=72, step="20min")
+    third = sun_of(MUNICH, fine, 1200.0, clear_sky(fine, 1200.0))
+    assert hour.altitude == pytest.approx(third.altitude[1::3], abs=1e-12)
+
+
+def test_clocks_that_change_do_not_move_the_sun() -> None:
+    stamps = days("2023-03-25 20:00", n=24)
+    weather = clear_sky(stamps, 3600.0)
+    local = sun_of(MUNICH, stamps, 3600.0, weather)
+    world = sun_of(MUNICH, stamps.tz_convert("UTC"), 3600.0, weather)
+    assert local.azimuth == pytest.approx(world.azimuth, abs=1e-12)
+    assert np.diff(np.unwrap(local.azimuth, period=360.0)).max() < 25.0  # no jump where the clock jumps
+
+
+@pytest.mark.parametrize("seen", [(NORMAL, DIFFUSE), (NORMAL, GLOBAL), (DIFFUSE, GLOBAL), (NORMAL, DIFFUSE, GLOBAL)])
+def test_two_irradiances_give_the_third(seen: tuple[str, ...]) -> None:
+    stamps = days()
+    weather = clear_sky(stamps, 3600.0)
+    sun = sun_of(MUNICH, stamps, 3600.0, weather[list(seen)])
+    assert sun.normal == pytest.approx(weather[NORMAL].to_numpy(), abs=1e-9)
+    assert sun.diffuse == pytest.approx(weather[DIFFUSE].to_numpy(), abs=1e-9)
+    assert sun.horizontal == pytest.approx(weather[GLOBAL].to_numpy(), abs=1e-9)
+
+
+def test_the_global_one_alone_is_split_and_adds_up() -> None:
+    stamps = days()
+    weather = clear_sky(stamps, 3600.0)[[GLOBAL]]
+    sun = sun_of(MUNICH, stamps, 3600.0, weather)
+    high = sun.altitude > 5.0
+    again = sun.normal * np.sin(np.radians(sun.altitude)) + sun.diffuse
+    assert again[high] == pytest.approx(weather[GLOBAL].to_numpy()[high], rel=1e-9)
+    assert (sun.normal[sun.altitude < 0.0] == 0.0).all()
+    clear = sun.altitude > 50.0
+    assert (sun.normal[clear] > 500.0).all()  # a high sun on a bright day is mostly beam
+
+
+@pytest.mark.parametrize("seen", [(), (NORMAL,), (DIFFUSE,)])
+def test_what_does_not_tell_beam_and_diffuse_apart_is_refused(seen: tuple[str, ...]) -> None:
+    stamps = days()
+    with pytest.raises(EffectError, match="expected global_horizontal_irradiance_sensor, or direct_normal"):
+        sun_of(MUNICH, stamps, 3600.0, clear_sky(stamps, 3600.0)[list(seen)])
+
+
+def test_a_low_sun_makes_no_beam_out_of_noise() -> None:
+    stamps = days(n=144, step="10min")
+    weather = clear_sky(stamps, 600.0)[[DIFFUSE, GLOBAL]]
+    weather[GLOBAL] += 5.0  # an offset of the sensor, at night too
+    assert sun_of(MUNICH, stamps, 600.0, weather).normal.max() < 1000.0
+
+
+def test_incidence_modifier_of_known_angles() -> None:
+    angle = np.radians([0.0, 60.0, 89.9, 120.0])
+    assert incidence_modifier(np.cos(angle)) == pytest.approx([1.0, 0.87, 0.0, 0.0])
+
+
+def test_a_sun_below_the_horizon_does_not_shine_through_glass() -> None:
+    sun = Sun(*(np.array([v]) for v in (180.0, -10.0, 0.0, 0.0, 0.0)))
+    assert sun.through_glass(180.0, 90.0)[0] == 0.0

@@ -1,0 +1,338 @@
+"""What an effect of the catalogue is, and how it joins a building's network."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from thermal.errors import EffectError, nearest
+from thermal.network import Anatomy, GraphBuilder, Room
+from thermal.parameters import Parameter, Scale
+from thermal.inputs import Drivers, Signal
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+_Part = tuple[IntArray, FloatArray]
+
+#: Adds an effect to a graph, in some of its zones (all of them when there are none).
+Builder = Callable[["Joining"], None]
+
+
+#: Between the names of two zones, where a strength belongs to both.
+PAIR = " + "
+
+
+@dataclass(frozen=True)
+class Effect:
+    """An effect that a building may have and the baseline does not.
+
+    Parameters
+    ----------
+    id : str
+        Short name, fixed for good.
+    title : str
+        In plain words.
+    equation : str
+        Heat that it brings, with symbols as in the nomenclature.
+    source : str
+        Where equation and ranges come from.
+    acts_on : str
+        Control volumes that receive the heat.
+    confounders : tuple of str
+        What looks alike: ids of effects, or words.
+    separated_by : str
+        Experiment that tells it from these.
+    parameters : tuple of Parameter
+        What it brings; the first is its strength, 0 where it is absent.
+    build : callable
+        Adds its terms.
+    needs : tuple of str
+        Point types of the weather station that it cannot do without.
+    zonal : bool
+        Whether it may be there in some zones only; it then has a strength a zone.
+    requires : tuple of str
+        Effects that it modifies, and without which it means nothing.
+    applies : callable, optional
+        Says why a building cannot have it, None when it can; every building can by default.
+    shifts : tuple of str
+        Parameters that move telemetry in time [h]. Up to a step they say how a value is spread over its own step, which
+        telemetry cannot tell from the effect.
+    level : str
+        Parameter that the effect's heat per unit of strength is linear in, so that what it is matters as much as the
+        strength; empty where there is none.
+    """
+
+    id: str
+    title: str
+    equation: str
+    source: str
+    acts_on: str
+    confounders: tuple[str, ...]
+    separated_by: str
+    parameters: tuple[Parameter, ...]
+    build: Builder
+    needs: tuple[str, ...] = ()
+    zonal: bool = False
+    requires: tuple[str, ...] = ()
+    applies: Callable[[Anatomy], str | None] | None = None
+    shifts: tuple[str, ...] = ()
+    level: str = ""
+
+    def untestable(self, drivers: Drivers, anatomy: Anatomy) -> str | None:
+        """Say why a case cannot tell whether the effect is there; None when it can.
+
+        Parameters
+        ----------
+        drivers : Drivers
+            The case's telemetry.
+        anatomy : Anatomy
+            Of its building.
+        """
+        missing = [point for point in self.needs if not drivers.measured(point)]
+        if missing:
+            return f"not measured: {', '.join(missing)}"
+        return None if self.applies is None else self.applies(anatomy)
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """An effect in some zones of a building: what a network is extended by.
+
+    Parameters
+    ----------
+    effect : Effect
+        Which.
+    zones : tuple of str
+        Where; all zones when empty.
+    """
+
+    effect: Effect
+    zones: tuple[str, ...] = ()
+
+    def extend(self, graph: GraphBuilder) -> None:
+        """Add volumes, faces, sources and parameters to a graph whose baseline is complete.
+
+        Parameters
+        ----------
+        graph : GraphBuilder
+            With its anatomy.
+
+        Raises
+        ------
+        EffectError
+            When a zone is not of the building, or the effect cannot be in some zones only.
+        """
+        unknown = sorted(set(self.zones) - set(graph.zones))
+        if unknown:
+            known = nearest(unknown[0], graph.zones)
+            raise EffectError(f"effect {self.effect.id}: zones {unknown} are not of this building; {known}")
+        if self.zones and not self.effect.zonal:
+            raise EffectError(
+                f"effect {self.effect.id}: acts on the whole building, came zones {list(self.zones)}; leave them out"
+            )
+        self.effect.build(Joining(graph, self.effect, self.zones or graph.zones))
+
+
+class Joining:
+    """A graph while one effect joins it.
+
+    Parameters
+    ----------
+    graph : GraphBuilder
+        The building.
+    effect : Effect
+        What joins.
+    zones : tuple of str
+        Where it may act.
+    """
+
+    def __init__(self, graph: GraphBuilder, effect: Effect, zones: Sequence[str]) -> None:
+        self.graph, self.effect, self.anatomy = graph, effect, graph.anatomy
+        self.rooms: tuple[Room, ...] = tuple(graph.anatomy.rooms[z] for z in zones)
+        self._count = 0
+        self._keys: dict[int, tuple[str, ca.SX]] = {}
+
+    def parameter(self, name: str, zone: str | None = None, facade: str | None = None) -> ca.SX:
+        """Symbol of one of the effect's parameters, or that of a zone or a facade.
+
+        Parameters
+        ----------
+        name : str
+            Its name.
+        zone, facade : str, optional
+            Whose value it is.
+        """
+        found = next(p for p in self.effect.parameters if p.name == name)
+        if zone is not None:
+            found = found.of("zone", zone)
+        elif facade is not None:
+            found = found.of("facade", facade)
+        return self.graph.own(found)
+
+    def key(self, what: str = "") -> str:
+        """Name of a new class of this effect.
+
+        Parameters
+        ----------
+        what : str
+            Where, for those who read it.
+        """
+        self._count += 1
+        return f"{self.effect.id} {what} {self._count}".replace("  ", " ")
+
+    def heat_air(self, room: Room, value: ca.SX, signal: Signal, weight: float) -> None:
+        """Give heat to a zone's air, ``value weight s`` [W].
+
+        Parameters
+        ----------
+        room : Room
+            The zone.
+        value : casadi.SX
+            Heat per unit of weight and signal [W per both].
+        signal : Signal
+            What drives it.
+        weight : float
+            Geometry, such as an area [m2].
+        """
+        self.graph.source(self._shared(value), value, room.air, signal, weight * room.share)
+
+    def heat_surfaces(self, room: Room, value: ca.SX, signal: Signal, weight: float) -> None:
+        """Give heat to a zone's surfaces by its radiant node; to its air where it has none.
+
+        Parameters
+        ----------
+        room : Room
+            The zone.
+        value : casadi.SX
+            Heat per unit of weight and signal [W per both].
+        signal : Signal
+            What drives it.
+        weight : float
+            Geometry, such as an area [m2].
+        """
+        if room.radiant < 0:
+            self.heat_air(room, value, signal, weight)
+        else:
+            self.graph.source(self._shared(value), value, room.radiant, signal, weight)
+
+    def air_to(self, room: Room, value: ca.SX, far: int, weight: float) -> None:
+        """Join a zone's air to a node or a boundary, ``value weight`` [W/K].
+
+        Parameters
+        ----------
+        room : Room
+            The zone.
+        value : casadi.SX
+            Conductance per unit of weight [W/K per weight].
+        far : int
+            Node, or code of a boundary.
+        weight : float
+            Geometry, such as an area [m2].
+        """
+        self.graph.face(self._shared(value), value, room.air, far, weight * room.share)
+
+    def _shared(self, value: ca.SX) -> str:
+        """Class of all faces of one kind with this very value: many classes make a large building slow."""
+        number = value.element_hash()
+        if number not in self._keys:
+            self._keys[number] = (self.key(), value)  # the value is kept, or another might get its number
+        return self._keys[number][0]
+
+
+def paired(first: _Part, second: _Part) -> tuple[IntArray, IntArray, FloatArray]:
+    """Faces between two sets of volumes whose flow is that between their means, in as few as can be.
+
+    Every volume takes part by its share on both sides: the north-west corner of a transport problem (Dantzig 1951).
+
+    Parameters
+    ----------
+    first, second : tuple of ndarray
+        Nodes and their shares, which sum to 1 [-].
+
+    Returns
+    -------
+    tuple of ndarray
+        Nodes of the first set, nodes of the second, shares that sum to 1 [-].
+    """
+    ends = [np.cumsum(share) / np.sum(share) for _, share in (first, second)]
+    cuts = np.union1d(*ends)
+    cuts = cuts[np.append(np.diff(cuts) > 1e-12, True)]
+    middle = cuts - np.diff(cuts, prepend=0.0) / 2.0
+    numbers = [np.minimum(np.searchsorted(e, middle), e.size - 1) for e in ends]
+    return first[0][numbers[0]], second[0][numbers[1]], np.diff(cuts, prepend=0.0)
+
+
+def strength(name: str, unit: str, upper: float, source: str, effect: str, lower: float = 0.0) -> Parameter:
+    """Parameter of an effect that is absent at 0.
+
+    Parameters
+    ----------
+    name, unit, source, effect : str
+        As in `Parameter`.
+    upper, lower : float
+        Plausible range [unit].
+    """
+    return Parameter(name, unit, 0.0, lower, upper, source, "linear", effect)
+
+
+def shape(
+    name: str, unit: str, start: float, lower: float, upper: float, source: str, effect: str, scale: Scale = "log"
+) -> Parameter:
+    """Parameter of an effect that has no value of absence.
+
+    Parameters
+    ----------
+    name, unit, source, effect : str
+        As in `Parameter`.
+    start, lower, upper : float
+        Centre of the prior and plausible range [unit].
+    scale : str
+        What it is estimated on.
+    """
+    return Parameter(name, unit, start, lower, upper, source, scale, effect)
+
+
+def hat(value: ca.SX, knots: Sequence[float], number: int, signed: bool = False) -> ca.SX:
+    """Weight of one knot in a linear interpolation between knots; flat beyond the ends.
+
+    Parameters
+    ----------
+    value : casadi.SX
+        Where.
+    knots : sequence of float
+        Increasing, in the value's unit [parameter unit].
+    number : int
+        Which of them.
+    signed : bool
+        Whether the line from the first to the second knot goes on below the first: at a strength of zero an
+        interpolation that is flat on one side has half a slope.
+    """
+    last = number + 1 == len(knots)
+    rise = (value - knots[number - 1]) / (knots[number] - knots[number - 1]) if number else ca.SX(1.0)
+    fall = ca.SX(1.0) if last else (knots[number + 1] - value) / (knots[number + 1] - knots[number])
+    if signed and number == 1:
+        return ca.fmin(rise, ca.fmax(0.0, fall))
+    return ca.fmax(0.0, ca.fmin(rise, fall))
+
+
+def _one(drivers: Drivers) -> FloatArray:
+    return np.ones(len(drivers.stamps))
+
+
+#: A signal that is 1 throughout.
+CONSTANT = Signal("constant", "1", _one)
+
+
+def without_facades(anatomy: Anatomy) -> str | None:
+    """Say that a building has no exterior walls; None where it has.
+
+    Parameters
+    ----------
+    anatomy : Anatomy
+        Of the building.
+    """
+    return None if anatomy.facades else "the building has no exterior walls"

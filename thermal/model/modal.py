@@ -1,0 +1,259 @@
+"""The modes of a reduced model: decoupled states, stepped exactly or as a scheme would, and their derivatives."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import scipy.linalg as sl
+from numpy.typing import NDArray
+
+from thermal.errors import ModelError, SingularModelError
+from thermal.model.scheme import EXACT, Scheme
+
+if TYPE_CHECKING:
+    from thermal.model.symbolic import Matrices
+
+FloatArray = NDArray[np.float64]
+
+#: Shift that keeps a building without any path to the outside regular [1/s]: three years.
+SHIFT = 1e-8
+
+#: Modes faster than this are at rest within any step [s]; massless volumes make them.
+_FASTEST = 1e-3
+
+#: Relative distance of two modes below which a difference quotient is the derivative at their middle [-]: the error of
+#: either is then some 1e-11.
+_CLOSE = 1e-5
+
+
+@dataclass(frozen=True)
+class Propagator:
+    """One step of every mode: ``ξ' = end ξ + end_gain b``, mean over the step ``mean ξ + mean_gain b``.
+
+    Parameters
+    ----------
+    end, mean : ndarray, shape (r,)
+        Share of the start that is left at the end, and in the mean [-].
+    end_gain, mean_gain : ndarray, shape (r,)
+        Response to a constant modal input b [-].
+    """
+
+    end: FloatArray
+    end_gain: FloatArray
+    mean: FloatArray
+    mean_gain: FloatArray
+
+
+@dataclass(frozen=True)
+class ModalModel:
+    """A reduced model at one θ in its modes: ``c dξ/dt = -k ξ + B u + H q``, diagonal c and k.
+
+    The modes are those of the symmetric pencil (C, K + s C) with a tiny s, normalised so that ``k + s c = 1``; they
+    decouple, so that a zero-order hold is exact at any step (Bathe 1996, Finite Element Procedures, ch. 9.3).
+
+    Parameters
+    ----------
+    capacity : ndarray, shape (r,)
+        c of every mode [s], the slowest last; c/k is its time constant.
+    boundary : ndarray, shape (r, n_boundary)
+        B, drive by the boundary temperatures [(W/K)^0.5].
+    heating : ndarray, shape (r, n_zone)
+        H, drive by the zones' heat [(K/W)^0.5].
+    observation : ndarray, shape (n_zone, r)
+        Zone means [(K/W)^0.5].
+    uniform : ndarray, shape (r,)
+        The state in which every volume is at 1 K [(W K)^0.5].
+    states : ndarray, shape (n, r)
+        Modes as columns in the states of the reduced model [(K/W)^0.5].
+    coordinates : ndarray, shape (r, n)
+        Its inverse [(W/K)^0.5].
+    reading : ndarray, shape (n_zone, r), optional
+        What the zones' sensors read where these lag behind [(K/W)^0.5]; see `output`.
+    n_signal : int
+        How many of the columns of B, the last ones, are signals of effects.
+
+    Examples
+    --------
+    >>> from thermal import build_network, load_bundled_case, reduced_model, SymbolicModel
+    >>> grid = SymbolicModel(build_network(load_bundled_case().building, dx=1.0))
+    >>> modes = modal_model(reduced_model(grid, [grid.network.start()]).matrices(grid.network.start()))
+    >>> bool((modes.propagator(300.0).end < 1.0).all())
+    True
+    """
+
+    capacity: FloatArray
+    boundary: FloatArray
+    heating: FloatArray
+    observation: FloatArray
+    uniform: FloatArray
+    states: FloatArray
+    coordinates: FloatArray
+    reading: FloatArray | None = None
+    n_signal: int = 0
+
+    @property
+    def output(self) -> FloatArray:
+        """What is compared with telemetry, shape (n_zone, r): the sensors' readings, or the zone means."""
+        return self.observation if self.reading is None else self.reading
+
+    @property
+    def conductance(self) -> FloatArray:
+        """Diagonal k of every mode [-]."""
+        return 1.0 - SHIFT * self.capacity
+
+    @property
+    def time_constants(self) -> FloatArray:
+        """Time constants c/k, shape (r,) [s]."""
+        return np.asarray(self.capacity / self.conductance)
+
+    def propagator(self, step: float, scheme: Scheme = EXACT) -> Propagator:
+        """One step of every mode.
+
+        Parameters
+        ----------
+        step : float
+            Time step [s], positive.
+        scheme : Scheme
+            Exact zero-order hold by default.
+
+        Raises
+        ------
+        ModelError
+            When the step is not positive.
+        """
+        if not step > 0.0:
+            raise ModelError(f"step: expected a positive number of seconds, came {step!r}")
+        end, end_gain, mean, mean_gain = (
+            np.asarray(f(self.capacity), dtype=float) for f in propagator_functions(step, scheme)
+        )
+        return Propagator(end, end_gain, mean, mean_gain)
+
+
+#: Functions of the capacity c of a mode (with k = 1 - s c): end, end_gain, mean, mean_gain.
+ModalFunction = Callable[[NDArray[np.inexact]], NDArray[np.inexact]]
+
+
+def modal_model(matrices: Matrices) -> ModalModel:
+    """Modes of a reduced model.
+
+    Parameters
+    ----------
+    matrices : Matrices
+        Of a reduced model, dense.
+
+    Raises
+    ------
+    ModelError
+        When the matrices are sparse, that is, on the grid.
+    SingularModelError
+        When they are not positive definite.
+    """
+    if not matrices.reduced:
+        raise ModelError("modes: expected a reduced model, came the grid; see `thermal.reduced_model`")
+    n = matrices.n
+    capacity = 0.5 * (matrices.capacity + matrices.capacity.T)
+    stiffness = matrices.flow[:, :n] + SHIFT * capacity
+    stiffness = 0.5 * (stiffness + stiffness.T)
+    try:
+        c, states = sl.eigh(capacity, stiffness)
+    except np.linalg.LinAlgError as error:
+        raise SingularModelError(
+            f"the reduced model (order {n}) is not positive definite: {error}; a parameter out of range does this"
+        ) from error
+    return ModalModel(
+        capacity=np.maximum(c, _FASTEST),
+        boundary=-states.T @ matrices.flow[:, n:],
+        heating=states.T @ matrices.heating,
+        observation=matrices.observation @ states,
+        uniform=(states.T @ stiffness) @ matrices.uniform,
+        states=states,
+        coordinates=states.T @ stiffness,
+        reading=None if matrices.reading is None else matrices.reading @ states,
+        n_signal=matrices.n_signal,
+    )
+
+
+def propagator_functions(
+    step: float, scheme: Scheme
+) -> tuple[ModalFunction, ModalFunction, ModalFunction, ModalFunction]:
+    """End, end gain, mean and mean gain of a step as functions of a mode's capacity c.
+
+    They are analytic, so that a complex step differentiates them exactly.
+
+    Parameters
+    ----------
+    step : float
+        Time step [s].
+    scheme : Scheme
+        A scheme's stability function, or the exponential of the exact zero-order hold.
+    """
+    if scheme.stages:
+        runs = [_staged(step, scheme, start, drive) for start, drive in ((1.0, 0.0), (0.0, 1.0))]
+        return runs[0][0], runs[1][0], runs[0][1], runs[1][1]
+
+    def end(c: NDArray[np.inexact]) -> NDArray[np.inexact]:
+        return np.asarray(np.exp(-step * (1.0 - SHIFT * c) / c))
+
+    def mean(c: NDArray[np.inexact]) -> NDArray[np.inexact]:
+        z = step * (1.0 - SHIFT * c) / c
+        small = np.abs(z) < 1e-4
+        series = 1.0 - z / 2.0 + z**2 / 6.0 - z**3 / 24.0
+        return np.asarray(np.where(small, series, (1.0 - np.exp(-z)) / np.where(small, 1.0, z)))
+
+    def end_gain(c: NDArray[np.inexact]) -> NDArray[np.inexact]:
+        return np.asarray(step / c * mean(c))
+
+    def mean_gain(c: NDArray[np.inexact]) -> NDArray[np.inexact]:
+        # (1 - φ1(z)) / k, by its series where a slow mode would cancel
+        z = step * (1.0 - SHIFT * c) / c
+        small = np.abs(z) < 1e-4
+        series = 0.5 - z / 6.0 + z**2 / 24.0
+        return np.asarray(step / c * np.where(small, series, (1.0 - mean(c)) / np.where(small, 1.0, z)))
+
+    return end, end_gain, mean, mean_gain
+
+
+def _staged(step: float, scheme: Scheme, start: float, drive: float) -> tuple[ModalFunction, ModalFunction]:
+    """End and mean of one mode under a scheme from ``start`` with input ``drive``."""
+
+    def trail(c: NDArray[np.inexact]) -> list[NDArray[np.inexact]]:
+        k = 1.0 - SHIFT * c
+        values = [np.full_like(c, start)]
+        for stage in scheme.stages:
+            base = sum(w * x for w, x in zip(stage.weights, values, strict=False))
+            push = step * (stage.implicit + stage.explicit) * drive - step * stage.explicit * k * values[0]
+            values.append(np.asarray((c * base + push) / (c + step * stage.implicit * k)))
+        return values
+
+    def mean(c: NDArray[np.inexact]) -> NDArray[np.inexact]:
+        return np.asarray(sum(w * x for w, x in zip(scheme.mean, trail(c), strict=True)))
+
+    return (lambda c: trail(c)[-1]), mean
+
+
+def divided_differences(function: ModalFunction, c: FloatArray) -> FloatArray:
+    """``(f(c_i) - f(c_j)) / (c_i - c_j)``, and ``f'`` where they meet, shape (r, r).
+
+    Times ``E``, elementwise, it is the derivative of ``f(S)`` in direction E in the basis where S is diagonal (Daleckii
+    and Krein 1965; Higham 2008, Functions of Matrices, th. 3.11).
+
+    Parameters
+    ----------
+    function : callable
+        Analytic f.
+    c : ndarray, shape (r,)
+        Eigenvalues [s].
+    """
+    value = function(c)
+    gap = c[:, None] - c[None, :]
+    middle = 0.5 * (c[:, None] + c[None, :])
+    close = np.abs(gap) <= _CLOSE * middle
+    quotient = (value[:, None] - value[None, :]) / np.where(close, 1.0, gap)
+    row, column = np.nonzero(close)
+    points = middle[row, column]
+    tiny = 1e-30 * points
+    quotient[row, column] = function(points + 1j * tiny).imag / tiny
+    return np.asarray(quotient)

@@ -1,0 +1,284 @@
+"""Replay of a case's telemetry: inputs, spin-up with the zones held at their measured temperatures, and free runs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from thermal.case import Case
+from thermal.errors import SimulationError
+from thermal.model.modal_series import run_along
+from thermal.model.scheme import IMPLICIT_EULER, Scheme
+from thermal.model.stepper import Stepper
+from thermal.model.symbolic import Matrices
+from thermal.network import ThermalNetwork
+from thermal.inputs import REFERENCE_TEMPERATURE, Drivers, signal_values
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+#: Longest gap of an input that is bridged by a straight line [s] (results contract: 30 minutes).
+LONGEST_BRIDGE = 1800.0
+
+#: Length of the spin-up [s] (results contract: 3 days).
+SPIN_UP = 3 * 86400.0
+
+#: The least spin-up that is accepted [s] (results contract: 12 hours).
+LEAST_SPIN_UP = 12 * 3600.0
+
+#: Temperatures are stepped as differences from this one [K]: rows of ``[K, -B]`` sum to zero but for signals,
+#: which are counted from it, so nothing changes but round-off.
+_REFERENCE = REFERENCE_TEMPERATURE
+
+#: One long implicit step towards the steady state that a spin-up starts from [s].
+_STEADY_STEP = 10 * 86400.0
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """What drives a replay, one row a stamp; a row stands for the step that ends at its stamp.
+
+    Parameters
+    ----------
+    stamps : DatetimeIndex, length n_time
+        Ends of the steps.
+    step : float
+        Length of a step [s].
+    heat : ndarray, shape (n_time, n_zone)
+        Metered heat given to each zone [W].
+    boundary : ndarray, shape (n_time, n_boundary)
+        Boundary temperatures, outdoor first [K]; then the signals of the effects in the model, counted from the
+        reference temperature like these [signal unit].
+    airflow : ndarray, shape (n_time, n_airflow)
+        Directed airflows [kg/s].
+    zone : ndarray, shape (n_time, n_zone)
+        Measured zone temperatures [K], NaN where missing; an unmeasured zone is NaN throughout.
+    bridged : ndarray, shape (n_time, n_zone)
+        ``zone`` with the last value kept for at most 30 minutes: a start may know nothing of what comes after it [K].
+    held : ndarray, shape (n_time, n_zone)
+        ``zone`` with the last value kept through every gap, to hold the zones at in a spin-up [K].
+    complete : ndarray of bool, shape (n_time,)
+        Whether heat, boundaries and airflows of this step are measured or bridged over at most 30 minutes.
+    """
+
+    stamps: pd.DatetimeIndex
+    step: float
+    heat: FloatArray
+    boundary: FloatArray
+    airflow: FloatArray
+    zone: FloatArray
+    bridged: FloatArray
+    held: FloatArray
+    complete: NDArray[np.bool_]
+
+    def __len__(self) -> int:
+        return len(self.stamps)
+
+
+def replay_inputs(case: Case, network: ThermalNetwork, drivers: Drivers | None = None) -> Inputs:
+    """Collect the inputs of a replay from a case's telemetry.
+
+    Parameters
+    ----------
+    case : Case
+        With telemetry.
+    network : ThermalNetwork
+        Says which boundaries, airflows and signals the model has.
+    drivers : Drivers, optional
+        Of the same case, where they are at hand.
+
+    Returns
+    -------
+    Inputs
+        In SI units.
+
+    Raises
+    ------
+    SimulationError
+        When no zone temperature or no outdoor temperature is measured, or no step has all its inputs.
+    """
+    step = float(case.telemetry.step)
+    zone = case.zone_temperatures()
+    boundary = case.boundary_temperatures()
+    if zone.isna().all(axis=None):
+        raise SimulationError(
+            "telemetry: expected a zone_air_temperature_sensor of at least one zone, found none that is usable"
+        )
+    missing = [str(c) for c in boundary.columns if boundary[c].isna().all()]
+    if missing:
+        raise SimulationError(
+            f"telemetry: expected temperatures of the boundaries, found none that is usable for {missing}"
+        )
+    frames = [case.zone_heat(), boundary, case.airflow_rates()]
+    limit = int(LONGEST_BRIDGE // step)
+    bridged = [_bridge(f, limit) for f in frames]
+    complete = np.logical_and.reduce([f.notna().all(axis=1).to_numpy() for f in bridged])
+    if not complete.any():
+        raise SimulationError(f"telemetry: no step has all its inputs; {_most_missing(bridged)}")
+    filled = [f.interpolate(limit_direction="both").fillna(0.0).to_numpy(dtype=float) for f in bridged]
+    index = pd.DatetimeIndex(zone.index)
+    signals = _REFERENCE + signal_values(network.signals, drivers or Drivers(case))
+    return Inputs(
+        stamps=index,
+        step=step,
+        heat=filled[0],
+        boundary=np.hstack([filled[1], signals]),
+        airflow=filled[2],
+        zone=zone.to_numpy(dtype=float),
+        bridged=(zone.ffill(limit=limit) if limit else zone).to_numpy(dtype=float),
+        held=zone.ffill().bfill().to_numpy(dtype=float),
+        complete=complete,
+    )
+
+
+def _most_missing(frames: list[pd.DataFrame]) -> str:
+    """Name the inputs that are missing most."""
+    kinds = ("heat of zone", "temperature of boundary", "airflow")
+    shares = [(f[c].isna().mean(), f"{kind} {c}") for kind, f in zip(kinds, frames, strict=True) for c in f.columns]
+    worst = sorted((s for s in shares if s[0] > 0), reverse=True)[:5]
+    named = ", ".join(f"{name} ({share:.0%} missing)" for share, name in worst)
+    return f"{named}; a device that gives heat must report its flow and discharge temperature, or its power"
+
+
+def _bridge(frame: pd.DataFrame, limit: int) -> pd.DataFrame:
+    """Bridge gaps of at most ``limit`` rows by straight lines and leave longer ones as they are."""
+    if frame.empty or limit == 0 or not frame.isna().any(axis=None):
+        return frame
+    out = frame.copy()
+    for name in frame.columns[frame.isna().any()]:
+        column = frame[name]
+        gap = column.isna()
+        run = gap.groupby((gap != gap.shift()).cumsum()).transform("sum")
+        out[name] = column.where(~gap | (run > limit), column.interpolate(limit_area="inside"))
+    return out
+
+
+def spin_up(
+    matrices: Matrices,
+    inputs: Inputs,
+    begin: int,
+    at: IntArray,
+    progress: Callable[[int], None] | None = None,
+) -> tuple[FloatArray, FloatArray | None]:
+    """States at several stamps after holding the zones at their measured temperatures since stamp ``begin``.
+
+    The zones are held by whatever heat that takes, so walls, slabs and furniture follow the building as it was
+    measured. It starts
+    from the steady state of the mean temperatures of the first day (or of what there is before the first start).
+
+    Parameters
+    ----------
+    matrices : Matrices
+        The model at one θ; with slopes, sensitivities are returned as well.
+    inputs : Inputs
+        The telemetry.
+    begin : int
+        First stamp of the spin-up.
+    at : ndarray of int, shape (m,)
+        Stamps at which states are wanted, increasing, none before ``begin``.
+    progress : callable, optional
+        Called with the number of steps done.
+
+    Returns
+    -------
+    tuple
+        States (n, m) [K] and their derivatives (n, n_parameter m) parameter by parameter, or None.
+    """
+    p = len(matrices.flow_slopes)
+    # a day, or what lies before the first start: a state may know nothing of what comes after it
+    first = slice(begin, min(begin + max(1, int(86400.0 / inputs.step)), int(at[0]) + 1))
+    rows = np.arange(begin, int(at[-1]) + 1)
+    held, boundary = inputs.held - _REFERENCE, inputs.boundary - _REFERENCE
+    states = float(np.nanmean(held[first].mean(axis=0))) * matrices.uniform[:, None]
+    slopes = np.zeros((matrices.n, p)) if p else None
+    driven = (boundary, held, inputs.heat)
+    stages = (
+        (_STEADY_STEP, [v[first].mean(axis=0)[None] for v in driven], np.array([0]), None),
+        (inputs.step, [v[rows] for v in driven], at - begin, progress),
+    )
+    for step, (outside, zone, heat), keep, told in stages:
+        if matrices.reduced and matrices.modal.heated_as_observed:
+            states, slopes = matrices.modal.hold(states, outside, zone, heat, keep, step, slopes)
+        else:
+            stepper = Stepper(matrices, step, IMPLICIT_EULER)
+            states, slopes = stepper.hold_many(states, outside, zone, keep, slopes, heat, told)
+    return states + _REFERENCE * matrices.uniform[:, None], slopes
+
+
+def free_runs(
+    matrices: Matrices,
+    network: ThermalNetwork,
+    inputs: Inputs,
+    starts: IntArray,
+    steps: int,
+    states: FloatArray,
+    slopes: FloatArray | None = None,
+    scheme: Scheme = IMPLICIT_EULER,
+    keep: IntArray | None = None,
+    progress: Callable[[int], None] | None = None,
+) -> tuple[FloatArray, FloatArray | None]:
+    """Run the model freely from several stamps, driven by the telemetry's inputs.
+
+    Parameters
+    ----------
+    matrices : Matrices
+        The model at one θ.
+    network : ThermalNetwork
+        For zones and airflows.
+    inputs : Inputs
+        The telemetry.
+    starts : ndarray of int, shape (m,)
+        Stamps at which the runs start.
+    steps : int
+        Number of steps N.
+    states : ndarray, shape (n, m)
+        States at the starts [K].
+    slopes : ndarray, shape (n, n_parameter m), optional
+        Their derivatives [K per unit of θ].
+    scheme : Scheme
+        Implicit Euler by default.
+    keep : ndarray of int, optional
+        Steps to return, 1 to ``steps``; all by default.
+    progress : callable, optional
+        Called with the number of steps done.
+
+    Returns
+    -------
+    tuple
+        Zone means over the kept steps (m, n_keep, n_zone) [K] and derivatives (m, n_keep, n_zone, n_parameter), or
+        None.
+    """
+    keep = np.arange(1, steps + 1) if keep is None else keep
+    if matrices.reduced and not network.airflows:
+        start, boundary = states - _REFERENCE * matrices.uniform[:, None], inputs.boundary - _REFERENCE
+        if slopes is None:
+            modes = matrices.modal.modes
+            along = run_along(modes, start, boundary, inputs.heat, starts, keep, inputs.step, scheme)
+            return along + _REFERENCE, None
+        row = starts + np.arange(1, int(keep[-1]) + 1)[:, None]
+        boundary, heat = ((v[row]).transpose(0, 2, 1) for v in (boundary, inputs.heat))
+        means, moved = matrices.modal.run(start, boundary, heat, keep, inputs.step, scheme, slopes)
+        return means + _REFERENCE, moved
+    stepper = Stepper(matrices, inputs.step, scheme, network.airflows)
+    m, n_zone, p = starts.size, len(network.zones), len(matrices.flow_slopes)
+    means = np.empty((m, keep.size, n_zone))
+    mean_slopes = np.empty((m, keep.size, n_zone, p)) if slopes is not None else None
+    boundary = inputs.boundary - _REFERENCE
+    states = states - _REFERENCE * matrices.uniform[:, None]
+    position = {int(s): i for i, s in enumerate(keep)}
+    for k in range(1, int(keep[-1]) + 1):
+        row = starts + k
+        states, mean, slopes, mean_slope = stepper.advance(
+            states, boundary[row].T, inputs.heat[row].T, inputs.airflow[row].T, slopes
+        )
+        if k in position:
+            means[:, position[k]] = mean.T + _REFERENCE
+            if mean_slopes is not None and mean_slope is not None:
+                mean_slopes[:, position[k]] = mean_slope.reshape(n_zone, p, m).transpose(2, 0, 1)
+        if progress is not None:
+            progress(k)
+    return means, mean_slopes

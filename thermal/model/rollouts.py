@@ -1,0 +1,313 @@
+"""Roll-outs as CasADi functions of θ: fully symbolic, and sparse behind a Callback, with one signature."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import casadi as ca
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from thermal.errors import InputShapeError, ModelError
+from thermal.model.scheme import IMPLICIT_EULER, Scheme, Stage
+from thermal.model.stepper import Stepper
+from thermal.model.symbolic import Matrix, SymbolicModel
+from thermal.units import AIR_HEAT_CAPACITY
+
+FloatArray = NDArray[np.float64]
+
+#: Beyond this many volumes the symbolic executor's LDL factors and tapes outgrow it (measured: 6,000 volumes).
+LARGEST_SYMBOLIC = 8000
+
+
+@dataclass(frozen=True)
+class RolloutData:
+    """What a roll-out of N steps starts from and is driven by.
+
+    Parameters
+    ----------
+    initial : ndarray, shape (n,)
+        States at the start [K].
+    boundary : ndarray, shape (N, n_boundary)
+        Boundary temperatures [K].
+    heat : ndarray, shape (N, n_zone)
+        Heat given to the zones [W].
+    airflow : ndarray, shape (N, n_airflow)
+        Directed airflows [kg/s]; no columns where the building has none.
+    """
+
+    initial: FloatArray
+    boundary: FloatArray
+    heat: FloatArray
+    airflow: FloatArray
+
+    def check(self, model: SymbolicModel) -> None:
+        """Refuse shapes that do not fit the model, and values that are not finite.
+
+        Parameters
+        ----------
+        model : SymbolicModel
+            What the data must fit.
+
+        Raises
+        ------
+        InputShapeError
+            Naming the array, what was expected and what came.
+        """
+        network = model.network
+        n = network.n_node if model.projection is None else model.projection.shape[1]
+        steps = self.boundary.shape[0]
+        wanted = {
+            "initial": (n,),
+            "boundary": (steps, network.n_boundary),
+            "heat": (steps, len(network.zones)),
+            "airflow": (steps, len(network.airflows)),
+        }
+        for name, shape in wanted.items():
+            value = getattr(self, name)
+            if value.shape != shape:
+                raise InputShapeError(f"{name}: expected shape {shape}, came {value.shape}")
+            if not np.isfinite(value).all():
+                raise InputShapeError(f"{name}: expected finite values, came {value[~np.isfinite(value)][0]}")
+
+
+def rollout(
+    model: SymbolicModel,
+    data: RolloutData,
+    step: float,
+    scheme: Scheme = IMPLICIT_EULER,
+    executor: Literal["symbolic", "sparse"] = "sparse",
+) -> ca.Function:
+    """Make a roll-out, a CasADi function ``zone_temperatures(theta)``, differentiable once.
+
+    Parameters
+    ----------
+    model : SymbolicModel
+        On the grid (both executors) or reduced (sparse only).
+    data : RolloutData
+        Start and inputs.
+    step : float
+        Time step [s].
+    scheme : Scheme
+        Time stepping.
+    executor : {"symbolic", "sparse"}
+        ``mapaccum`` over a step with CasADi's LDL, or SuperLU behind a Callback with forward sensitivities.
+
+    Returns
+    -------
+    casadi.Function
+        θ (n_parameter,) to zone means over the steps (n_zone, N) [K].
+
+    Raises
+    ------
+    InputShapeError
+        When the data do not fit the model.
+    ModelError
+        When the symbolic executor is asked for a reduced model or too large a grid.
+    """
+    data.check(model)
+    if executor == "sparse":
+        return SparseRollout(model, data, step, scheme)
+    if executor != "symbolic":
+        raise ModelError(f"executor: expected 'symbolic' or 'sparse', came {executor!r}")
+    if model.projection is not None:
+        raise ModelError("symbolic executor: expected a grid model, came a reduced one; use executor='sparse'")
+    if model.network.n_node > LARGEST_SYMBOLIC:
+        raise ModelError(
+            f"symbolic executor: expected at most {LARGEST_SYMBOLIC} volumes, came {model.network.n_node}; "
+            "use executor='sparse'"
+        )
+    return _symbolic_rollout(model, data, step, scheme)
+
+
+class SparseRollout(ca.Callback):
+    """Zone temperatures of a roll-out as a Callback of θ, with exact forward sensitivities as its Jacobian.
+
+    Parameters
+    ----------
+    model : SymbolicModel
+        On the grid or reduced.
+    data : RolloutData
+        Start and inputs.
+    step : float
+        Time step [s].
+    scheme : Scheme
+        Time stepping.
+    """
+
+    def __init__(self, model: SymbolicModel, data: RolloutData, step: float, scheme: Scheme) -> None:
+        ca.Callback.__init__(self)
+        self._model, self._data, self._step, self._scheme = model, data, step, scheme
+        self._kept: list[ca.Callback] = []  # CasADi holds no reference to the Jacobian it is handed
+        self.construct("rollout", {})
+
+    def get_n_in(self) -> int:
+        """One input, θ."""
+        return 1
+
+    def get_n_out(self) -> int:
+        """One output, the zone temperatures."""
+        return 1
+
+    def get_sparsity_in(self, i: int) -> ca.Sparsity:
+        """θ is a dense column."""
+        return ca.Sparsity.dense(len(self._model.network.parameters), 1)
+
+    def get_sparsity_out(self, i: int) -> ca.Sparsity:
+        """Zones by steps."""
+        return ca.Sparsity.dense(self._data.heat.shape[1], self._data.heat.shape[0])
+
+    def eval(self, arg: Sequence[ca.DM]) -> list[ca.DM]:
+        """Zone means over the steps."""
+        return [ca.DM(self._run(np.asarray(arg[0]).ravel(), slopes=False)[0])]
+
+    def has_jacobian(self) -> bool:
+        """Exact, by forward sensitivities."""
+        return True
+
+    def get_jacobian(
+        self, name: str, inames: Sequence[str], onames: Sequence[str], opts: Mapping[str, object]
+    ) -> ca.Function:
+        """Jacobian of the stacked output with respect to θ."""
+        p, m = len(self._model.network.parameters), self._data.heat.size
+        self._kept.append(
+            _Jacobian(name, lambda theta: self._run(theta, slopes=True)[1], p, self.get_sparsity_out(0), m)
+        )
+        return self._kept[-1]
+
+    def _run(self, theta: FloatArray, slopes: bool) -> tuple[FloatArray, FloatArray]:
+        """Zone means (n_zone, N), and their derivatives (n_zone N, n_parameter) in CasADi's column-major order."""
+        data, p = self._data, theta.size
+        stepper = Stepper(self._model.matrices(theta, slopes), self._step, self._scheme, self._model.network.airflows)
+        states = data.initial[:, None]
+        moved = np.zeros((states.size, p)) if slopes else None
+        means, mean_slopes = [], []
+        for boundary, heat, airflow in zip(data.boundary, data.heat, data.airflow, strict=True):
+            states, mean, moved, mean_slope = stepper.advance(
+                states, boundary[:, None], heat[:, None], airflow[:, None], moved
+            )
+            means.append(mean[:, 0])
+            if mean_slope is not None:
+                mean_slopes.append(mean_slope)
+        return np.array(means).T, np.concatenate(mean_slopes) if slopes else np.empty((0, p))
+
+
+class _Jacobian(ca.Callback):
+    """Jacobian of a Callback of θ, as CasADi asks for it: inputs θ and the nominal output."""
+
+    def __init__(
+        self, name: str, function: Callable[[FloatArray], FloatArray], p: int, out: ca.Sparsity, m: int
+    ) -> None:
+        ca.Callback.__init__(self)
+        self._function, self._p, self._out, self._m = function, p, out, m
+        self.construct(name, {})
+
+    def get_n_in(self) -> int:
+        return 2
+
+    def get_n_out(self) -> int:
+        return 1
+
+    def get_sparsity_in(self, i: int) -> ca.Sparsity:
+        return ca.Sparsity.dense(self._p, 1) if i == 0 else self._out
+
+    def get_sparsity_out(self, i: int) -> ca.Sparsity:
+        return ca.Sparsity.dense(self._m, self._p)
+
+    def eval(self, arg: Sequence[ca.DM]) -> list[ca.DM]:
+        return [ca.DM(self._function(np.asarray(arg[0]).ravel()))]
+
+
+def _symbolic_rollout(model: SymbolicModel, data: RolloutData, step: float, scheme: Scheme) -> ca.Function:
+    """``mapaccum`` over one symbolic step."""
+    network, count = model.network, data.heat.shape[0]
+    theta = ca.MX.sym("theta", len(network.parameters))
+    steps = symbolic_step(model, step, scheme).mapaccum("rollout", count)
+    inputs = [ca.DM(v.T) for v in (data.boundary, data.heat, data.airflow)]
+    _, means = steps(ca.DM(data.initial), *inputs, ca.repmat(theta, 1, count))
+    return ca.Function("rollout", [theta], [means], ["theta"], ["zone_temperatures"])
+
+
+def symbolic_step(model: SymbolicModel, step: float, scheme: Scheme = IMPLICIT_EULER) -> ca.Function:
+    """One step of the grid model as a CasADi function of everything.
+
+    Parameters
+    ----------
+    model : SymbolicModel
+        On the grid.
+    step : float
+        Time step [s].
+    scheme : Scheme
+        Time stepping.
+
+    Returns
+    -------
+    casadi.Function
+        ``(states (n,) [K], boundary (n_boundary,) [K], heat (n_zone,) [W], airflow (n_airflow,) [kg/s], θ)`` to
+        ``(states (n,) [K], zone means over the step (n_zone,) [K])``.
+    """
+    network = model.network
+    n = network.n_node
+    theta = ca.MX.sym("theta", len(network.parameters))
+    x, u = ca.MX.sym("states", n), ca.MX.sym("boundary", network.n_boundary)
+    q, v = ca.MX.sym("heat", len(network.zones)), ca.MX.sym("airflow", len(network.airflows))
+    kappa, heat = model.classes(theta)
+    faces = len(model.class_flows)
+    flow = _assembled(model.class_flows, kappa[:faces])
+    capacity = _assembled(model.class_masses, heat)
+    stiffness, exchange = flow[:, :n], flow[:, n:]
+    heating, observation = ca.DM(network.heating.tocsc()), ca.DM(network.observation.tocsc())
+    mixing = _symbolic_mixing(network.airflows, len(network.zones), v) if network.airflows else None
+    given = heating @ q
+    if model.sources.signal.size:
+        given = given + ca.DM(model.sources.spread) @ (kappa[faces:] * u[model.sources.signal.tolist()])
+    matrix = capacity + scheme.implicit * step * stiffness
+    response = ca.solve(matrix, ca.densify(heating), "ldl") if mixing is not None else ca.MX()
+
+    def inflow(state: ca.MX) -> ca.MX:
+        own = -(stiffness @ state) - exchange @ u + given
+        return own if mixing is None else own + heating @ (mixing @ (observation @ state))
+
+    def solved(stage: Stage, rhs: ca.MX) -> ca.MX:
+        free = ca.solve(matrix, rhs, "ldl")
+        if mixing is None:
+            return free
+        scale = stage.implicit * step
+        zones = ca.solve(ca.MX.eye(len(network.zones)) - scale * observation @ response @ mixing, observation @ free)
+        return free + scale * response @ (mixing @ zones)
+
+    trail = [x]
+    for stage in scheme.stages:
+        rhs = capacity @ _weighted_sum(stage.weights, trail) + stage.implicit * step * (given - exchange @ u)
+        if stage.explicit:
+            rhs = rhs + stage.explicit * step * inflow(x)
+        trail.append(solved(stage, rhs))
+    mean = ca.DM(network.reading.tocsc()) @ _weighted_sum(scheme.mean, trail)
+    return ca.Function("step", [x, u, q, v, theta], [trail[-1], mean])
+
+
+def _weighted_sum(weights: tuple[float, ...], terms: list[ca.MX]) -> ca.MX:
+    return sum(w * t for w, t in zip(weights[1:], terms[1:], strict=False)) + weights[0] * terms[0]
+
+
+def _symbolic_mixing(airflows: tuple[tuple[int, int], ...], n_zone: int, flow: ca.MX) -> ca.MX:
+    """M(t), shape (n_zone, n_zone) [W/K]."""
+    total = ca.MX(n_zone, n_zone)
+    for k, (source, target) in enumerate(airflows):
+        unit = np.zeros((n_zone, n_zone))
+        unit[target, source], unit[target, target] = AIR_HEAT_CAPACITY, -AIR_HEAT_CAPACITY
+        total = total + flow[k] * ca.DM(unit)
+    return total
+
+
+def _assembled(classes: list[Matrix], weights: ca.MX) -> ca.MX:
+    """Sparse matrix ``Σ_c weights_c classes_c`` as an MX of the union's pattern."""
+    union = sp.csc_matrix(sum((abs(c) for c in classes[1:]), abs(classes[0])))
+    union.sort_indices()
+    pattern = ca.Sparsity(union.shape[0], union.shape[1], union.indptr.tolist(), union.indices.tolist())
+    columns = np.repeat(np.arange(union.shape[1]), np.diff(union.indptr))
+    values = sp.csc_matrix(np.column_stack([np.asarray(c.tocsr()[union.indices, columns]).ravel() for c in classes]))
+    return ca.MX(pattern, ca.DM(values) @ weights)

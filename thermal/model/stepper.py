@@ -1,0 +1,339 @@
+"""One factorisation, many steps: states and their forward sensitivities for many runs at once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cached_property
+
+import numpy as np
+import scipy.linalg as sl
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from thermal.errors import ModelError, SingularModelError
+from thermal.model.factor import Elimination, SparseSolver
+from thermal.model.scheme import IMPLICIT_EULER, Scheme, Stage
+from thermal.model.symbolic import Matrices, Matrix
+from thermal.units import AIR_HEAT_CAPACITY
+
+FloatArray = NDArray[np.float64]
+
+
+class Stepper:
+    """Steps ``C dT/dt = -K T + B u + H (q + M(t) T_zone)`` and its derivatives with respect to θ.
+
+    ``M(t)`` are the directed airflows: not part of the symmetric K, they act between zone means and enter each solve
+    exactly, as a
+    correction of the rank of the zones (Woodbury), so that a flow that changes every step needs no new factorisation.
+
+    Parameters
+    ----------
+    matrices : Matrices
+        The model at one θ; with slopes when sensitivities are wanted.
+    step : float
+        Time step [s].
+    scheme : Scheme
+        Implicit Euler by default.
+    airflows : tuple of (int, int)
+        Source and target zone of each directed airflow.
+
+    Raises
+    ------
+    SingularModelError
+        When the matrix of the step cannot be factorised.
+    """
+
+    def __init__(
+        self,
+        matrices: Matrices,
+        step: float,
+        scheme: Scheme = IMPLICIT_EULER,
+        airflows: tuple[tuple[int, int], ...] = (),
+    ) -> None:
+        self.matrices, self.step, self.scheme, self.airflows = matrices, step, scheme, airflows
+        n = matrices.n
+        self._stiffness = matrices.flow[:, :n]
+        self._exchange = matrices.flow[:, n:]
+        system = matrices.capacity + scheme.implicit * step * self._stiffness
+        self._solve = factorise(system)
+        self.n_parameter = len(matrices.flow_slopes)
+
+    @cached_property
+    def _slope_stacks(self) -> tuple[tuple[list[int], Matrix], tuple[list[int], Matrix]]:
+        """dC/dθ and d[K, -B]/dθ, each as the parameters that it depends on and their matrices stacked."""
+        return _stacked(self.matrices.capacity_slopes), _stacked(self.matrices.flow_slopes)
+
+    @cached_property
+    def response(self) -> tuple[FloatArray, FloatArray]:
+        """End of a stage per joule in each zone [K/J]: states (n, n_zone) and zone means (n_zone, n_zone)."""
+        heating = self.matrices.heating
+        states = self._solve(heating.toarray() if sp.issparse(heating) else np.asarray(heating))
+        return states, np.asarray(self.matrices.observation @ states)
+
+    def advance(
+        self,
+        states: FloatArray,
+        boundary: FloatArray,
+        heat: FloatArray,
+        airflow: FloatArray | None = None,
+        slopes: FloatArray | None = None,
+    ) -> tuple[FloatArray, FloatArray, FloatArray | None, FloatArray | None]:
+        """One step of m independent runs.
+
+        Parameters
+        ----------
+        states : ndarray, shape (n, m)
+            Temperatures at the start of the step [K].
+        boundary : ndarray, shape (n_boundary, m)
+            Boundary temperatures during the step [K].
+        heat : ndarray, shape (n_zone, m)
+            Heat given to the zones during the step [W].
+        airflow : ndarray, shape (n_airflow, m), optional
+            Directed airflows during the step [kg/s].
+        slopes : ndarray, shape (n, n_parameter m), optional
+            Derivatives of ``states`` with respect to θ, parameter by parameter [K per unit of θ].
+
+        Returns
+        -------
+        tuple
+            States at the end (n, m); zone means over the step (n_zone, m); and their derivatives, or None.
+        """
+        scheme, m = self.scheme, self.matrices
+        mixing = self._mixing(airflow)
+        trail = [states]
+        slope_trail = [] if slopes is None else [slopes]
+        source = m.heating @ heat
+        for stage in scheme.stages:
+            base = _combine(stage.weights, trail)
+            rhs = m.capacity @ base + (stage.implicit + stage.explicit) * self.step * source
+            rhs -= stage.implicit * self.step * (self._exchange @ boundary)
+            if stage.explicit:
+                rhs += stage.explicit * self.step * self._flow_in(states, boundary, mixing)
+            new = self._solve_mixed(rhs, mixing, stage.implicit)
+            if slopes is not None:
+                slope_trail.append(self._stage_slopes(stage, base, new, states, slope_trail, boundary, mixing))
+            trail.append(new)
+        mean = np.asarray(m.output @ _combine(scheme.mean, trail))
+        if slopes is None:
+            return trail[-1], mean, None, None
+        return trail[-1], mean, slope_trail[-1], np.asarray(m.output @ _combine(scheme.mean, slope_trail))
+
+    def hold(
+        self,
+        states: FloatArray,
+        boundary: FloatArray,
+        zone: FloatArray,
+        slopes: FloatArray | None = None,
+        heat: FloatArray | None = None,
+    ) -> tuple[FloatArray, FloatArray | None, FloatArray]:
+        """One implicit Euler step with zone means held at given temperatures by whatever heat that takes.
+
+        Parameters
+        ----------
+        states : ndarray, shape (n, 1)
+            Temperatures at the start of the step [K].
+        boundary : ndarray, shape (n_boundary, 1)
+            Boundary temperatures [K].
+        zone : ndarray, shape (n_zone, 1)
+            Zone means at the end of the step [K]; NaN leaves a zone free.
+        slopes : ndarray, shape (n, n_parameter), optional
+            Derivatives of ``states`` [K per unit of θ].
+        heat : ndarray, shape (n_zone, 1), optional
+            Metered heat, for the zones that are left free [W]; zero by default.
+
+        Returns
+        -------
+        tuple
+            States at the end (n, 1), their derivatives or None, and the heat that held the zones (n_zone,) [W].
+
+        Raises
+        ------
+        ModelError
+            When the scheme is not implicit Euler.
+        """
+        m = self.matrices
+        if self.scheme.implicit != 1.0:
+            raise ModelError(f"hold: expected a stepper with scheme implicit_euler, came {self.scheme.name}")
+        held = np.isfinite(zone[:, 0])
+        rhs = m.capacity @ states - self.step * (self._exchange @ boundary)
+        if heat is not None and not held.all():
+            rhs += self.step * (m.heating @ np.where(held[:, None], 0.0, heat))
+        free = self._solve(rhs)
+        missing = zone - m.observation @ free
+        missing[~held] = 0.0
+        response, gain = self.response
+        holding = np.zeros_like(missing)
+        holding[held] = np.linalg.solve(gain if held.all() else gain[np.ix_(held, held)], missing[held])
+        new = free + response @ holding
+        watts = holding[:, 0] / self.step
+        if slopes is None:
+            return new, None, watts
+        moved = self._solve(m.capacity @ slopes + self._slope_source(new - states, np.vstack([new, boundary])))
+        return new, moved - self._lift(held) @ (m.observation @ moved)[held], watts
+
+    def hold_many(
+        self,
+        states: FloatArray,
+        boundary: FloatArray,
+        zone: FloatArray,
+        keep: NDArray[np.int64],
+        slopes: FloatArray | None = None,
+        heat: FloatArray | None = None,
+        progress: Callable[[int], None] | None = None,
+    ) -> tuple[FloatArray, FloatArray | None]:
+        """Hold the zones over many steps and keep the states at some of them.
+
+        Parameters
+        ----------
+        states : ndarray, shape (n, 1)
+            Temperatures at the start [K].
+        boundary : ndarray, shape (n_time, n_boundary)
+            Boundary temperatures of each step [K].
+        zone : ndarray, shape (n_time, n_zone)
+            Zone means at the end of each step [K]; a zone that is NaN throughout stays free.
+        keep : ndarray of int, shape (m,)
+            Steps (counted from 0) after which states are kept, increasing.
+        slopes : ndarray, shape (n, n_parameter), optional
+            Derivatives of ``states`` [K per unit of θ].
+        heat : ndarray, shape (n_time, n_zone), optional
+            Metered heat of each step, for the zones that are left free [W]; zero by default.
+        progress : callable, optional
+            Called with the number of steps done.
+
+        Returns
+        -------
+        tuple
+            Kept states (n, m) and derivatives (n, n_parameter m) parameter by parameter, or None.
+        """
+        n, p = self.matrices.n, self.n_parameter
+        kept, kept_slopes = np.empty((n, keep.size)), np.empty((n, p, keep.size))
+        wanted = {int(k): i for i, k in enumerate(keep)}
+        for k in range(int(keep[-1]) + 1):
+            given = heat[k][:, None] if heat is not None else None
+            states, slopes, _ = self.hold(states, boundary[k][:, None], zone[k][:, None], slopes, given)
+            if k in wanted:
+                kept[:, wanted[k]] = states[:, 0]
+                if slopes is not None:
+                    kept_slopes[:, :, wanted[k]] = slopes
+            if progress is not None:
+                progress(k + 1)
+        return kept, kept_slopes.reshape(n, p * keep.size) if slopes is not None else None
+
+    def _lift(self, held: NDArray[np.bool_]) -> FloatArray:
+        """States per kelvin of each held zone mean, shape (n, n_held) [K/K]."""
+        response, gain = self.response
+        return np.asarray(np.linalg.solve(gain[np.ix_(held, held)].T, response[:, held].T).T)
+
+    def _slope_source(self, change: FloatArray, full: FloatArray) -> FloatArray:
+        """Source of the slopes in a stage, (n, n_parameter m): ``-dC (T - T_base) - Δt d[K, -B] [T; u]``."""
+        capacity, flow = self._slope_stacks
+        n, m = change.shape
+        out = np.zeros((self.n_parameter, m, n))  # one slope after the other, as the solver wants its columns
+        for (which, matrix), x in ((capacity, -change), (flow, -self.step * full)):
+            if which:
+                out[which] += np.asarray(matrix @ x).reshape(len(which), n, m).transpose(0, 2, 1)
+        return out.reshape(self.n_parameter * m, n).T
+
+    def _mixing(self, airflow: FloatArray | None) -> FloatArray | None:
+        """M for each run, shape (m, n_zone, n_zone) [W/K]: air that enters a zone at another zone's temperature."""
+        if airflow is None or not self.airflows:
+            return None
+        n_zone = self.matrices.observation.shape[0]
+        mixing = np.zeros((airflow.shape[1], n_zone, n_zone))
+        for flow, (source, target) in zip(airflow, self.airflows, strict=True):
+            mixing[:, target, source] += AIR_HEAT_CAPACITY * flow
+            mixing[:, target, target] -= AIR_HEAT_CAPACITY * flow
+        return mixing
+
+    def _solve_mixed(self, rhs: FloatArray, mixing: FloatArray | None, implicit: float) -> FloatArray:
+        """Solve ``(C + a Δt (K - H M O)) T = rhs``; columns of ``rhs`` cycle through the runs."""
+        free = self._solve(rhs)
+        if mixing is None:
+            return free
+        response, gain = self.response
+        m, n_zone = mixing.shape[:2]
+        scale = implicit * self.step
+        zone = np.asarray(self.matrices.observation @ free).reshape(n_zone, -1, m).transpose(2, 0, 1)
+        zone = np.linalg.solve(np.eye(n_zone) - scale * (gain @ mixing), zone)
+        heat = (mixing @ zone).transpose(1, 2, 0).reshape(n_zone, -1)
+        return np.asarray(free + scale * (response @ heat))
+
+    def _flow_in(self, states: FloatArray, boundary: FloatArray, mixing: FloatArray | None) -> FloatArray:
+        """Heat into each volume without the zone heat [W]."""
+        m = self.matrices
+        flow = -(self._stiffness @ states) - (self._exchange @ boundary)
+        return flow + m.heating @ self._mixed_heat(states, mixing) if mixing is not None else np.asarray(flow)
+
+    def _mixed_heat(self, states: FloatArray, mixing: FloatArray) -> FloatArray:
+        m, n_zone = mixing.shape[:2]
+        zone = np.asarray(self.matrices.observation @ states).reshape(n_zone, -1, m).transpose(2, 0, 1)
+        return np.asarray((mixing @ zone).transpose(1, 2, 0).reshape(n_zone, -1))
+
+    def _stage_slopes(
+        self,
+        stage: Stage,
+        base: FloatArray,
+        new: FloatArray,
+        start: FloatArray,
+        trail: list[FloatArray],
+        boundary: FloatArray,
+        mixing: FloatArray | None,
+    ) -> FloatArray:
+        """Differentiate one stage with respect to θ."""
+        m = self.matrices
+        full = stage.implicit * np.vstack([new, boundary]) + stage.explicit * np.vstack([start, boundary])
+        rhs = m.capacity @ _combine(stage.weights, trail) + self._slope_source(new - base, full)
+        if stage.explicit:
+            rhs -= stage.explicit * self.step * (self._stiffness @ trail[0])
+            if mixing is not None:
+                rhs += stage.explicit * self.step * (m.heating @ self._mixed_heat(trail[0], mixing))
+        return self._solve_mixed(rhs, mixing, stage.implicit)
+
+
+def _stacked(slopes: list[Matrix]) -> tuple[list[int], Matrix]:
+    """Which slopes are not zero, and these on top of each other."""
+    sparse = bool(slopes) and sp.issparse(slopes[0])
+    which = [j for j, m in enumerate(slopes) if (m.nnz if sparse else np.any(m))]
+    chosen = [slopes[j] for j in which]
+    return which, sp.vstack(chosen).tocsr() if sparse and chosen else np.vstack(chosen) if chosen else np.empty((0, 0))
+
+
+def _combine(weights: tuple[float, ...], trail: list[FloatArray]) -> FloatArray:
+    """Weighted sum of states."""
+    total = weights[0] * trail[0]
+    for w, x in zip(weights[1:], trail[1:], strict=False):
+        total = total + w * x
+    return np.asarray(total)
+
+
+def factorise(system: Matrix, elimination: Elimination | None = None) -> Callable[[FloatArray], FloatArray]:
+    """Factorise a symmetric positive definite matrix, sparse (SuperLU) or dense (inverse by Cholesky).
+
+    Parameters
+    ----------
+    system : sparse matrix or ndarray, shape (n, n)
+        Matrix of the step [J/K].
+    elimination : Elimination, optional
+        What factorises sparse matrices of its structure, for a few solves each; a step is solved many times.
+
+    Returns
+    -------
+    callable
+        Solves for right-hand sides of shape (n,) or (n, m).
+
+    Raises
+    ------
+    SingularModelError
+        When it is not positive definite.
+    """
+    try:
+        if sp.issparse(system):
+            return SparseSolver(system) if elimination is None else elimination(system)
+        factor = sl.cho_factor(np.asarray(system))
+        inverse = sl.cho_solve(factor, np.eye(system.shape[0]))
+        return lambda rhs: np.asarray(inverse @ rhs)
+    except (RuntimeError, np.linalg.LinAlgError) as error:
+        raise SingularModelError(
+            f"the matrix of the step (n = {system.shape[0]}) cannot be factorised: {error}; "
+            "a volume without heat capacity and without any face, or a parameter out of range, does this"
+        ) from error

@@ -1,0 +1,350 @@
+"""The symbolic model: class conductances κ(θ) and capacities c(θ), their derivatives, and the matrices they make."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from thermal.errors import ModelError
+from thermal.model.factor import Elimination
+from thermal.model.modal_runs import ModalRuns
+from thermal.network import ConductanceClass, ThermalNetwork
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+#: A csr_matrix on the grid, an ndarray when reduced; the stubs of scipy cannot type products with such a union.
+Matrix = Any
+
+
+@dataclass(frozen=True)
+class Matrices:
+    """The model at one θ: ``C dT/dt = -K T + B u + H q`` and its derivatives with respect to θ.
+
+    The boundary nodes are the last columns of ``flow = [K, -B]``, so that ``flow @ [T; u]`` is the heat that leaves
+    each volume.
+
+    Parameters
+    ----------
+    capacity : sparse matrix or ndarray, shape (n, n)
+        C [J/K]; diagonal on the grid.
+    flow : sparse matrix or ndarray, shape (n, n + n_boundary)
+        ``[K, -B]`` [W/K].
+    heating : matrix, shape (n, n_zone)
+        H, distribution of a zone's heat; columns sum to 1 on the grid.
+    observation : matrix, shape (n_zone, n)
+        Zone means.
+    uniform : ndarray, shape (n,)
+        The state in which every volume is at 1 K [K].
+    capacity_slopes, flow_slopes : list of matrices
+        dC/dθ_j and d[K, -B]/dθ_j, one a parameter.
+    reading : matrix, shape (n_zone, n), optional
+        What the zones' sensors read where these lag behind; see `output`.
+    n_signal : int
+        How many of the boundary columns, the last ones, are signals of effects.
+    """
+
+    capacity: Matrix
+    flow: Matrix
+    heating: Matrix
+    observation: Matrix
+    uniform: FloatArray
+    capacity_slopes: list[Matrix]
+    flow_slopes: list[Matrix]
+    reading: Matrix = None
+    n_signal: int = 0
+
+    @property
+    def n(self) -> int:
+        """Number of states."""
+        return int(self.flow.shape[0])
+
+    @property
+    def n_boundary(self) -> int:
+        """Number of boundary temperatures and signals."""
+        return int(self.flow.shape[1] - self.flow.shape[0])
+
+    @property
+    def output(self) -> Matrix:
+        """What is compared with telemetry, shape (n_zone, n): the sensors' readings, or the zone means."""
+        return self.observation if self.reading is None else self.reading
+
+    @property
+    def reduced(self) -> bool:
+        """Whether the matrices are dense, those of a reduced model."""
+        return isinstance(self.capacity, np.ndarray)
+
+    @cached_property
+    def modal(self) -> ModalRuns:
+        """What steps a reduced model in its modes."""
+        return ModalRuns(self)
+
+
+class SymbolicModel:
+    """A network's conductances and capacities as CasADi functions of θ, differentiated by CasADi.
+
+    Parameters
+    ----------
+    network : ThermalNetwork
+        Control volumes and faces.
+    projection : ndarray, shape (n_node, r), optional
+        Orthonormal basis [-] of a Galerkin reduction: every class is projected, so the model stays affine in κ(θ)
+        and c(θ).
+
+    Attributes
+    ----------
+    classes : casadi.Function
+        θ to κ and c.
+    class_flows, class_masses : list of matrices
+        ``[K, -B]`` and C of each class at unit value, sources left out.
+    sources : object
+        Columns of -B that the sources' classes bring; their values follow those of the faces in κ.
+    elimination : Elimination
+        What factorises its matrices where they are solved with a few times only.
+
+    Examples
+    --------
+    >>> from thermal import load_bundled_case, build_network, SymbolicModel
+    >>> model = SymbolicModel(build_network(load_bundled_case().building, dx=1.0))
+    >>> model.matrices(model.network.start()).n > 100
+    True
+    """
+
+    def __init__(self, network: ThermalNetwork, projection: FloatArray | None = None) -> None:
+        self.network, self.projection = network, projection
+        faces = [c for c in network.conductances if not c.source]
+        sources = [c for c in network.conductances if c.source]
+        kappa = ca.vertcat(*[c.value for c in (*faces, *sources)])
+        heat = ca.vertcat(*[c.value for c in network.capacities])
+        theta = network.symbols
+        jacobians = [ca.densify(ca.jacobian(e, theta)) for e in (kappa, heat)]
+        self.classes = ca.Function("classes", [theta], [kappa, heat], ["theta"], ["conductance", "capacity"])
+        self._slopes = ca.Function("slopes", [theta], jacobians)
+        self._heating: Matrix = network.heating
+        self._observation: Matrix = network.observation
+        self._reading: Matrix = network.reading if network.readings else None
+        self._uniform = np.ones(network.n_node)
+        self._faces = faces
+        self.sources = _Sources(network, sources, projection)
+        self.elimination = Elimination()
+        self.class_flows: list[Matrix]
+        self.class_masses: list[Matrix]
+        if projection is None:
+            self.class_flows = [_class_laplacian(network, c) for c in faces]
+            self.class_masses = [_class_mass(network, k) for k in range(len(network.capacities))]
+        else:
+            self._project(projection)
+
+    def _project(self, v: FloatArray) -> None:
+        self.class_flows = [_projected_class(c, v, self.network.n_boundary) for c in self._faces]
+        self.class_masses = [congruent(v[c.node], c.weight) for c in self.network.capacities]
+        self._uniform = v.T @ np.ones(self.network.n_node)
+        self._heating = v.T @ self.network.heating.toarray()
+        self._observation = self.network.observation @ v
+        self._reading = self.network.reading @ v if self.network.readings else None
+
+    def matrices(self, theta: FloatArray, slopes: bool = False) -> Matrices:
+        """Assemble the model at θ.
+
+        Parameters
+        ----------
+        theta : ndarray, shape (n_parameter,)
+            Parameter values, as in `ThermalNetwork.parameters` [parameter units].
+        slopes : bool
+            Also the derivatives with respect to θ.
+
+        Raises
+        ------
+        ModelError
+            When θ has the wrong length or a value that is not positive and finite.
+        """
+        theta = np.asarray(theta, dtype=float)
+        names = [p.name for p in self.network.parameters]
+        if theta.shape != (len(names),):
+            raise ModelError(f"theta: expected shape ({len(names)},) for {names}, came {theta.shape}")
+        bad = [
+            p.name
+            for p, t in zip(self.network.parameters, theta, strict=True)
+            if not np.isfinite(t) or (t <= 0 and p.scale != "linear")
+        ]
+        if bad:
+            raise ModelError(f"theta: expected positive finite values, came {theta[names.index(bad[0])]} for {bad[0]}")
+        for p, t in zip(self.network.parameters, theta, strict=True):
+            if p.scale == "logit" and t > 1:
+                raise ModelError(f"theta: expected a probability of at most 1, came {t} for {p.name}")
+        kappa, heat = (np.asarray(v).ravel() for v in self.classes(theta))
+        negative = [c.name for c, k in zip(self._faces, kappa, strict=False) if not (np.isfinite(k) and k >= 0)]
+        if negative:
+            raise ModelError(
+                f"theta: makes the conductance of {negative} negative; a parameter lies outside of its physical range"
+            )
+        flow_slopes: list[Matrix] = []
+        capacity_slopes: list[Matrix] = []
+        if slopes:
+            d_kappa, d_heat = (np.asarray(v) for v in self._slopes(theta))
+            flow_slopes = [self._flow(d_kappa[:, j]) for j in range(theta.size)]
+            capacity_slopes = [_weighted(self.class_masses, d_heat[:, j]) for j in range(theta.size)]
+        return Matrices(
+            capacity=_weighted(self.class_masses, heat),
+            flow=self._flow(kappa),
+            heating=self._heating,
+            observation=self._observation,
+            uniform=self._uniform,
+            capacity_slopes=capacity_slopes,
+            flow_slopes=flow_slopes,
+            reading=self._reading,
+            n_signal=len(self.network.signals),
+        )
+
+    def source_slopes(self, theta: FloatArray) -> Matrix:
+        """Heat that the signals bring per unit of every parameter, a column for each that the parameter moves.
+
+        Parameters
+        ----------
+        theta : ndarray, shape (n_parameter,)
+            Parameter values [parameter units].
+        """
+        slopes = np.asarray(self._slopes(np.asarray(theta, dtype=float))[0])
+        return self.sources.columns(slopes[len(self.class_flows) :])
+
+    def _flow(self, weights: FloatArray) -> Matrix:
+        """Sum of the classes of faces, then of sources, with weights."""
+        count = len(self.class_flows)
+        return self.sources.added(_weighted(self.class_flows, weights[:count]), weights[count:])
+
+
+class _Sources:
+    """Heat that signals bring: columns of -B, summed over classes.
+
+    Parameters
+    ----------
+    network : ThermalNetwork
+        For its sizes.
+    classes : list of ConductanceClass
+        Sources.
+    projection : ndarray, shape (n_node, r), optional
+        Basis of a reduction [-].
+    """
+
+    def __init__(self, network: ThermalNetwork, classes: list[ConductanceClass], projection: FloatArray | None) -> None:
+        count, n = len(classes), network.n_node
+        sizes = [c.first.size for c in classes]
+        rows, column = np.concatenate([[], *[c.first for c in classes]]).astype(int), np.repeat(np.arange(count), sizes)
+        weight = np.concatenate([[], *[c.weight for c in classes]])
+        spread = sp.csc_matrix((weight, (rows, column)), shape=(n, count))
+        self.signal = np.array([c.second[0] - n for c in classes], dtype=np.int64)
+        self.spread: Matrix = spread if projection is None else np.asarray((spread.T @ projection).T)
+        self.n_boundary = network.n_boundary
+
+    def added(self, flow: Matrix, weights: FloatArray) -> Matrix:
+        """Add the sources to ``[K, -B]``.
+
+        Parameters
+        ----------
+        flow : matrix, shape (n, n + n_boundary)
+            Of the faces.
+        weights : ndarray, shape (n_source,)
+            Values of the classes, or their slopes.
+        """
+        there = np.flatnonzero(weights)
+        if not there.size:
+            return flow
+        n = flow.shape[0]
+        if sp.issparse(flow):
+            lift = sp.csr_matrix((-weights[there], (there, n + self.signal[there])), (weights.size, flow.shape[1]))
+            return sp.csr_matrix(flow + self.spread @ lift)
+        flow = flow.copy()
+        np.add.at(flow.T, n + self.signal[there], -weights[there, None] * self.spread[:, there].T)
+        return flow
+
+    def columns(self, slopes: FloatArray) -> Matrix:
+        """Columns of B per unit of every parameter, those of one parameter after those of another, zeros left out.
+
+        Parameters
+        ----------
+        slopes : ndarray, shape (n_source, n_parameter)
+            Of the values of the classes.
+        """
+        parameter, source = np.nonzero(slopes.T)
+        place = parameter * (self.signal.max(initial=0) + 1) + self.signal[source]
+        there, column = np.unique(place, return_inverse=True)
+        return self.spread @ sp.csc_matrix(
+            (slopes[source, parameter], (source, column)), shape=(len(slopes), there.size)
+        )
+
+
+def _weighted(terms: list[Matrix], weights: FloatArray) -> Matrix:
+    """Sum of class matrices with weights; zero weights cost nothing."""
+    chosen = [w * m for w, m in zip(weights, terms, strict=True) if w != 0.0]
+    total = sum(chosen[1:], chosen[0]) if chosen else 0.0 * terms[0]
+    if sp.issparse(total):
+        total = sp.csr_matrix(total)
+        total.eliminate_zeros()
+    return total
+
+
+#: Faces that are projected together, so that a class of all of a large grid fits the memory.
+_FACES = 8192
+
+
+def _projected_class(c: ConductanceClass, v: FloatArray, n_boundary: int) -> FloatArray:
+    """Rows of a class's graph Laplacian at κ = 1 on a basis, from its faces, shape (r, r + n_boundary)."""
+    n, r = v.shape
+    total = np.zeros((r, r + n_boundary))
+    for begin in range(0, c.weight.size, _FACES):
+        part = slice(begin, begin + _FACES)
+        ends, weight = (c.first[part], c.second[part]), c.weight[part]
+        drop = _at(v, ends[0]) - _at(v, ends[1])
+        total[:, :r] += congruent(drop, weight)
+        for sign, end in zip((1.0, -1.0), ends, strict=True):
+            out = np.flatnonzero(end >= n)
+            for boundary in np.unique(end[out]):
+                faces = out[end[out] == boundary]
+                total[:, r + boundary - n] += sign * (weight[faces] @ drop[faces])
+    return total
+
+
+def _at(v: FloatArray, end: IntArray) -> FloatArray:
+    """Rows of a basis at the ends of faces; zero at boundaries."""
+    within = end < len(v)
+    if within.all():
+        return v[end]
+    rows = np.zeros((end.size, v.shape[1]))
+    rows[within] = v[end[within]]
+    return rows
+
+
+def congruent(rows: FloatArray, weight: FloatArray) -> FloatArray:
+    """``V' diag(w) V`` of positive weights, by a symmetric product, shape (r, r).
+
+    Parameters
+    ----------
+    rows : ndarray, shape (n, r)
+        V.
+    weight : ndarray, shape (n,)
+        w, not negative.
+    """
+    scaled = np.sqrt(weight)[:, None] * rows
+    return np.asarray(scaled.T @ scaled)
+
+
+def _class_laplacian(network: ThermalNetwork, c: ConductanceClass) -> sp.csr_matrix:
+    """Rows of the graph Laplacian of a conductance class at κ = 1, shape (n_node, n_node + n_boundary)."""
+    n, total = network.n_node, network.n_node + network.n_boundary
+    rows = np.concatenate([c.first, c.second, c.first, c.second])
+    columns = np.concatenate([c.first, c.second, c.second, c.first])
+    values = np.concatenate([c.weight, c.weight, -c.weight, -c.weight])
+    return sp.csr_matrix((values, (rows, columns)), shape=(total, total))[:n]
+
+
+def _class_mass(network: ThermalNetwork, k: int) -> sp.csr_matrix:
+    """Diagonal matrix of capacity class ``k`` at unit heat capacity, shape (n_node, n_node)."""
+    c = network.capacities[k]
+    n = network.n_node
+    return sp.csr_matrix(sp.diags(np.bincount(c.node, c.weight, minlength=n)))

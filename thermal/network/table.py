@@ -1,0 +1,182 @@
+"""From a zone table to control volumes and faces: one air volume a zone, each surface a chain of layers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import casadi as ca
+import numpy as np
+
+from thermal.case import Building, Layer, Surface, ZoneTable
+from thermal.network.topology import DOWNWARD, UPWARD, VERTICAL, GroundFace, OuterFaces, Outlook, Pane
+from thermal.network.assembly import Blueprint
+from thermal.network.chains import Chain
+from thermal.network.facades import facade_of
+from thermal.network.films import series
+from thermal.network.graph import GraphBuilder
+from thermal.network.interior import Zone
+from thermal.network.materials import (
+    BOUNDARY_FILM_RESISTANCE,
+    LEAST_PANE_RESISTANCE,
+    RATED_OUTSIDE_FILM,
+    WINDOW_RATED_FILM,
+)
+from thermal.network.structure import BASELINE, Structure
+from thermal.parameters import Scope
+from thermal.units import AIR_HEAT_CAPACITY, air_density
+
+
+def table_blueprint(
+    building: Building,
+    table: ZoneTable,
+    scopes: Mapping[str, Scope] | None = None,
+    structure: Structure = BASELINE,
+) -> Blueprint:
+    """Build the baseline of a building given by a zone table.
+
+    Parameters
+    ----------
+    building : Building
+        For its location, zones, boundaries and airflows.
+    table : ZoneTable
+        Its geometry.
+    scopes : mapping of str to {"global", "facade", "zone"}, optional
+        Parameters with one value a facade (`thermal.network.facades.facade_of`) or a zone.
+    structure : Structure
+        What the model is made of.
+
+    Returns
+    -------
+    Blueprint
+        Boundaries ``outdoor`` and the measured ones. Surfaces to ``ground`` are adiabatic at their back
+        (``ground_exchange`` is an effect of the catalogue).
+    """
+    graph = GraphBuilder(building.zone_names, ("outdoor", *building.measured_boundaries), scopes or {}, structure)
+    density = air_density(building.location.elevation)
+    graph.anatomy.air_heat_capacity = density * AIR_HEAT_CAPACITY
+    zones: dict[str, Zone] = {}
+    for entry in table.zones:
+        air = graph.volumes("air", graph.zones.index(entry.name))
+        graph.capacity("air", density * AIR_HEAT_CAPACITY, air, entry.volume)
+        zones[entry.name] = Zone(graph, entry.name, air, np.ones(1))
+        zones[entry.name].furniture(entry.floor_area)
+    for surface in table.surfaces:
+        _add_surface(graph, zones, surface, table, density)
+    for entry in table.zones:
+        zones[entry.name].room(entry.floor_area, entry.volume)
+    graph.anatomy.airflows = tuple(
+        (graph.zones.index(a.source), graph.zones.index(a.target)) for a in building.airflows
+    )
+    air, ones = np.concatenate([zones[z].air for z in graph.zones]), np.ones(len(zones))
+    return Blueprint(graph, air, np.arange(len(zones)), ones, ones)
+
+
+def _add_surface(
+    graph: GraphBuilder, zones: Mapping[str, Zone], surface: Surface, table: ZoneTable, density: float
+) -> None:
+    """Add one row of the surface table."""
+    zone, other = zones[surface.zone], surface.other
+    if other == "ground" and surface.kind in ("bridge", "window"):
+        return  # adiabatic in the baseline, and without mass nothing is left of them
+    if surface.kind == "opening":
+        velocity = graph.parameter("opening_exchange_velocity")
+        graph.face("opening", velocity * density * AIR_HEAT_CAPACITY, zone.air, zones[other].air, surface.area)
+    elif surface.kind == "bridge":
+        far = zones[other].air[0] if other in zones else graph.boundary(other)
+        graph.face("bridge", ca.SX(1.0), zone.air, far, surface.area * float(surface.u_value or 0.0))
+    elif surface.kind == "window":
+        _add_window(graph, zones, surface)
+    else:
+        layers = table.constructions[str(surface.construction)]
+        _add_layers(graph, zones, surface, layers)
+
+
+def _facade(graph: GraphBuilder, surface: Surface) -> str | None:
+    """Facade of a surface where that matters."""
+    return facade_of(surface) if graph.has_facades else None
+
+
+def _add_window(graph: GraphBuilder, zones: Mapping[str, Zone], surface: Surface) -> None:
+    """Glass: rated air-to-air u-value with its films replaced by the building's own."""
+    zone, rated, facade = zones[surface.zone], float(surface.u_value or 0.0), _facade(graph, surface)
+    outlook = None
+    multiplier = graph.parameter("window_conductance_multiplier", facade=facade)
+    if surface.other in zones:
+        far = zones[surface.other]
+        graph.face(f"window u={rated:g} between zones", rated * multiplier, zone.air, far.air, surface.area)
+        return
+    pane = multiplier / max(1.0 / rated - 1.0 / WINDOW_RATED_FILM - 1.0 / RATED_OUTSIDE_FILM, LEAST_PANE_RESISTANCE)
+    if surface.other == "outdoor":
+        film = graph.parameter("exterior_convection_coefficient", facade=facade)
+        value = series(pane, film)
+        azimuth = _azimuth(surface)
+        outlook = Outlook(azimuth, VERTICAL, film, glass=True)
+        transmittance = surface.solar_transmittance
+        graph.anatomy.panes.append(Pane(zone.name, azimuth, VERTICAL, surface.area, transmittance))
+        _count_facade(graph, surface)
+    else:
+        value = series(pane, 1.0 / BOUNDARY_FILM_RESISTANCE)
+    kind = f"window u={rated:g} {'outdoor' if surface.other == 'outdoor' else 'boundary'}"
+    depends = ("window_conductance_multiplier", "exterior_convection_coefficient")
+    far_side = graph.boundary(surface.other)
+    zone.surface(kind, value, far_side, surface.area, depends=depends, facade=facade, outlook=outlook)
+
+
+def _count_facade(graph: GraphBuilder, surface: Surface) -> None:
+    """Add a wall's or a window's area to its facade."""
+    key = (surface.zone, _azimuth(surface))
+    graph.anatomy.facades[key] = graph.anatomy.facades.get(key, 0.0) + surface.area
+
+
+def _azimuth(surface: Surface) -> float:
+    """Where the outer face looks to, from 0 to 360 deg."""
+    return float(surface.azimuth or 0.0) % 360.0
+
+
+def _group(surface: Surface) -> str:
+    """Which multipliers a surface's layers share."""
+    if surface.kind in ("floor", "ceiling"):
+        return "slab"
+    return "exterior_wall" if surface.other == "outdoor" else "interior_wall"
+
+
+def _add_layers(graph: GraphBuilder, zones: Mapping[str, Zone], surface: Surface, layers: tuple[Layer, ...]) -> None:
+    """Add a chain of nodes from the zone to what lies behind, scaled by its group's multipliers."""
+    group, facade = _group(surface), _facade(graph, surface)
+    conductivity, heat_capacity = f"{group}_conductivity_multiplier", f"{group}_heat_capacity_multiplier"
+    scale = graph.parameter(conductivity, facade=facade)
+    heat = graph.parameter(heat_capacity, facade=facade)
+    wall = Chain.of(layers, graph.structure.wall_nodes)
+    nodes = graph.volumes(group, np.full(wall.capacity.size, graph.zones.index(surface.zone)))
+    graph.capacity(graph.key(group, None, heat_capacity, facade=facade), heat, nodes, wall.capacity * surface.area)
+    between = graph.key(f"{group}-{group}", None, conductivity, facade=facade)
+    graph.face(between, scale, nodes[:-1], nodes[1:], surface.area * (1.0 / wall.between))
+
+    def room_side(zone: Zone, resistance: float, node: int) -> None:  # equal resistances share a class
+        kind = f"{group} r={2.0 * resistance:.6g}"
+        zone.surface(kind, scale / resistance, node, surface.area, depends=(conductivity,), facade=facade)
+
+    room_side(zones[surface.zone], wall.near, int(nodes[0]))
+    if surface.other in zones:
+        room_side(zones[surface.other], wall.far, int(nodes[-1]))
+        if surface.kind == "wall" and surface.other != surface.zone:
+            pair = (min(surface.zone, surface.other), max(surface.zone, surface.other))
+            graph.anatomy.partitions[pair] = graph.anatomy.partitions.get(pair, 0.0) + surface.area
+    elif surface.other == "ground":
+        face = GroundFace(surface.zone, int(nodes[-1]), surface.area, scale / wall.far)
+        graph.anatomy.ground_faces.append(face)
+    else:
+        place, film = "boundary", ca.SX(1.0 / BOUNDARY_FILM_RESISTANCE)
+        if surface.other == "outdoor":
+            place, film = "outdoor", graph.parameter("exterior_convection_coefficient", facade=facade)
+        depends = (conductivity, "exterior_convection_coefficient")
+        key = graph.key(f"{group}-{place} r={2.0 * wall.far:.6g}", None, *depends, facade=facade)
+        value = series(film, scale / wall.far)
+        graph.face(key, value, int(nodes[-1]), graph.boundary(surface.other), surface.area)
+        if surface.other == "outdoor":
+            tilt = {"wall": VERTICAL, "ceiling": UPWARD, "floor": DOWNWARD}[surface.kind]
+            outlook = Outlook(_azimuth(surface), tilt, film, glass=False)
+            outer = OuterFaces(value, nodes[-1:], np.array([float(surface.area)]), outlook)
+            graph.anatomy.outer.append(outer)
+            if surface.kind == "wall":
+                _count_facade(graph, surface)

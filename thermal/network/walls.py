@@ -1,0 +1,210 @@
+"""Exterior and interior walls of one floor of a plan, with their windows."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from thermal.network.topology import VERTICAL, OuterFaces, Outlook, azimuth_of
+from thermal.network.arms import Arms
+from thermal.network.facades import wall_facades
+from thermal.network.films import series
+from thermal.network.floor import Floor
+from thermal.network.grid import FACADES
+from thermal.network.interior import Zone
+from thermal.network.materials import EXTERIOR_WALL_MASS, INTERIOR_WALL_MASS, STRUCTURE_RESISTANCE
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+#: Walls by token.
+_KINDS = {"#": "exterior_wall", "+": "interior_wall"}
+
+#: Directions in which pairs of volumes are counted once, with those opposite to them.
+_FORWARD = {"south": "north", "east": "west"}
+
+
+class Walls:
+    """Walls and windows of one floor while its network is built.
+
+    Parameters
+    ----------
+    floor : Floor
+        Its volumes.
+    zones : mapping of str to Zone
+        Zones so far, those of this floor among them.
+    thickness : float
+        Of a wall, one cell of the plan [m].
+    orientation : float
+        Clockwise from true north to the plan's "up" [deg].
+    """
+
+    def __init__(self, floor: Floor, zones: Mapping[str, Zone], thickness: float, orientation: float) -> None:
+        self.orientation = orientation
+        self.graph, self.grid, self.floor, self.thickness = floor.graph, floor.grid, floor, thickness
+        self.zones = {name: zone for name, zone in zones.items() if (floor.grid.token == name).any()}
+        self.height = floor.plan.height
+        self.conductivity = thickness / STRUCTURE_RESISTANCE
+        self.arms = Arms(floor, thickness, self.conductivity)
+
+    def add(self, glazing: Mapping[str, Mapping[str, float]]) -> None:
+        """Add all of them.
+
+        Parameters
+        ----------
+        glazing : mapping
+            Glazed area by zone and facade [m2].
+        """
+        opaque = {facade: self._windows(facade, glazing) for facade in FACADES}
+        half = 0.5 * self.grid.cell
+        inner = self.graph.parameter("interior_wall_conductivity", factor=self.thickness)
+        behind: dict[str, Any] = {"#": self.conductivity / self.arms.half, "+": inner / half}
+        for facade in FACADES:
+            for token, conductance in behind.items():
+                for zone in self.zones.values():
+                    self._room_side(facade, zone, token, conductance, opaque[facade] if token == "#" else None)
+            self._outer_faces(facade, inner / half, opaque[facade])
+            if facade in _FORWARD:
+                along = np.minimum(opaque[facade], opaque[_FORWARD[facade]])
+                self._between_walls(facade, inner, along)
+        self._mass(opaque)
+
+    def _room_side(self, facade: str, zone: Zone, token: str, conductance: Any, share: FloatArray | None) -> None:
+        """Surfaces of walls that a zone looks at in a direction; of exterior wall only the ``share`` without glass."""
+        air, wall = self.floor.beside(FACADES[facade], zone.name, token)
+        if not air.size:
+            return
+        area = np.full(air.size, self.grid.cell * self.height)
+        if share is not None:
+            area *= share.ravel()[wall]
+        volume = self.grid.volume.ravel()
+        nodes, rooms = self.floor.node[volume[wall]], self.floor.node[volume[air]]
+        if token == "#":
+            nodes, rooms, area = self.arms.grow(volume[wall], nodes, rooms, area)
+        kind = _KINDS[token]
+        zone.surface(kind, conductance, nodes, area, rooms, depends=(f"{kind}_conductivity",))
+
+    def _outer_faces(self, facade: str, stub: ca.SX, opaque: FloatArray) -> None:
+        """Faces to outdoor in a direction: insulation and film on exterior walls, the film on ends of interior ones."""
+        graph, w = self.graph, self.thickness
+        insulation = graph.parameter("exterior_wall_conductivity", factor=w, facade=facade) / w
+        film = graph.parameter("exterior_convection_coefficient", facade=facade)
+        values = {"#": series(film, insulation, self.conductivity / self.arms.half), "+": series(film, stub)}
+        for token, value in values.items():
+            wall, _ = self.floor.beside(FACADES[facade], token, ".")
+            if not wall.size:
+                continue
+            area = np.full(wall.size, self.grid.cell * self.height)
+            volume = self.grid.volume.ravel()[wall]
+            nodes, outdoor = self.floor.node[volume], np.full(wall.size, graph.boundary("outdoor"))
+            if token == "#":
+                area *= opaque.ravel()[wall]
+                nodes, outdoor, area = self.arms.grow(volume, nodes, outdoor, area)
+            depends = ("exterior_convection_coefficient", *(("exterior_wall_conductivity",) if token == "#" else ()))
+            key = graph.key(f"{_KINDS[token]}-outdoor", None, *depends, facade=facade)
+            graph.face(key, value, nodes, outdoor, area)
+            if token == "#":
+                outlook = Outlook(azimuth_of(facade, self.orientation), VERTICAL, film, glass=False)
+                graph.anatomy.outer.append(OuterFaces(value, nodes, area, outlook))
+
+    def _between_walls(self, facade: str, inner: ca.SX, along: FloatArray) -> None:
+        """Faces between wall volumes in a direction; glass leaves the share ``along`` of those of exterior walls."""
+        half, spacing = 0.5 * self.grid.cell, self.grid.spacing
+        mixed = series(self.conductivity / half, inner / half)
+        for a, b, value in (
+            ("#", "#", self.conductivity / spacing),
+            ("+", "+", inner / spacing),
+            ("#", "+", mixed),
+            ("+", "#", mixed),
+        ):
+            first, second, faces = self.floor.pairs(FACADES[facade], a, b, along if a == b == "#" else None)
+            if first.size:
+                key = "-".join(sorted((_KINDS[a], _KINDS[b])))
+                self.graph.face(key, value, first, second, faces * (self.grid.cell * self.height))
+
+    def _mass(self, opaque: Mapping[str, FloatArray]) -> None:
+        """Heat capacity of the walls; that of exterior ones without the share of the glass in them."""
+        grid, graph = self.grid, self.graph
+        cube = grid.cell**2 * self.height
+        least = np.minimum.reduce(list(opaque.values()))
+        for token, mass in (("#", EXTERIOR_WALL_MASS), ("+", INTERIOR_WALL_MASS)):
+            cells, name = grid.tokens == token, _KINDS[token]
+            if not cells.any():
+                continue
+            density = mass / self.thickness
+            graph.nominal[f"{name}_density"] = (density, "kg/m^3")
+            weight = least[cells] if token == "#" else np.ones(cells.sum())
+            volume = np.bincount(grid.volume[cells], weight * cube, minlength=grid.token.size).astype(float)
+            if token == "#":
+                node, held, owner = self.arms.spread(volume)
+            else:
+                owner = np.flatnonzero(grid.token == token)
+                node, held = self.floor.node[owner], volume[owner]
+            for facade, share in self._shares(name).items():
+                mine = share[owner] > 0.0
+                if not mine.any():
+                    continue
+                heat = graph.parameter(f"{name}_heat_capacity", facade=facade)
+                key = graph.key(name, None, f"{name}_heat_capacity", facade=facade)
+                graph.capacity(key, density * heat, node[mine], held[mine] * share[owner][mine])
+
+    def _shares(self, name: str) -> dict[str | None, FloatArray]:
+        """Share of each volume's walls in each facade, of the rest under None; all is rest without facade scope."""
+        grid = self.grid
+        rest = np.ones(grid.token.size)
+        if self.graph.scopes.get(f"{name}_heat_capacity") != "facade":
+            return {None: rest}
+        cells = grid.tokens == "#"
+        count = np.bincount(grid.volume[cells], minlength=rest.size)
+        shares: dict[str | None, FloatArray] = {}
+        for facade, of_cell in wall_facades(grid).items():
+            cells_of = np.bincount(grid.volume[cells], of_cell[cells], minlength=rest.size)
+            shares[facade] = np.divide(cells_of, count, out=np.zeros_like(rest), where=count > 0)
+            rest = rest - shares[facade]
+        rest[rest < 1e-9] = 0.0
+        return {**shares, **({None: rest} if rest[grid.token == "#"].any() else {})}
+
+    def _windows(self, facade: str, glazing: Mapping[str, Mapping[str, float]]) -> FloatArray:
+        """Add the windows of a facade; returns the share of each cell of exterior wall that is not glass."""
+        grid = self.grid
+        row_step, column_step = FACADES[facade]
+        share = np.ones(grid.tokens.shape)
+        for name, zone in self.zones.items():
+            area = float(glazing.get(name, {}).get(facade, 0.0))
+            if area <= 0.0:
+                continue
+            rows, columns, depth = _facade_cells(grid.tokens, name, (row_step, column_step))
+            if rows.size == 0:
+                continue
+            exposed = rows.size * grid.cell * self.height
+            u_value = self.graph.parameter("window_u_value", name, facade=facade)
+            air = self.floor.node[grid.volume[rows, columns]]
+            zone.window(u_value, area, air, facade, azimuth_of(facade, self.orientation))
+            for k in range(1, depth + 1):
+                share[rows + k * row_step, columns + k * column_step] = max(0.0, 1.0 - area / exposed)
+        return share
+
+
+def _facade_cells(tokens: NDArray[np.str_], zone: str, step: tuple[int, int]) -> tuple[IntArray, IntArray, int]:
+    """Air cells of a zone behind a wall to the outside in one direction, and the thickness of that wall in cells.
+
+    A wall that runs on in that direction before it ends outside is another facade's, seen from its end.
+    """
+    rows, columns = np.nonzero(tokens == zone)
+    depth = np.zeros(rows.size, dtype=np.int64)
+    wall = np.ones(rows.size, dtype=bool)
+    while wall.any():
+        r, c = rows + (depth + 1) * step[0], columns + (depth + 1) * step[1]
+        wall &= tokens[np.clip(r, 0, tokens.shape[0] - 1), np.clip(c, 0, tokens.shape[1] - 1)] == "#"
+        depth[wall] += 1
+    beyond = tokens[rows + (depth + 1) * step[0], columns + (depth + 1) * step[1]]
+    outside = (depth > 0) & (beyond == ".")
+    if not outside.any():
+        return rows[:0], columns[:0], 0
+    thickness = int(depth[outside].min())
+    mine = outside & (depth == thickness)
+    return rows[mine], columns[mine], thickness

@@ -1,0 +1,161 @@
+"""From floors to the plans of a case: above each other, on one grid, with the areas of the drawings."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from thermal.case import FloorPlan, FloorPlans
+from thermal.case.plan import check_plan
+from thermal.errors import LostRoomError, PlanSettingError, RoomNameError, describe
+from thermal.plan.align import align_floors
+from thermal.plan.cells import ZonedFloor, draw_cells, drawn_areas
+from thermal.plan.guard import checked_number
+
+#: Sides of cells that are tried, largest first [m].
+CELL_SIZES = (0.5, 0.4, 0.25, 0.2, 0.1, 0.05)
+
+#: Error of a zone's area that is let be [-].
+AREA_TOLERANCE = 0.02
+_PHASES = 4  # corners of the grid that are tried, a side
+_MOST_CELLS = 4_000_000  # of all floors together
+
+Progress = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True, eq=False)
+class PlanImport:
+    """Plans of a building, and the drawings that they were made from.
+
+    Parameters
+    ----------
+    plans : FloorPlans
+        For a case.
+    floors : tuple of ZonedFloor
+        Drawings with their zones, lowest first, above each other.
+    area_errors : mapping
+        Area of the zone in the plans against that on its drawing, minus one [-], by zone.
+    corner : tuple of float
+        Rightwards and downwards, from the common origin of the drawings to the plans' first corner [m].
+    """
+
+    plans: FloorPlans
+    floors: tuple[ZonedFloor, ...]
+    area_errors: Mapping[str, float]
+    corner: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def largest_error(self) -> float:
+        """Largest error of a zone's area [-]."""
+        return max(abs(error) for error in self.area_errors.values())
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What a look at the pictures should confirm, floor by floor."""
+        found = [f"floor {floor.name!r}: {remark}" for floor in self.floors for remark in floor.survey.remarks]
+        angles = [floor.survey.turned for floor in self.floors]
+        if max(angles) - min(angles) > 20.0:
+            listed = ", ".join(f"{floor.name} {floor.survey.turned:.1f} deg" for floor in self.floors)
+            found.append(f"drawings were turned upright by angles far apart ({listed}): is 'up' the same on all?")
+        coarse = [zone for zone, error in self.area_errors.items() if abs(error) > AREA_TOLERANCE]
+        if coarse:
+            shown = ", ".join(coarse[:5]) + (f" and {len(coarse) - 5} more" if len(coarse) > 5 else "")
+            found.append(
+                f"cells of {self.plans.cell_size:g} m miss the area of {len(coarse)} zones by over "
+                f"{AREA_TOLERANCE:.0%} ({shown}): choose smaller cells"
+            )
+        return tuple(found)
+
+
+def assemble_plans(
+    floors: Sequence[ZonedFloor],
+    *,
+    cell_size: float | None = None,
+    anchors: Mapping[str, tuple[float, float]] | None = None,
+    progress: Progress | None = None,
+) -> PlanImport:
+    """Put floors above each other and draw them as plans of tokens.
+
+    Parameters
+    ----------
+    floors : sequence of ZonedFloor
+        Lowest first.
+    cell_size : float, optional
+        Side of a cell [m], 0.02 to 5. Default: the largest of `CELL_SIZES` that keeps the area of every zone within
+        2 % of its drawing, and otherwise the one with the smallest error.
+    anchors : mapping, optional
+        The same spot of the building on each floor's drawing [px], by floor; default: outlines are matched.
+    progress : callable, optional
+        Told stage, steps done and all steps.
+
+    Returns
+    -------
+    PlanImport
+        Plans of the building.
+
+    Raises
+    ------
+    LostRoomError
+        A room has no cell of its own at this size.
+    RoomNameError
+        Two floors, or two zones, have the same name.
+    PlanSettingError
+        `cell_size` is out of its range or makes too many cells, or some floors only have an anchor.
+
+    Notes
+    -----
+    The grid's corner is chosen too, among 16, for the smallest largest error.
+    """
+    _check_names(floors)
+    placed = align_floors(floors, anchors)
+    sizes = CELL_SIZES if cell_size is None else (checked_number(cell_size, "cell_size", 0.02, 5.0, "m"),)
+    best: tuple[float, PlanImport] | None = None
+    lost: LostRoomError | None = None
+    for number, size in enumerate(sizes):
+        if progress is not None:
+            progress(f"cells of {size:g} m", number, len(sizes))
+        cells = sum(f.zones.size * f.survey.pixel**2 for f in placed) / size**2
+        if cells > _MOST_CELLS:
+            if cell_size is None:
+                break
+            found = f"{size:g} m, which makes {cells / 1e6:.0f} million"
+            raise PlanSettingError(describe("cell_size", f"at most {_MOST_CELLS / 1e6:.0f} million cells", found))
+        for phase in np.ndindex(_PHASES, _PHASES):
+            try:
+                drawn, corner = draw_cells(placed, size, (phase[0] / _PHASES, phase[1] / _PHASES))
+            except LostRoomError as error:
+                lost = error
+                break
+            errors = _area_errors(placed, drawn, size)
+            worst = max(map(abs, errors.values()))
+            if best is None or worst < best[0]:
+                best = (worst, PlanImport(FloorPlans(size, drawn), placed, errors, corner))
+        if best is not None and best[0] <= AREA_TOLERANCE:
+            break
+    if best is None:
+        raise lost or LostRoomError("no cell size fits")
+    for plan in best[1].plans.floors:
+        check_plan(plan.tokens, f"floor {plan.name!r}")
+    return best[1]
+
+
+def _area_errors(floors: Sequence[ZonedFloor], plans: Sequence[FloorPlan], cell_size: float) -> dict[str, float]:
+    errors: dict[str, float] = {}
+    for floor, plan in zip(floors, plans, strict=True):
+        wanted, found = floor.areas, drawn_areas(plan, cell_size)
+        errors |= {zone: found.get(zone, 0.0) / wanted[zone] - 1.0 for zone in wanted}
+    return errors
+
+
+def _check_names(floors: Sequence[ZonedFloor]) -> None:
+    if not floors:
+        raise PlanSettingError(describe("floors", "at least one", "none"))
+    for what, names in (
+        ("floor", [floor.name for floor in floors]),
+        ("zone", [zone for floor in floors for zone in floor.names]),
+    ):
+        for name in names:
+            if names.count(name) > 1:
+                raise RoomNameError(describe(f"{what} {name!r}", "a name of its own", "two of that name"))

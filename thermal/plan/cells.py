@@ -1,0 +1,230 @@
+"""From rooms to cells: plans of tokens whose zones have the areas of the drawing, with walls one cell thick.
+
+The plan's walls run along the middle of the drawing's interior walls and along the inner face of its exterior walls,
+as a ``+`` cell counts half to each side and a ``#`` cell to nobody.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from thermal.case import FloorPlan
+from thermal.case.areas import wall_shares
+from thermal.case.building import EXTERIOR_WALL, INTERIOR_WALL, OUTSIDE
+from thermal.errors import LostRoomError, describe
+from thermal.plan.survey import OUTSIDE_LABEL, WALL_LABEL, FloorSurvey
+
+IntArray = NDArray[np.int32]
+FloatArray = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+_SAMPLES = 5  # points a cell's side at which the drawing is looked at
+
+
+@dataclass(frozen=True, eq=False)
+class ZonedFloor:
+    """A floor whose rooms are grouped to zones.
+
+    Parameters
+    ----------
+    name : str
+        Of the floor.
+    height : float
+        Clear height [m].
+    survey : FloorSurvey
+        The drawing.
+    zones : ndarray of int, shape (n_row, n_col)
+        Zone, from 1, of each element of the survey; interior walls are split at their middle, 0 is outside and
+        exterior wall.
+    names : tuple of str
+        Names of the zones, in the order of their numbers.
+    offset : tuple of float
+        Rightwards and downwards, from the common origin of the floors to the survey's first corner [m].
+    """
+
+    name: str
+    height: float
+    survey: FloorSurvey
+    zones: IntArray
+    names: tuple[str, ...]
+    offset: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def areas(self) -> dict[str, float]:
+        """Area of each zone on the drawing, with half of its interior walls [m2]."""
+        counts = np.bincount(self.zones.ravel(), minlength=len(self.names) + 1)[1:]
+        return {name: float(n) * self.survey.pixel**2 for name, n in zip(self.names, counts, strict=True)}
+
+
+def split_walls(survey: FloorSurvey) -> tuple[IntArray, Mask]:
+    """Tell exterior from interior walls, and give each interior wall half to each side.
+
+    Parameters
+    ----------
+    survey : FloorSurvey
+        A floor.
+
+    Returns
+    -------
+    tuple
+        Room of each element, 0 for outside and exterior wall; and where exterior wall is.
+
+    Notes
+    -----
+    An element of wall is exterior when it is no deeper in the wall than the wall is thick where it stands, which is the
+    way from the nearest point outside to the nearest room.
+    """
+    labels = survey.labels
+    to_room, room = ndimage.distance_transform_edt(labels <= 0, return_indices=True)
+    wall = labels == WALL_LABEL
+    exterior = np.zeros_like(wall)
+    if (labels == OUTSIDE_LABEL).any():
+        to_outside, outside = ndimage.distance_transform_edt(labels != OUTSIDE_LABEL, return_indices=True)
+        thickness = to_room[outside[0], outside[1]]
+        exterior = wall & (to_outside < thickness - 1e-6)
+    rooms: IntArray = np.where(wall & ~exterior, labels[room[0], room[1]], np.maximum(labels, 0)).astype(np.int32)
+    return rooms, exterior
+
+
+def draw_cells(
+    floors: Sequence[ZonedFloor], cell_size: float, phase: tuple[float, float]
+) -> tuple[tuple[FloorPlan, ...], tuple[float, float]]:
+    """Draw floors as plans of tokens on one grid.
+
+    Parameters
+    ----------
+    floors : sequence of ZonedFloor
+        Lowest first.
+    cell_size : float
+        Side of a cell [m].
+    phase : tuple of float
+        Rightwards and downwards, from the common origin to a corner of the grid [-], in cells.
+
+    Returns
+    -------
+    tuple
+        Plans of all floors, of one shape, cropped to what is built; and rightwards and downwards, from the common
+        origin to their first corner [m].
+
+    Raises
+    ------
+    LostRoomError
+        A zone has no cell, or falls apart, at this size.
+    """
+    frame = _frame(floors, cell_size, phase)
+    drawn = [_floor_tokens(floor, cell_size, *frame) for floor in floors]
+    built = np.any([tokens != OUTSIDE for tokens in drawn], axis=0)
+    rows, columns = (np.flatnonzero(built.any(axis=axis)) for axis in (1, 0))
+    part = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
+    corner = (frame[0] + float(columns[0]) * cell_size, frame[1] + float(rows[0]) * cell_size)
+    return tuple(FloorPlan(f.name, f.height, tokens[part]) for f, tokens in zip(floors, drawn, strict=True)), corner
+
+
+def drawn_areas(plan: FloorPlan, cell_size: float) -> dict[str, float]:
+    """Floor area of the zones of a plan, with half of their interior walls.
+
+    Parameters
+    ----------
+    plan : FloorPlan
+        One floor.
+    cell_size : float
+        Side of a cell [m].
+
+    Returns
+    -------
+    dict
+        Area [m2] by zone.
+    """
+    names, cells = np.unique(plan.tokens, return_counts=True)
+    counts = {str(n): float(c) for n, c in zip(names, cells, strict=True)}
+    for token in (OUTSIDE, EXTERIOR_WALL, INTERIOR_WALL):
+        counts.pop(token, None)
+    for zones in wall_shares(plan.tokens).values():
+        for zone in zones:
+            counts[zone] += 1.0 / len(zones)
+    return {name: count * cell_size**2 for name, count in counts.items()}
+
+
+def _frame(floors: Sequence[ZonedFloor], cell_size: float, phase: tuple[float, float]) -> tuple[float, float, int, int]:
+    """Corner of a grid that holds all floors with two cells around them [m], and its rows and columns."""
+    left = min(f.offset[0] for f in floors)
+    top = min(f.offset[1] for f in floors)
+    right = max(f.offset[0] + f.zones.shape[1] * f.survey.pixel for f in floors)
+    bottom = max(f.offset[1] + f.zones.shape[0] * f.survey.pixel for f in floors)
+    x, y = left + (phase[0] - 3.0) * cell_size, top + (phase[1] - 3.0) * cell_size
+    return x, y, int((bottom - y) / cell_size) + 4, int((right - x) / cell_size) + 4
+
+
+def _floor_tokens(
+    floor: ZonedFloor, cell_size: float, left: float, top: float, n_row: int, n_col: int
+) -> NDArray[np.str_]:
+    """Look at points of each cell, take what most of it is, and put one-cell walls between."""
+    samples = _sample(floor, cell_size, left, top, n_row, n_col)
+    middle = samples[:, _SAMPLES // 2, :, _SAMPLES // 2]
+    purity = (samples == middle[:, None, :, None]).mean(axis=(1, 3))
+    cells = _connected(middle, floor, cell_size)
+    interior = _between(cells, purity)
+    beside = ndimage.binary_dilation((cells > 0) | interior, np.ones((3, 3))) & (cells == 0)
+    cells = np.where(interior, 0, cells)
+    cells = _connected(cells, floor, cell_size)
+    tokens = np.array([OUTSIDE, *floor.names])[cells]
+    tokens[(cells == 0) & (interior | ((middle > 0) & ~beside))] = INTERIOR_WALL
+    tokens[beside] = EXTERIOR_WALL
+    return tokens
+
+
+def _sample(floor: ZonedFloor, cell_size: float, left: float, top: float, n_row: int, n_col: int) -> IntArray:
+    """Zones at points of the cells, shape (n_row, samples, n_col, samples)."""
+    pixel = floor.survey.pixel
+    step = (np.arange(_SAMPLES) + 0.5) / _SAMPLES
+    found = []
+    for start, offset, count, most in (
+        (top, floor.offset[1], n_row, floor.zones.shape[0]),
+        (left, floor.offset[0], n_col, floor.zones.shape[1]),
+    ):
+        metres = start + (np.arange(count)[:, None] + step) * cell_size - offset
+        # A point on the line between two elements is in the second, whatever rounding says.
+        index = np.floor(metres.ravel() / pixel + 1e-6).astype(int) + 1
+        found.append(np.clip(index, 0, most + 1))
+    framed = np.pad(floor.zones, 1)
+    sampled: IntArray = framed[np.ix_(found[0], found[1])]
+    return sampled.reshape(n_row, _SAMPLES, n_col, _SAMPLES)
+
+
+def _between(cells: IntArray, purity: FloatArray) -> Mask:
+    """Cells to make a wall of: of each two zones side by side, the cell that is more on the line between them."""
+    wall = np.zeros(cells.shape, dtype=bool)
+    for here, there in ((np.s_[:, :-1], np.s_[:, 1:]), (np.s_[:-1], np.s_[1:])):
+        a, b = cells[here], cells[there]
+        apart = (a != b) & (a > 0) & (b > 0) & ~wall[here] & ~wall[there]
+        first = (purity[here] < purity[there]) | ((purity[here] == purity[there]) & (a < b))
+        wall[here] |= apart & first
+        wall[there] |= apart & ~first
+    return wall
+
+
+def _connected(cells: IntArray, floor: ZonedFloor, cell_size: float) -> IntArray:
+    """Keep the largest part of each zone; refuse when there is none, or when much of one is lost."""
+    result = cells.copy()
+    pieces = ndimage.find_objects(cells, len(floor.names))
+    for number, where in enumerate(pieces, start=1):
+        if where is None:
+            raise _lost(floor, number, cell_size, "no cell")
+        parts, count = ndimage.label(cells[where] == number)
+        if count > 1:
+            sizes = np.bincount(parts.ravel())[1:]
+            if sizes.max() < 0.9 * sizes.sum():
+                raise _lost(floor, number, cell_size, f"{count} parts")
+            result[where][(parts > 0) & (parts != 1 + int(sizes.argmax()))] = 0
+    return result
+
+
+def _lost(floor: ZonedFloor, number: int, cell_size: float, found: str) -> LostRoomError:
+    where = f"floor {floor.name!r}: zone {floor.names[number - 1]!r}"
+    expected = f"a room with cells of {cell_size:g} m that hang together"
+    return LostRoomError(describe(where, expected, found, "choose a smaller cell_size"))

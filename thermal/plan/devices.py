@@ -1,0 +1,257 @@
+"""Devices from lists: names, types and zones of a CSV, and what all such lists have in common."""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+
+from thermal.case import Device
+from thermal.case.schema import DEVICE_TYPES
+from thermal.errors import DeviceListError, describe, nearest
+from thermal.plan.guard import checked_file
+
+_COLUMNS = {
+    "name": ("name", "device", "device_name", "equipment", "equip", "id", "tag", "asset"),
+    "type": ("type", "device_type", "class", "kind", "category", "equipment_type"),
+    "zone": ("zone", "zone_name", "room", "space", "serves", "location", "area"),
+}
+
+# Words of the trade, longest first where one is part of another.
+_TYPES: tuple[tuple[str, str], ...] = (
+    (r"fan ?coil|\bfcu?\b", "fan_coil"),
+    (r"\b[rcdv]?vav|variable air volume|\bcav\b|constant air volume|reheat box|terminal unit", "vav"),
+    (r"electric (heater|radiator|baseboard)|unit heater|space heater", "electric_heater"),
+    (r"radiator|baseboard|convector|radiant panel", "radiator"),
+    (r"\bahu\b|air ?hand|roof ?top|\brtu\b|\bdoas\b", "ahu"),
+    (r"boiler", "boiler"),
+    (r"chiller", "chiller"),
+    (r"diffuser|supply air terminal|air terminal|grille", "supply_air_terminal"),
+)
+
+
+@dataclass(frozen=True)
+class ListedPoint:
+    """A point of telemetry that a list of devices says something of.
+
+    Parameters
+    ----------
+    column : str
+        Its identifier where the measurements are, or its name.
+    entity : str
+        Device or zone it belongs to.
+    point : str
+        Point type of the case format; empty when the list's type has none.
+    """
+
+    column: str
+    entity: str
+    point: str
+
+
+@dataclass(frozen=True)
+class DeviceImport:
+    """Devices of a list.
+
+    Parameters
+    ----------
+    devices : tuple of Device
+        In the order of the list; without a zone where theirs is not known.
+    unplaced : mapping
+        What the list says of the zone, by device, where no zone has that name.
+    unknown_types : mapping
+        Type by device, where the library does not know the type.
+    points : tuple of ListedPoint
+        Points, where the list has them.
+    """
+
+    devices: tuple[Device, ...]
+    unplaced: dict[str, str]
+    unknown_types: dict[str, str]
+    points: tuple[ListedPoint, ...] = ()
+
+
+def read_devices(path: str | PathLike[str], zones: Sequence[str]) -> DeviceImport:
+    """Read a list of devices.
+
+    Parameters
+    ----------
+    path : str or path
+        CSV with a column of names and columns of types and zones; a Brick model (``.ttl``); Haystack as JSON or Zinc.
+    zones : sequence of str
+        Zones of the building.
+
+    Returns
+    -------
+    DeviceImport
+        Devices, and what could not be placed.
+
+    Raises
+    ------
+    DrawingFileError
+        The file is missing or of another kind.
+    DeviceListError
+        It cannot be understood.
+    """
+    file = checked_file(Path(path), (".csv", ".ttl", ".json", ".zinc"))
+    if file.suffix.lower() == ".ttl":
+        from thermal.plan.brick import read_brick
+
+        return read_brick(file, zones)
+    if file.suffix.lower() in (".json", ".zinc"):
+        from thermal.plan.haystack import read_haystack
+
+        return read_haystack(file, zones)
+    rows = _read_rows(file)
+    return import_devices(((r["name"], r.get("type", ""), r.get("zone", "")) for r in rows), zones, file.name)
+
+
+def import_devices(
+    rows: Iterable[tuple[str, str, str]], zones: Sequence[str], where: str, points: Sequence[ListedPoint] = ()
+) -> DeviceImport:
+    """Make devices of names, types and zones.
+
+    Parameters
+    ----------
+    rows : iterable of tuple
+        Name, type and zone of each, as the list has them; type and zone may be empty.
+    zones : sequence of str
+        Zones of the building.
+    where : str
+        File, for messages.
+    points : sequence of ListedPoint
+        Points, where the list has them.
+
+    Returns
+    -------
+    DeviceImport
+        Devices with the format's types; zones are found by name whatever the case, signs and leading zeros.
+
+    Raises
+    ------
+    DeviceListError
+        A name stands twice, or there is no device.
+    """
+    by_key: dict[tuple[str, ...], list[str]] = {}
+    for zone in zones:
+        by_key.setdefault(key(zone), []).append(zone)
+    devices: list[Device] = []
+    unplaced: dict[str, str] = {}
+    unknown: dict[str, str] = {}
+    seen: dict[str, int] = {}
+    for number, (name, kind, zone) in enumerate(rows, start=1):
+        if name in seen:
+            found = f"{name!r}, which device {seen[name]} has too"
+            raise DeviceListError(describe(f"{where}: device {number}", "a name of its own", found))
+        seen[name] = number
+        known = device_type(kind or name)
+        if known is None:
+            unknown[name] = kind
+        place = [zone] if zone in zones else by_key.get(key(zone), []) if zone else []
+        if zone and len(place) != 1:
+            unplaced[name] = zone
+        devices.append(Device(name=name, type=known or kind or "unknown", zone=place[0] if len(place) == 1 else None))
+    if not devices:
+        raise DeviceListError(describe(where, "at least one device", "none"))
+    return DeviceImport(tuple(devices), unplaced, unknown, tuple(points))
+
+
+def device_type(words: str) -> str | None:
+    """Device type of the case format for a list's words.
+
+    Parameters
+    ----------
+    words : str
+        Such as ``VAV w/ reheat`` or ``AHU-1``.
+
+    Returns
+    -------
+    str or None
+        One of the format's types.
+
+    Examples
+    --------
+    >>> device_type("Fan Coil Unit")
+    'fan_coil'
+    """
+    plain = words.strip().casefold()
+    if plain in DEVICE_TYPES:
+        return plain
+    # "VAV_1" and "VAV-F1": signs and digits part words, but not for the pattern's \b.
+    plain = " ".join(re.findall(r"[a-z]+", plain))
+    return next((kind for pattern, kind in _TYPES if re.search(pattern, plain)), None)
+
+
+def key(name: str) -> tuple[str, ...]:
+    """Words and numbers of a name, so that ``VAV-01.03`` and ``vav_1_3`` are the same.
+
+    Parameters
+    ----------
+    name : str
+        Any.
+
+    Returns
+    -------
+    tuple of str
+        In lower case, numbers without leading zeros.
+
+    Examples
+    --------
+    >>> key("VAV-01.03")
+    ('vav', '1', '3')
+    """
+    return tuple(part.lstrip("0") or "0" if part.isdigit() else part for part in words_of(name))
+
+
+def words_of(name: str) -> list[str]:
+    """Words and numbers of a name, in lower case; ``ZoneAirTemp`` is three words.
+
+    Parameters
+    ----------
+    name : str
+        Any.
+
+    Returns
+    -------
+    list of str
+        In their order.
+    """
+    parted = re.sub(r"(?<=[a-zäöüß])(?=[A-Z])", " ", name)
+    return re.findall(r"[^\W\d_]+|\d+", parted.casefold())
+
+
+def _read_rows(file: Path) -> list[dict[str, str]]:
+    """Rows of a CSV by what their columns are for."""
+    try:
+        text = file.read_text(encoding="utf-8-sig")
+        head = text.partition("\n")[0]
+        sign = max(",;\t", key=head.count)
+        rows = [
+            row for row in csv.reader(text.splitlines(), delimiter=sign, strict=True) if any(x.strip() for x in row)
+        ]
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise DeviceListError(describe(file.name, "a CSV in UTF-8 with a header", str(error))) from error
+    if not rows:
+        raise DeviceListError(describe(file.name, "a header and a row a device", "an empty file"))
+    header = ["_".join(words_of(cell)) for cell in rows[0]]
+    found: dict[str, int] = {}
+    for use, names in _COLUMNS.items():
+        places = [header.index(name) for name in names if name in header]
+        if places:
+            found[use] = places[0]
+    if "name" not in found:
+        advice = nearest(header[0], _COLUMNS["name"])
+        raise DeviceListError(describe(f"{file.name}: header", "a column 'name'", ", ".join(header[:6]), advice))
+    result = []
+    for number, row in enumerate(rows[1:], start=2):
+        if len(row) != len(header):
+            expected = f"{len(header)} cells as in the header"
+            raise DeviceListError(describe(f"{file.name}: row {number}", expected, f"{len(row)}"))
+        entry = {use: row[place].strip() for use, place in found.items()}
+        if not entry["name"]:
+            raise DeviceListError(describe(f"{file.name}: row {number}", "the name of a device", "a blank"))
+        result.append(entry)
+    return result

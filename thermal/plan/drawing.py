@@ -1,0 +1,163 @@
+"""Raster drawings: PNG, JPEG and pages of a PDF, as an array of grey."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import tempfile
+import warnings
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermal.errors import DrawingFileError, MissingExtraError, OversizedFileError, PlanSettingError, describe
+from thermal.plan.extra import extra
+from thermal.plan.guard import check_pixels, checked_file, checked_number
+
+RASTER_KINDS = (".png", ".jpg", ".jpeg", ".pdf")
+
+#: Resolution at which pages of a PDF are drawn unless told otherwise [dots per inch]: 1 px is 1.7 cm at 1:100.
+DOTS_PER_INCH = 150.0
+_PATIENCE = 60.0  # s, for a page of a PDF; an honest one takes a second or two
+
+
+@dataclass(frozen=True, eq=False)
+class Drawing:
+    """A raster drawing.
+
+    Parameters
+    ----------
+    grey : ndarray of uint8, shape (n_row, n_col)
+        0 black, 255 white; transparent is white.
+    source : str
+        File and page, for messages and pictures.
+    dots_per_inch : float or None
+        Resolution of a PDF's page [1/inch]; None for images, whose notes on it are seldom right.
+    corner : tuple of float
+        Column and row of the whole drawing at which this part of it begins [px].
+    """
+
+    grey: NDArray[np.uint8]
+    source: str
+    dots_per_inch: float | None = None
+    corner: tuple[float, float] = (0.0, 0.0)
+
+
+def read_drawing(
+    path: str | PathLike[str],
+    *,
+    page: int = 1,
+    dots_per_inch: float = DOTS_PER_INCH,
+    crop: tuple[int, int, int, int] | None = None,
+) -> Drawing:
+    """Read a raster drawing.
+
+    Parameters
+    ----------
+    path : str or path
+        PNG, JPEG or PDF; pages of a PDF are drawn by ``pdftoppm`` (Debian's poppler-utils).
+    page : int
+        Page of a PDF, from 1.
+    dots_per_inch : float
+        Resolution of a PDF's page [1/inch], 20 to 600.
+    crop : tuple of int, optional
+        Left, top, right, bottom [px] of the part that is one floor's plan, without frame and title block.
+
+    Returns
+    -------
+    Drawing
+        In grey.
+
+    Raises
+    ------
+    DrawingFileError
+        The file is not what its name says, or damaged, or has no such page.
+    OversizedFileError
+        It has, or unpacks to, more than any real plan.
+    MissingExtraError
+        Pillow or ``pdftoppm`` is not installed.
+    PlanSettingError
+        `page`, `dots_per_inch` or `crop` does not fit.
+    """
+    file = checked_file(Path(path), RASTER_KINDS)
+    if isinstance(page, bool) or not isinstance(page, int) or page < 1:
+        raise PlanSettingError(describe("page", "a number from 1", repr(page)))
+    if file.suffix.lower() == ".pdf":
+        dpi: float | None = checked_number(dots_per_inch, "dots_per_inch", 20.0, 600.0, "1/inch")
+        grey, source = _pdf_page(file, page, dots_per_inch), f"{file.name} page {page}"
+    else:
+        dpi, grey, source = None, _image(file), file.name
+    if crop is None:
+        return Drawing(grey, source, dpi)
+    left, top, right, bottom = _checked_crop(crop, grey.shape)
+    return Drawing(grey[top:bottom, left:right], source, dpi, (float(left), float(top)))
+
+
+def _image(file: Path) -> NDArray[np.uint8]:
+    """Decode an image, after a look at its size."""
+    image_of = extra("PIL.Image")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # Pillow warns of a bomb at a size of its own; ours is checked below
+        try:
+            with image_of.open(file, formats=("PNG", "JPEG")) as image:
+                check_pixels(image.width, image.height, file.name)
+                if image.mode in ("RGBA", "LA", "PA") or "transparency" in image.info:
+                    image = image.convert("RGBA")
+                    white = image_of.new("RGBA", image.size, "white")
+                    image = image_of.alpha_composite(white, image)
+                elif image.mode.startswith(("I", "F")):  # 16 bits: Pillow would clip, not scale, them
+                    image = image.point(lambda value: value / 256.0).convert("L")
+                return np.asarray(image.convert("L"), dtype=np.uint8)
+        except (image_of.DecompressionBombError, MemoryError) as error:
+            raise OversizedFileError(describe(file.name, "an image of a plan", str(error), "export it anew")) from error
+        except (OSError, SyntaxError, ValueError, TypeError) as error:  # Pillow has all of them for damaged files
+            expected = f"a whole {file.suffix[1:].upper()} image"
+            found = " ".join(str(error).replace(str(file), file.name).split())
+            raise DrawingFileError(describe(file.name, expected, found)) from error
+
+
+def _pdf_page(file: Path, page: int, dpi: float) -> NDArray[np.uint8]:
+    """Draw a page of a PDF in grey, after a look at its size."""
+    report = _poppler(["pdfinfo", "-f", str(page), "-l", str(page), str(file)], file)
+    size = re.search(r"^Page\s+\d+ size:\s+([\d.e+]+) x ([\d.e+]+) pts", report, re.MULTILINE)
+    pages = re.search(r"^Pages:\s+(\d+)", report, re.MULTILINE)
+    if size is None or pages is None or int(pages[1]) < page:
+        found = f"{pages[1]} pages" if pages else "none"
+        raise DrawingFileError(describe(file.name, f"a page {page}", found))
+    check_pixels(float(size[1]) * dpi / 72.0, float(size[2]) * dpi / 72.0, f"{file.name} page {page}")
+    with tempfile.TemporaryDirectory() as folder:
+        target = Path(folder) / "page"
+        pages_wanted = ["-f", str(page), "-l", str(page), "-singlefile"]
+        _poppler(["pdftoppm", "-r", f"{dpi:g}", *pages_wanted, "-gray", "-png", str(file), str(target)], file)
+        drawn = target.with_suffix(".png")
+        if not drawn.is_file():
+            raise DrawingFileError(describe(file.name, f"a page {page} that can be drawn", "nothing drawn"))
+        return _image(drawn)
+
+
+def _poppler(command: list[str], file: Path) -> str:
+    """Run one of poppler's programs, for a limited time."""
+    try:
+        done = subprocess.run(command, capture_output=True, timeout=_PATIENCE, check=False)
+    except FileNotFoundError as error:
+        advice = "run: apt install poppler-utils"
+        raise MissingExtraError(describe("plan import", f"the program {command[0]!r}", "none", advice)) from error
+    except subprocess.TimeoutExpired as error:
+        expected = f"a page that is drawn within {_PATIENCE:.0f} s"
+        raise OversizedFileError(describe(file.name, expected, "one that takes longer", "export it anew")) from error
+    if done.returncode != 0:
+        found = " ".join(done.stderr.decode(errors="replace").replace(str(file), file.name).split())[:200]
+        raise DrawingFileError(describe(file.name, "a whole PDF file with that page", found or "an error"))
+    return done.stdout.decode(errors="replace")
+
+
+def _checked_crop(crop: tuple[int, int, int, int], shape: tuple[int, ...]) -> tuple[int, int, int, int]:
+    """Refuse a crop that is no part of the drawing."""
+    whole = len(crop) == 4 and all(isinstance(x, int) and not isinstance(x, bool) for x in crop)
+    if not whole or not (0 <= crop[0] < crop[2] <= shape[1] and 0 <= crop[1] < crop[3] <= shape[0]):
+        expected = f"left, top, right, bottom within {shape[1]} x {shape[0]} px"
+        raise PlanSettingError(describe("crop", expected, repr(tuple(crop))))
+    return crop

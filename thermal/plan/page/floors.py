@@ -1,0 +1,176 @@
+"""Floors of a draft from drawings, beside those that are there already."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermal.case.building import OUTSIDE
+from thermal.errors import PlanSettingError, describe
+from thermal.plan.align import align_floors
+from thermal.plan.assemble import assemble_plans
+from thermal.plan.cells import ZonedFloor, draw_cells
+from thermal.plan.drawing import RASTER_KINDS, read_drawing
+from thermal.plan.list import FloorEntry, read_floor
+from thermal.plan.survey import OUTSIDE_LABEL, WALL_LABEL, FloorSurvey
+from thermal.plan.page.convert import encode_floor
+from thermal.plan.page.draft import BASIC, Draft, DraftFloor, Picture
+from thermal.plan.page.store import write_whole
+from thermal.plan.page.uploads import picture_of
+
+Progress = Callable[[str, int, int], None]
+
+_INK, _WALL, _PAPER = 90, 150, 255  # greys of the picture of a drawing that is no image
+
+
+@dataclass(frozen=True)
+class _NewFloors:
+    """Floors with those that were made of drawings.
+
+    Parameters
+    ----------
+    floors : tuple of DraftFloor
+        All of one shape, lowest first; the new ones last.
+    cell_size : float
+        Side of a cell [m].
+    shift : tuple of int
+        Columns and rows by which what was there has moved [cells].
+    orientation : float or None
+        To add to the draft's, when these are its first floors [deg].
+    remarks : tuple of str
+        What a look at the page should confirm.
+    """
+
+    floors: tuple[DraftFloor, ...]
+    cell_size: float
+    shift: tuple[int, int] = (0, 0)
+    orientation: float | None = None
+    remarks: tuple[str, ...] = ()
+
+
+def add_floors(
+    draft: Draft, entries: Sequence[FloorEntry], own: Path, cell_size: float | None, progress: Progress
+) -> _NewFloors:
+    """Make floors of drawings, beside those that a draft has.
+
+    Parameters
+    ----------
+    draft : Draft
+        What is on the page; its floors are kept as they are, on the same grid.
+    entries : sequence of FloorEntry
+        Drawings, lowest first.
+    own : Path
+        The page's own folder, with the drawings.
+    cell_size : float or None
+        Side of a cell [m] for the first floors; None chooses it by the areas of the rooms.
+    progress : callable
+        Told stage, steps done and all steps.
+
+    Returns
+    -------
+    _NewFloors
+        All floors.
+
+    Raises
+    ------
+    PlanError
+        One of its family, for the first thing that does not fit.
+    """
+    taken = {floor.name for floor in draft.floors}
+    for entry in entries:
+        if entry.name in taken:
+            raise PlanSettingError(describe("floors: name", "a name of its own", repr(entry.name), "choose another"))
+        taken.add(entry.name)
+    zoned = []
+    for number, entry in enumerate(entries):
+        progress(f"finding rooms of {entry.name}", number, len(entries) + 1)
+        zoned.append(read_floor(entry, own / "drawings"))
+    progress("drawing walls on the grid", len(entries), len(entries) + 1)
+    if draft.floors:
+        return _beside(draft, entries, zoned, own)
+    found = assemble_plans(zoned, cell_size=cell_size)
+    floors = [
+        encode_floor(
+            plan.name, plan.height, plan.tokens, entry, _picture(entry, floor, found.corner, found.plans.cell_size, own)
+        )
+        for plan, entry, floor in zip(found.plans.floors, entries, found.floors, strict=True)
+    ]
+    turned = found.floors[0].survey.turned
+    return _NewFloors(tuple(floors), found.plans.cell_size, orientation=turned, remarks=found.remarks)
+
+
+def _beside(draft: Draft, entries: Sequence[FloorEntry], zoned: Sequence[ZonedFloor], own: Path) -> _NewFloors:
+    """Draw new floors on the grid of those that are there; these are moved at most, never drawn again."""
+    size = draft.cell_size
+    base = _as_surveyed(draft.floors[0], size)
+    placed = align_floors((base, *zoned))[1:]
+    left, top = (min(floor.offset[axis] for floor in placed) for axis in (0, 1))
+    phase = ((-left / size) % 1.0, (-top / size) % 1.0)
+    plans, corner = draw_cells(placed, size, phase)
+    column, row = round(corner[0] / size), round(corner[1] / size)
+    shift = (max(0, -column), max(0, -row))
+    rows = max(shift[1] + draft.floors[0].rows, shift[1] + row + plans[0].tokens.shape[0])
+    columns = max(shift[0] + draft.floors[0].columns, shift[0] + column + plans[0].tokens.shape[1])
+    kept = [_moved(floor, shift, (rows, columns)) for floor in draft.floors]
+    origin = (-shift[0] * size, -shift[1] * size)
+    new = [
+        encode_floor(
+            plan.name,
+            plan.height,
+            _framed(plan.tokens, (shift[0] + column, shift[1] + row), (rows, columns)),
+            entry,
+            _picture(entry, floor, origin, size, own),
+        )
+        for plan, entry, floor in zip(plans, entries, placed, strict=True)
+    ]
+    remarks = tuple(f"floor {f.name!r}: {remark}" for f in placed for remark in f.survey.remarks)
+    return _NewFloors((*kept, *new), size, shift, remarks=remarks)
+
+
+def _as_surveyed(floor: DraftFloor, cell_size: float) -> ZonedFloor:
+    """See a plan of cells as a drawing of one element a cell, to bring others above it."""
+    zones = np.where(np.isin(floor.tokens, BASIC[:2]), 0, 1).astype(np.int32)
+    labels = np.where(floor.tokens == OUTSIDE, OUTSIDE_LABEL, zones).astype(np.int32)
+    return ZonedFloor(floor.name, floor.height, FloorSurvey(floor.name, labels, cell_size, ()), zones, ("all",))
+
+
+def _framed(tokens: NDArray[np.str_], corner: tuple[int, int], shape: tuple[int, int]) -> NDArray[np.str_]:
+    """Put a plan into a larger one."""
+    framed = np.full(shape, OUTSIDE, dtype=tokens.dtype)
+    framed[corner[1] : corner[1] + tokens.shape[0], corner[0] : corner[0] + tokens.shape[1]] = tokens
+    return framed
+
+
+def _moved(floor: DraftFloor, shift: tuple[int, int], shape: tuple[int, int]) -> DraftFloor:
+    picture = floor.picture
+    if picture is not None:
+        a, b, c, d, e, f = picture.matrix
+        picture = picture.model_copy(update={"matrix": (a, b, c, d, e + shift[0], f + shift[1])})
+    return encode_floor(floor.name, floor.height, _framed(floor.tokens, shift, shape), floor.drawing, picture)
+
+
+def _picture(entry: FloorEntry, floor: ZonedFloor, corner: tuple[float, float], cell_size: float, own: Path) -> Picture:
+    """Save what lies under the plan: the image as it is, or what was understood of lines and codes."""
+    survey, file = floor.survey, own / "drawings" / entry.file
+    pixel = np.array([[survey.pixel, 0.0, floor.offset[0]], [0.0, survey.pixel, floor.offset[1]], [0.0, 0.0, 1.0]])
+    to_cells = np.array([[1.0, 0.0, -corner[0]], [0.0, 1.0, -corner[1]], [0.0, 0.0, cell_size]]) / cell_size
+    matrix = to_cells @ pixel
+    if file.suffix.lower() in RASTER_KINDS:
+        grey = read_drawing(file, page=entry.page, dots_per_inch=entry.dots_per_inch).grey
+        # A pixel's number is that of its middle, which lies half a pixel from the picture's edge.
+        half = np.array([[1.0, 0.0, 0.5], [0.0, 1.0, 0.5], [0.0, 0.0, 1.0]])
+        placement = np.eye(3) if survey.placement is None else survey.placement
+        matrix = matrix @ half @ placement @ np.linalg.inv(half)
+    else:
+        grey = np.where(survey.labels == WALL_LABEL, _WALL, _PAPER).astype(np.uint8)
+        if survey.ink is not None:
+            grey[survey.ink] = _INK
+    name = f"{Path(entry.file).stem}_{entry.page}.png"
+    write_whole(own / "pictures" / name, picture_of(grey))
+    height, width = grey.shape
+    a, c, e, b, d, f = (float(x) for x in matrix[:2].ravel())
+    return Picture(file=name, width=width, height=height, matrix=(a, b, c, d, e, f))

@@ -1,0 +1,255 @@
+"""The addresses of the labelling page."""
+
+from __future__ import annotations
+
+from importlib.resources import files
+from typing import Annotated, Any
+
+from fastapi import FastAPI, Query, Request
+from fastapi.concurrency import run_in_threadpool
+from fastapi.exceptions import RequestValidationError
+from fastapi.responses import FileResponse, JSONResponse, Response
+from pydantic import TypeAdapter, ValidationError
+
+from thermal.errors import (
+    DrawingFileError,
+    MalformedRequestError,
+    OversizedFileError,
+    ReportError,
+    SessionHeldError,
+    ThermalError,
+    describe,
+)
+from thermal.plan.devices import read_devices
+from thermal.plan.drawing import DOTS_PER_INCH, RASTER_KINDS, read_drawing
+from thermal.plan.guard import inside_folder
+from thermal.plan.list import FloorEntry
+from thermal.plan.page.access import REPORT_POLICY
+from thermal.plan.page.app import LabelDesk, parse_json, plain
+from thermal.plan.page.convert import zones_of
+from thermal.plan.page.floors import add_floors
+from thermal.plan.page.jobs import Progress
+from thermal.plan.page.uploads import DEVICE_KINDS, DRAWING_KINDS, Upload, look_at, picture_of
+
+_MOST_BODY = 60_000_000  # bytes of JSON: four floors of a million cells
+_MOST_WORDS = 100_000  # bytes of any other request
+_TYPES = {".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml"}
+_STATUS: dict[type[ThermalError], int] = {SessionHeldError: 409, OversizedFileError: 413, ReportError: 404}
+
+Window = Annotated[str, Query(max_length=100)]
+
+
+def routes_of(desk: LabelDesk) -> FastAPI:
+    """Make the addresses of a labelling page.
+
+    Parameters
+    ----------
+    desk : LabelDesk
+        What they work on.
+
+    Returns
+    -------
+    FastAPI
+        Without the gate in front of it.
+    """
+    app = FastAPI(openapi_url=None, docs_url=None, redoc_url=None)
+    app.add_exception_handler(ThermalError, _named)
+    app.add_exception_handler(RequestValidationError, _malformed)
+    _add_page(app)
+    _add_draft(app, desk)
+    _add_drawings(app, desk)
+    _add_jobs(app, desk)
+    _add_reports(app, desk)
+    return app
+
+
+def _add_page(app: FastAPI) -> None:
+    static = files("thermal.plan.page").joinpath("static")
+    known = {entry.name: entry for entry in static.iterdir() if entry.is_file()}
+
+    @app.get("/")
+    def page() -> Response:
+        return Response(known["index.html"].read_bytes(), media_type="text/html; charset=utf-8")
+
+    @app.get("/static/{name}")
+    def file(name: str) -> Response:
+        if name not in known:
+            raise ReportError(describe("address", "a file of the page", repr(name[:80])))
+        kind = _TYPES.get(name[name.rfind(".") :], "application/octet-stream")
+        return Response(known[name].read_bytes(), media_type=kind)
+
+
+def _add_draft(app: FastAPI, desk: LabelDesk) -> None:
+    @app.get("/api/state")
+    def state() -> dict[str, Any]:
+        return desk.state()
+
+    @app.put("/api/draft")
+    async def save(request: Request, window: Window) -> dict[str, Any]:
+        content = parse_json(await _body(request, _MOST_BODY))
+        return await run_in_threadpool(desk.save, window, content)
+
+    @app.post("/api/session")
+    async def open_session(request: Request) -> dict[str, Any]:
+        asked = parse_json(await _body(request, _MOST_WORDS))
+        if not isinstance(asked, dict) or not isinstance(asked.get("window"), str) or not asked["window"]:
+            raise MalformedRequestError(describe("session", "a window's name", repr(asked)[:80]))
+        previous, take_over = str(asked.get("previous", "")), asked.get("take_over") is True
+        return desk.sessions.open(asked["window"], previous=previous, take_over=take_over)
+
+    @app.post("/api/session/beat")
+    def beat(window: Window) -> dict[str, Any]:
+        desk.sessions.check(window)
+        return {}
+
+    @app.post("/api/session/close")
+    def close(window: Window) -> dict[str, Any]:
+        desk.sessions.close(window)
+        return {}
+
+
+def _add_drawings(app: FastAPI, desk: LabelDesk) -> None:
+    own = desk.store.own
+    seen: dict[tuple[str, int], dict[str, Any]] = {}
+
+    @app.get("/api/drawings")
+    def list_drawings() -> dict[str, Any]:
+        files_there = sorted(p for p in (own / "drawings").iterdir() if p.is_file() and p.name[0] != ".")
+        for file in files_there:
+            key = (file.name, file.stat().st_mtime_ns)
+            if key not in seen:
+                try:
+                    seen[key] = plain(look_at(file))
+                except ThermalError as error:  # somebody else has put it there: say so beside it
+                    seen[key] = {"file": file.name, "kind": "unreadable", "message": str(error)}
+        return {"drawings": [seen[file.name, file.stat().st_mtime_ns] for file in files_there]}
+
+    @app.delete("/api/drawings/{name}")
+    def drop_drawing(name: str, window: Window) -> dict[str, Any]:
+        desk.sessions.check(window)
+        inside_folder(own / "drawings", name, "drawing").unlink(missing_ok=True)
+        return {}
+
+    @app.post("/api/drawings")
+    async def take_drawing(request: Request, name: str, window: Window) -> dict[str, Any]:
+        desk.sessions.check(window)
+        with Upload(own / "drawings", name, DRAWING_KINDS) as upload:
+            async for chunk in request.stream():
+                upload.write(chunk)
+            return plain(await run_in_threadpool(upload.keep_drawing))
+
+    @app.get("/api/drawings/{name}")
+    def show_drawing(name: str, page: int = 1, dots_per_inch: float = DOTS_PER_INCH) -> Response:
+        file = inside_folder(own / "drawings", name, "drawing")
+        if file.suffix.lower() not in RASTER_KINDS:
+            raise DrawingFileError(describe(file.name, "a raster drawing", repr(file.suffix)))
+        sheet = look_at(file, page, dots_per_inch)
+        picture = picture_of(read_drawing(file, page=page, dots_per_inch=dots_per_inch).grey)
+        size = {"x-width": f"{sheet.width:.0f}", "x-height": f"{sheet.height:.0f}"}
+        return Response(picture, media_type="image/png", headers=size)
+
+    @app.get("/api/pictures/{name}")
+    def show_picture(name: str) -> Response:
+        file = inside_folder(own / "pictures", name, "picture")
+        if not file.is_file() or file.suffix != ".png":
+            raise DrawingFileError(describe(name[:80], "a picture of the page", "none"))
+        return FileResponse(file, media_type="image/png")
+
+    @app.post("/api/floors")
+    async def make_floors(request: Request, window: Window) -> dict[str, Any]:
+        desk.sessions.check(window)
+        entries, size = _floor_request(parse_json(await _body(request, _MOST_WORDS)))
+        draft = desk.store.draft
+
+        def work(progress: Progress) -> dict[str, Any]:
+            found = add_floors(draft, entries, own, size, progress)
+            return plain(found) | {"floors": [floor.model_dump() for floor in found.floors]}
+
+        return desk.jobs.start("floors", work).to_dict()
+
+    @app.post("/api/devices")
+    async def take_devices(request: Request, name: str, window: Window) -> dict[str, Any]:
+        desk.sessions.check(window)
+        with Upload(own / "drawings", name, DEVICE_KINDS) as upload:
+            async for chunk in request.stream():
+                upload.write(chunk)
+            zones = list(zones_of(desk.store.draft.floors))
+            found = await run_in_threadpool(read_devices, upload.close(), zones)
+        return {"devices": [d.model_dump() | {"room": found.unplaced.get(d.name, "")} for d in found.devices]}
+
+
+def _add_jobs(app: FastAPI, desk: LabelDesk) -> None:
+    @app.get("/api/jobs/{number}")
+    def ask(number: int) -> dict[str, Any]:
+        job = desk.jobs.get(number)
+        if job is None:
+            raise ReportError(describe("job", "one that was started", str(number)))
+        return job.to_dict()
+
+    @app.post("/api/jobs/{number}/stop")
+    def stop(number: int) -> dict[str, Any]:
+        job = desk.jobs.get(number)
+        if job is not None:
+            job.stop.set()
+        return {}
+
+
+def _add_reports(app: FastAPI, desk: LabelDesk) -> None:
+    @app.get("/api/reports")
+    def listed() -> dict[str, Any]:
+        running = [job.to_dict() for kind in desk.reports.kinds if (job := desk.jobs.busy(kind)) is not None]
+        return {"reports": [report.to_dict() for report in desk.reports.found()], "running": running}
+
+    @app.post("/api/reports/{kind}")
+    def make(kind: str) -> dict[str, Any]:
+        busy = desk.jobs.busy(desk.reports.checked_kind(kind))
+        job = busy or desk.jobs.start(kind, lambda progress: desk.reports.make(kind, progress))
+        return job.to_dict()
+
+    @app.get("/reports/{key}/{name:path}")
+    def show(key: str, name: str) -> Response:
+        page = desk.reports.page(key, name)
+        return FileResponse(page, media_type="text/html", headers={"content-security-policy": REPORT_POLICY})
+
+
+async def _body(request: Request, most: int) -> bytes:
+    """Read a body of JSON, up to a size."""
+    kind = request.headers.get("content-type", "").partition(";")[0].strip()
+    if kind != "application/json":
+        raise MalformedRequestError(describe("content-type", "application/json", repr(kind[:60])))
+    parts, size = [], 0
+    async for chunk in request.stream():
+        size += len(chunk)
+        if size > most:
+            raise OversizedFileError(describe("body", f"at most {most / 1e6:g} MB", "more"))
+        parts.append(chunk)
+    return b"".join(parts)
+
+
+def _floor_request(content: Any) -> tuple[list[FloorEntry], float | None]:
+    """Drawings to make floors of, and the size of cells."""
+    try:
+        entries = TypeAdapter(list[FloorEntry]).validate_python(content["floors"])
+        size = TypeAdapter(float | None).validate_python(content.get("cell_size"))
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        where = f"floors: {'.'.join(str(part) for part in first['loc'])}"
+        raise MalformedRequestError(describe(where, first["msg"], repr(first["input"])[:80])) from error
+    except (TypeError, KeyError, AttributeError) as error:
+        raise MalformedRequestError(describe("body", "{'floors': [...]}", repr(content)[:80])) from error
+    if not entries:
+        raise MalformedRequestError(describe("floors", "at least one drawing", "none"))
+    return entries, size
+
+
+async def _named(request: Request, error: Exception) -> Response:
+    """Turn an error of the family into an answer that the page shows."""
+    status = next((code for kind, code in _STATUS.items() if isinstance(error, kind)), 400)
+    return JSONResponse({"error": type(error).__name__, "message": str(error)}, status)
+
+
+async def _malformed(request: Request, error: Exception) -> Response:
+    first = error.errors()[0] if isinstance(error, RequestValidationError) else {}
+    where = ".".join(str(part) for part in first.get("loc", ("request",)))
+    message = describe(where, str(first.get("msg", "a valid value")), repr(first.get("input"))[:80])
+    return JSONResponse({"error": MalformedRequestError.__name__, "message": message}, 400)

@@ -1,0 +1,241 @@
+"""The case folder that is being labelled: the draft after each change, and the case whenever the draft is one."""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from thermal.case.building_file import NAME, read_building_file
+from thermal.case.load import load_case
+from thermal.case.telemetry_file import check_units, read_telemetry
+from thermal.errors import CaseError, LabelledCaseError, ThermalError, describe
+from thermal.plan.columns import read_columns
+from thermal.plan.folder import save_plan_case
+from thermal.plan.guard import inside_folder
+from thermal.plan.kept import DRAFT, OWN_FOLDER
+from thermal.plan.page.convert import building_of_draft, draft_of, parse_draft
+from thermal.plan.page.draft import Draft
+from thermal.plan.page.findings import DraftFinding, find_faults
+
+_MOST_DRAFT = 50_000_000  # bytes
+_NOTE = "# labelled with buildingmpc label, {minutes:.0f} minutes of work\n"
+
+
+def write_whole(path: Path, content: bytes) -> None:
+    """Write a file whole or not at all.
+
+    Parameters
+    ----------
+    path : Path
+        File; its folder is there.
+    content : bytes
+        What to write.
+    """
+    handle, name = tempfile.mkstemp(prefix=f".{path.name}-", dir=path.parent)
+    try:
+        with os.fdopen(handle, "wb") as stream:
+            stream.write(content)
+            stream.flush()
+            os.fsync(stream.fileno())
+        os.chmod(name, 0o644)
+        os.replace(name, path)
+    except BaseException:
+        Path(name).unlink(missing_ok=True)
+        raise
+
+
+class CaseStore:
+    """A case folder that is being labelled.
+
+    Parameters
+    ----------
+    path : str or path
+        Case folder; made where there is none.
+
+    Raises
+    ------
+    LabelledCaseError
+        It holds something that is no case, a case with a zone table, or a damaged draft.
+    CaseError
+        One of its family: the case that is there cannot be read.
+    """
+
+    def __init__(self, path: str | PathLike[str]) -> None:
+        self.folder = Path(path).absolute()
+        if self.folder.exists() and not self.folder.is_dir():
+            raise LabelledCaseError(describe(str(path), "a case folder", "a file"))
+        own = self.folder / OWN_FOLDER
+        is_case = (self.folder / NAME).is_file()
+        if self.folder.is_dir() and any(self.folder.iterdir()) and not is_case and not own.is_dir():
+            advice = "choose another folder"
+            raise LabelledCaseError(
+                describe(str(path), "a case, or an empty folder", "a folder of other files", advice)
+            )
+        self.draft = _read_draft(self.folder, is_case)
+        if own.is_symlink() or (own.exists() and not own.is_dir()):
+            raise LabelledCaseError(describe(f"{path}: {OWN_FOLDER}", "a folder of the page's own", "something else"))
+        for name in ("drawings", "pictures", "reports"):
+            if (own / name).is_symlink():
+                raise LabelledCaseError(
+                    describe(f"{path}: {OWN_FOLDER}/{name}", "a folder of the page's own", "a link")
+                )
+            (own / name).mkdir(parents=True, exist_ok=True)
+        self.columns: tuple[str, ...] = ()
+        self.telemetry, self._trouble = "", ""
+        self._seen: tuple[str, int, str] | None = None
+        self.findings: tuple[DraftFinding, ...] = ()
+        self._find_faults()
+
+    @property
+    def own(self) -> Path:
+        """Folder of the page's own files."""
+        return self.folder / OWN_FOLDER
+
+    def _look_at_telemetry(self) -> None:
+        """Read the telemetry when it has changed: somebody may put it there while the page is open."""
+        content = self._content()
+        if "telemetry" not in content:
+            return
+        try:
+            file = inside_folder(self.folder, str(content["telemetry"]), "telemetry")
+            state = (str(file), file.stat().st_mtime_ns, repr(content.get("units")))
+            if state == self._seen:
+                return
+            self._seen, self._trouble = state, ""
+            self.telemetry, self.columns = file.name, read_columns(file)
+            parsed = read_building_file(self.folder)
+            check_units(parsed.units)
+            read_telemetry(file, parsed.units, parsed.location)
+        except (ThermalError, OSError) as error:
+            self._trouble = str(error)
+
+    def _find_faults(self) -> None:
+        self._look_at_telemetry()
+        found = find_faults(self.draft, self.columns, self.telemetry or "telemetry")
+        trouble = (DraftFinding("error", "case", self.telemetry, self._trouble),) if self._trouble else ()
+        self.findings = (*trouble, *found)
+
+    def _content(self) -> dict[str, Any]:
+        """Read what `building.yaml` holds; nothing where there is none."""
+        file = self.folder / NAME
+        return yaml.safe_load(file.read_text(encoding="utf-8-sig")) if file.is_file() else {}
+
+    def save(self, draft: Draft) -> bool:
+        """Save a draft, and the case when the draft is one.
+
+        Parameters
+        ----------
+        draft : Draft
+            What is on the page.
+
+        Returns
+        -------
+        bool
+            Whether the case folder now says the same as the draft.
+        """
+        write_whole(self.own / DRAFT, draft.model_dump_json(by_alias=True).encode("utf-8"))
+        self.draft = draft
+        self._find_faults()
+        if any(finding.level == "error" for finding in self.findings):
+            return False
+        try:
+            self._write_case(draft)
+        except CaseError as error:
+            self.findings = (DraftFinding("error", "case", draft.name, str(error)), *self.findings)
+            return False
+        return True
+
+    def _write_case(self, draft: Draft) -> None:
+        """Write the case beside, read it back, and move what changed into place, `building.yaml` last."""
+        before = self._content()
+        with tempfile.TemporaryDirectory(prefix=".case-", dir=self.own) as work:
+            new = save_plan_case(building_of_draft(draft), Path(work) / "case")
+            content = yaml.safe_load((new / NAME).read_text(encoding="utf-8"))
+            if "telemetry" in before:
+                content |= {key: before[key] for key in ("telemetry", "units")}
+            elif not (self.folder / content["telemetry"]).exists():
+                write_whole(self.folder / content["telemetry"], (new / content["telemetry"]).read_bytes())
+            files = {floor["name"]: floor["plan"] for floor in before.get("floors") or ()}
+            for floor in content["floors"]:
+                drawn = (new / floor["plan"]).read_bytes()
+                if files.keys() >= {f["name"] for f in content["floors"]}:
+                    floor["plan"] = files[floor["name"]]
+                _replace_if_other(inside_folder(self.folder, floor["plan"], "plan"), drawn)
+        if _filled(before) == _filled(content) and not self._is_ours():
+            return  # nothing new to say: the file stays with the comments of its author
+        text = yaml.safe_dump(content, sort_keys=False, allow_unicode=True, width=120)
+        note = _NOTE.format(minutes=draft.seconds / 60.0)
+        _replace_if_other(self.folder / NAME, (note + text).encode("utf-8"))
+        for plan in {*files.values()} - {floor["plan"] for floor in content["floors"]}:
+            inside_folder(self.folder, plan, "plan").unlink(missing_ok=True)
+
+    def _is_ours(self) -> bool:
+        """Whether the page wrote `building.yaml`."""
+        return (self.folder / NAME).read_text(encoding="utf-8-sig").startswith(_NOTE.partition("{")[0])
+
+
+def _filled(content: dict[str, Any]) -> dict[str, Any]:
+    """Leave out what is empty: a key without an entry says the same as no key."""
+    return {key: value for key, value in content.items() if value or value == 0}
+
+
+def _replace_if_other(path: Path, content: bytes) -> None:
+    if not path.is_file() or path.read_bytes() != content:
+        write_whole(path, content)
+
+
+def _read_draft(folder: Path, is_case: bool) -> Draft:
+    """Read what was on the page the last time; else the case; else an empty page.
+
+    A case that was changed by hand since the page last wrote it counts more than the page's own file.
+    """
+    file = folder / OWN_FOLDER / DRAFT
+    draft: Draft | None = None
+    if file.is_file():
+        if file.stat().st_size > _MOST_DRAFT:
+            raise LabelledCaseError(describe(str(file), f"at most {_MOST_DRAFT} bytes", f"{file.stat().st_size}"))
+        try:
+            draft = parse_draft(json.loads(file.read_text(encoding="utf-8")), file.name)
+        except (OSError, ValueError, RecursionError, ThermalError) as error:
+            advice = f"move {OWN_FOLDER}/{DRAFT} away to begin with the case"
+            raise LabelledCaseError(describe(str(file), "the page's own file", str(error), advice)) from error
+    if not is_case:
+        return draft or Draft(name=folder.name)
+    read_building_file(folder)
+    if draft is not None and not _is_newer(folder, file):
+        return draft
+    fresh = draft_of(load_case(folder).building)
+    return fresh if draft is None else _with_positions(fresh, draft)
+
+
+def _is_newer(folder: Path, file: Path) -> bool:
+    """Whether somebody has edited the case since the page saved its draft."""
+    patience = 10.0  # s: the page writes the case right after its draft
+    names = [NAME, *(path.name for path in folder.glob("plan_*.csv"))]
+    return max((folder / name).stat().st_mtime for name in names) > file.stat().st_mtime + patience
+
+
+def _with_positions(fresh: Draft, draft: Draft) -> Draft:
+    """Take from the page's own file what a case does not hold: drawings, places of devices, time spent."""
+    floors = {floor.name: floor for floor in draft.floors}
+    kept = []
+    for floor in fresh.floors:
+        old = floors.get(floor.name)
+        same = old is not None and (old.rows, old.columns) == (floor.rows, floor.columns)
+        known = {"drawing": old.drawing, "picture": old.picture} if old is not None and same else {}
+        kept.append(floor.model_copy(update=known))
+    places = {device.name: device for device in draft.devices}
+    devices = [
+        device.model_copy(update={k: getattr(places[device.name], k) for k in ("room", "floor", "x", "y")})
+        if device.name in places and places[device.name].zone == device.zone
+        else device
+        for device in fresh.devices
+    ]
+    update = {"floors": tuple(kept), "devices": tuple(devices), "seconds": draft.seconds, "revision": draft.revision}
+    return fresh.model_copy(update=update)

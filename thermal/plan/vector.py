@@ -1,0 +1,304 @@
+"""Vector drawings: walls, doors, texts and rooms of a DXF file."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import islice
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermal.errors import DrawingFileError, DrawingUnitsError, NoRoomsError, OversizedFileError, describe
+from thermal.plan.extra import extra
+from thermal.plan.guard import check_pixels, checked_file, checked_number
+from thermal.plan.ink import FINE, Ink
+from thermal.plan.rooms import finish, survey_ink
+from thermal.plan.survey import FloorSurvey, PlanSettings
+
+FloatArray = NDArray[np.float64]
+
+VECTOR_KINDS = (".dxf",)
+
+#: Names of layers, in the languages of many offices: English, German, French, Spanish, Italian, Dutch.
+WALL_LAYERS = r"wall|wand|w[aä]nde|mauer|\bmur|muro|parete|tabique|partition|a-glaz|window|fenster"
+ROOM_LAYERS = r"room|raum|space|area|zone|pi[eè]ce|local|stanza"
+
+_MOST_ENTITIES = 400_000  # a floor of a hospital has some 50,000; blocks within blocks can hold any number
+_SMALLEST, _LARGEST = 2.0, 2000.0  # m, of a building's longer side
+_STROKE = 0.01  # m: half the width of a line, so that it is seen at the resolution of the survey
+_SAGITTA = 0.005  # m: how far a chord may lie from its arc
+#: Metres in a unit of a DXF ($INSUNITS): inch, foot, mile, mm, cm, m, km, yard, dm.
+_UNITS = {1: 0.0254, 2: 0.3048, 3: 1609.344, 4: 0.001, 5: 0.01, 6: 1.0, 7: 1000.0, 10: 0.9144, 14: 0.1}
+
+
+@dataclass(frozen=True, eq=False)
+class _Content:
+    """What a drawing holds, in metres with y upwards."""
+
+    lines: list[FloatArray]
+    solids: list[FloatArray]
+    rooms: list[FloatArray]
+    texts: list[tuple[str, float, float]]
+
+
+def read_dxf(
+    path: str | PathLike[str],
+    *,
+    unit: float | None = None,
+    wall_layers: str | None = None,
+    room_layers: str | None = None,
+    settings: PlanSettings | None = None,
+    straighten: bool = True,
+) -> FloorSurvey:
+    """Find walls, rooms and doors in a DXF drawing.
+
+    Parameters
+    ----------
+    path : str or path
+        DXF, text or binary; one floor in its model space.
+    unit : float, optional
+        Metres in one unit of the drawing [m]; default: what the drawing says ($INSUNITS).
+    wall_layers : str, optional
+        Regular expression for layers of walls and windows, in any case of letters; default: the usual names, and all
+        layers when none has one.
+    room_layers : str, optional
+        The same for layers whose closed polylines are rooms; where there are some, they are taken as they stand.
+    settings : PlanSettings, optional
+        What counts as a wall, a door and a room; strokes on layers of walls are walls however thin they are.
+    straighten : bool
+        Whether to turn the drawing so that its walls stand upright; the angle is kept in the result.
+
+    Returns
+    -------
+    FloorSurvey
+        What was understood, with texts in rooms as their names.
+
+    Raises
+    ------
+    DrawingFileError
+        The file is no DXF drawing, or has no lines on the layers.
+    DrawingUnitsError
+        It has no unit, or one that makes no building of it.
+    OversizedFileError
+        It has more lines than any plan.
+    NoRoomsError
+        Its walls enclose nothing.
+    """
+    file = checked_file(Path(path), VECTOR_KINDS)
+    document = _open(file)
+    metres = _unit(document, unit, file.name)
+    content = _collect(document, metres, wall_layers or WALL_LAYERS, room_layers or ROOM_LAYERS, file.name, wall_layers)
+    angle, placement, shape = _upright(content, straighten, metres, file.name)
+    settings = settings or PlanSettings()
+    survey = _survey(content, placement, shape, angle, settings, file.name)
+    return _named(survey, content.texts, metres)
+
+
+def _open(file: Path) -> Any:
+    ezdxf = extra("ezdxf")
+    try:
+        return ezdxf.readfile(file)
+    except (
+        OSError,
+        ezdxf.DXFError,
+        ValueError,
+        TypeError,
+        IndexError,
+        KeyError,
+        StopIteration,
+        RecursionError,
+    ) as error:
+        found = " ".join(str(error).replace(str(file), file.name).split())[:200]
+        raise DrawingFileError(describe(file.name, "a DXF drawing", found or type(error).__name__)) from error
+
+
+def _unit(document: Any, unit: float | None, where: str) -> float:
+    if unit is not None:
+        return checked_number(unit, "unit", 1e-6, 1e4, "m")
+    code = document.header.get("$INSUNITS", 0)
+    if code not in _UNITS:
+        expected = "a unit of length in $INSUNITS"
+        raise DrawingUnitsError(describe(where, expected, f"code {code}", "pass unit, such as 0.001 for millimetres"))
+    return _UNITS[code]
+
+
+def _collect(document: Any, metres: float, walls: str, rooms: str, where: str, wanted: str | None) -> _Content:
+    """Sort the entities of the model space by what their layers are for."""
+    try:
+        is_wall, is_room = re.compile(walls, re.IGNORECASE), re.compile(rooms, re.IGNORECASE)
+    except re.error as error:
+        raise DrawingFileError(describe(where, "a regular expression for layers", str(error))) from error
+    decompose = extra("ezdxf.disassemble").recursive_decompose
+    found: list[tuple[str, str, Any]] = []
+    texts: list[tuple[str, float, float]] = []
+    try:
+        for count, entity in enumerate(islice(decompose(document.modelspace()), _MOST_ENTITIES + 1)):
+            if count == _MOST_ENTITIES:
+                expected = f"at most {_MOST_ENTITIES} lines and arcs"
+                raise OversizedFileError(describe(where, expected, "more", "explode less, or export one floor"))
+            kind, layer = entity.dxftype(), str(entity.dxf.layer)
+            if kind in ("TEXT", "MTEXT"):
+                texts.append(_text(entity, metres))
+            elif kind in ("LINE", "LWPOLYLINE", "POLYLINE", "ARC", "HATCH", "SOLID"):
+                found.append((kind, layer, entity))
+    except RecursionError as error:
+        raise OversizedFileError(describe(where, "blocks that end", "blocks within blocks", "explode them")) from error
+    on_walls = [item for item in found if is_wall.search(item[1])]
+    outlines = [item for item in found if is_room.search(item[1]) and not is_wall.search(item[1])]
+    if not on_walls and not outlines:
+        if wanted is not None or not found:
+            layers = ", ".join(sorted({layer for _, layer, _ in found})[:12])
+            raise DrawingFileError(
+                describe(where, f"lines on layers like {walls!r}", f"layers {layers or 'without any'}")
+            )
+        on_walls = found
+    content = _Content([], [], [], texts)
+    for kind, _, entity in on_walls:
+        target = content.solids if kind in ("HATCH", "SOLID") else content.lines
+        target.extend(line for line in _lines(entity, kind, metres) if len(line) > 1)
+    for kind, _, entity in outlines:
+        content.rooms.extend(
+            line for line in _lines(entity, kind, metres) if len(line) > 3 and np.allclose(line[0], line[-1])
+        )
+    return content
+
+
+def _lines(entity: Any, kind: str, metres: float) -> Iterator[FloatArray]:
+    """Points of what an entity draws [m], arcs as chords."""
+    path = extra("ezdxf.path")
+    tolerance = _SAGITTA / metres
+    paths = path.from_hatch(entity) if kind == "HATCH" else [path.make_path(entity)]
+    for one in paths:
+        points = np.array([(p.x, p.y) for p in one.flattening(tolerance)], dtype=float) * metres
+        if points.size and np.isfinite(points).all():
+            if kind in ("HATCH", "SOLID") or one.is_closed:
+                points = np.vstack([points, points[:1]])
+            yield points
+
+
+def _text(entity: Any, metres: float) -> tuple[str, float, float]:
+    words = entity.plain_text() if entity.dxftype() == "TEXT" else entity.plain_text(split=False)
+    at = entity.dxf.insert
+    if entity.dxftype() == "TEXT" and entity.dxf.hasattr("align_point"):
+        at = entity.dxf.align_point
+    return " ".join(str(words).split())[:60], at.x * metres, at.y * metres
+
+
+def _upright(
+    content: _Content, straighten: bool, metres: float, where: str
+) -> tuple[float, FloatArray, tuple[int, int]]:
+    """Angle of the walls clockwise, what takes (x, y, 1) [m] to column and row of the survey, and its shape."""
+    lines = content.lines + content.solids or content.rooms
+    if not lines:
+        raise NoRoomsError(describe(where, "lines", "none that can be drawn"))
+    angle = _main_angle(lines) if straighten else 0.0
+    cosine, sine = math.cos(math.radians(angle)), math.sin(math.radians(angle))
+    turn = np.array([[cosine, -sine], [sine, cosine]])
+    points = np.vstack([*lines, *content.rooms]) @ turn.T
+    size = points.max(axis=0) - points.min(axis=0)
+    if not _SMALLEST <= size.max() <= _LARGEST:
+        expected = f"a building of {_SMALLEST:g} to {_LARGEST:g} m"
+        found = f"{size[0]:.4g} m x {size[1]:.4g} m with {metres:g} m for a unit"
+        advice = "pass unit, such as 0.001 for millimetres"
+        raise DrawingUnitsError(describe(where, expected, found, advice))
+    pixel = max(FINE, math.sqrt(size[0] * size[1] / 3e7))
+    margin = 0.5
+    left, top = points[:, 0].min() - margin, points[:, 1].max() + margin
+    shape = tuple(math.ceil((extent + 2 * margin) / pixel) for extent in size[::-1])
+    check_pixels(shape[1], shape[0], where)
+    placement = np.eye(3)
+    placement[0, :2], placement[0, 2] = turn[0] / pixel, -left / pixel - 0.5
+    placement[1, :2], placement[1, 2] = -turn[1] / pixel, top / pixel - 0.5
+    return angle, placement, (shape[0], shape[1])
+
+
+def _main_angle(lines: list[FloatArray]) -> float:
+    """Angle of the walls, clockwise of upright, weighed by length; ``4 angle = -arg Σ |d| exp(4iφ)`` [deg]."""
+    steps = np.vstack([np.diff(line, axis=0) for line in lines])
+    direction = steps[:, 0] + 1j * steps[:, 1]
+    length = np.abs(direction)
+    unit = np.divide(direction, length, out=np.zeros_like(direction), where=length > 0)
+    vector = complex((length * unit**4).sum())
+    return -math.degrees(np.angle(vector)) / 4.0 if abs(vector) >= 0.3 * length.sum() else 0.0
+
+
+def _survey(
+    content: _Content, placement: FloatArray, shape: tuple[int, int], angle: float, settings: PlanSettings, where: str
+) -> FloorSurvey:
+    """Draw the walls, or the rooms where the drawing has them, on the survey's grid."""
+    pixel = 1.0 / math.hypot(*placement[0, :2])
+    if content.rooms:
+        return _from_outlines(content.rooms, placement, shape, angle, pixel, where)
+    walls = _solid_walls(content, settings.thickest_wall)
+    mask = _drawn(walls, placement, shape)
+    return survey_ink(Ink(mask, pixel, angle, placement), where, replace(settings, thinnest_wall=0.0))
+
+
+def _solid_walls(content: _Content, thickest: float) -> Any:
+    """Walls as areas: hatches as they are, the space between two faces of a wall, a stroke where there is one line."""
+    shapely = extra("shapely")
+    solids = [_polygon(points) for points in content.solids if len(points) > 3]
+    if not content.lines:
+        return shapely.unary_union(solids)
+    lines = shapely.unary_union([shapely.LineString(line) for line in content.lines])
+    faces = shapely.polygonize([lines]).geoms
+    # Faces that nothing is left of when half the thickness of a wall is taken off all around.
+    solids += [face for face in faces if face.buffer(-thickest / 2.0 - 1e-6).is_empty]
+    walls = shapely.unary_union(solids)
+    single = lines.difference(walls.buffer(1e-4))
+    return shapely.unary_union([walls, single.buffer(_STROKE, cap_style="square")])
+
+
+def _from_outlines(
+    rooms: list[FloatArray], placement: FloatArray, shape: tuple[int, int], angle: float, pixel: float, where: str
+) -> FloorSurvey:
+    """Take closed polylines as rooms; what lies between them and is no wider than a wall is wall."""
+    shapely = extra("shapely")
+    outlines = sorted((_polygon(points) for points in rooms), key=lambda shape: -shape.area)
+    labels = np.full(shape, -1, dtype=np.int32)
+    footprint = shapely.unary_union(outlines).buffer(0.4, join_style="mitre").buffer(-0.3, join_style="mitre")
+    labels[_drawn(footprint, placement, shape)] = 0
+    for number, outline in enumerate(outlines, start=1):
+        labels[_drawn(outline, placement, shape)] = number
+    numbers = np.unique(labels[labels > 0])
+    labels[labels > 0] = 1 + np.searchsorted(numbers, labels[labels > 0])
+    return finish(labels, pixel, where, (), angle, placement, ("rooms are closed polylines of the drawing",))
+
+
+def _polygon(points: FloatArray) -> Any:
+    """Make a valid area of an outline; one that crosses itself is taken apart."""
+    shapely = extra("shapely")
+    return shapely.make_valid(shapely.Polygon(points)).buffer(0)
+
+
+def _drawn(area: Any, placement: FloatArray, shape: tuple[int, int]) -> NDArray[np.bool_]:
+    """Elements of the survey whose middle lies in an area."""
+    polygon = extra("skimage.draw").polygon
+    mask = np.zeros(shape, dtype=bool)
+    for part in getattr(area, "geoms", [area]):
+        if part.geom_type != "Polygon" or part.is_empty:
+            continue
+        filled = np.zeros(shape, dtype=bool)
+        for number, ring in enumerate((part.exterior, *part.interiors)):
+            columns, rows = (np.asarray(ring.coords)[:, :2] @ placement[:2, :2].T + placement[:2, 2]).T
+            filled[polygon(rows, columns, shape)] = number == 0
+        mask |= filled
+    return mask
+
+
+def _named(survey: FloorSurvey, texts: list[tuple[str, float, float]], metres: float) -> FloorSurvey:
+    """Give rooms the texts in them as names, the first one in each."""
+    names: dict[int, str] = {}
+    for words, x, y in texts:
+        label = survey.label_at((x, y))
+        if label > 0 and words:
+            names.setdefault(label, words)
+    rooms = tuple(replace(room, name=names.get(room.label, "")) for room in survey.rooms)
+    placement = survey.placement if survey.placement is not None else np.eye(3)
+    return replace(survey, rooms=rooms, placement=placement @ np.diag([metres, metres, 1.0]))
