@@ -29,19 +29,13 @@ from _code import code
 from _paper_search import EVALUATIONS, RANGES, Search, bayesian_search, sobol_search, theta, values
 from numpy.typing import NDArray
 
-from calibration import (
-    CalibrationResult,
-    Interval,
-    ModelSettings,
-    calibrate,
-    default_intervals,
-    evaluate_model,
-    horizon_steps,
-    spatial_metrics,
-)
+from calibration import CalibrationResult, Interval, ModelSettings, calibrate, evaluate_model
+from calibration.evaluation.intervals import default_intervals, horizon_steps
+from calibration.evaluation.n_step import spatial_metrics
 from thermal import Case, Inputs, Structure, SymbolicModel, free_runs, load_case, replay_inputs, spin_up
-from thermal.model import SPIN_UP, Matrices
-from thermal.network import BASELINE
+from thermal.model.replay import SPIN_UP
+from thermal.model.symbolic import Matrices
+from thermal.network.structure import BASELINE
 
 FloatArray = NDArray[np.float64]
 

@@ -12,10 +12,15 @@ from typing import Any
 import numpy as np
 from _site import Site
 
-from mpc.environment import ActorNetwork, EconomicReward, PolicyController, ScenarioPlant
-from mpc.kpi import StageCost, measure_kpis
-from mpc.loop import Controller, Measurements, RecentSteps, run_closed_loop
-from mpc.scenario import Forecast
+from mpc.environment.environment import ScenarioPlant
+from mpc.environment.policy import ActorNetwork, PolicyController
+from mpc.environment.reward import EconomicReward
+from mpc.kpi.kpis import measure_kpis
+from mpc.kpi.rewards import StageCost
+from mpc.loop.history import RecentSteps
+from mpc.loop.plant import Controller, Measurements
+from mpc.loop.run import run_closed_loop
+from mpc.scenario.forecast import Forecast
 
 PEER_DAYS = 1  # of each week that the site's peers are run for
 

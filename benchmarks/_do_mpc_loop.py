@@ -23,10 +23,14 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from mpc.control import ControlProblem, HorizonData, MpcController, Rollout, Solution, Status
-from thermal.hvac import hvac_function
-from thermal.model import IMPLICIT_EULER
-from thermal.inputs import REFERENCE_TEMPERATURE
+from mpc.control.controller.controller import MpcController
+from mpc.control.predictor.predictor import Rollout
+from mpc.control.problem.data import HorizonData
+from mpc.control.problem.problem import ControlProblem
+from mpc.control.solvers.solution import Solution, Status
+from thermal.hvac._symbolic import hvac_function
+from thermal.inputs.drivers import REFERENCE_TEMPERATURE
+from thermal.model.scheme import IMPLICIT_EULER
 
 #: Ipopt's settings: quiet, a good first guess, tolerance, and when to give up. Of the barriers that were tried (1e-3 to
 #: 1e-5) this one solves most often and soonest.

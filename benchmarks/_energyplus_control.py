@@ -10,12 +10,18 @@ import numpy as np
 import pandas as pd
 from _energyplus_offices import CONTROL_STEPS, ELECTRICITY, GAS, STEP
 
-from mpc.control import Action, Channel, ComfortOperation, ControllerSettings, Horizon, MpcController
-from mpc.loop import Measurements
-from mpc.adapters.energyplus import EnergyPlusPlant, controller_system
-from mpc.scenario import Forecast
-from mpc.studies import control_model, make_controller, site_points
-from thermal.effects import chosen
+from mpc.adapters.energyplus.plant import EnergyPlusPlant
+from mpc.adapters.energyplus.system import controller_system
+from mpc.control.controller.action import Action, ControllerSettings
+from mpc.control.controller.controller import MpcController
+from mpc.control.problem.assembly import ComfortOperation
+from mpc.control.problem.channels import Channel
+from mpc.control.problem.horizon import Horizon
+from mpc.loop.plant import Measurements
+from mpc.scenario.forecast import Forecast
+from mpc.studies.controller import make_controller, site_points
+from mpc.studies.model import control_model
+from thermal.effects.catalogue import chosen
 
 #: Schedules as the building has them: setpoints half a kelvin inside of the band, an hour before people count.
 OPERATION = ComfortOperation(margin=0.5, lead_hours=1.0, widest_occupied=8.0)

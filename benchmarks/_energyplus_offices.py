@@ -11,10 +11,16 @@ from typing import Any
 
 import numpy as np
 
-from calibration.diagnosis import diagnose, write_diagnosis
-from mpc.loop import Measurements, SensorNoise, run_closed_loop
-from mpc.adapters.energyplus import EnergyPlusPlant, energyplus_plant
-from mpc.scenario import ConstantRate, Forecast, Tariff
+from calibration.diagnosis.diagnosis import diagnose
+from mpc.adapters.energyplus.make import energyplus_plant
+from mpc.adapters.energyplus.plant import EnergyPlusPlant
+from mpc.loop.noise import SensorNoise
+from mpc.loop.plant import Measurements
+from mpc.loop.run import run_closed_loop
+from mpc.reports.diagnosis import write_diagnosis
+from mpc.scenario.forecast import Forecast
+from mpc.scenario.rates import ConstantRate
+from mpc.scenario.tariff import Tariff
 from thermal import Case, load_case, save_case
 
 STEP, CONTROL_STEPS = 300.0, 6  # s; an action every half hour

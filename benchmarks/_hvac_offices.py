@@ -11,21 +11,14 @@ import psychrolib
 from _hvac_reference import STEPS_PER_HOUR, Reference
 from scipy.optimize import brentq
 
-from thermal.hvac import (
-    CONSTANT_EFFICIENCY,
-    AirHandler,
-    AirHandlerReplay,
-    BoilerLoop,
-    CoolingCoil,
-    Fan,
-    Heater,
-    Pump,
-    Terminals,
-    WaterCoil,
-    replay_air_handler,
-    replay_loop,
-    replay_reheat,
-)
+from thermal.hvac._air_handler import AirHandler, Heater
+from thermal.hvac._boiler import BoilerLoop, Pump
+from thermal.hvac._coil import WaterCoil
+from thermal.hvac._cooling import CoolingCoil
+from thermal.hvac._curves import CONSTANT_EFFICIENCY
+from thermal.hvac._fan import Fan
+from thermal.hvac._replay import AirHandlerReplay, replay_air_handler, replay_loop, replay_reheat
+from thermal.hvac._terminals import Terminals
 from thermal.units import air_density
 
 FloatArray = npt.NDArray[np.float64]

@@ -22,13 +22,15 @@ from _energyplus_offices import CONTROL_STEPS, HORIZON, OFFICES, STEP, Office, p
 from _modelled_office import ModelledOffice, modelled_building
 from _site import POLICIES, Site, Week, World
 
-from mpc.baselines import OutdoorReset
-from mpc.environment import ScenarioPlant
-from mpc.loop import Controller, FixedSetpoints
-from mpc.adapters.energyplus import EnergyPlusPlant, energyplus_building
-from mpc.studies import control_model
-from thermal.effects import chosen
-from thermal.model import ReducedModel
+from mpc.adapters.energyplus.building import energyplus_building
+from mpc.adapters.energyplus.plant import EnergyPlusPlant
+from mpc.baselines.reset import OutdoorReset
+from mpc.environment.environment import ScenarioPlant
+from mpc.loop.plant import Controller
+from mpc.loop.run import FixedSetpoints
+from mpc.studies.model import control_model
+from thermal.effects.catalogue import chosen
+from thermal.model.reduce import ReducedModel
 
 _SUMMER = Office("medium_summer", "Medium Office", OFFICES["medium_winter"].file, "summer", "2023-07-03")
 SEASONS = {o.season: o for o in (OFFICES["medium_winter"], OFFICES["medium_spring"], _SUMMER)}

@@ -10,21 +10,20 @@ from _energyplus_control import OPERATION
 from _energyplus_offices import ELECTRICITY, GAS
 from numpy.typing import NDArray
 
-from mpc.kpi import PlantRecord
-from mpc.loop import (
-    Measurements,
-    PointLayout,
-    RecentSteps,
-    ReducedBuilding,
-    SensorNoise,
-    SimulatedPlant,
-    scheduled_operation,
-)
-from mpc.adapters.energyplus import EnergyPlusBuilding, EnergyPlusPlant, controller_system
-from mpc.scenario import Forecast
+from mpc.adapters.energyplus.building import EnergyPlusBuilding
+from mpc.adapters.energyplus.plant import EnergyPlusPlant
+from mpc.adapters.energyplus.system import controller_system
+from mpc.kpi.record import PlantRecord
+from mpc.loop.history import RecentSteps
+from mpc.loop.noise import SensorNoise
+from mpc.loop.operation import scheduled_operation
+from mpc.loop.plant import Measurements, PointLayout
+from mpc.loop.reduced import ReducedBuilding
+from mpc.loop.simulated import SimulatedPlant
+from mpc.scenario.forecast import Forecast
 from thermal import Building
-from thermal.case import Device
-from thermal.model import ReducedModel
+from thermal.case.schema import Device
+from thermal.model.reduce import ReducedModel
 
 #: Our plant has hot water; electric reheat is a loop of this name whose water is always as warm as the coils can use.
 _REHEAT, _WATER = "electric_reheat", 323.15  # K

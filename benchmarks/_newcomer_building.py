@@ -19,9 +19,11 @@ import yaml
 from _table import ROOT
 
 from calibration import Interval, evaluate_case
-from mpc.loop import pilot_building
 from thermal import load_case, save_case
-from thermal.pilot import MOUNTAIN_VIEW, TwinTruth, generate_twin
+from thermal.pilot.building import pilot_building
+from thermal.pilot.truth import TwinTruth
+from thermal.pilot.twin import generate_twin
+from thermal.pilot.weather import MOUNTAIN_VIEW
 
 BROWSER = ROOT / "tests" / "browser"
 SEED = 0

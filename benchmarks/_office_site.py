@@ -24,35 +24,37 @@ import pandas as pd
 from _site import POLICIES, Site, Week, World
 
 from calibration import calibrate
-from calibration.diagnosis import diagnose, write_diagnosis
-from mpc.baselines import Guideline36, OutdoorReset, day_schedule
-from mpc.control import ControllerSettings, Horizon, Margin, MpcController
-from mpc.environment import SUPPLY_SETPOINTS, ScenarioPlant
-from mpc.loop import (
-    Controller,
-    FixedSetpoints,
-    ReducedBuilding,
-    SensorNoise,
-    SimulatedPlant,
-    pilot_building,
-    pilot_weather,
-)
-from mpc.scenario import (
-    DAY_AHEAD_ERRORS,
-    Forecaster,
-    InternalGains,
-    Scenario,
-    StepGrid,
-    build_scenario,
-    paper_carbon,
-    paper_tariff,
-)
-from mpc.studies import ORDER, KnownState, control_model, default_horizon, make_controller, site_points
+from calibration.diagnosis.diagnosis import diagnose
+from mpc.baselines.guideline36 import Guideline36
+from mpc.baselines.reset import OutdoorReset
+from mpc.baselines.schedule import day_schedule
+from mpc.control.controller.action import ControllerSettings
+from mpc.control.controller.controller import MpcController
+from mpc.control.problem.back_off import Margin
+from mpc.control.problem.horizon import Horizon
+from mpc.environment.actions import SUPPLY_SETPOINTS
+from mpc.environment.environment import ScenarioPlant
+from mpc.loop.make import pilot_weather
+from mpc.loop.noise import SensorNoise
+from mpc.loop.plant import Controller
+from mpc.loop.reduced import ReducedBuilding
+from mpc.loop.run import FixedSetpoints
+from mpc.loop.simulated import SimulatedPlant
+from mpc.reports.diagnosis import write_diagnosis
+from mpc.scenario.forecaster import DAY_AHEAD_ERRORS, Forecaster
+from mpc.scenario.gains import InternalGains
+from mpc.scenario.grid import StepGrid
+from mpc.scenario.paper import paper_carbon, paper_tariff
+from mpc.scenario.scenario import Scenario, build_scenario
+from mpc.studies.bound import KnownState
+from mpc.studies.controller import default_horizon, make_controller, site_points
+from mpc.studies.model import ORDER, control_model
 from thermal import Building, Case
-from thermal.effects import chosen
-from thermal.hvac import HvacSystem
-from thermal.model import ReducedModel
-from thermal.pilot import size_system
+from thermal.effects.catalogue import chosen
+from thermal.hvac._system import HvacSystem
+from thermal.model.reduce import ReducedModel
+from thermal.pilot.building import pilot_building
+from thermal.pilot.sizing import size_system
 
 EFFECTS = ("solar_gain", "infiltration")
 #: Parameters of the building that differ from the library's starting values [parameter units].

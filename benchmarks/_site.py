@@ -7,9 +7,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import ClassVar, Literal
 
-from mpc.environment import ControlEnvironment, EconomicReward, ScenarioPlant
-from mpc.kpi import StageCost
-from mpc.loop import Controller
+from mpc.environment.environment import ControlEnvironment, ScenarioPlant
+from mpc.environment.reward import EconomicReward
+from mpc.kpi.rewards import StageCost
+from mpc.loop.plant import Controller
 
 POLICIES = Path(__file__).parent / "policies"
 

@@ -18,7 +18,8 @@ from stable_baselines3 import PPO, SAC
 from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import DummyVecEnv, VecEnv
 
-from mpc.environment import ActorNetwork, ControlEnvironment
+from mpc.environment.environment import ControlEnvironment
+from mpc.environment.policy import ActorNetwork
 
 ENVIRONMENTS = 4
 VALIDATION_SEED = 11

@@ -15,9 +15,8 @@ from typing import Any
 import numpy as np
 from _code import code
 from _table import markdown, publish, write
+from _trial_scores import LEAST_GAP, Trial, gap_of, score, trial_of
 from energyplus_trials.drawing import draw_spec, without
-
-from calibration.diagnosis import LEAST_GAP, Trial, gap_of, score, trial_of
 
 NAME = "blind_trials"
 CASES, SEALED, ANSWERS, GAPS = "cases", "sealed", "answers", "gaps"
@@ -28,7 +27,7 @@ _ANSWER, _GAP = "diagnose(case).to_dict()", '{"gap": {"mae": baseline_gap(case)}
 _PROGRAM = """
 import json, sys
 from pathlib import Path
-from calibration.diagnosis import baseline_gap, diagnose
+from calibration.diagnosis.diagnosis import baseline_gap, diagnose
 from thermal import load_case
 case = load_case(sys.argv[1])
 answer = %s | {"code": sys.argv[3]}

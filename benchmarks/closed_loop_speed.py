@@ -31,10 +31,13 @@ import numpy as np
 from _table import markdown, write
 from simulator_speed import use_one_thread
 
-from mpc.loop import SensorNoise, SimulatedPlant, pilot_building, pilot_weather, simulated_plant
+from mpc.loop.make import pilot_weather, simulated_plant
+from mpc.loop.noise import SensorNoise
+from mpc.loop.simulated import SimulatedPlant
 from thermal import Building
-from thermal.hvac import HvacSystem
-from thermal.pilot import size_system
+from thermal.hvac._system import HvacSystem
+from thermal.pilot.building import pilot_building
+from thermal.pilot.sizing import size_system
 
 SEED = 0
 DAY, NEXT = "2023-01-09", "2023-01-10"

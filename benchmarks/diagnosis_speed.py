@@ -26,9 +26,9 @@ from pathlib import Path
 from _code import code
 from _table import markdown, write
 
-from mpc.loop import save_pilot
+from mpc.loop.make import save_pilot
 from thermal import load_case
-from thermal.effects import chosen
+from thermal.effects.catalogue import chosen
 
 NAME = "diagnosis_speed"
 

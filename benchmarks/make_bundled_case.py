@@ -22,7 +22,7 @@ from energyplus_case import folder, model, run, sensors
 from energyplus_trials.frame import SITE_OUTPUTS, STEPS_PER_HOUR
 from rich.logging import RichHandler
 
-from thermal.case import load_case
+from thermal.case.load import load_case
 
 HERE = Path(__file__).resolve().parent
 VERSION = "25.2"  # of EnergyPlus, as pyenergyplus-lbnl 26.1.0 brings it

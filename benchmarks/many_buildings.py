@@ -32,8 +32,10 @@ from typing import Any
 
 from _table import markdown, write
 
-from calibration import CaseOutcome, calibrate_many, case_folders
-from thermal.pilot import generate_pilot
+from calibration import calibrate_many
+from calibration.fleet.record import CaseOutcome
+from calibration.fleet.run import case_folders
+from thermal.pilot.pilot import generate_pilot
 
 BUILDINGS = 40
 OFFICE: dict[str, Any] = {

@@ -35,10 +35,13 @@ import pandas as pd
 from _table import markdown, publish, write
 from simulator_speed import use_one_thread
 
-from mpc.loop import SensorNoise, pilot_building, pilot_weather
-from mpc.scenario import DAY_AHEAD_ERRORS
-from mpc.studies import Study, make_study, prediction_errors, run_controller
+from mpc.loop.make import pilot_weather
+from mpc.loop.noise import SensorNoise
+from mpc.scenario.forecaster import DAY_AHEAD_ERRORS
+from mpc.studies.run import prediction_errors, run_controller
+from mpc.studies.study import Study, make_study
 from thermal import Building
+from thermal.pilot.building import pilot_building
 
 SEED, DX, PRICE = 0, 0.5, 1.0  # -, m, currency/K/h
 SEASONS = {"winter": "2023-01-09", "spring": "2023-04-17", "summer": "2023-07-17"}

@@ -35,11 +35,11 @@ from _energyplus_control import Own, optimal
 from _energyplus_offices import CONTROL_DAYS, HORIZON, OFFICES, Office, prepared
 from _table import markdown, write
 
-from mpc.baselines import OutdoorReset
+from mpc.adapters.energyplus.plant import EnergyPlusPlant
+from mpc.baselines.reset import OutdoorReset
 from mpc.errors import EnergyPlusError
-from mpc.kpi import measure_kpis
-from mpc.loop import run_closed_loop
-from mpc.adapters.energyplus import EnergyPlusPlant
+from mpc.kpi.kpis import measure_kpis
+from mpc.loop.run import run_closed_loop
 
 CONTROLLERS = {"own": "own control", "reset": "outdoor reset", "before": "MPC before diagnosis", "after": "MPC after"}
 COLUMNS = ("office", "week", "controller", "electricity, kWh", "gas, kWh", "cost, USD", "against own, %",

@@ -32,26 +32,28 @@ from _do_mpc_peer import SETTINGS, DoMpc
 from _table import markdown, publish, write
 from simulator_speed import pilot
 
-from mpc.control import (
-    ControlProblem,
-    Horizon,
-    HorizonData,
-    IpoptSolver,
-    PeakData,
-    Predictor,
-    ResetRule,
-    SequentialSolver,
-    StageData,
-    StageMethod,
-    StageSolution,
-    StageSolver,
-    Status,
-    supply_channels,
-)
-from mpc.scenario import zone_areas
+from mpc.control.controller.rules import ResetRule
+from mpc.control.predictor.predictor import Predictor
+from mpc.control.problem.channels import supply_channels
+from mpc.control.problem.data import HorizonData, PeakData
+from mpc.control.problem.horizon import Horizon
+from mpc.control.problem.problem import ControlProblem
+from mpc.control.problem.stages import StageData
+from mpc.control.solvers.ipopt import IpoptSolver
+from mpc.control.solvers.sequential import SequentialSolver
+from mpc.control.solvers.solution import Status
+from mpc.control.solvers.stage_solver import StageMethod, StageSolution, StageSolver
+from mpc.scenario.scenario import zone_areas
 from thermal import SymbolicModel, build_network, reduced_model
-from thermal.hvac import AirHandler, BoilerLoop, CoolingCoil, Fan, HvacSystem, Pump, SmoothHvac, Terminals, WaterCoil
-from thermal.model import ModalModel, modal_model
+from thermal.hvac._air_handler import AirHandler
+from thermal.hvac._boiler import BoilerLoop, Pump
+from thermal.hvac._coil import WaterCoil
+from thermal.hvac._cooling import CoolingCoil
+from thermal.hvac._fan import Fan
+from thermal.hvac._smooth import SmoothHvac
+from thermal.hvac._system import HvacSystem
+from thermal.hvac._terminals import Terminals
+from thermal.model.modal import ModalModel, modal_model
 
 ORDER, WARM, SEED = 201, 12, 0
 HORIZONS = {

@@ -40,9 +40,13 @@ from _code import code
 from _recovery_tables import report
 from _table import publish, write
 
-from calibration import CalibrationResult, ParameterEstimate, calibrate, evaluate_case
+from calibration import CalibrationResult, calibrate, evaluate_case
+from calibration.fit.result import ParameterEstimate
 from thermal import Building, Case, Parameter, load_case
-from thermal.pilot import MOUNTAIN_VIEW, Excitation, Meter, TwinTruth, devices, generate_office, generate_twin
+from thermal.pilot.layout import devices, generate_office
+from thermal.pilot.truth import TwinTruth
+from thermal.pilot.twin import Excitation, Meter, generate_twin
+from thermal.pilot.weather import MOUNTAIN_VIEW
 
 NAME = "parameter_recovery"
 

@@ -11,7 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from calibration import calibrate
-from mpc.reports.figures import error_growth, floor_maps
+from mpc.reports.figures.error import error_growth
+from mpc.reports.figures.plan import floor_maps
 from thermal import FloorPlans, load_bundled_case
 
 IMAGES = Path(__file__).parents[1] / "docs" / "images"

@@ -29,15 +29,15 @@ import numpy.typing as npt
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
-from thermal.shuffle import (
-    RandomShuffle,
+from thermal.shuffle.equivalent import (
+    MIXING_EXTENT,
     choose_equivalent,
     effective_diffusivity,
     exchange_rate,
     mean_square_reach,
     mixing_rate,
 )
-from thermal.shuffle.equivalent import MIXING_EXTENT
+from thermal.shuffle.random import RandomShuffle
 
 matplotlib.use("Agg")
 from matplotlib import pyplot as plt

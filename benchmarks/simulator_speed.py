@@ -36,11 +36,14 @@ from _table import markdown, write
 from scipy.sparse.linalg import splu
 
 from thermal import Building, SymbolicModel, build_network
-from thermal.model import IMPLICIT_EULER, TR_BDF2, Matrices, Scheme, Stepper, factorise
 from thermal.model.factor import SparseSolver
-from thermal.network import ThermalNetwork
-from thermal.pilot import MOUNTAIN_VIEW, devices, generate_office
-from thermal.shuffle import RandomShuffle
+from thermal.model.scheme import IMPLICIT_EULER, TR_BDF2, Scheme
+from thermal.model.stepper import Stepper, factorise
+from thermal.model.symbolic import Matrices
+from thermal.network.network import ThermalNetwork
+from thermal.pilot.layout import devices, generate_office
+from thermal.pilot.weather import MOUNTAIN_VIEW
+from thermal.shuffle.random import RandomShuffle
 
 FloatArray = npt.NDArray[np.float64]
 

@@ -1,7 +1,10 @@
 """Run a small office in closed loop for a winter day: fixed setpoints, noisy sensors, indicators at the end."""
 
-from mpc.kpi import Kpis, measure_kpis
-from mpc.loop import FixedSetpoints, SensorNoise, pilot_building, pilot_weather, run_closed_loop, simulated_plant
+from mpc.kpi.kpis import Kpis, measure_kpis
+from mpc.loop.make import pilot_weather, simulated_plant
+from mpc.loop.noise import SensorNoise
+from mpc.loop.run import FixedSetpoints, run_closed_loop
+from thermal.pilot.building import pilot_building
 
 DAY, NEXT = "2023-01-09", "2023-01-10"
 

@@ -3,7 +3,7 @@
 import sys
 
 from thermal import Case
-from thermal.pilot import generate_pilot
+from thermal.pilot.pilot import generate_pilot
 
 
 def small(path: str) -> Case:

@@ -1,20 +1,21 @@
 """A building as a thermal system: cases, control volumes and faces, the symbolic model and what steps it."""
 
-from thermal.case import (
-    Building,
-    Case,
-    FloorPlan,
-    FloorPlans,
-    Telemetry,
-    ZoneTable,
-    load_case,
-    local_timestamp,
-    save_case,
-)
+from thermal.case.building import Building, FloorPlan, FloorPlans, ZoneTable
+from thermal.case.case import Case
+from thermal.case.load import load_case
+from thermal.case.save import save_case
+from thermal.case.telemetry import Telemetry
+from thermal.case.times import local_timestamp
 from thermal.data import load_bundled_case
 from thermal.errors import CaseError, ModelError, PlanError, ThermalError
-from thermal.model import Inputs, Simulator, SymbolicModel, free_runs, reduced_model, replay_inputs, simulate, spin_up
-from thermal.network import Structure, ThermalNetwork, build_network
+from thermal.model.reduce import reduced_model
+from thermal.model.replay import Inputs, free_runs, replay_inputs, spin_up
+from thermal.model.simulation import simulate
+from thermal.model.simulator import Simulator
+from thermal.model.symbolic import SymbolicModel
+from thermal.network.build import build_network
+from thermal.network.network import ThermalNetwork
+from thermal.network.structure import Structure
 from thermal.parameters import PARAMETERS, Parameter
 
 __all__ = [

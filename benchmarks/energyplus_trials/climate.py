@@ -13,8 +13,8 @@ from scipy.signal import lfilter
 from energyplus_trials.errors import EnergyPlusMissingError
 from energyplus_trials.sites import GENERATED
 from energyplus_trials.specification import Climate
-from thermal.case import Location
-from thermal.pilot import generate_weather
+from thermal.case.schema import Location
+from thermal.pilot.weather import generate_weather
 
 Series = NDArray[np.float64]
 

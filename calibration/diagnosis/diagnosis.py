@@ -8,20 +8,20 @@ from dataclasses import dataclass, field
 from importlib.metadata import version
 from typing import Any
 
-from calibration.evaluation.n_step import Progress
-from calibration.evaluation.intervals import Interval
-from calibration.evaluation.settings import ModelSettings
+from calibration.diagnosis.decide.evidence import gains_of
+from calibration.diagnosis.decide.levels import p_value
+from calibration.diagnosis.decide.verdict import Verdict, judge
+from calibration.diagnosis.decide.where import Where, where_it_lies
 from calibration.diagnosis.refit.comparison import Bench, Fit
 from calibration.diagnosis.refit.held_out import elsewhere, held_out
 from calibration.diagnosis.refit.how_far import Step, how_far
-from calibration.diagnosis.decide.levels import p_value
 from calibration.diagnosis.refit.refit import ACCEPTED
 from calibration.diagnosis.refit.search import Round, search
-from calibration.diagnosis.decide.verdict import Verdict, judge
-from calibration.diagnosis.decide.where import Where, where_it_lies
-from calibration.diagnosis.decide.evidence import gains_of
-from thermal import Case
-from thermal.effects import CATALOGUE
+from calibration.evaluation.intervals import Interval
+from calibration.evaluation.n_step import Progress
+from calibration.evaluation.settings import ModelSettings
+from thermal.case.case import Case
+from thermal.effects.catalogue import CATALOGUE
 
 #: Subsystem that an effect belongs to.
 SUBSYSTEMS = {
@@ -187,7 +187,7 @@ def diagnose(
 
     Examples
     --------
-    >>> from thermal import load_bundled_case
+    >>> from thermal.data import load_bundled_case
     >>> diagnose(load_bundled_case(), dx=1.0).verdict.suspects[0].effect
     'solar_gain'
     """

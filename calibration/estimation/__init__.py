@@ -1,0 +1,1 @@
+"""Filters and smoothers: states, unmeasured heat, and the likelihood of innovations."""

@@ -9,11 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from calibration.errors import FilterError
 from calibration.estimation.riccati import doubled_riccati
 from calibration.estimation.state_space import StateSpace
-from calibration.errors import FilterError
-
-FloatArray = NDArray[np.float64]
+from thermal._types import FloatArray
 
 #: What a random walk's deviation is the growth over [s]: a day.
 RANDOM_WALK_TIME = 86400.0

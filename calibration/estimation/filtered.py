@@ -6,20 +6,19 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from calibration.errors import FilterError
 from calibration.estimation.disturbance import DisturbanceModel
-from calibration.evaluation.n_step import Evaluation, Progress, Wanted, evaluate_runs
 from calibration.estimation.gains import TOLERANCE, Covariance
-from calibration.evaluation.intervals import Interval
 from calibration.estimation.kalman import Filtered, KalmanFilter
 from calibration.estimation.start_spread import start_spread
 from calibration.estimation.state_space import StateSpace, mean_flow, state_space
-from calibration.errors import FilterError
-from thermal import Inputs, SymbolicModel, spin_up
-from thermal.model import IMPLICIT_EULER, LEAST_SPIN_UP, SPIN_UP, Matrices, Scheme
-
-FloatArray = NDArray[np.float64]
+from calibration.evaluation.intervals import Interval
+from calibration.evaluation.n_step import Evaluation, Progress, Wanted, evaluate_runs
+from thermal._types import FloatArray
+from thermal.model.replay import LEAST_SPIN_UP, SPIN_UP, Inputs, spin_up
+from thermal.model.scheme import IMPLICIT_EULER, Scheme
+from thermal.model.symbolic import Matrices, SymbolicModel
 
 
 def filter_interval(

@@ -6,12 +6,9 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from calibration.estimation.disturbance import DisturbedSpace
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
+from thermal._types import BoolArray, FloatArray
 
 #: Whether the covariance follows every missing value, or the gains are those of the steady covariance throughout.
 Covariance = Literal["exact", "steady"]

@@ -11,13 +11,12 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from calibration.estimation.filtered import rows_of
-from calibration.evaluation.intervals import Interval
 from calibration.estimation.state_space import REFERENCE
-from thermal import Inputs, SymbolicModel, spin_up
-from thermal.model import LEAST_SPIN_UP, SPIN_UP, Matrices
+from calibration.evaluation.intervals import Interval
+from thermal._types import FloatArray
+from thermal.model.replay import LEAST_SPIN_UP, SPIN_UP, Inputs, spin_up
+from thermal.model.symbolic import Matrices, SymbolicModel
 from thermal.units import AIR_HEAT_CAPACITY
-
-FloatArray = NDArray[np.float64]
 
 #: Limits of ASHRAE Guideline 14-2014 for a whole-building simulation calibrated on hourly data [-].
 NMBE_LIMIT, CV_RMSE_LIMIT = 0.10, 0.30

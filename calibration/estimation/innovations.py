@@ -8,21 +8,20 @@ from typing import Any
 
 import numpy as np
 import scipy.optimize as so
-from numpy.typing import NDArray
 
-from calibration.estimation.filtered import prepare, rows_of
+from calibration.errors import FilterError
 from calibration.estimation.disturbance import DisturbanceModel
-from calibration.evaluation.n_step import Progress
+from calibration.estimation.filtered import prepare, rows_of
 from calibration.estimation.gains import Covariance
-from calibration.evaluation.intervals import Interval
 from calibration.estimation.kalman import Filtered, KalmanFilter
 from calibration.estimation.score import log_likelihood_slopes
 from calibration.estimation.state_space import StateSpace
-from calibration.errors import FilterError
-from thermal import Inputs, SymbolicModel
-from thermal.model import IMPLICIT_EULER, SPIN_UP, Scheme
-
-FloatArray = NDArray[np.float64]
+from calibration.evaluation.intervals import Interval
+from calibration.evaluation.n_step import Progress
+from thermal._types import FloatArray
+from thermal.model.replay import SPIN_UP, Inputs
+from thermal.model.scheme import IMPLICIT_EULER, Scheme
+from thermal.model.symbolic import SymbolicModel
 
 
 @dataclass(frozen=True)

@@ -9,14 +9,12 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from calibration.errors import FilterError
 from calibration.estimation.disturbance import DisturbanceModel, DisturbedSpace
 from calibration.estimation.gains import TOLERANCE, Covariance, Gain, exact_gains, steady_gains
 from calibration.estimation.state_space import REFERENCE, StateSpace
-from calibration.errors import FilterError
-from thermal import Inputs
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
+from thermal._types import BoolArray, FloatArray
+from thermal.model.replay import Inputs
 
 
 @dataclass(frozen=True)
@@ -109,8 +107,12 @@ class KalmanFilter:
 
     Examples
     --------
-    >>> from calibration import state_space
-    >>> from thermal import build_network, load_bundled_case, reduced_model, replay_inputs, spin_up, SymbolicModel
+    >>> from calibration.estimation.state_space import state_space
+    >>> from thermal.data import load_bundled_case
+    >>> from thermal.model.reduce import reduced_model
+    >>> from thermal.model.replay import replay_inputs, spin_up
+    >>> from thermal.model.symbolic import SymbolicModel
+    >>> from thermal.network.build import build_network
     >>> case = load_bundled_case()
     >>> grid = SymbolicModel(build_network(case.building, dx=1.0))
     >>> inputs, theta = replay_inputs(case, grid.network), grid.network.start()

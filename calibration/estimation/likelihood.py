@@ -18,14 +18,13 @@ from numpy.typing import NDArray
 from calibration.estimation.disturbance import DisturbanceModel
 from calibration.estimation.gains import Covariance
 from calibration.estimation.innovations import DISTURBANCE_PRIORS
+from calibration.estimation.whitening import Whitening, whitening
 from calibration.evaluation.intervals import Interval
 from calibration.fit.precision import Precision, precision, unexplained
 from calibration.fit.problem import Problem
-from calibration.estimation.whitening import Whitening, whitening
-from thermal import SymbolicModel, free_runs, spin_up
-from thermal.model import SPIN_UP
-
-FloatArray = NDArray[np.float64]
+from thermal._types import FloatArray
+from thermal.model.replay import SPIN_UP, free_runs, spin_up
+from thermal.model.symbolic import SymbolicModel
 
 #: Zones beyond which the gains are those of the steady covariance, as in the tuning of the disturbance.
 _MANY_ZONES = 40

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import scipy.linalg as sl
-from numpy.typing import NDArray
 
 from calibration.errors import FilterError
-
-FloatArray = NDArray[np.float64]
+from thermal._types import FloatArray
 
 #: Doublings: 2^60 steps are longer than any building remembers.
 _DOUBLINGS = 60

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from calibration.estimation.kalman import Filtered
 from calibration.estimation.riccati import summed_stein
 from calibration.estimation.smoother import costates, smoothed_zones, spreads
-
-FloatArray = NDArray[np.float64]
+from thermal._types import FloatArray
 
 Slopes = tuple[FloatArray, float, FloatArray]
 

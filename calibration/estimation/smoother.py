@@ -9,12 +9,11 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
+from calibration.errors import FilterError
 from calibration.estimation.disturbance import DisturbedSpace
 from calibration.estimation.gains import Gain
 from calibration.estimation.kalman import Filtered
-from calibration.errors import FilterError
-
-FloatArray = NDArray[np.float64]
+from thermal._types import FloatArray
 
 
 @dataclass(frozen=True)
@@ -102,8 +101,14 @@ def smooth(filtered: Filtered) -> Smoothed:
 
     Examples
     --------
-    >>> from calibration import DisturbanceModel, Interval, filter_interval
-    >>> from thermal import build_network, load_bundled_case, reduced_model, replay_inputs, SymbolicModel
+    >>> from calibration.estimation.disturbance import DisturbanceModel
+    >>> from calibration.estimation.filtered import filter_interval
+    >>> from calibration.evaluation.intervals import Interval
+    >>> from thermal.data import load_bundled_case
+    >>> from thermal.model.reduce import reduced_model
+    >>> from thermal.model.replay import replay_inputs
+    >>> from thermal.model.symbolic import SymbolicModel
+    >>> from thermal.network.build import build_network
     >>> grid = SymbolicModel(build_network(load_bundled_case().building, dx=1.0))
     >>> inputs, theta = replay_inputs(load_bundled_case(), grid.network), grid.network.start()
     >>> small = reduced_model(grid, [theta])
@@ -211,8 +216,14 @@ def averaged_deviation(filtered: Filtered, steps: int) -> FloatArray:
 
     Examples
     --------
-    >>> from calibration import DisturbanceModel, Interval, filter_interval
-    >>> from thermal import build_network, load_bundled_case, reduced_model, replay_inputs, SymbolicModel
+    >>> from calibration.estimation.disturbance import DisturbanceModel
+    >>> from calibration.estimation.filtered import filter_interval
+    >>> from calibration.evaluation.intervals import Interval
+    >>> from thermal.data import load_bundled_case
+    >>> from thermal.model.reduce import reduced_model
+    >>> from thermal.model.replay import replay_inputs
+    >>> from thermal.model.symbolic import SymbolicModel
+    >>> from thermal.network.build import build_network
     >>> grid = SymbolicModel(build_network(load_bundled_case().building, dx=1.0))
     >>> inputs, theta = replay_inputs(load_bundled_case(), grid.network), grid.network.start()
     >>> small = reduced_model(grid, [theta])

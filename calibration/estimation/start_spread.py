@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from thermal.model import ModalModel
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
+from thermal._types import BoolArray, FloatArray
+from thermal.model.modal import ModalModel
 
 #: How far the mean temperatures of the weeks before the telemetry may be from those of its first day [K], standard
 #: deviation. Daily means of the shared cases vary by 1.5 to 8 K outdoors and by 0.4 to 0.6 K in occupied zones (4 K in

@@ -6,14 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg as sl
-from numpy.typing import NDArray
 
 from calibration.errors import FilterError
-from thermal import Inputs
-from thermal.model import IMPLICIT_EULER, ModalModel, Scheme
+from thermal._types import FloatArray
+from thermal.model.modal import ModalModel
+from thermal.model.replay import Inputs
+from thermal.model.scheme import IMPLICIT_EULER, Scheme
 from thermal.units import AIR_HEAT_CAPACITY
-
-FloatArray = NDArray[np.float64]
 
 #: Temperatures are stepped as differences from this one [K], as in a replay: nothing changes but round-off.
 REFERENCE = 293.15
@@ -182,7 +181,10 @@ def state_space(
 
     Examples
     --------
-    >>> from thermal import build_network, load_bundled_case, reduced_model, SymbolicModel
+    >>> from thermal.data import load_bundled_case
+    >>> from thermal.model.reduce import reduced_model
+    >>> from thermal.model.symbolic import SymbolicModel
+    >>> from thermal.network.build import build_network
     >>> grid = SymbolicModel(build_network(load_bundled_case().building, dx=1.0))
     >>> small = reduced_model(grid, [grid.network.start()])
     >>> space = state_space(small.matrices(grid.network.start()).modal.modes, 300.0)

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from calibration.estimation.disturbance import DisturbanceModel
 from calibration.estimation.innovations import tune_disturbance
 from calibration.fit.problem import Problem
-from thermal import ThermalNetwork, reduced_model
-from thermal.model import ReducedModel
-
-FloatArray = NDArray[np.float64]
+from thermal._types import FloatArray
+from thermal.model.reduce import ReducedModel, reduced_model
+from thermal.network.network import ThermalNetwork
 
 #: Zones beyond which it is tuned on a model of this order: 123 zones take minutes with the five hundred states of their
 #: calibration.

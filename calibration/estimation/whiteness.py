@@ -7,17 +7,15 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import solve_toeplitz
 from scipy.signal import lfilter
 from scipy.stats import chi2, kstwo
 from statsmodels.tsa.stattools import acovf
 
-from calibration.estimation.kalman import Filtered
 from calibration.errors import FilterError
-from thermal import Inputs
-
-FloatArray = NDArray[np.float64]
+from calibration.estimation.kalman import Filtered
+from thermal._types import FloatArray
+from thermal.model.replay import Inputs
 
 #: Lags of the Ljung-Box test [s]: half an hour, two hours, a day.
 LAGS = (1800.0, 7200.0, 86400.0)

@@ -7,14 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from calibration.estimation.filtered import filter_interval, rows_of
 from calibration.estimation.disturbance import DisturbanceModel, DisturbedSpace
+from calibration.estimation.filtered import filter_interval, rows_of
 from calibration.estimation.gains import Covariance, Gain
 from calibration.evaluation.intervals import Interval
-from thermal import Inputs, SymbolicModel
-from thermal.model import Scheme
-
-FloatArray = NDArray[np.float64]
+from thermal._types import FloatArray
+from thermal.model.replay import Inputs
+from thermal.model.scheme import Scheme
+from thermal.model.symbolic import SymbolicModel
 
 #: Relative change of a variance in a step below which it counts as steady [-]: log-likelihoods are then right to a
 #: tenth.

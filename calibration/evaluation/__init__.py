@@ -1,0 +1,1 @@
+"""How well a model predicts: N-step errors, their intervals and runs."""

@@ -8,25 +8,18 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
-from calibration.evaluation.n_step import HORIZONS, Evaluation, Progress, evaluate_model
-from calibration.evaluation.intervals import Interval, Runs, horizon_steps, merge, select_runs
-from calibration.fit.result import GridCheck, load_parameters
-from calibration.evaluation.settings import ModelSettings, read_settings
 from calibration.errors import NotEnoughDataError
-from thermal import (
-    Case,
-    Inputs,
-    SymbolicModel,
-    free_runs,
-    reduced_model,
-    replay_inputs,
-    spin_up,
-)
-from thermal.model import SPIN_UP, ReducedModel, Scheme
-
-FloatArray = NDArray[np.float64]
+from calibration.evaluation.intervals import Interval, Runs, horizon_steps, merge, select_runs
+from calibration.evaluation.n_step import HORIZONS, Evaluation, Progress, evaluate_model
+from calibration.evaluation.settings import ModelSettings, read_settings
+from calibration.fit.result import GridCheck, load_parameters
+from thermal._types import FloatArray
+from thermal.case.case import Case
+from thermal.model.reduce import ReducedModel, reduced_model
+from thermal.model.replay import SPIN_UP, Inputs, free_runs, replay_inputs, spin_up
+from thermal.model.scheme import Scheme
+from thermal.model.symbolic import SymbolicModel
 
 #: Runs of the check of a reduced model on the grid, and the stretch of telemetry they are spread over [days].
 CHECK_RUNS, CHECK_DAYS = 6, 2.0
@@ -148,7 +141,7 @@ def evaluate_case(
 
     Examples
     --------
-    >>> from thermal import load_bundled_case
+    >>> from thermal.data import load_bundled_case
     >>> evaluate_case(load_bundled_case(), dx=1.0).metrics.mae < 1.0
     True
     """

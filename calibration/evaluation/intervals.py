@@ -9,13 +9,13 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from calibration.errors import HorizonError, IntervalError, NotEnoughDataError
-from thermal import Case, CaseError, Inputs, local_timestamp
-from thermal.model import LEAST_SPIN_UP, SPIN_UP
-
-IntArray = NDArray[np.int64]
+from thermal._types import IntArray
+from thermal.case.case import Case
+from thermal.case.times import local_timestamp
+from thermal.errors import CaseError
+from thermal.model.replay import LEAST_SPIN_UP, SPIN_UP, Inputs
 
 #: Days that tune before one that is held out, where they alternate, and fewest such turns.
 _TUNING_DAYS, _TURNS = 2, 3

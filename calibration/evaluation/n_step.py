@@ -10,12 +10,13 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from calibration.evaluation.intervals import Interval, Runs, horizon_steps, select_runs
 from calibration.errors import HorizonError, NotEnoughDataError
-from thermal import Inputs, SymbolicModel, ThermalNetwork, free_runs, spin_up
-from thermal.model import IMPLICIT_EULER, SPIN_UP, Matrices, Scheme
-
-FloatArray = NDArray[np.float64]
+from calibration.evaluation.intervals import Interval, Runs, horizon_steps, select_runs
+from thermal._types import FloatArray
+from thermal.model.replay import SPIN_UP, Inputs, free_runs, spin_up
+from thermal.model.scheme import IMPLICIT_EULER, Scheme
+from thermal.model.symbolic import Matrices, SymbolicModel
+from thermal.network.network import ThermalNetwork
 
 #: Called with what is being done, how much is done and how much there is.
 Progress = Callable[[str, int, int], None]

@@ -9,10 +9,14 @@ from pathlib import Path
 from typing import Any, get_args
 
 from calibration.errors import CalibrationError, ParameterFileError
-from thermal import Building, ModelError, Structure, ThermalNetwork, build_network
-from thermal.effects import CATALOGUE, chosen
-from thermal.model import LEAST_SPIN_UP, SCHEMES, SPIN_UP, Scheme
-from thermal.network import BASELINE
+from thermal.case.building import Building
+from thermal.effects.catalogue import CATALOGUE, chosen
+from thermal.errors import ModelError
+from thermal.model.replay import LEAST_SPIN_UP, SPIN_UP
+from thermal.model.scheme import SCHEMES, Scheme
+from thermal.network.build import build_network
+from thermal.network.network import ThermalNetwork
+from thermal.network.structure import BASELINE, Structure
 from thermal.parameters import Scope
 
 

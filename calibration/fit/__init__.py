@@ -1,0 +1,1 @@
+"""Parameters from telemetry by least squares."""

@@ -7,26 +7,23 @@ from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 from typing import get_args
 
-import numpy as np
-from numpy.typing import NDArray
-
-from calibration.evaluation.case_model import CaseModel
-from calibration.fit.describe import describe
-from calibration.evaluation.n_step import HORIZONS, Evaluation, Progress, evaluate_model
-from calibration.identifiability.information import information_of
-from calibration.evaluation.intervals import Interval, default_intervals, horizon_steps, select_runs
+from calibration.errors import CalibrationError
 from calibration.estimation.likelihood import InnovationsProblem
+from calibration.evaluation.case_model import CaseModel
+from calibration.evaluation.intervals import Interval, default_intervals, horizon_steps, select_runs
+from calibration.evaluation.n_step import HORIZONS, Evaluation, Progress, evaluate_model
+from calibration.evaluation.settings import ModelSettings
+from calibration.fit.describe import describe
 from calibration.fit.problem import Loss, Objective, Problem
 from calibration.fit.result import CalibrationResult, GridCheck, SolverReport
-from calibration.evaluation.settings import ModelSettings
 from calibration.fit.starts import solve_starts, tuning_runs
-from calibration.errors import CalibrationError
-from thermal import Case, Structure, SymbolicModel, reduced_model, replay_inputs
-from thermal.model import SPIN_UP, ReducedModel
-from thermal.network import BASELINE
+from calibration.identifiability.information import information_of
+from thermal.case.case import Case
+from thermal.model.reduce import ReducedModel, reduced_model
+from thermal.model.replay import SPIN_UP, replay_inputs
+from thermal.model.symbolic import SymbolicModel
+from thermal.network.structure import BASELINE, Structure
 from thermal.parameters import Scope
-
-FloatArray = NDArray[np.float64]
 
 #: Starts that are tried unless told otherwise: the given one, where compensation would lead, and a draw.
 STARTS = 3
@@ -110,7 +107,7 @@ def calibrate(
 
     Examples
     --------
-    >>> from thermal import load_bundled_case
+    >>> from thermal.data import load_bundled_case
     >>> result = calibrate(load_bundled_case(), dx=1.0)
     >>> result.solver.success
     True

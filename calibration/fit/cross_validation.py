@@ -11,17 +11,18 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from calibration.fit.calibrate import calibrate
-from calibration.evaluation.n_step import Evaluation, Progress
-from calibration.evaluation.intervals import Interval, horizon_steps, merge
-from calibration.fit.least_squares import INTERRUPTED
-from calibration.fleet.record import INTERVALS, check_settings
-from calibration.fit.result import ParameterEstimate
 from calibration.errors import CalibrationError, NotEnoughDataError
-from thermal import PARAMETERS, Case, ThermalError
-from thermal.model import LEAST_SPIN_UP
+from calibration.evaluation.intervals import Interval, horizon_steps, merge
+from calibration.evaluation.n_step import Evaluation, Progress
+from calibration.fit.calibrate import calibrate
+from calibration.fit.least_squares import INTERRUPTED
+from calibration.fit.result import ParameterEstimate
+from calibration.fleet.record import INTERVALS, check_settings
+from thermal.case.case import Case
+from thermal.errors import ThermalError
+from thermal.model.replay import LEAST_SPIN_UP
+from thermal.parameters import PARAMETERS
 
-FloatArray = NDArray[np.float64]
 T = TypeVar("T")
 
 #: An estimate that differs between folds by more than this times its standard error is said to move [-].
@@ -164,7 +165,7 @@ def cross_validate(
 
     Examples
     --------
-    >>> from thermal import load_bundled_case
+    >>> from thermal.data import load_bundled_case
     >>> found = cross_validate(load_bundled_case(), 5, {"dx": 1.0})  # doctest: +SKIP
     >>> found.mae < 1.0  # doctest: +SKIP
     True

@@ -6,15 +6,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import stats
 
 from calibration.fit.estimate import Estimate
-from calibration.identifiability.information import Information
 from calibration.fit.result import ParameterEstimate
-from thermal import Parameter
-
-FloatArray = NDArray[np.float64]
+from calibration.identifiability.information import Information
+from thermal._types import FloatArray
+from thermal.parameters import Parameter
 
 #: A bound counts as hit within this share of the range, on the estimation scale [-].
 BOUND_SHARE = 0.01

@@ -6,17 +6,15 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from calibration.estimation.disturbance import DisturbanceModel
 from calibration.evaluation.n_step import Progress
 from calibration.fit.least_squares import LeastSquaresResult, solve_least_squares
 from calibration.fit.precision import Precision, precision, unexplained
 from calibration.fit.problem import Problem
-from thermal import SymbolicModel, reduced_model
-from thermal.model import ReducedModel
-
-FloatArray = NDArray[np.float64]
+from thermal._types import FloatArray
+from thermal.model.reduce import ReducedModel, reduced_model
+from thermal.model.symbolic import SymbolicModel
 
 #: Most rounds, and the change of the estimate in standard errors that ends them [-].
 ROUNDS = 8

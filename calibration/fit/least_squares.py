@@ -8,9 +8,8 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from thermal._types import FloatArray
 
 #: Residuals (m,) and Jacobian (m, p) at a point (p,).
 ResidualFunction = Callable[[FloatArray], tuple[FloatArray, FloatArray]]

@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 
 from calibration.estimation.disturbance import DisturbanceModel
 from calibration.fit.problem import Problem
-from thermal import Inputs, SymbolicModel
-
-FloatArray = NDArray[np.float64]
+from thermal._types import FloatArray
+from thermal.model.replay import Inputs
+from thermal.model.symbolic import SymbolicModel
 
 #: Least standard deviation of daily means before the telemetry [K].
 _LEAST_SWING = 0.2

@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 
 from calibration.estimation.disturbance import DisturbanceModel
 from calibration.evaluation.intervals import Interval, Runs
-from thermal import Inputs, Parameter, SymbolicModel, free_runs, spin_up
-from thermal.model import IMPLICIT_EULER, Scheme
-
-FloatArray = NDArray[np.float64]
+from thermal._types import FloatArray
+from thermal.model.replay import Inputs, free_runs, spin_up
+from thermal.model.scheme import IMPLICIT_EULER, Scheme
+from thermal.model.symbolic import SymbolicModel
+from thermal.parameters import Parameter
 
 #: ``linear`` is plain least squares; ``pseudo_huber`` takes errors far beyond the others for outliers.
 Loss = Literal["linear", "pseudo_huber"]

@@ -9,19 +9,17 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from calibration.estimation.disturbance import DisturbanceModel
-from calibration.evaluation.n_step import Evaluation
-from calibration.identifiability.information import Information
-from calibration.evaluation.intervals import Interval
-from calibration.fit.problem import Objective
-from calibration.evaluation.settings import ModelSettings
 from calibration.errors import ParameterFileError
-from thermal import ThermalNetwork
-from thermal.effects import CATALOGUE
-
-FloatArray = NDArray[np.float64]
+from calibration.estimation.disturbance import DisturbanceModel
+from calibration.evaluation.intervals import Interval
+from calibration.evaluation.n_step import Evaluation
+from calibration.evaluation.settings import ModelSettings
+from calibration.fit.problem import Objective
+from calibration.identifiability.information import Information
+from thermal._types import FloatArray
+from thermal.effects.catalogue import CATALOGUE
+from thermal.network.network import ThermalNetwork
 
 
 @dataclass(frozen=True)

@@ -8,22 +8,21 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from calibration.errors import CalibrationError
+from calibration.evaluation.intervals import Interval
+from calibration.evaluation.n_step import Progress
 from calibration.fit.calibrate import calibrate
 from calibration.fit.cross_validation import in_order, run_errors
-from calibration.evaluation.n_step import Progress
-from calibration.identifiability.information_search import InformationSearch
-from calibration.evaluation.intervals import Interval
 from calibration.fit.least_squares import INTERRUPTED
-from calibration.fleet.record import INTERVALS, check_settings
-from calibration.identifiability.power import tuning_problem
 from calibration.fit.precision import precision
 from calibration.fit.selection_verdict import Candidate, Selection, compare_candidates
-from calibration.errors import CalibrationError
-from thermal import Case, Structure, reduced_model
-
-FloatArray = NDArray[np.float64]
+from calibration.fleet.record import INTERVALS, check_settings
+from calibration.identifiability.information_search import InformationSearch
+from calibration.identifiability.power import tuning_problem
+from thermal.case.case import Case
+from thermal.model.reduce import reduced_model
+from thermal.network.structure import Structure
 
 
 def select_structure(
@@ -70,7 +69,7 @@ def select_structure(
 
     Examples
     --------
-    >>> from thermal import load_bundled_case
+    >>> from thermal.data import load_bundled_case
     >>> structures = {"the paper's": Structure.paper(), "with interior mass": Structure()}
     >>> select_structure(load_bundled_case(), structures).verdict  # doctest: +SKIP
     """

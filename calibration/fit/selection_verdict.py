@@ -9,15 +9,13 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 from scipy.stats import chi2, norm, t
 
 from calibration.evaluation.case_model import CHECK_TOLERANCE
+from calibration.evaluation.settings import ModelSettings
 from calibration.fit.cross_validation import local_days
 from mpc.reports.identifiability import listed
-from calibration.evaluation.settings import ModelSettings
-
-FloatArray = NDArray[np.float64]
+from thermal._types import FloatArray
 
 #: Confidence of the interval of a difference of held-out errors [-].
 LEVEL = 0.90

@@ -7,14 +7,15 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
-from calibration.fit.estimate import Estimate, Tuner, compensated_start, draw_starts, estimate
-from calibration.evaluation.n_step import Progress
-from calibration.evaluation.intervals import Interval, Runs, select_runs
-from calibration.fit.problem import Problem, thin
-from calibration.estimation.tuner import tune
 from calibration.errors import CalibrationError, NotEnoughDataError
-from thermal import Inputs, ModelError
-from thermal.model import LEAST_SPIN_UP, ReducedModel
+from calibration.estimation.tuner import tune
+from calibration.evaluation.intervals import Interval, Runs, select_runs
+from calibration.evaluation.n_step import Progress
+from calibration.fit.estimate import Estimate, Tuner, compensated_start, draw_starts, estimate
+from calibration.fit.problem import Problem, thin
+from thermal.errors import ModelError
+from thermal.model.reduce import ReducedModel
+from thermal.model.replay import LEAST_SPIN_UP, Inputs
 
 
 def tuning_runs(inputs: Inputs, intervals: Sequence[Interval], steps: int, spin_up: float) -> tuple[Runs, ...]:

@@ -1,0 +1,1 @@
+"""Many buildings at once, on any executor."""

@@ -11,9 +11,11 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from calibration.fit.calibrate import calibrate
+from calibration.errors import CalibrationError, WorkerLostError
 from calibration.evaluation.intervals import parse_interval
+from calibration.fit.calibrate import calibrate
 from calibration.fit.least_squares import INTERRUPTED
+from calibration.fit.result import CalibrationResult
 from calibration.fleet.record import (
     INTERVALS,
     RECORD,
@@ -24,11 +26,11 @@ from calibration.fleet.record import (
     outcome_of,
     read_record,
 )
-from mpc.reports.calibration import write_calibration
-from calibration.fit.result import CalibrationResult
 from calibration.results import write_results
-from calibration.errors import CalibrationError, WorkerLostError
-from thermal import Case, ThermalError, load_case
+from mpc.reports.calibration import write_calibration
+from thermal.case.case import Case
+from thermal.case.load import load_case
+from thermal.errors import ThermalError
 
 
 @dataclass(frozen=True)

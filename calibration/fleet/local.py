@@ -109,7 +109,7 @@ class _Process:
     """A process that answers pickled calls on its standard input and output."""
 
     def __init__(self) -> None:
-        code = f"import sys; sys.path[:] = {sys.path!r}; from calibration import _many_local; _many_local._serve()"
+        code = f"import sys; sys.path[:] = {sys.path!r}; from calibration.fleet.local import _serve; _serve()"
         self._popen = subprocess.Popen(
             [sys.executable, "-c", code],
             stdin=subprocess.PIPE,

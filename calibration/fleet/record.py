@@ -11,13 +11,12 @@ from inspect import signature
 from pathlib import Path
 from typing import Any, Literal
 
-from calibration.fit.calibrate import calibrate
-from calibration.evaluation.intervals import Interval
-from calibration.results import to_json
 from calibration.errors import CalibrationError, OtherResultsError, ResultsExistError
-from thermal import CaseError
+from calibration.evaluation.intervals import Interval
+from calibration.fit.calibrate import calibrate
+from calibration.results import to_json
 from thermal.case.building_file import NAME, read_building_file
-from thermal.errors import nearest
+from thermal.errors import CaseError, nearest
 
 #: File in the results of each case: what they were made from, and how it went.
 RECORD = "case.json"

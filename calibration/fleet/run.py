@@ -14,13 +14,13 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from calibration.errors import AnotherRunError, CalibrationError, CaseFoldersError, ResultsExistError, WorkerLostError
 from calibration.evaluation.n_step import Progress
 from calibration.fleet.case import CaseTask, calibrate_one
 from calibration.fleet.cluster import ClusterExecutor, killed_worker
 from calibration.fleet.local import LocalProcesses, available_cores
 from calibration.fleet.record import RECORD, CaseOutcome, check_settings, earlier_outcome
 from calibration.results import check_results_folder, to_json
-from calibration.errors import AnotherRunError, CalibrationError, CaseFoldersError, ResultsExistError, WorkerLostError
 from thermal.case.building_file import NAME
 
 #: File in the folder of results with an entry a case.

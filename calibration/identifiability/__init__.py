@@ -1,0 +1,1 @@
+"""What data determine: Fisher information, profiles, power before a fit."""

@@ -8,15 +8,14 @@ from itertools import combinations
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from calibration.fit.estimate import Estimate
+from calibration.fit.problem import Problem
 from calibration.identifiability.information_search import DETERMINED, InformationSearch
 from mpc.reports.identifiability import combination_words, describe
-from calibration.fit.problem import Problem
-from thermal import Parameter, SymbolicModel
-
-FloatArray = NDArray[np.float64]
+from thermal._types import FloatArray
+from thermal.model.symbolic import SymbolicModel
+from thermal.parameters import Parameter
 
 #: Above this ratio of posterior to prior deviation the data tell nothing of a parameter [-].
 UNTOLD = 0.9
@@ -160,7 +159,7 @@ def fisher_information(
 
     Examples
     --------
-    >>> from thermal import PARAMETERS
+    >>> from thermal.parameters import PARAMETERS
     >>> pair = [PARAMETERS[name] for name in ("exterior_wall_conductivity", "exterior_convection_coefficient")]
     >>> found = fisher_information(pair, np.array([[30.0, 30.0]]), np.diag([p.prior_deviation**-2 for p in pair]))
     >>> found.combinations[0].words

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
-FloatArray = NDArray[np.float64]
+from thermal._types import FloatArray
 
 #: A parameter, or a combination, is determined when the data at least halve the deviation of its prior [-].
 DETERMINED = 0.5

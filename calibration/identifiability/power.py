@@ -9,19 +9,22 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from calibration.errors import CalibrationError
+from calibration.evaluation.intervals import Interval, default_intervals, horizon_steps, merge
 from calibration.evaluation.n_step import Progress
+from calibration.evaluation.settings import ModelSettings
+from calibration.fit.problem import FIRST_DEVIATION, Loss, Problem
+from calibration.fit.starts import tuning_runs
 from calibration.identifiability.information import Information, fisher_information, split_jacobian
 from calibration.identifiability.information_search import DETERMINED
 from mpc.reports.identifiability import spoken
-from calibration.evaluation.intervals import Interval, default_intervals, horizon_steps, merge
-from calibration.fit.problem import FIRST_DEVIATION, Loss, Problem
-from calibration.evaluation.settings import ModelSettings
-from calibration.fit.starts import tuning_runs
-from calibration.errors import CalibrationError
-from thermal import Case, Parameter, SymbolicModel, reduced_model, replay_inputs
+from thermal._types import FloatArray
+from thermal.case.case import Case
 from thermal.errors import nearest
-
-FloatArray = NDArray[np.float64]
+from thermal.model.reduce import reduced_model
+from thermal.model.replay import replay_inputs
+from thermal.model.symbolic import SymbolicModel
+from thermal.parameters import Parameter
 
 #: Draws of the parameters beside their start, from the prior at half its spread as the starts of a calibration are.
 DRAWS, DRAW_SPREAD = 4, 0.5
@@ -145,7 +148,7 @@ def power_of_data(
 
     Examples
     --------
-    >>> from thermal import load_bundled_case
+    >>> from thermal.data import load_bundled_case
     >>> power = power_of_data(load_bundled_case(), settings=ModelSettings(dx=1.5), draws=0)
     >>> {p.name: p.told for p in power.parameters}["shuffle_probability"]
     'no'

@@ -7,18 +7,16 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from calibration.fit.estimate import Estimate
-from calibration.evaluation.n_step import Progress
-from mpc.reports.identifiability import spoken
-from calibration.identifiability.profile_section import ProfileSection
 from calibration.errors import CalibrationError
-from thermal import Parameter
+from calibration.evaluation.n_step import Progress
+from calibration.fit.estimate import Estimate
+from calibration.identifiability.profile_section import ProfileSection
+from mpc.reports.identifiability import spoken
+from thermal._types import FloatArray
 from thermal.errors import nearest
-
-FloatArray = NDArray[np.float64]
+from thermal.parameters import Parameter
 
 #: Confidence levels of the intervals [-].
 LEVELS = (0.90, 0.95)

@@ -11,10 +11,10 @@ from scipy.optimize import lsq_linear
 
 from calibration.fit.estimate import Estimate
 from calibration.fit.least_squares import solve_least_squares
-from thermal import Parameter, SymbolicModel, reduced_model
-from thermal.model import ReducedModel
-
-FloatArray = NDArray[np.float64]
+from thermal._types import FloatArray
+from thermal.model.reduce import ReducedModel, reduced_model
+from thermal.model.symbolic import SymbolicModel
+from thermal.parameters import Parameter
 
 #: A crossing counts as found when a point lies this near to it in the root of the deviance [-]; the rest is a straight
 #: line, which is exact for a linear model.

@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 
 from mpc.baselines.requests import HysteresisRequests, SuppressedRequests
 from mpc.baselines.trim_respond import TrimRespond, TrimRespondLoop
-from mpc.control import SitePoints
+from mpc.control.controller.reading import SitePoints
 from mpc.errors import ControlError
-from mpc.loop import Actuator, Measurements
-from mpc.scenario import Forecast
+from mpc.loop.actuators import Actuator
+from mpc.loop.plant import Measurements
+from mpc.scenario.forecast import Forecast
+from thermal._types import FloatArray
 from thermal.case.points import OUTDOOR_TEMPERATURE, ZONE_TEMPERATURE
 from thermal.errors import describe
-
-FloatArray = NDArray[np.float64]
 
 _AIR, _WATER = "supply_air_temperature_setpoint", "supply_water_temperature_setpoint"
 

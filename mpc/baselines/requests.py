@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+from thermal._types import FloatArray, IntArray
 
 #: Share of a loop or valve above which it asks once, and below which it stops asking [-] (5.6.8.1.c, 5.6.8.3.c).
 ASKING, CONTENT = 0.95, 0.85

@@ -6,9 +6,10 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from mpc.control import Channel, ResetRule
-from mpc.loop import Actuator
-from mpc.scenario import Forecast
+from mpc.control.controller.rules import ResetRule
+from mpc.control.problem.channels import Channel
+from mpc.loop.actuators import Actuator
+from mpc.scenario.forecast import Forecast
 from thermal.case.points import OUTDOOR_TEMPERATURE
 
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from mpc.loop import Actuator, FixedSetpoints
+from mpc.loop.actuators import Actuator
+from mpc.loop.run import FixedSetpoints
 
 _AIR, _WATER = "supply_air_temperature_setpoint", "supply_water_temperature_setpoint"
 

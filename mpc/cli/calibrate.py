@@ -13,7 +13,8 @@ from mpc.cli.console import Force, Json, Waiting, complain, say, show_table, wri
 from mpc.cli.evaluate import Dx, SchemeName
 
 if TYPE_CHECKING:
-    from calibration import CalibrationResult, CaseOutcome
+    from calibration.fit.result import CalibrationResult
+    from calibration.fleet.record import CaseOutcome
 
 _BUILDING = "building.yaml"
 
@@ -62,7 +63,9 @@ def calibrate(
     json: Json = False,
 ) -> int:
     """Calibrate a case, or each case of a folder; a folder that was interrupted goes on where it stopped."""
-    from calibration import CalibrationError, case_folders, check_results_folder
+    from calibration.errors import CalibrationError
+    from calibration.fleet.run import case_folders
+    from calibration.results import check_results_folder
 
     settings = {
         "tune": tune or [], "hold_out": hold_out or [], "dx": dx, "horizon": horizon,
@@ -88,21 +91,22 @@ def calibrate(
 
 
 def _calibrate_one(folder: Path, out: Path, settings: dict[str, Any], force: bool) -> tuple[CalibrationResult, Path]:
-    import calibration
-    from calibration import parse_interval
-    from thermal import load_case
+    from calibration.evaluation.intervals import parse_interval
+    from calibration.fit.calibrate import calibrate as fit
+    from mpc.reports.calibration import write_calibration
+    from thermal.case.load import load_case
 
     case = load_case(folder)
     intervals = {name: [parse_interval(text, case) for text in settings[name]] for name in ("tune", "hold_out")}
     with Waiting(f"calibrate {folder.name}") as progress:
-        result = calibration.calibrate(case, progress=progress, **(settings | intervals))
-        report = calibration.write_calibration(result, case, out, force=force)
+        result = fit(case, progress=progress, **(settings | intervals))
+        report = write_calibration(result, case, out, force=force)
     return result, report
 
 
 def _show(result: CalibrationResult, report: Path) -> None:
     """Write what a calibration found to stdout."""
-    from calibration import calibration_verdict
+    from mpc.reports.calibration import calibration_verdict
 
     say(calibration_verdict(result))
     rows = []
@@ -133,7 +137,7 @@ def _show(result: CalibrationResult, report: Path) -> None:
 
 
 def _exit_code(result: CalibrationResult) -> int:
-    from calibration import INTERRUPTED
+    from calibration.fit.least_squares import INTERRUPTED
 
     if result.solver.success:
         return 0
@@ -154,7 +158,8 @@ def _calibrate_many(
     json: bool,
 ) -> int:
     """Calibrate each case into a folder of its name; one that fails is reported beside the others."""
-    from calibration import ClusterExecutor, calibrate_many, case_folders
+    from calibration.fleet.cluster import ClusterExecutor
+    from calibration.fleet.run import calibrate_many, case_folders
 
     cases = case_folders(folder)
     inside = [p for p in sorted(folder.iterdir()) if p.is_dir() and p.name[0] != "."]

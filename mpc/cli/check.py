@@ -10,7 +10,8 @@ import typer
 from mpc.cli.console import Force, Json, is_narrow, say, show_table, write_json
 
 if TYPE_CHECKING:
-    from thermal.case import CaseCheck, PointSummary
+    from thermal.case.check import CaseCheck
+    from thermal.case.summary import PointSummary
 
 
 def check(
@@ -20,8 +21,9 @@ def check(
     json: Json = False,
 ) -> int:
     """Validate a case and say what is in it."""
-    from calibration import check_results_folder, write_check
-    from thermal.case import check_case
+    from calibration.results import check_results_folder
+    from mpc.reports.case import write_check
+    from thermal.case.check import check_case
 
     if out is not None:
         check_results_folder(out, force)
@@ -39,7 +41,7 @@ def check(
 
 def _show(found: CaseCheck) -> None:
     """Write the geometry and the quality of a case to stdout."""
-    from calibration import check_verdict, quality_rows
+    from mpc.reports.case import check_verdict, quality_rows
 
     say(
         f"{found.name} ({found.geometry}), {found.start:%Y-%m-%d %H:%M} to {found.end:%Y-%m-%d %H:%M} "

@@ -113,7 +113,7 @@ def write_json(content: Mapping[str, Any]) -> None:
     content : mapping
         Plain types.
     """
-    from calibration import to_json
+    from calibration.results import to_json
 
     typer.echo(to_json(content))
 
@@ -143,6 +143,7 @@ class Waiting:
         return self
 
     def __call__(self, stage: str, done: int, total: int) -> None:
+        """Say what goes on, and how much of it is done."""
         with self._lock:
             self._state = (f"{self.label}: {stage}" if stage not in self.label else self.label, done, total)
             if self._bar is not None and self._task is not None:

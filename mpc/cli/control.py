@@ -12,7 +12,8 @@ from mpc.cli.console import Force, Json, Waiting, complain, say, show_table, wri
 from mpc.cli.evaluate import Dx, Parameters
 
 if TYPE_CHECKING:
-    from mpc.studies import ControlRun, Study
+    from mpc.studies.run import ControlRun
+    from mpc.studies.study import Study
 
 #: Options that both commands have.
 CaseFolder = Annotated[Path, typer.Argument(metavar="CASE", help="Case folder.")]
@@ -61,8 +62,11 @@ def control(
     json: Json = False,
 ) -> int:
     """Run a building in closed loop with one controller."""
-    from calibration import check_results_folder
-    from mpc.studies import check_controller, control_summary, control_verdict, run_controller, write_control
+    from calibration.results import check_results_folder
+    from mpc.reports.control import write_control
+    from mpc.reports.control_tables import control_summary
+    from mpc.reports.control_words import control_verdict
+    from mpc.studies.run import check_controller, run_controller
 
     check_results_folder(out, force)
     check_controller(controller)
@@ -104,15 +108,12 @@ def compare(
     json: Json = False,
 ) -> int:
     """Run a building with one controller after the other, on the same weather, people, prices and noise."""
-    from calibration import check_results_folder
-    from mpc.studies import (
-        check_controller,
-        compare_controllers,
-        comparison_rows,
-        comparison_summary,
-        comparison_verdict,
-        write_comparison,
-    )
+    from calibration.results import check_results_folder
+    from mpc.reports.control import write_comparison
+    from mpc.reports.control_tables import comparison_rows, comparison_summary
+    from mpc.reports.control_words import comparison_verdict
+    from mpc.studies.compare import compare_controllers
+    from mpc.studies.run import check_controller
 
     check_results_folder(out, force)
     names = [name.strip() for name in controllers.split(",") if name.strip()]
@@ -150,10 +151,13 @@ def _study(
     exact: bool,
     seed: int,
 ) -> Study:
-    from mpc.loop import SensorNoise
-    from mpc.scenario import DAY_AHEAD_ERRORS, paper_tariff, read_urdb, weather_of_case
-    from mpc.studies import check_kind, make_study
-    from thermal import load_case
+    from mpc.loop.noise import SensorNoise
+    from mpc.scenario.forecaster import DAY_AHEAD_ERRORS
+    from mpc.scenario.paper import paper_tariff
+    from mpc.scenario.urdb import read_urdb
+    from mpc.scenario.weather_files import weather_of_case
+    from mpc.studies.study import check_kind, make_study
+    from thermal.case.load import load_case
 
     kind, loaded = check_kind(plant), load_case(case)
     prices = None if tariff is None else read_urdb(tariff, paper_tariff().gas)

@@ -10,7 +10,7 @@ import typer
 from mpc.cli.console import Force, Json, Waiting, complain, say, show_table, write_json
 
 if TYPE_CHECKING:
-    from mpc.studies import Demo
+    from mpc.studies.demo import Demo
 
 OUT = Path("buildingmpc_demo")
 
@@ -21,9 +21,9 @@ def demo(
     json: Json = False,
 ) -> int:
     """Do the main job on the bundled case, from check to control."""
-    from calibration import check_results_folder
-    from mpc.studies import run_demo
-    from thermal import load_bundled_case
+    from calibration.results import check_results_folder
+    from mpc.studies.demo import run_demo
+    from thermal.data import load_bundled_case
 
     check_results_folder(out, force)
     case = load_bundled_case()
@@ -49,7 +49,7 @@ def demo(
 
 def _show(found: Demo) -> None:
     """Write what came of the error and of the costs to stdout."""
-    from mpc.studies import comparison_rows
+    from mpc.reports.control_tables import comparison_rows
 
     content = found.to_dict()
     names = {"uncalibrated": "as it was drawn", "calibrated": "calibrated", "with_effects": "with what was found"}

@@ -11,7 +11,7 @@ from mpc.cli.console import Force, Json, Waiting, say, show_table, write_json
 from mpc.cli.evaluate import Dx
 
 if TYPE_CHECKING:
-    from calibration.diagnosis import Diagnosis
+    from calibration.diagnosis.diagnosis import Diagnosis
 
 #: Suspects on the terminal; the page and diagnosis.json have them all.
 _MOST_SUSPECTS = 5
@@ -47,16 +47,18 @@ def diagnose(
     json: Json = False,
 ) -> int:
     """Diagnose a case."""
-    from calibration import check_results_folder, parse_interval
-    from calibration import diagnosis as gap
-    from thermal import load_case
+    from calibration.diagnosis.diagnosis import diagnose as answer
+    from calibration.evaluation.intervals import parse_interval
+    from calibration.results import check_results_folder
+    from mpc.reports.diagnosis import write_diagnosis
+    from thermal.case.load import load_case
 
     check_results_folder(out, force)
     loaded = load_case(case)
     tuned, judged = ([parse_interval(text, loaded) for text in texts or ()] for texts in (tune, hold_out))
     with Waiting(f"diagnose {case.name}") as progress:
-        result = gap.diagnose(loaded, tuned, judged, dx=dx, horizon=horizon, progress=progress)
-        report = gap.write_diagnosis(result, loaded, out, force=force)
+        result = answer(loaded, tuned, judged, dx=dx, horizon=horizon, progress=progress)
+        report = write_diagnosis(result, loaded, out, force=force)
     if json:
         write_json(result.to_dict())
         return 0
@@ -66,7 +68,7 @@ def diagnose(
 
 
 def _show(result: Diagnosis) -> None:
-    from calibration.diagnosis import called, diagnosis_verdict, in_zones
+    from mpc.reports.diagnosis_words import called, diagnosis_verdict, in_zones
 
     say(diagnosis_verdict(result))
     say(f"Where: {result.where.sentence}")

@@ -10,7 +10,7 @@ import typer
 from mpc.cli.console import Force, Json, Waiting, say, show_table, write_json
 
 if TYPE_CHECKING:
-    from calibration import Evaluation
+    from calibration.evaluation.n_step import Evaluation
 
 Dx = Annotated[
     float | None, typer.Option(metavar="M", help="Distance between control volumes of a plan; default its cell size.")
@@ -41,8 +41,11 @@ def evaluate(
     json: Json = False,
 ) -> int:
     """Evaluate a model over N steps."""
-    from calibration import check_results_folder, evaluate_case, parse_interval, write_evaluation
-    from thermal import load_case
+    from calibration.evaluation.case_model import evaluate_case
+    from calibration.evaluation.intervals import parse_interval
+    from calibration.results import check_results_folder
+    from mpc.reports.evaluation import write_evaluation
+    from thermal.case.load import load_case
 
     if out is not None:
         check_results_folder(out, force)
@@ -65,7 +68,7 @@ def evaluate(
 
 
 def _show(found: Evaluation, source: str) -> None:
-    from calibration import evaluation_verdict
+    from mpc.reports.evaluation import evaluation_verdict
 
     say(f"{evaluation_verdict(found)} Parameters: {source}.")
     show_table(

@@ -11,7 +11,9 @@ import typer
 from mpc.cli.console import Force, Json, Waiting, say, show_table, write_json
 
 if TYPE_CHECKING:
-    from thermal.plan import DeviceImport, PlanImport, PointMatch
+    from thermal.plan.assemble import PlanImport
+    from thermal.plan.devices import DeviceImport
+    from thermal.plan.match import PointMatch
 
 
 def import_plan(
@@ -24,16 +26,11 @@ def import_plan(
     json: Json = False,
 ) -> int:
     """Make a case of drawings."""
-    from thermal.plan import (
-        building_of,
-        check_nothing_lost,
-        held_work,
-        import_drawings,
-        import_page,
-        read_devices,
-        read_drawing_list,
-        save_plan_case,
-    )
+    from thermal.plan.devices import read_devices
+    from thermal.plan.folder import building_of, save_plan_case
+    from thermal.plan.kept import check_nothing_lost, held_work
+    from thermal.plan.list import import_drawings, read_drawing_list
+    from thermal.plan.picture import import_page
 
     if not force:
         check_nothing_lost(out)
@@ -77,8 +74,12 @@ def import_devices(
     json: Json = False,
 ) -> int:
     """Give a case its devices, and match columns of telemetry to them."""
-    from thermal import load_case
-    from thermal.plan import match_points, read_columns, read_devices, save_with_labels, with_devices, write_matches
+    from thermal.case.load import load_case
+    from thermal.plan.columns import read_columns, write_matches
+    from thermal.plan.devices import read_devices
+    from thermal.plan.folder import with_devices
+    from thermal.plan.kept import save_with_labels
+    from thermal.plan.match import match_points
 
     zones = load_case(case).building.zone_names
     served = read_devices(devices, zones)
@@ -115,15 +116,11 @@ def import_telemetry(
     json: Json = False,
 ) -> int:
     """Give a case its telemetry, whatever its columns are called."""
-    from thermal import load_case
-    from thermal.plan import (
-        match_points,
-        read_columns,
-        read_matches,
-        save_with_labels,
-        with_telemetry,
-        write_matches,
-    )
+    from thermal.case.load import load_case
+    from thermal.plan.attach import with_telemetry
+    from thermal.plan.columns import read_columns, read_matches, write_matches
+    from thermal.plan.kept import save_with_labels
+    from thermal.plan.match import match_points
 
     units = _units(unit or ())
     if points is not None:
@@ -196,7 +193,7 @@ def _match_content(match: PointMatch) -> dict[str, Any]:
 
 def _show_plan(found: PlanImport, name: str) -> None:
     """Write floors and zones to stdout."""
-    from mpc.reports.figures.style import counted
+    from mpc.reports.page import counted
 
     size = f"{counted(len(found.area_errors), 'zone')} on {counted(len(found.floors), 'floor')}"
     near = f"areas within {100 * found.largest_error:.1f} % of the drawings"

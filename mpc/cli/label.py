@@ -16,7 +16,7 @@ from mpc.cli.console import say
 if TYPE_CHECKING:
     from multiprocessing.connection import Connection
 
-    from thermal.plan.page import LabelDesk
+    from thermal.plan.page.app import LabelDesk
 
 #: Folder of a new case, where the command names none.
 _NEW = Path("case")
@@ -45,7 +45,8 @@ def label(
     ] = False,
 ) -> int:
     """Open the labelling page of a case until Ctrl-C."""
-    from thermal.plan.page import LabelDesk, serve_page
+    from thermal.plan.page.app import LabelDesk
+    from thermal.plan.page.serve import serve_page
 
     case, drawings = _case_of(target, out)
     makers = {name: partial(_make_apart, name) for name in ("check", "calibrate", "diagnose")}
@@ -85,7 +86,7 @@ def _prepare(desk: LabelDesk, drawings: Path) -> None:
     """Put a drawing, or all floors of a list, on the page of a new case."""
     from mpc.cli.console import Waiting
     from thermal.errors import LabelError, describe
-    from thermal.plan.page import import_list, import_sheet
+    from thermal.plan.page.start import import_list, import_sheet
 
     if desk.store.draft.floors:
         advice = "open the case itself, and import the drawing on the page"
@@ -142,26 +143,28 @@ def _make(kind: str, case: Path, out: Path, connection: Connection[Any, Any]) ->
 
 
 def _check(case: Path, out: Path, progress: Progress) -> None:
-    from calibration import write_check
-    from thermal.case import check_case
+    from mpc.reports.case import write_check
+    from thermal.case.check import check_case
 
     progress("check", 0, 1)
     write_check(check_case(case), out, force=True)
 
 
 def _calibrate(case: Path, out: Path, progress: Progress) -> None:
-    import calibration
-    from thermal import load_case
+    from calibration.fit.calibrate import calibrate
+    from mpc.reports.calibration import write_calibration
+    from thermal.case.load import load_case
 
     loaded = load_case(case)
-    result = calibration.calibrate(loaded, progress=progress)
-    calibration.write_calibration(result, loaded, out, force=True)
+    result = calibrate(loaded, progress=progress)
+    write_calibration(result, loaded, out, force=True)
 
 
 def _diagnose(case: Path, out: Path, progress: Progress) -> None:
-    from calibration import diagnosis
-    from thermal import load_case
+    from calibration.diagnosis.diagnosis import diagnose
+    from mpc.reports.diagnosis import write_diagnosis
+    from thermal.case.load import load_case
 
     loaded = load_case(case)
-    result = diagnosis.diagnose(loaded, progress=progress)
-    diagnosis.write_diagnosis(result, loaded, out, force=True)
+    result = diagnose(loaded, progress=progress)
+    write_diagnosis(result, loaded, out, force=True)

@@ -12,7 +12,8 @@ from mpc.cli.console import Json, Waiting, say, show_table, write_json
 from mpc.cli.evaluate import Dx, Parameters
 
 if TYPE_CHECKING:
-    from mpc.adapters.boptest import BoptestCase, BoptestServer
+    from mpc.adapters.boptest.case import BoptestCase
+    from mpc.adapters.boptest.server import BoptestServer
 
 PORT = 8000
 
@@ -47,8 +48,9 @@ def serve(
     json: Json = False,
 ) -> int:
     """Serve plants until interrupted."""
+    from mpc.adapters.boptest.guard import check_host
+    from mpc.adapters.boptest.server import BoptestServer
     from mpc.errors import BoptestError
-    from mpc.adapters.boptest import BoptestServer, check_host
 
     if not boptest:
         raise BoptestError("serve: expected what to serve as, found nothing; say --boptest")
@@ -75,8 +77,9 @@ def _make(
     dx: float | None,
     progress: Waiting,
 ) -> list[BoptestCase]:
-    from mpc.adapters.boptest import case_to_serve, pilot_to_serve
-    from thermal import load_bundled_case, load_case
+    from mpc.adapters.boptest.make import case_to_serve, pilot_to_serve
+    from thermal.case.load import load_case
+    from thermal.data import load_bundled_case
 
     made: list[BoptestCase] = []
     count = (len(cases) or 1) + 2 * pilot

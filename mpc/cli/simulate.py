@@ -25,9 +25,12 @@ def simulate(
     json: Json = False,
 ) -> int:
     """Replay an interval on the grid, from the measured temperatures at its start."""
-    from calibration import case_model, check_results_folder, simulation_summary, simulation_verdict, write_simulation
-    from thermal import load_case, local_timestamp
-    from thermal.model import simulate as replay
+    from calibration.evaluation.case_model import case_model
+    from calibration.results import check_results_folder
+    from mpc.reports.case import simulation_summary, simulation_verdict, write_simulation
+    from thermal.case.load import load_case
+    from thermal.case.times import local_timestamp
+    from thermal.model.simulation import simulate as replay
 
     if out is not None:
         check_results_folder(out, force)

@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from mpc.errors import EnvironmentSetupError, PlantActionError
-from mpc.loop import Actuator
+from mpc.loop.actuators import Actuator
+from thermal._types import FloatArray
 from thermal.errors import describe, nearest
-
-FloatArray = NDArray[np.float64]
 
 #: What the paper's agent sets: supply water, and supply air common to the air handlers.
 SUPPLY_SETPOINTS = ("supply_water_temperature_setpoint", "supply_air_temperature_setpoint")

@@ -16,12 +16,13 @@ from mpc.environment.observation import Observation, ObservationLayout
 from mpc.environment.outlook import BLOCK_ENDS, Outlook, clock
 from mpc.environment.reward import REWARDS, Reward
 from mpc.errors import EnvironmentSetupError
-from mpc.kpi import measure_kpis
-from mpc.loop import Measurements, Plant, RecentSteps
-from mpc.scenario import Forecaster, Scenario
+from mpc.kpi.kpis import measure_kpis
+from mpc.loop.history import RecentSteps
+from mpc.loop.plant import Measurements, Plant
+from mpc.scenario.forecaster import Forecaster
+from mpc.scenario.scenario import Scenario
+from thermal._types import FloatArray
 from thermal.errors import describe, nearest
-
-FloatArray = NDArray[np.float64]
 
 
 @runtime_checkable

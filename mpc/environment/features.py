@@ -7,15 +7,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mpc.errors import EnvironmentSetupError
-from mpc.loop import Actuator
+from mpc.loop.actuators import Actuator
+from thermal._types import FloatArray
 from thermal.case.points import POINT_TYPES, split_column
 from thermal.errors import describe, nearest
 from thermal.units import QUANTITIES
-
-FloatArray = NDArray[np.float64]
 
 #: Ends of the range that each point is counted in [library's units]; those of powers and air flows are per floor area
 #: [W/m2] and [kg/s/m2], shared out among the devices that report them. An observation is -1 at the lower end and 1 at

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from mpc.environment.features import LARGEST, Feature, measured_features, scaling
 from mpc.environment.outlook import CLOCK_FEATURES, Outlook
-from mpc.loop import Actuator
+from mpc.loop.actuators import Actuator
+from thermal._types import FloatArray
 from thermal.case.points import split_column
 
-FloatArray = NDArray[np.float64]
 Observation = NDArray[np.float32]
 
 #: Points that a histogram can stand for, with the edges of its bins [library's units]: those of google/sbsim's

@@ -9,14 +9,13 @@ from itertools import pairwise
 from zoneinfo import ZoneInfo
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mpc.environment.features import OBSERVED_RANGES, Feature, scaling
 from mpc.errors import EnvironmentSetupError
-from mpc.scenario import Forecast, Forecaster, column_unit
+from mpc.scenario.forecast import Forecast, column_unit
+from mpc.scenario.forecaster import Forecaster
+from thermal._types import FloatArray
 from thermal.errors import describe
-
-FloatArray = NDArray[np.float64]
 
 #: Ends of the blocks over which a forecast is averaged, from now on [h]: the horizon of the paper's predictions, six
 #: hours, fine at first as its beginning matters most.

@@ -17,11 +17,10 @@ from mpc.environment.actions import ActionLayout
 from mpc.environment.observation import Observation, ObservationLayout
 from mpc.environment.outlook import clock
 from mpc.errors import EnvironmentSetupError
-from mpc.loop import Measurements
-from mpc.scenario import Forecast
+from mpc.loop.plant import Measurements
+from mpc.scenario.forecast import Forecast
+from thermal._types import FloatArray
 from thermal.errors import describe, nearest
-
-FloatArray = NDArray[np.float64]
 
 #: What a layer applies to its sums.
 Activation = Literal["tanh", "relu"]

@@ -10,7 +10,9 @@ import pandas as pd
 from mpc.environment.environment import ControlEnvironment
 from mpc.environment.outlook import BLOCK_ENDS
 from mpc.environment.reward import Reward
-from mpc.loop import SensorNoise, pilot_building, pilot_weather, simulated_plant
+from mpc.loop.make import pilot_weather, simulated_plant
+from mpc.loop.noise import SensorNoise
+from thermal.pilot.building import pilot_building
 
 #: Id of the environment in Gymnasium's registry; ``gymnasium.make("mpc.environment:buildingmpc/Office-v0")``.
 ENVIRONMENT_ID = "buildingmpc/Office-v0"

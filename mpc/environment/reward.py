@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from mpc.errors import EnvironmentSetupError
-from mpc.kpi import PaperReward, StageCost
-from mpc.loop import RecentSteps
-from mpc.scenario import Scenario
+from mpc.kpi.rewards import PaperReward, StageCost
+from mpc.loop.history import RecentSteps
+from mpc.scenario.scenario import Scenario
 from thermal.errors import describe
 
 

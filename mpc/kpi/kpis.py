@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 from mpc.errors import KpiError
 from mpc.kpi.integrals import excess
 from mpc.kpi.record import PlantRecord
-from mpc.scenario import KILOWATT_HOUR, Scenario, window_means
+from mpc.scenario.rates import KILOWATT_HOUR
+from mpc.scenario.scenario import Scenario
+from mpc.scenario.tariff import window_means
+from thermal._types import FloatArray
 from thermal.errors import describe
-
-FloatArray = NDArray[np.float64]
 
 #: Length of the mean whose highest value is a peak [s], as in BOPTEST.
 PEAK_WINDOW = 900.0

@@ -6,15 +6,15 @@ from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.special import expit
 
 from mpc.errors import KpiError
 from mpc.kpi.integrals import excess
-from mpc.scenario import KILOWATT_HOUR, Scenario
+from mpc.scenario.rates import KILOWATT_HOUR
+from mpc.scenario.scenario import Scenario
+from thermal._types import FloatArray
 from thermal.errors import describe, nearest
-
-FloatArray = NDArray[np.float64]
 
 _HOUR = 3600.0  # s
 

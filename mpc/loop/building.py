@@ -5,12 +5,11 @@ from __future__ import annotations
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-from thermal import Simulator, ThermalNetwork
-from thermal.inputs import REFERENCE_TEMPERATURE
-
-FloatArray = NDArray[np.float64]
+from thermal._types import FloatArray
+from thermal.inputs.drivers import REFERENCE_TEMPERATURE
+from thermal.model.simulator import Simulator
+from thermal.network.network import ThermalNetwork
 
 
 class BuildingStep(NamedTuple):

@@ -6,17 +6,17 @@ from collections.abc import Sequence
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mpc.errors import PlantError
-from mpc.scenario import Scenario
-from thermal.case import Case
-from thermal.effects import Chosen
+from mpc.scenario.scenario import Scenario
+from thermal._types import FloatArray
+from thermal.case.case import Case
+from thermal.effects.effect import Chosen
 from thermal.errors import EffectError, describe
-from thermal.network import Extension, GraphBuilder, ThermalNetwork
-from thermal.inputs import Drivers, Signal
-
-FloatArray = NDArray[np.float64]
+from thermal.inputs.drivers import Drivers, Signal
+from thermal.network.extension import Extension
+from thermal.network.graph import GraphBuilder
+from thermal.network.network import ThermalNetwork
 
 _RADIANT = "radiant gains of "
 
@@ -53,7 +53,8 @@ class RadiantGains:
 
     Examples
     --------
-    >>> from thermal import build_network, load_bundled_case
+    >>> from thermal.data import load_bundled_case
+    >>> from thermal.network.build import build_network
     >>> building = load_bundled_case().building
     >>> [s.name for s in build_network(building, dx=1.0, effects=(RadiantGains(),)).signals][:1]
     ['radiant gains of F1_N']

@@ -5,13 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from mpc.loop.building import BuildingFlows
-from thermal.hvac import Actions, Conditions, EnergyBalance, HvacStep
-
-FloatArray = NDArray[np.float64]
+from thermal._types import FloatArray
+from thermal.hvac._balance import EnergyBalance
+from thermal.hvac._step import Actions, Conditions, HvacStep
 
 
 class PlantStep(NamedTuple):

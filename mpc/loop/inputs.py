@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mpc.errors import PlantError
 from mpc.loop.building import BuildingModel
 from mpc.loop.extras import check_radiant
-from mpc.scenario import Scenario
+from mpc.scenario.scenario import Scenario
+from thermal._types import FloatArray
 from thermal.errors import describe
-
-FloatArray = NDArray[np.float64]
 
 
 def check_parts(scenario: Scenario, model: BuildingModel, control_steps: int, warm_up_days: int, seed: int) -> None:

@@ -14,12 +14,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from thermal.hvac import HvacSystem
+from thermal._types import FloatArray
+from thermal.hvac._system import HvacSystem
 from thermal.units import AIR_HEAT_CAPACITY
-
-FloatArray = NDArray[np.float64]
 
 _FAR = 50.0  # K beyond the thermostat's ranges, where terminals are at their limits and q is a line
 _ENDLESS = 1e9  # K

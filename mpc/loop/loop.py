@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mpc.loop.building import BuildingModel, zone_response
 from mpc.loop.history import PlantStep
@@ -17,10 +16,11 @@ from mpc.loop.schedule import Schedule
 from mpc.loop.sensors import PlantDevices
 from mpc.loop.signals import EffectSignals
 from mpc.loop.supply import SupplySetpoints
-from mpc.scenario import Scenario
-from thermal.hvac import Conditions, HvacPlant, HvacState, HvacSystem
-
-FloatArray = NDArray[np.float64]
+from mpc.scenario.scenario import Scenario
+from thermal._types import FloatArray
+from thermal.hvac._plant import HvacPlant, HvacState
+from thermal.hvac._step import Conditions
+from thermal.hvac._system import HvacSystem
 
 _WATER = 320.0  # K, of the loop at a start
 _ZONES = 293.15  # K, of the zones at a start

@@ -15,24 +15,27 @@ from mpc.loop.noise import SensorNoise
 from mpc.loop.reduced import reduced_building
 from mpc.loop.run import FixedSetpoints
 from mpc.loop.simulated import SimulatedPlant
-from mpc.scenario import (
-    CarbonIntensity,
-    Forecaster,
-    InternalGains,
-    Occupancy,
-    StepGrid,
-    Tariff,
-    Weather,
-    build_scenario,
-    paper_carbon,
-    paper_tariff,
-)
-from thermal import Building, Case, Simulator, load_case, save_case
-from thermal.effects import Chosen
+from mpc.scenario.carbon import CarbonIntensity
+from mpc.scenario.forecaster import Forecaster
+from mpc.scenario.gains import InternalGains
+from mpc.scenario.grid import StepGrid
+from mpc.scenario.occupancy import Occupancy
+from mpc.scenario.paper import paper_carbon, paper_tariff
+from mpc.scenario.scenario import build_scenario
+from mpc.scenario.tariff import Tariff
+from mpc.scenario.weather import Weather
+from thermal.case.building import Building
+from thermal.case.case import Case
+from thermal.case.load import load_case
+from thermal.case.save import save_case
+from thermal.effects.effect import Chosen
 from thermal.errors import describe
-from thermal.hvac import HvacSystem
-from thermal.network import Extension
-from thermal.pilot import MOUNTAIN_VIEW, generate_weather, pilot_building, size_system
+from thermal.hvac._system import HvacSystem
+from thermal.model.simulator import Simulator
+from thermal.network.extension import Extension
+from thermal.pilot.building import pilot_building
+from thermal.pilot.sizing import size_system
+from thermal.pilot.weather import MOUNTAIN_VIEW, generate_weather
 
 ModelKind = Literal["reduced", "grid", "random"]
 

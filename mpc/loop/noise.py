@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 
 from mpc.errors import PlantError
 from mpc.loop.plant import PointLayout
+from thermal._types import FloatArray
 from thermal.case.points import POINT_TYPES, split_column
 from thermal.errors import describe
-
-FloatArray = NDArray[np.float64]
 
 _STREAM = 7  # of random numbers of a seed, apart from those of people, forecasts and the shuffle
 _BLOCK = 64  # steps whose noise is drawn together

@@ -8,10 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mpc.errors import PlantError
-from mpc.scenario import Scenario
+from mpc.scenario.scenario import Scenario
+from thermal._types import FloatArray
 from thermal.errors import describe
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,19 +7,16 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Protocol
 
-import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from mpc.errors import PlantError
-from mpc.kpi import PlantRecord
+from mpc.kpi.record import PlantRecord
 from mpc.loop.actuators import Actuator
-from mpc.scenario import Forecast
+from mpc.scenario.forecast import Forecast
+from thermal._types import FloatArray
 from thermal.case.points import POINT_TYPES, split_column
 from thermal.errors import describe, nearest
 from thermal.units import QUANTITIES, from_si
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,17 +6,19 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mpc.errors import PlantError
 from mpc.loop.building import BuildingFlows, BuildingStep
-from thermal import Building, SymbolicModel, build_network, reduced_model
+from thermal._types import FloatArray
+from thermal.case.building import Building
 from thermal.errors import describe
-from thermal.model import IMPLICIT_EULER, ModalModel, ReducedModel, modal_model
-from thermal.network import Extension
-from thermal.inputs import REFERENCE_TEMPERATURE
-
-FloatArray = NDArray[np.float64]
+from thermal.inputs.drivers import REFERENCE_TEMPERATURE
+from thermal.model.modal import ModalModel, modal_model
+from thermal.model.reduce import ReducedModel, reduced_model
+from thermal.model.scheme import IMPLICIT_EULER
+from thermal.model.symbolic import SymbolicModel
+from thermal.network.build import build_network
+from thermal.network.extension import Extension
 
 
 class ReducedBuilding:
@@ -194,7 +196,7 @@ def reduced_building(
 
     Examples
     --------
-    >>> from thermal import load_bundled_case
+    >>> from thermal.data import load_bundled_case
     >>> small = reduced_building(load_bundled_case().building, dx=1.0, order=40)
     >>> none, cold = np.zeros(0), np.array([273.15])
     >>> start = small.reset(np.full(5, 293.15), cold, none)

@@ -12,20 +12,21 @@ from functools import cached_property
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
-from calibration import Interval, heat_balance
+from calibration.estimation.heat_balance import heat_balance
+from calibration.evaluation.intervals import Interval
 from mpc.errors import ReplayError
 from mpc.loop.noise import SensorNoise
 from mpc.loop.replay_plant import Gap, Measured, Replayed, replay_plant
 from mpc.loop.sensors import plant_devices
-from thermal import Case, SymbolicModel, Telemetry, replay_inputs
+from thermal._types import FloatArray
+from thermal.case.case import Case
 from thermal.case.points import POINT_TYPES, split_column
+from thermal.case.telemetry import Telemetry
 from thermal.errors import describe
-from thermal.hvac import HvacSystem
-from thermal.model import LEAST_SPIN_UP, SPIN_UP
-
-FloatArray = NDArray[np.float64]
+from thermal.hvac._system import HvacSystem
+from thermal.model.replay import LEAST_SPIN_UP, SPIN_UP, replay_inputs
+from thermal.model.symbolic import SymbolicModel
 
 _HOUR = 3600.0
 _SIGNIFICANT = 3.0  # times what noise alone makes

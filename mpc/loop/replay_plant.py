@@ -7,16 +7,16 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from mpc.errors import ReplayError
 from mpc.loop.sensors import PlantDevices
+from thermal._types import FloatArray
 from thermal.case.points import ZONE_TEMPERATURE
 from thermal.errors import describe, nearest
-from thermal.hvac import HvacSystem, TerminalReplay, WaterCoil, replay_air_handler, replay_loop, replay_terminals
+from thermal.hvac._coil import WaterCoil
+from thermal.hvac._replay import TerminalReplay, replay_air_handler, replay_loop, replay_terminals
+from thermal.hvac._system import HvacSystem
 from thermal.units import AIR_HEAT_CAPACITY
-
-FloatArray = NDArray[np.float64]
 
 _WATER_HEAT_CAPACITY = 4186.0  # J/kg/K, liquid at 50 degC within 0.2 % (IAPWS-95)
 _USUAL_HUMIDITY = 0.006  # kg/kg, as the plant has where no humidity is known

@@ -9,16 +9,14 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from mpc.errors import PlantError
-from mpc.kpi import PlantRecord
+from mpc.kpi.record import PlantRecord
 from mpc.loop.actuators import Actuator
 from mpc.loop.plant import Controller, Measurements, Plant
-from mpc.scenario import Forecast
+from mpc.scenario.forecast import Forecast
+from thermal._types import FloatArray
 from thermal.errors import describe, nearest
-
-FloatArray = NDArray[np.float64]
 
 
 class ClosedLoopRun(NamedTuple):

@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mpc.loop.actuators import COOLING_SETPOINT, HEATING_SETPOINT
 from mpc.loop.operation import Operation, shared_rows
-from thermal.hvac import HvacSystem
-
-FloatArray = NDArray[np.float64]
+from thermal._types import FloatArray
+from thermal.hvac._system import HvacSystem
 
 
 class Schedule:

@@ -6,17 +6,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mpc.errors import PlantError
 from mpc.loop.noise import NoiseSource, SensorNoise
 from mpc.loop.plant import PointLayout
-from mpc.scenario import Scenario
-from thermal import Building
+from mpc.scenario.scenario import Scenario
+from thermal._types import FloatArray
+from thermal.case.building import Building
 from thermal.errors import describe
-from thermal.hvac import Actions, Conditions, HvacPoints, HvacStep, HvacSystem
-
-FloatArray = NDArray[np.float64]
+from thermal.hvac._points import HvacPoints
+from thermal.hvac._step import Actions, Conditions, HvacStep
+from thermal.hvac._system import HvacSystem
 
 _LEAST_FLOW = 1e-6  # kg/s: less is none
 

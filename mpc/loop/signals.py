@@ -6,18 +6,17 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mpc.errors import PlantError
 from mpc.loop.extras import ScenarioDrivers
-from mpc.scenario import Scenario
+from mpc.scenario.scenario import Scenario
+from thermal._types import FloatArray
 from thermal.errors import describe
-from thermal.hvac import HvacSystem, replay_reheat
-from thermal.network import ThermalNetwork
-from thermal.inputs import Signal
+from thermal.hvac._replay import replay_reheat
+from thermal.hvac._system import HvacSystem
+from thermal.inputs.drivers import Signal
+from thermal.network.network import ThermalNetwork
 from thermal.units import AIR_HEAT_CAPACITY
-
-FloatArray = NDArray[np.float64]
 
 #: Zone, supply air and supply water that design capacities of terminals are counted at [K], those of `Terminals.sized`.
 _ROOM, _SUPPLY, _WATER = 294.15, 285.95, 355.35

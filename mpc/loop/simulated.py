@@ -8,10 +8,9 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from mpc.errors import PlantError
-from mpc.kpi import PlantRecord
+from mpc.kpi.record import PlantRecord
 from mpc.loop.actuators import SUPPLY_AIR, SUPPLY_WATER, Actuator, actuators_of, checked_actions
 from mpc.loop.building import BuildingModel
 from mpc.loop.history import PlantStep, RecentSteps, SystemBalance
@@ -22,12 +21,15 @@ from mpc.loop.operation import Operation, scheduled_operation, shared_rows
 from mpc.loop.plant import Measurements, need_running
 from mpc.loop.sensors import Sensors, plant_devices
 from mpc.loop.signals import EffectSignals
-from mpc.scenario import Forecast, Forecaster, Scenario
-from thermal import Case, Telemetry
+from mpc.scenario.forecast import Forecast
+from mpc.scenario.forecaster import Forecaster
+from mpc.scenario.scenario import Scenario
+from thermal._types import FloatArray
+from thermal.case.case import Case
+from thermal.case.telemetry import Telemetry
 from thermal.errors import describe
-from thermal.hvac import HvacSystem, energy_balance
-
-FloatArray = NDArray[np.float64]
+from thermal.hvac._balance import energy_balance
+from thermal.hvac._system import HvacSystem
 
 _DAY = 86400.0
 

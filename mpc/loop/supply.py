@@ -8,7 +8,8 @@ from typing import Any
 
 from mpc.loop.actuators import DIFFERENTIAL_PRESSURE, STATIC_PRESSURE, SUPPLY_AIR, SUPPLY_WATER
 from mpc.loop.sensors import PlantDevices
-from thermal.hvac import Actions, HvacSystem
+from thermal.hvac._step import Actions
+from thermal.hvac._system import HvacSystem
 
 #: Setpoints of supply air, supply water, static pressures and differential pressure [K, Pa].
 _Supply = tuple[tuple[float, ...], float, tuple[float, ...], float | None]

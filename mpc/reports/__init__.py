@@ -1,0 +1,1 @@
+"""All words, pages and figures: results carry data only."""

@@ -9,11 +9,10 @@ from typing import Any
 
 import pandas as pd
 
-from calibration import _figures as figures
 from calibration.evaluation.case_model import CHECK_TOLERANCE
-from mpc.reports.identifiability import in_words
-from mpc.reports.page import clock, counted, duration, kelvin, plain, render, signed, significant, unit
-from mpc.reports.residuals import diagnostics_content
+from calibration.fit.result import CalibrationResult, ParameterEstimate
+from calibration.results import check_results_folder, write_results
+from mpc.reports import figures
 from mpc.reports.evaluation import (
     evaluation_figures,
     interval_rows,
@@ -22,9 +21,12 @@ from mpc.reports.evaluation import (
     unchanged_error,
     zone_rows,
 )
-from calibration.fit.result import CalibrationResult, ParameterEstimate
-from calibration.results import check_results_folder, write_results
-from thermal import Case, Inputs, SymbolicModel, replay_inputs
+from mpc.reports.identifiability import in_words
+from mpc.reports.page import clock, counted, duration, kelvin, plain, render, signed, significant, unit
+from mpc.reports.residuals import diagnostics_content
+from thermal.case.case import Case
+from thermal.model.replay import Inputs, replay_inputs
+from thermal.model.symbolic import SymbolicModel
 
 #: The heat map shows every cell of the grid up to this many control volumes; beyond, one colour a zone.
 MOST_VOLUMES = 40_000

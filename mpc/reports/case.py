@@ -9,13 +9,14 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from calibration import _figures as figures
-from mpc.reports.page import clock, counted, duration, kelvin, render, signed, significant, unit
-from mpc.reports.evaluation import CELSIUS, error_maps, tidy
 from calibration.results import check_results_folder, write_results
-from thermal import Case, FloorPlans
-from thermal.case import CaseCheck
-from thermal.model import Simulation
+from mpc.reports import figures
+from mpc.reports.evaluation import CELSIUS, error_maps, tidy
+from mpc.reports.page import clock, counted, duration, kelvin, render, signed, significant, unit
+from thermal.case.building import FloorPlans
+from thermal.case.case import Case
+from thermal.case.check import CaseCheck
+from thermal.model.simulation import Simulation
 
 
 def write_check(check: CaseCheck, out: str | Path, *, force: bool = False) -> Path:

@@ -8,14 +8,14 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from calibration import check_results_folder, write_results
-from mpc.reports.figures.style import clock, counted, render, significant
-from mpc.studies.compare import Comparison
-from mpc.reports.figures.control import NAMES, cost_bars, course, expectations, side_by_side
+from calibration.results import check_results_folder, write_results
 from mpc.reports.control_log import reason_rows
-from mpc.studies.run import ControlRun, prediction_errors
 from mpc.reports.control_tables import comparison_rows, comparison_summary, control_summary, trajectory
 from mpc.reports.control_words import comparison_verdict, control_verdict, money
+from mpc.reports.figures.control import NAMES, cost_bars, course, expectations, side_by_side
+from mpc.reports.page import clock, counted, render, significant
+from mpc.studies.compare import Comparison
+from mpc.studies.run import ControlRun, prediction_errors
 
 _RULES = {
     "schedule": "Supply air stands at its design value; supply water is hot by day and cooler by night.",
@@ -106,7 +106,7 @@ def _write(
     check_results_folder(out, force)
     content = _frame(shown, verdict, title) | together
     content |= {"runs": [_section(run, run is shown) for run in runs], "reproduce": _reproduce(runs[0], command)}
-    return write_results(out, {**numbers, "report.html": render("control", content, "mpc")}, force) / "report.html"
+    return write_results(out, {**numbers, "report.html": render("control", content)}, force) / "report.html"
 
 
 def _frame(run: ControlRun, verdict: str, title: str) -> dict[str, Any]:

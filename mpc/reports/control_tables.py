@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from mpc.studies.compare import Comparison
-from mpc.reports.figures.control import NAMES
 from mpc.reports.control_log import reason_rows
+from mpc.reports.figures.control import NAMES
+from mpc.studies.compare import Comparison
 from mpc.studies.run import ControlRun, prediction_errors
 from thermal.case.points import POINT_TYPES, split_column
 from thermal.units import QUANTITIES, from_si

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from mpc.reports.figures.style import significant
-from mpc.studies.compare import Comparison
 from mpc.reports.figures.control import NAMES
+from mpc.reports.page import significant
+from mpc.studies.compare import Comparison
 from mpc.studies.run import ControlRun
 
 

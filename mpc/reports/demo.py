@@ -9,11 +9,12 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from calibration import Evaluation
-from calibration.diagnosis import called
-from mpc.reports.figures.style import INK, MEASURED, MUTED, SIMULATED, Picture, clock, picture, render, styled
-from mpc.studies.compare import Comparison
+from calibration.evaluation.n_step import Evaluation
+from mpc.reports.diagnosis_words import called
 from mpc.reports.figures.control import cost_bars
+from mpc.reports.figures.style import INK, MEASURED, MUTED, SIMULATED, Picture, picture, styled
+from mpc.reports.page import clock, render
+from mpc.studies.compare import Comparison
 
 #: What each step is, in the order in which they are done.
 _STEPS = {
@@ -87,7 +88,7 @@ def render_demo(
             ("seed", str(study.seed)),
         ],
     }  # fmt: skip
-    return render("demo", content, "mpc")
+    return render("demo", content)
 
 
 @styled

@@ -8,10 +8,8 @@ from typing import Any
 
 import pandas as pd
 
-from calibration import _figures as figures
-from mpc.reports.page import clock, counted, duration, kelvin, render, signed, significant, unit
-from mpc.reports.evaluation import CELSIUS, subtitle
-from calibration.results import check_results_folder, write_results
+from calibration.diagnosis.decide.levels import LARGEST_GROUP
+from calibration.diagnosis.decide.verdict import Suspect
 from calibration.diagnosis.diagnosis import Diagnosis
 from calibration.diagnosis.refit.final import (
     Replay,
@@ -21,10 +19,10 @@ from calibration.diagnosis.refit.final import (
     missing_table,
     replays,
 )
-from calibration.diagnosis.decide.levels import LARGEST_GROUP
-from mpc.reports.diagnosis_where import where_content
+from calibration.results import check_results_folder, write_results
+from mpc.reports import figures
 from mpc.reports.diagnosis_statistics import statistics_content
-from calibration.diagnosis.decide.verdict import Suspect
+from mpc.reports.diagnosis_where import where_content
 from mpc.reports.diagnosis_words import (
     accepted,
     ahead,
@@ -37,8 +35,10 @@ from mpc.reports.diagnosis_words import (
     sure,
     suspect,
 )
-from thermal import Case
-from thermal.effects import CATALOGUE
+from mpc.reports.evaluation import CELSIUS, subtitle
+from mpc.reports.page import clock, counted, duration, kelvin, render, signed, significant, unit
+from thermal.case.case import Case
+from thermal.effects.catalogue import CATALOGUE
 
 #: Effects shown at the top: those at least so probable [-], and how many at least and at most.
 _LIKELY, _FEWEST, _MOST = 0.05, 3, 6

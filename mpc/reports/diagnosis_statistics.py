@@ -6,14 +6,14 @@ from typing import Any
 
 import numpy as np
 
-from mpc.reports.page import clock, kelvin, plain, significant, unit, watts
-from calibration.fit.result import ParameterEstimate
+from calibration.diagnosis.decide.levels import GENERIC_GAP
 from calibration.diagnosis.diagnosis import Diagnosis
 from calibration.diagnosis.refit.final import describe_fit
-from calibration.diagnosis.decide.levels import GENERIC_GAP
 from calibration.diagnosis.refit.refit import ACCEPTED
 from calibration.diagnosis.refit.search import Round
+from calibration.fit.result import ParameterEstimate
 from mpc.reports.diagnosis_words import called, in_zones, listed, sure
+from mpc.reports.page import clock, kelvin, plain, significant, unit, watts
 
 #: Effects of a round that are listed, and those whose likeness is.
 _MOST_GAINS, _MOST_ALIKE = 10, 6

@@ -7,18 +7,16 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
-from calibration import _figures as figures
-from mpc.reports.page import watts
-from calibration.diagnosis.diagnosis import Diagnosis
 from calibration.diagnosis.decide.drift import drift_sentence
+from calibration.diagnosis.decide.where import Share
+from calibration.diagnosis.diagnosis import Diagnosis
 from calibration.diagnosis.refit.final import Replay
 from calibration.diagnosis.screen.missing import Missing
-from calibration.diagnosis.decide.where import Share
-from thermal import Case, FloorPlans
-
-FloatArray = NDArray[np.float64]
+from mpc.reports import figures
+from mpc.reports.page import watts
+from thermal.case.building import FloorPlans
+from thermal.case.case import Case
 
 #: Rows of a table of zones, and of parts of the day and the building.
 _MOST_ZONES, _MOST_PARTS = 24, 10

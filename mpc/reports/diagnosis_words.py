@@ -6,12 +6,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from mpc.reports.page import duration, kelvin, watts
-from calibration.diagnosis.diagnosis import Diagnosis
 from calibration.diagnosis.decide.levels import LARGEST_GROUP
-from calibration.diagnosis.refit.refit import Refit
 from calibration.diagnosis.decide.verdict import Suspect, group_of
-from thermal.effects import CATALOGUE
+from calibration.diagnosis.diagnosis import Diagnosis
+from calibration.diagnosis.refit.refit import Refit
+from mpc.reports.page import duration, kelvin, watts
+from thermal.effects.catalogue import CATALOGUE
 
 #: What an effect is called where its title would read oddly after "leaves out".
 _CALLED = {"hidden_mass": "mass that stores heat"}

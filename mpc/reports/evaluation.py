@@ -8,15 +8,14 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
-from calibration import _figures as figures
 from calibration.evaluation.n_step import Evaluation, spatial_metrics
-from mpc.reports.page import clock, counted, duration, kelvin, render, signed
 from calibration.results import check_results_folder, write_results
-from thermal import Case, FloorPlans
-
-FloatArray = NDArray[np.float64]
+from mpc.reports import figures
+from mpc.reports.page import clock, counted, duration, kelvin, render, signed
+from thermal._types import FloatArray
+from thermal.case.building import FloorPlans
+from thermal.case.case import Case
 
 #: Zero of the Celsius scale [K].
 CELSIUS = 273.15

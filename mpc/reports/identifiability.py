@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from mpc.reports.page import unit
-from thermal import Parameter
-from thermal.parameters import FACADE_PREFIX
+from thermal.parameters import FACADE_PREFIX, Parameter
 
 #: Relative deviations up to this one are told in per cent, larger ones as a factor [-].
 MOST_PER_CENT = 0.5
@@ -78,7 +77,7 @@ def combination_words(parameters: Mapping[str, Parameter], exponents: Mapping[st
 
     Examples
     --------
-    >>> from thermal import PARAMETERS
+    >>> from thermal.parameters import PARAMETERS
     >>> combination_words(PARAMETERS, {"slab_heat_capacity": 1.0, "slab_coupling": -1.0})
     'ratio slab heat capacity / slab coupling'
     """

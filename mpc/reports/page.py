@@ -14,10 +14,9 @@ _NO_NUMBER = "–"
 
 
 @cache
-def _environment(package: str) -> jinja2.Environment:
-    homes = dict.fromkeys([package, "calibration"])  # whose base page and macros all pages share
+def _environment() -> jinja2.Environment:
     return jinja2.Environment(
-        loader=jinja2.ChoiceLoader([jinja2.PackageLoader(home, "templates") for home in homes]),
+        loader=jinja2.PackageLoader("mpc.reports", "templates"),
         autoescape=True,
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
@@ -25,8 +24,8 @@ def _environment(package: str) -> jinja2.Environment:
     )
 
 
-def render(template: str, content: dict[str, Any], package: str = "calibration") -> str:
-    """Fill a template of a package; the page loads nothing from elsewhere.
+def render(template: str, content: dict[str, Any]) -> str:
+    """Fill a template; the page loads nothing from elsewhere.
 
     Parameters
     ----------
@@ -34,10 +33,8 @@ def render(template: str, content: dict[str, Any], package: str = "calibration")
         Name without its ending, such as ``calibration``.
     content : dict
         What it shows; every text is escaped.
-    package : str
-        Whose folder ``templates`` it is in.
     """
-    return _environment(package).get_template(f"{template}.html.j2").render(version=version("buildingmpc"), **content)
+    return _environment().get_template(f"{template}.html.j2").render(version=version("buildingmpc"), **content)
 
 
 def kelvin(value: float) -> str:

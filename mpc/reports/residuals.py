@@ -6,22 +6,22 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from calibration import _figures as figures
-from calibration.estimation.filtered import evaluate_filter, filter_interval
+from calibration.errors import FilterError, NotEnoughDataError
 from calibration.estimation.disturbance import DisturbanceModel
-from calibration.evaluation.n_step import HORIZONS, Evaluation
+from calibration.estimation.filtered import evaluate_filter, filter_interval
 from calibration.estimation.heat_balance import CV_RMSE_LIMIT, NMBE_LIMIT, HeatBalance, HeatFit, heat_balance
 from calibration.estimation.kalman import Filtered
-from mpc.reports.page import clock, counted, duration, significant
+from calibration.estimation.whiteness import Whiteness, whiteness
+from calibration.evaluation.n_step import HORIZONS, Evaluation
 from calibration.fit.problem import Objective
 from calibration.fit.result import CalibrationResult
-from calibration.estimation.whiteness import Whiteness, whiteness
-from calibration.errors import FilterError, NotEnoughDataError
-from thermal import Inputs, SymbolicModel, reduced_model
-
-FloatArray = NDArray[np.float64]
+from mpc.reports import figures
+from mpc.reports.page import clock, counted, duration, significant
+from thermal._types import FloatArray
+from thermal.model.reduce import reduced_model
+from thermal.model.replay import Inputs
+from thermal.model.symbolic import SymbolicModel
 
 #: Zones up to which innovations are tested: the filter of a larger building takes minutes.
 MOST_FILTERED = 40

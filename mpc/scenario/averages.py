@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
-FloatArray = NDArray[np.float64]
+from thermal._types import FloatArray
 
 
 def means_of_readings(times: FloatArray, values: FloatArray, edges: FloatArray) -> FloatArray:

@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mpc.errors import ScenarioError
 from mpc.scenario.grid import SATURDAY, SUNDAY, WEEKDAY, Calendar, StepGrid, local_hours
+from thermal._types import FloatArray
 from thermal.errors import describe
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -8,14 +8,12 @@ from typing import Literal
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from mpc.errors import ForecastError
+from thermal._types import FloatArray
 from thermal.case.points import POINT_TYPES
 from thermal.errors import CaseError, describe, nearest
 from thermal.units import QUANTITIES, to_si
-
-FloatArray = NDArray[np.float64]
 
 #: Columns of a forecast that are no points of the case format, with their unit; those of a zone are ``ZONE/name``.
 FORECAST_UNITS = {

@@ -9,17 +9,15 @@ from typing import Literal
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from mpc.errors import ForecastError
 from mpc.scenario.forecast import Forecast
 from mpc.scenario.scenario import OCCUPANCY_POINT, Scenario
 from mpc.scenario.weather import SKY, SUN_POINTS
+from thermal._types import FloatArray
 from thermal.case.points import OUTDOOR_TEMPERATURE
 from thermal.errors import describe, nearest
-
-FloatArray = NDArray[np.float64]
 
 _STREAM = 12  # of random numbers of a seed
 

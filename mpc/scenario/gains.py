@@ -6,12 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from mpc.errors import ScenarioError
+from thermal._types import FloatArray
 from thermal.errors import describe
-
-FloatArray = NDArray[np.float64]
 
 #: Shares of an office's gains that radiate [-]: people and equipment with fans by ASHRAE Fundamentals 2017, ch. 18,
 #: table 14; lights as recessed luminaires without lens, the middle of 0.48 to 0.68 in its table 3.

@@ -13,10 +13,10 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from mpc.errors import ScenarioError
-from thermal import Building, local_timestamp
+from thermal._types import FloatArray
+from thermal.case.building import Building
+from thermal.case.times import local_timestamp
 from thermal.errors import describe
-
-FloatArray = NDArray[np.float64]
 
 #: Local clocks, schedules and tariffs change on multiples of this [s]; offsets of time zones are whole quarter hours.
 RESOLUTION = 300

@@ -10,13 +10,12 @@ from typing import Literal, Protocol
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from mpc.errors import ScenarioError
 from mpc.scenario.grid import RESOLUTION, WEEKDAY, Calendar, StepGrid, index_seconds, local_hours
+from thermal._types import FloatArray
 from thermal.errors import describe
-
-FloatArray = NDArray[np.float64]
 
 #: Share of the people that are in at each hour of a weekday, a Saturday, and a Sunday or holiday [-]: offices of the
 #: U.S. DOE's reference buildings (Deru et al. 2011, NREL/TP-5500-46861), schedule BLDG_OCC_SCH.

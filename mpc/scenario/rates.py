@@ -8,13 +8,12 @@ from typing import Literal, Protocol
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from mpc.errors import TariffError
 from mpc.scenario.grid import WEEKDAY, Calendar, StepGrid, index_seconds
+from thermal._types import FloatArray
 from thermal.errors import describe
-
-FloatArray = NDArray[np.float64]
 
 #: Energy of a kilowatt-hour [J].
 KILOWATT_HOUR = 3.6e6

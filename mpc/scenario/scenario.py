@@ -8,7 +8,6 @@ from functools import cached_property
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from mpc.errors import ScenarioError
 from mpc.scenario.carbon import CarbonIntensity
@@ -18,12 +17,14 @@ from mpc.scenario.grid import StepGrid
 from mpc.scenario.occupancy import OFFICE_AREA_PER_PERSON, Occupancy, ScheduledOccupancy
 from mpc.scenario.tariff import DemandBuckets, Tariff
 from mpc.scenario.weather import Weather
-from thermal import Building, Case, Telemetry, ZoneTable
-from thermal.case import QualityReport, zone_floor_areas
+from thermal._types import FloatArray
+from thermal.case.areas import zone_floor_areas
+from thermal.case.building import Building, ZoneTable
+from thermal.case.case import Case
 from thermal.case.points import OUTDOOR_TEMPERATURE, ZONE_TEMPERATURE
+from thermal.case.quality import QualityReport
+from thermal.case.telemetry import Telemetry
 from thermal.errors import describe, nearest
-
-FloatArray = NDArray[np.float64]
 
 OCCUPANCY_POINT = "occupancy_count_sensor"
 

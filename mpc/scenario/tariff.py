@@ -7,15 +7,13 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from mpc.errors import TariffError
 from mpc.scenario.grid import Calendar, StepGrid
 from mpc.scenario.rates import Rate, by_month_and_hour
+from thermal._types import FloatArray, IntArray
 from thermal.errors import describe
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 
 def window_means(power: ArrayLike, starts: ArrayLike, step: float, window: float) -> tuple[FloatArray, FloatArray]:

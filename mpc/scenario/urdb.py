@@ -14,9 +14,8 @@ from mpc.errors import TariffError
 from mpc.scenario.grid import Calendar
 from mpc.scenario.rates import HourlyRate, Rate
 from mpc.scenario.tariff import DemandCharge, Tariff
+from thermal._types import FloatArray
 from thermal.errors import describe
-
-FloatArray = NDArray[np.float64]
 
 # Parts of a tariff that change its bill and are not modelled.
 _REFUSED = {

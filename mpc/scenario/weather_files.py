@@ -8,17 +8,15 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from mpc.errors import WeatherError
 from mpc.scenario.weather import DIRECTION, SKY, SUN_POINTS, WEATHER_POINTS, Weather
-from thermal import Case
-from thermal.case import Location
+from thermal._types import FloatArray
+from thermal.case.case import Case
 from thermal.case.points import OUTDOOR_TEMPERATURE, POINT_TYPES
+from thermal.case.schema import Location
 from thermal.errors import CaseError, describe, nearest
 from thermal.units import QUANTITIES, to_si
-
-FloatArray = NDArray[np.float64]
 
 _STEFAN_BOLTZMANN = 5.670374419e-8  # W/m2/K4, CODATA 2018
 _YEAR = 2023  # of a typical year's stamps: any year that is not a leap year

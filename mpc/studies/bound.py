@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from calibration import DisturbanceModel, KalmanFilter
-from mpc.control import Observer
-from mpc.loop import ReducedBuilding, SimulatedPlant
+from calibration.estimation.disturbance import DisturbanceModel
+from calibration.estimation.kalman import KalmanFilter
+from mpc.control.controller.observer import Observer
+from mpc.loop.reduced import ReducedBuilding
+from mpc.loop.simulated import SimulatedPlant
 from mpc.studies.controller import LASTING, SENSOR_NOISE, UNMEASURED, held_space
-from thermal.model import ModalModel, ReducedModel, modal_model
-
-FloatArray = NDArray[np.float64]
+from thermal._types import FloatArray
+from thermal.model.modal import ModalModel, modal_model
+from thermal.model.reduce import ReducedModel
 
 #: Unmeasured heat of a plant that is known, but for the random shuffle of its air [W/m2].
 SHUFFLED = 1.0

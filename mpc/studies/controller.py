@@ -6,31 +6,34 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from calibration import DisturbanceModel, KalmanFilter, StateSpace, state_space
-from mpc.control import (
-    Channel,
-    ControllerSettings,
-    ControlProblem,
-    ForecastSignals,
-    Horizon,
-    Margin,
-    MpcController,
-    Observer,
-    Predictor,
-    SequentialSolver,
-    SitePoints,
-)
+from calibration.estimation.disturbance import DisturbanceModel
+from calibration.estimation.kalman import KalmanFilter
+from calibration.estimation.state_space import StateSpace, state_space
+from mpc.control.controller.action import ControllerSettings
+from mpc.control.controller.controller import MpcController
+from mpc.control.controller.observer import Observer
+from mpc.control.controller.reading import SitePoints
+from mpc.control.predictor.forecast_signals import ForecastSignals
+from mpc.control.predictor.predictor import Predictor
+from mpc.control.problem.back_off import Margin
+from mpc.control.problem.channels import Channel
+from mpc.control.problem.horizon import Horizon
+from mpc.control.problem.problem import ControlProblem
+from mpc.control.solvers.sequential import SequentialSolver
 from mpc.errors import ControlError
-from mpc.loop import Actuator, Plant, PlantDevices, SimulatedPlant
-from mpc.scenario import zone_areas
-from thermal import Building
+from mpc.loop.actuators import Actuator
+from mpc.loop.plant import Plant
+from mpc.loop.sensors import PlantDevices
+from mpc.loop.simulated import SimulatedPlant
+from mpc.scenario.scenario import zone_areas
+from thermal.case.building import Building
 from thermal.errors import describe
-from thermal.hvac import HvacSystem, SmoothHvac
-from thermal.model import IMPLICIT_EULER, ModalModel, ReducedModel, modal_model
-
-FloatArray = NDArray[np.float64]
+from thermal.hvac._smooth import SmoothHvac
+from thermal.hvac._system import HvacSystem
+from thermal.model.modal import ModalModel, modal_model
+from thermal.model.reduce import ReducedModel
+from thermal.model.scheme import IMPLICIT_EULER
 
 #: Step of a controller's model [s]: that of telemetry in most cases.
 MODEL_STEP = 300.0

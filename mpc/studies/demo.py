@@ -10,34 +10,31 @@ from typing import Any
 
 import pandas as pd
 
-import calibration
-from calibration import (
-    CalibrationResult,
-    Evaluation,
-    Interval,
-    calibration_verdict,
-    check_results_folder,
-    check_verdict,
-    default_intervals,
-    evaluate_case,
-    evaluation_verdict,
-    write_calibration,
-    write_check,
-    write_evaluation,
-    write_results,
-)
-from calibration.diagnosis import Diagnosis, diagnose, diagnosis_verdict, write_diagnosis
+from calibration.diagnosis.diagnosis import Diagnosis, diagnose
+from calibration.evaluation.case_model import evaluate_case
+from calibration.evaluation.intervals import Interval, default_intervals
+from calibration.evaluation.n_step import Evaluation
+from calibration.fit.calibrate import calibrate
+from calibration.fit.result import CalibrationResult
+from calibration.results import check_results_folder, write_results
 from mpc.errors import ControlError
-from mpc.loop import SensorNoise
-from mpc.scenario import DAY_AHEAD_ERRORS, weather_of_case
-from mpc.studies.compare import Comparison, compare_controllers
-from mpc.reports.demo import render_demo
+from mpc.loop.noise import SensorNoise
+from mpc.reports.calibration import calibration_verdict, write_calibration
+from mpc.reports.case import check_verdict, write_check
 from mpc.reports.control import write_comparison
+from mpc.reports.control_words import comparison_verdict
+from mpc.reports.demo import render_demo
+from mpc.reports.diagnosis import write_diagnosis
+from mpc.reports.diagnosis_words import diagnosis_verdict
+from mpc.reports.evaluation import evaluation_verdict, write_evaluation
+from mpc.scenario.forecaster import DAY_AHEAD_ERRORS
+from mpc.scenario.weather_files import weather_of_case
+from mpc.studies.compare import Comparison, compare_controllers
 from mpc.studies.run import Progress
 from mpc.studies.study import make_study
-from mpc.reports.control_words import comparison_verdict
-from thermal import Case, load_bundled_case
-from thermal.case import CaseCheck, describe_case
+from thermal.case.case import Case
+from thermal.case.check import CaseCheck, describe_case
+from thermal.data import load_bundled_case
 from thermal.errors import describe
 
 #: Controllers of the day, rules first.
@@ -170,7 +167,7 @@ def run_demo(
 
     checked = describe_case(case)
     end("check", write_check(checked, folder / "check", force=force), check_verdict(checked))
-    fitted = calibration.calibrate(case, dx=dx, progress=_staged(done, "calibrate"))
+    fitted = calibrate(case, dx=dx, progress=_staged(done, "calibrate"))
     end("calibrate", write_calibration(fitted, case, folder / "calibrate", force=force), calibration_verdict(fitted))
     found = diagnose(case, dx=dx, progress=_staged(done, "diagnose"))
     end("diagnose", write_diagnosis(found, case, folder / "diagnose", force), diagnosis_verdict(found))

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from thermal import Building
-from thermal.case import Device
+from thermal.case.building import Building
+from thermal.case.schema import Device
 
 
 def equip(building: Building) -> tuple[Building, tuple[str, ...]]:
@@ -23,7 +23,7 @@ def equip(building: Building) -> tuple[Building, tuple[str, ...]]:
 
     Examples
     --------
-    >>> from thermal import load_bundled_case
+    >>> from thermal.data import load_bundled_case
     >>> equip(load_bundled_case().building)[1]
     ('the case names no air handler and no boiler: one of each is assumed',)
     """

@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from calibration import ModelSettings, load_parameters, read_settings
+from calibration.evaluation.settings import ModelSettings, read_settings
+from calibration.fit.result import load_parameters
 from mpc.errors import ControlError
-from thermal import Building, SymbolicModel, reduced_model
-from thermal.effects import Chosen
+from thermal.case.building import Building
+from thermal.effects.effect import Chosen
 from thermal.errors import describe
-from thermal.model import ReducedModel
+from thermal.model.reduce import ReducedModel, reduced_model
+from thermal.model.symbolic import SymbolicModel
 
 #: Largest number of states of a controller's model: 76 mK from the grid on 123 zones at 0.5 m, at a third of the time.
 ORDER = 201
@@ -54,7 +56,7 @@ def control_model(
 
     Examples
     --------
-    >>> from thermal import load_bundled_case
+    >>> from thermal.data import load_bundled_case
     >>> control_model(load_bundled_case().building, dx=1.0, order=30).order
     30
     """

@@ -9,20 +9,24 @@ from typing import Any, Literal, NamedTuple, cast, get_args
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
-from mpc.baselines import Guideline36, OutdoorReset, day_schedule
-from mpc.control import Action, MpcController
+from mpc.baselines.guideline36 import Guideline36
+from mpc.baselines.reset import OutdoorReset
+from mpc.baselines.schedule import day_schedule
+from mpc.control.controller.action import Action
+from mpc.control.controller.controller import MpcController
 from mpc.errors import ControlError
-from mpc.kpi import Kpis, measure_kpis
-from mpc.loop import ClosedLoopRun, Controller, Measurements, SimulatedPlant, run_closed_loop
-from mpc.scenario import Forecast
+from mpc.kpi.kpis import Kpis, measure_kpis
+from mpc.loop.plant import Controller, Measurements
+from mpc.loop.run import ClosedLoopRun, run_closed_loop
+from mpc.loop.simulated import SimulatedPlant
+from mpc.scenario.forecast import Forecast
 from mpc.studies.bound import knowing_observer
 from mpc.studies.controller import MODEL_STEP, default_horizon, make_controller, site_points
 from mpc.studies.study import HORIZON_HOURS, Study
+from thermal._types import FloatArray
 from thermal.errors import describe, nearest
 
-FloatArray = NDArray[np.float64]
 Progress = Callable[[str, int, int], None]
 
 #: Controllers by name: optimal control, three rules, and optimal control that knows everything.

@@ -10,35 +10,34 @@ from typing import Literal, cast, get_args
 import numpy as np
 import pandas as pd
 
-from calibration import ModelSettings
-from mpc.control import ControllerSettings
+from calibration.evaluation.settings import ModelSettings
+from mpc.control.controller.action import ControllerSettings
 from mpc.errors import PlantError
-from mpc.kpi import DISCOMFORT_PRICE
-from mpc.loop import BuildingModel, GridBuilding, ReducedBuilding, SensorNoise, SimulatedPlant
-from mpc.scenario import (
-    CarbonIntensity,
-    ComfortBand,
-    ErrorGrowth,
-    Forecaster,
-    InternalGains,
-    Occupancy,
-    Scenario,
-    StepGrid,
-    Tariff,
-    Weather,
-    build_scenario,
-    paper_carbon,
-    paper_tariff,
-)
+from mpc.kpi.rewards import DISCOMFORT_PRICE
+from mpc.loop.building import BuildingModel, GridBuilding
+from mpc.loop.noise import SensorNoise
+from mpc.loop.reduced import ReducedBuilding
+from mpc.loop.simulated import SimulatedPlant
+from mpc.scenario.carbon import CarbonIntensity
+from mpc.scenario.comfort import ComfortBand
+from mpc.scenario.forecaster import ErrorGrowth, Forecaster
+from mpc.scenario.gains import InternalGains
+from mpc.scenario.grid import StepGrid
+from mpc.scenario.occupancy import Occupancy
+from mpc.scenario.paper import paper_carbon, paper_tariff
+from mpc.scenario.scenario import Scenario, build_scenario
+from mpc.scenario.tariff import Tariff
+from mpc.scenario.weather import Weather
 from mpc.studies.controller import MODEL_STEP
 from mpc.studies.devices import equip
 from mpc.studies.model import ORDER, model_settings, reduced
-from thermal import Building, Simulator, reduced_model
-from thermal.effects import chosen
+from thermal.case.building import Building
+from thermal.effects.catalogue import chosen
 from thermal.errors import describe, nearest
-from thermal.hvac import HvacSystem
-from thermal.model import ReducedModel
-from thermal.pilot import size_system
+from thermal.hvac._system import HvacSystem
+from thermal.model.reduce import ReducedModel, reduced_model
+from thermal.model.simulator import Simulator
+from thermal.pilot.sizing import size_system
 
 #: What steps the plant: the reduced model, its grid with the mean of the shuffle, or with the random shuffle.
 PlantKind = Literal["reduced", "grid", "random"]

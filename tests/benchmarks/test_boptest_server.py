@@ -8,7 +8,8 @@ from types import ModuleType
 
 import pytest
 
-from mpc.adapters.boptest import BoptestServer, pilot_to_serve
+from mpc.adapters.boptest.make import pilot_to_serve
+from mpc.adapters.boptest.server import BoptestServer
 
 
 @pytest.fixture(scope="module")

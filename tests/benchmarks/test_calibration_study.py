@@ -2,25 +2,22 @@
 
 from __future__ import annotations
 
-import importlib
 import json
-import sys
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-import numpy as np
 import pandas as pd
 import pytest
 
-import calibration
 from calibration import Interval, evaluate_model
 from thermal import Case
-from thermal.model import SPIN_UP
-from thermal.network import BASELINE
-from thermal.pilot import generate_twin, pilot_building
+from thermal.model.replay import SPIN_UP
+from thermal.network.structure import BASELINE
+from thermal.pilot.building import pilot_building
+from thermal.pilot.twin import generate_twin
 
 SCRIPTS = Path(__file__).parents[2] / "benchmarks"
 
@@ -127,7 +124,7 @@ def test_the_first_version_is_read_from_a_readme(tables: ModuleType) -> None:
 def test_a_study_goes_on_where_it_was(
     script: Callable[[str], ModuleType], tables: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    command, measured = script("_calibration_command"), []
+    command, measured = script("calibration_accuracy"), []
     row = {
         "method": "ours", "errors": {k: {"mae": 0.1} for k in tables.INTERVALS}, "tuned_on": [], "evaluations": 1,
         "cpu_seconds": 1.0, "on_bound": [], "of": 13,
@@ -142,25 +139,14 @@ def test_a_study_goes_on_where_it_was(
     monkeypatch.setattr(command, "measure", measure)
     monkeypatch.setattr(command, "cases_with_plans", lambda places: {p.name: p for p in places})
     monkeypatch.setattr(command, "ProcessPoolExecutor", lambda workers, context: ThreadPoolExecutor(workers))
-    run = ["calibration.py", "--out", str(tmp_path), "--cases", "one", "two"]
+    run = ["calibration_accuracy.py", "--out", str(tmp_path), "--cases", "one", "two"]
     for expected in (["one", "two"], ["one", "two", "two"]):  # what failed is tried again
         monkeypatch.setattr("sys.argv", run)
-        command.main("")
+        command.main()
         assert measured == expected
     data = json.loads((tmp_path / "calibration.json").read_text(encoding="utf-8"))
     assert [line["case"] for line in data["cases"]] == ["one"]
     assert data["failed"] == {"two": "ValueError: no day"}
     monkeypatch.setattr("sys.argv", [*run, "--seed", "1"])
     with pytest.raises(SystemExit, match="choose another --out"):
-        command.main("")
-
-
-def test_scripts_beside_it_get_the_package(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The script has the name of the package, and stands before it on the path of every script of its folder."""
-    monkeypatch.syspath_prepend(str(SCRIPTS))
-    monkeypatch.delitem(sys.modules, "calibration")
-    found = importlib.import_module("calibration")
-    assert found.__file__ == calibration.__file__
-    assert found.calibrate is calibration.calibrate
-    assert sys.path[0] == str(SCRIPTS)
-    assert np.isfinite(found.horizon_steps("6h", 300.0))
+        command.main()

@@ -8,8 +8,8 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from mpc.loop import pilot_building
-from thermal.pilot import size_system
+from thermal.pilot.building import pilot_building
+from thermal.pilot.sizing import size_system
 
 
 @pytest.fixture(scope="module")

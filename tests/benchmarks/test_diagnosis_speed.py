@@ -9,8 +9,9 @@ from types import ModuleType
 
 import pytest
 
-from thermal.case import save_case
-from thermal.pilot import generate_twin, pilot_building
+from thermal.case.save import save_case
+from thermal.pilot.building import pilot_building
+from thermal.pilot.twin import generate_twin
 
 
 @pytest.fixture(scope="module")

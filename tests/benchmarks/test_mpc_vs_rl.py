@@ -18,7 +18,7 @@ import pytest
 
 pytest.importorskip("gymnasium", reason="needs the extra [rl]")
 
-from mpc.environment import ActorNetwork
+from mpc.environment.policy import ActorNetwork
 
 
 @pytest.fixture(scope="module")

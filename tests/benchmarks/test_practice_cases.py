@@ -11,7 +11,7 @@ import pytest
 @pytest.fixture(scope="module")
 def practice(script: Callable[[str], ModuleType], package: Callable[[str], ModuleType]) -> ModuleType:
     package("energyplus_trials.drawing")
-    for name in ("_table", "_code", "_trial_answers"):
+    for name in ("_table", "_code", "_trial_scores", "_trial_answers"):
         script(name)
     return script("practice_cases")
 

@@ -9,7 +9,8 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from thermal.case import FloorPlan, FloorPlans, facade_areas, zone_floor_areas
+from thermal.case.areas import facade_areas, zone_floor_areas
+from thermal.case.building import FloorPlan, FloorPlans
 from thermal.case.plan import check_plan
 
 SEEDS = range(60)

@@ -19,11 +19,12 @@ import pandas as pd
 import pytest
 from numpy.typing import NDArray
 
-from calibration import CaseOutcome, DisturbanceModel, StateSpace, state_space
-from calibration.fleet.record import RECORD
+from calibration import DisturbanceModel, StateSpace
+from calibration.estimation.state_space import state_space
+from calibration.fleet.record import RECORD, CaseOutcome
 from thermal import Inputs
-from thermal.model import Matrices
-from thermal.pilot import generate_pilot
+from thermal.model.symbolic import Matrices
+from thermal.pilot.pilot import generate_pilot
 
 FILES = ["calibration.json", RECORD, "evaluation.json", "predictions.parquet", "report.html"]
 FloatArray = NDArray[np.float64]

@@ -11,8 +11,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from calibration import CalibrationError, check_results_folder, to_json, write_results
+from calibration import CalibrationError
 from calibration.errors import ResultsExistError
+from calibration.results import check_results_folder, to_json, write_results
 
 
 def table() -> pd.DataFrame:

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from thermal.case.points import POINT_TYPES
-from thermal.effects import CATALOGUE
+from thermal.effects.catalogue import CATALOGUE
 from thermal.parameters import PARAMETERS
 from thermal.units import QUANTITIES
 

@@ -8,18 +8,15 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from mpc.scenario import (
-    CarbonIntensity,
-    ConstantRate,
-    Scenario,
-    ScheduledOccupancy,
-    StepGrid,
-    Tariff,
-    Weather,
-    build_scenario,
-)
+from mpc.scenario.carbon import CarbonIntensity
+from mpc.scenario.grid import StepGrid
+from mpc.scenario.occupancy import ScheduledOccupancy
+from mpc.scenario.rates import ConstantRate
+from mpc.scenario.scenario import Scenario, build_scenario
+from mpc.scenario.tariff import Tariff
+from mpc.scenario.weather import Weather
 from thermal import Building, ZoneTable
-from thermal.case import Location, ZoneEntry
+from thermal.case.schema import Location, ZoneEntry
 
 BAY = Location(latitude=37.4, longitude=-122.1, elevation=20.0, timezone="America/Los_Angeles")
 

@@ -36,8 +36,9 @@ def test_diagnose_writes_what_it_says(tmp_path: Path) -> None:
 
 
 def test_the_terminal_has_verdict_suspects_and_how_far(capsys: pytest.CaptureFixture[str]) -> None:
-    from calibration.diagnosis import diagnose, diagnosis_verdict
+    from calibration.diagnosis.diagnosis import diagnose
     from mpc.cli.diagnose import _show
+    from mpc.reports.diagnosis_words import diagnosis_verdict
     from thermal import load_bundled_case
 
     result = diagnose(load_bundled_case(), dx=2.0)

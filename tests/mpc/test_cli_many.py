@@ -21,7 +21,7 @@ from typer.testing import CliRunner
 import calibration
 from calibration import calibrate
 from mpc.cli.app import app
-from thermal.pilot import generate_pilot
+from thermal.pilot.pilot import generate_pilot
 
 OPTIONS = ("--horizon", "1h", "--starts", "1")
 NAMES = [f"office {k}" for k in range(3)]

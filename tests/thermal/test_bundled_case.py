@@ -7,7 +7,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from thermal.case import Case, load_case
+from thermal.case.case import Case
+from thermal.case.load import load_case
 
 FOLDER = Path(str(files("thermal"))) / "data" / "bundled_case"
 

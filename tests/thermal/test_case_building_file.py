@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from thermal.case import load_case
+from thermal.case.load import load_case
 from thermal.errors import (
     CaseError,
     DuplicateKeyError,

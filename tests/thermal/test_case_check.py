@@ -5,7 +5,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from thermal.case import check_case, describe_case, load_case
+from thermal.case.check import check_case, describe_case
+from thermal.case.load import load_case
 from thermal.errors import UnknownZoneError
 
 

@@ -7,19 +7,12 @@ import pandas as pd
 import pytest
 
 import thermal.case.save as saving
-from thermal.case import (
-    Building,
-    Case,
-    Device,
-    FloorPlan,
-    FloorPlans,
-    Location,
-    Telemetry,
-    ZoneEntry,
-    ZoneTable,
-    load_case,
-    save_case,
-)
+from thermal.case.building import Building, FloorPlan, FloorPlans, ZoneTable
+from thermal.case.case import Case
+from thermal.case.load import load_case
+from thermal.case.save import save_case
+from thermal.case.schema import Device, Location, ZoneEntry
+from thermal.case.telemetry import Telemetry
 from thermal.errors import CaseError, CaseExistsError, MissingTimeZoneError, UnknownZoneError
 
 

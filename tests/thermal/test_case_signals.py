@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from thermal.case import load_case
+from thermal.case.load import load_case
 
 STAMP = pd.Timestamp("2023-03-01T00:20:00-06:00")
 

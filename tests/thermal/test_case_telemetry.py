@@ -9,7 +9,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from thermal.case import Telemetry, load_case
+from thermal.case.load import load_case
+from thermal.case.telemetry import Telemetry
 from thermal.errors import (
     CaseError,
     DuplicateColumnError,

@@ -4,7 +4,9 @@ from typing import Any
 import pandas as pd
 import pytest
 
-from thermal.case import Case, load_case, local_timestamp
+from thermal.case.case import Case
+from thermal.case.load import load_case
+from thermal.case.times import local_timestamp
 from thermal.errors import EmptyIntervalError, InvalidTimeError
 
 

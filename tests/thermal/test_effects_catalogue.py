@@ -11,10 +11,12 @@ import pint
 import pytest
 
 from thermal import Case, FloorPlans, Telemetry, ZoneTable, build_network
-from thermal.effects import CATALOGUE, Chosen, catalogue_table, chosen
+from thermal.effects.catalogue import CATALOGUE, chosen
+from thermal.effects.effect import Chosen
+from thermal.effects.words import catalogue_table
 from thermal.errors import EffectError
+from thermal.inputs.drivers import INFRARED, IRRADIANCE, WIND, Drivers
 from thermal.parameters import PARAMETERS
-from thermal.inputs import INFRARED, IRRADIANCE, WIND, Drivers
 
 CaseOf = Callable[[str], Case]
 UNITS = pint.UnitRegistry()

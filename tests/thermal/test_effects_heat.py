@@ -11,8 +11,10 @@ from numpy.typing import NDArray
 from pvlib import irradiance, solarposition
 
 from thermal import Case, SymbolicModel, ThermalNetwork, build_network
-from thermal.effects import CATALOGUE, PAIR, chosen
-from thermal.inputs import Drivers, incidence_modifier, signal_values
+from thermal.effects.catalogue import CATALOGUE, chosen
+from thermal.effects.effect import PAIR
+from thermal.inputs.drivers import Drivers, signal_values
+from thermal.inputs.sun import incidence_modifier
 from thermal.units import air_density
 
 FloatArray = NDArray[np.float64]

@@ -12,9 +12,11 @@ import pytest
 from numpy.typing import NDArray
 
 from thermal import Case, Simulator, SymbolicModel, Telemetry, build_network, free_runs, replay_inputs, spin_up
-from thermal.effects import chosen
-from thermal.model import EXACT, ModalRuns, reduced_model
-from thermal.inputs import Drivers, signal_values
+from thermal.effects.catalogue import chosen
+from thermal.inputs.drivers import Drivers, signal_values
+from thermal.model.modal_runs import ModalRuns
+from thermal.model.reduce import reduced_model
+from thermal.model.scheme import EXACT
 from thermal.units import AIR_HEAT_CAPACITY, air_density
 
 FloatArray = NDArray[np.float64]

@@ -20,10 +20,12 @@ from thermal import (
     replay_inputs,
     spin_up,
 )
-from thermal.effects import CATALOGUE, chosen
+from thermal.effects.catalogue import CATALOGUE, chosen
 from thermal.errors import InputShapeError
-from thermal.model import IMPLICIT_EULER, TR_BDF2, Inputs, RolloutData, Scheme, rollout
-from thermal.inputs import REFERENCE_TEMPERATURE, Drivers, signal_values
+from thermal.inputs.drivers import REFERENCE_TEMPERATURE, Drivers, signal_values
+from thermal.model.replay import Inputs
+from thermal.model.rollouts import RolloutData, rollout
+from thermal.model.scheme import IMPLICIT_EULER, TR_BDF2, Scheme
 
 FloatArray = NDArray[np.float64]
 CaseOf = Callable[[str], Case]

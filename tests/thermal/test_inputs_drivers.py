@@ -11,7 +11,7 @@ import pytest
 
 from thermal import Case, Telemetry
 from thermal.errors import EffectError
-from thermal.inputs import INFRARED, IRRADIANCE, WIND, Drivers, Signal, signal_values
+from thermal.inputs.drivers import INFRARED, IRRADIANCE, WIND, Drivers, Signal, signal_values
 
 CaseOf = Callable[[str], Case]
 

@@ -7,9 +7,9 @@ import pandas as pd
 import pytest
 from pvlib import irradiance, solarposition
 
-from thermal.case import Location
+from thermal.case.schema import Location
 from thermal.errors import EffectError
-from thermal.inputs import Sun, incidence_modifier, sun_of
+from thermal.inputs.sun import Sun, incidence_modifier, sun_of
 
 MUNICH = Location(latitude=48.0, longitude=12.0, elevation=690.0, timezone="Europe/Berlin")
 NORMAL, DIFFUSE, GLOBAL = (

@@ -11,8 +11,8 @@ from thermal import SymbolicModel, build_network
 from thermal.data import load_bundled_case
 from thermal.errors import SingularModelError
 from thermal.model import factor as _factor
-from thermal.model import factorise
 from thermal.model.factor import Elimination, SparseSolver
+from thermal.model.stepper import factorise
 
 
 @pytest.fixture(scope="module")

@@ -10,16 +10,9 @@ import scipy.linalg as sl
 from numpy.typing import NDArray
 
 from thermal import ModelError, SymbolicModel, build_network, load_bundled_case, reduced_model
-from thermal.model import (
-    EXACT,
-    IMPLICIT_EULER,
-    TR_BDF2,
-    Matrices,
-    Scheme,
-    divided_differences,
-    modal_model,
-    propagator_functions,
-)
+from thermal.model.modal import divided_differences, modal_model, propagator_functions
+from thermal.model.scheme import EXACT, IMPLICIT_EULER, TR_BDF2, Scheme
+from thermal.model.symbolic import Matrices
 
 FloatArray = NDArray[np.float64]
 

@@ -12,8 +12,11 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from thermal.model import IMPLICIT_EULER, SCHEMES, TR_BDF2, Matrices, Scheme, Stepper, SymbolicModel
-from thermal.network import GraphBuilder, ThermalNetwork
+from thermal.model.scheme import IMPLICIT_EULER, SCHEMES, TR_BDF2, Scheme
+from thermal.model.stepper import Stepper
+from thermal.model.symbolic import Matrices, SymbolicModel
+from thermal.network.graph import GraphBuilder
+from thermal.network.network import ThermalNetwork
 
 FloatArray = NDArray[np.float64]
 

@@ -27,9 +27,10 @@ from thermal import (
     replay_inputs,
     spin_up,
 )
-from thermal.case import Airflow, Layer, Location, Surface, ZoneEntry
+from thermal.case.schema import Airflow, Layer, Location, Surface, ZoneEntry
 from thermal.errors import SimulationError
-from thermal.model import IMPLICIT_EULER, SCHEMES, Stepper
+from thermal.model.scheme import IMPLICIT_EULER, SCHEMES
+from thermal.model.stepper import Stepper
 
 FloatArray = NDArray[np.float64]
 

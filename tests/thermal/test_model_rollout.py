@@ -10,9 +10,11 @@ import pytest
 from numpy.typing import NDArray
 
 from thermal import Building, FloorPlan, FloorPlans, SymbolicModel, ZoneTable, build_network
-from thermal.case import Airflow, Layer, Location, Surface, ZoneEntry
+from thermal.case.schema import Airflow, Layer, Location, Surface, ZoneEntry
 from thermal.errors import InputShapeError, ModelError
-from thermal.model import IMPLICIT_EULER, SCHEMES, RolloutData, Stepper, rollout, symbolic_step
+from thermal.model.rollouts import RolloutData, rollout, symbolic_step
+from thermal.model.scheme import IMPLICIT_EULER, SCHEMES
+from thermal.model.stepper import Stepper
 
 FloatArray = NDArray[np.float64]
 

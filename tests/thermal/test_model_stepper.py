@@ -22,9 +22,11 @@ from thermal import (
     load_bundled_case,
     load_case,
 )
-from thermal.case import Airflow, Layer, Location, Surface, ZoneEntry
+from thermal.case.schema import Airflow, Layer, Location, Surface, ZoneEntry
 from thermal.errors import ModelError, SingularModelError
-from thermal.model import IMPLICIT_EULER, SCHEMES, TR_BDF2, Matrices, Scheme, Stepper, factorise
+from thermal.model.scheme import IMPLICIT_EULER, SCHEMES, TR_BDF2, Scheme
+from thermal.model.stepper import Stepper, factorise
+from thermal.model.symbolic import Matrices
 
 FloatArray = NDArray[np.float64]
 

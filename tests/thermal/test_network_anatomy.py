@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 
 from thermal import Building, Case, FloorPlan, FloorPlans, build_network
-from thermal.case import Location
-from thermal.network import BASELINE, Anatomy, ThermalNetwork
+from thermal.case.schema import Location
+from thermal.network.network import ThermalNetwork
+from thermal.network.structure import BASELINE
+from thermal.network.topology import Anatomy
 
 CaseOf = Callable[[str], Case]
 SITE = Location(latitude=48.0, longitude=12.0, elevation=690.0, timezone="Etc/GMT-1")

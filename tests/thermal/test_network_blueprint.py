@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from thermal import SymbolicModel, ThermalNetwork, build_network, load_bundled_case
-from thermal.effects import CATALOGUE, chosen
-from thermal.network import blueprint
+from thermal.effects.catalogue import CATALOGUE, chosen
+from thermal.network.build import blueprint
 
 SETS: tuple[dict[str, tuple[str, ...]], ...] = (
     {name: () for name in CATALOGUE if name not in ("neighbour", "interfloor_exchange")},

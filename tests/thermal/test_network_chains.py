@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from thermal import Building, Structure, SymbolicModel, ThermalNetwork, ZoneTable, build_network
-from thermal.case import Layer, Location, Surface, ZoneEntry
+from thermal.case.schema import Layer, Location, Surface, ZoneEntry
 from thermal.network.chains import Chain
 
 SITE = Location(latitude=48.0, longitude=12.0, elevation=690.0, timezone="Etc/GMT-1")

@@ -20,12 +20,13 @@ from thermal import (
     ZoneTable,
     build_network,
 )
-from thermal.case import Layer, Location, Surface, ZoneEntry
+from thermal.case.schema import Layer, Location, Surface, ZoneEntry
 from thermal.errors import ModelError, ScopeError
-from thermal.network import GraphBuilder, floor_grid
 from thermal.network.facades import facade_of, wall_facades
+from thermal.network.graph import GraphBuilder
+from thermal.network.grid import floor_grid
 from thermal.parameters import ENVELOPE_PARAMETERS, PARAMETERS, Scope
-from thermal.pilot import generate_office
+from thermal.pilot.layout import generate_office
 
 FloatArray = NDArray[np.float64]
 

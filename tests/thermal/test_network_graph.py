@@ -9,9 +9,10 @@ import scipy.sparse as sp
 
 from thermal import SymbolicModel
 from thermal.errors import ModelError
-from thermal.network import GraphBuilder, ThermalNetwork
+from thermal.inputs.drivers import Signal
+from thermal.network.graph import GraphBuilder
+from thermal.network.network import ThermalNetwork
 from thermal.parameters import PARAMETERS, Parameter
-from thermal.inputs import Signal
 
 
 def three_nodes(scope: bool = False) -> ThermalNetwork:

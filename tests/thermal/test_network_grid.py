@@ -7,7 +7,7 @@ import pytest
 
 from thermal import FloorPlan
 from thermal.errors import CellSizeError
-from thermal.network import floor_grid
+from thermal.network.grid import floor_grid
 
 PLAN = FloorPlan("F1", 3.0, np.array([list(row) for row in ("#######", "#AA+BB#", "#AA+BB#", "#######")]))
 

@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
 from thermal import Building, FloorPlan, FloorPlans, SymbolicModel, ThermalNetwork, build_network, load_bundled_case
-from thermal.case import Location, zone_floor_areas
+from thermal.case.areas import zone_floor_areas
+from thermal.case.schema import Location
 from thermal.errors import CellSizeError, ModelError
-from thermal.shuffle import mean_square_reach
+from thermal.shuffle.equivalent import mean_square_reach
 from thermal.units import air_density
 
 FloatArray = NDArray[np.float64]

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from calibration.evaluation.settings import ModelSettings, read_settings
 from calibration.errors import CalibrationError, ParameterFileError
+from calibration.evaluation.settings import ModelSettings, read_settings
 from thermal import (
     Building,
     FloorPlan,
@@ -23,7 +23,7 @@ from thermal import (
     build_network,
     load_bundled_case,
 )
-from thermal.case import Layer, Location, Surface, ZoneEntry
+from thermal.case.schema import Layer, Location, Surface, ZoneEntry
 from thermal.errors import ScopeError, StructureError
 from thermal.units import air_density
 

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from thermal.pilot import TwinError, draw_disturbance
+from thermal.pilot.disturbance import draw_disturbance
+from thermal.pilot.errors import TwinError
 
 TIME = 3600.0  # s
 

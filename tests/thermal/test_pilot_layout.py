@@ -11,9 +11,10 @@ import pytest
 from hypothesis import given, reject, settings
 from hypothesis import strategies as st
 
-from thermal.case import FloorPlan, FloorPlans, zone_floor_areas
+from thermal.case.areas import zone_floor_areas
+from thermal.case.building import FloorPlan, FloorPlans
 from thermal.errors import ThermalError
-from thermal.pilot import LayoutError
+from thermal.pilot.errors import LayoutError
 from thermal.pilot.layout import devices, generate_office
 
 WALLS = {".", "#", "+"}

@@ -8,9 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from thermal.case import Building, Case, FloorPlans, load_case
+from thermal.case.building import Building, FloorPlans
+from thermal.case.case import Case
+from thermal.case.load import load_case
 from thermal.errors import CaseExistsError
-from thermal.pilot import generate_pilot
+from thermal.pilot.pilot import generate_pilot
 
 
 class HeldPlant:

@@ -6,7 +6,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from thermal.pilot import ClosedLoopError, draw_prbs_thermostats, draw_thermostats
+from thermal.pilot.errors import ClosedLoopError
+from thermal.pilot.prbs import draw_prbs_thermostats
+from thermal.pilot.thermostat import draw_thermostats
 
 TIMES = pd.date_range("2023-01-09", periods=21 * 96, freq="15min", tz="Etc/GMT+8")
 

@@ -7,8 +7,10 @@ import pytest
 
 from thermal import Building, Simulator, load_bundled_case
 from thermal.errors import HvacParameterError
-from thermal.hvac import Actions, Conditions, HvacPlant
-from thermal.pilot import DesignConditions, pilot_building, size_system
+from thermal.hvac._plant import HvacPlant
+from thermal.hvac._step import Actions, Conditions
+from thermal.pilot.building import pilot_building
+from thermal.pilot.sizing import DesignConditions, size_system
 from thermal.units import AIR_HEAT_CAPACITY
 
 

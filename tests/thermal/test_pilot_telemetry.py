@@ -8,7 +8,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from thermal.case import Building, Case, FloorPlans, Telemetry, zone_floor_areas
+from thermal.case.areas import zone_floor_areas
+from thermal.case.building import Building, FloorPlans
+from thermal.case.case import Case
+from thermal.case.telemetry import Telemetry
 from thermal.errors import ThermalError
 from thermal.pilot.layout import devices, generate_office
 from thermal.pilot.telemetry import generate_telemetry

@@ -24,11 +24,15 @@ from thermal import (
     save_case,
     spin_up,
 )
-from thermal.case import Building, Location, ZoneTable, zone_floor_areas
-from thermal.model import Stepper
-from thermal.pilot import ClosedLoopError, TwinError, TwinRanges, TwinTruth, pilot_building
-from thermal.pilot import generate_twin as generate
+from thermal.case.areas import zone_floor_areas
+from thermal.case.building import Building, ZoneTable
+from thermal.case.schema import Location
+from thermal.model.stepper import Stepper
+from thermal.pilot.building import pilot_building
+from thermal.pilot.errors import ClosedLoopError, TwinError
+from thermal.pilot.truth import TwinRanges, TwinTruth
 from thermal.pilot.twin import _draw_conditions, _draw_values
+from thermal.pilot.twin import generate_twin as generate
 
 QUIET = TwinRanges(disturbance_deviation=(0.0, 0.0), noise=(0.0, 0.0))
 LOUD = TwinRanges(disturbance_deviation=(2.0, 2.0), disturbance_time=(7200.0, 7200.0), noise=(0.05, 0.05))

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from thermal.case import Telemetry
+from thermal.case.telemetry import Telemetry
 from thermal.errors import ThermalError
 from thermal.pilot.weather import MOUNTAIN_VIEW, generate_weather
 

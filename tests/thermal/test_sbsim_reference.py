@@ -13,8 +13,10 @@ import pytest
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from thermal.model import Matrices, Stepper, SymbolicModel
-from thermal.network import GraphBuilder, ThermalNetwork
+from thermal.model.stepper import Stepper
+from thermal.model.symbolic import Matrices, SymbolicModel
+from thermal.network.graph import GraphBuilder
+from thermal.network.network import ThermalNetwork
 
 FloatArray = NDArray[np.float64]
 

@@ -7,10 +7,8 @@ import pytest
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
-from thermal.shuffle import (
-    RandomShuffle,
-    ShuffleParameterError,
-    _equivalent,
+from thermal.shuffle import equivalent as _equivalent
+from thermal.shuffle.equivalent import (
     choose_equivalent,
     effective_diffusivity,
     exchange_rate,
@@ -18,6 +16,8 @@ from thermal.shuffle import (
     mixing_factor,
     mixing_rate,
 )
+from thermal.shuffle.errors import ShuffleParameterError
+from thermal.shuffle.random import RandomShuffle
 
 STEP, N_STEP = 300.0, 48  # [s], four hours
 AIR = 1.2 * 1006.0  # [J/m3/K]

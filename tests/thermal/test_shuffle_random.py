@@ -7,14 +7,10 @@ from time import perf_counter
 import numpy as np
 import pytest
 
-from thermal.shuffle import (
-    RandomShuffle,
-    ShuffleCellError,
-    ShuffleParameterError,
-    ShuffleStateError,
-    _random,
-    apply_swaps,
-)
+from thermal.shuffle import random as _random
+from thermal.shuffle.errors import ShuffleCellError, ShuffleParameterError, ShuffleStateError
+from thermal.shuffle.random import RandomShuffle
+from thermal.shuffle.swaps import apply_swaps
 
 N_RUN = 2500
 

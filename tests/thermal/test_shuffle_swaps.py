@@ -3,7 +3,9 @@ import doctest
 import numpy as np
 import pytest
 
-from thermal.shuffle import ShuffleCellError, ShuffleParameterError, _swaps, apply_swaps
+from thermal.shuffle import swaps as _swaps
+from thermal.shuffle.errors import ShuffleCellError, ShuffleParameterError
+from thermal.shuffle.swaps import apply_swaps
 
 
 def sequential(temperatures, first, second, capacities=None):

@@ -10,9 +10,10 @@ import pytest
 from numpy.typing import NDArray
 
 from thermal import Building, FloorPlan, FloorPlans, Simulator, SymbolicModel, ZoneTable, load_bundled_case
-from thermal.case import Airflow, Layer, Location, Surface, ZoneEntry
+from thermal.case.schema import Airflow, Layer, Location, Surface, ZoneEntry
 from thermal.errors import InputShapeError, ModelError, ThermalError
-from thermal.model import TR_BDF2, free_runs, replay_inputs, spin_up
+from thermal.model.replay import free_runs, replay_inputs, spin_up
+from thermal.model.scheme import TR_BDF2
 from thermal.units import AIR_HEAT_CAPACITY
 
 FloatArray = NDArray[np.float64]

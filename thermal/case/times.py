@@ -33,7 +33,8 @@ def local_timestamp(time: str | datetime, building: Building) -> pd.Timestamp:
 
     Examples
     --------
-    >>> from thermal.case import Building, Location, ZoneEntry, ZoneTable
+    >>> from thermal.case.building import Building, ZoneTable
+    >>> from thermal.case.schema import Location, ZoneEntry
     >>> site = Location(latitude=48, longitude=12, elevation=690, timezone="Europe/Berlin")
     >>> house = Building("house", site, 0.0, ZoneTable((ZoneEntry(name="room", volume=50, floor_area=20),)))
     >>> local_timestamp("2023-07-06T07:10", house).isoformat()

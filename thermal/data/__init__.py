@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from thermal.case import Case, load_case
+from thermal.case.case import Case
+from thermal.case.load import load_case
 
 __all__ = ["bundled_case_path", "load_bundled_case"]
 

@@ -6,13 +6,11 @@ from functools import partial
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from thermal._types import FloatArray
 from thermal.effects.effect import PAIR, Effect, Joining, paired, strength, without_facades
-from thermal.network import Anatomy, Room
-from thermal.inputs import WIND, Drivers, Signal
-
-FloatArray = NDArray[np.float64]
+from thermal.inputs.drivers import WIND, Drivers, Signal
+from thermal.network.topology import Anatomy, Room
 
 #: Wind speed [m/s], root of temperature difference [K^0.5] and presence [-] at which a varying exchange is part of K;
 #: what they differ from it acts as heat at usual zone temperatures. Unmeasured wind blows at this speed. Windows are no

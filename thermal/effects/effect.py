@@ -7,15 +7,14 @@ from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from thermal._types import FloatArray, IntArray
 from thermal.errors import EffectError, nearest
-from thermal.network import Anatomy, GraphBuilder, Room
+from thermal.inputs.drivers import Drivers, Signal
+from thermal.network.graph import GraphBuilder
+from thermal.network.topology import Anatomy, Room
 from thermal.parameters import Parameter, Scale
-from thermal.inputs import Drivers, Signal
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 _Part = tuple[IntArray, FloatArray]
 
 #: Adds an effect to a graph, in some of its zones (all of them when there are none).

@@ -6,13 +6,11 @@ from functools import partial
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from thermal._types import FloatArray
 from thermal.effects.effect import CONSTANT, Effect, Joining, hat, shape, strength
-from thermal.inputs import Drivers, Signal
+from thermal.inputs.drivers import Drivers, Signal
 from thermal.units import AIR_HEAT_CAPACITY
-
-FloatArray = NDArray[np.float64]
 
 #: Heat that a sensor takes up in a minute over that of the zone's air [-]: too little to cool the zone, and enough for
 #: a reduced model to see.

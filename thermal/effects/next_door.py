@@ -6,11 +6,11 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal._types import FloatArray
 from thermal.effects.effect import CONSTANT, Effect, Joining, paired, shape, strength, without_facades
-from thermal.network import RATED_OUTSIDE_FILM, UPWARD, Anatomy, OuterFaces, Outlook, Room
-from thermal.inputs import REFERENCE_TEMPERATURE, Drivers, Signal
-
-FloatArray = NDArray[np.float64]
+from thermal.inputs.drivers import REFERENCE_TEMPERATURE, Drivers, Signal
+from thermal.network.materials import RATED_OUTSIDE_FILM
+from thermal.network.topology import UPWARD, Anatomy, OuterFaces, Outlook, Room
 
 
 def _zero(drivers: Drivers) -> FloatArray:

@@ -6,13 +6,11 @@ from functools import partial
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
+from thermal._types import FloatArray
 from thermal.effects.effect import CONSTANT, Effect, Joining, strength
-from thermal.network import Anatomy
-from thermal.inputs import INFRARED, WIND, Drivers, Signal
-
-FloatArray = NDArray[np.float64]
+from thermal.inputs.drivers import INFRARED, WIND, Drivers, Signal
+from thermal.network.topology import Anatomy
 
 
 def _sky(drivers: Drivers) -> FloatArray:

@@ -5,12 +5,10 @@ from __future__ import annotations
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermal._types import FloatArray
 from thermal.effects.effect import CONSTANT, Effect, Joining, shape, strength
-from thermal.inputs import Drivers, Signal
-
-FloatArray = NDArray[np.float64]
+from thermal.inputs.drivers import Drivers, Signal
 
 
 def _slope(values: FloatArray, step: float) -> FloatArray:

@@ -6,13 +6,11 @@ from functools import partial
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from thermal._types import FloatArray
 from thermal.effects.effect import Effect, Joining, hat, shape, strength
-from thermal.network import Anatomy
-from thermal.inputs import IRRADIANCE, Drivers, Signal
-
-FloatArray = NDArray[np.float64]
+from thermal.inputs.drivers import IRRADIANCE, Drivers, Signal
+from thermal.network.topology import Anatomy
 
 _ASHRAE = "ASHRAE Fundamentals 2017, ch. 15 (fenestration)"
 

@@ -20,7 +20,7 @@ def catalogue_table(effects: Iterable[Effect]) -> str:
 
     Examples
     --------
-    >>> from thermal.effects import CATALOGUE
+    >>> from thermal.effects.catalogue import CATALOGUE
     >>> print(catalogue_table([CATALOGUE["latent_load"]]).splitlines()[2][:70])
     | `latent_load` | heat that evaporating water takes: -L A occ(t) | air
     """

@@ -8,8 +8,8 @@ from typing import Any
 
 import casadi
 import numpy as np
-from numpy.typing import NDArray
 
+from thermal._types import FloatArray
 from thermal.hvac._air_handler import Mixed, Warmed
 from thermal.hvac._boiler import Heated
 from thermal.hvac._central import Circulated, DirectCentral, Supplied
@@ -17,8 +17,6 @@ from thermal.hvac._operations import CasadiOperations
 from thermal.hvac._settings import Settings
 from thermal.hvac._step import Conditions
 from thermal.hvac._system import HvacSystem
-
-FloatArray = NDArray[np.float64]
 
 _AIR, _COIL, _LOOP = len(Mixed._fields), len(Warmed._fields), len(Heated._fields)
 

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal._types import FloatArray
 from thermal.errors import HvacActionError, describe
 from thermal.hvac._advance import advance
 from thermal.hvac._checks import action, scalar_action
@@ -17,7 +18,6 @@ from thermal.hvac._step import Actions, Calls, Conditions, HvacStep
 from thermal.hvac._system import HvacSystem
 from thermal.hvac._thermostat import Mode, ModeArray
 
-FloatArray = NDArray[np.float64]
 _Limits = tuple[str, str, float, float]  # name, unit, lowest, highest
 _AIR = (233.15, 353.15)  # K, of rooms: what lies outside is a fault of the caller's
 _COLDEST, _HOTTEST = 193.15, 338.15  # K, outdoors
@@ -68,7 +68,11 @@ class HvacPlant:
 
     Examples
     --------
-    >>> from thermal.hvac import Actions, AirHandler, BoilerLoop, Conditions, Fan, Pump, Terminals
+    >>> from thermal.hvac._air_handler import AirHandler
+    >>> from thermal.hvac._boiler import BoilerLoop, Pump
+    >>> from thermal.hvac._fan import Fan
+    >>> from thermal.hvac._step import Actions, Conditions
+    >>> from thermal.hvac._terminals import Terminals
     >>> system = HvacSystem((AirHandler(Fan(1.0)),), BoilerLoop(2e4, Pump(0.5)), Terminals.sized([0.5, 0.5], 4000.0))
     >>> plant = HvacPlant(system)
     >>> cold = np.array([292.0, 296.0])

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermal._types import FloatArray
 from thermal.errors import HvacParameterError, describe
 from thermal.hvac._air_handler import Heater
 from thermal.hvac._coil import valve_position
@@ -14,8 +14,6 @@ from thermal.hvac._operations import StepOperations
 from thermal.hvac._settings import Settings, settings_of
 from thermal.hvac._step import Actions, Conditions, HvacStep
 from thermal.hvac._system import HvacSystem
-
-FloatArray = NDArray[np.float64]
 
 _LEAST = 1e-6  # kg/s: less air is none, and the dampers of an air handler that is off are shut
 _TERMINAL = (

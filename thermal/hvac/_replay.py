@@ -9,15 +9,14 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermal._types import FloatArray
 from thermal.hvac._air_handler import AirHandler, Heater, Mixed
 from thermal.hvac._boiler import BoilerLoop
 from thermal.hvac._coil import LEAST_FLOW, heat_share, valve_flow, water_share
 from thermal.hvac._operations import FloatOperations, NumpyOperations
 from thermal.hvac._terminals import Terminals, heat_rate
 
-FloatArray = NDArray[np.float64]
 _LEAST = 1e-9
 
 

@@ -10,13 +10,12 @@ import casadi
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal._types import FloatArray
 from thermal.hvac._advance import advance
 from thermal.hvac._operations import CasadiOperations, Value
 from thermal.hvac._settings import settings_of
 from thermal.hvac._step import Actions, Calls, Conditions, HvacStep
 from thermal.hvac._system import HvacSystem
-
-FloatArray = NDArray[np.float64]
 
 
 class _SumOperations(CasadiOperations):
@@ -129,7 +128,10 @@ class SmoothHvac:
 
     Examples
     --------
-    >>> from thermal.hvac import AirHandler, BoilerLoop, Fan, Pump, Terminals
+    >>> from thermal.hvac._air_handler import AirHandler
+    >>> from thermal.hvac._boiler import BoilerLoop, Pump
+    >>> from thermal.hvac._fan import Fan
+    >>> from thermal.hvac._terminals import Terminals
     >>> system = HvacSystem((AirHandler(Fan(1.0)),), BoilerLoop(2e4, Pump(0.5)), Terminals.sized([0.5], 4000.0))
     >>> smooth = SmoothHvac(system)
     >>> smooth.knobs.size, smooth.n_sum

@@ -43,7 +43,11 @@ def hvac_function(system: HvacSystem, width: float = 0.02) -> Any:
 
     Examples
     --------
-    >>> from thermal.hvac import AirHandler, BoilerLoop, Fan, HvacSystem, Pump, Terminals
+    >>> from thermal.hvac._air_handler import AirHandler
+    >>> from thermal.hvac._boiler import BoilerLoop, Pump
+    >>> from thermal.hvac._fan import Fan
+    >>> from thermal.hvac._system import HvacSystem
+    >>> from thermal.hvac._terminals import Terminals
     >>> system = HvacSystem((AirHandler(Fan(1.0)),), BoilerLoop(2e4, Pump(0.5)), Terminals.sized([0.5], 4000.0))
     >>> hvac_function(system).name_out()[:2]
     ['water_end', 'heat']

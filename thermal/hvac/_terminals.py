@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from thermal._types import FloatArray
 from thermal.errors import HvacParameterError, describe
 from thermal.hvac._air import WATER_HEAT_CAPACITY
 from thermal.hvac._checks import all_in_range, fields_in_range, in_range
@@ -17,7 +18,6 @@ from thermal.hvac._kept import LastValue
 from thermal.hvac._operations import NumpyOperations, Operations, Value
 from thermal.units import AIR_HEAT_CAPACITY
 
-FloatArray = NDArray[np.float64]
 _LEAST = 1e-9  # K, W/K, kg/s: next to nothing
 
 

@@ -8,10 +8,10 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal._types import FloatArray
 from thermal.hvac._checks import fields_in_range
 from thermal.hvac._operations import Operations, Value
 
-FloatArray = NDArray[np.float64]
 ModeArray = NDArray[np.int8]
 
 

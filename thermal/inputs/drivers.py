@@ -8,15 +8,13 @@ from functools import cached_property
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
-from thermal.case import Case
+from thermal._types import FloatArray
+from thermal.case.case import Case
 from thermal.case.points import DISCHARGE_TEMPERATURE, SUPPLY_FLOW
 from thermal.errors import EffectError
 from thermal.inputs.sun import Sun, suffices, sun_of
 from thermal.units import AIR_HEAT_CAPACITY
-
-FloatArray = NDArray[np.float64]
 
 #: Temperature from which states, boundaries and signals that stand for a temperature are counted in a replay [K].
 REFERENCE_TEMPERATURE = 293.15

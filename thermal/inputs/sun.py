@@ -6,12 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
+from thermal._types import FloatArray
 from thermal.case.schema import Location
 from thermal.errors import EffectError
-
-FloatArray = NDArray[np.float64]
 
 #: Reflectance of the ground [-]: grass and worn concrete (ASHRAE Fundamentals 2017, ch. 14, table 5).
 GROUND_REFLECTANCE = 0.2

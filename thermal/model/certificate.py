@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermal._types import FloatArray
 from thermal.model.scheme import IMPLICIT_EULER
 from thermal.model.stepper import Stepper
 from thermal.model.symbolic import Matrices
-
-FloatArray = NDArray[np.float64]
 
 #: Length [h] and step [s] of the replay.
 _HOURS, _STEP = 48.0, 300.0

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from thermal._types import FloatArray
 
 #: Most numbers of an array of fading sums: they are gone over again and again, so that they should fit the cache.
 _LARGEST = 2**18

@@ -10,7 +10,7 @@ import scipy.sparse as sp
 import scipy.sparse.linalg as spl
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from thermal._types import FloatArray
 
 #: Entries of the factors below this share of their column are left out [-]. What one volume passes on decays with every
 #: volume between, so up to two fifths of the complete factors lie below it; double precision ends at 1e-16.

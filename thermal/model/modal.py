@@ -10,13 +10,13 @@ import numpy as np
 import scipy.linalg as sl
 from numpy.typing import NDArray
 
+from thermal._types import FloatArray
 from thermal.errors import ModelError, SingularModelError
 from thermal.model.scheme import EXACT, Scheme
 
 if TYPE_CHECKING:
     from thermal.model.symbolic import Matrices
 
-FloatArray = NDArray[np.float64]
 
 #: Shift that keeps a building without any path to the outside regular [1/s]: three years.
 SHIFT = 1e-8
@@ -77,7 +77,10 @@ class ModalModel:
 
     Examples
     --------
-    >>> from thermal import build_network, load_bundled_case, reduced_model, SymbolicModel
+    >>> from thermal.data import load_bundled_case
+    >>> from thermal.model.reduce import reduced_model
+    >>> from thermal.model.symbolic import SymbolicModel
+    >>> from thermal.network.build import build_network
     >>> grid = SymbolicModel(build_network(load_bundled_case().building, dx=1.0))
     >>> modes = modal_model(reduced_model(grid, [grid.network.start()]).matrices(grid.network.start()))
     >>> bool((modes.propagator(300.0).end < 1.0).all())

@@ -14,16 +14,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal.model.modal import SHIFT, divided_differences, modal_model, propagator_functions
+from thermal._types import FloatArray
 from thermal.model.convolution import all_fading_sums, fading_sums, rows_of
-from thermal.model.prescribed import HeldFrame, scan
+from thermal.model.modal import SHIFT, divided_differences, modal_model, propagator_functions
 from thermal.model.modal_sensitivities import ModalSlopes
+from thermal.model.prescribed import HeldFrame, scan
 from thermal.model.scheme import IMPLICIT_EULER, Scheme
 
 if TYPE_CHECKING:
     from thermal.model.symbolic import Matrices
-
-FloatArray = NDArray[np.float64]
 
 
 class ModalRuns:

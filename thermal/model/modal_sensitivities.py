@@ -12,15 +12,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 
+from thermal._types import FloatArray, IntArray
 from thermal.model.modal import SHIFT, ModalModel
 
 if TYPE_CHECKING:
     from thermal.model.symbolic import Matrices, Matrix
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 
 @dataclass(frozen=True)

@@ -7,13 +7,10 @@ From its start on, a run is the path of one long run plus the difference of thei
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermal._types import FloatArray, IntArray
 from thermal.model.modal import ModalModel
 from thermal.model.scheme import Scheme
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 
 def run_along(

@@ -6,9 +6,8 @@ import numpy as np
 import scipy.linalg as sl
 from numpy.typing import NDArray
 
+from thermal._types import FloatArray
 from thermal.model.modal import SHIFT, ModalModel
-
-FloatArray = NDArray[np.float64]
 
 
 class HeldFrame:

@@ -9,14 +9,13 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from thermal._types import FloatArray
 from thermal.errors import ModelError
 from thermal.model.certificate import Certificate, Replay, closed_loop, differences
 from thermal.model.factor import Elimination
 from thermal.model.modal import modal_model
 from thermal.model.stepper import factorise
 from thermal.model.symbolic import Matrices, Matrix, SymbolicModel, congruent
-
-FloatArray = NDArray[np.float64]
 
 #: Expansion points of the transfer function [1/s]: a month, a day, eight hours, an hour, ten minutes and two minutes.
 SHIFTS = (1.0 / 2.6e6, 1.0 / 86400.0, 1.0 / 28800.0, 1.0 / 3600.0, 1.0 / 600.0, 1.0 / 120.0)
@@ -226,7 +225,8 @@ def reduced_model(
 
     Examples
     --------
-    >>> from thermal import build_network, load_bundled_case
+    >>> from thermal.data import load_bundled_case
+    >>> from thermal.network.build import build_network
     >>> grid = SymbolicModel(build_network(load_bundled_case().building, dx=1.0))
     >>> reduced_model(grid, [grid.network.start()], order=20).certificate.max_difference < 0.1
     True

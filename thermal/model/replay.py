@@ -9,17 +9,15 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from thermal.case import Case
+from thermal._types import FloatArray, IntArray
+from thermal.case.case import Case
 from thermal.errors import SimulationError
+from thermal.inputs.drivers import REFERENCE_TEMPERATURE, Drivers, signal_values
 from thermal.model.modal_series import run_along
 from thermal.model.scheme import IMPLICIT_EULER, Scheme
 from thermal.model.stepper import Stepper
 from thermal.model.symbolic import Matrices
-from thermal.network import ThermalNetwork
-from thermal.inputs import REFERENCE_TEMPERATURE, Drivers, signal_values
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+from thermal.network.network import ThermalNetwork
 
 #: Longest gap of an input that is bridged by a straight line [s] (results contract: 30 minutes).
 LONGEST_BRIDGE = 1800.0

@@ -9,15 +9,13 @@ from typing import Literal
 import casadi as ca
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 
+from thermal._types import FloatArray
 from thermal.errors import InputShapeError, ModelError
 from thermal.model.scheme import IMPLICIT_EULER, Scheme, Stage
 from thermal.model.stepper import Stepper
 from thermal.model.symbolic import Matrix, SymbolicModel
 from thermal.units import AIR_HEAT_CAPACITY
-
-FloatArray = NDArray[np.float64]
 
 #: Beyond this many volumes the symbolic executor's LDL factors and tapes outgrow it (measured: 6,000 volumes).
 LARGEST_SYMBOLIC = 8000

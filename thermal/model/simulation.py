@@ -7,15 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
-from thermal.case import Case
+from thermal._types import FloatArray
+from thermal.case.case import Case
 from thermal.errors import SimulationError
 from thermal.model.replay import LEAST_SPIN_UP, SPIN_UP, free_runs, replay_inputs, spin_up
 from thermal.model.scheme import IMPLICIT_EULER, Scheme
 from thermal.model.symbolic import SymbolicModel
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -8,18 +8,20 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal.case import Building, Case
+from thermal._types import FloatArray
+from thermal.case.building import Building
+from thermal.case.case import Case
 from thermal.errors import InputShapeError, ModelError
+from thermal.inputs.drivers import REFERENCE_TEMPERATURE
 from thermal.model.replay import LEAST_SPIN_UP, SPIN_UP, replay_inputs, spin_up
 from thermal.model.scheme import SCHEMES
 from thermal.model.stepper import Stepper
 from thermal.model.symbolic import Matrices, SymbolicModel
-from thermal.network import SHUFFLE_STEP, Extension, build_network
+from thermal.network.build import build_network
+from thermal.network.extension import Extension
+from thermal.network.materials import SHUFFLE_STEP
 from thermal.parameters import Scope
-from thermal.shuffle import RandomShuffle
-from thermal.inputs import REFERENCE_TEMPERATURE
-
-FloatArray = NDArray[np.float64]
+from thermal.shuffle.random import RandomShuffle
 
 #: One long implicit step to the steady state of a reset [s], three years.
 _STEADY_STEP = 1e8
@@ -66,7 +68,8 @@ class Simulator:
 
     Examples
     --------
-    >>> from thermal import Simulator, load_bundled_case
+    >>> from thermal.data import load_bundled_case
+    >>> from thermal.model.simulator import Simulator
     >>> plant = Simulator(load_bundled_case().building, dx=1.0)
     >>> start = plant.reset(np.full(5, 293.15), np.array([273.15]))
     >>> bool((plant.step(np.zeros(5), np.array([273.15])) < start).all())

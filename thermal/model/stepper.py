@@ -10,13 +10,12 @@ import scipy.linalg as sl
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from thermal._types import FloatArray
 from thermal.errors import ModelError, SingularModelError
 from thermal.model.factor import Elimination, SparseSolver
 from thermal.model.scheme import IMPLICIT_EULER, Scheme, Stage
 from thermal.model.symbolic import Matrices, Matrix
 from thermal.units import AIR_HEAT_CAPACITY
-
-FloatArray = NDArray[np.float64]
 
 
 class Stepper:

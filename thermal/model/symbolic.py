@@ -9,15 +9,12 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 
+from thermal._types import FloatArray, IntArray
 from thermal.errors import ModelError
 from thermal.model.factor import Elimination
 from thermal.model.modal_runs import ModalRuns
-from thermal.network import ConductanceClass, ThermalNetwork
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+from thermal.network.network import ConductanceClass, ThermalNetwork
 
 #: A csr_matrix on the grid, an ndarray when reduced; the stubs of scipy cannot type products with such a union.
 Matrix = Any
@@ -110,7 +107,9 @@ class SymbolicModel:
 
     Examples
     --------
-    >>> from thermal import load_bundled_case, build_network, SymbolicModel
+    >>> from thermal.data import load_bundled_case
+    >>> from thermal.model.symbolic import SymbolicModel
+    >>> from thermal.network.build import build_network
     >>> model = SymbolicModel(build_network(load_bundled_case().building, dx=1.0))
     >>> model.matrices(model.network.start()).n > 100
     True

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermal._types import FloatArray, IntArray
 from thermal.errors import StructureError
 from thermal.network.floor import Floor
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 #: Share of a cell below which what its chains leave to its middle is round-off [-].
 _ROUND_OFF = 1e-9

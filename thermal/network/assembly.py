@@ -5,16 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 
+from thermal._types import FloatArray, IntArray
 from thermal.network.extension import Extension
 from thermal.network.graph import GraphBuilder
 from thermal.network.network import ThermalNetwork
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 
 @dataclass(frozen=True)

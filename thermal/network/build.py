@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal.case import Building, ZoneTable
+from thermal.case.building import Building, ZoneTable
 from thermal.network.assembly import Blueprint
 from thermal.network.extension import Extension
 from thermal.network.network import ThermalNetwork
@@ -62,7 +62,8 @@ def build_network(
 
     Examples
     --------
-    >>> from thermal import Structure, load_bundled_case
+    >>> from thermal.data import load_bundled_case
+    >>> from thermal.network.structure import Structure
     >>> building = load_bundled_case().building
     >>> network = build_network(building, dx=1.0, scopes={"window_u_value": "facade"}, structure=Structure.paper())
     >>> [p.member for p in network.parameters if p.base == "window_u_value"]
@@ -103,8 +104,8 @@ def blueprint(
 
     Examples
     --------
-    >>> from thermal import load_bundled_case
-    >>> from thermal.effects import chosen
+    >>> from thermal.data import load_bundled_case
+    >>> from thermal.effects.catalogue import chosen
     >>> baseline = blueprint(load_bundled_case().building, dx=1.0)
     >>> len(baseline.network().signals), len(baseline.network(chosen({"solar_gain": ()})).signals) > 0
     (0, True)

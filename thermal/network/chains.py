@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from thermal.case import Layer
-
-FloatArray = NDArray[np.float64]
+from thermal._types import FloatArray
+from thermal.case.schema import Layer
 
 #: Time that a sublayer must resolve [s]: its thickness is at most sqrt(diffusivity x this), a Fourier number of one.
 SUBLAYER_TIME = 1800.0

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal.case import Surface
+from thermal.case.schema import Surface
 from thermal.errors import ScopeError
 from thermal.network.grid import FACADES, FloorGrid
 

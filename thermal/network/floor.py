@@ -6,17 +6,15 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal.case import FloorPlan
+from thermal._types import FloatArray, IntArray
+from thermal.case.building import FloorPlan
 from thermal.errors import ModelError
 from thermal.network.graph import GraphBuilder
 from thermal.network.grid import FACADES, FloorGrid
 from thermal.network.interior import Zone
 from thermal.network.materials import AIR_CONDUCTIVITY, SHUFFLE_STEP
-from thermal.shuffle import choose_equivalent, effective_diffusivity, exchange_rate, mean_square_reach
+from thermal.shuffle.equivalent import choose_equivalent, effective_diffusivity, exchange_rate, mean_square_reach
 from thermal.units import AIR_HEAT_CAPACITY
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 
 class Floor:

@@ -11,15 +11,13 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from thermal._types import FloatArray, IntArray
 from thermal.errors import ScopeError
-from thermal.network.topology import Anatomy
+from thermal.inputs.drivers import Signal
 from thermal.network.network import CapacityClass, ConductanceClass, ThermalNetwork
 from thermal.network.structure import BASELINE, Structure
+from thermal.network.topology import Anatomy
 from thermal.parameters import ENVELOPE_PARAMETERS, FACADE_PREFIX, PARAMETERS, Parameter, Scope
-from thermal.inputs import Signal
-
-IntArray = NDArray[np.int64]
-FloatArray = NDArray[np.float64]
 
 
 class GraphBuilder:

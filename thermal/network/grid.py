@@ -10,10 +10,9 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
-from thermal.case import FloorPlan
+from thermal._types import IntArray
+from thermal.case.building import FloorPlan
 from thermal.errors import CellSizeError
-
-IntArray = NDArray[np.int64]
 
 #: Steps (row, column) towards the plan's sides; north is the first row.
 FACADES: dict[str, tuple[int, int]] = {"north": (-1, 0), "south": (1, 0), "west": (0, -1), "east": (0, 1)}

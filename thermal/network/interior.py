@@ -6,10 +6,10 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal.network.topology import VERTICAL, OuterFaces, Outlook, Pane, Room
 from thermal.network.films import series, surface_mesh
 from thermal.network.graph import GraphBuilder
 from thermal.network.materials import RATED_OUTSIDE_FILM, WINDOW_RATED_FILM
+from thermal.network.topology import VERTICAL, OuterFaces, Outlook, Pane, Room
 
 #: Parameters of the inside films with a radiant node, and of the one film without.
 _FILMS = {True: ("interior_film_coefficient", "radiant_coefficient"), False: ("combined_film_coefficient",)}

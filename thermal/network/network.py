@@ -11,13 +11,11 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from thermal._types import FloatArray, IntArray
 from thermal.errors import ModelError
+from thermal.inputs.drivers import Signal
 from thermal.network.topology import Anatomy
 from thermal.parameters import Parameter
-from thermal.inputs import Signal
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 
 @dataclass(frozen=True)

@@ -7,20 +7,20 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal.case import Building, FloorPlans, facade_areas, zone_floor_areas
+from thermal._types import FloatArray
+from thermal.case.areas import facade_areas, zone_floor_areas
+from thermal.case.building import Building, FloorPlans
 from thermal.errors import ModelError
-from thermal.network.topology import UNKNOWN_GLAZING, VERTICAL, Pane, azimuth_of, partition_areas, stacked_areas
 from thermal.network.assembly import Blueprint
 from thermal.network.floor import Floor
 from thermal.network.graph import GraphBuilder
 from thermal.network.grid import floor_grid
 from thermal.network.interior import Zone
 from thermal.network.structure import BASELINE, Structure
+from thermal.network.topology import UNKNOWN_GLAZING, VERTICAL, Pane, azimuth_of, partition_areas, stacked_areas
 from thermal.network.walls import Walls
 from thermal.parameters import Scope
 from thermal.units import AIR_HEAT_CAPACITY, air_density
-
-FloatArray = NDArray[np.float64]
 
 
 def plan_blueprint(

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 import casadi as ca
 import numpy as np
 
-from thermal.case import Building, Layer, Surface, ZoneTable
-from thermal.network.topology import DOWNWARD, UPWARD, VERTICAL, GroundFace, OuterFaces, Outlook, Pane
+from thermal.case.building import Building, ZoneTable
+from thermal.case.schema import Layer, Surface
 from thermal.network.assembly import Blueprint
 from thermal.network.chains import Chain
 from thermal.network.facades import facade_of
@@ -22,6 +22,7 @@ from thermal.network.materials import (
     WINDOW_RATED_FILM,
 )
 from thermal.network.structure import BASELINE, Structure
+from thermal.network.topology import DOWNWARD, UPWARD, VERTICAL, GroundFace, OuterFaces, Outlook, Pane
 from thermal.parameters import Scope
 from thermal.units import AIR_HEAT_CAPACITY, air_density
 

@@ -10,10 +10,8 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal.case import FloorPlan, FloorPlans
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+from thermal._types import FloatArray, IntArray
+from thermal.case.building import FloorPlan, FloorPlans
 
 #: Tilt of a vertical, an upward and a downward face [deg].
 VERTICAL, UPWARD, DOWNWARD = 90.0, 0.0, 180.0

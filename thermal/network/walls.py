@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal.network.topology import VERTICAL, OuterFaces, Outlook, azimuth_of
+from thermal._types import FloatArray, IntArray
 from thermal.network.arms import Arms
 from thermal.network.facades import wall_facades
 from thermal.network.films import series
@@ -17,9 +17,7 @@ from thermal.network.floor import Floor
 from thermal.network.grid import FACADES
 from thermal.network.interior import Zone
 from thermal.network.materials import EXTERIOR_WALL_MASS, INTERIOR_WALL_MASS, STRUCTURE_RESISTANCE
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+from thermal.network.topology import VERTICAL, OuterFaces, Outlook, azimuth_of
 
 #: Walls by token.
 _KINDS = {"#": "exterior_wall", "+": "interior_wall"}

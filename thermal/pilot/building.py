@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from thermal.case import Building
+from thermal.case.building import Building
 from thermal.pilot.layout import devices, generate_office
 from thermal.pilot.weather import MOUNTAIN_VIEW
 

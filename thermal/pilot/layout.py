@@ -7,9 +7,8 @@ from types import MappingProxyType
 import numpy as np
 import numpy.typing as npt
 
-from thermal.case import Device, FloorPlan, FloorPlans
-from thermal.case.building import EXTERIOR_WALL, INTERIOR_WALL, OUTSIDE
-from thermal.case.schema import FACADES
+from thermal.case.building import EXTERIOR_WALL, INTERIOR_WALL, OUTSIDE, FloorPlan, FloorPlans
+from thermal.case.schema import FACADES, Device
 from thermal.pilot.errors import LayoutError
 from thermal.pilot.outline import Mask, draw_outline, exterior_ring
 from thermal.pilot.partition import partition

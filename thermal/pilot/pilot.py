@@ -8,9 +8,13 @@ from pathlib import Path
 
 import pandas as pd
 
-from thermal.case import Building, Case, Location, load_case, save_case
+from thermal.case.building import Building
+from thermal.case.case import Case
+from thermal.case.load import load_case
+from thermal.case.save import save_case
+from thermal.case.schema import Location
 from thermal.errors import CaseExistsError, describe
-from thermal.model import Simulator
+from thermal.model.simulator import Simulator
 from thermal.pilot.layout import devices, generate_office
 from thermal.pilot.telemetry import Plant, Progress, generate_telemetry
 from thermal.pilot.weather import MOUNTAIN_VIEW, generate_weather

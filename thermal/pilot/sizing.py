@@ -7,11 +7,20 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from thermal.case import Building, FloorPlans, ZoneTable, zone_floor_areas
+from thermal.case.areas import zone_floor_areas
+from thermal.case.building import Building, FloorPlans, ZoneTable
 from thermal.errors import HvacParameterError, describe
-from thermal.hvac import AirHandler, BoilerLoop, CoolingCoil, Fan, HvacSystem, Pump, Terminals, Thermostat, WaterCoil
-from thermal.model import Stepper, SymbolicModel
-from thermal.network import build_network
+from thermal.hvac._air_handler import AirHandler
+from thermal.hvac._boiler import BoilerLoop, Pump
+from thermal.hvac._coil import WaterCoil
+from thermal.hvac._cooling import CoolingCoil
+from thermal.hvac._fan import Fan
+from thermal.hvac._system import HvacSystem
+from thermal.hvac._terminals import Terminals
+from thermal.hvac._thermostat import Thermostat
+from thermal.model.stepper import Stepper
+from thermal.model.symbolic import SymbolicModel
+from thermal.network.build import build_network
 from thermal.units import AIR_HEAT_CAPACITY, air_density
 
 Series = npt.NDArray[np.float64]
@@ -96,7 +105,7 @@ def size_system(
 
     Examples
     --------
-    >>> from thermal import load_bundled_case
+    >>> from thermal.data import load_bundled_case
     >>> system = size_system(load_bundled_case().building)
     >>> len(system.terminals), bool(system.loop.capacity > 0.0)
     (5, True)

@@ -9,8 +9,10 @@ import numpy as np
 import numpy.typing as npt
 import pandas as pd
 
-from thermal.case import FloorPlans, Telemetry, zone_floor_areas
+from thermal.case.areas import zone_floor_areas
+from thermal.case.building import FloorPlans
 from thermal.case.points import DISCHARGE_TEMPERATURE, OUTDOOR_TEMPERATURE, SUPPLY_FLOW, ZONE_TEMPERATURE
+from thermal.case.telemetry import Telemetry
 from thermal.pilot.errors import ClosedLoopError
 from thermal.pilot.thermostat import Terminals, Thermostats, draw_thermostats, size_terminals
 from thermal.units import AIR_HEAT_CAPACITY

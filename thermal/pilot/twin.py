@@ -11,19 +11,22 @@ import numpy.typing as npt
 import pandas as pd
 from scipy.special import ndtr, ndtri
 
-from thermal.case import Building, Case, FloorPlans, Telemetry, zone_floor_areas
+from thermal.case.areas import zone_floor_areas
+from thermal.case.building import Building, FloorPlans
+from thermal.case.case import Case
 from thermal.case.points import DISCHARGE_TEMPERATURE, OUTDOOR_TEMPERATURE, SUPPLY_FLOW, ZONE_TEMPERATURE
+from thermal.case.telemetry import Telemetry
 from thermal.errors import nearest
-from thermal.model import Simulator
-from thermal.network import build_network
+from thermal.model.simulator import Simulator
+from thermal.network.build import build_network
 from thermal.parameters import Parameter, Scope
-from thermal.pilot.errors import TwinError
-from thermal.pilot.truth import TwinRanges, TwinTruth
 from thermal.pilot.disturbance import draw_disturbance
+from thermal.pilot.errors import TwinError
 from thermal.pilot.layout import devices
 from thermal.pilot.prbs import draw_prbs_thermostats
 from thermal.pilot.telemetry import Progress, generate_telemetry
 from thermal.pilot.thermostat import draw_thermostats
+from thermal.pilot.truth import TwinRanges, TwinTruth
 from thermal.pilot.weather import generate_weather
 from thermal.units import AIR_HEAT_CAPACITY
 
@@ -151,7 +154,7 @@ def generate_twin(
 
     Examples
     --------
-    >>> from thermal import load_bundled_case
+    >>> from thermal.data import load_bundled_case
     >>> case, truth = generate_twin(load_bundled_case().building, 3, days=1.0, spin_up_days=1.0, dx=1.0)
     >>> case.zone_heat().shape == truth.heat.shape
     True

@@ -8,7 +8,7 @@ import pandas as pd
 import pvlib
 from scipy.signal import lfilter
 
-from thermal.case import Location
+from thermal.case.schema import Location
 from thermal.pilot.errors import ClosedLoopError
 
 Series = npt.NDArray[np.float64]

@@ -6,13 +6,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import fftconvolve
 
+from thermal._types import FloatArray
 from thermal.errors import PlanSettingError, describe
 from thermal.plan.cells import ZonedFloor
-
-FloatArray = NDArray[np.float64]
 
 _GRID = 0.1  # m, on which outlines are compared
 _LEAST_OVERLAP = 0.6  # -, of the smaller floor; below it outlines say nothing

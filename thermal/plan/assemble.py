@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from thermal.case import FloorPlan, FloorPlans
+from thermal.case.building import FloorPlan, FloorPlans
 from thermal.case.plan import check_plan
 from thermal.errors import LostRoomError, PlanSettingError, RoomNameError, describe
 from thermal.plan.align import align_floors

@@ -7,7 +7,8 @@ from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 
-from thermal.case import Case, load_case
+from thermal.case.case import Case
+from thermal.case.load import load_case
 from thermal.case.points import point_type
 from thermal.case.telemetry_file import check_units, read_telemetry
 from thermal.errors import PointListError, describe

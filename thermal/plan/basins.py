@@ -12,16 +12,12 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.sparse.csgraph import connected_components
 
+from thermal._types import BoolArray, Float32Array, FloatArray, Int32Array, IntArray
 from thermal.plan.extra import extra
 from thermal.plan.survey import PlanSettings
-
-IntArray = NDArray[np.int32]
-FloatArray = NDArray[np.float32]
-Mask = NDArray[np.bool_]
 
 _PEAK_REACH = 0.15  # m: lower peaks of the distance within this are part of a higher one's basin
 _WIDENS = 1.12  # -, of a door's width, reached close behind it: a corridor is at least that much wider than its doors
@@ -43,12 +39,12 @@ class Basins:
         Two pieces, width [m], row and column [px] of each gap between them.
     """
 
-    pieces: IntArray
+    pieces: Int32Array
     outside: int
     saddles: list[tuple[int, int, float, int, int]]
 
 
-def find_basins(walls: Mask, pixel: float, settings: PlanSettings) -> Basins:
+def find_basins(walls: BoolArray, pixel: float, settings: PlanSettings) -> Basins:
     """Cut free space into rooms at the doors.
 
     Parameters
@@ -73,7 +69,7 @@ def find_basins(walls: Mask, pixel: float, settings: PlanSettings) -> Basins:
     peaks = (ndimage.maximum_filter(distance, size) == distance) & ~walls
     markers, _ = ndimage.label(peaks, np.ones((3, 3)))
     watershed = extra("skimage.segmentation").watershed
-    cut: IntArray = watershed(-distance, markers, mask=~walls).astype(np.int32)
+    cut: Int32Array = watershed(-distance, markers, mask=~walls).astype(np.int32)
     first, second, half, place = _interfaces(cut, distance)
     roots = _join_wide(int(cut.max()), first, second, 2.0 * half > settings.widest_door)
     outside = int(roots[cut[0, 0]])
@@ -94,12 +90,12 @@ def find_basins(walls: Mask, pixel: float, settings: PlanSettings) -> Basins:
             roots[roots == b] = a
             outside = a if outside == b else outside
     saddles = [(int(roots[a]), int(roots[b]), *rest) for a, b, *rest in kept if roots[a] != roots[b]]
-    joined: IntArray = roots[cut].astype(np.int32)
+    joined: Int32Array = roots[cut].astype(np.int32)
     joined[closed] = 0
     return Basins(joined, outside, saddles)
 
 
-def _interfaces(cut: IntArray, distance: FloatArray) -> tuple[IntArray, IntArray, FloatArray, NDArray[np.int64]]:
+def _interfaces(cut: Int32Array, distance: Float32Array) -> tuple[Int32Array, Int32Array, Float32Array, IntArray]:
     """Pairs of pieces that touch, the largest distance from the walls where they do [m], and the place of that."""
     index = np.arange(cut.size).reshape(cut.shape)
     sides = []
@@ -116,7 +112,7 @@ def _interfaces(cut: IntArray, distance: FloatArray) -> tuple[IntArray, IntArray
     return low[new], high[new], depth[new], place[new]
 
 
-def _join_wide(count: int, first: IntArray, second: IntArray, wide: Mask) -> IntArray:
+def _join_wide(count: int, first: Int32Array, second: Int32Array, wide: BoolArray) -> Int32Array:
     """Give pieces that are joined by more than a door one number; returns it by piece."""
     ones = np.ones(int(wide.sum()))
     graph = sp.coo_matrix((ones, (first[wide], second[wide])), shape=(count + 1, count + 1))
@@ -126,9 +122,9 @@ def _join_wide(count: int, first: IntArray, second: IntArray, wide: Mask) -> Int
 
 
 def _widens(
-    cut: IntArray,
-    distance: FloatArray,
-    roots: IntArray,
+    cut: Int32Array,
+    distance: Float32Array,
+    roots: Int32Array,
     sides: tuple[int, int],
     place: tuple[int, int],
     half: float,
@@ -140,10 +136,10 @@ def _widens(
     return all(float(depth[around == side].max(initial=0.0)) >= _WIDENS * half for side in sides)
 
 
-def _jamb(walls: Mask, nearest: IntArray, place: tuple[int, int], thickest: float) -> NDArray[np.float64] | None:
+def _jamb(walls: BoolArray, nearest: Int32Array, place: tuple[int, int], thickest: float) -> FloatArray | None:
     """Direction of a neck that ends, on one side at least, at a wall no longer than thick along the way through it."""
-    here: NDArray[np.float64] = np.array(place, dtype=float)
-    direction: NDArray[np.float64]
+    here: FloatArray = np.array(place, dtype=float)
+    direction: FloatArray
     ends = [nearest[:, place[0], place[1]].astype(float)]
     across = here - ends[0]
     beyond = np.rint(here + 0.5 * across).astype(int)
@@ -162,7 +158,9 @@ def _jamb(walls: Mask, nearest: IntArray, place: tuple[int, int], thickest: floa
     return None
 
 
-def _between_jambs(walls: Mask, place: tuple[int, int], along: NDArray[np.float64], width: float, reach: float) -> Mask:
+def _between_jambs(
+    walls: BoolArray, place: tuple[int, int], along: FloatArray, width: float, reach: float
+) -> BoolArray:
     """Mark what lies between the two jambs of a door, so that its floor counts to the wall as elsewhere."""
     marked = np.zeros_like(walls)
     half = int(np.ceil(max(width, reach))) + 2
@@ -181,7 +179,7 @@ def _between_jambs(walls: Mask, place: tuple[int, int], along: NDArray[np.float6
     return marked
 
 
-def _run(walls: Mask, start: NDArray[np.float64], step: NDArray[np.float64], most: float) -> float:
+def _run(walls: BoolArray, start: FloatArray, step: FloatArray, most: float) -> float:
     """Length of wall from a point in a direction [px]; more than `most` is not told apart."""
     points = np.rint(start + np.arange(int(most) + 2)[:, None] * step).astype(int)
     points = np.clip(points, 0, np.array(walls.shape) - 1)

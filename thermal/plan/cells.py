@@ -13,15 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from thermal.case import FloorPlan
+from thermal._types import BoolArray, FloatArray, Int32Array
 from thermal.case.areas import wall_shares
-from thermal.case.building import EXTERIOR_WALL, INTERIOR_WALL, OUTSIDE
+from thermal.case.building import EXTERIOR_WALL, INTERIOR_WALL, OUTSIDE, FloorPlan
 from thermal.errors import LostRoomError, describe
 from thermal.plan.survey import OUTSIDE_LABEL, WALL_LABEL, FloorSurvey
-
-IntArray = NDArray[np.int32]
-FloatArray = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 _SAMPLES = 5  # points a cell's side at which the drawing is looked at
 
@@ -50,7 +46,7 @@ class ZonedFloor:
     name: str
     height: float
     survey: FloorSurvey
-    zones: IntArray
+    zones: Int32Array
     names: tuple[str, ...]
     offset: tuple[float, float] = (0.0, 0.0)
 
@@ -61,7 +57,7 @@ class ZonedFloor:
         return {name: float(n) * self.survey.pixel**2 for name, n in zip(self.names, counts, strict=True)}
 
 
-def split_walls(survey: FloorSurvey) -> tuple[IntArray, Mask]:
+def split_walls(survey: FloorSurvey) -> tuple[Int32Array, BoolArray]:
     """Tell exterior from interior walls, and give each interior wall half to each side.
 
     Parameters
@@ -87,7 +83,7 @@ def split_walls(survey: FloorSurvey) -> tuple[IntArray, Mask]:
         to_outside, outside = ndimage.distance_transform_edt(labels != OUTSIDE_LABEL, return_indices=True)
         thickness = to_room[outside[0], outside[1]]
         exterior = wall & (to_outside < thickness - 1e-6)
-    rooms: IntArray = np.where(wall & ~exterior, labels[room[0], room[1]], np.maximum(labels, 0)).astype(np.int32)
+    rooms: Int32Array = np.where(wall & ~exterior, labels[room[0], room[1]], np.maximum(labels, 0)).astype(np.int32)
     return rooms, exterior
 
 
@@ -178,7 +174,7 @@ def _floor_tokens(
     return tokens
 
 
-def _sample(floor: ZonedFloor, cell_size: float, left: float, top: float, n_row: int, n_col: int) -> IntArray:
+def _sample(floor: ZonedFloor, cell_size: float, left: float, top: float, n_row: int, n_col: int) -> Int32Array:
     """Zones at points of the cells, shape (n_row, samples, n_col, samples)."""
     pixel = floor.survey.pixel
     step = (np.arange(_SAMPLES) + 0.5) / _SAMPLES
@@ -192,11 +188,11 @@ def _sample(floor: ZonedFloor, cell_size: float, left: float, top: float, n_row:
         index = np.floor(metres.ravel() / pixel + 1e-6).astype(int) + 1
         found.append(np.clip(index, 0, most + 1))
     framed = np.pad(floor.zones, 1)
-    sampled: IntArray = framed[np.ix_(found[0], found[1])]
+    sampled: Int32Array = framed[np.ix_(found[0], found[1])]
     return sampled.reshape(n_row, _SAMPLES, n_col, _SAMPLES)
 
 
-def _between(cells: IntArray, purity: FloatArray) -> Mask:
+def _between(cells: Int32Array, purity: FloatArray) -> BoolArray:
     """Cells to make a wall of: of each two zones side by side, the cell that is more on the line between them."""
     wall = np.zeros(cells.shape, dtype=bool)
     for here, there in ((np.s_[:, :-1], np.s_[:, 1:]), (np.s_[:-1], np.s_[1:])):
@@ -208,7 +204,7 @@ def _between(cells: IntArray, purity: FloatArray) -> Mask:
     return wall
 
 
-def _connected(cells: IntArray, floor: ZonedFloor, cell_size: float) -> IntArray:
+def _connected(cells: Int32Array, floor: ZonedFloor, cell_size: float) -> Int32Array:
     """Keep the largest part of each zone; refuse when there is none, or when much of one is lost."""
     result = cells.copy()
     pieces = ndimage.find_objects(cells, len(floor.names))

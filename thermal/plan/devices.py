@@ -9,8 +9,7 @@ from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 
-from thermal.case import Device
-from thermal.case.schema import DEVICE_TYPES
+from thermal.case.schema import DEVICE_TYPES, Device
 from thermal.errors import DeviceListError, describe, nearest
 from thermal.plan.guard import checked_file
 

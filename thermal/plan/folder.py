@@ -10,9 +10,13 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from thermal.case import Building, Case, Device, Location, Telemetry, load_case, save_case
+from thermal.case.building import Building
+from thermal.case.case import Case
+from thermal.case.load import load_case
 from thermal.case.points import OUTDOOR_TEMPERATURE
-from thermal.case.telemetry import INDEX
+from thermal.case.save import save_case
+from thermal.case.schema import Device, Location
+from thermal.case.telemetry import INDEX, Telemetry
 from thermal.plan.assemble import PlanImport
 
 

@@ -9,13 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from thermal._types import BoolArray, FloatArray
 from thermal.errors import NoRoomsError, describe
 from thermal.plan.drawing import Drawing
 from thermal.plan.extra import extra
 from thermal.plan.guard import check_pixels
-
-FloatArray = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 #: Side of a pixel that a drawing is worked on at [m]: a partition of 75 mm is four; coarser drawings are refined.
 FINE, COARSE = 0.02, 0.025
@@ -44,7 +42,7 @@ class Ink:
         Side of a pixel of the drawing [m]; 0 for one of vectors.
     """
 
-    mask: Mask
+    mask: BoolArray
     pixel: float
     turned: float
     placement: FloatArray
@@ -146,7 +144,7 @@ def _blocks(picture: NDArray[np.float32], block: int) -> FloatArray:
     return np.asarray(padded.reshape(rows // block, block, columns // block, block).mean(axis=(1, 3)), dtype=float)
 
 
-def _with_hairlines(cover: FloatArray) -> Mask:
+def _with_hairlines(cover: FloatArray) -> BoolArray:
     """Find ink, and lines thinner than a pixel, such as the panes of a window, which close walls too."""
     dark = cover >= 0.5
     square = np.ones((3, 3))
@@ -155,8 +153,8 @@ def _with_hairlines(cover: FloatArray) -> Mask:
     # The edge of a thin wall looks the same: a line begins apart from all that is solid, and runs on to it.
     apart = faint & ~ndimage.binary_dilation(body, square)
     lines = ndimage.binary_dilation(apart, square, iterations=2, mask=faint) if apart.any() else apart
-    thin: Mask = extra("skimage.morphology").skeletonize(dark | lines)
-    found: Mask = dark | (thin & lines)
+    thin: BoolArray = extra("skimage.morphology").skeletonize(dark | lines)
+    found: BoolArray = dark | (thin & lines)
     return found
 
 

@@ -8,8 +8,11 @@ import tempfile
 from os import PathLike
 from pathlib import Path
 
-from thermal.case import Case, FloorPlans, load_case, save_case
+from thermal.case.building import FloorPlans
 from thermal.case.building_file import NAME
+from thermal.case.case import Case
+from thermal.case.load import load_case
+from thermal.case.save import save_case
 from thermal.errors import CaseError, LostWorkError, describe
 
 #: Folder inside a case that holds what is the labelling page's own: draft, drawings, pictures, reports.

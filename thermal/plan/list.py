@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from thermal.case import Location
+from thermal.case.schema import Location
 from thermal.errors import DrawingFileError, PlanSettingError, ScaleError, describe
 from thermal.plan.assemble import PlanImport, Progress, assemble_plans
 from thermal.plan.cells import ZonedFloor

@@ -6,8 +6,8 @@ import difflib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from thermal.case import Device
 from thermal.case.points import POINT_TYPES
+from thermal.case.schema import Device
 from thermal.plan.devices import ListedPoint, key, words_of
 
 _LEAST = 0.5  # -, of the confidence of a match that is offered

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from thermal.case import Device
+from thermal.case.schema import Device
 from thermal.plan.assemble import AREA_TOLERANCE, PlanImport
 from thermal.plan.cells import ZonedFloor, split_walls
 from thermal.plan.devices import DeviceImport

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from thermal._types import Int32Array
 from thermal.errors import NoRoomsError, describe
 from thermal.plan.basins import Basins, find_basins
 from thermal.plan.drawing import Drawing
@@ -15,9 +16,6 @@ from thermal.plan.ink import Ink, ink_of
 from thermal.plan.scale import checked_scale
 from thermal.plan.survey import OUTSIDE_LABEL, WALL_LABEL, Door, FloorSurvey, PlanSettings, Room
 from thermal.plan.walls import walls_of
-
-IntArray = NDArray[np.int32]
-Mask = NDArray[np.bool_]
 
 _COLUMN = 1.0  # m: free-standing pieces of wall up to this size are columns and part of their room
 _COARSE = 0.03  # m/px: a partition of 100 mm is three pixels, and lines of windows are still seen
@@ -101,7 +99,7 @@ def survey_ink(ink: Ink, source: str, settings: PlanSettings) -> FloorSurvey:
 
 
 def finish(
-    labels: IntArray,
+    labels: Int32Array,
     pixel: float,
     source: str,
     doors: tuple[Door, ...],
@@ -145,7 +143,7 @@ def finish(
     return FloorSurvey(source, labels, pixel, tuple(rooms), doors, turned, placement, remarks)
 
 
-def _doubts(labels: IntArray, ink: Ink, settings: PlanSettings) -> list[str]:
+def _doubts(labels: Int32Array, ink: Ink, settings: PlanSettings) -> list[str]:
     """Say where a drawing may have been misread: too coarse for its lines, or open where it should be closed."""
     doubts = []
     if ink.drawn_pixel > _COARSE:
@@ -170,7 +168,7 @@ def _doubts(labels: IntArray, ink: Ink, settings: PlanSettings) -> list[str]:
     return doubts
 
 
-def _label(basins: Basins, pixel: float, settings: PlanSettings) -> tuple[IntArray, tuple[Door, ...], int]:
+def _label(basins: Basins, pixel: float, settings: PlanSettings) -> tuple[Int32Array, tuple[Door, ...], int]:
     """Give the rooms numbers, row by row; shafts become wall and columns part of their room."""
     pieces = basins.pieces
     count = int(pieces.max())
@@ -196,7 +194,7 @@ def _label(basins: Basins, pixel: float, settings: PlanSettings) -> tuple[IntArr
     return labels, tuple(doors), max(small, 0)
 
 
-def _without_columns(labels: IntArray, pixel: float) -> IntArray:
+def _without_columns(labels: Int32Array, pixel: float) -> Int32Array:
     """Give small free-standing pieces of wall to the room around them."""
     walls, count = ndimage.label(labels == WALL_LABEL, np.ones((3, 3)))
     result = labels.copy()

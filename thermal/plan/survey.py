@@ -7,11 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal._types import FloatArray, Int32Array
 from thermal.errors import PlanSettingError
 from thermal.plan.guard import checked_number
-
-IntArray = NDArray[np.int32]
-FloatArray = NDArray[np.float64]
 
 #: Labels of what is no room.
 OUTSIDE_LABEL, WALL_LABEL = -1, 0
@@ -129,7 +127,7 @@ class FloorSurvey:
     """
 
     source: str
-    labels: IntArray
+    labels: Int32Array
     pixel: float
     rooms: tuple[Room, ...]
     doors: tuple[Door, ...] = ()

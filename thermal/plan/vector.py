@@ -14,14 +14,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal._types import FloatArray
 from thermal.errors import DrawingFileError, DrawingUnitsError, NoRoomsError, OversizedFileError, describe
 from thermal.plan.extra import extra
 from thermal.plan.guard import check_pixels, checked_file, checked_number
 from thermal.plan.ink import FINE, Ink
 from thermal.plan.rooms import finish, survey_ink
 from thermal.plan.survey import FloorSurvey, PlanSettings
-
-FloatArray = NDArray[np.float64]
 
 VECTOR_KINDS = (".dxf",)
 

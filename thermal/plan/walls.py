@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import ndimage
 
+from thermal._types import BoolArray
 from thermal.plan.survey import PlanSettings
-
-Mask = NDArray[np.bool_]
 
 _SPECK = 0.35  # m: smaller pieces of ink that stand alone are letters and symbols, not piers between doors
 
 
-def walls_of(ink: Mask, pixel: float, settings: PlanSettings) -> Mask:
+def walls_of(ink: BoolArray, pixel: float, settings: PlanSettings) -> BoolArray:
     """Find the walls in what is drawn.
 
     Parameters
@@ -40,7 +38,7 @@ def walls_of(ink: Mask, pixel: float, settings: PlanSettings) -> Mask:
     return _without_specks(solid, pixel)
 
 
-def _fill_narrow(ink: Mask, pixel: float, width: float) -> Mask:
+def _fill_narrow(ink: BoolArray, pixel: float, width: float) -> BoolArray:
     """Fill closed spaces that are nowhere wider than a wall: between its faces, between the panes of a window.
 
     Parameters
@@ -62,14 +60,14 @@ def _fill_narrow(ink: Mask, pixel: float, width: float) -> Mask:
     depth = ndimage.maximum(ndimage.distance_transform_edt(~framed), spaces, np.arange(count + 1))
     narrow = 2.0 * np.asarray(depth) * pixel <= width + 2.0 * pixel
     narrow[[0, spaces[0, 0]]] = False
-    filled: Mask = framed | narrow[spaces]
+    filled: BoolArray = framed | narrow[spaces]
     return filled[1:-1, 1:-1]
 
 
-def _without_specks(ink: Mask, pixel: float) -> Mask:
+def _without_specks(ink: BoolArray, pixel: float) -> BoolArray:
     pieces, _ = ndimage.label(ink, np.ones((3, 3)))
     keep = [False]
     for rows, columns in ndimage.find_objects(pieces):
         keep.append(np.hypot(rows.stop - rows.start, columns.stop - columns.start) * pixel >= _SPECK)
-    kept: Mask = np.asarray(keep)[pieces]
+    kept: BoolArray = np.asarray(keep)[pieces]
     return kept

@@ -8,13 +8,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal._types import Int32Array
 from thermal.case.validation import RESERVED
 from thermal.errors import RoomNameError, describe
 from thermal.plan.cells import ZonedFloor, split_walls
 from thermal.plan.guard import checked_number
 from thermal.plan.survey import FloorSurvey
-
-IntArray = NDArray[np.int32]
 
 
 def propose_zones(
@@ -102,7 +101,7 @@ def _given_names(survey: FloorSurvey, floor: str, names: Mapping[str, tuple[floa
     return chosen
 
 
-def _join_small(survey: FloorSurvey, rooms: IntArray, given: Mapping[int, str], smallest: float) -> NDArray[np.int32]:
+def _join_small(survey: FloorSurvey, rooms: Int32Array, given: Mapping[int, str], smallest: float) -> NDArray[np.int32]:
     """Room whose zone each room belongs to; itself for most."""
     area = {room.label: room.area for room in survey.rooms}
     owner = np.arange(len(survey.rooms) + 1, dtype=np.int32)

@@ -1,0 +1,1 @@
+"""From gains to probabilities, groups and a verdict."""

@@ -8,17 +8,15 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-from calibration.evaluation.n_step import Wanted, predict_runs
-from calibration.evaluation.intervals import Interval, Runs, select_runs
-from mpc.reports.page import duration, kelvin
 from calibration.diagnosis.refit.comparison import Fit
 from calibration.errors import NotEnoughDataError
-from thermal import Inputs
-from thermal.model import IMPLICIT_EULER, SPIN_UP, Scheme
-
-FloatArray = NDArray[np.float64]
+from calibration.evaluation.intervals import Interval, Runs, select_runs
+from calibration.evaluation.n_step import Wanted, predict_runs
+from mpc.reports.page import duration, kelvin
+from thermal._types import FloatArray
+from thermal.model.replay import SPIN_UP, Inputs
+from thermal.model.scheme import IMPLICIT_EULER, Scheme
 
 Kind = Literal["sensors", "random", "persistent", "hump"]
 

@@ -44,7 +44,7 @@ SMALL, DOUBTFUL = 4.0, 1.0
 IN_SET = 0.1
 
 _NULLS: dict[str, Any] = json.loads(
-    (files("calibration") / "diagnosis" / "null_levels.json").read_text(encoding="utf-8")
+    (files("calibration.diagnosis.decide") / "null_levels.json").read_text(encoding="utf-8")
 )
 
 #: Largest gains of the first round in development cases without any missing effect, in order [-]: made by

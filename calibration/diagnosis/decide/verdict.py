@@ -8,8 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from calibration.diagnosis.refit.comparison import Fit
-from calibration.diagnosis.screen.gains import Gain
+from calibration.diagnosis.decide.evidence import beyond, gains_of, levelled, probabilities, raw
 from calibration.diagnosis.decide.levels import (
     ALIKE,
     APART,
@@ -24,10 +23,11 @@ from calibration.diagnosis.decide.levels import (
     LEFT_OVER,
     RIVAL,
 )
+from calibration.diagnosis.refit.comparison import Fit
 from calibration.diagnosis.refit.refit import ACCEPTED, Refit
 from calibration.diagnosis.refit.search import Round
-from calibration.diagnosis.decide.evidence import beyond, gains_of, levelled, probabilities, raw
-from thermal.effects import CATALOGUE
+from calibration.diagnosis.screen.gains import Gain
+from thermal.effects.catalogue import CATALOGUE
 
 #: Standard deviations from the estimate to an end of a 90 % interval [-].
 _NINETY = 1.645

@@ -7,18 +7,15 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
-from calibration.evaluation.n_step import Predictions
-from calibration.diagnosis.refit.comparison import Bench, Fit
 from calibration.diagnosis.decide.drift import DriftCurve, drift_of
+from calibration.diagnosis.refit.comparison import Bench, Fit
 from calibration.diagnosis.screen.missing import Missing, at_start, missing_heat
-from thermal import ThermalNetwork
-from thermal.case import FloorPlans
-from thermal.inputs import Drivers
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
+from calibration.evaluation.n_step import Predictions
+from thermal._types import BoolArray, FloatArray
+from thermal.case.building import FloorPlans
+from thermal.inputs.drivers import Drivers
+from thermal.network.network import ThermalNetwork
 
 #: Resamples of the days for intervals, and the share of them that an interval holds [-].
 _RESAMPLES, _LEVEL = 400, 0.9

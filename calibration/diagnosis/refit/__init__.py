@@ -1,0 +1,1 @@
+"""Effects fitted together with all that was accepted before."""

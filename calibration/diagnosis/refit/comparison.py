@@ -7,23 +7,33 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from calibration.evaluation.n_step import Predictions, evaluate_model
-from calibration.evaluation.intervals import Interval, alternating_intervals, default_intervals, horizon_steps, select_runs
-from calibration.fit.problem import Problem
-from calibration.evaluation.settings import ModelSettings
-from calibration.fit.starts import tuning_runs
 from calibration.diagnosis.refit.fit import Found, evidence_of, settle
 from calibration.diagnosis.screen.openings import seen_openings
 from calibration.errors import NotEnoughDataError
-from thermal import Case, Inputs, SymbolicModel, ThermalNetwork, replay_inputs
-from thermal.effects import CATALOGUE, chosen
-from thermal.model import ReducedModel
-from thermal.network import Anatomy, Blueprint, Extension, blueprint
-from thermal.inputs import Drivers
-
-FloatArray = NDArray[np.float64]
+from calibration.evaluation.intervals import (
+    Interval,
+    alternating_intervals,
+    default_intervals,
+    horizon_steps,
+    select_runs,
+)
+from calibration.evaluation.n_step import Predictions, evaluate_model
+from calibration.evaluation.settings import ModelSettings
+from calibration.fit.problem import Problem
+from calibration.fit.starts import tuning_runs
+from thermal._types import FloatArray
+from thermal.case.case import Case
+from thermal.effects.catalogue import CATALOGUE, chosen
+from thermal.inputs.drivers import Drivers
+from thermal.model.reduce import ReducedModel
+from thermal.model.replay import Inputs, replay_inputs
+from thermal.model.symbolic import SymbolicModel
+from thermal.network.assembly import Blueprint
+from thermal.network.build import blueprint
+from thermal.network.extension import Extension
+from thermal.network.network import ThermalNetwork
+from thermal.network.topology import Anatomy
 
 #: Effects in a model, each with its zones; none is the whole building.
 Effects = Mapping[str, Sequence[str]]

@@ -8,15 +8,15 @@ from typing import Any
 
 import pandas as pd
 
-from calibration.fit.describe import describe_parameters
-from calibration.evaluation.n_step import Evaluation, evaluate_model
-from calibration.evaluation.intervals import Interval
-from mpc.reports.evaluation import predictions_table
-from calibration.fit.result import ParameterEstimate, SolverReport, effect_entries
-from calibration.diagnosis.refit.comparison import Fit
-from calibration.diagnosis.diagnosis import Diagnosis
 from calibration.diagnosis.decide.drift import DriftCurve, drift_of
+from calibration.diagnosis.diagnosis import Diagnosis
+from calibration.diagnosis.refit.comparison import Fit
 from calibration.diagnosis.screen.missing import Missing, at_start, missing_heat
+from calibration.evaluation.intervals import Interval
+from calibration.evaluation.n_step import Evaluation, evaluate_model
+from calibration.fit.describe import describe_parameters
+from calibration.fit.result import ParameterEstimate, SolverReport, effect_entries
+from mpc.reports.evaluation import predictions_table
 
 
 @dataclass(frozen=True)

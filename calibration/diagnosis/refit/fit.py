@@ -10,16 +10,14 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 from scipy.special import log_ndtr
 
 from calibration.fit.estimate import DRIFT_TOLERANCE
 from calibration.fit.problem import Problem
-from thermal import SymbolicModel, reduced_model
-from thermal.model import FEW_SHIFTS, ReducedModel
-
-FloatArray = NDArray[np.float64]
+from thermal._types import FloatArray
+from thermal.model.reduce import FEW_SHIFTS, ReducedModel, reduced_model
+from thermal.model.symbolic import SymbolicModel
 
 #: Longest change of a parameter in a step, in deviations of its prior [-].
 _LONGEST = 1.5

@@ -9,8 +9,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from calibration.diagnosis.refit.comparison import Bench, Fit
-
-FloatArray = NDArray[np.float64]
+from thermal._types import FloatArray
 
 #: Held-out mean absolute error over the root mean square of the tuning errors above which they are errors of other
 #: days [-]; 0.7 is usual.

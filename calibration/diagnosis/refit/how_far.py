@@ -8,19 +8,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from calibration.diagnosis.refit.comparison import Bench, Built, Fit
 from calibration.diagnosis.refit.fit import settle
-from calibration.diagnosis.screen.generic import GENERIC
 from calibration.diagnosis.refit.held_out import HeldOut, held_out
 from calibration.diagnosis.refit.refit import Refit
 from calibration.diagnosis.refit.search import Round
+from calibration.diagnosis.screen.generic import GENERIC
 from calibration.errors import HorizonError, NotEnoughDataError
-from thermal import Inputs, reduced_model
-from thermal.effects import Chosen
-
-FloatArray = NDArray[np.float64]
+from thermal.effects.effect import Chosen
+from thermal.model.reduce import reduced_model
+from thermal.model.replay import Inputs
 
 #: Resamples of days for intervals, and the share of them that an interval holds [-].
 _RESAMPLES, _LEVEL = 1000, 0.9

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from calibration.diagnosis.refit.comparison import Bench, Fit, is_strength
-from calibration.diagnosis.screen.gains import Gain, choice_of
 from calibration.diagnosis.refit.held_out import HeldOut, growth, held_out
+from calibration.diagnosis.screen.gains import Gain, choice_of
 from calibration.diagnosis.screen.screen import Screening
 from calibration.errors import CalibrationError
-from thermal import ModelError
-from thermal.effects import CATALOGUE
+from thermal.effects.catalogue import CATALOGUE
+from thermal.errors import ModelError
 
 #: Evaluations of a fit from one start.
 _EVALUATIONS = 10

@@ -8,16 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from calibration.evaluation.n_step import Progress
-from calibration.diagnosis.refit.comparison import Bench, Fit
-from calibration.diagnosis.screen.gains import Gain
-from calibration.diagnosis.refit.held_out import HeldOut
 from calibration.diagnosis.decide.levels import APART
-from calibration.diagnosis.screen.pairs import Pair, nominate
+from calibration.diagnosis.refit.comparison import Bench, Fit
+from calibration.diagnosis.refit.held_out import HeldOut
 from calibration.diagnosis.refit.refit import ACCEPTED, Refit, Work, promising
+from calibration.diagnosis.screen.gains import Gain
+from calibration.diagnosis.screen.pairs import Pair, nominate
 from calibration.diagnosis.screen.screen import Screening, screen
 from calibration.diagnosis.screen.windows import WINDOWS, look_again
-from thermal.effects import CATALOGUE
+from calibration.evaluation.n_step import Progress
+from thermal.effects.catalogue import CATALOGUE
 
 #: Most rounds, and most effects that a round fits anew.
 ROUNDS, MOST_REFITS = 8, 4

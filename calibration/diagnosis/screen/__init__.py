@@ -1,0 +1,1 @@
+"""Which effects could explain the errors, by their tangents."""

@@ -5,12 +5,10 @@ from __future__ import annotations
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
-from thermal.effects import CONSTANT, Effect, Joining, strength
-from thermal.inputs import Drivers, Signal
-
-FloatArray = NDArray[np.float64]
+from thermal._types import FloatArray
+from thermal.effects.effect import CONSTANT, Effect, Joining, strength
+from thermal.inputs.drivers import Drivers, Signal
 
 #: Hours of a bin of the day.
 _BIN = 3

@@ -10,19 +10,19 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
-from calibration.estimation.filtered import filter_interval
+from calibration.diagnosis.refit.comparison import Fit
 from calibration.estimation.disturbance import DisturbanceModel
+from calibration.estimation.filtered import filter_interval
 from calibration.estimation.gains import Covariance
 from calibration.estimation.heat_balance import HOUR, heat_balance, hourly_means
 from calibration.estimation.innovations import tune_disturbance
-from calibration.evaluation.intervals import Interval
 from calibration.estimation.smoother import averaged_deviation, smooth
 from calibration.estimation.tuner import air_volumes
-from calibration.diagnosis.refit.comparison import Fit
-from thermal import Inputs, reduced_model
-from thermal.model import IMPLICIT_EULER, SPIN_UP, ReducedModel, Scheme
-
-FloatArray = NDArray[np.float64]
+from calibration.evaluation.intervals import Interval
+from thermal._types import FloatArray
+from thermal.model.reduce import ReducedModel, reduced_model
+from thermal.model.replay import SPIN_UP, Inputs
+from thermal.model.scheme import IMPLICIT_EULER, Scheme
 
 #: Telemetry that the size and the course of the missing heat are tuned on [s]: the last four days that were fitted,
 #: of which at most two are a weekend.

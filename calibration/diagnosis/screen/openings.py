@@ -10,14 +10,14 @@ from __future__ import annotations
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from calibration.estimation.heat_balance import step_balance
 from calibration.evaluation.settings import ModelSettings
-from thermal import Inputs, SymbolicModel, reduced_model, replay_inputs
-from thermal.inputs import Drivers
-
-FloatArray = NDArray[np.float64]
+from thermal._types import FloatArray
+from thermal.inputs.drivers import Drivers
+from thermal.model.reduce import reduced_model
+from thermal.model.replay import Inputs, replay_inputs
+from thermal.model.symbolic import SymbolicModel
 
 #: Deviations within which 90 % of a normal distribution are [-].
 _NINETY = 1.645

@@ -13,18 +13,15 @@ from copy import copy
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from calibration.diagnosis.refit.comparison import Bench, Fit, is_strength
 from calibration.diagnosis.screen.gains import Gain, choice_of
 from calibration.diagnosis.screen.generic import GENERIC, ZONE_HEAT
-from thermal import Parameter, reduced_model
-from thermal.effects import CATALOGUE, PAIR, Chosen
-from thermal.model import FEW_SHIFTS, SHIFTS
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-BoolArray = NDArray[np.bool_]
+from thermal._types import BoolArray, FloatArray, IntArray
+from thermal.effects.catalogue import CATALOGUE
+from thermal.effects.effect import PAIR, Chosen
+from thermal.model.reduce import FEW_SHIFTS, SHIFTS, reduced_model
+from thermal.parameters import Parameter
 
 #: Sweeps of the quadratic programme, and the change of an estimate in prior deviations that ends them [-].
 _SWEEPS, _TOLERANCE = 200, 1e-6

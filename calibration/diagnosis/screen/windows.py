@@ -10,15 +10,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from calibration.diagnosis.refit.comparison import Fit
+from calibration.diagnosis.refit.refit import Refit, Work
 from calibration.diagnosis.screen.gains import Gain
 from calibration.diagnosis.screen.openings import openings_beyond
-from calibration.diagnosis.refit.refit import Refit, Work
-from thermal.effects import CATALOGUE
-
-FloatArray = NDArray[np.float64]
+from thermal._types import FloatArray
+from thermal.effects.catalogue import CATALOGUE
 
 #: The effect whose signal is seen and not measured.
 WINDOWS = "window_opening"

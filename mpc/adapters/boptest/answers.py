@@ -8,13 +8,11 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mpc.errors import BoptestAnswerError
 from mpc.loop.actuators import Actuator
+from thermal._types import FloatArray
 from thermal.errors import describe
-
-FloatArray = NDArray[np.float64]
 
 _SAME = 1e-6  # of a value: beyond it another was used
 

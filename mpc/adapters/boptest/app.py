@@ -16,10 +16,10 @@ from fastapi import FastAPI, Request
 from starlette.requests import ClientDisconnect
 from starlette.responses import Response
 
-from mpc.errors import BoptestRequestError, MpcError
 from mpc.adapters.boptest.body import read_body
 from mpc.adapters.boptest.registry import DEFAULT_TEST, HeldTest, HeldTests
 from mpc.adapters.boptest.test import Answer, BoptestTest
+from mpc.errors import BoptestRequestError, MpcError
 
 #: Version of BOPTEST whose API this is.
 API_VERSION = "1.0.0"

@@ -9,37 +9,31 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
-from mpc.errors import BoptestRequestError, PlantError
-from mpc.loop.building import BuildingModel
-from mpc.loop.noise import SensorNoise
-from mpc.loop.operation import Operation, scheduled_operation
 from mpc.adapters.boptest.clock import DAY, YearClock
 from mpc.adapters.boptest.periods import Period, find_periods
 from mpc.adapters.boptest.prices import scenario_prices
 from mpc.adapters.boptest.recent import Recent
 from mpc.adapters.boptest.signals import ObservedPlant, PlantSignals
 from mpc.adapters.boptest.trajectory import Trajectory
-from mpc.scenario import (
-    CarbonIntensity,
-    ComfortBand,
-    Occupancy,
-    Rate,
-    Scenario,
-    StepGrid,
-    Tariff,
-    Weather,
-    build_scenario,
-    paper_carbon,
-    paper_tariff,
-)
-from thermal import Building
+from mpc.errors import BoptestRequestError, PlantError
+from mpc.loop.building import BuildingModel
+from mpc.loop.noise import SensorNoise
+from mpc.loop.operation import Operation, scheduled_operation
+from mpc.scenario.carbon import CarbonIntensity
+from mpc.scenario.comfort import ComfortBand
+from mpc.scenario.grid import StepGrid
+from mpc.scenario.occupancy import Occupancy
+from mpc.scenario.paper import paper_carbon, paper_tariff
+from mpc.scenario.rates import Rate
+from mpc.scenario.scenario import Scenario, build_scenario
+from mpc.scenario.tariff import Tariff
+from mpc.scenario.weather import Weather
+from thermal._types import FloatArray
+from thermal.case.building import Building
 from thermal.case.points import OUTDOOR_TEMPERATURE
 from thermal.errors import describe
-from thermal.hvac import HvacSystem
-
-FloatArray = NDArray[np.float64]
+from thermal.hvac._system import HvacSystem
 
 _MINUTE = 60.0
 _KEPT, _WARM = 8, 4  # scenarios and warm-ups that are kept, so that tests of one period share theirs

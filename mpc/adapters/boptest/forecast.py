@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from mpc.adapters.boptest.case import BoptestCase
 from mpc.adapters.boptest.prices import PRICE_POINTS
 from mpc.adapters.boptest.signals import Metadata
-from mpc.scenario import ErrorGrowth, Rate, Scenario
-
-FloatArray = NDArray[np.float64]
+from mpc.scenario.forecaster import ErrorGrowth
+from mpc.scenario.rates import Rate
+from mpc.scenario.scenario import Scenario
+from thermal._types import FloatArray
 
 #: BOPTEST's names of weather, with unit, point of the case format, factor from the library's unit, and meaning.
 WEATHER_NAMES: Mapping[str, tuple[str, str, float, str]] = {

@@ -8,8 +8,8 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
-from mpc.errors import BoptestError
 from mpc.adapters.boptest.body import LONGEST_BODY
+from mpc.errors import BoptestError
 from thermal.errors import describe
 
 if TYPE_CHECKING:

@@ -6,8 +6,8 @@ import re
 import time
 from typing import TYPE_CHECKING, Any
 
-from mpc.errors import BoptestAnswerError, BoptestError, BoptestTimeoutError
 from mpc.adapters.boptest.test import Answer
+from mpc.errors import BoptestAnswerError, BoptestError, BoptestTimeoutError
 from thermal.errors import describe
 
 if TYPE_CHECKING:

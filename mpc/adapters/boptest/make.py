@@ -7,22 +7,24 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
-from calibration import case_model
+from calibration.evaluation.case_model import case_model
+from mpc.adapters.boptest.case import BoptestCase
 from mpc.errors import BoptestError
 from mpc.loop.building import BuildingModel
 from mpc.loop.make import pilot_weather
 from mpc.loop.reduced import ReducedBuilding
-from mpc.adapters.boptest.case import BoptestCase
-from mpc.scenario import Weather, read_epw, read_tmy3, read_weather_csv, weather_of_case
-from thermal import Building, Case, SymbolicModel, build_network, reduced_model
-from thermal.case import Device
+from mpc.scenario.weather import Weather
+from mpc.scenario.weather_files import read_epw, read_tmy3, read_weather_csv, weather_of_case
+from thermal._types import FloatArray
+from thermal.case.building import Building
+from thermal.case.case import Case
+from thermal.case.schema import Device
 from thermal.errors import describe
-from thermal.pilot import pilot_building, size_system
-
-FloatArray = NDArray[np.float64]
+from thermal.model.reduce import reduced_model
+from thermal.model.symbolic import SymbolicModel
+from thermal.network.build import build_network
+from thermal.pilot.building import pilot_building
+from thermal.pilot.sizing import size_system
 
 _PILOT_STEP = 3600.0  # s, of a year of made weather
 

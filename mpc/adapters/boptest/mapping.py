@@ -6,8 +6,8 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from mpc.errors import BoptestError
 from mpc.adapters.boptest.signals import ELECTRICITY_OUTPUT, GAS_OUTPUT, Metadata
+from mpc.errors import BoptestError
 from thermal.case.points import split_column
 from thermal.errors import CaseError, describe, nearest
 

@@ -7,16 +7,14 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
-from mpc.errors import BoptestAnswerError
 from mpc.adapters.boptest.forecast import WEATHER_NAMES
 from mpc.adapters.boptest.mapping import BoptestSignals
 from mpc.adapters.boptest.prices import PRICE_POINTS
-from mpc.scenario import Forecast
+from mpc.errors import BoptestAnswerError
+from mpc.scenario.forecast import Forecast
+from thermal._types import FloatArray
 from thermal.errors import describe
-
-FloatArray = NDArray[np.float64]
 
 _ZONE_COLUMNS = {
     "LowerSetp": "comfort_lower_temperature",

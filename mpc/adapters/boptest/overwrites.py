@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from mpc.errors import BoptestRequestError
-from mpc.loop.actuators import Actuator
 from mpc.adapters.boptest.signals import activation
 from mpc.adapters.boptest.values import flag, number
+from mpc.errors import BoptestRequestError
+from mpc.loop.actuators import Actuator
 
 
 class _Overwrites(NamedTuple):

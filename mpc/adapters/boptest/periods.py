@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mpc.adapters.boptest.clock import DAY
-
-FloatArray = NDArray[np.float64]
+from thermal._types import FloatArray
 
 #: Length of a period and of the warm-up before it, BOPTEST's [d].
 PERIOD_DAYS, WARM_UP_DAYS = 14, 7

@@ -11,13 +11,7 @@ from urllib.parse import quote
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
-from mpc.errors import BoptestAnswerError, BoptestError, PlantError
-from mpc.kpi import PlantRecord
-from mpc.loop.actuators import checked_actions
-from mpc.loop.conversion import conversion
-from mpc.loop.plant import Measurements, PointLayout, need_running
 from mpc.adapters.boptest.answers import actuator_of, check_step, regular, time_of
 from mpc.adapters.boptest.clock import DAY, YearClock
 from mpc.adapters.boptest.http import BoptestClient
@@ -27,10 +21,13 @@ from mpc.adapters.boptest.periods import PERIOD_DAYS
 from mpc.adapters.boptest.prices import PRICE_POINTS
 from mpc.adapters.boptest.signals import activation
 from mpc.adapters.boptest.test import KPI_NAMES
-from mpc.scenario import Forecast
+from mpc.errors import BoptestAnswerError, BoptestError, PlantError
+from mpc.kpi.record import PlantRecord
+from mpc.loop.actuators import checked_actions
+from mpc.loop.conversion import conversion
+from mpc.loop.plant import Measurements, PointLayout, need_running
+from mpc.scenario.forecast import Forecast
 from thermal.errors import describe, nearest
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

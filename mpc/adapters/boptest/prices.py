@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from mpc.scenario import ConstantRate, Rate, SeriesRate, StepGrid
+from mpc.scenario.grid import StepGrid
+from mpc.scenario.rates import ConstantRate, Rate, SeriesRate
 
 #: Names that a scenario's ``electricity_price`` takes, and the forecast point of each.
 PRICE_POINTS: Mapping[str, str] = {

@@ -7,9 +7,9 @@ import time
 import uuid
 from collections.abc import Callable, Mapping, Sequence
 
-from mpc.errors import BoptestError
 from mpc.adapters.boptest.case import BoptestCase
 from mpc.adapters.boptest.test import BoptestTest
+from mpc.errors import BoptestError
 from thermal.errors import describe
 
 #: The test that requests without a number go to, as before BOPTEST 0.7.

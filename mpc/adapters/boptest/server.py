@@ -8,10 +8,10 @@ import threading
 from collections.abc import Iterable, Sequence
 from types import TracebackType
 
-from mpc.errors import BoptestError
 from mpc.adapters.boptest.case import BoptestCase
 from mpc.adapters.boptest.guard import Guard, check_host
 from mpc.adapters.boptest.registry import HeldTests
+from mpc.errors import BoptestError
 from thermal.errors import describe
 
 _KEEP_ALIVE = 75  # s: a controller that thinks for a while finds its connection open

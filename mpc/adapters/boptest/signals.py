@@ -6,9 +6,6 @@ import re
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from mpc.loop.actuators import (
     DIFFERENTIAL_PRESSURE,
     HEATING_SETPOINT,
@@ -19,10 +16,10 @@ from mpc.loop.actuators import (
 from mpc.loop.conversion import SIGNAL_UNITS
 from mpc.loop.history import PlantStep
 from mpc.loop.simulated import SimulatedPlant
+from thermal._types import FloatArray
 from thermal.case.points import POINT_TYPES, split_column
-from thermal.hvac import HvacSystem
+from thermal.hvac._system import HvacSystem
 
-FloatArray = NDArray[np.float64]
 Metadata = dict[str, dict[str, Any]]
 
 #: Outputs beside the sensors': true power of the whole plant, means over the plant's step that ends at their time [W].

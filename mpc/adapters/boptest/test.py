@@ -11,8 +11,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from mpc.errors import BoptestRequestError
-from mpc.kpi import PlantRecord, measure_kpis
 from mpc.adapters.boptest.case import BegunPlant, BoptestCase
 from mpc.adapters.boptest.forecast import UNCERTAINTY, BoundaryConditions, forecast_metadata, uncertain
 from mpc.adapters.boptest.overwrites import read_overwrites
@@ -20,6 +18,9 @@ from mpc.adapters.boptest.periods import Period
 from mpc.adapters.boptest.signals import Metadata
 from mpc.adapters.boptest.trajectory import Trajectory
 from mpc.adapters.boptest.values import MOST_VALUES, allowed, choice, names, number, required, time_or_infinite
+from mpc.errors import BoptestRequestError
+from mpc.kpi.kpis import measure_kpis
+from mpc.kpi.record import PlantRecord
 
 #: Names of the indicators that `GET /kpi` gives.
 KPI_NAMES = ("cost_tot", "emis_tot", "ener_tot", "idis_tot", "pdih_tot", "pele_tot", "pgas_tot", "tdis_tot", "time_rat")

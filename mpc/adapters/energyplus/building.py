@@ -14,14 +14,14 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from mpc.errors import EnergyPlusError
-from mpc.loop.sensors import PlantDevices
 from mpc.adapters.energyplus.geometry import building_of
 from mpc.adapters.energyplus.input import InputFile, read_input, with_period
 from mpc.adapters.energyplus.install import CHICAGO, building_path, weather_path
 from mpc.adapters.energyplus.layout import PlantLayout, find_layout
 from mpc.adapters.energyplus.process import Job, run_energyplus
-from thermal import Building
+from mpc.errors import EnergyPlusError
+from mpc.loop.sensors import PlantDevices
+from thermal.case.building import Building
 from thermal.errors import describe
 
 _METER = re.compile(r"^Output:Meter,([^,]+),", re.M)

@@ -10,9 +10,9 @@ from typing import Any, Literal, NamedTuple
 from mpc.adapters.energyplus.input import InputFile
 from mpc.adapters.energyplus.layout import PlantLayout
 from mpc.adapters.energyplus.points import entity
-from mpc.scenario import read_epw
-from thermal import Building, ZoneTable
-from thermal.case import Device, Layer, Surface, ZoneEntry
+from mpc.scenario.weather_files import read_epw
+from thermal.case.building import Building, ZoneTable
+from thermal.case.schema import Device, Layer, Surface, ZoneEntry
 
 Kind = Literal["wall", "floor", "ceiling"]
 

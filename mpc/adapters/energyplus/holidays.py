@@ -7,8 +7,8 @@ import re
 from collections.abc import Iterable
 from datetime import date, timedelta
 
-from mpc.errors import EnergyPlusError
 from mpc.adapters.energyplus.input import InputFile
+from mpc.errors import EnergyPlusError
 from thermal.errors import describe
 
 _MONTHS = [name.lower() for name in calendar.month_abbr]

@@ -10,9 +10,9 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from mpc.errors import EnergyPlusError
 from mpc.adapters.energyplus.install import CHICAGO, weather_path
 from mpc.adapters.energyplus.process import Job, run_energyplus
+from mpc.errors import EnergyPlusError
 from thermal.errors import describe, nearest
 
 _REPORTS = (

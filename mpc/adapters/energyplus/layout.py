@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from mpc.errors import EnergyPlusError
 from mpc.adapters.energyplus.input import InputFile
+from mpc.errors import EnergyPlusError
 from thermal.errors import describe
 
 _TERMINALS = ("AirTerminal:SingleDuct:VAV:Reheat", "AirTerminal:SingleDuct:VAV:NoReheat")

@@ -8,25 +8,20 @@ from pathlib import Path
 
 import pandas as pd
 
-from mpc.loop.noise import SensorNoise
 from mpc.adapters.energyplus.building import EnergyPlusBuilding, energyplus_building
 from mpc.adapters.energyplus.holidays import holidays
 from mpc.adapters.energyplus.install import CHICAGO
 from mpc.adapters.energyplus.plant import EnergyPlusPlant
-from mpc.scenario import (
-    Calendar,
-    CarbonIntensity,
-    ComfortBand,
-    ErrorGrowth,
-    Forecaster,
-    InternalGains,
-    Scenario,
-    StepGrid,
-    Tariff,
-    build_scenario,
-    paper_tariff,
-    read_epw,
-)
+from mpc.loop.noise import SensorNoise
+from mpc.scenario.carbon import CarbonIntensity
+from mpc.scenario.comfort import ComfortBand
+from mpc.scenario.forecaster import ErrorGrowth, Forecaster
+from mpc.scenario.gains import InternalGains
+from mpc.scenario.grid import Calendar, StepGrid
+from mpc.scenario.paper import paper_tariff
+from mpc.scenario.scenario import Scenario, build_scenario
+from mpc.scenario.tariff import Tariff
+from mpc.scenario.weather_files import read_epw
 
 #: Thermostats of the reference offices, 21 and 24 degC while they run, half a kelvin wider; an hour to get there.
 OFFICE_COMFORT = ComfortBand((293.65, 297.65), (288.25, 300.35), weekday=(7.0, 22.0), saturday=(7.0, 18.0))

@@ -8,23 +8,24 @@ from datetime import timedelta
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
-from mpc.errors import PlantError
-from mpc.kpi import PlantRecord
-from mpc.loop.actuators import checked_actions
-from mpc.loop.history import RecentSteps
-from mpc.loop.noise import NoiseSource, SensorNoise
-from mpc.loop.plant import Measurements, PointLayout, need_running
 from mpc.adapters.energyplus.building import EnergyPlusBuilding
 from mpc.adapters.energyplus.points import Reader, columns_of, meters
 from mpc.adapters.energyplus.process import EnergyPlusProcess, Job
 from mpc.adapters.energyplus.setpoints import actuators_of, prepared
-from mpc.scenario import Forecast, Forecaster, Scenario
-from thermal import Case, Telemetry
+from mpc.errors import PlantError
+from mpc.kpi.record import PlantRecord
+from mpc.loop.actuators import checked_actions
+from mpc.loop.history import RecentSteps
+from mpc.loop.noise import NoiseSource, SensorNoise
+from mpc.loop.plant import Measurements, PointLayout, need_running
+from mpc.scenario.forecast import Forecast
+from mpc.scenario.forecaster import Forecaster
+from mpc.scenario.scenario import Scenario
+from thermal._types import FloatArray
+from thermal.case.case import Case
+from thermal.case.telemetry import Telemetry
 from thermal.errors import describe
-
-FloatArray = NDArray[np.float64]
 
 _FREEZING = 273.15  # K
 _DAY, _HOUR = 86_400, 3_600  # s

@@ -6,12 +6,11 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mpc.loop.actuators import COOLING_SETPOINT, HEATING_SETPOINT, SUPPLY_AIR, SUPPLY_WATER
 from mpc.adapters.energyplus.layout import AirLoop, PlantLayout, WaterLoop
+from mpc.loop.actuators import COOLING_SETPOINT, HEATING_SETPOINT, SUPPLY_AIR, SUPPLY_WATER
+from thermal._types import FloatArray
 
-FloatArray = NDArray[np.float64]
 Output = tuple[str, str]
 
 _FREEZING = 273.15  # K

@@ -17,8 +17,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from mpc.errors import EnergyPlusError, EnergyPlusTimeoutError
 from mpc.adapters.energyplus.install import data_folder
+from mpc.errors import EnergyPlusError, EnergyPlusTimeoutError
 from thermal.errors import describe
 
 _WORKER = Path(__file__).with_name("_worker.py")

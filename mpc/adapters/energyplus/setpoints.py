@@ -6,11 +6,11 @@ from collections.abc import Mapping
 from datetime import date
 from typing import Any
 
-from mpc.errors import EnergyPlusError, PlantError
-from mpc.loop.actuators import ACTION_LIMITS, COOLING_SETPOINT, HEATING_SETPOINT, SUPPLY_AIR, SUPPLY_WATER, Actuator
 from mpc.adapters.energyplus.building import EnergyPlusBuilding
 from mpc.adapters.energyplus.input import InputFile, with_period
 from mpc.adapters.energyplus.points import entity
+from mpc.errors import EnergyPlusError, PlantError
+from mpc.loop.actuators import ACTION_LIMITS, COOLING_SETPOINT, HEATING_SETPOINT, SUPPLY_AIR, SUPPLY_WATER, Actuator
 from thermal.errors import describe, nearest
 
 #: Ranges of the supply setpoints [K]; water as hot as the reference buildings' own, 82.2 degC, must be in.

@@ -10,20 +10,15 @@ import numpy as np
 
 from mpc.adapters.energyplus.building import EnergyPlusBuilding
 from mpc.adapters.energyplus.layout import AirLoop, Terminal
-from thermal.hvac import (
-    CONSTANT_EFFICIENCY,
-    AirHandler,
-    Biquadratic,
-    BoilerLoop,
-    CoolingCoil,
-    Fan,
-    Heater,
-    HvacSystem,
-    Pump,
-    Terminals,
-    Thermostat,
-    WaterCoil,
-)
+from thermal.hvac._air_handler import AirHandler, Heater
+from thermal.hvac._boiler import BoilerLoop, Pump
+from thermal.hvac._coil import WaterCoil
+from thermal.hvac._cooling import CoolingCoil
+from thermal.hvac._curves import CONSTANT_EFFICIENCY, Biquadratic
+from thermal.hvac._fan import Fan
+from thermal.hvac._system import HvacSystem
+from thermal.hvac._terminals import Terminals
+from thermal.hvac._thermostat import Thermostat
 from thermal.units import air_density
 
 _WATER = 983.0  # kg/m3, as `thermal.hvac` has it

@@ -9,20 +9,18 @@ from types import TracebackType
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
+from mpc.adapters.fmu.signals import FmuSignals, actuator_of
+from mpc.adapters.fmu.unit import Unit
 from mpc.errors import FmuError, PlantError
-from mpc.kpi import PlantRecord
+from mpc.kpi.record import PlantRecord
 from mpc.loop.actuators import checked_actions
 from mpc.loop.conversion import conversion
 from mpc.loop.plant import Measurements, PointLayout, need_running
-from mpc.adapters.fmu.signals import FmuSignals, actuator_of
-from mpc.adapters.fmu.unit import Unit
-from mpc.scenario import Forecast
+from mpc.scenario.forecast import Forecast
+from thermal._types import FloatArray
 from thermal.case.points import ZONE_TEMPERATURE
 from thermal.errors import describe
-
-FloatArray = NDArray[np.float64]
 
 _READABLE = ("output", "local", "input", "calculatedParameter", "parameter")
 

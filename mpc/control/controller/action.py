@@ -8,12 +8,12 @@ from enum import StrEnum
 
 import pandas as pd
 
+from mpc.control.controller.rules import ResetRule
 from mpc.control.problem.assembly import ComfortOperation
 from mpc.control.problem.back_off import BackOff, Margin
-from mpc.control.controller.rules import ResetRule
 from mpc.control.solvers.solution import Solution
-from mpc.kpi import DISCOMFORT_PRICE
-from mpc.scenario import DemandCharge
+from mpc.kpi.rewards import DISCOMFORT_PRICE
+from mpc.scenario.tariff import DemandCharge
 
 
 class Source(StrEnum):

@@ -7,25 +7,23 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from mpc.control.controller.action import Action, ControllerSettings, Source
+from mpc.control.controller.observer import Observer
+from mpc.control.controller.reading import Readings, SitePoints
+from mpc.control.controller.start_up import past_forecast, past_steps
+from mpc.control.controller.watch import FarFromModel, StuckSensors
 from mpc.control.problem.assembly import Expected, expect, peak_data
 from mpc.control.problem.data import HorizonData
 from mpc.control.problem.demand_count import DemandCount
 from mpc.control.problem.explain import explain_comfort
-from mpc.control.controller.observer import Observer
 from mpc.control.problem.problem import ControlProblem
-from mpc.control.controller.reading import Readings, SitePoints
-from mpc.control.solvers.starts import Starts
 from mpc.control.solvers.solution import Solution, Solver, Status
-from mpc.control.controller.start_up import past_forecast, past_steps
-from mpc.control.controller.watch import FarFromModel, StuckSensors
+from mpc.control.solvers.starts import Starts
 from mpc.errors import ControlError, MpcError
-from mpc.scenario import Forecast
+from mpc.scenario.forecast import Forecast
+from thermal._types import FloatArray
 from thermal.errors import describe
-
-FloatArray = NDArray[np.float64]
 
 _USUAL_HUMIDITY = 0.006  # kg/kg, as `thermal.hvac` has it where none is measured
 

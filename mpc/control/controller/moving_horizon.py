@@ -7,16 +7,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from calibration import KalmanFilter
+from calibration.estimation.kalman import KalmanFilter
 from mpc.control.controller.observer import Observer
 from mpc.control.solvers.quadratic import solve_quadratic
 from mpc.control.solvers.solution import Status
 from mpc.errors import ControlError
+from thermal._types import FloatArray
 from thermal.errors import describe
-from thermal.model import ModalModel
-from thermal.inputs import REFERENCE_TEMPERATURE
-
-FloatArray = NDArray[np.float64]
+from thermal.inputs.drivers import REFERENCE_TEMPERATURE
+from thermal.model.modal import ModalModel
 
 _ROUND_OFF = 1e-6  # W: bounds that are missed by less are met
 

@@ -5,13 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from calibration import KalmanFilter
+from calibration.estimation.kalman import KalmanFilter
 from mpc.errors import ControlError
+from thermal._types import FloatArray
 from thermal.errors import describe
-from thermal.model import ModalModel
-from thermal.inputs import REFERENCE_TEMPERATURE
-
-FloatArray = NDArray[np.float64]
+from thermal.inputs.drivers import REFERENCE_TEMPERATURE
+from thermal.model.modal import ModalModel
 
 
 class Observer:

@@ -7,16 +7,15 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mpc.control.problem.channels import Channel
 from mpc.errors import ControlError
+from thermal._types import FloatArray
 from thermal.case.points import OUTDOOR_TEMPERATURE, ZONE_TEMPERATURE
 from thermal.errors import describe
-from thermal.hvac import HvacSystem, SmoothHvac
+from thermal.hvac._smooth import SmoothHvac
+from thermal.hvac._system import HvacSystem
 from thermal.units import AIR_HEAT_CAPACITY
-
-FloatArray = NDArray[np.float64]
 
 _POINTS = {
     "supply_air_temperature": "supply_air_temperature_setpoint",

@@ -6,12 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mpc.control.problem.channels import Channel
 from mpc.control.predictor.predictor import Predictor
-
-FloatArray = NDArray[np.float64]
+from mpc.control.problem.channels import Channel
+from thermal._types import FloatArray
 
 
 @dataclass(frozen=True)

@@ -6,15 +6,13 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from mpc.control.controller.reading import SitePoints
 from mpc.errors import ControlError
-from mpc.scenario import Forecast
+from mpc.scenario.forecast import Forecast
+from thermal._types import FloatArray
 from thermal.case.points import OUTDOOR_TEMPERATURE
 from thermal.errors import describe
-
-FloatArray = NDArray[np.float64]
 
 
 class _PastStep(NamedTuple):

@@ -5,14 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import ndtr
 
 from mpc.errors import ControlError
+from thermal._types import BoolArray, FloatArray
 from thermal.errors import describe
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 _SAME = 1e-6  # K: readings that differ by less are one and the same
 _FEWEST = 6  # readings that must be the same, whatever the sensor

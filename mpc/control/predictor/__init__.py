@@ -1,0 +1,1 @@
+"""Building and HVAC system over a horizon, with exact sensitivities."""

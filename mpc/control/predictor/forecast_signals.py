@@ -8,18 +8,18 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from mpc.errors import ControlError
-from mpc.scenario import Forecast
-from thermal import Building, Case, Telemetry
-from thermal.case import QualityReport
+from mpc.scenario.forecast import Forecast
+from thermal._types import FloatArray
+from thermal.case.building import Building
+from thermal.case.case import Case
 from thermal.case.points import ZONE_TEMPERATURE
+from thermal.case.quality import QualityReport
+from thermal.case.telemetry import Telemetry
 from thermal.errors import EffectError, describe
-from thermal.network import ThermalNetwork
-from thermal.inputs import Drivers
-
-FloatArray = NDArray[np.float64]
+from thermal.inputs.drivers import Drivers
+from thermal.network.network import ThermalNetwork
 
 _OCCUPANCY = "occupancy_count_sensor"
 

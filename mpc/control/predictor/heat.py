@@ -7,18 +7,17 @@ from dataclasses import dataclass
 from typing import Literal, cast, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mpc.control.predictor.predictor import Predictor, Rollout, Sensitivity
 from mpc.control.problem.channels import Channel
 from mpc.control.problem.data import HorizonData
 from mpc.control.problem.horizon import Horizon
-from mpc.control.predictor.predictor import Predictor, Rollout, Sensitivity
 from mpc.errors import ControlError
+from thermal._types import FloatArray
 from thermal.errors import describe, nearest
-from thermal.model import IMPLICIT_EULER, ModalModel, Scheme
-from thermal.inputs import REFERENCE_TEMPERATURE
-
-FloatArray = NDArray[np.float64]
+from thermal.inputs.drivers import REFERENCE_TEMPERATURE
+from thermal.model.modal import ModalModel
+from thermal.model.scheme import IMPLICIT_EULER, Scheme
 
 #: What a plant can do to a zone.
 HeatQuantity = Literal["heating", "cooling"]

@@ -12,12 +12,12 @@ from mpc.control.problem.channels import Channel
 from mpc.control.problem.data import HorizonData
 from mpc.control.problem.horizon import Horizon
 from mpc.errors import ControlError
+from thermal._types import FloatArray
 from thermal.errors import describe
-from thermal.hvac import SmoothHvac
-from thermal.model import IMPLICIT_EULER, ModalModel, Scheme
-from thermal.inputs import REFERENCE_TEMPERATURE
-
-FloatArray = NDArray[np.float64]
+from thermal.hvac._smooth import SmoothHvac
+from thermal.inputs.drivers import REFERENCE_TEMPERATURE
+from thermal.model.modal import ModalModel
+from thermal.model.scheme import IMPLICIT_EULER, Scheme
 
 _SETTLED = 1e-5  # K: what thermostats go by is found to within this
 _NARROW = 0.02  # K: width of a bracket from which on Newton's method is left alone

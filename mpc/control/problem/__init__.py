@@ -1,0 +1,1 @@
+"""The optimal control problem: cost, constraints, and the data of a horizon."""

@@ -8,16 +8,16 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from mpc.control.problem.data import PeakData
 from mpc.control.problem.horizon import Horizon
 from mpc.errors import ForecastError
-from mpc.scenario import DemandCharge, Forecast, StepGrid
+from mpc.scenario.forecast import Forecast
+from mpc.scenario.grid import StepGrid
+from mpc.scenario.tariff import DemandCharge
+from thermal._types import FloatArray
 from thermal.case.points import OUTDOOR_TEMPERATURE
 from thermal.errors import describe
-
-FloatArray = NDArray[np.float64]
 
 _HOUR = 3600.0  # s
 

@@ -6,20 +6,17 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import ndtri
 
-from calibration import KalmanFilter
+from calibration.estimation.kalman import KalmanFilter
 from mpc.control.problem.data import HorizonData
 from mpc.control.problem.horizon import Horizon
 from mpc.errors import ControlError
-from mpc.scenario import ErrorGrowth
+from mpc.scenario.forecaster import ErrorGrowth
+from thermal._types import BoolArray, FloatArray
 from thermal.errors import describe
-from thermal.model import IMPLICIT_EULER, ModalModel, Scheme
-
-FloatArray = NDArray[np.float64]
-
-BoolArray = NDArray[np.bool_]
+from thermal.model.modal import ModalModel
+from thermal.model.scheme import IMPLICIT_EULER, Scheme
 
 
 @dataclass(frozen=True, eq=False)

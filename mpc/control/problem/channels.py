@@ -10,9 +10,7 @@ from numpy.typing import NDArray
 
 from mpc.errors import ControlError
 from thermal.errors import describe, nearest
-from thermal.hvac import SmoothHvac
-
-FloatArray = NDArray[np.float64]
+from thermal.hvac._smooth import SmoothHvac
 
 #: What a channel can set.
 Quantity = Literal[

@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mpc.errors import ControlError
+from thermal._types import FloatArray
 from thermal.errors import describe
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
-from mpc.scenario import DemandCharge, StepGrid
+from mpc.scenario.grid import StepGrid
+from mpc.scenario.tariff import DemandCharge
 
 
 class DemandCount:

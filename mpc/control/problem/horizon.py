@@ -11,9 +11,8 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from mpc.errors import ControlError
+from thermal._types import FloatArray
 from thermal.errors import describe
-
-FloatArray = NDArray[np.float64]
 
 #: Longest step of the predictor [s]: the water of the loop and the air's mixing are lost in longer ones.
 LONGEST_STEP = 1800.0

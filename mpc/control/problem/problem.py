@@ -9,13 +9,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mpc.control.problem.data import HorizonData
 from mpc.control.predictor.predictor import Predictor, Rollout, Sensitivity
+from mpc.control.problem.data import HorizonData
 from mpc.errors import ControlError
-from mpc.scenario import KILOWATT_HOUR
+from mpc.scenario.rates import KILOWATT_HOUR
+from thermal._types import FloatArray
 from thermal.errors import describe
-
-FloatArray = NDArray[np.float64]
 
 _HOUR = 3600.0  # s
 _KILOWATT = 1000.0  # W

@@ -1,0 +1,1 @@
+"""Solvers of the optimal control problem: never numbers without a status."""

@@ -8,15 +8,13 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
-from mpc.control.problem.data import HorizonData
 from mpc.control.predictor.predictor import Rollout
+from mpc.control.problem.data import HorizonData
 from mpc.control.problem.problem import ControlProblem
 from mpc.control.solvers.solution import Solution, Status
 from mpc.errors import MpcError
-
-FloatArray = NDArray[np.float64]
+from thermal._types import FloatArray
 
 _KILOWATT = 1000.0  # W
 _QUIET = {

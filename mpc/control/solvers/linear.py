@@ -8,18 +8,16 @@ import warnings
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mpc.control.problem.data import HorizonData
 from mpc.control.predictor.heat import HeatPredictor
+from mpc.control.problem.data import HorizonData
 from mpc.control.problem.problem import ControlProblem
 from mpc.control.solvers.solution import Solution, Status
 from mpc.errors import ControlError
-from mpc.scenario import KILOWATT_HOUR
+from mpc.scenario.rates import KILOWATT_HOUR
+from thermal._types import FloatArray
 from thermal.errors import describe
-from thermal.inputs import REFERENCE_TEMPERATURE
-
-FloatArray = NDArray[np.float64]
+from thermal.inputs.drivers import REFERENCE_TEMPERATURE
 
 _KILOWATT = 1000.0  # W
 _ENDS = {

@@ -6,9 +6,8 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from thermal._types import FloatArray
 
 #: Clarabel (interior point) or OSQP (operator splitting, polished).
 QuadraticSolver = Literal["clarabel", "osqp"]

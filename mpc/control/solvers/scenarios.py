@@ -10,17 +10,16 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from mpc.control.predictor.predictor import Predictor, Rollout, Sensitivity
 from mpc.control.problem.data import HorizonData
 from mpc.control.problem.horizon import Horizon
-from mpc.control.predictor.predictor import Predictor, Rollout, Sensitivity
 from mpc.control.problem.problem import ControlProblem, CostTerms
 from mpc.control.solvers.sequential import SequentialSolver
 from mpc.control.solvers.solution import Solution, Solver
 from mpc.errors import ControlError
-from mpc.scenario import ErrorGrowth
+from mpc.scenario.forecaster import ErrorGrowth
+from thermal._types import FloatArray
 from thermal.errors import describe
-
-FloatArray = NDArray[np.float64]
 
 _ZONES = ("disturbance", "gains", "lower", "upper", "heating_setpoint", "cooling_setpoint", "comfort_price")
 

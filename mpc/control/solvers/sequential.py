@@ -7,15 +7,13 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mpc.control.problem.data import HorizonData
 from mpc.control.predictor.predictor import Rollout, Sensitivity
+from mpc.control.problem.data import HorizonData
 from mpc.control.problem.problem import ControlProblem, CostTerms
 from mpc.control.solvers.quadratic import QuadraticSolver, solve_quadratic
 from mpc.control.solvers.solution import Solution, Status
-
-FloatArray = NDArray[np.float64]
+from thermal._types import FloatArray
 
 _KILOWATT = 1000.0  # W
 _INNER = 12  # most quadratic programmes of one step; three are usual

@@ -7,13 +7,11 @@ from enum import StrEnum
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mpc.control.problem.data import HorizonData
 from mpc.control.predictor.predictor import Rollout
+from mpc.control.problem.data import HorizonData
 from mpc.control.problem.problem import ControlProblem, CostTerms
-
-FloatArray = NDArray[np.float64]
+from thermal._types import FloatArray
 
 
 class Status(StrEnum):

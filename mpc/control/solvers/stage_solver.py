@@ -9,14 +9,12 @@ from typing import Any, Literal, get_args
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
-from mpc.control.solvers.solution import Status
 from mpc.control.problem.stages import StageData, StageProblem
+from mpc.control.solvers.solution import Status
 from mpc.errors import ControlError
+from thermal._types import FloatArray
 from thermal.errors import describe, nearest
-
-FloatArray = NDArray[np.float64]
 
 #: Interior points that solve problems in stages.
 StageMethod = Literal["fatrop", "ipopt"]

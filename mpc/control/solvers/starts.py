@@ -4,15 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from mpc.control.problem.channels import Channel
 from mpc.control.problem.data import HorizonData
 from mpc.control.solvers.solution import Solution, Solver
-
-FloatArray = NDArray[np.float64]
+from thermal._types import FloatArray
 
 #: Share of the cost by which a plan begun anew has to be cheaper [-]: of plans of equal cost the carried one is kept,
 #: or setpoints would leap from valley to valley.

@@ -8,7 +8,6 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from mpc.reports.figures.style import (
     CELSIUS,
@@ -24,8 +23,7 @@ from mpc.reports.figures.style import (
     time_axis,
 )
 from mpc.studies.run import AHEAD, ControlRun, compared_decisions
-
-FloatArray = NDArray[np.float64]
+from thermal._types import FloatArray
 
 _KILO = 1000.0
 _FELT = 0.1  # K h outside of the band: bars of less are to look like little

@@ -19,7 +19,6 @@ from mpc.reports.figures.style import (
     MEASURED,
     MUTED,
     SIMULATED,
-    FloatArray,
     Picture,
     day_numbers,
     picture,
@@ -27,7 +26,8 @@ from mpc.reports.figures.style import (
     time_axis,
 )
 from mpc.reports.page import watts
-from thermal import FloorPlans
+from thermal._types import FloatArray
+from thermal.case.building import FloorPlans
 
 #: White is none, dark red most; it reads in grey too.
 HEAT_COLOURS = colormaps["OrRd"]

@@ -11,7 +11,8 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from calibration.evaluation.n_step import Evaluation, Predictions
-from mpc.reports.figures.style import CELSIUS, MEASURED, SIMULATED, FloatArray, Picture, picture, styled
+from mpc.reports.figures.style import CELSIUS, MEASURED, SIMULATED, Picture, picture, styled
+from thermal._types import FloatArray
 
 #: Time between two pairs of boxes [s].
 SPACING = 1800.0

@@ -9,7 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from calibration.evaluation.n_step import Evaluation
-from mpc.reports.figures.style import INK, MUTED, SIMULATED, FloatArray, Picture, picture, styled
+from mpc.reports.figures.style import INK, MUTED, SIMULATED, Picture, picture, styled
+from thermal._types import FloatArray
 
 #: Colour and line of each model.
 LINES = {"before": (MUTED, "--"), "after": (SIMULATED, "-"), "model": (SIMULATED, "-")}

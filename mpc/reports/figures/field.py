@@ -7,9 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from mpc.reports.figures.style import FloatArray
-from thermal import Inputs, SymbolicModel, ThermalNetwork, spin_up
-from thermal.model import IMPLICIT_EULER, SPIN_UP, Scheme, Stepper
+from thermal._types import FloatArray
+from thermal.model.replay import SPIN_UP, Inputs, spin_up
+from thermal.model.scheme import IMPLICIT_EULER, Scheme
+from thermal.model.stepper import Stepper
+from thermal.model.symbolic import SymbolicModel
+from thermal.network.network import ThermalNetwork
 
 #: The steppers take temperatures as differences from this one [K], which costs no accuracy.
 _REFERENCE = 293.15

@@ -8,7 +8,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
-from mpc.reports.figures.style import INK, MUTED, SIMULATED, FloatArray, Picture, picture, styled
+from mpc.reports.figures.style import INK, MUTED, SIMULATED, Picture, picture, styled
+from thermal._types import FloatArray
 
 #: Slopes that are drawn beside the curves [-], with what they are called.
 SLOPES = ((0.5, "slope ½"), (1.0, "slope 1"))

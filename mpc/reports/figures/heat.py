@@ -6,16 +6,8 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from mpc.reports.figures.style import (
-    MEASURED,
-    SIMULATED,
-    FloatArray,
-    Picture,
-    day_numbers,
-    picture,
-    styled,
-    time_axis,
-)
+from mpc.reports.figures.style import MEASURED, SIMULATED, Picture, day_numbers, picture, styled, time_axis
+from thermal._types import FloatArray
 
 
 @styled

@@ -9,18 +9,9 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from mpc.reports.figures.style import (
-    INK,
-    MUTED,
-    SIMULATED,
-    FloatArray,
-    Picture,
-    day_numbers,
-    picture,
-    styled,
-    time_axis,
-)
+from mpc.reports.figures.style import INK, MUTED, SIMULATED, Picture, day_numbers, picture, styled, time_axis
 from mpc.reports.page import watts
+from thermal._types import FloatArray
 
 #: Colour and dashes of each model in turn: the parameters at their starts, calibrated, with effects.
 LINES = (("#7B3F98", (0, (4, 2))), (MUTED, "-"), (SIMULATED, "-"))

@@ -9,11 +9,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from calibration.fit.result import ParameterEstimate
 from mpc.reports.figures.style import INK, MEASURED, MUTED, WARNING, Picture, picture, styled
 from mpc.reports.identifiability import in_words
-from calibration.fit.result import ParameterEstimate
-from thermal import PARAMETERS, Parameter
-from thermal.effects import CATALOGUE
+from thermal.effects.catalogue import CATALOGUE
+from thermal.parameters import PARAMETERS, Parameter
 
 #: More rows than this are not drawn; the table has them all.
 MOST_ROWS = 40

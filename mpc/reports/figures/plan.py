@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
 from mpc.reports.figures.field import Field
-from mpc.reports.figures.style import INK, FloatArray, Picture, picture, styled
-from thermal import FloorPlan, FloorPlans
+from mpc.reports.figures.style import INK, Picture, picture, styled
+from thermal._types import FloatArray
+from thermal.case.building import FloorPlan, FloorPlans
 
 #: Red is a simulation that is too warm, blue one that is too cold, white none, as in the paper.
 ERROR_COLOURS = colormaps["RdBu_r"]

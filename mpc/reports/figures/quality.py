@@ -6,17 +6,8 @@ import pandas as pd
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from mpc.reports.figures.style import (
-    MUTED,
-    SIMULATED,
-    WARNING,
-    Picture,
-    day_numbers,
-    picture,
-    styled,
-    time_axis,
-)
-from thermal.case import QualityReport
+from mpc.reports.figures.style import MUTED, SIMULATED, WARNING, Picture, day_numbers, picture, styled, time_axis
+from thermal.case.quality import QualityReport
 
 #: Colour of each kind of finding; what is constant is only reported, not left out.
 COLOURS = {"gap": MUTED, "impossible": WARNING, "flat": SIMULATED, "spike": "#7B3FA0", "constant": "#7FB2D6"}

@@ -10,17 +10,8 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from calibration.evaluation.n_step import Evaluation
-from mpc.reports.figures.style import (
-    CELSIUS,
-    MEASURED,
-    SIMULATED,
-    FloatArray,
-    Picture,
-    day_numbers,
-    picture,
-    styled,
-    time_axis,
-)
+from mpc.reports.figures.style import CELSIUS, MEASURED, SIMULATED, Picture, day_numbers, picture, styled, time_axis
+from thermal._types import FloatArray
 
 #: Panels of a figure: the zones with the largest error.
 MOST_PANELS = 12

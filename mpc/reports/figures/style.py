@@ -17,11 +17,11 @@ import pandas as pd
 from matplotlib import dates
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
+
+from thermal._types import FloatArray
 
 P = ParamSpec("P")
 T = TypeVar("T")
-FloatArray = NDArray[np.float64]
 
 #: Measured is blue and simulated orange, as in the paper, from a palette that the colour-blind can tell apart.
 MEASURED, SIMULATED, WARNING, MUTED, INK = "#0072B2", "#D55E00", "#C00028", "#8A8F98", "#22262B"

@@ -7,7 +7,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from mpc.reports.figures.plan import colour_bar, error_colour, error_scale, ink_on, signed_kelvin
-from mpc.reports.figures.style import FloatArray, Picture, picture, styled
+from mpc.reports.figures.style import Picture, picture, styled
+from thermal._types import FloatArray
 
 Box = tuple[float, float, float, float]
 

@@ -9,7 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy.stats import kstwo
 
-from mpc.reports.figures.style import INK, MEASURED, MUTED, SIMULATED, FloatArray, Picture, picture, styled
+from mpc.reports.figures.style import INK, MEASURED, MUTED, SIMULATED, Picture, picture, styled
+from thermal._types import FloatArray
 
 #: Probability of white innovations beyond the dashed bounds [-].
 LEVEL = 0.05

@@ -8,18 +8,20 @@ from functools import cache
 import numpy as np
 import pytest
 
-from calibration.evaluation.settings import ModelSettings
-from calibration.diagnosis import Diagnosis, baseline_gap, diagnose
+from calibration.diagnosis.decide.levels import CONCENTRATED, LEFT_OF_CHANGE, LEFT_OVER
+from calibration.diagnosis.decide.verdict import _left_over, judge
+from calibration.diagnosis.diagnosis import Diagnosis, baseline_gap, diagnose
 from calibration.diagnosis.refit.comparison import Bench, Fit
 from calibration.diagnosis.refit.held_out import held_out
-from calibration.diagnosis.decide.levels import CONCENTRATED, LEFT_OF_CHANGE, LEFT_OVER
 from calibration.diagnosis.refit.refit import ACCEPTED, CHANCE, MATTERS, Refit, Work, _beyond_a_step
-from calibration.diagnosis.screen.screen import Screening
 from calibration.diagnosis.refit.search import _first
-from calibration.diagnosis.decide.verdict import _left_over, judge
+from calibration.diagnosis.screen.screen import Screening
+from calibration.evaluation.settings import ModelSettings
 from thermal import Case, Telemetry
-from thermal.effects import CATALOGUE
-from thermal.pilot import TwinRanges, generate_twin, pilot_building
+from thermal.effects.catalogue import CATALOGUE
+from thermal.pilot.building import pilot_building
+from thermal.pilot.truth import TwinRanges
+from thermal.pilot.twin import generate_twin
 
 #: Share by which the flow of one zone is under-reported [-].
 ERROR = 0.25

@@ -11,10 +11,13 @@ import pytest
 import scipy.linalg as sl
 from numpy.typing import NDArray
 
-from calibration import DisturbanceModel, DisturbedSpace, state_space
+from calibration import DisturbanceModel
 from calibration.errors import FilterError
+from calibration.estimation.disturbance import DisturbedSpace
+from calibration.estimation.state_space import state_space
 from thermal import SymbolicModel, build_network, load_bundled_case, reduced_model
-from thermal.model import EXACT, Matrices
+from thermal.model.scheme import EXACT
+from thermal.model.symbolic import Matrices
 
 FloatArray = NDArray[np.float64]
 

@@ -10,20 +10,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from calibration import (
-    HORIZONS,
-    DisturbanceModel,
-    Interval,
-    default_intervals,
-    evaluate_filter,
-    evaluate_model,
-    filter_interval,
-    smooth,
-    spatial_metrics,
-    tune_disturbance,
-    whiteness,
-)
+from calibration import DisturbanceModel, Interval, evaluate_model, smooth, tune_disturbance
 from calibration.errors import FilterError, NotEnoughDataError
+from calibration.estimation.filtered import evaluate_filter, filter_interval
+from calibration.estimation.whiteness import whiteness
+from calibration.evaluation.intervals import default_intervals
+from calibration.evaluation.n_step import HORIZONS, spatial_metrics
 from thermal import (
     Inputs,
     SymbolicModel,

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from calibration import DisturbanceModel, Filtered, KalmanFilter, StateSpace
+from calibration import DisturbanceModel, KalmanFilter, StateSpace
+from calibration.estimation.kalman import Filtered
 from thermal import Inputs
 
 FloatArray = NDArray[np.float64]

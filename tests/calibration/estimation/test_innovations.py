@@ -11,16 +11,11 @@ import pandas as pd
 import pytest
 from numpy.typing import NDArray
 
-from calibration import (
-    DISTURBANCE_PRIORS,
-    DisturbanceModel,
-    Interval,
-    TunedDisturbance,
-    filter_interval,
-    state_space,
-    tune_disturbance,
-)
+from calibration import DisturbanceModel, Interval, tune_disturbance
 from calibration.errors import FilterError
+from calibration.estimation.filtered import filter_interval
+from calibration.estimation.innovations import DISTURBANCE_PRIORS, TunedDisturbance
+from calibration.estimation.state_space import state_space
 from thermal import Inputs, SymbolicModel, build_network, load_bundled_case, reduced_model, replay_inputs
 
 FloatArray = NDArray[np.float64]

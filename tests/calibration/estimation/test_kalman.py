@@ -12,10 +12,12 @@ from numpy.typing import NDArray
 from scipy.stats import multivariate_normal
 from statsmodels.tsa.statespace.kalman_filter import KalmanFilter as Reference
 
-from calibration import DisturbanceModel, KalmanFilter, StateSpace, state_space
+from calibration import DisturbanceModel, KalmanFilter, StateSpace
 from calibration.errors import FilterError
+from calibration.estimation.state_space import state_space
 from thermal import Inputs
-from thermal.model import EXACT, Matrices
+from thermal.model.scheme import EXACT
+from thermal.model.symbolic import Matrices
 
 FloatArray = NDArray[np.float64]
 

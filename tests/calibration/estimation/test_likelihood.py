@@ -25,8 +25,10 @@ from thermal import (
     replay_inputs,
     spin_up,
 )
-from thermal.model import ReducedModel
-from thermal.pilot import TwinTruth, generate_twin, pilot_building
+from thermal.model.reduce import ReducedModel
+from thermal.pilot.building import pilot_building
+from thermal.pilot.truth import TwinTruth
+from thermal.pilot.twin import generate_twin
 
 FloatArray = NDArray[np.float64]
 

@@ -8,8 +8,8 @@ import pytest
 import scipy.linalg as sl
 from numpy.typing import NDArray
 
-from calibration.estimation.riccati import doubled_riccati, summed_stein
 from calibration.errors import FilterError
+from calibration.estimation.riccati import doubled_riccati, summed_stein
 
 FloatArray = NDArray[np.float64]
 

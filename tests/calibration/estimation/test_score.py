@@ -9,10 +9,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from calibration import DisturbanceModel, Filtered, KalmanFilter, StateSpace, state_space
+from calibration import DisturbanceModel, KalmanFilter, StateSpace
+from calibration.estimation.kalman import Filtered
 from calibration.estimation.score import log_likelihood_slopes
+from calibration.estimation.state_space import state_space
 from thermal import Inputs
-from thermal.model import Matrices
+from thermal.model.symbolic import Matrices
 
 FloatArray = NDArray[np.float64]
 

@@ -10,9 +10,10 @@ import pytest
 from numpy.typing import NDArray
 from statsmodels.tsa.statespace.kalman_smoother import KalmanSmoother as Reference
 
-from calibration import DisturbanceModel, Filtered, KalmanFilter, StateSpace, smooth
-from calibration.estimation.smoother import averaged_deviation
+from calibration import DisturbanceModel, KalmanFilter, StateSpace, smooth
 from calibration.errors import FilterError
+from calibration.estimation.kalman import Filtered
+from calibration.estimation.smoother import averaged_deviation
 from thermal import Inputs
 
 FloatArray = NDArray[np.float64]

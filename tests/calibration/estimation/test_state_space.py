@@ -7,10 +7,14 @@ import pytest
 import scipy.linalg as sl
 from numpy.typing import NDArray
 
-from calibration import StateSpace, state_space
+from calibration import StateSpace
 from calibration.errors import CalibrationError, FilterError
+from calibration.estimation.state_space import state_space
 from thermal import ModelError
-from thermal.model import EXACT, IMPLICIT_EULER, TR_BDF2, Matrices, Scheme, Stepper, modal_model
+from thermal.model.modal import modal_model
+from thermal.model.scheme import EXACT, IMPLICIT_EULER, TR_BDF2, Scheme
+from thermal.model.stepper import Stepper
+from thermal.model.symbolic import Matrices
 from thermal.units import AIR_HEAT_CAPACITY
 
 FloatArray = NDArray[np.float64]

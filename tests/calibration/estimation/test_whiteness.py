@@ -11,10 +11,13 @@ import pytest
 from numpy.typing import NDArray
 from statsmodels.stats.diagnostic import acorr_ljungbox
 
-from calibration import DisturbanceModel, Filtered, KalmanFilter, StateSpace, Whiteness, state_space, whiteness
+from calibration import DisturbanceModel, KalmanFilter, StateSpace
 from calibration.errors import FilterError
+from calibration.estimation.kalman import Filtered
+from calibration.estimation.state_space import state_space
+from calibration.estimation.whiteness import Whiteness, whiteness
 from thermal import Inputs
-from thermal.model import Matrices
+from thermal.model.symbolic import Matrices
 
 FloatArray = NDArray[np.float64]
 

@@ -23,7 +23,9 @@ from thermal import (
     replay_inputs,
     spin_up,
 )
-from thermal.model import IMPLICIT_EULER, SPIN_UP, ReducedModel
+from thermal.model.reduce import ReducedModel
+from thermal.model.replay import SPIN_UP
+from thermal.model.scheme import IMPLICIT_EULER
 
 FloatArray = NDArray[np.float64]
 

@@ -11,20 +11,19 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from calibration import (
-    CalibrationError,
-    Interval,
-    calibrate,
+from calibration import CalibrationError, Interval, calibrate
+from calibration.errors import HorizonError, IntervalError, NotEnoughDataError
+from calibration.evaluation.intervals import (
+    alternating_intervals,
     default_intervals,
     horizon_steps,
+    merge,
     parse_interval,
     select_runs,
 )
-from calibration.evaluation.intervals import alternating_intervals, merge
 from calibration.fit.starts import tuning_runs
-from calibration.errors import HorizonError, IntervalError, NotEnoughDataError
 from thermal import Case, Inputs, Telemetry, build_network, load_bundled_case, replay_inputs
-from thermal.model import SPIN_UP
+from thermal.model.replay import SPIN_UP
 
 
 def inputs_of(days: float = 6.0, step: float = 300.0, start: str = "2023-03-01T00:05:00-05:00", **given: Any) -> Inputs:

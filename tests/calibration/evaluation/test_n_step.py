@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from calibration import HORIZONS, Interval, evaluate_model, spatial_metrics
+from calibration import Interval, evaluate_model
 from calibration.errors import NotEnoughDataError
+from calibration.evaluation.n_step import HORIZONS, spatial_metrics
 from thermal import Case, Inputs, SymbolicModel, build_network, free_runs, load_bundled_case, replay_inputs, spin_up
-from thermal.model import TR_BDF2
+from thermal.model.scheme import TR_BDF2
 
 FloatArray = NDArray[np.float64]
 

@@ -13,10 +13,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from calibration import CalibrationError, CrossValidation, Interval, cross_validate, select_runs, tuning_problem
-from calibration.fit import cross_validation as module
+from calibration import CalibrationError, CrossValidation, Interval, cross_validate
+from calibration.evaluation.intervals import select_runs
 from calibration.evaluation.n_step import Evaluation, Predictions
 from calibration.evaluation.settings import ModelSettings
+from calibration.fit import cross_validation as module
+from calibration.identifiability.power import tuning_problem
 from thermal import Case, build_network, load_bundled_case, replay_inputs
 
 STEPS = 72

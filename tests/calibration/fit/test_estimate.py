@@ -9,12 +9,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from calibration import Interval, Problem, estimate, select_runs
-from calibration.fit.estimate import compensated_start, draw_starts
-from calibration.fit.problem import thin
+from calibration import Interval
+from calibration.evaluation.intervals import select_runs
+from calibration.fit.estimate import compensated_start, draw_starts, estimate
+from calibration.fit.problem import Problem, thin
 from thermal import SymbolicModel, build_network, free_runs, load_bundled_case, reduced_model, replay_inputs, spin_up
-from thermal.effects import chosen
-from thermal.model import TR_BDF2
+from thermal.effects.catalogue import chosen
+from thermal.model.scheme import TR_BDF2
 
 FloatArray = NDArray[np.float64]
 

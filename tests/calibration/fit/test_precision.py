@@ -9,12 +9,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from calibration import Interval, Problem, select_runs
+from calibration import Interval
 from calibration.estimation.disturbance import DisturbanceModel
+from calibration.evaluation.intervals import select_runs
 from calibration.fit.precision import Precision, precision, unexplained
-from calibration.fit.problem import thin
+from calibration.fit.problem import Problem, thin
 from thermal import SymbolicModel, build_network, load_bundled_case, reduced_model, replay_inputs
-from thermal.model import IMPLICIT_EULER, ReducedModel
+from thermal.model.reduce import ReducedModel
+from thermal.model.scheme import IMPLICIT_EULER
 
 FloatArray = NDArray[np.float64]
 

@@ -14,17 +14,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from calibration import (
-    HORIZONS,
-    CalibrationError,
-    CalibrationResult,
-    Estimate,
-    calibrate,
-    evaluate_model,
-    load_parameters,
-)
-from calibration.fit.describe import describe
+from calibration import CalibrationError, CalibrationResult, calibrate, evaluate_model, load_parameters
 from calibration.errors import ParameterFileError
+from calibration.evaluation.n_step import HORIZONS
+from calibration.fit.describe import describe
+from calibration.fit.estimate import Estimate
 from thermal import SymbolicModel, ThermalNetwork, build_network, load_bundled_case, replay_inputs
 
 

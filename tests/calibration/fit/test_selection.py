@@ -13,11 +13,11 @@ import pytest
 from numpy.typing import NDArray
 from scipy.stats import chi2, multivariate_normal
 
-from calibration import CalibrationError, Candidate, Interval, select_structure
-from calibration.fit import selection as module
-from calibration.identifiability.information_search import InformationSearch
-from calibration.fit.selection_verdict import _day_bootstrap, _likelihood_ratio, _nested, compare_candidates
+from calibration import CalibrationError, Interval, select_structure
 from calibration.evaluation.settings import ModelSettings
+from calibration.fit import selection as module
+from calibration.fit.selection_verdict import Candidate, _day_bootstrap, _likelihood_ratio, _nested, compare_candidates
+from calibration.identifiability.information_search import InformationSearch
 from thermal import Structure, load_bundled_case
 
 FloatArray = NDArray[np.float64]

@@ -15,9 +15,11 @@ from typing import Any
 import distributed
 import pytest
 
-from calibration import ClusterExecutor, calibrate_many, case_folders
-from calibration.fleet.local import ONE_THREAD
+from calibration import calibrate_many
 from calibration.errors import ClusterError, MissingExtraError
+from calibration.fleet.cluster import ClusterExecutor
+from calibration.fleet.local import ONE_THREAD
+from calibration.fleet.run import case_folders
 
 SETTINGS = {"horizon": "1h", "starts": 1}
 WITHOUT = "import sys; sys.modules['calibration'] = None"  # as where the package is not installed

@@ -14,9 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from calibration import INTERRUPTED, CaseOutcome, Interval, calibrate, calibrate_many, case_folders
-from calibration.fleet.case import CaseTask, calibrate_one
-from calibration.fleet.record import RECORD, check_settings
+from calibration import Interval, calibrate, calibrate_many
 from calibration.errors import (
     AnotherRunError,
     CalibrationError,
@@ -24,6 +22,10 @@ from calibration.errors import (
     OtherResultsError,
     ResultsExistError,
 )
+from calibration.fit.least_squares import INTERRUPTED
+from calibration.fleet.case import CaseTask, calibrate_one
+from calibration.fleet.record import RECORD, CaseOutcome, check_settings
+from calibration.fleet.run import case_folders
 from thermal import load_case
 
 SETTINGS = {"horizon": "1h", "starts": 1}

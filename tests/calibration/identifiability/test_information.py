@@ -12,11 +12,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from calibration import Information, estimate, fisher_information, information_of, tuning_problem
-from calibration.identifiability.information import split_jacobian
-from calibration.identifiability.information_search import DETERMINED
-from mpc.reports.identifiability import _precision_words, combination_words, listed, spoken
+from calibration import Information, fisher_information
 from calibration.evaluation.settings import ModelSettings
+from calibration.fit.estimate import estimate
+from calibration.identifiability.information import information_of, split_jacobian
+from calibration.identifiability.information_search import DETERMINED
+from calibration.identifiability.power import tuning_problem
+from mpc.reports.identifiability import _precision_words, combination_words, listed, spoken
 from thermal import PARAMETERS, Parameter, load_bundled_case, reduced_model
 
 FloatArray = NDArray[np.float64]

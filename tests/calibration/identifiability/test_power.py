@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from calibration import CalibrationError, Interval, Power, Problem, fisher_information, power_of_data, tuning_problem
-from calibration.identifiability.power import _information, _zones_of_rows
+from calibration import CalibrationError, Interval, Power, fisher_information, power_of_data
 from calibration.evaluation.settings import ModelSettings
+from calibration.fit.problem import Problem
+from calibration.identifiability.power import _information, _zones_of_rows, tuning_problem
 from thermal import load_bundled_case, reduced_model
 
 COARSE = ModelSettings(dx=1.5)

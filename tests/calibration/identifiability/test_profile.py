@@ -13,8 +13,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from calibration import CalibrationError, Estimate, Profile, estimate, profile_likelihood, tuning_problem
+from calibration import CalibrationError, Profile, profile_likelihood
 from calibration.evaluation.settings import ModelSettings
+from calibration.fit.estimate import Estimate, estimate
+from calibration.identifiability.power import tuning_problem
 from thermal import Parameter, load_bundled_case, reduced_model
 
 FloatArray = NDArray[np.float64]

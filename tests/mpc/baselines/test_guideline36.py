@@ -6,10 +6,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from mpc.baselines import Guideline36, Guideline36Settings, HysteresisRequests, OutdoorReset, SuppressedRequests
-from mpc.control import SitePoints
+from mpc.baselines.guideline36 import Guideline36, Guideline36Settings
+from mpc.baselines.requests import HysteresisRequests, SuppressedRequests
+from mpc.baselines.reset import OutdoorReset
+from mpc.control.controller.reading import SitePoints
 from mpc.errors import ControlError
-from mpc.loop import Actuator
+from mpc.loop.actuators import Actuator
 
 TERMINALS = ("A", "B", "C", "D")
 POINTS = SitePoints(TERMINALS, TERMINALS, ("AHU1", "AHU2"), "BOILER", "station")

@@ -8,30 +8,24 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from mpc.control import (
-    Channel,
-    ControlProblem,
-    Horizon,
-    HorizonData,
-    PeakData,
-    Predictor,
-    SitePoints,
-    supply_channels,
-)  # fmt: skip
-from mpc.scenario import Forecast, zone_areas
+from mpc.control.controller.reading import SitePoints
+from mpc.control.predictor.predictor import Predictor
+from mpc.control.problem.channels import Channel, supply_channels
+from mpc.control.problem.data import HorizonData, PeakData
+from mpc.control.problem.horizon import Horizon
+from mpc.control.problem.problem import ControlProblem
+from mpc.scenario.forecast import Forecast
+from mpc.scenario.scenario import zone_areas
 from thermal import SymbolicModel, build_network, load_bundled_case, reduced_model
-from thermal.hvac import (
-    AirHandler,
-    BoilerLoop,
-    CoolingCoil,
-    Fan,
-    HvacSystem,
-    Pump,
-    SmoothHvac,
-    Terminals,
-    WaterCoil,
-)  # fmt: skip
-from thermal.model import ModalModel, modal_model
+from thermal.hvac._air_handler import AirHandler
+from thermal.hvac._boiler import BoilerLoop, Pump
+from thermal.hvac._coil import WaterCoil
+from thermal.hvac._cooling import CoolingCoil
+from thermal.hvac._fan import Fan
+from thermal.hvac._smooth import SmoothHvac
+from thermal.hvac._system import HvacSystem
+from thermal.hvac._terminals import Terminals
+from thermal.model.modal import ModalModel, modal_model
 
 START = pd.Timestamp("2023-01-16 06:00", tz="Etc/GMT+8")
 DataMaker = Callable[..., HorizonData]

@@ -6,9 +6,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from mpc.control import ComfortOperation, Horizon, expect, peak_data
+from mpc.control.problem.assembly import ComfortOperation, expect, peak_data
+from mpc.control.problem.horizon import Horizon
 from mpc.errors import ForecastError
-from mpc.scenario import DemandCharge, Forecast, StepGrid
+from mpc.scenario.forecast import Forecast
+from mpc.scenario.grid import StepGrid
+from mpc.scenario.tariff import DemandCharge
 
 AHEAD = Horizon.growing([(0.5, 300.0), (1.5, 900.0)], [1.0, 1.0])
 START = pd.Timestamp("2023-01-16 06:00", tz="Etc/GMT+8")

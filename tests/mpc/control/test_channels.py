@@ -7,9 +7,15 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from mpc.control import Channel, ControlProblem, Horizon, IpoptSolver, Predictor, SequentialSolver, supply_channels
+from mpc.control.predictor.predictor import Predictor
+from mpc.control.problem.channels import Channel, supply_channels
+from mpc.control.problem.horizon import Horizon
+from mpc.control.problem.problem import ControlProblem
+from mpc.control.solvers.ipopt import IpoptSolver
+from mpc.control.solvers.sequential import SequentialSolver
 from mpc.errors import ControlError
-from thermal.hvac import HvacSystem, SmoothHvac
+from thermal.hvac._smooth import SmoothHvac
+from thermal.hvac._system import HvacSystem
 
 PRESSURES = (Channel("static_pressure", 60.0, 300.0), Channel("differential_pressure", 2e4, 9e4))
 HEATING = Channel("heating_setpoint", 289.0, 295.0, zones=(0, 2))

@@ -6,19 +6,18 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from calibration import DisturbanceModel, KalmanFilter, state_space
-from mpc.control import (
-    ControllerSettings,
-    HorizonData,
-    MpcController,
-    Observer,
-    SequentialSolver,
-    SitePoints,
-    Source,
-)  # fmt: skip
+from calibration import DisturbanceModel, KalmanFilter
+from calibration.estimation.state_space import state_space
+from mpc.control.controller.action import ControllerSettings, Source
+from mpc.control.controller.controller import MpcController
+from mpc.control.controller.observer import Observer
+from mpc.control.controller.reading import SitePoints
+from mpc.control.problem.data import HorizonData
+from mpc.control.solvers.sequential import SequentialSolver
 from mpc.errors import ControlError
-from mpc.scenario import DemandCharge, Forecast
-from thermal.model import IMPLICIT_EULER
+from mpc.scenario.forecast import Forecast
+from mpc.scenario.tariff import DemandCharge
+from thermal.model.scheme import IMPLICIT_EULER
 
 START = pd.Timestamp("2023-01-16 06:00", tz="Etc/GMT+8")
 STEP = pd.Timedelta(minutes=5)

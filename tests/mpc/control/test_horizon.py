@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mpc.control import Horizon
+from mpc.control.problem.horizon import Horizon
 from mpc.errors import ControlError
 
 

@@ -5,10 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mpc.control import Channel, Horizon, HorizonData, Predictor
+from mpc.control.predictor.predictor import Predictor
+from mpc.control.problem.channels import Channel
+from mpc.control.problem.data import HorizonData
+from mpc.control.problem.horizon import Horizon
 from mpc.errors import ControlError
-from thermal.hvac import hvac_function
-from thermal.model import IMPLICIT_EULER
+from thermal.hvac._symbolic import hvac_function
+from thermal.model.scheme import IMPLICIT_EULER
 
 
 def test_a_rollout_solves_plant_and_building_together(make_problem, make_data, hvac, modes) -> None:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mpc.control import Channel, PeakData
+from mpc.control.problem.channels import Channel
+from mpc.control.problem.data import PeakData
 
 
 def test_terms_are_what_they_say(make_problem, make_data) -> None:

@@ -9,20 +9,15 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from mpc.control import (
-    Channel,
-    ControlProblem,
-    HeatPredictor,
-    Horizon,
-    IpoptSolver,
-    ScenarioSolver,
-    SequentialSolver,
-    heat_channels,
-    outdoor_scenarios,
-)
-from mpc.control.solvers.scenarios import _Tree
+from mpc.control.predictor.heat import HeatPredictor, heat_channels
+from mpc.control.problem.channels import Channel
+from mpc.control.problem.horizon import Horizon
+from mpc.control.problem.problem import ControlProblem
+from mpc.control.solvers.ipopt import IpoptSolver
+from mpc.control.solvers.scenarios import ScenarioSolver, _Tree, outdoor_scenarios
+from mpc.control.solvers.sequential import SequentialSolver
 from mpc.errors import ControlError
-from mpc.scenario import ErrorGrowth
+from mpc.scenario.forecaster import ErrorGrowth
 
 GROWTH = ErrorGrowth(4.0, 3 * 3600.0)
 

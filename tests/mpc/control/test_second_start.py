@@ -8,19 +8,16 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from mpc.control import (
-    Channel,
-    ControlProblem,
-    Horizon,
-    HorizonData,
-    Predictor,
-    SequentialSolver,
-    Solution,
-    supply_channels,
-)  # fmt: skip
-from mpc.control.problem.problem import CostTerms
+from mpc.control.predictor.predictor import Predictor
+from mpc.control.problem.channels import Channel, supply_channels
+from mpc.control.problem.data import HorizonData
+from mpc.control.problem.horizon import Horizon
+from mpc.control.problem.problem import ControlProblem, CostTerms
+from mpc.control.solvers.sequential import SequentialSolver
+from mpc.control.solvers.solution import Solution
 from mpc.control.solvers.starts import CHEAPER, Starts
-from thermal.hvac import Heater, SmoothHvac
+from thermal.hvac._air_handler import Heater
+from thermal.hvac._smooth import SmoothHvac
 
 NOW = pd.Timestamp("2023-01-16 10:00", tz="Etc/GMT+8")
 HOUR = pd.Timedelta(hours=1)

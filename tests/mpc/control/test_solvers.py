@@ -5,7 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mpc.control import Channel, IpoptSolver, PeakData, SequentialSolver, Status
+from mpc.control.problem.channels import Channel
+from mpc.control.problem.data import PeakData
+from mpc.control.solvers.ipopt import IpoptSolver
+from mpc.control.solvers.sequential import SequentialSolver
+from mpc.control.solvers.solution import Status
 
 
 def charged(problem, rate: float = 6.0, so_far: float = 1000.0) -> PeakData:

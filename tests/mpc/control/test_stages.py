@@ -8,7 +8,9 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from mpc.control import StageData, StageProblem, StageSolver, Status
+from mpc.control.problem.stages import StageData, StageProblem
+from mpc.control.solvers.solution import Status
+from mpc.control.solvers.stage_solver import StageSolver
 from mpc.errors import ControlError
 
 N = 15

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mpc.control import FarFromModel, StuckSensors
+from mpc.control.controller.watch import FarFromModel, StuckSensors
 from mpc.errors import ControlError
 
 ZONES = ("hall", "lab", "loft")

@@ -10,28 +10,20 @@ import pytest
 
 pytest.importorskip("gymnasium", reason="needs the extra [rl]")
 
-from mpc.environment import ControlEnvironment
-from mpc.loop import (
-    ReducedBuilding,
-    SensorNoise,
-    SimulatedPlant,
-    pilot_building,
-    pilot_weather,
-    reduced_building,
-)
-from mpc.scenario import (
-    DAY_AHEAD_ERRORS,
-    Forecaster,
-    RandomOccupancy,
-    Scenario,
-    StepGrid,
-    build_scenario,
-    paper_carbon,
-    paper_tariff,
-)
+from mpc.environment.environment import ControlEnvironment
+from mpc.loop.make import pilot_weather
+from mpc.loop.noise import SensorNoise
+from mpc.loop.reduced import ReducedBuilding, reduced_building
+from mpc.loop.simulated import SimulatedPlant
+from mpc.scenario.forecaster import DAY_AHEAD_ERRORS, Forecaster
+from mpc.scenario.grid import StepGrid
+from mpc.scenario.occupancy import RandomOccupancy
+from mpc.scenario.paper import paper_carbon, paper_tariff
+from mpc.scenario.scenario import Scenario, build_scenario
 from thermal import Building
-from thermal.hvac import HvacSystem
-from thermal.pilot import size_system
+from thermal.hvac._system import HvacSystem
+from thermal.pilot.building import pilot_building
+from thermal.pilot.sizing import size_system
 
 
 @cache

@@ -11,10 +11,12 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 import mpc.environment  # registers
-from mpc.environment import ControlEnvironment, EconomicReward, PaperStepReward
+from mpc.environment.environment import ControlEnvironment
+from mpc.environment.reward import EconomicReward, PaperStepReward
 from mpc.errors import EnvironmentSetupError, PlantActionError
-from mpc.kpi import PaperReward, PlantRecord, StageCost
-from mpc.loop import SimulatedPlant
+from mpc.kpi.record import PlantRecord
+from mpc.kpi.rewards import PaperReward, StageCost
+from mpc.loop.simulated import SimulatedPlant
 
 Make = Callable[..., ControlEnvironment]
 

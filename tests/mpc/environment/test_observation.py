@@ -7,17 +7,12 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from mpc.environment import (
-    HISTOGRAM_EDGES,
-    LARGEST,
-    OBSERVED_RANGES,
-    ActionLayout,
-    ControlEnvironment,
-    ObservationLayout,
-    Outlook,
-    clock,
-)
-from mpc.loop import SimulatedPlant
+from mpc.environment.actions import ActionLayout
+from mpc.environment.environment import ControlEnvironment
+from mpc.environment.features import LARGEST, OBSERVED_RANGES
+from mpc.environment.observation import HISTOGRAM_EDGES, ObservationLayout
+from mpc.environment.outlook import Outlook, clock
+from mpc.loop.simulated import SimulatedPlant
 from thermal.case.points import POINT_TYPES
 
 Make = Callable[..., ControlEnvironment]

@@ -8,9 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mpc.environment import ActorNetwork, ControlEnvironment, PolicyController
+from mpc.environment.environment import ControlEnvironment
+from mpc.environment.policy import ActorNetwork, PolicyController
 from mpc.errors import EnvironmentSetupError
-from mpc.loop import run_closed_loop
+from mpc.loop.run import run_closed_loop
 
 Make = Callable[..., ControlEnvironment]
 

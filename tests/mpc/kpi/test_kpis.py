@@ -13,8 +13,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from mpc.errors import KpiError
-from mpc.kpi import Kpis, PlantRecord, measure_kpis
-from mpc.scenario import DemandCharge, Scenario
+from mpc.kpi.kpis import Kpis, measure_kpis
+from mpc.kpi.record import PlantRecord
+from mpc.scenario.scenario import Scenario
+from mpc.scenario.tariff import DemandCharge
 
 Make = Callable[..., Scenario]
 

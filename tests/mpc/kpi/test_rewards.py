@@ -10,8 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mpc.errors import KpiError
-from mpc.kpi import PaperReward, PlantRecord, StageCost, measure_kpis
-from mpc.scenario import Scenario
+from mpc.kpi.kpis import measure_kpis
+from mpc.kpi.record import PlantRecord
+from mpc.kpi.rewards import PaperReward, StageCost
+from mpc.scenario.scenario import Scenario
 
 Make = Callable[..., Scenario]
 BAND = (np.full(2, 293.0), np.full(2, 297.0))

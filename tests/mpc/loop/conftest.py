@@ -8,18 +8,18 @@ from typing import Any
 
 import pytest
 
-from mpc.loop import (
-    BuildingModel,
-    ReducedBuilding,
-    SimulatedPlant,
-    pilot_building,
-    pilot_weather,
-    reduced_building,
-)
-from mpc.scenario import InternalGains, Scenario, StepGrid, build_scenario, paper_carbon, paper_tariff
+from mpc.loop.building import BuildingModel
+from mpc.loop.make import pilot_weather
+from mpc.loop.reduced import ReducedBuilding, reduced_building
+from mpc.loop.simulated import SimulatedPlant
+from mpc.scenario.gains import InternalGains
+from mpc.scenario.grid import StepGrid
+from mpc.scenario.paper import paper_carbon, paper_tariff
+from mpc.scenario.scenario import Scenario, build_scenario
 from thermal import Building
-from thermal.hvac import HvacSystem
-from thermal.pilot import size_system
+from thermal.hvac._system import HvacSystem
+from thermal.pilot.building import pilot_building
+from thermal.pilot.sizing import size_system
 
 MakePlant = Callable[..., SimulatedPlant]
 

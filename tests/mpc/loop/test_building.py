@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from mpc.errors import PlantError
-from mpc.loop import BuildingModel, GridBuilding, ReducedBuilding, reduced_building
-from mpc.loop.building import zone_response
+from mpc.loop.building import BuildingModel, GridBuilding, zone_response
+from mpc.loop.reduced import ReducedBuilding, reduced_building
 from thermal import Building, Simulator
-from thermal.effects import chosen
+from thermal.effects.catalogue import chosen
 
 NONE = np.zeros(0)
 START, COLD = np.full(12, 294.15), np.array([278.15])

@@ -8,22 +8,20 @@ import numpy as np
 import pytest
 
 from mpc.errors import PlantError
-from mpc.loop import (
-    RadiantGains,
-    SimulatedPlant,
-    pilot_building,
-    pilot_weather,
-    reduced_building,
-    simulated_plant,
-)
-from mpc.loop.make import ModelKind
-from mpc.scenario import RADIANT_SHARES, InternalGains, RandomOccupancy, Weather
+from mpc.loop.extras import RadiantGains
+from mpc.loop.make import ModelKind, pilot_weather, simulated_plant
+from mpc.loop.reduced import reduced_building
+from mpc.loop.simulated import SimulatedPlant
+from mpc.scenario.gains import RADIANT_SHARES, InternalGains
+from mpc.scenario.occupancy import RandomOccupancy
+from mpc.scenario.weather import Weather
 from thermal import Building, build_network
-from thermal.effects import CATALOGUE, chosen
+from thermal.effects.catalogue import CATALOGUE, chosen
 from thermal.errors import EffectError
-from thermal.hvac import HvacSystem
-from thermal.pilot import size_system
-from thermal.inputs import Drivers, signal_values
+from thermal.hvac._system import HvacSystem
+from thermal.inputs.drivers import Drivers, signal_values
+from thermal.pilot.building import pilot_building
+from thermal.pilot.sizing import size_system
 
 #: Effects that a plant cannot have, and what is said.
 REFUSED = {"clock_shift": "leave that effect out", "neighbour": "every side has windows"}

@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 
 from mpc.errors import PlantError
-from mpc.loop import SensorNoise, pilot_building, pilot_weather, save_pilot, simulated_plant
+from mpc.loop.make import pilot_weather, save_pilot, simulated_plant
+from mpc.loop.noise import SensorNoise
 from thermal.case.points import POINT_TYPES
+from thermal.pilot.building import pilot_building
 
 START, END = "2023-01-09", "2023-01-10"
 

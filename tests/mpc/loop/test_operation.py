@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from mpc.errors import PlantError
-from mpc.loop import Operation, scheduled_operation
-from mpc.loop.operation import shared_rows
-from mpc.scenario import Scenario
+from mpc.loop.operation import Operation, scheduled_operation, shared_rows
+from mpc.scenario.scenario import Scenario
 
 
 def test_the_plant_comes_before_the_people(scenario: Callable[..., Scenario]) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mpc.loop import Measurements, PointLayout
+from mpc.loop.plant import Measurements, PointLayout
 
 LAYOUT = PointLayout(("VAV/zone_air_temperature_sensor", "VAV/supply_air_damper_percentage_command"), "Etc/GMT+8")
 

@@ -10,18 +10,17 @@ import pandas as pd
 import pytest
 
 from mpc.errors import ReplayError
-from mpc.loop import (
-    ReducedBuilding,
-    SensorNoise,
-    SimulatedPlant,
-    SubsystemReplay,
-    reduced_building,
-    replay_subsystems,
-)
-from mpc.scenario import InternalGains, Scenario
+from mpc.loop.noise import SensorNoise
+from mpc.loop.reduced import ReducedBuilding, reduced_building
+from mpc.loop.replay import SubsystemReplay, replay_subsystems
+from mpc.loop.simulated import SimulatedPlant
+from mpc.scenario.gains import InternalGains
+from mpc.scenario.scenario import Scenario
 from thermal import Building, Case, SymbolicModel, Telemetry, build_network, reduced_model
-from thermal.effects import chosen
-from thermal.hvac import HvacSystem, Terminals, WaterCoil
+from thermal.effects.catalogue import chosen
+from thermal.hvac._coil import WaterCoil
+from thermal.hvac._system import HvacSystem
+from thermal.hvac._terminals import Terminals
 
 AIR, WATER = "supply_air_temperature_setpoint", "supply_water_temperature_setpoint"
 NO_GAINS = InternalGains(sensible=0.0, latent=0.0, equipment=0.0, lights=0.0)

@@ -8,8 +8,12 @@ import numpy as np
 import pytest
 
 from mpc.errors import PlantError
-from mpc.loop import FixedSetpoints, Measurements, Plant, RestorablePlant, SimulatedPlant, run_closed_loop
-from mpc.scenario import Forecast, Forecaster, Scenario
+from mpc.loop.plant import Measurements, Plant, RestorablePlant
+from mpc.loop.run import FixedSetpoints, run_closed_loop
+from mpc.loop.simulated import SimulatedPlant
+from mpc.scenario.forecast import Forecast
+from mpc.scenario.forecaster import Forecaster
+from mpc.scenario.scenario import Scenario
 
 Make = Callable[..., SimulatedPlant]
 AIR, WATER = "supply_air_temperature_setpoint", "supply_water_temperature_setpoint"

@@ -11,12 +11,13 @@ import pytest
 import yaml
 
 from mpc.errors import PlantError
-from mpc.loop import SensorNoise, SimulatedPlant
+from mpc.loop.noise import SensorNoise
 from mpc.loop.sensors import plant_devices
+from mpc.loop.simulated import SimulatedPlant
 from thermal import Building, load_case, save_case
 from thermal.case.points import POINT_TYPES, split_column
 from thermal.case.schema import Device
-from thermal.hvac import HvacSystem
+from thermal.hvac._system import HvacSystem
 
 Drive = Callable[..., SimulatedPlant]
 

@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 
 from mpc.errors import PlantError
-from mpc.loop import SimulatedPlant, reduced_building
+from mpc.loop.reduced import reduced_building
 from mpc.loop.signals import EffectSignals
-from mpc.scenario import Scenario
+from mpc.loop.simulated import SimulatedPlant
+from mpc.scenario.scenario import Scenario
 from thermal import Building, build_network
-from thermal.effects import chosen
-from thermal.hvac import HvacSystem
-from thermal.inputs import Drivers, signal_values
+from thermal.effects.catalogue import chosen
+from thermal.hvac._system import HvacSystem
+from thermal.inputs.drivers import Drivers, signal_values
 from thermal.units import AIR_HEAT_CAPACITY
 
 

@@ -9,11 +9,16 @@ import numpy as np
 import pytest
 
 from mpc.errors import PlantActionError, PlantError
-from mpc.kpi import StageCost, measure_kpis
-from mpc.loop import GridBuilding, SensorNoise, SimulatedPlant, scheduled_operation
-from mpc.scenario import Forecaster, Scenario
+from mpc.kpi.kpis import measure_kpis
+from mpc.kpi.rewards import StageCost
+from mpc.loop.building import GridBuilding
+from mpc.loop.noise import SensorNoise
+from mpc.loop.operation import scheduled_operation
+from mpc.loop.simulated import SimulatedPlant
+from mpc.scenario.forecaster import Forecaster
+from mpc.scenario.scenario import Scenario
 from thermal import Building, Simulator, load_case, save_case
-from thermal.hvac import HvacSystem
+from thermal.hvac._system import HvacSystem
 
 Make = Callable[..., SimulatedPlant]
 

@@ -7,7 +7,7 @@ import pytest
 from mpc.loop.sensors import plant_devices
 from mpc.loop.supply import SupplySetpoints
 from thermal import Building
-from thermal.hvac import HvacSystem
+from thermal.hvac._system import HvacSystem
 
 AIR, WATER = "supply_air_temperature_setpoint", "supply_water_temperature_setpoint"
 

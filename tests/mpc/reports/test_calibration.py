@@ -14,22 +14,14 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from calibration import (
-    CalibrationResult,
-    Evaluation,
-    Interval,
-    Predictions,
-    calibrate,
-    calibration_verdict,
-    evaluation_verdict,
-    write_calibration,
-    write_check,
-    write_evaluation,
-    write_simulation,
-)
-from calibration import _figures as figures
-from mpc.reports.page import significant
+from calibration import CalibrationResult, Evaluation, Interval, calibrate
 from calibration.errors import ResultsExistError
+from calibration.evaluation.n_step import Predictions
+from mpc.reports import figures
+from mpc.reports.calibration import calibration_verdict, write_calibration
+from mpc.reports.case import write_check, write_simulation
+from mpc.reports.evaluation import evaluation_verdict, write_evaluation
+from mpc.reports.page import significant
 from thermal import (
     Building,
     Case,
@@ -40,8 +32,9 @@ from thermal import (
     load_bundled_case,
     local_timestamp,
 )
-from thermal.case import Location, ZoneEntry, describe_case
-from thermal.model import simulate
+from thermal.case.check import describe_case
+from thermal.case.schema import Location, ZoneEntry
+from thermal.model.simulation import simulate
 
 LARGEST_PAGE = 5e6  # bytes
 

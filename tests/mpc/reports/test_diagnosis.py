@@ -13,9 +13,11 @@ import pandas as pd
 import pytest
 
 from calibration import CalibrationError, evaluate_case
-from calibration.diagnosis import Diagnosis, diagnose, diagnosis_verdict, write_diagnosis
+from calibration.diagnosis.diagnosis import Diagnosis, diagnose
+from mpc.reports.diagnosis import write_diagnosis
+from mpc.reports.diagnosis_words import diagnosis_verdict
 from thermal import load_bundled_case
-from thermal.effects import CATALOGUE
+from thermal.effects.catalogue import CATALOGUE
 
 
 @cache

@@ -8,8 +8,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from calibration import CalibrationResult, DisturbanceModel, Whiteness, ZoneWhiteness, calibrate
+from calibration import CalibrationResult, DisturbanceModel, calibrate
 from calibration.estimation.heat_balance import HeatBalance
+from calibration.estimation.whiteness import Whiteness, ZoneWhiteness
 from mpc.reports.residuals import (
     MOST_FILTERED,
     _heat_sentence,

@@ -8,7 +8,8 @@ import pandas as pd
 import pytest
 
 from mpc.errors import ScenarioError
-from mpc.scenario import Calendar, ComfortBand, StepGrid
+from mpc.scenario.comfort import ComfortBand
+from mpc.scenario.grid import Calendar, StepGrid
 
 ZONE = "America/Los_Angeles"
 

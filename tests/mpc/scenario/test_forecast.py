@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from mpc.errors import ForecastError
-from mpc.scenario import Forecast, column_unit
+from mpc.scenario.forecast import Forecast, column_unit
 
 AIR, BEAM = "outside_air_temperature_sensor", "direct_normal_irradiance_sensor"
 

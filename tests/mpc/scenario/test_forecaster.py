@@ -9,16 +9,11 @@ import pandas as pd
 import pytest
 
 from mpc.errors import ForecastError
-from mpc.scenario import (
-    DAY_AHEAD_ERRORS,
-    ErrorGrowth,
-    Forecaster,
-    RandomOccupancy,
-    Scenario,
-    Weather,
-    build_scenario,
-    paper_tariff,
-)
+from mpc.scenario.forecaster import DAY_AHEAD_ERRORS, ErrorGrowth, Forecaster
+from mpc.scenario.occupancy import RandomOccupancy
+from mpc.scenario.paper import paper_tariff
+from mpc.scenario.scenario import Scenario, build_scenario
+from mpc.scenario.weather import Weather
 from thermal import Building
 
 AIR, WIND = "outside_air_temperature_sensor", "wind_speed_sensor"

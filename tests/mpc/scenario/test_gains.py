@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mpc.errors import ScenarioError
-from mpc.scenario import InternalGains
+from mpc.scenario.gains import InternalGains
 
 
 def test_gains_worked_by_hand() -> None:

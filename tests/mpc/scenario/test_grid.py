@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mpc.errors import ScenarioError
-from mpc.scenario import Calendar, StepGrid
+from mpc.scenario.grid import Calendar, StepGrid
 from thermal import Building
 from thermal.errors import CaseError
 

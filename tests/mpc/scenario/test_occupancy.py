@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 
 from mpc.errors import ScenarioError
-from mpc.scenario import OFFICE_PRESENCE, Calendar, RandomOccupancy, ScheduledOccupancy, StepGrid
+from mpc.scenario.grid import Calendar, StepGrid
+from mpc.scenario.occupancy import OFFICE_PRESENCE, RandomOccupancy, ScheduledOccupancy
 
 ZONE = "America/Los_Angeles"
 LAWS = ("exponential", "uniform")

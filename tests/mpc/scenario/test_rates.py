@@ -12,18 +12,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mpc.errors import TariffError
-from mpc.scenario import (
-    GAS_UNITS,
-    Calendar,
-    ConstantRate,
-    HourlyRate,
-    MonthlyRate,
-    SeriesRate,
-    StepGrid,
-    gas_price,
-    paper_carbon,
-    paper_tariff,
-)
+from mpc.scenario.grid import Calendar, StepGrid
+from mpc.scenario.paper import paper_carbon, paper_tariff
+from mpc.scenario.rates import GAS_UNITS, ConstantRate, HourlyRate, MonthlyRate, SeriesRate, gas_price
 
 ZONE = "America/Los_Angeles"
 BY_HOUR = [float(hour) for hour in range(24)]

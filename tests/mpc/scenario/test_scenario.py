@@ -9,21 +9,16 @@ import pandas as pd
 import pytest
 
 from mpc.errors import ScenarioError, WeatherError
-from mpc.scenario import (
-    ComfortBand,
-    InternalGains,
-    RandomOccupancy,
-    Scenario,
-    StepGrid,
-    Weather,
-    build_scenario,
-    paper_carbon,
-    paper_tariff,
-    weather_of_case,
-    zone_areas,
-)
+from mpc.scenario.comfort import ComfortBand
+from mpc.scenario.gains import InternalGains
+from mpc.scenario.grid import StepGrid
+from mpc.scenario.occupancy import RandomOccupancy
+from mpc.scenario.paper import paper_carbon, paper_tariff
+from mpc.scenario.scenario import Scenario, build_scenario, zone_areas
+from mpc.scenario.weather import Weather
+from mpc.scenario.weather_files import weather_of_case
 from thermal import Building, load_bundled_case
-from thermal.inputs import Drivers
+from thermal.inputs.drivers import Drivers
 
 
 @pytest.fixture(scope="module")

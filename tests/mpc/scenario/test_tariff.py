@@ -9,7 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mpc.errors import TariffError
-from mpc.scenario import DemandCharge, StepGrid, window_means
+from mpc.scenario.grid import StepGrid
+from mpc.scenario.tariff import DemandCharge, window_means
 
 ZONE = "America/Los_Angeles"
 

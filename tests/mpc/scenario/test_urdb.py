@@ -12,7 +12,9 @@ import pandas as pd
 import pytest
 
 from mpc.errors import TariffError
-from mpc.scenario import ConstantRate, StepGrid, read_urdb
+from mpc.scenario.grid import StepGrid
+from mpc.scenario.rates import ConstantRate
+from mpc.scenario.urdb import read_urdb
 
 ZONE = "America/Los_Angeles"
 GAS = ConstantRate(0.04)

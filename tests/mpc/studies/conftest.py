@@ -8,12 +8,15 @@ from typing import Any
 
 import pytest
 
-from mpc.loop import SensorNoise, SimulatedPlant, pilot_building, pilot_weather, simulated_plant
-from mpc.studies import control_model
+from mpc.loop.make import pilot_weather, simulated_plant
+from mpc.loop.noise import SensorNoise
+from mpc.loop.simulated import SimulatedPlant
+from mpc.studies.model import control_model
 from thermal import Building
-from thermal.hvac import HvacSystem
-from thermal.model import ReducedModel
-from thermal.pilot import size_system
+from thermal.hvac._system import HvacSystem
+from thermal.model.reduce import ReducedModel
+from thermal.pilot.building import pilot_building
+from thermal.pilot.sizing import size_system
 
 
 @cache

@@ -5,14 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from calibration import state_space
-from mpc.control import Source
+from calibration.estimation.state_space import state_space
+from mpc.control.controller.action import Source
 from mpc.errors import ControlError
-from mpc.kpi import measure_kpis
-from mpc.loop import FixedSetpoints, run_closed_loop
-from mpc.studies import control_model, default_horizon, held_space, make_controller
-from thermal.effects import chosen
-from thermal.model import modal_model
+from mpc.kpi.kpis import measure_kpis
+from mpc.loop.run import FixedSetpoints, run_closed_loop
+from mpc.studies.controller import default_horizon, held_space, make_controller
+from mpc.studies.model import control_model
+from thermal.effects.catalogue import chosen
+from thermal.model.modal import modal_model
 
 
 def test_a_held_step_is_several_steps_one_after_the_other(model) -> None:

@@ -15,8 +15,7 @@ from calibration import Interval
 from calibration.errors import ResultsExistError
 from mpc.cli.app import app
 from mpc.errors import ControlError
-from mpc.studies import Demo, run_demo
-from mpc.studies.demo import _working_day
+from mpc.studies.demo import Demo, _working_day, run_demo
 from thermal import Case, load_bundled_case
 
 STEPS = ["check", "calibrate", "diagnose", "evaluate", "compare"]

@@ -13,27 +13,19 @@ import pytest
 
 from calibration.errors import ResultsExistError
 from mpc.errors import ControlError, PlantError
-from mpc.loop import SensorNoise, pilot_weather
-from mpc.scenario import weather_of_case
-from mpc.studies import (
-    Comparison,
-    KnownState,
-    Study,
-    check_controller,
-    check_kind,
-    compare_controllers,
-    comparison_summary,
-    comparison_verdict,
-    control_verdict,
-    equip,
-    make_controller,
-    make_study,
-    prediction_errors,
-    run_controller,
-    write_comparison,
-    write_control,
-)
+from mpc.loop.make import pilot_weather
+from mpc.loop.noise import SensorNoise
+from mpc.reports.control import write_comparison, write_control
 from mpc.reports.control_log import reason_rows
+from mpc.reports.control_tables import comparison_summary
+from mpc.reports.control_words import comparison_verdict, control_verdict
+from mpc.scenario.weather_files import weather_of_case
+from mpc.studies.bound import KnownState
+from mpc.studies.compare import Comparison, compare_controllers
+from mpc.studies.controller import make_controller
+from mpc.studies.devices import equip
+from mpc.studies.run import check_controller, prediction_errors, run_controller
+from mpc.studies.study import Study, check_kind, make_study
 from thermal import Building, load_bundled_case
 
 START, END = "2023-01-09T06:00", "2023-01-09T08:00"

@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 from hypothesis import settings
 
-from thermal.hvac import AirHandler, BoilerLoop, CoolingCoil, Fan, Heater, HvacSystem, Pump, Terminals, WaterCoil
+from thermal.hvac._air_handler import AirHandler, Heater
+from thermal.hvac._boiler import BoilerLoop, Pump
+from thermal.hvac._coil import WaterCoil
+from thermal.hvac._cooling import CoolingCoil
+from thermal.hvac._fan import Fan
+from thermal.hvac._system import HvacSystem
+from thermal.hvac._terminals import Terminals
 
 # the same examples at each run, and as long as a busy machine takes for them
 settings.register_profile("repeatable", deadline=None, derandomize=True)

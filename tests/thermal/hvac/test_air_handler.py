@@ -2,7 +2,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thermal.hvac import AirHandler, CoolingCoil, Fan, Heater, HvacParameterError, WaterCoil
+from thermal.errors import HvacParameterError
+from thermal.hvac._air_handler import AirHandler, Heater
+from thermal.hvac._coil import WaterCoil
+from thermal.hvac._cooling import CoolingCoil
+from thermal.hvac._fan import Fan
 from thermal.hvac._operations import FloatOperations
 
 OPS = FloatOperations()

@@ -2,7 +2,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thermal.hvac import CONDENSING_BOILER, BoilerLoop, HvacParameterError, Pump
+from thermal.errors import HvacParameterError
+from thermal.hvac._boiler import BoilerLoop, Pump
+from thermal.hvac._curves import CONDENSING_BOILER
 from thermal.hvac._operations import FloatOperations
 
 OPS = FloatOperations()

@@ -4,8 +4,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import brentq
 
-from thermal.hvac import HvacParameterError, WaterCoil
-from thermal.hvac._coil import _effectiveness, heat_share, valve_flow, valve_position, water_share
+from thermal.errors import HvacParameterError
+from thermal.hvac._coil import WaterCoil, _effectiveness, heat_share, valve_flow, valve_position, water_share
 from thermal.hvac._operations import FloatOperations
 
 OPS = FloatOperations()

@@ -5,12 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from thermal.hvac import Actions, BoilerLoop, Conditions, HvacPlant, HvacSystem
 from thermal.hvac._advance import advance
+from thermal.hvac._boiler import BoilerLoop
 from thermal.hvac._compiled import CompiledCentral
 from thermal.hvac._operations import StepOperations
+from thermal.hvac._plant import HvacPlant
 from thermal.hvac._settings import settings_of
-from thermal.hvac._step import Calls
+from thermal.hvac._step import Actions, Calls, Conditions
+from thermal.hvac._system import HvacSystem
 
 
 def drawn(seed, n):

@@ -3,8 +3,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thermal.hvac import DX_CAPACITY, CoolingCoil, HvacParameterError, Polynomial
+from thermal.errors import HvacParameterError
 from thermal.hvac._air import wet_bulb
+from thermal.hvac._cooling import CoolingCoil
+from thermal.hvac._curves import DX_CAPACITY, Polynomial
 from thermal.hvac._operations import FloatOperations
 
 OPS = FloatOperations()

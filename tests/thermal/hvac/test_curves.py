@@ -1,7 +1,15 @@
 import pytest
 
-from thermal.hvac import CONDENSING_BOILER, DX_CAPACITY, DX_INPUT, FAN_PART_LOAD, ORDINARY_BOILER, HvacParameterError
-from thermal.hvac._curves import Biquadratic, Polynomial
+from thermal.errors import HvacParameterError
+from thermal.hvac._curves import (
+    CONDENSING_BOILER,
+    DX_CAPACITY,
+    DX_INPUT,
+    FAN_PART_LOAD,
+    ORDINARY_BOILER,
+    Biquadratic,
+    Polynomial,
+)
 from thermal.hvac._operations import FloatOperations
 
 OPS = FloatOperations()

@@ -2,7 +2,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thermal.hvac import Fan, HvacParameterError
+from thermal.errors import HvacParameterError
+from thermal.hvac._fan import Fan
 from thermal.hvac._operations import FloatOperations
 
 OPS = FloatOperations()

@@ -2,9 +2,11 @@ import pickle
 
 import numpy as np
 
-from thermal.hvac import Actions, Conditions, HvacPlant, WaterCoil
+from thermal.hvac._coil import WaterCoil
 from thermal.hvac._kept import LastValue
 from thermal.hvac._operations import FloatOperations
+from thermal.hvac._plant import HvacPlant
+from thermal.hvac._step import Actions, Conditions
 
 
 def test_a_value_is_made_once_as_long_as_its_arguments_stay():

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thermal.hvac import HvacParameterError
+from thermal.errors import HvacParameterError
 from thermal.hvac._operations import CasadiOperations, FloatOperations, NumpyOperations, StepOperations
 
 KINDS = (FloatOperations, NumpyOperations, CasadiOperations)

@@ -4,7 +4,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from thermal.hvac import Actions, Conditions, HvacActionError, HvacPlant, Mode, Thermostat
+from thermal.errors import HvacActionError
+from thermal.hvac._plant import HvacPlant
+from thermal.hvac._step import Actions, Conditions
+from thermal.hvac._thermostat import Mode, Thermostat
 
 LOW, HIGH = np.full(5, 293.0), np.full(5, 297.0)
 CONDITIONS = Conditions(np.array([290.0, 294.0, 296.5, 297.4, 300.0]), LOW, HIGH, 280.0)

@@ -2,7 +2,10 @@ import numpy as np
 import pytest
 
 from thermal.case.points import POINT_TYPES
-from thermal.hvac import Actions, Conditions, HvacParameterError, HvacPlant, HvacPoints
+from thermal.errors import HvacParameterError
+from thermal.hvac._plant import HvacPlant
+from thermal.hvac._points import HvacPoints
+from thermal.hvac._step import Actions, Conditions
 
 NAMES = [f"VAV_{k}" for k in range(5)]
 

@@ -1,16 +1,10 @@
 import numpy as np
 import pytest
 
-from thermal.hvac import (
-    Actions,
-    Conditions,
-    HvacPlant,
-    HvacPoints,
-    replay_air_handler,
-    replay_loop,
-    replay_reheat,
-    replay_terminals,
-)
+from thermal.hvac._plant import HvacPlant
+from thermal.hvac._points import HvacPoints
+from thermal.hvac._replay import replay_air_handler, replay_loop, replay_reheat, replay_terminals
+from thermal.hvac._step import Actions, Conditions
 
 N_TIME = 200
 

@@ -2,9 +2,9 @@ import casadi
 import numpy as np
 import pytest
 
-from thermal.hvac import Actions
 from thermal.hvac._operations import CasadiOperations, StepOperations
 from thermal.hvac._settings import settings_of
+from thermal.hvac._step import Actions
 
 
 def test_pressures_that_are_not_given_are_those_of_the_design(plant_system):

@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from thermal.hvac import HvacSystem, SmoothHvac, hvac_function
+from thermal.hvac._smooth import SmoothHvac
+from thermal.hvac._symbolic import hvac_function
+from thermal.hvac._system import HvacSystem
 
 
 @pytest.fixture(scope="module")

@@ -2,7 +2,12 @@ import casadi
 import numpy as np
 import pytest
 
-from thermal.hvac import Actions, Conditions, HvacParameterError, HvacPlant, HvacSystem, Terminals, hvac_function
+from thermal.errors import HvacParameterError
+from thermal.hvac._plant import HvacPlant
+from thermal.hvac._step import Actions, Conditions
+from thermal.hvac._symbolic import hvac_function
+from thermal.hvac._system import HvacSystem
+from thermal.hvac._terminals import Terminals
 
 
 def drawn(seed, n_zone, n_air):

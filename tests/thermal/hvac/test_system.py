@@ -5,19 +5,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from thermal.hvac import (
-    Actions,
-    Conditions,
-    HvacParameterError,
-    HvacPlant,
-    HvacSystem,
-    Terminals,
-    energy_balance,
-)
+from thermal.errors import HvacParameterError
 from thermal.hvac._advance import advance
+from thermal.hvac._balance import energy_balance
 from thermal.hvac._operations import StepOperations
+from thermal.hvac._plant import HvacPlant
 from thermal.hvac._settings import settings_of
-from thermal.hvac._step import Calls
+from thermal.hvac._step import Actions, Calls, Conditions
+from thermal.hvac._system import HvacSystem
+from thermal.hvac._terminals import Terminals
 
 SITUATIONS = {
     "zones": st.lists(st.floats(283.0, 306.0), min_size=5, max_size=5), "heating": st.floats(287.0, 296.0),

@@ -1,8 +1,9 @@
 import numpy as np
 import pytest
 
-from thermal.hvac import HvacParameterError, Terminals
+from thermal.errors import HvacParameterError
 from thermal.hvac._operations import StepOperations
+from thermal.hvac._terminals import Terminals
 
 OPS = StepOperations()
 FLOATS = OPS.scalar

@@ -3,8 +3,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thermal.hvac import HvacParameterError, Mode, Thermostat
+from thermal.errors import HvacParameterError
 from thermal.hvac._operations import FloatOperations, NumpyOperations
+from thermal.hvac._thermostat import Mode, Thermostat
 
 LOW, HIGH = np.array([293.0]), np.array([297.0])
 DAY, NIGHT = np.array([False]), np.array([True])

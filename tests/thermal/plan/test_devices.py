@@ -10,9 +10,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thermal.case import Device
+from thermal.case.schema import Device
 from thermal.errors import DeviceListError, DrawingFileError
-from thermal.plan import match_points, read_columns, read_devices, write_matches
+from thermal.plan.columns import read_columns, write_matches
+from thermal.plan.devices import read_devices
+from thermal.plan.match import match_points
 
 ZONES = ["F1_R01", "F1_R02"]
 

@@ -13,7 +13,8 @@ import pytest
 from PIL import Image
 
 from thermal.errors import DrawingFileError, MissingExtraError, OversizedFileError, PlanSettingError
-from thermal.plan import read_codes, read_drawing
+from thermal.plan.codes import read_codes
+from thermal.plan.drawing import read_drawing
 
 
 def png_of(path: Path, width: int, height: int) -> Path:

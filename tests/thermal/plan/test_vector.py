@@ -10,7 +10,8 @@ import ezdxf
 import pytest
 
 from thermal.errors import DrawingFileError, DrawingUnitsError, NoRoomsError, OversizedFileError
-from thermal.plan import propose_zones, read_dxf
+from thermal.plan.vector import read_dxf
+from thermal.plan.zones import propose_zones
 
 NAMES = ("A", "B", "C", "D", "corridor", "E", "F", "G")
 

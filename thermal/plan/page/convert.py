@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from thermal.case import Building, Device, FloorPlan, FloorPlans, Location, ZoneTable
+from thermal.case.building import Building, FloorPlan, FloorPlans, ZoneTable
+from thermal.case.schema import Device, Location
 from thermal.errors import LabelledCaseError, MalformedRequestError, describe
 from thermal.plan.list import FloorEntry
 from thermal.plan.page.draft import BASIC, Draft, DraftDevice, DraftFloor, Picture, Site

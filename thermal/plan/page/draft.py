@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
-from thermal.case import Airflow
 from thermal.case.building import EXTERIOR_WALL, INTERIOR_WALL, OUTSIDE
+from thermal.case.schema import Airflow
 from thermal.plan.list import FloorEntry
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]

@@ -16,11 +16,11 @@ from thermal.plan.assemble import assemble_plans
 from thermal.plan.cells import ZonedFloor, draw_cells
 from thermal.plan.drawing import RASTER_KINDS, read_drawing
 from thermal.plan.list import FloorEntry, read_floor
-from thermal.plan.survey import OUTSIDE_LABEL, WALL_LABEL, FloorSurvey
 from thermal.plan.page.convert import encode_floor
 from thermal.plan.page.draft import BASIC, Draft, DraftFloor, Picture
 from thermal.plan.page.store import write_whole
 from thermal.plan.page.uploads import picture_of
+from thermal.plan.survey import OUTSIDE_LABEL, WALL_LABEL, FloorSurvey
 
 Progress = Callable[[str, int, int], None]
 

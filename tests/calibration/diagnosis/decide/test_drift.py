@@ -9,11 +9,13 @@ import pytest
 from numpy.typing import NDArray
 
 from calibration import Interval
-from calibration.evaluation.settings import ModelSettings
-from calibration.diagnosis.refit.comparison import Bench
 from calibration.diagnosis.decide.drift import DriftCurve, drift_of, drift_sentence
+from calibration.diagnosis.refit.comparison import Bench
 from calibration.errors import NotEnoughDataError
-from thermal.pilot import TwinRanges, generate_twin, pilot_building
+from calibration.evaluation.settings import ModelSettings
+from thermal.pilot.building import pilot_building
+from thermal.pilot.truth import TwinRanges
+from thermal.pilot.twin import generate_twin
 
 FloatArray = NDArray[np.float64]
 

@@ -10,13 +10,15 @@ import pandas as pd
 import pytest
 from numpy.typing import NDArray
 
+from calibration.diagnosis.refit.comparison import Bench, Fit
+from calibration.diagnosis.screen import missing as _missing
+from calibration.diagnosis.screen.missing import Missing, at_start, missing_heat
 from calibration.estimation.heat_balance import heat_balance
 from calibration.evaluation.settings import ModelSettings
-from calibration.diagnosis.screen import missing as _missing
-from calibration.diagnosis.refit.comparison import Bench, Fit
-from calibration.diagnosis.screen.missing import Missing, at_start, missing_heat
 from thermal import reduced_model
-from thermal.pilot import TwinRanges, TwinTruth, generate_twin, pilot_building
+from thermal.pilot.building import pilot_building
+from thermal.pilot.truth import TwinRanges, TwinTruth
+from thermal.pilot.twin import generate_twin
 
 FloatArray = NDArray[np.float64]
 

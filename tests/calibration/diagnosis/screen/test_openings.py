@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from calibration.diagnosis.screen.openings import _most_likely_paths, _noise, _opened_when
 from calibration.estimation.heat_balance import heat_balance, step_balance
 from calibration.evaluation.intervals import Interval
-from calibration.diagnosis.screen.openings import _most_likely_paths, _noise, _opened_when
 from thermal import SymbolicModel, build_network, load_bundled_case, reduced_model, replay_inputs
 
 FloatArray = NDArray[np.float64]

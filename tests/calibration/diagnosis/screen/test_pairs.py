@@ -9,19 +9,21 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from calibration.evaluation.settings import ModelSettings
-from calibration.diagnosis.refit.comparison import Bench
-from calibration.diagnosis.screen.gains import Gain, choice_of
-from calibration.diagnosis.refit.held_out import held_out
-from calibration.diagnosis.decide.levels import SMALL
-from calibration.diagnosis.screen.pairs import nominate
-from calibration.diagnosis.refit.refit import ACCEPTED, MATTERS, Work, promising
-from calibration.diagnosis.screen.screen import Screening
-from calibration.diagnosis.refit.search import Round, _best_pair, _exchanged, _refits
 from calibration.diagnosis.decide.evidence import gains_of
+from calibration.diagnosis.decide.levels import SMALL
+from calibration.diagnosis.refit.comparison import Bench
+from calibration.diagnosis.refit.held_out import held_out
+from calibration.diagnosis.refit.refit import ACCEPTED, MATTERS, Work, promising
+from calibration.diagnosis.refit.search import Round, _best_pair, _exchanged, _refits
+from calibration.diagnosis.screen.gains import Gain, choice_of
+from calibration.diagnosis.screen.pairs import nominate
+from calibration.diagnosis.screen.screen import Screening
+from calibration.evaluation.settings import ModelSettings
 from thermal import Case, Telemetry
-from thermal.effects import CATALOGUE
-from thermal.pilot import TwinRanges, generate_twin, pilot_building
+from thermal.effects.catalogue import CATALOGUE
+from thermal.pilot.building import pilot_building
+from thermal.pilot.truth import TwinRanges
+from thermal.pilot.twin import generate_twin
 
 FloatArray = NDArray[np.float64]
 

@@ -8,16 +8,18 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from calibration.evaluation.settings import ModelSettings
 from calibration.diagnosis.refit.comparison import Bench, Fit
-from calibration.diagnosis.screen.gains import Gain
 from calibration.diagnosis.refit.held_out import held_out
 from calibration.diagnosis.refit.refit import Refit, Work
+from calibration.diagnosis.screen.gains import Gain
 from calibration.diagnosis.screen.screen import screen
 from calibration.diagnosis.screen.windows import WINDOWS, look_again
+from calibration.evaluation.settings import ModelSettings
 from thermal import Case, Telemetry
-from thermal.pilot import TwinRanges, generate_twin, pilot_building
-from thermal.inputs import Drivers
+from thermal.inputs.drivers import Drivers
+from thermal.pilot.building import pilot_building
+from thermal.pilot.truth import TwinRanges
+from thermal.pilot.twin import generate_twin
 from thermal.units import AIR_HEAT_CAPACITY
 
 FloatArray = NDArray[np.float64]

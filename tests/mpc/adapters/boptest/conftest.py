@@ -8,7 +8,10 @@ from typing import Any
 import httpx
 import pytest
 
-from mpc.adapters.boptest import BoptestCase, BoptestPlant, BoptestServer, BoptestTime, pilot_to_serve
+from mpc.adapters.boptest.case import BoptestCase
+from mpc.adapters.boptest.make import pilot_to_serve
+from mpc.adapters.boptest.plant import BoptestPlant, BoptestTime
+from mpc.adapters.boptest.server import BoptestServer
 
 DAY = 86_400.0
 

@@ -11,16 +11,18 @@ import pandas as pd
 import pytest
 
 from calibration import ModelSettings
-from mpc.errors import BoptestError, BoptestRequestError, PlantError
-from mpc.adapters.boptest import BoptestCase, YearClock, case_to_serve
-from mpc.adapters.boptest.make import _plain_name, with_plant
+from mpc.adapters.boptest.case import BoptestCase
+from mpc.adapters.boptest.clock import YearClock
+from mpc.adapters.boptest.make import _plain_name, case_to_serve, with_plant
 from mpc.adapters.boptest.periods import find_periods
 from mpc.adapters.boptest.prices import MarketRate, scenario_prices
 from mpc.adapters.boptest.signals import _signal_names
 from mpc.adapters.boptest.trajectory import Trajectory
-from mpc.scenario import HourlyRate, StepGrid
+from mpc.errors import BoptestError, BoptestRequestError, PlantError
+from mpc.scenario.grid import StepGrid
+from mpc.scenario.rates import HourlyRate
 from thermal import load_bundled_case, load_case
-from thermal.case import Device
+from thermal.case.schema import Device
 
 DAY = 86_400.0
 SHARED = Path(__file__).parents[4].parent / "shared" / "cases"

@@ -15,7 +15,7 @@ import httpx
 import pytest
 import requests
 
-from mpc.adapters.boptest import BoptestServer
+from mpc.adapters.boptest.server import BoptestServer
 
 DAY = 86_400.0
 HEX = r"[0-9a-f]"

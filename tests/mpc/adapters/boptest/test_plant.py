@@ -8,11 +8,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from mpc.adapters.boptest.case import BoptestCase
+from mpc.adapters.boptest.plant import BoptestPlant, BoptestTime
 from mpc.errors import BoptestAnswerError, BoptestError, PlantActionError, PlantError
-from mpc.kpi import measure_kpis
-from mpc.loop import Measurements, SimulatedPlant, run_closed_loop
-from mpc.adapters.boptest import BoptestCase, BoptestPlant, BoptestTime
-from mpc.scenario import Forecast, Forecaster, StepGrid
+from mpc.kpi.kpis import measure_kpis
+from mpc.loop.plant import Measurements
+from mpc.loop.run import run_closed_loop
+from mpc.loop.simulated import SimulatedPlant
+from mpc.scenario.forecast import Forecast
+from mpc.scenario.forecaster import Forecaster
+from mpc.scenario.grid import StepGrid
 
 DAY = 86_400.0
 MORNING = 9 * DAY + 6 * 3600.0  # of a Tuesday

@@ -16,9 +16,10 @@ from typing import Any
 import httpx
 import pytest
 
-from mpc.errors import BoptestError
-from mpc.adapters.boptest import BoptestCase, BoptestServer
+from mpc.adapters.boptest.case import BoptestCase
 from mpc.adapters.boptest.registry import HeldTests
+from mpc.adapters.boptest.server import BoptestServer
+from mpc.errors import BoptestError
 
 DAY = 86_400.0
 MORNING = 4 * DAY + 7 * 3600.0  # of a Thursday

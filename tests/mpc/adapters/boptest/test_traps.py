@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from mpc.adapters.boptest.mapping import BoptestSignals
+from mpc.adapters.boptest.plant import BoptestPlant, BoptestTime
 from mpc.errors import BoptestAnswerError, BoptestError, BoptestTimeoutError, PlantActionError, PlantError
-from mpc.adapters.boptest import BoptestPlant, BoptestSignals, BoptestTime
 
 HOUSE = BoptestSignals(
     {

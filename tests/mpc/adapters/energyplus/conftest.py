@@ -21,14 +21,14 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 @pytest.fixture(scope="session")
 def office():
-    from mpc.adapters.energyplus import energyplus_building
+    from mpc.adapters.energyplus.building import energyplus_building
 
     return energyplus_building(MEDIUM)
 
 
 @pytest.fixture
 def make_plant():
-    from mpc.adapters.energyplus import energyplus_plant
+    from mpc.adapters.energyplus.make import energyplus_plant
 
     made = []
 
@@ -44,7 +44,7 @@ def make_plant():
 @pytest.fixture(scope="session")
 def own():
     """The plant after a day under its own control."""
-    from mpc.adapters.energyplus import energyplus_plant
+    from mpc.adapters.energyplus.make import energyplus_plant
 
     plant = energyplus_plant(MEDIUM, DAY, 1, step_seconds=600.0, control_steps=3)
     plant.reset()

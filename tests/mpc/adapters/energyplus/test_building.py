@@ -72,7 +72,7 @@ def test_a_day_is_a_case_that_can_be_saved_and_read(own, tmp_path):
 
 
 def test_a_controllers_plant_has_energyplus_sizes(office):
-    from mpc.adapters.energyplus import controller_system
+    from mpc.adapters.energyplus.system import controller_system
 
     system = controller_system(office, 0.34)
     fan = system.air_handlers[0].supply_fan
@@ -83,7 +83,7 @@ def test_a_controllers_plant_has_energyplus_sizes(office):
 
 
 def test_unknown_names_are_refused_with_the_nearest():
-    from mpc.adapters.energyplus import energyplus_building
+    from mpc.adapters.energyplus.building import energyplus_building
 
     with pytest.raises(EnergyPlusError, match="RefBldgMediumOfficeNew2004_Chicago"):
         energyplus_building("RefBldgMediumOffice")
@@ -94,7 +94,7 @@ def test_unknown_names_are_refused_with_the_nearest():
 
 
 def test_a_building_without_vav_is_refused_with_what_it_has():
-    from mpc.adapters.energyplus import energyplus_building
+    from mpc.adapters.energyplus.building import energyplus_building
 
     with pytest.raises(EnergyPlusError, match="VAV terminals.*ConstantVolume:NoReheat"):
         energyplus_building("RefBldgWarehouseNew2004_Chicago")

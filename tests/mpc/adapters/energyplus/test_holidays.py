@@ -7,9 +7,9 @@ from datetime import date
 import pytest
 from pandas.tseries.holiday import USColumbusDay, USLaborDay, USMartinLutherKingJr, USMemorialDay, USThanksgivingDay
 
-from mpc.errors import EnergyPlusError
 from mpc.adapters.energyplus.holidays import holidays
 from mpc.adapters.energyplus.input import InputFile
+from mpc.errors import EnergyPlusError
 
 YEARS = range(2020, 2030)
 
@@ -49,7 +49,7 @@ def test_a_date_that_is_none_is_named(text):
 @pytest.mark.energyplus
 def test_nobody_expects_comfort_on_a_holiday(office):
     """The fourth of July 2023, a Tuesday, has the band of a Sunday; the day after does not."""
-    from mpc.adapters.energyplus import energyplus_scenario
+    from mpc.adapters.energyplus.make import energyplus_scenario
 
     scenario = energyplus_scenario(office, "2023-07-04", 2, step_seconds=3600.0)
     width = (scenario.upper - scenario.lower)[:, 0].reshape(2, 24)

@@ -6,9 +6,9 @@ import importlib.util
 
 import pytest
 
-from mpc.errors import EnergyPlusError
 from mpc.adapters.energyplus import install as _install
-from mpc.adapters.energyplus import reference_buildings, weather_files
+from mpc.adapters.energyplus.install import reference_buildings, weather_files
+from mpc.errors import EnergyPlusError
 
 
 @pytest.fixture

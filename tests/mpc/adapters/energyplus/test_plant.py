@@ -135,7 +135,7 @@ def test_a_dead_process_is_a_named_error_and_nothing_is_left(make_plant, left_ov
 
 def test_a_warm_up_that_swings_without_end_is_no_error_of_the_run(office):
     """A plenum of that day has two states that follow each other for 25 days, which EnergyPlus calls severe."""
-    from mpc.adapters.energyplus import energyplus_plant
+    from mpc.adapters.energyplus.make import energyplus_plant
 
     plant = energyplus_plant("RefBldgMediumOfficeNew2004_Chicago", "2023-08-28", 1, control_steps=288)
     plant.reset()
@@ -174,7 +174,8 @@ def test_the_end_of_the_run_ends_the_process(own, left_over):
 
 
 def test_a_scenario_of_another_building_is_refused(office):
-    from mpc.adapters.energyplus import EnergyPlusPlant, energyplus_scenario
+    from mpc.adapters.energyplus.make import energyplus_scenario
+    from mpc.adapters.energyplus.plant import EnergyPlusPlant
 
     scenario = energyplus_scenario(office, "2023-01-10", 1, step_seconds=600.0)
     with pytest.raises(PlantError, match="days that the scenario covers"):

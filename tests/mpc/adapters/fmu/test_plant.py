@@ -14,9 +14,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from mpc.adapters.fmu.plant import FmuPlant
+from mpc.adapters.fmu.signals import FmuSignals
 from mpc.errors import FmuError, PlantActionError, PlantError
-from mpc.loop import FixedSetpoints, run_closed_loop
-from mpc.adapters.fmu import FmuPlant, FmuSignals
+from mpc.loop.run import FixedSetpoints, run_closed_loop
 
 fmpy = pytest.importorskip("fmpy", reason="needs the extra [fmu]")
 HERE = Path(__file__).parent

@@ -12,10 +12,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thermal import Building, ZoneTable
-from thermal.case import Location, ZoneEntry
+from thermal.case.schema import Location, ZoneEntry
 from thermal.errors import LabelledCaseError, MalformedRequestError
-from thermal.plan.page import Draft, building_of_draft, draft_of
-from thermal.plan.page.convert import encode_floor, parse_draft, zones_of
+from thermal.plan.page.convert import building_of_draft, draft_of, encode_floor, parse_draft, zones_of
+from thermal.plan.page.draft import Draft
 
 
 @given(

@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
-from thermal.case import Airflow
-from thermal.plan.page import Draft, DraftDevice, Site, find_faults
-from thermal.plan.page.findings import zone_facts
+from thermal.case.schema import Airflow
+from thermal.plan.page.draft import Draft, DraftDevice, Site
+from thermal.plan.page.findings import find_faults, zone_facts
 
 Make = Callable[..., Draft]
 VAV = DraftDevice(name="VAV_A", type="vav", zone="A")

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from thermal.plan.page import LabelDesk, create_app
+from thermal.plan.page.app import LabelDesk, create_app
 
 Progress = Callable[[str, int, int], None]
 

@@ -14,9 +14,11 @@ import pandas as pd
 import pytest
 import yaml
 
-from thermal.case import check_case, load_case
+from thermal.case.check import check_case
+from thermal.case.load import load_case
 from thermal.errors import LabelledCaseError, UnknownEntityError
-from thermal.plan.page import CaseStore, Draft, DraftDevice
+from thermal.plan.page.draft import Draft, DraftDevice
+from thermal.plan.page.store import CaseStore
 
 Make = Callable[..., Draft]
 

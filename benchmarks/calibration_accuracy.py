@@ -1,4 +1,19 @@
-"""The command of `calibration.py`: measure the cases that are not there yet, and write the tables of all."""
+"""Calibration beside the paper's own method: errors on its three intervals and held out, evaluations, seconds, bounds.
+
+Every case of ``--cases`` that has floor plans is calibrated seven ways: not at all; by the paper's 100 evaluations of
+its metric over its eight ranges, in its structure of the model (air and walls) and in ours (slabs, furniture and a
+radiant node beside them), each by a plain search and by a Bayesian one; by `calibration.calibrate` on the same six
+hours; and by it on the first two thirds of the telemetry. The plain search is the paper's row: it says "100 iterations"
+and nothing of how. `_paper_search.py` has searches, ranges and how its parameters map to ours, `_calibration_study.py`
+the intervals and what is shared, so that methods differ in nothing but method.
+
+Run: ``python benchmarks/calibration_accuracy.py --out results/calibration [--cases CASES] [--publish]``; some three
+minutes a case on a core. Each case is one file of ``cases/`` in ``--out`` as soon as it is done: run the same command
+again after an interruption and it goes on where it was.
+
+Errors of the first version, beside these, are read from ``first_accuracy.json``: the table of ``baseline_accuracy.py``
+in the README of the commit that it names, written by ``--first-version COMMIT``.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +35,7 @@ from _paper_search import EVALUATIONS
 from _table import ROOT, publish, write
 
 from thermal import load_case
-from thermal.case import FloorPlans
+from thermal.case.building import FloorPlans
 
 NAME = "calibration"
 SHARED = ROOT.parent / "shared" / "cases"
@@ -85,9 +100,9 @@ def run(cases: dict[str, Path], study: Study, workers: int, folder: Path) -> dic
     return failed
 
 
-def main(description: str) -> None:
+def main() -> None:
     """Measure the cases that are not there yet, and write the tables of all."""
-    parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--cases", type=Path, nargs="+", default=[SHARED], help="case folders, or folders of them")
     parser.add_argument("--out", type=Path, default=Path("results"), help="folder of the results")
     parser.add_argument("--hours", nargs=2, default=Study.hours, metavar="CLOCK", help="starts of (a), and of (c)")
@@ -115,3 +130,7 @@ def main(description: str) -> None:
         publish(NAME, short)
         publish(f"{NAME}_cases", by_case)
     print(page)
+
+
+if __name__ == "__main__":
+    main()
