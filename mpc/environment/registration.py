@@ -79,4 +79,4 @@ def office_environment(
 def register() -> None:
     """Put the environment in Gymnasium's registry, once; importing the package does it."""
     if ENVIRONMENT_ID not in gymnasium.registry:
-        gymnasium.register(ENVIRONMENT_ID, entry_point="mpc.environment:office_environment")
+        gymnasium.register(ENVIRONMENT_ID, entry_point="mpc.environment.registration:office_environment")

@@ -61,6 +61,7 @@ class Measurements(Mapping[str, float]):
 
     Examples
     --------
+    >>> import numpy as np
     >>> layout = PointLayout(("weather_station/outside_air_temperature_sensor",), "UTC")
     >>> seen = Measurements(layout, 0, np.array([283.15]))
     >>> seen["weather_station/outside_air_temperature_sensor"], round(float(seen.in_file_units().iloc[0]), 3)

@@ -86,18 +86,28 @@ class Project:
 
     @property
     def packages(self) -> dict[str, ModuleType]:
-        """Packages that a user imports from: no part of their name starts with an underscore."""
-        found = {n: m for n, m in self.modules.items() if self.files[n].name == "__init__.py"}
-        return {name: module for name, module in found.items() if "._" not in name}
+        """The packages that hand on names: what their `__all__` lists is public."""
+        return {name: module for name, module in self.modules.items() if name in PACKAGES}
 
     @cached_property
-    def public(self) -> list[Public]:
-        """Every name in an `__all__`, once, and the public members of the classes among them."""
+    def exported(self) -> list[Public]:
+        """Every name in an `__all__`, once."""
         found: dict[int, Public] = {}
         for package, module in self.packages.items():
             for name in (n for n in getattr(module, "__all__", ()) if hasattr(module, n)):
                 value = getattr(module, name)
                 found.setdefault(id(value), Public(f"{package}.{name}", value, _where(value, self.where(package))))
+        return list(found.values())
+
+    @cached_property
+    def public(self) -> list[Public]:
+        """What a user can reach: what is exported, what documents its parameters, and the members of such classes."""
+        found = {id(p.value): p for p in self.exported}
+        for name, module in self.modules.items():
+            for node in (n for n in self.trees[name].body if isinstance(n, ast.FunctionDef | ast.ClassDef)):
+                if not node.name.startswith("_") and "\nParameters\n---" in (ast.get_docstring(node) or ""):
+                    value = getattr(module, node.name)
+                    found.setdefault(id(value), Public(f"{name}.{node.name}", value, _where(value, self.where(name))))
         return [*found.values(), *(m for p in found.values() if inspect.isclass(p.value) for m in _members(p))]
 
 

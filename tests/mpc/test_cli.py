@@ -122,7 +122,7 @@ def test_an_unexpected_error_is_a_failure(monkeypatch: pytest.MonkeyPatch) -> No
     def broken(path: object) -> None:
         raise ZeroDivisionError("of no one's making")
 
-    monkeypatch.setattr("thermal.case.check_case", broken)
+    monkeypatch.setattr("thermal.case.check.check_case", broken)
     answer = run("check", CASE)
     assert (answer.exit_code, answer.stdout) == (1, "")
     assert answer.stderr == (
@@ -201,7 +201,7 @@ def test_a_solver_that_does_not_converge_is_a_failure_with_results(
 ) -> None:
     from dataclasses import replace
 
-    import calibration
+    import calibration.fit.calibrate as calibration
 
     fit = calibration.calibrate
 

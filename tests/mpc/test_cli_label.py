@@ -55,7 +55,7 @@ def served(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
         desks.append((desk, port))
         desk.end()
 
-    monkeypatch.setattr("thermal.plan.page.serve_page", serve_page)
+    monkeypatch.setattr("thermal.plan.page.serve.serve_page", serve_page)
     return desks
 
 

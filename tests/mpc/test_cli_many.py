@@ -18,7 +18,7 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-import calibration
+import calibration.fleet.cluster
 from calibration import calibrate
 from mpc.cli.app import app
 from thermal.pilot.pilot import generate_pilot
@@ -75,7 +75,7 @@ def on_threads(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
         called.append((scheduler, folders))
         return ThreadPoolExecutor(1)
 
-    monkeypatch.setattr(calibration, "ClusterExecutor", executor)
+    monkeypatch.setattr(calibration.fleet.cluster, "ClusterExecutor", executor)
     return called
 
 

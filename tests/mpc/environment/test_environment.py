@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 
-import mpc.environment  # registers
 from mpc.environment.environment import ControlEnvironment
+from mpc.environment.registration import office_environment
 from mpc.environment.reward import EconomicReward, PaperStepReward
 from mpc.errors import EnvironmentSetupError, PlantActionError
 from mpc.kpi.record import PlantRecord
@@ -147,7 +147,7 @@ def test_vectors_of_gymnasium(make_environment: Make) -> None:
 
 def test_vectors_in_processes_of_their_own() -> None:
     def make() -> ControlEnvironment:
-        return mpc.environment.office_environment(**SMALL)
+        return office_environment(**SMALL)
 
     apart = gymnasium.vector.AsyncVectorEnv([make], context="spawn")
     try:

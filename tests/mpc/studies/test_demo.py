@@ -75,7 +75,7 @@ def test_the_command_prints_what_was_found(
             told(step, verdict)
         return found
 
-    monkeypatch.setattr("mpc.studies.run_demo", told_at_once)
+    monkeypatch.setattr("mpc.studies.demo.run_demo", told_at_once)
     run = partial(CliRunner().invoke, app)
     answer = run(["demo", "--out", str(tmp_path / "out")])
     assert (answer.exit_code, answer.stderr) == (0, "")
