@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from thermal.errors import IncompatibleUnitError, UnknownUnitError, describe
+from thermal.errors import CaseError, describe
 
 
 @dataclass(frozen=True)
@@ -108,9 +108,9 @@ def to_si(values: ArrayLike, unit: str, quantity: str, *, elevation: float = 0.0
 
     Raises
     ------
-    UnknownUnitError
+    CaseError
         Pint does not know the unit.
-    IncompatibleUnitError
+    CaseError
         It is a unit of something else.
 
     Examples
@@ -164,9 +164,9 @@ def check_unit(unit: str, quantity: str, where: str) -> None:
 
     Raises
     ------
-    UnknownUnitError
+    CaseError
         Pint does not know the unit.
-    IncompatibleUnitError
+    CaseError
         It is a unit of something else.
     """
     _line(unit, quantity, 0.0, where)
@@ -190,7 +190,7 @@ def _line(unit: str, quantity: str, elevation: float, where: str) -> tuple[float
     parsed = _parse(unit, target, where)
     registry = _registry()
     if "delta_" in str(parsed):
-        raise IncompatibleUnitError(
+        raise CaseError(
             describe(where, f"{target.name} ({target.examples})", repr(unit), "this is a difference")
         )
     if quantity == "air_flow" and parsed.dimensionality == registry.parse_units("m^3/s").dimensionality:
@@ -198,7 +198,7 @@ def _line(unit: str, quantity: str, elevation: float, where: str) -> tuple[float
     is_angle = "radian" in str(registry.Quantity(1.0, parsed).to_root_units().units)
     if parsed.dimensionality != registry.parse_units(target.unit).dimensionality or is_angle != (quantity == "angle"):
         hint = {"C": "write degC", "F": "write degF"}.get(unit, f"use one of {target.examples}")
-        raise IncompatibleUnitError(describe(where, f"a unit of {target.name}", repr(unit), hint))
+        raise CaseError(describe(where, f"a unit of {target.name}", repr(unit), hint))
     zero, one = (float(registry.Quantity(x, parsed).to(target.unit).magnitude) for x in (0.0, 1.0))
     return one - zero, zero
 
@@ -213,4 +213,4 @@ def _parse(unit: str, target: _Quantity, where: str) -> Any:
         message = describe(
             where, f"a unit that pint knows, of {target.name}", repr(unit), f"use one of {target.examples}"
         )
-        raise UnknownUnitError(message) from error
+        raise CaseError(message) from error

@@ -95,7 +95,7 @@ def case_model(
 
     Raises
     ------
-    ParameterFileError
+    CalibrationError
         When the file cannot be read, or is of another building.
     """
     settings = read_settings(parameters) if parameters is not None else {}

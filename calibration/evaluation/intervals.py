@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from calibration.errors import HorizonError, IntervalError, NotEnoughDataError
+from calibration.errors import CalibrationError, HorizonError, NotEnoughDataError
 from thermal._types import IntArray
 from thermal.case.case import Case
 from thermal.case.times import local_timestamp
@@ -36,7 +36,7 @@ class Interval:
 
     def __post_init__(self) -> None:
         if not self.start < self.end:
-            raise IntervalError(f"interval {self.start}/{self.end}: expected the start before the end")
+            raise CalibrationError(f"interval {self.start}/{self.end}: expected the start before the end")
 
     def to_dict(self) -> dict[str, str]:
         """ISO 8601 texts of both ends."""
@@ -55,22 +55,24 @@ def parse_interval(text: str, case: Case) -> Interval:
 
     Raises
     ------
-    IntervalError
+    CalibrationError
         When it is not two ordered times, or holds no telemetry.
     """
     parts = text.split("/")
     if len(parts) != 2:
-        raise IntervalError(
+        raise CalibrationError(
             f"interval: expected START/END in ISO 8601, came {text!r}; for example 2023-10-02/2023-10-09T12:00"
         )
     try:
         start, end = (pd.Timestamp(local_timestamp(part.strip(), case.building)) for part in parts)
     except CaseError as error:
-        raise IntervalError(f"interval {text!r}: {error}") from error
+        raise CalibrationError(f"interval {text!r}: {error}") from error
     stamps = case.stamps
     interval = Interval(start, end)
     if end < stamps[0] or start > stamps[-1]:
-        raise IntervalError(f"interval {text!r}: outside of the telemetry, which goes from {stamps[0]} to {stamps[-1]}")
+        raise CalibrationError(
+            f"interval {text!r}: outside of the telemetry, which goes from {stamps[0]} to {stamps[-1]}"
+        )
     return interval
 
 
@@ -94,7 +96,7 @@ def default_intervals(
 
     Raises
     ------
-    IntervalError
+    CalibrationError
         When the given intervals leave nothing, or overlap.
     """
     stamps = case.stamps
@@ -146,7 +148,7 @@ def _rest(stamps: pd.DatetimeIndex, given: Sequence[Interval]) -> Interval:
     before, after = stamps[stamps < given[0].start], stamps[stamps > max(i.end for i in given)]
     longer = max((after, before), key=len)
     if len(longer) < 2:
-        raise IntervalError(
+        raise CalibrationError(
             "intervals: what is given leaves no telemetry for the other; give both --tune and --hold-out"
         )
     return Interval(longer[0], longer[-1])
@@ -259,13 +261,13 @@ def merge(intervals: Sequence[Interval]) -> list[Interval]:
 
     Raises
     ------
-    IntervalError
+    CalibrationError
         When two of them overlap: their telemetry would count twice.
     """
     ordered = sorted(intervals, key=lambda i: (i.start, i.end))
     for a, b in itertools.pairwise(ordered):
         if b.start <= a.end:
-            raise IntervalError(
+            raise CalibrationError(
                 f"intervals {a.start}/{a.end} and {b.start}/{b.end} overlap: their telemetry would count twice"
             )
     return ordered

@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, get_args
 
-from calibration.errors import CalibrationError, ParameterFileError
+from calibration.errors import CalibrationError
 from thermal.case.building import Building
 from thermal.effects.catalogue import CATALOGUE, chosen
 from thermal.errors import ModelError
@@ -109,7 +109,7 @@ def read_settings(path: str | Path) -> dict[str, Any]:
 
     Raises
     ------
-    ParameterFileError
+    CalibrationError
         When the settings are not as `ModelSettings` writes them.
     """
     path = Path(path)
@@ -120,11 +120,11 @@ def read_settings(path: str | Path) -> dict[str, Any]:
     settings = content.get("settings", {}) if isinstance(content, dict) else {}
     known = set(ModelSettings.__dataclass_fields__)
     if not isinstance(settings, dict) or set(settings) - known:
-        raise ParameterFileError(f"{path}: settings: expected a mapping with keys {sorted(known)}, found {settings!r}")
+        raise CalibrationError(f"{path}: settings: expected a mapping with keys {sorted(known)}, found {settings!r}")
     for name in ("dx", "reach", "spin_up_seconds"):
         value = settings.get(name)
         if value is not None and (isinstance(value, bool) or not isinstance(value, int | float) or value <= 0):
-            raise ParameterFileError(f"{path}: settings.{name}: expected a positive number or null, found {value!r}")
+            raise CalibrationError(f"{path}: settings.{name}: expected a positive number or null, found {value!r}")
     if "scopes" in settings:
         _check_scopes(path, settings["scopes"])
     if "effects" in settings:
@@ -137,7 +137,7 @@ def read_settings(path: str | Path) -> dict[str, Any]:
 def _check_scopes(path: Path, scopes: Any) -> None:
     """Refuse scopes that are not as `ModelSettings` writes them; the network says whether they fit the building."""
     if not isinstance(scopes, dict) or not all(scope in get_args(Scope) for scope in scopes.values()):
-        raise ParameterFileError(
+        raise CalibrationError(
             f"{path}: settings.scopes: expected a mapping to {', '.join(get_args(Scope))}, found {scopes!r}"
         )
 
@@ -146,7 +146,7 @@ def _check_effects(path: Path, effects: Any) -> None:
     """Refuse effects that are not as `ModelSettings` writes them; the network says whether they fit the building."""
     lists = isinstance(effects, dict) and all(isinstance(zones, list) for zones in effects.values())
     if not lists or not set(effects) <= set(CATALOGUE):
-        raise ParameterFileError(
+        raise CalibrationError(
             f"{path}: settings.effects: expected a mapping from effects of the catalogue to lists of zones, "
             f"found {effects!r}"
         )
@@ -156,10 +156,10 @@ def _structure(path: Path, entry: Any) -> Structure:
     """Make the structure that a file names."""
     known = sorted(Structure.__dataclass_fields__)
     if not isinstance(entry, dict) or set(entry) - set(known):
-        raise ParameterFileError(
+        raise CalibrationError(
             f"{path}: settings.structure: expected a mapping with keys among {known}, found {entry!r}"
         )
     try:
         return Structure(**entry)
     except ModelError as error:
-        raise ParameterFileError(f"{path}: settings.{error}") from error
+        raise CalibrationError(f"{path}: settings.{error}") from error

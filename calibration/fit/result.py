@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from calibration.errors import ParameterFileError
+from calibration.errors import CalibrationError
 from calibration.estimation.disturbance import DisturbanceModel
 from calibration.evaluation.intervals import Interval
 from calibration.evaluation.n_step import Evaluation
@@ -257,43 +257,43 @@ def load_parameters(path: str | Path, network: ThermalNetwork) -> FloatArray:
 
     Raises
     ------
-    ParameterFileError
+    CalibrationError
         When the file cannot be read, or does not hold the parameters of this building.
     """
     path = Path(path)
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
-        raise ParameterFileError(f"parameters: cannot read {path}: {error.strerror or error}") from error
+        raise CalibrationError(f"parameters: cannot read {path}: {error.strerror or error}") from error
     except (json.JSONDecodeError, UnicodeDecodeError) as error:
-        raise ParameterFileError(f"{path}: expected JSON as `calibrate` writes it, found {error}") from error
+        raise CalibrationError(f"{path}: expected JSON as `calibrate` writes it, found {error}") from error
     entries = content.get("parameters") if isinstance(content, dict) else None
     if not isinstance(entries, dict) or not entries:
-        raise ParameterFileError(
+        raise CalibrationError(
             f"{path}: expected a key 'parameters' with an entry a parameter, as in calibration.json"
         )
     values: dict[str, float] = {}
     for name, entry in entries.items():
         value = entry.get("value") if isinstance(entry, dict) else entry
         if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value):
-            raise ParameterFileError(
+            raise CalibrationError(
                 f"{path}: parameters.{name}: expected a positive number under 'value', found {value!r}"
             )
         values[name] = float(value)
     signed = {p.name for p in network.parameters if p.scale == "linear"}
     wrong = [name for name, value in values.items() if value <= 0 and name not in signed]
     if wrong:
-        raise ParameterFileError(
+        raise CalibrationError(
             f"{path}: parameters.{wrong[0]}: expected a positive number under 'value', found {values[wrong[0]]!r}"
         )
     for p in network.parameters:
         if p.scale == "logit" and values.get(p.name, 0.0) > 1.0:
-            raise ParameterFileError(f"{path}: parameters.{p.name}: expected at most 1, found {values[p.name]!r}")
+            raise CalibrationError(f"{path}: parameters.{p.name}: expected at most 1, found {values[p.name]!r}")
     wanted = {p.name for p in network.parameters}
     unknown = sorted(set(values) - wanted - set(network.nominal))
     missing = sorted(wanted - set(values))
     if unknown or missing:
-        raise ParameterFileError(
+        raise CalibrationError(
             f"{path}: parameters of another building: unknown {unknown or 'none'}, missing {missing or 'none'}; "
             "calibrate this case, or give the file that belongs to it"
         )

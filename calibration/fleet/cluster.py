@@ -13,7 +13,8 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
-from calibration.errors import ClusterError, MissingExtraError
+from calibration.errors import CalibrationError
+from thermal.errors import MissingExtraError
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -46,7 +47,7 @@ class ClusterExecutor(Executor):
     ------
     MissingExtraError
         When `distributed` is not installed.
-    ClusterError
+    CalibrationError
         When no scheduler answers, it has no workers, or a worker has not this version of the package or does not see a
         folder.
 
@@ -65,7 +66,7 @@ class ClusterExecutor(Executor):
         folders: Sequence[str | Path] = (),
     ) -> None:
         if not scheduler.strip():  # dask would start a cluster of its own
-            raise ClusterError("scheduler: expected an address such as tcp://HOST:8786, came none")
+            raise CalibrationError("scheduler: expected an address such as tcp://HOST:8786, came none")
         self._client = _connected(scheduler, timeout)
         self._address, self._patience = scheduler, patience
         try:
@@ -131,7 +132,7 @@ class ClusterExecutor(Executor):
         try:
             self._client.wait_for_workers(1, timeout=timeout)
         except TimeoutError as error:
-            raise ClusterError(
+            raise CalibrationError(
                 f"scheduler {self._address}: expected at least one worker, found none within {timeout:g} s; start some "
                 f"with: dask worker {self._address} --nworkers N --nthreads 1"
             ) from error
@@ -141,12 +142,12 @@ class ClusterExecutor(Executor):
                 continue
             if isinstance(answer, BaseException) or answer[0] != version("buildingmpc"):
                 found = f"{type(answer).__name__}: {answer}" if isinstance(answer, BaseException) else answer[0]
-                raise ClusterError(
+                raise CalibrationError(
                     f"worker {worker}: expected buildingmpc {version('buildingmpc')}, found {found}; install the same "
                     "version in the environment of every worker"
                 )
             if answer[1]:
-                raise ClusterError(
+                raise CalibrationError(
                     f"worker {worker}: does not see {', '.join(answer[1])}; cases and results must lie on a file "
                     "system that every worker sees under the same path"
                 )
@@ -171,7 +172,7 @@ def _connected(scheduler: str, timeout: float) -> Any:
                 client.close()
             raise
     except (OSError, ValueError, TypeError) as error:
-        raise ClusterError(
+        raise CalibrationError(
             f"scheduler {scheduler!r}: expected an answer within {timeout:g} s, as from tcp://HOST:8786: {error}"
         ) from error
     return client

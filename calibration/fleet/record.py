@@ -11,7 +11,7 @@ from inspect import signature
 from pathlib import Path
 from typing import Any, Literal
 
-from calibration.errors import CalibrationError, OtherResultsError, ResultsExistError
+from calibration.errors import CalibrationError, ResultsExistError
 from calibration.evaluation.intervals import Interval
 from calibration.fit.calibrate import calibrate
 from calibration.results import to_json
@@ -129,7 +129,7 @@ def earlier_outcome(case: Path, out: Path, settings: Mapping[str, Any]) -> CaseO
 
     Raises
     ------
-    OtherResultsError
+    ResultsExistError
         When the results there are of other settings, other telemetry, or another version.
     """
     there = read_record(out)
@@ -140,7 +140,7 @@ def earlier_outcome(case: Path, out: Path, settings: Mapping[str, Any]) -> CaseO
     here = {"settings": dict(settings), "files": digest(case), "version": version("buildingmpc")}
     for what in here:
         if there[what] != here[what]:
-            raise OtherResultsError(
+            raise ResultsExistError(
                 f"{out}: holds results of {_difference(what, there[what], here[what])}; "
                 "choose another --out, or --force (force=True) to replace them"
             )

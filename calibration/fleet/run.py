@@ -14,7 +14,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from calibration.errors import AnotherRunError, CalibrationError, CaseFoldersError, ResultsExistError, WorkerLostError
+from calibration.errors import CalibrationError, ResultsExistError, WorkerLostError
 from calibration.evaluation.n_step import Progress
 from calibration.fleet.case import CaseTask, calibrate_one
 from calibration.fleet.cluster import ClusterExecutor, killed_worker
@@ -95,11 +95,11 @@ def calibrate_many(
 
     Raises
     ------
-    CaseFoldersError
+    CalibrationError
         When there are no cases, two have the same name, or results would land in a case.
     ResultsExistError
         When the folder holds results of other settings, or something else, and `force` is not set.
-    AnotherRunError
+    CalibrationError
         When another run writes to the folder.
     CalibrationError
         When a setting is unknown, or a number out of range.
@@ -142,20 +142,20 @@ def _check_cases(cases: Sequence[str | Path], out: Path) -> list[Path]:
     """Refuse cases whose results would get in each other's way; return their absolute paths."""
     paths = [_absolute(case) for case in cases]
     if not paths:
-        raise CaseFoldersError("cases: expected at least one case folder, came none")
+        raise CalibrationError("cases: expected at least one case folder, came none")
     for name, count in Counter(path.name for path in paths).items():
         if count > 1:
             both = ", ".join(str(path) for path in paths if path.name == name)
-            raise CaseFoldersError(
+            raise CalibrationError(
                 f"cases: expected each name once, came {both}; both would write to {out / name}: rename one, or "
                 "calibrate them into different folders"
             )
         if not name or name.startswith(".") or name == SUMMARY:
-            raise CaseFoldersError(f"cases: expected folders whose names results can take, came {name!r}; rename it")
+            raise CalibrationError(f"cases: expected folders whose names results can take, came {name!r}; rename it")
     real = out.resolve()
     for path in paths:
         if path.resolve() in (real, *real.parents, (real / path.name).resolve()):
-            raise CaseFoldersError(f"{out}: results would land in the case {path}; choose another --out")
+            raise CalibrationError(f"{out}: results would land in the case {path}; choose another --out")
     return paths
 
 
@@ -209,7 +209,7 @@ def _lock(descriptor: int, out: Path) -> None:
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError as error:
-        raise AnotherRunError(f"{out}: another run writes its results here; wait for it, or choose another") from error
+        raise CalibrationError(f"{out}: another run writes its results here; wait for it, or choose another") from error
     except OSError:  # a file system without locks
         return
 

@@ -146,11 +146,11 @@ def import_telemetry(
 
 def _units(given: Sequence[str]) -> dict[str, str]:
     """Take options POINT=UNIT apart."""
-    from thermal.errors import PointListError, describe
+    from thermal.errors import PlanError, describe
 
     for text in given:
         if not all(text.partition("=")):
-            raise PointListError(describe("--unit", "POINT=UNIT, such as zone_air_temperature_sensor=degF", repr(text)))
+            raise PlanError(describe("--unit", "POINT=UNIT, such as zone_air_temperature_sensor=degF", repr(text)))
     return {point.strip(): unit.strip() for point, _, unit in (text.partition("=") for text in given)}
 
 

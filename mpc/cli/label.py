@@ -100,7 +100,7 @@ def _prepare(desk: LabelDesk, drawings: Path) -> None:
 
 def _make_apart(kind: str, case: Path, out: Path, progress: Progress) -> None:
     """Make a report in a process of its own, so that the page stays quick, and stop it with the job."""
-    from mpc.errors import ReportProcessError
+    from mpc.errors import MpcError
 
     context = multiprocessing.get_context("spawn")
     here, there = context.Pipe(duplex=False)
@@ -116,7 +116,7 @@ def _make_apart(kind: str, case: Path, out: Path, progress: Progress) -> None:
                 except EOFError:
                     break
                 if message[0] == "error":
-                    raise ReportProcessError(message[1])
+                    raise MpcError(message[1])
                 last = message
             progress(*last)
         process.join()
@@ -125,7 +125,7 @@ def _make_apart(kind: str, case: Path, out: Path, progress: Progress) -> None:
             process.terminate()
         process.join()
     if process.exitcode:
-        raise ReportProcessError(f"the process that makes the report ended with code {process.exitcode}")
+        raise MpcError(f"the process that makes the report ended with code {process.exitcode}")
 
 
 def _make(kind: str, case: Path, out: Path, connection: Connection[Any, Any]) -> None:

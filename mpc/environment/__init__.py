@@ -1,6 +1,6 @@
 """The closed loop as a Gymnasium environment, and learned policies as controllers (extra ``[rl]``)."""
 
-from mpc.errors import MissingExtraError
+from thermal.errors import MissingExtraError
 
 try:
     import gymnasium as _gymnasium  # noqa: F401

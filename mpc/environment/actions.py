@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mpc.errors import EnvironmentSetupError, PlantActionError
+from mpc.errors import MpcError, PlantActionError
 from mpc.loop.actuators import Actuator
 from thermal._types import FloatArray
 from thermal.errors import describe, nearest
@@ -31,7 +31,7 @@ class ActionLayout:
 
     Raises
     ------
-    EnvironmentSetupError
+    MpcError
         When a setpoint is not the plant's, is chosen twice, or one that every action must have is left out.
 
     Examples
@@ -48,14 +48,14 @@ class ActionLayout:
         for name in chosen:
             if name not in known:
                 advice = nearest(name, known)
-                raise EnvironmentSetupError(describe("actions", "a setpoint of the plant", repr(name), advice))
+                raise MpcError(describe("actions", "a setpoint of the plant", repr(name), advice))
             groups.append([a for a in actuators if name in (a.name, a.name.rpartition("/")[2])])
         set_by = [a.name for group in groups for a in group]
         missing = [a.name for a in actuators if a.required and a.name not in set_by]
         if missing or len(set_by) != len(set(set_by)):
             expected = "every setpoint that is required, each once"
             found = f"none for {missing[0]}" if missing else "one twice"
-            raise EnvironmentSetupError(describe("actions", expected, found))
+            raise MpcError(describe("actions", expected, found))
         self.chosen = tuple(chosen)
         self.lowest = np.array([max(a.lowest for a in group) for group in groups])
         self.highest = np.array([min(a.highest for a in group) for group in groups])

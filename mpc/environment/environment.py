@@ -15,7 +15,7 @@ from mpc.environment.features import LARGEST
 from mpc.environment.observation import Observation, ObservationLayout
 from mpc.environment.outlook import BLOCK_ENDS, Outlook, clock
 from mpc.environment.reward import REWARDS, Reward
-from mpc.errors import EnvironmentSetupError
+from mpc.errors import MpcError
 from mpc.kpi.kpis import measure_kpis
 from mpc.loop.history import RecentSteps
 from mpc.loop.plant import Measurements, Plant
@@ -109,7 +109,7 @@ class ControlEnvironment(gymnasium.Env[Observation, NDArray[np.float32]]):
 
     Raises
     ------
-    EnvironmentSetupError
+    MpcError
         When plants do not fit each other, have no scenario or no forecasts, or an option is not known.
 
     Notes
@@ -135,7 +135,7 @@ class ControlEnvironment(gymnasium.Env[Observation, NDArray[np.float32]]):
         self.plants = _checked(plants)
         self.reward = _reward_of(reward)
         if episode_steps is not None and episode_steps < 1:
-            raise EnvironmentSetupError(describe("episode_steps", "1 or more", repr(episode_steps)))
+            raise MpcError(describe("episode_steps", "1 or more", repr(episode_steps)))
         self.episode_steps = episode_steps
         first = self.plants[0]
         self._courses = [_Course(plant, block_ends) for plant in self.plants]
@@ -174,7 +174,7 @@ class ControlEnvironment(gymnasium.Env[Observation, NDArray[np.float32]]):
 
         Raises
         ------
-        EnvironmentSetupError
+        MpcError
             When an option is not known.
         """
         super().reset(seed=seed)
@@ -182,11 +182,11 @@ class ControlEnvironment(gymnasium.Env[Observation, NDArray[np.float32]]):
                  "plant_seed": int(self.np_random.integers(2**31))}  # fmt: skip
         for name in options or {}:
             if name not in drawn:
-                raise EnvironmentSetupError(describe("options", "a known one", repr(name), nearest(name, drawn)))
+                raise MpcError(describe("options", "a known one", repr(name), nearest(name, drawn)))
         info: dict[str, Any] = {**drawn, **(options or {})}
         if info["plant"] not in range(len(self.plants)):
             expected = f"a plant from 0 to {len(self.plants) - 1}"
-            raise EnvironmentSetupError(describe("options: plant", expected, repr(info["plant"])))
+            raise MpcError(describe("options: plant", expected, repr(info["plant"])))
         self._plant, self._course = self.plants[info["plant"]], self._courses[info["plant"]]
         self._step = self._done = 0
         return self._observe(self._plant.reset(info["plant_seed"])), info
@@ -235,21 +235,21 @@ def _checked(plants: Plant | Sequence[Plant]) -> tuple[ScenarioPlant, ...]:
     """Plants that have scenarios and fit each other."""
     several = tuple(plants) if isinstance(plants, Sequence) else (plants,)
     if not several:
-        raise EnvironmentSetupError(describe("environment", "a plant or more", "none"))
+        raise MpcError(describe("environment", "a plant or more", "none"))
     checked: list[ScenarioPlant] = []
     for plant in several:
         if not isinstance(plant, ScenarioPlant):
-            raise EnvironmentSetupError(describe("environment", "plants with a scenario", type(plant).__name__))
+            raise MpcError(describe("environment", "plants with a scenario", type(plant).__name__))
         checked.append(plant)
     first = checked[0]
     for k, plant in enumerate(checked):
         for what in ("columns", "actuators", "control_step"):
             if getattr(plant, what) != getattr(first, what):
                 expected = f"the same {what.replace('_', ' ')} as plant 0"
-                raise EnvironmentSetupError(describe(f"environment: plant {k}", expected, "others"))
+                raise MpcError(describe(f"environment: plant {k}", expected, "others"))
         if plant.control_step % plant.scenario.grid.step:
             expected = f"a control step of whole steps of {plant.scenario.grid.step:g} s"
-            raise EnvironmentSetupError(describe(f"environment: plant {k}", expected, f"{plant.control_step:g} s"))
+            raise MpcError(describe(f"environment: plant {k}", expected, f"{plant.control_step:g} s"))
     return tuple(checked)
 
 
@@ -257,7 +257,7 @@ def _reward_of(reward: str | Reward) -> Reward:
     if not isinstance(reward, str):
         return reward
     if reward not in REWARDS:
-        raise EnvironmentSetupError(describe("reward", "a known one", repr(reward), nearest(reward, REWARDS)))
+        raise MpcError(describe("reward", "a known one", repr(reward), nearest(reward, REWARDS)))
     return REWARDS[reward]
 
 
@@ -268,7 +268,7 @@ def _last_steps(plant: Any, course: _Course) -> RecentSteps:
         return recent
     whole = plant.record()
     if whole.district_heating is not None:
-        raise EnvironmentSetupError(describe("reward: plant", "electricity and gas", "district heating too"))
+        raise MpcError(describe("reward: plant", "electricity and gas", "district heating too"))
     n = round(plant.control_step / whole.step)
     gas = np.zeros(n) if whole.gas is None else whole.gas[-n:]
     temperature, electricity = list(whole.zone_temperature[-n - 1 :]), whole.electricity[-n:].tolist()

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mpc.errors import EnvironmentSetupError
+from mpc.errors import MpcError
 from mpc.loop.actuators import Actuator
 from thermal._types import FloatArray
 from thermal.case.points import POINT_TYPES, split_column
@@ -116,7 +116,7 @@ def measured_features(
 
     Raises
     ------
-    EnvironmentSetupError
+    MpcError
         When the floor area or a range is none, or a range is for nothing that is measured.
     """
     points = [split_column(column, "plant")[1] for column in columns]
@@ -124,12 +124,12 @@ def measured_features(
     for name, (lowest, highest) in given.items():
         if name not in (known := {*points, *columns, *OBSERVED_RANGES}):
             advice = nearest(name, known)
-            raise EnvironmentSetupError(describe("ranges", "a point that is observed", repr(name), advice))
+            raise MpcError(describe("ranges", "a point that is observed", repr(name), advice))
         if not -np.inf < lowest < highest < np.inf:
             found = repr((lowest, highest))
-            raise EnvironmentSetupError(describe(f"ranges: {name}", "a lower and a higher number", found))
+            raise MpcError(describe(f"ranges: {name}", "a lower and a higher number", found))
     if not 0.0 < floor_area < np.inf:
-        raise EnvironmentSetupError(describe("floor area", "a positive number of m2", repr(floor_area)))
+        raise MpcError(describe("floor area", "a positive number of m2", repr(floor_area)))
     own = {a.name: (a.lowest, a.highest) for a in actuators if a.required}
     count, kept, features = Counter(points), [], []
     for at, (column, point) in enumerate(zip(columns, points, strict=True)):

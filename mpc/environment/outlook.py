@@ -11,7 +11,7 @@ from zoneinfo import ZoneInfo
 import numpy as np
 
 from mpc.environment.features import OBSERVED_RANGES, Feature, scaling
-from mpc.errors import EnvironmentSetupError
+from mpc.errors import MpcError
 from mpc.scenario.forecast import Forecast, column_unit
 from mpc.scenario.forecaster import Forecaster
 from thermal._types import FloatArray
@@ -48,7 +48,7 @@ class Outlook:
 
     Raises
     ------
-    EnvironmentSetupError
+    MpcError
         When the blocks are not whole numbers of steps that rise, or forecasts lack a zone.
     """
 
@@ -64,10 +64,10 @@ class Outlook:
         edges = np.concatenate([[0], np.round(ends).astype(int)])
         if not len(ends) or (np.diff(edges) < 1).any() or not np.allclose(edges[1:], ends):
             expected = f"ends that rise, whole numbers of steps of {step:g} s"
-            raise EnvironmentSetupError(describe("outlook: block_ends", expected, repr(tuple(block_ends))))
+            raise MpcError(describe("outlook: block_ends", expected, repr(tuple(block_ends))))
         lacking = [f"{zone}/{name}" for name in _OF_ZONES for zone in zones if f"{zone}/{name}" not in columns]
         if lacking:
-            raise EnvironmentSetupError(
+            raise MpcError(
                 describe("outlook", f"forecasts with {lacking[0]!r}", "none", "use a Forecaster")
             )
         weather = [c for c in columns if "/" not in c and c.endswith("_sensor") and "direction" not in c]

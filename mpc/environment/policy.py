@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from mpc.environment.actions import ActionLayout
 from mpc.environment.observation import Observation, ObservationLayout
 from mpc.environment.outlook import clock
-from mpc.errors import EnvironmentSetupError
+from mpc.errors import MpcError
 from mpc.loop.plant import Measurements
 from mpc.scenario.forecast import Forecast
 from thermal._types import FloatArray
@@ -46,7 +46,7 @@ class ActorNetwork:
 
     Raises
     ------
-    EnvironmentSetupError
+    MpcError
         When layers do not fit each other or a number is not finite.
 
     Examples
@@ -65,14 +65,14 @@ class ActorNetwork:
     def __post_init__(self) -> None:
         if self.activation not in get_args(Activation):
             advice = nearest(self.activation, get_args(Activation))
-            raise EnvironmentSetupError(describe("network: activation", "a known one", repr(self.activation), advice))
+            raise MpcError(describe("network: activation", "a known one", repr(self.activation), advice))
         for name in ("weights", "biases"):
             object.__setattr__(self, name, tuple(np.asarray(v, dtype=np.float32) for v in getattr(self, name)))
         shapes = [(w.shape, b.shape) for w, b in zip(self.weights, self.biases, strict=False)]
         fit = len(self.weights) == len(self.biases) > 0 and all(len(w) == 2 and b == (w[0],) for w, b in shapes)
         chained = fit and all(a[0][0] == b[0][1] for a, b in pairwise(shapes))
         if not chained or not all(np.isfinite(v).all() for v in (*self.weights, *self.biases)):
-            raise EnvironmentSetupError(describe("network", "finite layers that fit each other", repr(shapes)))
+            raise MpcError(describe("network", "finite layers that fit each other", repr(shapes)))
 
     @property
     def inputs(self) -> int:
@@ -123,7 +123,7 @@ class ActorNetwork:
 
         Raises
         ------
-        EnvironmentSetupError
+        MpcError
             When it is no such file.
         """
         try:
@@ -134,7 +134,7 @@ class ActorNetwork:
             return cls(layers["weights"], layers["biases"], about["activation"], about["squashed"], about["about"])
         except (OSError, KeyError, ValueError, TypeError, EOFError) as error:
             found = f"{type(error).__name__}: {error}"
-            raise EnvironmentSetupError(describe(str(path), "a file that ActorNetwork.save wrote", found)) from error
+            raise MpcError(describe(str(path), "a file that ActorNetwork.save wrote", found)) from error
 
     @classmethod
     def of_stable_baselines(cls, model: Any, about: Mapping[str, Any] | None = None) -> ActorNetwork:
@@ -149,14 +149,14 @@ class ActorNetwork:
 
         Raises
         ------
-        EnvironmentSetupError
+        MpcError
             When the model is of another kind.
         """
         state = {name: value.detach().cpu().numpy() for name, value in model.policy.state_dict().items()}
         heads = {"PPO": ("mlp_extractor.policy_net", "action_net"), "SAC": ("actor.latent_pi", "actor.mu")}
         kind = type(model).__name__
         if kind not in heads:
-            raise EnvironmentSetupError(describe("model", "PPO or SAC of Stable-Baselines3", kind))
+            raise MpcError(describe("model", "PPO or SAC of Stable-Baselines3", kind))
         body, last = heads[kind]
         numbers = sorted({int(n.split(".")[-2]) for n in state if n.startswith(f"{body}.") and n.endswith("weight")})
         layers = [*(f"{body}.{n}" for n in numbers), last]
@@ -181,7 +181,7 @@ class PolicyController:
 
     Raises
     ------
-    EnvironmentSetupError
+    MpcError
         When the policy is of another environment.
     """
 
@@ -189,7 +189,7 @@ class PolicyController:
         found = network.inputs, int(network.weights[-1].shape[0])
         if found != (len(layout), len(actions)):
             expected = f"{len(layout)} inputs and {len(actions)} actions"
-            raise EnvironmentSetupError(describe("policy", expected, f"{found[0]} and {found[1]}"))
+            raise MpcError(describe("policy", expected, f"{found[0]} and {found[1]}"))
         self.network, self.layout, self.actions = network, layout, actions
         self._ahead: FloatArray | None = None
 

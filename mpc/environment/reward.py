@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from mpc.errors import EnvironmentSetupError
+from mpc.errors import MpcError
 from mpc.kpi.rewards import PaperReward, StageCost
 from mpc.loop.history import RecentSteps
 from mpc.scenario.scenario import Scenario
@@ -104,5 +104,5 @@ def _steps_each(done: RecentSteps, scenario: Scenario) -> int:
     each = round(scenario.grid.step / done.step)
     if abs(each * done.step - scenario.grid.step) > 1e-6:
         expected = f"steps that divide the scenario's {scenario.grid.step:g} s"
-        raise EnvironmentSetupError(describe("reward: plant", expected, f"{done.step:g} s"))
+        raise MpcError(describe("reward: plant", expected, f"{done.step:g} s"))
     return each

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mpc.errors import KpiError
+from mpc.errors import MpcError
 from mpc.kpi.integrals import excess
 from mpc.kpi.record import PlantRecord
 from mpc.scenario.rates import KILOWATT_HOUR
@@ -147,7 +147,7 @@ def measure_kpis(
 
     Raises
     ------
-    KpiError
+    MpcError
         When the record does not fit the scenario, or a limit or price is needed.
     """
     rows = _rows(record, scenario, first_step)
@@ -159,7 +159,7 @@ def measure_kpis(
     carbons = (scenario.electricity_carbon[rows], scenario.gas_carbon[rows], district_carbon)
     counted = bool(scenario.carbon_kind)
     if record.district_heating is not None and (district_price is None or (counted and district_carbon is None)):
-        raise KpiError(describe("district heating", "its price, and its emissions where they count", "none"))
+        raise MpcError(describe("district heating", "its price, and its emissions where they count", "none"))
     energy = sum(float(power.sum()) for power in powers.values() if power is not None) * record.step / KILOWATT_HOUR
     seconds = record.controller_seconds
     between = scenario.grid.step if control_step is None else control_step
@@ -188,13 +188,13 @@ def _rows(record: PlantRecord, scenario: Scenario, first_step: int) -> NDArray[n
     steps = record.n_steps / each
     if not (each >= 1 and float(each).is_integer() and float(steps).is_integer()):
         expected = f"whole steps of {scenario.grid.step:g} s of the scenario"
-        raise KpiError(describe("record", expected, f"{record.n_steps} steps of {record.step:g} s"))
+        raise MpcError(describe("record", expected, f"{record.n_steps} steps of {record.step:g} s"))
     if first_step < 0 or first_step + steps > scenario.grid.n_steps:
         expected = f"steps within the scenario's {scenario.grid.n_steps}"
-        raise KpiError(describe("record", expected, f"{first_step} to {first_step + steps:g}"))
+        raise MpcError(describe("record", expected, f"{first_step} to {first_step + steps:g}"))
     if record.zone_temperature.shape[1] != len(scenario.zones):
         found = f"{record.zone_temperature.shape[1]}"
-        raise KpiError(describe("record: zone_temperature", f"{len(scenario.zones)} zones", found))
+        raise MpcError(describe("record: zone_temperature", f"{len(scenario.zones)} zones", found))
     return first_step + np.arange(record.n_steps) // int(each)
 
 
@@ -218,7 +218,7 @@ def _comfort(record: PlantRecord, scenario: Scenario, rows: NDArray[np.int64]) -
 
 def _air_discomfort(record: PlantRecord, limit: float | None) -> float:
     if limit is None or record.co2 is None or not 0 < limit < 1:
-        raise KpiError(describe("co2_limit", "a share of volume, such as 1e-3", repr(limit)))
+        raise MpcError(describe("co2_limit", "a share of volume, such as 1e-3", repr(limit)))
     mean, _ = excess(record.co2[:-1] - limit, record.co2[1:] - limit)
     return float(mean.sum(0).mean() * record.step / _HOUR * 1e6)
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mpc.errors import KpiError
+from mpc.errors import MpcError
 from thermal._types import FloatArray
 from thermal.errors import describe
 
@@ -35,7 +35,7 @@ class PlantRecord:
 
     Raises
     ------
-    KpiError
+    MpcError
         When shapes do not fit or a value is not finite.
     """
 
@@ -51,7 +51,7 @@ class PlantRecord:
         temperature = np.asarray(self.zone_temperature, dtype=float)
         if temperature.ndim != 2 or len(temperature) < 2 or not self.step > 0:
             found = f"shape {temperature.shape}, a step of {self.step} s"
-            raise KpiError(describe("record: zone_temperature", "(n + 1, n_zone) over n positive steps", found))
+            raise MpcError(describe("record: zone_temperature", "(n + 1, n_zone) over n positive steps", found))
         each = (len(temperature) - 1,)
         shapes = dict.fromkeys(("electricity", "gas", "district_heating"), each) | {"co2": temperature.shape}
         for name in ("zone_temperature", *shapes, "controller_seconds"):
@@ -61,10 +61,10 @@ class PlantRecord:
             values = np.asarray(given, dtype=float)
             shape = shapes.get(name, values.shape)
             if values.shape != shape:
-                raise KpiError(describe(f"record: {name}", f"shape {shape}", f"shape {values.shape}"))
+                raise MpcError(describe(f"record: {name}", f"shape {shape}", f"shape {values.shape}"))
             if not np.isfinite(values).all():
                 at = int(np.argmax(~np.isfinite(values).reshape(len(values), -1).all(axis=1)))
-                raise KpiError(describe(f"record: {name}", "finite numbers", f"{values[at]} in row {at}"))
+                raise MpcError(describe(f"record: {name}", "finite numbers", f"{values[at]} in row {at}"))
             object.__setattr__(self, name, values)
 
     @property

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import expit
 
-from mpc.errors import KpiError
+from mpc.errors import MpcError
 from mpc.kpi.integrals import excess
 from mpc.scenario.rates import KILOWATT_HOUR
 from mpc.scenario.scenario import Scenario
@@ -75,7 +75,7 @@ class PaperReward:
 
     Raises
     ------
-    KpiError
+    MpcError
         When a number is out of range or the comfort term is not known.
     """
 
@@ -94,16 +94,16 @@ class PaperReward:
     def __post_init__(self) -> None:
         terms = ("productivity", "setpoint_deviation")
         if self.comfort not in terms:
-            raise KpiError(
+            raise MpcError(
                 describe("reward: comfort", "a known term", repr(self.comfort), nearest(self.comfort, terms))
             )
         weights = (self.comfort_weight, self.cost_weight, self.carbon_weight)
         if min(weights) < 0 or not sum(weights) > 0:
-            raise KpiError(describe("reward: weights", "numbers of 0 or more, not all 0", repr(weights)))
+            raise MpcError(describe("reward: weights", "numbers of 0 or more, not all 0", repr(weights)))
         scales = (self.highest_electricity, self.highest_gas, self.stiffness, self.half_distance, self.deviation_scale)
         if min(scales) <= 0 or not 0 <= self.lowest_productivity < self.highest_productivity:
             found = f"{scales}, productivity {self.lowest_productivity} to {self.highest_productivity}"
-            raise KpiError(describe("reward: scales", "positive numbers, a productivity that rises", found))
+            raise MpcError(describe("reward: scales", "positive numbers, a productivity that rises", found))
 
     def of_step(
         self, scenario: Scenario, k: int, temperature: ArrayLike, electricity: ArrayLike, gas: ArrayLike
@@ -208,7 +208,7 @@ class StageCost:
 
     Raises
     ------
-    KpiError
+    MpcError
         When a price is negative.
     """
 
@@ -217,7 +217,7 @@ class StageCost:
 
     def __post_init__(self) -> None:
         if not (self.discomfort_price >= 0 and self.carbon_price >= 0):
-            raise KpiError(describe("stage cost", "prices of 0 or more", repr(self)))
+            raise MpcError(describe("stage cost", "prices of 0 or more", repr(self)))
 
     def of_step(
         self, scenario: Scenario, k: int, start: ArrayLike, end: ArrayLike, electricity: ArrayLike, gas: ArrayLike

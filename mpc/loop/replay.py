@@ -15,7 +15,7 @@ import pandas as pd
 
 from calibration.estimation.heat_balance import heat_balance
 from calibration.evaluation.intervals import Interval
-from mpc.errors import ReplayError
+from mpc.errors import MpcError
 from mpc.loop.noise import SensorNoise
 from mpc.loop.replay_plant import Gap, Measured, Replayed, replay_plant
 from mpc.loop.sensors import plant_devices
@@ -159,13 +159,13 @@ def replay_subsystems(
 
     Raises
     ------
-    ReplayError
+    MpcError
         When a point is missing, or the telemetry is shorter than a day.
     """
     if not 0.0 <= tolerance <= 1.0:
-        raise ReplayError(describe("replay: tolerance", "a share from 0 to 1", repr(tolerance)))
+        raise MpcError(describe("replay: tolerance", "a share from 0 to 1", repr(tolerance)))
     if len(case.stamps) * case.step < 2.0 * LEAST_SPIN_UP:
-        raise ReplayError(describe("replay", "a day of telemetry or more", f"{len(case.stamps)} steps"))
+        raise MpcError(describe("replay", "a day of telemetry or more", f"{len(case.stamps)} steps"))
     devices = plant_devices(case.building, system)
 
     def parts(of: Case) -> list[Replayed]:

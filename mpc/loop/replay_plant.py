@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from mpc.errors import ReplayError
+from mpc.errors import MpcError
 from mpc.loop.sensors import PlantDevices
 from thermal._types import FloatArray
 from thermal.case.points import ZONE_TEMPERATURE
@@ -120,7 +120,7 @@ class Measured:
         for column in columns:
             if column not in self._frame or self._frame[column].isna().all():
                 advice = nearest(column, [c for c in self._frame.columns if str(c).endswith(point)])
-                raise ReplayError(describe("replay: telemetry", f"a usable column {column!r}", "none", advice))
+                raise MpcError(describe("replay: telemetry", f"a usable column {column!r}", "none", advice))
         return self._frame[columns].ffill().bfill().to_numpy(dtype=float)
 
 

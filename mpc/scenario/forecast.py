@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 import pandas as pd
 
-from mpc.errors import ForecastError
+from mpc.errors import ScenarioError
 from thermal._types import FloatArray
 from thermal.case.points import POINT_TYPES
 from thermal.errors import CaseError, describe, nearest
@@ -39,7 +39,7 @@ def column_unit(column: str) -> str:
 
     Raises
     ------
-    ForecastError
+    ScenarioError
         When the name is not known.
 
     Examples
@@ -53,7 +53,7 @@ def column_unit(column: str) -> str:
     if name in POINT_TYPES:
         return QUANTITIES[POINT_TYPES[name].quantity].unit
     advice = nearest(name, [*FORECAST_UNITS, *POINT_TYPES])
-    raise ForecastError(describe("forecast: column", "a name that forecasts have", repr(column), advice))
+    raise ScenarioError(describe("forecast: column", "a name that forecasts have", repr(column), advice))
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +68,7 @@ class Forecast:
 
     Raises
     ------
-    ForecastError
+    ScenarioError
         When stamps have no time zone or do not rise, or a column is not known.
     """
 
@@ -77,9 +77,9 @@ class Forecast:
     def __post_init__(self) -> None:
         index = self.table.index
         if not isinstance(index, pd.DatetimeIndex) or index.tz is None or not len(index):
-            raise ForecastError(describe("forecast", "stamps with a time zone", f"an index of {index.dtype}"))
+            raise ScenarioError(describe("forecast", "stamps with a time zone", f"an index of {index.dtype}"))
         if not index.is_monotonic_increasing or not index.is_unique:
-            raise ForecastError(describe("forecast", "stamps that rise", f"{index[0]} to {index[-1]}, out of order"))
+            raise ScenarioError(describe("forecast", "stamps that rise", f"{index[0]} to {index[-1]}, out of order"))
         for column in self.table.columns:
             column_unit(str(column))
 
@@ -101,7 +101,7 @@ class Forecast:
 
         Raises
         ------
-        ForecastError
+        ScenarioError
             When a column has no unit, or one of something else.
 
         Examples
@@ -114,17 +114,17 @@ class Forecast:
         converted = table.copy()
         for column in table.columns:
             if column not in units:
-                raise ForecastError(describe(f"forecast: column {column!r}", "a unit", "none", "add it to `units`"))
+                raise ScenarioError(describe(f"forecast: column {column!r}", "a unit", "none", "add it to `units`"))
             wanted, name = column_unit(str(column)), str(column).rpartition("/")[2]
             quantity = _QUANTITY.get(name) or (POINT_TYPES[name].quantity if name in POINT_TYPES else None)
             where = f"forecast: column {column!r}"
             if quantity is None and units[column] != wanted:
-                raise ForecastError(describe(where, f"the unit {wanted!r}", repr(units[column])))
+                raise ScenarioError(describe(where, f"the unit {wanted!r}", repr(units[column])))
             if quantity is not None:
                 try:
                     converted[column] = to_si(table[column].astype(float), units[column], quantity, where=where)
                 except (TypeError, ValueError, CaseError) as error:
-                    raise ForecastError(f"{where}: {error}") from error
+                    raise ScenarioError(f"{where}: {error}") from error
         return cls(converted)
 
     @property
@@ -156,7 +156,7 @@ class Forecast:
 
         Raises
         ------
-        ForecastError
+        ScenarioError
             Which column is missing, for how many steps, and when first.
         """
         index = pd.DatetimeIndex(self.table.index) if stamps is None else stamps
@@ -164,7 +164,7 @@ class Forecast:
         if fill == "hold":
             part = part.ffill().bfill()
         elif fill is not None:
-            raise ForecastError(describe("fill", "'hold' or None", repr(fill)))
+            raise ScenarioError(describe("fill", "'hold' or None", repr(fill)))
         values = part.to_numpy(dtype=float)
         empty = np.isnan(values)
         if empty.any():
@@ -174,7 +174,7 @@ class Forecast:
             advice = "supply it" if fill == "hold" else 'pass fill="hold" or supply it'
             known = columns[k] in self.table
             near = "" if known else f" ({nearest(columns[k], self.table.columns)})"
-            raise ForecastError(
+            raise ScenarioError(
                 f"forecast lacks {columns[k]!r}{near} for {count} of {len(index)} steps "
                 f"(first {first:%Y-%m-%d %H:%M}); {advice}"
             )

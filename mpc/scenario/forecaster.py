@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 from scipy.signal import lfilter
 
-from mpc.errors import ForecastError
+from mpc.errors import ScenarioError
 from mpc.scenario.forecast import Forecast
 from mpc.scenario.scenario import OCCUPANCY_POINT, Scenario
 from mpc.scenario.weather import SKY, SUN_POINTS
@@ -46,7 +46,7 @@ class ErrorGrowth:
 
     Raises
     ------
-    ForecastError
+    ScenarioError
         When a number is out of range.
 
     Examples
@@ -61,7 +61,7 @@ class ErrorGrowth:
     def __post_init__(self) -> None:
         if not (self.deviation >= 0 and self.time_constant > 0 and np.isfinite(self.deviation)):
             found = f"{self.deviation} and {self.time_constant} s"
-            raise ForecastError(describe("error", "a deviation of 0 or more and a positive time", found))
+            raise ScenarioError(describe("error", "a deviation of 0 or more and a positive time", found))
 
     def after(self, lead: float) -> float:
         """Tell the standard deviation of the error after a lead [unit of the deviation].
@@ -124,7 +124,7 @@ class Forecaster:
 
     Raises
     ------
-    ForecastError
+    ScenarioError
         When an option is not known or out of range.
     """
 
@@ -140,12 +140,12 @@ class Forecaster:
     ) -> None:
         if not 1 <= horizon <= scenario.grid.n_steps or seed < 0 or issue_every <= 0:
             expected = f"a horizon of 1 to {scenario.grid.n_steps} steps, a seed of 0 or more, a time between issues"
-            raise ForecastError(describe("forecaster", expected, f"{horizon}, {seed}, {issue_every} s"))
+            raise ScenarioError(describe("forecaster", expected, f"{horizon}, {seed}, {issue_every} s"))
         if occupancy not in ("expected", "actual"):
-            raise ForecastError(describe("occupancy", "'expected' or 'actual'", repr(occupancy)))
+            raise ScenarioError(describe("occupancy", "'expected' or 'actual'", repr(occupancy)))
         for name in errors or {}:
             if name not in ERROR_POINTS:
-                raise ForecastError(describe("errors", "a known one", repr(name), nearest(name, ERROR_POINTS)))
+                raise ScenarioError(describe("errors", "a known one", repr(name), nearest(name, ERROR_POINTS)))
         self.scenario, self.horizon, self.seed = scenario, horizon, seed
         self.errors, self.issue_every = dict(errors or {}), issue_every
         columns = _columns(scenario, actual=occupancy == "actual")
@@ -173,12 +173,12 @@ class Forecaster:
 
         Raises
         ------
-        ForecastError
+        ScenarioError
             When the scenario ends before the horizon does.
         """
         if not 0 <= k <= len(self._truth) - self.horizon:
             expected = f"a step from 0 to {len(self._truth) - self.horizon}, so that the scenario covers the horizon"
-            raise ForecastError(describe("forecast", expected, repr(k), "make the scenario's grid longer"))
+            raise ScenarioError(describe("forecast", expected, repr(k), "make the scenario's grid longer"))
         truth = self._truth[k : k + self.horizon]
         if not self.errors:
             return truth

@@ -77,7 +77,7 @@ class StepGrid:
         ------
         ScenarioError
             When there is not a whole number of steps between them, at least one.
-        InvalidTimeError
+        CaseError
             When a time cannot be read, or is one that the local clock skips or shows twice.
         """
         first, last = (local_timestamp(time, building) for time in (start, end))

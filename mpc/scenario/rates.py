@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from mpc.errors import TariffError
+from mpc.errors import ScenarioError
 from mpc.scenario.grid import WEEKDAY, Calendar, StepGrid, index_seconds
 from thermal._types import FloatArray
 from thermal.errors import describe
@@ -51,7 +51,7 @@ class ConstantRate:
 
     def __post_init__(self) -> None:
         if not np.isfinite(self.value):
-            raise TariffError(describe("rate", "a finite number per kWh", repr(self.value)))
+            raise ScenarioError(describe("rate", "a finite number per kWh", repr(self.value)))
 
     def on(self, grid: StepGrid) -> FloatArray:
         """Average over each step of a grid, shape (n_steps,) [per kWh].
@@ -83,7 +83,7 @@ class HourlyRate:
 
     Raises
     ------
-    TariffError
+    ScenarioError
         When a table has another shape or a value is not finite.
 
     Examples
@@ -137,7 +137,7 @@ def _month_hours(values: ArrayLike, name: str) -> FloatArray:
     table = np.asarray(values, dtype=float)
     if table.shape not in ((24,), (12, 24)) or not np.isfinite(table).all():
         expected = "24 finite numbers, or 12 rows of 24, one an hour of the local day"
-        raise TariffError(describe(f"hourly rate: {name}", expected, f"shape {table.shape}"))
+        raise ScenarioError(describe(f"hourly rate: {name}", expected, f"shape {table.shape}"))
     return np.array(np.broadcast_to(table, (12, 24)))
 
 
@@ -152,7 +152,7 @@ class MonthlyRate:
 
     Raises
     ------
-    TariffError
+    ScenarioError
         When there are not 12 finite numbers.
     """
 
@@ -160,7 +160,7 @@ class MonthlyRate:
 
     def __post_init__(self) -> None:
         if np.shape(self.values) != (12,) or not np.isfinite(self.values).all():
-            raise TariffError(describe("monthly rate", "12 finite numbers", repr(self.values)))
+            raise ScenarioError(describe("monthly rate", "12 finite numbers", repr(self.values)))
 
     def on(self, grid: StepGrid) -> FloatArray:
         """Average over each step of a grid, shape (n_steps,) [per kWh].
@@ -187,7 +187,7 @@ class SeriesRate:
 
     Raises
     ------
-    TariffError
+    ScenarioError
         When the stamps have no time zone or are irregular, or a value is missing.
     """
 
@@ -197,18 +197,20 @@ class SeriesRate:
     def __post_init__(self) -> None:
         index = self.series.index
         if self.stamped not in ("start", "end"):
-            raise TariffError(describe("series: stamped", "'start' or 'end'", repr(self.stamped)))
+            raise ScenarioError(describe("series: stamped", "'start' or 'end'", repr(self.stamped)))
         if not isinstance(index, pd.DatetimeIndex) or index.tz is None or len(index) < 2:
-            raise TariffError(describe("series", "at least two stamps with a time zone", f"an index of {index.dtype}"))
+            raise ScenarioError(
+                describe("series", "at least two stamps with a time zone", f"an index of {index.dtype}")
+            )
         gaps = np.diff(index_seconds(index))
         if (gaps != gaps[0]).any() or gaps[0] <= 0:
             row = int(np.flatnonzero((gaps != gaps[0]) | (gaps <= 0))[0])
             expected = f"a stamp {gaps[0]} s after {index[row]}"
-            raise TariffError(describe("series", expected, str(index[row + 1]), "fill gaps, and sort the stamps"))
+            raise ScenarioError(describe("series", expected, str(index[row + 1]), "fill gaps, and sort the stamps"))
         empty = self.series.isna().to_numpy()
         if empty.any():
             found = f"{empty.sum()} missing of {len(empty)}, first {index[int(np.argmax(empty))]}"
-            raise TariffError(describe("series", "a value at each stamp", found))
+            raise ScenarioError(describe("series", "a value at each stamp", found))
 
     def on(self, grid: StepGrid) -> FloatArray:
         """Average over each step of a grid, shape (n_steps,) [per kWh].
@@ -220,7 +222,7 @@ class SeriesRate:
 
         Raises
         ------
-        TariffError
+        ScenarioError
             When the series does not cover the grid.
         """
         stamps = index_seconds(pd.DatetimeIndex(self.series.index))
@@ -230,7 +232,7 @@ class SeriesRate:
             zone = grid.start.tz
             first, last = (pd.Timestamp(int(e), unit="s", tz=zone) for e in (edges[0], edges[-1]))
             found = f"{first} to {last}"
-            raise TariffError(describe("series", f"values from {grid.start} to {grid.stamps[-1]}", found))
+            raise ScenarioError(describe("series", f"values from {grid.start} to {grid.stamps[-1]}", found))
         total = np.concatenate([[0.0], np.cumsum(self.series.to_numpy(dtype=float))]) * length
         return np.asarray(np.diff(np.interp(grid.edges, edges, total)) / grid.step)
 
@@ -247,7 +249,7 @@ def gas_price(value: float, unit: str) -> ConstantRate:
 
     Raises
     ------
-    TariffError
+    ScenarioError
         When the unit is not known.
 
     Examples
@@ -256,5 +258,5 @@ def gas_price(value: float, unit: str) -> ConstantRate:
     0.0409
     """
     if unit not in GAS_UNITS:
-        raise TariffError(describe("gas price", f"a price per {', '.join(GAS_UNITS)}", repr(unit)))
+        raise ScenarioError(describe("gas price", f"a price per {', '.join(GAS_UNITS)}", repr(unit)))
     return ConstantRate(value / GAS_UNITS[unit])

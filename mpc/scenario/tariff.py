@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mpc.errors import TariffError
+from mpc.errors import ScenarioError
 from mpc.scenario.grid import Calendar, StepGrid
 from mpc.scenario.rates import Rate, by_month_and_hour
 from thermal._types import FloatArray, IntArray
@@ -92,14 +92,14 @@ class DemandBuckets:
 
         Raises
         ------
-        TariffError
+        ScenarioError
             When the run is not within the grid.
         """
         values, length = np.asarray(power, dtype=float), self.grid.step if step is None else step
         starts = self.grid.edges[first_step] + np.arange(len(values)) * length
         if values.ndim != 1 or not len(values) or starts[-1] + length > self.grid.edges[-1]:
             expected = f"means over steps within {self.grid.start} to {self.grid.stamps[-1]}"
-            raise TariffError(describe("power", expected, f"shape {values.shape}, steps of {length:g} s"))
+            raise ScenarioError(describe("power", expected, f"shape {values.shape}, steps of {length:g} s"))
         mean, begin = window_means(values, starts, length, self.window)
         owner = self.bucket[np.searchsorted(self.grid.edges, begin, side="right") - 1]
         peak = np.zeros(len(self.rate))
@@ -143,7 +143,7 @@ class DemandCharge:
 
     Raises
     ------
-    TariffError
+    ScenarioError
         When a table has another shape or names a period that has no rate.
 
     Examples
@@ -165,15 +165,15 @@ class DemandCharge:
     def __post_init__(self) -> None:
         rates = np.asarray(self.rates, dtype=float)
         if rates.ndim != 1 or not len(rates) or not (np.isfinite(rates) & (rates >= 0)).all():
-            raise TariffError(describe("demand charge: rates", "numbers of 0 or more", repr(self.rates)))
+            raise ScenarioError(describe("demand charge: rates", "numbers of 0 or more", repr(self.rates)))
         if self.window <= 0:
-            raise TariffError(describe("demand charge: window", "seconds above 0", repr(self.window)))
+            raise ScenarioError(describe("demand charge: window", "seconds above 0", repr(self.window)))
         weekday = np.zeros((12, 24)) if self.weekday is None else np.asarray(self.weekday)
         weekend = weekday if self.weekend is None else np.asarray(self.weekend)
         for key, table in (("weekday", weekday), ("weekend", weekend)):
             if table.shape != (12, 24) or not np.isin(table, np.arange(-1, len(rates))).all():
                 expected = f"12 rows of 24 periods from -1 to {len(rates) - 1}"
-                raise TariffError(describe(f"demand charge: {key}", expected, f"shape {table.shape}"))
+                raise ScenarioError(describe(f"demand charge: {key}", expected, f"shape {table.shape}"))
             object.__setattr__(self, key, table.astype(float))
 
     def on(self, grid: StepGrid) -> DemandBuckets:

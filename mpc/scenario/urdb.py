@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mpc.errors import TariffError
+from mpc.errors import ScenarioError
 from mpc.scenario.grid import Calendar
 from mpc.scenario.rates import HourlyRate, Rate
 from mpc.scenario.tariff import DemandCharge, Tariff
@@ -60,19 +60,19 @@ def read_urdb(
 
     Raises
     ------
-    TariffError
+    ScenarioError
         When the file is not such a tariff, or has a part that is not modelled: it is named.
     """
     item, where = _item(source)
     for key, what in _REFUSED.items():
         if np.any([bool(value) for value in _flat(item.get(key))]):
-            raise TariffError(describe(f"{where}: {key}", f"a tariff without {what}", "one"))
+            raise ScenarioError(describe(f"{where}: {key}", f"a tariff without {what}", "one"))
     days = calendar or Calendar()
     prices = _prices(item, "energyratestructure", tier, where, "kWh")
     weekday, weekend = (_schedule(item, f"energy{day}schedule", len(prices), where) for day in ("weekday", "weekend"))
     adjustment = np.asarray(item.get("fueladjustmentsmonthly") or [0.0] * 12, dtype=float)
     if adjustment.shape != (12,):
-        raise TariffError(describe(f"{where}: fueladjustmentsmonthly", "12 numbers", f"{adjustment.size}"))
+        raise ScenarioError(describe(f"{where}: fueladjustmentsmonthly", "12 numbers", f"{adjustment.size}"))
     tables = [prices[table] + adjustment[:, None] for table in (weekday, weekend)]
     demand = _demand(item, tier, days, where)
     name = " ".join(str(item[key]) for key in ("utility", "name") if item.get(key))
@@ -86,11 +86,11 @@ def _item(source: str | Path | Mapping[str, Any]) -> tuple[Mapping[str, Any], st
         try:
             content = json.loads(Path(source).read_text(encoding="utf-8"))
         except (OSError, ValueError) as error:
-            raise TariffError(describe(where, "a JSON file of the Utility Rate Database", str(error))) from error
+            raise ScenarioError(describe(where, "a JSON file of the Utility Rate Database", str(error))) from error
     items = content.get("items", [content]) if isinstance(content, Mapping) else content
     if not isinstance(items, Sequence) or len(items) != 1 or not isinstance(items[0], Mapping):
         found = f"{len(items)} items" if isinstance(items, Sequence) else type(items).__name__
-        raise TariffError(describe(where, "one tariff", found, "pass the item that is meant"))
+        raise ScenarioError(describe(where, "one tariff", found, "pass the item that is meant"))
     return items[0], where
 
 
@@ -114,23 +114,23 @@ def _prices(
     """Price of each period of a structure."""
     structure = item.get(key)
     if not isinstance(structure, Sequence) or not structure or not all(structure):
-        raise TariffError(describe(f"{where}: {key}", "periods of tiers", repr(structure)[:60]))
+        raise ScenarioError(describe(f"{where}: {key}", "periods of tiers", repr(structure)[:60]))
     prices = []
     for number, tiers in enumerate(structure):
         at = f"{where}: {key}[{number}]"
         if len(tiers) > 1 and tier is None:
             found = f"{len(tiers)}, the first up to {tiers[0].get('max')} {unit}"
-            raise TariffError(describe(at, "one tier", found, "choose one by `tier`"))
+            raise ScenarioError(describe(at, "one tier", found, "choose one by `tier`"))
         if tier is not None and tier < 0:
-            raise TariffError(describe("tier", "0 or more", repr(tier)))
+            raise ScenarioError(describe("tier", "0 or more", repr(tier)))
         chosen = tiers[min(tier or 0, len(tiers) - 1)]
         named = chosen.get("unit") or given or unit
         if named != unit:
-            raise TariffError(describe(f"{at}: unit", repr(unit), repr(named)))
+            raise ScenarioError(describe(f"{at}: unit", repr(unit), repr(named)))
         try:
             prices.append(float(chosen.get("rate") or 0.0) + float(chosen.get("adj") or 0.0))
         except (TypeError, ValueError) as error:
-            raise TariffError(describe(f"{at}: rate", "a number", repr(chosen))) from error
+            raise ScenarioError(describe(f"{at}: rate", "a number", repr(chosen))) from error
     return np.array(prices)
 
 
@@ -143,10 +143,10 @@ def _integers(item: Mapping[str, Any], key: str, shape: tuple[int, ...], periods
     try:
         table = np.asarray(item.get(key), dtype=float)
     except (TypeError, ValueError) as error:
-        raise TariffError(describe(f"{where}: {key}", expected, repr(item.get(key))[:60])) from error
+        raise ScenarioError(describe(f"{where}: {key}", expected, repr(item.get(key))[:60])) from error
     if table.shape != shape or not np.isin(table, np.arange(periods)).all():
         found = "nothing" if item.get(key) is None else f"shape {table.shape}, values {np.unique(table)[:8].tolist()}"
-        raise TariffError(describe(f"{where}: {key}", expected, found))
+        raise ScenarioError(describe(f"{where}: {key}", expected, found))
     return table.astype(np.int64)
 
 

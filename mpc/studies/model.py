@@ -51,7 +51,7 @@ def control_model(
     ------
     ControlError
         When effects are given beside a file.
-    ParameterFileError
+    CalibrationError
         When the file cannot be read, or is of another building.
 
     Examples

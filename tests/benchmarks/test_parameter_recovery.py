@@ -153,7 +153,7 @@ def test_a_study_goes_on_where_it_was(
         return known[seed]
 
     texts = [json.dumps(line) for line in known[:3]]
-    texts[1] = json.dumps({"seed": 1, "study": known[1]["study"], "code": "0", "failure": "SimulationError: gone"})
+    texts[1] = json.dumps({"seed": 1, "study": known[1]["study"], "code": "0", "failure": "ModelError: gone"})
     path = tmp_path / "parameter_recovery.jsonl"
     path.write_text("\n".join(texts)[:-40], encoding="utf-8")
     monkeypatch.setattr(recovery, "measure", measure)
@@ -161,7 +161,7 @@ def test_a_study_goes_on_where_it_was(
     monkeypatch.setattr("sys.argv", ["parameter_recovery.py", "--out", str(tmp_path), "--seeds", "4"])
     recovery.main()
     assert sorted(measured) == [2, 3]
-    assert "1: SimulationError: gone" in (tmp_path / "parameter_recovery.md").read_text(encoding="utf-8")
+    assert "1: ModelError: gone" in (tmp_path / "parameter_recovery.md").read_text(encoding="utf-8")
     monkeypatch.setattr("sys.argv", ["parameter_recovery.py", "--out", str(tmp_path), "--seeds", "4", "--retry"])
     recovery.main()
     assert sorted(measured) == [1, 2, 3]
@@ -186,7 +186,7 @@ def test_a_twin_from_plan_to_line(recovery: ModuleType, tables: ModuleType) -> N
     assert 0.0 < line["mae"]["truth"] < line["mae"]["before"]
     assert tables.report([line])[-1]["twins"][0]["seed"] == 1
     broken = recovery.measure(recovery.Study(days=2.0, dx=0.3, **small), 1)
-    assert broken["failure"].startswith("CellSizeError")
+    assert broken["failure"].startswith("ModelError")
 
 
 def test_standard_errors_go_to_the_estimation_scale(recovery: ModuleType) -> None:

@@ -92,7 +92,7 @@ def _nothing_is_lost(out: Path, outcomes: tuple[CaseOutcome, ...], killed: int) 
     assert [o.case for o in outcomes] == ["broken", "office 0", "office 1"]
     assert [o.status for o in outcomes] == ["failed", "calibrated", "calibrated"]
     assert sorted(o.attempts for o in outcomes) == [1, 1, 2]
-    assert (outcomes[0].error, outcomes[0].bad_input) == ("UnknownZoneError", True)
+    assert (outcomes[0].error, outcomes[0].bad_input) == ("CaseError", True)
     assert "nearest valid one is 'F1_" in str(outcomes[0].message)
     assert sorted(p.name for p in out.iterdir()) == ["office 0", "office 1", "summary.json"]
     for o in outcomes[1:]:

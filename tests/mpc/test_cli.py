@@ -77,35 +77,35 @@ def test_check_writes_and_answers_in_json(tmp_path: Path) -> None:
 def test_bad_input_is_named_on_stderr(spoilt: Path) -> None:
     answer = run("check", spoilt, "--json")
     assert (answer.exit_code, answer.stdout) == (2, "")
-    assert answer.stderr.startswith("error: UnknownZoneError: ")
+    assert answer.stderr.startswith("error: CaseError: ")
     assert "nearest valid one is 'F1_W'" in answer.stderr and "Traceback" not in answer.stderr
 
 
 def test_debug_shows_the_traceback(spoilt: Path) -> None:
     answer = run("--debug", "check", spoilt)
     assert answer.exit_code == 2
-    assert "Traceback" in answer.stderr and "error: UnknownZoneError" in answer.stderr
+    assert "Traceback" in answer.stderr and "error: CaseError" in answer.stderr
     assert "Traceback" not in run("check", spoilt).stderr
 
 
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("check", "nowhere"), "MissingFileError"),
+        (("check", "nowhere"), "CaseError"),
         (("check",), "Missing argument"),
         (("check", CASE, "--jsn"), "No such option"),
         (("evaluate", CASE, "--horizon", "7min"), "HorizonError"),
-        (("evaluate", CASE, "--interval", "2023-03-05"), "IntervalError"),
+        (("evaluate", CASE, "--interval", "2023-03-05"), "CalibrationError"),
         (("evaluate", CASE, "--scheme", "euler"), "CalibrationError: scheme: expected one of implicit_euler, tr_bdf2"),
-        (("evaluate", CASE, "--parameters", f"{CASE}/building.yaml"), "ParameterFileError"),
-        (("evaluate", CASE, "--dx", "0.3"), "CellSizeError"),
-        (("simulate", CASE, "--start", "soon", "--end", "2023-03-05"), "InvalidTimeError"),
-        (("simulate", CASE, "--start", "2023-03-01T01:00", "--end", "2023-03-02"), "SimulationError"),
+        (("evaluate", CASE, "--parameters", f"{CASE}/building.yaml"), "CalibrationError"),
+        (("evaluate", CASE, "--dx", "0.3"), "ModelError"),
+        (("simulate", CASE, "--start", "soon", "--end", "2023-03-05"), "CaseError"),
+        (("simulate", CASE, "--start", "2023-03-01T01:00", "--end", "2023-03-02"), "ModelError"),
         (("calibrate", CASE), "Missing option"),
         (("calibrate", CASE, "--out", "unused", "--starts", "0"), "CalibrationError: starts"),
         (("calibrate", CASE, "--out", "unused", "--objective", "kalman"), "CalibrationError: objective"),
-        (("calibrate", CASE, "--out", "unused", "--tune", "2023-03-01/2023-03-11"), "IntervalError: intervals"),
-        (("calibrate", "nowhere", "--out", "unused"), "MissingFileError"),
+        (("calibrate", CASE, "--out", "unused", "--tune", "2023-03-01/2023-03-11"), "CalibrationError: intervals"),
+        (("calibrate", "nowhere", "--out", "unused"), "CaseError"),
     ],
 )
 def test_bad_requests(
@@ -186,14 +186,14 @@ def test_a_folder_of_cases_reports_each(spoilt: Path, tmp_path: Path) -> None:
     answer = run("calibrate", spoilt.parent, "--out", out, "--dx", "2.0", "--json")
     assert answer.exit_code == 1
     cases = json.loads(answer.stdout)["cases"]
-    assert cases["spoilt"]["error"] == "UnknownZoneError"
+    assert cases["spoilt"]["error"] == "CaseError"
     assert cases["whole"]["solver"]["success"] is True
-    assert "error: spoilt: UnknownZoneError" in answer.stderr
+    assert "error: spoilt: CaseError" in answer.stderr
     assert sorted(p.name for p in out.iterdir()) == ["summary.json", "whole"]
     assert (out / "whole" / "report.html").is_file()
     shutil.rmtree(spoilt.parent / "whole")
     answer = run("calibrate", spoilt.parent, "--out", tmp_path / "none")
-    assert answer.exit_code == 2 and "UnknownZoneError" in answer.stdout
+    assert answer.exit_code == 2 and "CaseError" in answer.stdout
 
 
 def test_a_solver_that_does_not_converge_is_a_failure_with_results(

@@ -53,8 +53,8 @@ def test_the_terminal_has_verdict_suspects_and_how_far(capsys: pytest.CaptureFix
 @pytest.mark.parametrize(
     ("arguments", "error"),
     [
-        (("diagnose", "nowhere", "--out", "unused"), "MissingFileError"),
-        (("diagnose", CASE, "--out", "unused", "--tune", "yesterday"), "IntervalError"),
+        (("diagnose", "nowhere", "--out", "unused"), "CaseError"),
+        (("diagnose", CASE, "--out", "unused", "--tune", "yesterday"), "CalibrationError"),
         (("calibrate", CASE, "--out", "unused", "--effects", "solar_gian"), "EffectError"),
         (("calibrate", CASE, "--out", "unused", "--effects", "blinds"), "EffectError"),
     ],

@@ -87,9 +87,9 @@ def test_bad_input_is_refused_by_name(tmp_path: Path, drawings: Path) -> None:
     (tmp_path / "plans" / "bad.yaml").write_text(LIST.replace("codes.csv", "../codes.csv"), encoding="utf-8")
     for argument, told in (
         (tmp_path / "spam.png", "LabelError"),
-        (tmp_path / "evil.png", "DrawingFileError"),
-        (tmp_path / "plans", "LabelledCaseError"),
-        (tmp_path / "plans" / "bad.yaml", "OutsideFolderError"),
+        (tmp_path / "evil.png", "PlanError"),
+        (tmp_path / "plans", "LabelError"),
+        (tmp_path / "plans" / "bad.yaml", "PlanError"),
     ):
         answer = run(argument)
         assert answer.exit_code == 2 and told in answer.stderr, (argument, answer.stderr)
@@ -126,9 +126,9 @@ def test_a_report_is_made_in_a_process_of_its_own(drawings: Path, served: list[A
     case, told = drawings.with_suffix(""), []
     _label._make_apart("check", case, tmp_path / "out", lambda *words: told.append(words))
     assert (tmp_path / "out" / "report.html").is_file() and ("check", 0, 1) in told
-    with pytest.raises(Exception, match="ReportProcessError|expected|Error") as caught:
+    with pytest.raises(Exception, match="MpcError|expected|Error") as caught:
         _label._make_apart("calibrate", case, tmp_path / "out2", lambda *words: None)
-    assert type(caught.value).__name__ == "ReportProcessError"
+    assert type(caught.value).__name__ == "MpcError"
 
 
 def test_a_report_that_is_stopped_ends_its_process(drawings: Path, served: list[Any], tmp_path: Path) -> None:

@@ -128,7 +128,7 @@ def test_a_run_that_is_killed_or_interrupted_goes_on(cases: Path, tmp_path: Path
         assert text in answer.stdout
     answer = run("calibrate", cases, "--out", out, *OPTIONS, "--horizon", "2h")
     assert (answer.exit_code, answer.stdout) == (2, "")
-    assert "error: OtherResultsError: " in answer.stderr and "horizon is '1h' there and '2h' here" in answer.stderr
+    assert "error: ResultsExistError: " in answer.stderr and "horizon is '1h' there and '2h' here" in answer.stderr
 
 
 def test_a_solver_that_does_not_converge_fails_the_run_and_keeps_the_results(
@@ -152,7 +152,7 @@ def test_a_solver_that_does_not_converge_fails_the_run_and_keeps_the_results(
     [
         (("--workers", "2", "--scheduler", "tcp://127.0.0.1:9"), "CalibrationError: --workers and --scheduler"),
         (("--workers", "0"), "CalibrationError: workers: expected at least 1, came 0"),
-        (("--scheduler", "nonsense://x"), "ClusterError: scheduler 'nonsense://x': expected an answer within 10 s"),
+        (("--scheduler", "nonsense://x"), "CalibrationError: scheduler 'nonsense://x': expected an answer within 10 s"),
     ],
 )
 def test_bad_requests(cases: Path, tmp_path: Path, options: tuple[str, ...], message: str) -> None:

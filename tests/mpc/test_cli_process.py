@@ -31,7 +31,7 @@ def test_stdout_is_json_alone() -> None:
 def test_bad_input_leaves_with_2_and_no_traceback(tmp_path: Path) -> None:
     answer = run("calibrate", tmp_path, "--out", tmp_path / "out")
     assert (answer.returncode, answer.stdout) == (2, "")
-    assert answer.stderr.startswith("error: MissingFileError: ") and "Traceback" not in answer.stderr
+    assert answer.stderr.startswith("error: CaseError: ") and "Traceback" not in answer.stderr
     assert list(tmp_path.iterdir()) == []
 
 

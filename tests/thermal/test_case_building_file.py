@@ -6,19 +6,7 @@ from typing import Any
 import pytest
 
 from thermal.case.load import load_case
-from thermal.errors import (
-    CaseError,
-    DuplicateKeyError,
-    GeometryChoiceError,
-    InvalidValueError,
-    MalformedYamlError,
-    MissingFileError,
-    MissingKeyError,
-    UnknownKeyError,
-    UnknownTimeZoneError,
-    UnreadableFileError,
-    UnsupportedFormatError,
-)
+from thermal.errors import CaseError
 
 
 def set_at(content: dict[str, Any], path: tuple[Any, ...], value: object) -> None:
@@ -32,18 +20,18 @@ def set_at(content: dict[str, Any], path: tuple[Any, ...], value: object) -> Non
 
 
 def test_missing_folder(tmp_path: Path) -> None:
-    with pytest.raises(MissingFileError, match=r"nowhere: path: expected a case folder, found nothing"):
+    with pytest.raises(CaseError, match=r"nowhere: path: expected a case folder, found nothing"):
         load_case(tmp_path / "nowhere")
 
 
 def test_file_instead_of_a_folder(tmp_path: Path) -> None:
     (tmp_path / "building.yaml").write_text("format: 1\n")
-    with pytest.raises(MissingFileError, match="expected a case folder, found a file"):
+    with pytest.raises(CaseError, match="expected a case folder, found a file"):
         load_case(tmp_path / "building.yaml")
 
 
 def test_folder_without_building_file(tmp_path: Path) -> None:
-    with pytest.raises(MissingFileError, match=r"building\.yaml: .*no such file"):
+    with pytest.raises(CaseError, match=r"building\.yaml: .*no such file"):
         load_case(tmp_path)
 
 
@@ -52,20 +40,20 @@ def test_folder_without_building_file(tmp_path: Path) -> None:
 )
 def test_text_that_is_not_yaml(tmp_path: Path, text: str) -> None:
     (tmp_path / "building.yaml").write_text(text)
-    with pytest.raises(MalformedYamlError, match=r"building\.yaml: expected YAML"):
+    with pytest.raises(CaseError, match=r"building\.yaml: expected YAML"):
         load_case(tmp_path)
 
 
 @pytest.mark.parametrize("text", ["", "- 1\n- 2\n", "just a text\n"])
 def test_yaml_that_is_no_mapping(tmp_path: Path, text: str) -> None:
     (tmp_path / "building.yaml").write_text(text)
-    with pytest.raises(MalformedYamlError, match=r"expected a mapping of keys, found (NoneType|list|str)"):
+    with pytest.raises(CaseError, match=r"expected a mapping of keys, found (NoneType|list|str)"):
         load_case(tmp_path)
 
 
 def test_building_file_of_another_encoding(tmp_path: Path) -> None:
     (tmp_path / "building.yaml").write_bytes("name: Küche\n".encode("latin-1"))
-    with pytest.raises(UnreadableFileError, match=r"building\.yaml: expected YAML in UTF-8"):
+    with pytest.raises(CaseError, match=r"building\.yaml: expected YAML in UTF-8"):
         load_case(tmp_path)
 
 
@@ -73,20 +61,20 @@ def test_key_that_stands_twice(plan_draft: Any) -> None:
     folder = plan_draft.write()
     path = folder / "building.yaml"
     path.write_text(path.read_text() + "name: another\n")
-    with pytest.raises(DuplicateKeyError, match=r"line \d+: expected a new key, found 'name', which line 2 holds too"):
+    with pytest.raises(CaseError, match=r"line \d+: expected a new key, found 'name', which line 2 holds too"):
         load_case(folder)
 
 
 @pytest.mark.parametrize("number", [3, 0, "1", True, 1.5])
 def test_other_format_numbers(plan_draft: Any, number: object) -> None:
     plan_draft.content["format"] = number
-    with pytest.raises(UnsupportedFormatError, match=r"building\.yaml: format: expected 1 or 2, found"):
+    with pytest.raises(CaseError, match=r"building\.yaml: format: expected 1 or 2, found"):
         load_case(plan_draft.write())
 
 
 def test_format_is_looked_at_before_anything_else(plan_draft: Any) -> None:
     plan_draft.content |= {"format": 3, "new_key_of_format_3": 1}
-    with pytest.raises(UnsupportedFormatError):
+    with pytest.raises(CaseError):
         load_case(plan_draft.write())
 
 
@@ -115,7 +103,7 @@ def test_format_is_looked_at_before_anything_else(plan_draft: Any) -> None:
 def test_missing_keys(request: pytest.FixtureRequest, draft: str, path: tuple[Any, ...]) -> None:
     case = request.getfixturevalue(draft)
     set_at(case.content, path, None)
-    with pytest.raises(MissingKeyError, match=rf"building\.yaml: .*{path[-1]}: expected .*, found no such key"):
+    with pytest.raises(CaseError, match=rf"building\.yaml: .*{path[-1]}: expected .*, found no such key"):
         load_case(case.write())
 
 
@@ -138,7 +126,7 @@ def test_unknown_keys_name_the_nearest(
 ) -> None:
     case = request.getfixturevalue(draft)
     set_at(case.content, path, 1.0)
-    with pytest.raises(UnknownKeyError, match=rf"'{path[-1]}'; the nearest valid one is '{near}'"):
+    with pytest.raises(CaseError, match=rf"'{path[-1]}'; the nearest valid one is '{near}'"):
         load_case(case.write())
 
 
@@ -190,40 +178,40 @@ def test_values_of_the_wrong_kind_or_size(
 ) -> None:
     case = request.getfixturevalue(draft)
     set_at(case.content, path, value)
-    with pytest.raises(InvalidValueError, match=message):
+    with pytest.raises(CaseError, match=message):
         load_case(case.write())
 
 
 def test_several_mistakes_are_counted(plan_draft: Any) -> None:
     plan_draft.content["cell_size"] = -1.0
     plan_draft.content["floors"][0]["height"] = -1.0
-    with pytest.raises(InvalidValueError, match=r"cell_size.*\(and 1 more in this file\)"):
+    with pytest.raises(CaseError, match=r"cell_size.*\(and 1 more in this file\)"):
         load_case(plan_draft.write())
 
 
 def test_plans_and_table_at_once(plan_draft: Any, table_draft: Any) -> None:
     plan_draft.content["zones"] = table_draft.content["zones"]
-    with pytest.raises(GeometryChoiceError, match="keys of both: cell_size, floors, glazing, zones"):
+    with pytest.raises(CaseError, match="keys of both: cell_size, floors, glazing, zones"):
         load_case(plan_draft.write())
 
 
 def test_neither_plans_nor_table(table_draft: Any) -> None:
     for key in ("zones", "surfaces", "constructions"):
         del table_draft.content[key]
-    with pytest.raises(GeometryChoiceError, match=r"expected 'floors' \(plans\) or 'zones' .*, found neither"):
+    with pytest.raises(CaseError, match=r"expected 'floors' \(plans\) or 'zones' .*, found neither"):
         load_case(table_draft.write())
 
 
 @pytest.mark.parametrize("name", ["Europe/Berln", "UTC+1", "", "../etc/passwd", "Europe"])
 def test_time_zone_that_is_not_iana(plan_draft: Any, name: str) -> None:
     plan_draft.content["location"]["timezone"] = name
-    with pytest.raises((UnknownTimeZoneError, InvalidValueError), match=r"location\.timezone"):
+    with pytest.raises((CaseError), match=r"location\.timezone"):
         load_case(plan_draft.write())
 
 
 def test_time_zone_names_the_nearest(plan_draft: Any) -> None:
     plan_draft.content["location"]["timezone"] = "Europe/Berln"
-    with pytest.raises(UnknownTimeZoneError, match="the nearest valid one is 'Europe/Berlin'"):
+    with pytest.raises(CaseError, match="the nearest valid one is 'Europe/Berlin'"):
         load_case(plan_draft.write())
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from thermal.case.check import check_case, describe_case
 from thermal.case.load import load_case
-from thermal.errors import UnknownZoneError
+from thermal.errors import CaseError
 
 
 def test_building_in_numbers(plan_draft: Any) -> None:
@@ -135,7 +135,7 @@ def test_check_is_plain_json(plan_draft: Any) -> None:
 
 def test_check_of_bad_input_is_the_named_error(plan_draft: Any) -> None:
     plan_draft.content["devices"][0]["zone"] = "C"
-    with pytest.raises(UnknownZoneError):
+    with pytest.raises(CaseError):
         check_case(plan_draft.write())
 
 

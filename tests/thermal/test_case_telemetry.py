@@ -11,23 +11,7 @@ import pytest
 
 from thermal.case.load import load_case
 from thermal.case.telemetry import Telemetry
-from thermal.errors import (
-    CaseError,
-    DuplicateColumnError,
-    DuplicateStampError,
-    EmptyTelemetryError,
-    IrregularStepError,
-    MalformedColumnError,
-    MissingTimeZoneError,
-    MissingUnitError,
-    NonNumericColumnError,
-    StepTooLongError,
-    TimestampError,
-    UnknownFileTypeError,
-    UnknownPointError,
-    UnorderedStampError,
-    UnreadableFileError,
-)
+from thermal.errors import CaseError
 
 TYPES = ("telemetry.parquet", "telemetry.csv")
 FLOW = "VAV_A/supply_air_flowrate_sensor"
@@ -132,30 +116,30 @@ def test_parquet_with_the_stamps_as_a_column(plan_draft: Any) -> None:
 
 def test_parquet_with_an_index_of_another_name(plan_draft: Any) -> None:
     plan_draft.frame.index.name = "time"
-    refused(plan_draft, TimestampError, r"telemetry\.parquet: expected an index 'timestamp'.*found an index 'time'")
+    refused(plan_draft, CaseError, r"telemetry\.parquet: expected an index 'timestamp'.*found an index 'time'")
 
 
 def test_parquet_without_time_stamps(plan_draft: Any) -> None:
     plan_draft.frame = plan_draft.frame.reset_index(drop=True)
-    refused(plan_draft, TimestampError, "an index 'timestamp' of time stamps")
+    refused(plan_draft, CaseError, "an index 'timestamp' of time stamps")
 
 
 def test_csv_without_stamps(plan_draft: Any) -> None:
     plan_draft.content["telemetry"] = "telemetry.csv"
     plan_draft.frame.index.name = "time"
-    refused(plan_draft, TimestampError, r"telemetry\.csv: header: expected a column 'timestamp'")
+    refused(plan_draft, CaseError, r"telemetry\.csv: header: expected a column 'timestamp'")
 
 
 def test_no_time_zone(draft: Any) -> None:
     draft.frame.index = draft.frame.index.tz_localize(None)
-    refused(draft, MissingTimeZoneError, r"telemetry\.(parquet|csv): .*2023-03-01.00:05:00")
+    refused(draft, CaseError, r"telemetry\.(parquet|csv): .*2023-03-01.00:05:00")
 
 
 def test_one_stamp_of_a_csv_without_offset(plan_draft: Any) -> None:
     path, lines = csv_lines(plan_draft)
     lines[7] = lines[7].replace("-06:00", "", 1)
     path.write_text("\n".join(lines))
-    with pytest.raises(MissingTimeZoneError, match=r"data row 7: expected a time stamp with offset"):
+    with pytest.raises(CaseError, match=r"data row 7: expected a time stamp with offset"):
         load_case(path.parent)
 
 
@@ -164,45 +148,45 @@ def test_stamps_of_a_csv_that_are_none(plan_draft: Any, stamp: str) -> None:
     path, lines = csv_lines(plan_draft)
     lines[7] = ",".join([stamp, *lines[7].split(",")[1:]])
     path.write_text("\n".join(lines))
-    with pytest.raises(TimestampError, match=r"telemetry\.csv"):
+    with pytest.raises(CaseError, match=r"telemetry\.csv"):
         load_case(path.parent)
 
 
 def test_stamp_that_is_missing(plan_draft: Any) -> None:
     restamped(plan_draft, 5, pd.NaT)
-    refused(plan_draft, TimestampError, "data row 6: expected a time stamp, found nothing")
+    refused(plan_draft, CaseError, "data row 6: expected a time stamp, found nothing")
 
 
 def test_duplicate_stamp(draft: Any) -> None:
     restamped(draft, 5, draft.frame.index[4])
-    refused(draft, DuplicateStampError, r"data row 6: expected a new stamp, found 2023-03-01 00:25:00-06:00 again")
+    refused(draft, CaseError, r"data row 6: expected a new stamp, found 2023-03-01 00:25:00-06:00 again")
 
 
 def test_duplicate_stamp_far_away(draft: Any) -> None:
     restamped(draft, 20, draft.frame.index[4])
-    refused(draft, DuplicateStampError, "data row 21: expected a new stamp")
+    refused(draft, CaseError, "data row 21: expected a new stamp")
 
 
 def test_unordered_stamps(draft: Any) -> None:
     draft.frame = draft.frame.iloc[[0, 1, 3, 2, *range(4, 48)]]
-    refused(draft, UnorderedStampError, r"data row 4: .*found 2023-03-01 00:15:00-06:00 after 2023-03-01 00:20:00")
+    refused(draft, CaseError, r"data row 4: .*found 2023-03-01 00:15:00-06:00 after 2023-03-01 00:20:00")
 
 
 def test_stamps_that_run_backwards(draft: Any) -> None:
     draft.frame = draft.frame.iloc[::-1]
-    refused(draft, UnorderedStampError, "data row 2: expected stamps that go forwards")
+    refused(draft, CaseError, "data row 2: expected stamps that go forwards")
 
 
 def test_irregular_step(draft: Any) -> None:
     restamped(draft, 9, draft.frame.index[9] + timedelta(seconds=7))
-    refused(draft, IrregularStepError, r"data row 10: expected a whole number of steps of 300 s, found .*307 s after")
+    refused(draft, CaseError, r"data row 10: expected a whole number of steps of 300 s, found .*307 s after")
 
 
 def test_step_that_changes(plan_draft: Any) -> None:
     fine = pd.date_range(plan_draft.frame.index[0], periods=30, freq="5min")
     coarse = pd.date_range(fine[-1] + timedelta(minutes=1), periods=18, freq="1min")
     plan_draft.frame.index = fine.append(coarse).rename("timestamp")
-    refused(plan_draft, IrregularStepError, "data row 31: .*60 s after the row before")
+    refused(plan_draft, CaseError, "data row 31: .*60 s after the row before")
 
 
 def test_rows_left_out_come_in_as_gaps(draft: Any) -> None:
@@ -218,7 +202,7 @@ def test_rows_left_out_come_in_as_gaps(draft: Any) -> None:
 
 def test_a_stamp_of_another_decade_is_no_gap(plan_draft: Any) -> None:
     restamped(plan_draft, 47, plan_draft.frame.index[47] + timedelta(days=3650))
-    refused(plan_draft, IrregularStepError, "data row 48: expected telemetry without years of gaps")
+    refused(plan_draft, CaseError, "data row 48: expected telemetry without years of gaps")
 
 
 @pytest.mark.parametrize(("step", "seconds"), [("10min", 600.0), ("15min", 900.0), ("60min", 3600.0)])
@@ -229,18 +213,18 @@ def test_steps_up_to_an_hour(plan_draft: Any, step: str, seconds: float) -> None
 
 def test_steps_above_an_hour(plan_draft: Any) -> None:
     plan_draft.frame.index = pd.date_range(plan_draft.frame.index[0], periods=48, freq="2h", name="timestamp")
-    refused(plan_draft, StepTooLongError, "expected steps of up to 3600 s, found 7200 s")
+    refused(plan_draft, CaseError, "expected steps of up to 3600 s, found 7200 s")
 
 
 @pytest.mark.parametrize("n_time", [0, 1])
 def test_empty_telemetry(draft: Any, n_time: int) -> None:
     draft.frame = draft.frame.iloc[:n_time]
-    refused(draft, EmptyTelemetryError, f"at least two rows and one column, found {n_time} rows and 7 columns")
+    refused(draft, CaseError, f"at least two rows and one column, found {n_time} rows and 7 columns")
 
 
 def test_telemetry_without_columns(draft: Any) -> None:
     draft.frame = draft.frame[[]]
-    refused(draft, EmptyTelemetryError, "48 rows and 0 columns")
+    refused(draft, CaseError, "48 rows and 0 columns")
 
 
 def test_empty_files(plan_draft: Any) -> None:
@@ -248,7 +232,7 @@ def test_empty_files(plan_draft: Any) -> None:
         plan_draft.content["telemetry"] = name
         folder = plan_draft.write()
         (folder / name).write_bytes(b"")
-        with pytest.raises(UnreadableFileError, match=name):
+        with pytest.raises(CaseError, match=name):
             load_case(folder)
 
 
@@ -257,7 +241,7 @@ def test_telemetry_of_another_file_type(plan_draft: Any, name: str) -> None:
     folder = plan_draft.write()
     (folder / "telemetry.parquet").rename(folder / name)
     plan_draft.content["telemetry"] = name
-    with pytest.raises(UnknownFileTypeError, match=rf"telemetry: expected a \.parquet or a \.csv file, found '{name}'"):
+    with pytest.raises(CaseError, match=rf"telemetry: expected a \.parquet or a \.csv file, found '{name}'"):
         load_case(plan_draft.write() if name.endswith("csv") else _rewrite(plan_draft, folder))
 
 
@@ -271,7 +255,7 @@ def _rewrite(draft: Any, folder: Path) -> Path:
 def test_csv_under_the_name_of_parquet(plan_draft: Any) -> None:
     folder = plan_draft.write()
     plan_draft.frame.to_csv(folder / "telemetry.parquet")
-    with pytest.raises(UnreadableFileError, match=r"telemetry\.parquet: expected a Parquet file"):
+    with pytest.raises(CaseError, match=r"telemetry\.parquet: expected a Parquet file"):
         load_case(folder)
 
 
@@ -279,12 +263,12 @@ def test_csv_with_a_row_too_long(plan_draft: Any) -> None:
     path, lines = csv_lines(plan_draft)
     lines[1:] = [line + ",5" for line in lines[1:]]
     path.write_text("\n".join(lines))
-    with pytest.raises(UnreadableFileError, match=r"telemetry\.csv"):
+    with pytest.raises(CaseError, match=r"telemetry\.csv"):
         load_case(path.parent)
     lines[1:] = [line.rpartition(",")[0] for line in lines[1:]]
     lines[9] += ",5"
     path.write_text("\n".join(lines))
-    with pytest.raises(UnreadableFileError, match=r"telemetry\.csv"):
+    with pytest.raises(CaseError, match=r"telemetry\.csv"):
         load_case(path.parent)
 
 
@@ -304,26 +288,26 @@ def test_csv_column_that_is_not_numeric(plan_draft: Any, value: str) -> None:
     lines[12] = ",".join(cells)
     path.write_text("\n".join(lines))
     message = rf"column '{FLOW}', stamp 2023-03-01 .*: expected a number, found"
-    with pytest.raises(NonNumericColumnError, match=message):
+    with pytest.raises(CaseError, match=message):
         load_case(path.parent)
 
 
 @pytest.mark.parametrize("values", [["off", "on"], ["20.5", "21.5"], [True, False], [b"1", b"2"], [[1.0, 2.0], [3.0]]])
 def test_parquet_column_that_is_not_numeric(plan_draft: Any, values: list[object]) -> None:
     plan_draft.frame[FLOW] = values * 24
-    refused(plan_draft, NonNumericColumnError, f"column '{FLOW}', stamp 2023-03-01 .*expected a number, found")
+    refused(plan_draft, CaseError, f"column '{FLOW}', stamp 2023-03-01 .*expected a number, found")
 
 
 def test_frame_that_is_not_numeric(plan_draft: Any) -> None:
     frame = plan_draft.frame.astype({FLOW: object})
     frame.loc[frame.index[3], FLOW] = "closed"
-    with pytest.raises(NonNumericColumnError, match=f"telemetry: column '{FLOW}': expected numbers, found .*closed"):
+    with pytest.raises(CaseError, match=f"telemetry: column '{FLOW}': expected numbers, found .*closed"):
         Telemetry.from_frame(frame)
 
 
 def test_column_of_time_stamps_is_not_numeric(plan_draft: Any) -> None:
     plan_draft.frame[FLOW] = plan_draft.frame.index
-    refused(plan_draft, NonNumericColumnError, "expected a number, found Timestamp")
+    refused(plan_draft, CaseError, "expected a number, found Timestamp")
 
 
 @pytest.mark.parametrize(
@@ -356,35 +340,35 @@ def test_duplicate_columns_of_a_csv(plan_draft: Any) -> None:
     header[5] = header[4]
     lines[0] = ",".join(header)
     path.write_text("\n".join(lines))
-    with pytest.raises(DuplicateColumnError, match=f"'{FLOW}' twice"):
+    with pytest.raises(CaseError, match=f"'{FLOW}' twice"):
         load_case(path.parent)
 
 
 def test_duplicate_columns_of_a_frame(plan_draft: Any) -> None:
     frame = plan_draft.frame.iloc[:, [0, 1, 1]]
-    with pytest.raises(DuplicateColumnError, match=r"telemetry: columns: .* twice"):
+    with pytest.raises(CaseError, match=r"telemetry: columns: .* twice"):
         Telemetry.from_frame(frame)
 
 
 @pytest.mark.parametrize("column", ["temperature", "/supply_air_flowrate_sensor", "VAV_A/", ""])
 def test_columns_that_are_not_entity_and_point(draft: Any, column: str) -> None:
     draft.frame[column] = 1.0
-    refused(draft, MalformedColumnError, r"expected a name ENTITY/POINT")
+    refused(draft, CaseError, r"expected a name ENTITY/POINT")
 
 
 def test_unknown_point_type_of_a_column(draft: Any) -> None:
     draft.frame["VAV_A/zone_air_temperatur_sensor"] = 20.0
-    refused(draft, UnknownPointError, "the nearest valid one is 'zone_air_temperature_sensor'")
+    refused(draft, CaseError, "the nearest valid one is 'zone_air_temperature_sensor'")
 
 
 def test_unknown_point_type_among_the_units(plan_draft: Any) -> None:
     plan_draft.content["units"]["wind_sped_sensor"] = "m/s"
-    refused(plan_draft, UnknownPointError, r"units\.wind_sped_sensor: .*the nearest valid one is 'wind_speed_sensor'")
+    refused(plan_draft, CaseError, r"units\.wind_sped_sensor: .*the nearest valid one is 'wind_speed_sensor'")
 
 
 def test_point_without_a_unit(draft: Any) -> None:
     del draft.content["units"]["heating_power_sensor"]
-    refused(draft, MissingUnitError, r"building\.yaml: units: .*; add 'heating_power_sensor: <unit>'")
+    refused(draft, CaseError, r"building\.yaml: units: .*; add 'heating_power_sensor: <unit>'")
 
 
 def test_entity_with_a_slash(plan_draft: Any) -> None:

@@ -21,7 +21,7 @@ from thermal import (
     spin_up,
 )
 from thermal.effects.catalogue import CATALOGUE, chosen
-from thermal.errors import InputShapeError
+from thermal.errors import ModelError
 from thermal.inputs.drivers import REFERENCE_TEMPERATURE, Drivers, signal_values
 from thermal.model.replay import Inputs
 from thermal.model.rollouts import RolloutData, rollout
@@ -154,7 +154,7 @@ def test_the_simulator_has_the_effects(lively_case: CaseOf, kind: str) -> None:
     means, _ = trajectories(SymbolicModel(network), inputs, theta)
     assert plant.signal_names == tuple(s.name for s in network.signals)
     assert np.abs(np.array(zones) - means[0]).max() < 1e-9
-    with pytest.raises(InputShapeError, match=rf"signals: expected shape \({len(network.signals)},\), came \(0,\)"):
+    with pytest.raises(ModelError, match=rf"signals: expected shape \({len(network.signals)},\), came \(0,\)"):
         plant.step(inputs.heat[101], inputs.boundary[101, : len(network.boundaries)], inputs.airflow[101])
 
 

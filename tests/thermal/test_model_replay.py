@@ -28,7 +28,7 @@ from thermal import (
     spin_up,
 )
 from thermal.case.schema import Airflow, Layer, Location, Surface, ZoneEntry
-from thermal.errors import SimulationError
+from thermal.errors import ModelError
 from thermal.model.scheme import IMPLICIT_EULER, SCHEMES
 from thermal.model.stepper import Stepper
 
@@ -330,12 +330,12 @@ def test_telemetry_without_zones_or_outdoors_is_refused() -> None:
     network = bundled_network().network
     columns = load_bundled_case().telemetry.frame.columns
     zones = {c: (0, 576) for c in columns if c.endswith("/zone_air_temperature_sensor")}
-    with pytest.raises(SimulationError, match="zone_air_temperature_sensor"):
+    with pytest.raises(ModelError, match="zone_air_temperature_sensor"):
         replay_inputs(case_with(zones), network)
-    with pytest.raises(SimulationError, match="outdoor"):
+    with pytest.raises(ModelError, match="outdoor"):
         replay_inputs(case_with({OUTDOOR: (0, 576)}), network)
 
 
 def test_telemetry_without_a_complete_step_names_what_is_missing() -> None:
-    with pytest.raises(SimulationError, match="F1_W"):
+    with pytest.raises(ModelError, match="F1_W"):
         replay_inputs(case_with({FLOW: (0, 576)}), bundled_network().network)

@@ -19,7 +19,7 @@ from thermal import (
     simulate,
     spin_up,
 )
-from thermal.errors import SimulationError
+from thermal.errors import ModelError
 from thermal.model.scheme import TR_BDF2
 
 
@@ -69,7 +69,7 @@ def test_telemetry_after_the_start_reaches_the_replay_as_inputs_only() -> None:
 def test_spin_up_of_less_than_twelve_hours_is_refused_with_the_earliest_start() -> None:
     case, model = setting()
     stamps, theta = case.stamps, model.network.start()
-    with pytest.raises(SimulationError, match="12 h.*earliest is 2023-03-01 12:05"):
+    with pytest.raises(ModelError, match="12 h.*earliest is 2023-03-01 12:05"):
         simulate(case, model, theta, stamps[143], stamps[200])
     assert len(simulate(case, model, theta, stamps[144], stamps[150]).simulated) == 6
 
@@ -79,7 +79,7 @@ def test_intervals_that_are_not_in_the_telemetry_are_refused(first: int, last: i
     case, model = setting()
     begin = case.stamps[0]
     times = [begin + k * pd.Timedelta("5min") for k in (first, last)]
-    with pytest.raises(SimulationError, match="interval"):
+    with pytest.raises(ModelError, match="interval"):
         simulate(case, model, model.network.start(), *times)
 
 
@@ -90,6 +90,6 @@ def test_missing_inputs_are_refused_with_their_first_stamp() -> None:
     frame.iloc[920:930, column] = np.nan
     spoilt = Case(case.building, Telemetry.from_frame(frame))
     stamps = case.stamps
-    with pytest.raises(SimulationError, match="30 minutes"):
+    with pytest.raises(ModelError, match="30 minutes"):
         simulate(spoilt, model, model.network.start(), stamps[900], stamps[950])
     assert len(simulate(spoilt, model, model.network.start(), stamps[900], stamps[919]).simulated) == 19

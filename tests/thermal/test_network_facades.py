@@ -10,18 +10,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from thermal import (
-    Building,
-    FloorPlan,
-    FloorPlans,
-    Structure,
-    SymbolicModel,
-    ThermalNetwork,
-    ZoneTable,
-    build_network,
-)
+from thermal import Building, FloorPlan, FloorPlans, Structure, SymbolicModel, ThermalNetwork, ZoneTable, build_network
 from thermal.case.schema import Layer, Location, Surface, ZoneEntry
-from thermal.errors import ModelError, ScopeError
+from thermal.errors import ModelError
 from thermal.network.facades import facade_of, wall_facades
 from thermal.network.graph import GraphBuilder
 from thermal.network.grid import floor_grid
@@ -292,7 +283,7 @@ def test_a_zone_named_as_a_facade_is_not_confused_with_it() -> None:
     scopes: dict[str, Scope] = {"interior_film_coefficient": "zone", "exterior_wall_conductivity_multiplier": "facade"}
     names = {p.name for p in build_network(house, scopes=scopes).parameters}
     assert {"interior_film_coefficient@south", "exterior_wall_conductivity_multiplier@facade:south"} <= names
-    with pytest.raises(ScopeError, match=r"zones \['facade:south'\] are named as the facades"):
+    with pytest.raises(ModelError, match=r"zones \['facade:south'\] are named as the facades"):
         build_network(table_building("facade:south"), scopes=scopes)
     assert build_network(table_building("facade:south")).zones[0] == "facade:south"
 
@@ -341,14 +332,14 @@ def test_facade_of_what_is_no_envelope_is_refused_and_says_what_is(name: str) ->
     ],
 )
 def test_scopes_that_nothing_takes_are_refused(house: Building, name: str, scope: Scope, message: str) -> None:
-    with pytest.raises(ScopeError, match=f"{name} .*{message}|{name} {message}"):
+    with pytest.raises(ModelError, match=f"{name} .*{message}|{name} {message}"):
         build_network(house, scopes={name: scope})
 
 
 def test_windows_that_face_no_facade_are_refused_a_facade() -> None:
     attic = surface("G", "window", None, "R", "attic")
     table = ZoneTable((ZoneEntry(name="R", volume=50.0, floor_area=20.0),), (attic,), {})
-    with pytest.raises(ScopeError, match="window_conductance_multiplier belongs to no single facade"):
+    with pytest.raises(ModelError, match="window_conductance_multiplier belongs to no single facade"):
         build_network(Building("b", SITE, 0.0, table), scopes={"window_conductance_multiplier": "facade"})
 
 
@@ -356,7 +347,7 @@ def test_a_wall_without_azimuth_is_refused_by_its_name() -> None:
     table = ZoneTable((ZoneEntry(name="R", volume=50.0, floor_area=20.0),), (surface("W7", "wall"),), {"wall": LAYERS})
     house = Building("b", SITE, 0.0, table)
     assert build_network(house).zones == ("R",)
-    with pytest.raises(ScopeError, match=r"surface W7: expected an azimuth"):
+    with pytest.raises(ModelError, match=r"surface W7: expected an azimuth"):
         build_network(house, scopes={"exterior_convection_coefficient": "facade"})
 
 

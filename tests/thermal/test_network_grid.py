@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from thermal import FloorPlan
-from thermal.errors import CellSizeError
+from thermal.errors import ModelError
 from thermal.network.grid import floor_grid
 
 PLAN = FloorPlan("F1", 3.0, np.array([list(row) for row in ("#######", "#AA+BB#", "#AA+BB#", "#######")]))
@@ -31,7 +31,7 @@ def test_coarse_volumes_keep_the_cells_of_the_plan(cell: float, dx: float) -> No
 
 @pytest.mark.parametrize("dx", [0.0, -1.0, np.nan, np.inf, -np.inf])
 def test_cell_sizes_that_are_no_lengths_are_refused(dx: float) -> None:
-    with pytest.raises(CellSizeError, match="positive"):
+    with pytest.raises(ModelError, match="positive"):
         floor_grid(PLAN, 1.0, dx)
 
 

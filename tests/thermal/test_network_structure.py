@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from calibration.errors import CalibrationError, ParameterFileError
+from calibration.errors import CalibrationError
 from calibration.evaluation.settings import ModelSettings, read_settings
 from thermal import (
     Building,
@@ -24,7 +24,7 @@ from thermal import (
     load_bundled_case,
 )
 from thermal.case.schema import Layer, Location, Surface, ZoneEntry
-from thermal.errors import ScopeError, StructureError
+from thermal.errors import ModelError
 from thermal.units import air_density
 
 SITE = Location(latitude=42.0, longitude=-88.0, elevation=120.0, timezone="Etc/GMT+6")
@@ -265,12 +265,12 @@ def test_a_zone_without_surfaces_has_no_radiant_node() -> None:
     ],
 )
 def test_a_structure_that_cannot_be_built_is_refused_by_its_field(field: str, value: Any) -> None:
-    with pytest.raises(StructureError, match=rf"structure\.{field}: expected .* came {value!r}"):
+    with pytest.raises(ModelError, match=rf"structure\.{field}: expected .* came {value!r}"):
         replace(Structure(), **{field: value})
 
 
 def test_scope_of_what_a_structure_lacks_is_refused() -> None:
-    with pytest.raises(ScopeError, match=r"furniture_coupling is no parameter of this building with Structure\(furn"):
+    with pytest.raises(ModelError, match=r"furniture_coupling is no parameter of this building with Structure\(furn"):
         build_network(BUILDINGS["plan"], scopes={"furniture_coupling": "zone"}, structure=Structure.paper())
 
 
@@ -309,7 +309,7 @@ def test_settings_without_structure_are_those_of_the_baseline(tmp_path: Path) ->
 def test_settings_that_nobody_wrote_are_refused(tmp_path: Path, settings: dict[str, Any], message: str) -> None:
     path = tmp_path / "calibration.json"
     path.write_text(json.dumps({"settings": settings}), encoding="utf-8")
-    with pytest.raises(ParameterFileError, match=message):
+    with pytest.raises(CalibrationError, match=message):
         read_settings(path)
 
 

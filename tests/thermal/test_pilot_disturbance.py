@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from thermal.errors import ThermalError
 from thermal.pilot.disturbance import draw_disturbance
-from thermal.pilot.errors import TwinError
 
 TIME = 3600.0  # s
 
@@ -64,5 +64,5 @@ def test_same_seed_same_heat() -> None:
     ],
 )
 def test_what_is_no_process_is_refused(seed: int, n_time: int, deviation: float, time: float, step: float) -> None:
-    with pytest.raises(TwinError, match="deviations of 0 or more"):
+    with pytest.raises(ThermalError, match="deviations of 0 or more"):
         draw_disturbance(seed, n_time, np.array([deviation]), time, step)

@@ -14,7 +14,6 @@ from hypothesis import strategies as st
 from thermal.case.areas import zone_floor_areas
 from thermal.case.building import FloorPlan, FloorPlans
 from thermal.errors import ThermalError
-from thermal.pilot.errors import LayoutError
 from thermal.pilot.layout import devices, generate_office
 
 WALLS = {".", "#", "+"}
@@ -137,7 +136,7 @@ def test_other_sizes_keep_every_promise(
     floor_area = max(zones * zone_area, 240.0 * floors)
     try:
         plans = generate_office(seed, floor_area=floor_area, zones=zones, floors=floors, cell_size=cell_size)
-    except LayoutError as error:
+    except ThermalError as error:
         assert cell_size == 1.0, "only whole metres may miss an area"
         assert "smaller cell_size" in str(error)
         reject()

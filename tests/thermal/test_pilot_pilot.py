@@ -11,7 +11,7 @@ import pytest
 from thermal.case.building import Building, FloorPlans
 from thermal.case.case import Case
 from thermal.case.load import load_case
-from thermal.errors import CaseExistsError
+from thermal.errors import CaseError
 from thermal.pilot.pilot import generate_pilot
 
 
@@ -71,7 +71,7 @@ def test_a_folder_that_holds_something_is_left_alone(tmp_path: Path) -> None:
     def unwanted(building: Building, step_seconds: float) -> HeldPlant:
         raise AssertionError("refused too late")
 
-    with pytest.raises(CaseExistsError, match="overwrite"):
+    with pytest.raises(CaseError, match="overwrite"):
         generate_pilot(tmp_path, plant_factory=unwanted)
     assert [path.name for path in tmp_path.iterdir()] == ["notes.txt"]
 

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from thermal.pilot.errors import ClosedLoopError
+from thermal.errors import ThermalError
 from thermal.pilot.prbs import draw_prbs_thermostats
 from thermal.pilot.thermostat import draw_thermostats
 
@@ -62,5 +62,5 @@ def test_same_seed_same_setpoints_and_no_resolution_of_time_matters() -> None:
 
 
 def test_bad_arguments_are_refused() -> None:
-    with pytest.raises(ClosedLoopError, match="a seed of 0 or more and a zone"):
+    with pytest.raises(ThermalError, match="a seed of 0 or more and a zone"):
         draw_prbs_thermostats(-1, 3)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from thermal import Building, Simulator, load_bundled_case
-from thermal.errors import HvacParameterError
+from thermal.errors import ModelError
 from thermal.hvac._plant import HvacPlant
 from thermal.hvac._step import Actions, Conditions
 from thermal.pilot.building import pilot_building
@@ -63,5 +63,5 @@ def test_a_colder_winter_needs_more(office: Building) -> None:
 
 @pytest.mark.parametrize("wrong", [{"winter_outdoor": 290.0}, {"oversizing": 0.5}, {"gains": -1.0}])
 def test_conditions_that_mean_nothing_are_refused(wrong: dict[str, float]) -> None:
-    with pytest.raises(HvacParameterError, match="design conditions"):
+    with pytest.raises(ModelError, match="design conditions"):
         DesignConditions(**wrong)

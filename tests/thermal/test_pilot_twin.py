@@ -27,9 +27,9 @@ from thermal import (
 from thermal.case.areas import zone_floor_areas
 from thermal.case.building import Building, ZoneTable
 from thermal.case.schema import Location
+from thermal.errors import ThermalError
 from thermal.model.stepper import Stepper
 from thermal.pilot.building import pilot_building
-from thermal.pilot.errors import ClosedLoopError, TwinError
 from thermal.pilot.truth import TwinRanges, TwinTruth
 from thermal.pilot.twin import _draw_conditions, _draw_values
 from thermal.pilot.twin import generate_twin as generate
@@ -277,11 +277,11 @@ def test_a_twin_of_a_generated_office() -> None:
 @pytest.mark.parametrize(
     ("arguments", "error", "named"),
     [
-        ({"excitation": "steps"}, TwinError, "excitation: .*schedule, prbs"),
-        ({"meter": "sensor"}, TwinError, "nearest valid one is 'sensors'"),
-        ({"seed": -1}, ClosedLoopError, "seed"),
-        ({"days": 0.0, "spin_up_days": 0.0}, ClosedLoopError, "at least two steps"),
-        ({"resolution": -1.0}, ClosedLoopError, "resolution"),
+        ({"excitation": "steps"}, ThermalError, "excitation: .*schedule, prbs"),
+        ({"meter": "sensor"}, ThermalError, "nearest valid one is 'sensors'"),
+        ({"seed": -1}, ThermalError, "seed"),
+        ({"days": 0.0, "spin_up_days": 0.0}, ThermalError, "at least two steps"),
+        ({"resolution": -1.0}, ThermalError, "resolution"),
         ({"fixed": {"radiant_coeficient": 4.0}}, ModelError, "radiant_coefficient"),
     ],
 )
@@ -294,7 +294,7 @@ def test_bad_arguments_are_refused(
 
 def test_a_zone_table_is_refused() -> None:
     table = Building("hut", Location(latitude=0.0, longitude=0.0, elevation=0.0, timezone="UTC"), 0.0, ZoneTable(()))
-    with pytest.raises(TwinError, match="'hut': expected floor plans"):
+    with pytest.raises(ThermalError, match="'hut': expected floor plans"):
         generate(table)
 
 
@@ -310,5 +310,5 @@ def test_a_zone_table_is_refused() -> None:
     ],
 )
 def test_bad_ranges_are_refused(ranges: dict[str, tuple[float, float]]) -> None:
-    with pytest.raises(TwinError, match=next(iter(ranges))):
+    with pytest.raises(ThermalError, match=next(iter(ranges))):
         TwinRanges(**ranges)

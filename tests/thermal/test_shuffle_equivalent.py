@@ -7,6 +7,7 @@ import pytest
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
+from thermal.errors import ModelError
 from thermal.shuffle import equivalent as _equivalent
 from thermal.shuffle.equivalent import (
     choose_equivalent,
@@ -16,7 +17,6 @@ from thermal.shuffle.equivalent import (
     mixing_factor,
     mixing_rate,
 )
-from thermal.shuffle.errors import ShuffleParameterError
 from thermal.shuffle.random import RandomShuffle
 
 STEP, N_STEP = 300.0, 48  # [s], four hours
@@ -110,7 +110,7 @@ def test_probabilities_out_of_range_are_refused(probability):
         lambda: mixing_rate(probability, STEP, STEP),
         lambda: exchange_rate(probability, STEP),
     ):
-        with pytest.raises(ShuffleParameterError, match="probability in"):
+        with pytest.raises(ModelError, match="probability in"):
             call()
 
 
@@ -127,7 +127,7 @@ def test_probabilities_out_of_range_are_refused(probability):
     ],
 )
 def test_lengths_and_steps_out_of_range_are_refused(call, name):
-    with pytest.raises(ShuffleParameterError, match=name):
+    with pytest.raises(ModelError, match=name):
         call()
 
 

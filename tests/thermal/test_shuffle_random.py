@@ -7,8 +7,8 @@ from time import perf_counter
 import numpy as np
 import pytest
 
+from thermal.errors import ModelError
 from thermal.shuffle import random as _random
-from thermal.shuffle.errors import ShuffleCellError, ShuffleParameterError, ShuffleStateError
 from thermal.shuffle.random import RandomShuffle
 from thermal.shuffle.swaps import apply_swaps
 
@@ -193,25 +193,25 @@ def test_equal_seeds_give_equal_runs_and_a_saved_state_continues():
 
 @pytest.mark.parametrize("state", [{}, {"bit_generator": "MT19937", "state": {}}])
 def test_a_wrong_state_is_refused(state):
-    with pytest.raises(ShuffleStateError, match="PCG64"):
+    with pytest.raises(ModelError, match="PCG64"):
         RandomShuffle([[0, 1]], np.zeros((2, 2)), 0.5, None, seed=0).restore(state)
 
 
 @pytest.mark.parametrize(
     ("changes", "error", "message"),
     [
-        ({"probability": 1.1}, ShuffleParameterError, "probability in"),
-        ({"probability": np.nan}, ShuffleParameterError, "probability in"),
-        ({"reach": 0.0}, ShuffleParameterError, "reach"),
-        ({"reach": np.inf}, ShuffleParameterError, "reach"),
-        ({"capacities": [1.0, 1.0, 0.0]}, ShuffleParameterError, "capacities"),
-        ({"capacities": [1.0]}, ShuffleCellError, "capacities of shape"),
-        ({"positions": np.zeros(3)}, ShuffleCellError, "positions of shape"),
-        ({"positions": np.full((3, 2), np.nan)}, ShuffleCellError, "finite positions"),
-        ({"zone_cells": [[0, 3]]}, ShuffleCellError, "0, 3"),
-        ({"zone_cells": [[0, 1], [1, 2]]}, ShuffleCellError, "cell 1 of zone 1"),
-        ({"zone_cells": [[0, 0]]}, ShuffleCellError, "once in zone 0"),
-        ({"zone_cells": [[0.0, 1.0]]}, ShuffleCellError, "integers"),
+        ({"probability": 1.1}, ModelError, "probability in"),
+        ({"probability": np.nan}, ModelError, "probability in"),
+        ({"reach": 0.0}, ModelError, "reach"),
+        ({"reach": np.inf}, ModelError, "reach"),
+        ({"capacities": [1.0, 1.0, 0.0]}, ModelError, "capacities"),
+        ({"capacities": [1.0]}, ModelError, "capacities of shape"),
+        ({"positions": np.zeros(3)}, ModelError, "positions of shape"),
+        ({"positions": np.full((3, 2), np.nan)}, ModelError, "finite positions"),
+        ({"zone_cells": [[0, 3]]}, ModelError, "0, 3"),
+        ({"zone_cells": [[0, 1], [1, 2]]}, ModelError, "cell 1 of zone 1"),
+        ({"zone_cells": [[0, 0]]}, ModelError, "once in zone 0"),
+        ({"zone_cells": [[0.0, 1.0]]}, ModelError, "integers"),
     ],
 )
 def test_bad_input_is_refused(changes, error, message):
@@ -221,7 +221,7 @@ def test_bad_input_is_refused(changes, error, message):
 
 
 def test_temperatures_of_a_wrong_shape_are_refused():
-    with pytest.raises(ShuffleCellError, match=r"\(2,\)"):
+    with pytest.raises(ModelError, match=r"\(2,\)"):
         RandomShuffle([[0, 1]], np.zeros((2, 2)), 0.5, None, seed=0).apply([1.0, 2.0, 3.0])
 
 

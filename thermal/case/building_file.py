@@ -12,21 +12,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from thermal.case import schema
-from thermal.errors import (
-    CaseError,
-    DuplicateKeyError,
-    GeometryChoiceError,
-    InvalidValueError,
-    MalformedYamlError,
-    MissingFileError,
-    MissingKeyError,
-    UnknownKeyError,
-    UnknownTimeZoneError,
-    UnreadableFileError,
-    UnsupportedFormatError,
-    describe,
-    nearest,
-)
+from thermal.errors import CaseError, describe, nearest
 
 NAME = "building.yaml"
 _ENTRIES: dict[str, type[BaseModel]] = {
@@ -51,7 +37,7 @@ class _Loader(yaml.SafeLoader):
             if key.value != "<<" and isinstance(key.value, str) and lines.setdefault(key.value, line) != line:
                 where = f"{NAME}: line {line}"
                 found = f"{key.value!r}, which line {lines[key.value]} holds too"
-                raise DuplicateKeyError(describe(where, "a new key", found, "keep one of the two"))
+                raise CaseError(describe(where, "a new key", found, "keep one of the two"))
         return super().construct_mapping(node, deep=deep)
 
 
@@ -76,10 +62,10 @@ def read_building_file(folder: Path) -> schema.BuildingFile:
     content = _read_yaml(folder)
     number = content.get("format")
     if "format" not in content:
-        raise MissingKeyError(describe(f"{NAME}: format", "1 or 2", "no such key", "add 'format: 1'"))
+        raise CaseError(describe(f"{NAME}: format", "1 or 2", "no such key", "add 'format: 1'"))
     if type(number) is not int or number not in (1, 2):
         advice = "use a library that reads this format, or migrate the case"
-        raise UnsupportedFormatError(describe(f"{NAME}: format", "1 or 2", repr(number), advice))
+        raise CaseError(describe(f"{NAME}: format", "1 or 2", repr(number), advice))
     try:
         parsed = schema.BuildingFile.model_validate(content)
     except ValidationError as error:
@@ -92,18 +78,18 @@ def read_building_file(folder: Path) -> schema.BuildingFile:
 def _read_yaml(folder: Path) -> dict[str, Any]:
     if not folder.is_dir():
         found = "a file" if folder.exists() else "nothing"
-        raise MissingFileError(describe("path", "a case folder", found, f"give the folder that holds {NAME}"))
+        raise CaseError(describe("path", "a case folder", found, f"give the folder that holds {NAME}"))
     path = folder / NAME
     if not path.is_file():
-        raise MissingFileError(describe(NAME, "the description of the building", "no such file"))
+        raise CaseError(describe(NAME, "the description of the building", "no such file"))
     try:
         content = yaml.load(path.read_text(encoding="utf-8-sig"), Loader=_Loader)
     except (OSError, UnicodeDecodeError) as error:
-        raise UnreadableFileError(describe(NAME, "YAML in UTF-8", f"{error}")) from error
+        raise CaseError(describe(NAME, "YAML in UTF-8", f"{error}")) from error
     except (yaml.YAMLError, ValueError, RecursionError) as error:  # ValueError: a date such as 2023-13-45
-        raise MalformedYamlError(describe(NAME, "YAML", " ".join(str(error).split()))) from error
+        raise CaseError(describe(NAME, "YAML", " ".join(str(error).split()))) from error
     if not isinstance(content, dict):
-        raise MalformedYamlError(describe(NAME, "a mapping of keys", f"{type(content).__name__}"))
+        raise CaseError(describe(NAME, "a mapping of keys", f"{type(content).__name__}"))
     return content
 
 
@@ -112,7 +98,7 @@ def _check_time_zone(name: str) -> None:
         ZoneInfo(name)
     except (KeyError, ValueError, OSError) as error:
         advice = nearest(name, sorted(available_timezones()))
-        raise UnknownTimeZoneError(
+        raise CaseError(
             describe(f"{NAME}: location.timezone", "an IANA name", repr(name), advice)
         ) from error
 
@@ -121,18 +107,18 @@ def _check_geometry_choice(parsed: schema.BuildingFile) -> None:
     plans = [key for key in ("cell_size", "floors", "glazing") if getattr(parsed, key) is not None]
     table = [key for key in ("zones", "surfaces", "constructions") if getattr(parsed, key) is not None]
     if plans and table:
-        raise GeometryChoiceError(
+        raise CaseError(
             describe(NAME, "floor plans or a zone table", f"keys of both: {', '.join(plans + table)}", "drop one")
         )
     if not plans and not table:
-        raise GeometryChoiceError(describe(NAME, "'floors' (plans) or 'zones' (a zone table)", "neither", "add one"))
+        raise CaseError(describe(NAME, "'floors' (plans) or 'zones' (a zone table)", "neither", "add one"))
     for key in ("cell_size", "floors") if plans else ("zones",):
         if getattr(parsed, key) is None:
-            raise MissingKeyError(
+            raise CaseError(
                 describe(f"{NAME}: {key}", "a value", "no such key", f"needed beside {plans + table}")
             )
         if getattr(parsed, key) == ():
-            raise InvalidValueError(describe(f"{NAME}: {key}", "at least one entry", "none"))
+            raise CaseError(describe(f"{NAME}: {key}", "at least one entry", "none"))
 
 
 def _named(error: ValidationError) -> CaseError:
@@ -143,10 +129,10 @@ def _named(error: ValidationError) -> CaseError:
     more = f" (and {len(details) - 1} more in this file)" if len(details) > 1 else ""
     if first["type"] == "extra_forbidden":
         advice = nearest(first["loc"][-1], _keys_at(first["loc"]))
-        return UnknownKeyError(describe(where, "a key of the format", repr(first["loc"][-1]), advice) + more)
+        return CaseError(describe(where, "a key of the format", repr(first["loc"][-1]), advice) + more)
     if first["type"] == "missing":
-        return MissingKeyError(describe(where, "a value", "no such key") + more)
-    return InvalidValueError(describe(where, _expected(first), _short(first["input"]), _advice(first)) + more)
+        return CaseError(describe(where, "a value", "no such key") + more)
+    return CaseError(describe(where, _expected(first), _short(first["input"]), _advice(first)) + more)
 
 
 def _expected(detail: ErrorDetails) -> str:

@@ -23,7 +23,7 @@ from thermal.case.remarks import TERMINAL_TYPES, remarks
 from thermal.case.schema import Device
 from thermal.case.telemetry import Telemetry
 from thermal.case.times import local_timestamp
-from thermal.errors import EmptyIntervalError, describe
+from thermal.errors import CaseError, describe
 from thermal.units import AIR_HEAT_CAPACITY
 
 
@@ -91,9 +91,9 @@ class Case:
 
         Raises
         ------
-        InvalidTimeError
+        CaseError
             A time is not ISO 8601.
-        EmptyIntervalError
+        CaseError
             Fewer than two stamps lie in the interval.
         """
         stamps = self.stamps
@@ -102,7 +102,7 @@ class Case:
         frame = self.telemetry.frame.loc[first:last]
         if len(frame) < 2:
             expected = f"an interval with stamps of the telemetry, {stamps[0]} to {stamps[-1]}"
-            raise EmptyIntervalError(describe("interval", expected, f"{first} to {last}"))
+            raise CaseError(describe("interval", expected, f"{first} to {last}"))
         ends = (frame.index[0], frame.index[-1])
         missing = tuple(stamp for stamp in self.telemetry.missing_rows if ends[0] <= stamp <= ends[1])
         telemetry = Telemetry(frame=frame, step=self.step, missing_rows=missing)

@@ -12,7 +12,7 @@ from thermal.case.plan import read_plan
 from thermal.case.schema import BuildingFile
 from thermal.case.telemetry_file import check_units, read_telemetry
 from thermal.case.validation import check_building, check_columns
-from thermal.errors import CaseError, MissingFileError, OutsideCaseError, describe
+from thermal.errors import CaseError, describe
 
 
 def load_case(path: str | PathLike[str]) -> Case:
@@ -87,13 +87,13 @@ def _inside(folder: Path, name: str, key: str) -> Path:
         target = (folder / name).resolve()
         is_file = target.is_file()
     except (OSError, ValueError, RuntimeError) as error:  # a NUL, a name too long, links in a circle
-        raise MissingFileError(describe(where, "the name of a file", repr(name))) from error
+        raise CaseError(describe(where, "the name of a file", repr(name))) from error
     if not target.is_relative_to(folder.resolve()):
-        raise OutsideCaseError(
+        raise CaseError(
             describe(where, "a file inside the case folder", repr(name), "copy the file into the case")
         )
     if not is_file:
-        raise MissingFileError(
+        raise CaseError(
             describe(where, "a file of the case folder", repr(name), "add the file or correct the name")
         )
     return target

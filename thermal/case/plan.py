@@ -10,15 +10,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from thermal.case.building import EXTERIOR_WALL, INTERIOR_WALL, OUTSIDE
-from thermal.errors import (
-    EmptyCellError,
-    EmptyPlanError,
-    RaggedPlanError,
-    SplitZoneError,
-    UnreadableFileError,
-    UnwalledZoneError,
-    describe,
-)
+from thermal.errors import CaseError, describe
 
 
 def read_plan(path: Path) -> NDArray[np.str_]:
@@ -36,31 +28,31 @@ def read_plan(path: Path) -> NDArray[np.str_]:
 
     Raises
     ------
-    UnreadableFileError
+    CaseError
         It is no UTF-8 text or no CSV.
-    RaggedPlanError
+    CaseError
         Its rows differ in length.
-    EmptyCellError
+    CaseError
         A cell is blank.
-    EmptyPlanError
+    CaseError
         It has no row.
     """
     try:
         with path.open(encoding="utf-8-sig", newline="") as stream:
             rows = [[token.strip() for token in row] for row in csv.reader(stream, strict=True)]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise UnreadableFileError(describe(path.name, "a CSV of tokens in UTF-8", f"{error}")) from error
+        raise CaseError(describe(path.name, "a CSV of tokens in UTF-8", f"{error}")) from error
     while rows and not any(rows[-1]):
         rows.pop()
     if not rows:
-        raise EmptyPlanError(describe(path.name, "rows of tokens", "no row"))
+        raise CaseError(describe(path.name, "rows of tokens", "no row"))
     for number, row in enumerate(rows, start=1):
         if len(row) != len(rows[0]):
             expected = f"{len(rows[0])} cells as in row 1"
-            raise RaggedPlanError(describe(f"{path.name}: row {number}", expected, f"{len(row)} cells"))
+            raise CaseError(describe(f"{path.name}: row {number}", expected, f"{len(row)} cells"))
         if "" in row:
             where = f"{path.name}: row {number}, column {row.index('') + 1}"
-            raise EmptyCellError(describe(where, "'.', '#', '+' or a zone", "a blank", "write '.' for outside"))
+            raise CaseError(describe(where, "'.', '#', '+' or a zone", "a blank", "write '.' for outside"))
     return np.array(rows, dtype=np.str_)
 
 
@@ -76,20 +68,20 @@ def check_plan(tokens: NDArray[np.str_], where: str) -> None:
 
     Raises
     ------
-    EmptyPlanError
+    CaseError
         No cell is a zone.
-    UnwalledZoneError
+    CaseError
         A zone's cell has the outside, or the edge of the plan, beside it (cells that meet at a corner only are let
         be).
-    SplitZoneError
+    CaseError
         The cells of a zone do not hang together by their sides.
     """
     tokens = np.asarray(tokens, dtype=np.str_)
     if tokens.ndim != 2 or tokens.size == 0:
-        raise EmptyPlanError(describe(where, "rows and columns of tokens", f"an array of shape {tokens.shape}"))
+        raise CaseError(describe(where, "rows and columns of tokens", f"an array of shape {tokens.shape}"))
     is_zone = ~np.isin(tokens, [OUTSIDE, EXTERIOR_WALL, INTERIOR_WALL])
     if not is_zone.any():
-        raise EmptyPlanError(describe(where, "at least one zone", "none"))
+        raise CaseError(describe(where, "at least one zone", "none"))
     _check_walls(tokens, is_zone, where)
     for zone in np.unique(tokens[is_zone]):
         parts, n_part = ndimage.label(tokens == zone)
@@ -98,7 +90,7 @@ def check_plan(tokens: NDArray[np.str_], where: str) -> None:
             found = f"{n_part} parts, with cells at row {cells[0][0]}, column {cells[0][1]} and row {cells[1][0]}, "
             found += f"column {cells[1][1]}"
             advice = "give the parts names of their own, or join them"
-            raise SplitZoneError(describe(f"{where}: zone {str(zone)!r}", "cells that hang together", found, advice))
+            raise CaseError(describe(f"{where}: zone {str(zone)!r}", "cells that hang together", found, advice))
 
 
 def _check_walls(tokens: NDArray[np.str_], is_zone: NDArray[np.bool_], where: str) -> None:
@@ -112,4 +104,4 @@ def _check_walls(tokens: NDArray[np.str_], is_zone: NDArray[np.bool_], where: st
             row, col = (int(x) for x in np.argwhere(touching)[0])
             what = "the edge of the plan" if at_edge[rows, cols][row, col] else "the outside ('.')"
             at = f"{where}: row {row + 1}, column {col + 1} (zone {str(tokens[row, col])!r})"
-            raise UnwalledZoneError(describe(at, f"a wall {side}", what, "draw '#' between zone and outside"))
+            raise CaseError(describe(at, f"a wall {side}", what, "draw '#' between zone and outside"))

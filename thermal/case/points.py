@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from thermal.errors import MalformedColumnError, UnknownPointError, describe, nearest
+from thermal.errors import CaseError, describe, nearest
 
 
 @dataclass(frozen=True)
@@ -99,7 +99,7 @@ def point_type(name: str, where: str) -> PointType:
 
     Raises
     ------
-    UnknownPointError
+    CaseError
         The format does not know it; the message names the nearest one.
 
     Examples
@@ -108,7 +108,7 @@ def point_type(name: str, where: str) -> PointType:
     'speed'
     """
     if name not in POINT_TYPES:
-        raise UnknownPointError(
+        raise CaseError(
             describe(where, "a point type of the case format", repr(name), nearest(name, POINT_TYPES))
         )
     return POINT_TYPES[name]
@@ -131,9 +131,9 @@ def split_column(column: str, where: str) -> tuple[str, str]:
 
     Raises
     ------
-    MalformedColumnError
+    CaseError
         There is no slash, or nothing before or after it.
-    UnknownPointError
+    CaseError
         The format does not know the point type.
 
     Examples
@@ -143,7 +143,7 @@ def split_column(column: str, where: str) -> tuple[str, str]:
     """
     entity, slash, point = column.rpartition("/")
     if not slash or not entity or not point:
-        raise MalformedColumnError(
+        raise CaseError(
             describe(f"{where}: column {column!r}", "a name ENTITY/POINT", repr(column), "rename or drop the column")
         )
     return entity, point_type(point, f"{where}: column {column!r}").name

@@ -20,7 +20,7 @@ from thermal.case.case import Case
 from thermal.case.load import load_case
 from thermal.case.points import POINT_TYPES, SINCE_FORMAT_2, split_column
 from thermal.case.telemetry import Telemetry
-from thermal.errors import CaseExistsError, describe
+from thermal.errors import CaseError, describe
 from thermal.units import QUANTITIES, from_si
 
 TELEMETRY_FILE = "telemetry.parquet"
@@ -45,7 +45,7 @@ def save_case(case: Case, path: str | PathLike[str], *, overwrite: bool = False)
 
     Raises
     ------
-    CaseExistsError
+    CaseError
         The folder holds something and `overwrite` is not set, or what it holds is not a case.
     CaseError
         One of its family: the case does not fit together. Nothing is written then.
@@ -90,16 +90,16 @@ def _check_target(target: Path, overwrite: bool) -> None:
     if not target.exists():
         return
     if not target.is_dir():
-        raise CaseExistsError(describe(str(target), "a folder to make", "a file", "choose another path"))
+        raise CaseError(describe(str(target), "a folder to make", "a file", "choose another path"))
     if any(target.iterdir()):
         if not overwrite:
             advice = "choose another folder or pass overwrite=True"
-            raise CaseExistsError(
+            raise CaseError(
                 describe(str(target), "no folder or an empty one", "a folder that holds files", advice)
             )
         if not (target / NAME).is_file():
             found = f"a folder without {NAME}"
-            raise CaseExistsError(describe(str(target), "a case to overwrite", found, "choose another folder"))
+            raise CaseError(describe(str(target), "a case to overwrite", found, "choose another folder"))
 
 
 def _write(building: Building, frame: pd.DataFrame, folder: Path) -> None:

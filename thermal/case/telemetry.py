@@ -7,18 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from thermal.errors import (
-    DuplicateColumnError,
-    DuplicateStampError,
-    EmptyTelemetryError,
-    IrregularStepError,
-    MissingTimeZoneError,
-    NonNumericColumnError,
-    StepTooLongError,
-    TimestampError,
-    UnorderedStampError,
-    describe,
-)
+from thermal.errors import CaseError, describe
 
 INDEX = "timestamp"
 LONGEST_STEP = 3600.0  # s: "steps of up to 60 minutes are valid" (case format)
@@ -62,22 +51,22 @@ class Telemetry:
 
         Raises
         ------
-        TimestampError
+        CaseError
             The stamps have no zone, stand twice, run backwards or are not a whole number of steps apart.
-        EmptyTelemetryError
+        CaseError
             There are fewer than two rows, or no columns.
-        DuplicateColumnError
+        CaseError
             Two columns have the same name.
-        NonNumericColumnError
+        CaseError
             A column cannot be read as numbers.
         """
         doubled = frame.columns[frame.columns.duplicated()]
         if len(doubled):
             found = f"{str(doubled[0])!r} twice"
-            raise DuplicateColumnError(describe(f"{where}: columns", "names of their own", found, "drop one"))
+            raise CaseError(describe(f"{where}: columns", "names of their own", found, "drop one"))
         if len(frame) < 2 or frame.shape[1] == 0:
             found = f"{len(frame)} rows and {frame.shape[1]} columns"
-            raise EmptyTelemetryError(describe(where, "at least two rows and one column", found))
+            raise CaseError(describe(where, "at least two rows and one column", found))
         index = _checked_index(frame.index, where)
         step = _regular_step(index, where)
         full = pd.date_range(index[0], index[-1], freq=pd.Timedelta(step, unit="s"), name=INDEX)
@@ -100,31 +89,31 @@ def _as_numbers(frame: pd.DataFrame, where: str) -> pd.DataFrame:
             except (TypeError, ValueError) as error:
                 at = f"{where}: column {str(column)!r}"
                 found = " ".join(str(error).split())
-                raise NonNumericColumnError(describe(at, "numbers", found)) from error
+                raise CaseError(describe(at, "numbers", found)) from error
         raise
 
 
 def _checked_index(index: pd.Index, where: str) -> pd.DatetimeIndex:
     if not isinstance(index, pd.DatetimeIndex) or index.name != INDEX:
         found = f"an index {index.name!r} of {index.dtype}"
-        raise TimestampError(describe(where, f"an index {INDEX!r} of time stamps", found, "rename or set the index"))
+        raise CaseError(describe(where, f"an index {INDEX!r} of time stamps", found, "rename or set the index"))
     if index.tz is None:
         found = f"{index[0]} without one"
         advice = "write stamps with their offset, or localise them to the building's time zone"
-        raise MissingTimeZoneError(describe(f"{where}: {INDEX}", "stamps with a time zone", found, advice))
+        raise CaseError(describe(f"{where}: {INDEX}", "stamps with a time zone", found, advice))
     if index.hasnans:
         row = int(np.flatnonzero(index.isna())[0]) + 1
-        raise TimestampError(describe(f"{where}: data row {row}", "a time stamp", "nothing", "drop the row"))
+        raise CaseError(describe(f"{where}: data row {row}", "a time stamp", "nothing", "drop the row"))
     gaps = np.diff(index.as_unit("us").asi8)
     if (gaps <= 0).any():
         row = int(np.flatnonzero(gaps <= 0)[0]) + 1
         at = f"{where}: data row {row + 1}"
         if gaps[row - 1] == 0:
-            raise DuplicateStampError(describe(at, "a new stamp", f"{index[row]} again", "drop or merge the row"))
+            raise CaseError(describe(at, "a new stamp", f"{index[row]} again", "drop or merge the row"))
         found = f"{index[row]} after {index[row - 1]}"
         if (index == index[row]).sum() > 1:
-            raise DuplicateStampError(describe(at, "a new stamp", f"{index[row]} again", "drop or merge the row"))
-        raise UnorderedStampError(describe(at, "stamps that go forwards", found, "sort the rows"))
+            raise CaseError(describe(at, "a new stamp", f"{index[row]} again", "drop or merge the row"))
+        raise CaseError(describe(at, "stamps that go forwards", found, "sort the rows"))
     return index.as_unit("us")
 
 
@@ -139,14 +128,14 @@ def _regular_step(index: pd.DatetimeIndex, where: str) -> float:
         expected = f"a whole number of steps of {step / 1e6:g} s"
         found = f"{index[row]}, {gaps[row - 1] / 1e6:g} s after the row before"
         advice = "resample the telemetry to one step"
-        raise IrregularStepError(describe(f"{where}: data row {row + 1}", expected, found, advice))
+        raise CaseError(describe(f"{where}: data row {row + 1}", expected, found, advice))
     if step / 1e6 > LONGEST_STEP:
-        raise StepTooLongError(describe(where, f"steps of up to {LONGEST_STEP:g} s", f"{step / 1e6:g} s"))
+        raise CaseError(describe(where, f"steps of up to {LONGEST_STEP:g} s", f"{step / 1e6:g} s"))
     if gaps.sum() // step > FILL_LIMIT * len(index) + FILL_LIMIT:
         row = int(np.argmax(gaps)) + 1
         found = f"{index[row]} after {index[row - 1]}"
         advice = "correct the stamp, or make a case of each stretch"
-        raise IrregularStepError(
+        raise CaseError(
             describe(f"{where}: data row {row + 1}", "telemetry without years of gaps", found, advice)
         )
     return step / 1e6

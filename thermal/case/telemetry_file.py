@@ -15,16 +15,7 @@ from numpy.typing import NDArray
 from thermal.case.points import POINT_TYPES, point_type, split_column
 from thermal.case.schema import Location
 from thermal.case.telemetry import INDEX, Telemetry
-from thermal.errors import (
-    DuplicateColumnError,
-    MissingTimeZoneError,
-    MissingUnitError,
-    NonNumericColumnError,
-    TimestampError,
-    UnknownFileTypeError,
-    UnreadableFileError,
-    describe,
-)
+from thermal.errors import CaseError, describe
 from thermal.units import check_unit, to_si
 
 SUFFIXES = (".parquet", ".csv")
@@ -59,7 +50,7 @@ def read_telemetry(
         One of its family, for the first thing in the file that does not fit.
     """
     if path.suffix.lower() not in SUFFIXES:
-        raise UnknownFileTypeError(describe("building.yaml: telemetry", "a .parquet or a .csv file", repr(path.name)))
+        raise CaseError(describe("building.yaml: telemetry", "a .parquet or a .csv file", repr(path.name)))
     raw = _read_csv(path) if path.suffix.lower() == ".csv" else _read_parquet(path)
     if names is not None:
         raw = raw.loc[:, [str(column) in names for column in raw.columns]]
@@ -73,9 +64,9 @@ def read_telemetry(
         if point not in units:
             expected = f"a unit for {point}, which {path.name} has"
             advice = f"add '{point}: <unit>'"
-            raise MissingUnitError(describe("building.yaml: units", expected, "no such key", advice))
+            raise CaseError(describe("building.yaml: units", expected, "no such key", advice))
         if column in converted:
-            raise DuplicateColumnError(describe(f"{path.name}: columns", "names of their own", f"{column!r} twice"))
+            raise CaseError(describe(f"{path.name}: columns", "names of their own", f"{column!r} twice"))
         numbers = _numbers(raw.iloc[:, position], f"{path.name}: column {column!r}")
         quantity = POINT_TYPES[point].quantity
         converted[column] = to_si(numbers, units[point], quantity, elevation=location.elevation)
@@ -92,10 +83,10 @@ def check_units(units: Mapping[str, str]) -> None:
 
     Raises
     ------
-    UnknownPointError
+    CaseError
         A key is no point type.
-    UnknownUnitError
-        Pint does not know a unit, or it is one of something else (`IncompatibleUnitError`).
+    CaseError
+        Pint does not know a unit, or it is one of something else (`CaseError`).
     """
     for point, unit in units.items():
         where = f"building.yaml: units.{point}"
@@ -106,7 +97,7 @@ def _read_parquet(path: Path) -> pd.DataFrame:
     try:
         frame = pd.read_parquet(path)
     except Exception as error:  # pyarrow raises a family of its own, and plain ValueError and OSError
-        raise UnreadableFileError(describe(path.name, "a Parquet file", " ".join(str(error).split()))) from error
+        raise CaseError(describe(path.name, "a Parquet file", " ".join(str(error).split()))) from error
     return frame.set_index(INDEX) if INDEX in frame.columns else frame
 
 
@@ -116,18 +107,18 @@ def _read_csv(path: Path) -> pd.DataFrame:
         with path.open(encoding="utf-8-sig", newline="") as stream:
             rows = [row for row in csv.reader(stream, strict=True) if row]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise UnreadableFileError(describe(path.name, "a CSV in UTF-8", " ".join(str(error).split()))) from error
+        raise CaseError(describe(path.name, "a CSV in UTF-8", " ".join(str(error).split()))) from error
     if not rows:
-        raise UnreadableFileError(describe(path.name, "a CSV with one header row", "an empty file"))
+        raise CaseError(describe(path.name, "a CSV with one header row", "an empty file"))
     header = [name.strip() for name in rows.pop(0)]
     if header.count(INDEX) != 1:
         if INDEX in header:
-            raise DuplicateColumnError(describe(f"{path.name}: columns", "names of their own", f"{INDEX!r} twice"))
-        raise TimestampError(describe(f"{path.name}: header", f"a column {INDEX!r}", ", ".join(header[:3])))
+            raise CaseError(describe(f"{path.name}: columns", "names of their own", f"{INDEX!r} twice"))
+        raise CaseError(describe(f"{path.name}: header", f"a column {INDEX!r}", ", ".join(header[:3])))
     for number, row in enumerate(rows, start=1):
         if len(row) != len(header):
             expected = f"{len(header)} cells as in the header"
-            raise UnreadableFileError(describe(f"{path.name}: data row {number}", expected, f"{len(row)} cells"))
+            raise CaseError(describe(f"{path.name}: data row {number}", expected, f"{len(row)} cells"))
     columns = dict(enumerate(zip(*rows, strict=True))) if rows else dict.fromkeys(range(len(header)), ())
     stamps = _parse_stamps(columns.pop(header.index(INDEX)), path.name)
     names = [header[position] for position in columns]
@@ -154,17 +145,17 @@ def _parse_stamps(texts: Iterable[str], file: str) -> pd.DatetimeIndex:
     listed = [text.strip() for text in texts]
     for row, text in enumerate(listed, start=1):
         if not re.match(r"\d{4}-?\d{2}-?\d{2}", text):
-            raise TimestampError(describe(f"{file}: data row {row}", "an ISO 8601 time stamp with offset", repr(text)))
+            raise CaseError(describe(f"{file}: data row {row}", "an ISO 8601 time stamp with offset", repr(text)))
         if ("T" not in text and " " not in text) or not _OFFSET.search(text):
             advice = "write 2023-07-06T07:10:00+02:00"
-            raise MissingTimeZoneError(
+            raise CaseError(
                 describe(f"{file}: data row {row}", "a time stamp with offset", repr(text), advice)
             )
     try:
         stamps = pd.to_datetime(listed, utc=True, format="ISO8601")
     except (ValueError, OverflowError) as error:
         found = " ".join(str(error).split())
-        raise TimestampError(describe(f"{file}: {INDEX}", "ISO 8601 time stamps with offset", found)) from error
+        raise CaseError(describe(f"{file}: {INDEX}", "ISO 8601 time stamps with offset", found)) from error
     return pd.DatetimeIndex(stamps, name=INDEX)
 
 
@@ -182,6 +173,6 @@ def _numbers(column: pd.Series, where: str) -> NDArray[np.float64]:
     return values
 
 
-def _not_numeric(where: str, stamp: object, value: object) -> NonNumericColumnError:
+def _not_numeric(where: str, stamp: object, value: object) -> CaseError:
     advice = "leave a missing value blank or NaN"
-    return NonNumericColumnError(describe(f"{where}, stamp {stamp}", "a number", repr(value), advice))
+    return CaseError(describe(f"{where}, stamp {stamp}", "a number", repr(value), advice))

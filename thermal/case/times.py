@@ -8,7 +8,7 @@ from zoneinfo import ZoneInfo
 import pandas as pd
 
 from thermal.case.building import Building
-from thermal.errors import InvalidTimeError, describe
+from thermal.errors import CaseError, describe
 
 
 def local_timestamp(time: str | datetime, building: Building) -> pd.Timestamp:
@@ -28,7 +28,7 @@ def local_timestamp(time: str | datetime, building: Building) -> pd.Timestamp:
 
     Raises
     ------
-    InvalidTimeError
+    CaseError
         It is not ISO 8601, or a local time that the clock skips or shows twice.
 
     Examples
@@ -47,7 +47,7 @@ def local_timestamp(time: str | datetime, building: Building) -> pd.Timestamp:
         if pd.isna(stamp):
             raise ValueError("no time")
     except (TypeError, ValueError, OverflowError) as error:
-        raise InvalidTimeError(describe("time", "ISO 8601, such as 2023-07-06T07:10", repr(time))) from error
+        raise CaseError(describe("time", "ISO 8601, such as 2023-07-06T07:10", repr(time))) from error
     if stamp.tzinfo is not None:
         return stamp.tz_convert(zone)
     return _localised(stamp, zone)
@@ -59,5 +59,5 @@ def _localised(stamp: pd.Timestamp, zone: str) -> pd.Timestamp:
     if first != second:
         advice = "give the time with its offset, such as +02:00"
         expected = f"a time that the clocks of {zone} show once"
-        raise InvalidTimeError(describe("time", expected, stamp.isoformat(), advice))
+        raise CaseError(describe("time", expected, stamp.isoformat(), advice))
     return stamp.tz_localize(zone)

@@ -18,23 +18,7 @@ from thermal.case.building import (
 from thermal.case.plan import check_plan
 from thermal.case.points import ZONE_TEMPERATURE, split_column
 from thermal.case.schema import FACADES, Surface
-from thermal.errors import (
-    DuplicateNameError,
-    DuplicateZoneError,
-    InvalidAirflowError,
-    InvalidSurfaceError,
-    MissingAzimuthError,
-    OversizedGlazingError,
-    ReservedNameError,
-    UnknownBoundaryError,
-    UnknownConstructionError,
-    UnknownDeviceError,
-    UnknownEntityError,
-    UnknownFacadeError,
-    UnknownZoneError,
-    describe,
-    nearest,
-)
+from thermal.errors import CaseError, describe, nearest
 
 RESERVED = frozenset({OUTDOOR, GROUND, OUTSIDE, EXTERIOR_WALL, INTERIOR_WALL})
 GLAZING_TOLERANCE = 1.01  # drawings are rounded: a facade may be overdrawn by 1 %
@@ -96,9 +80,9 @@ def check_columns(building: Building, columns: Collection[str], file: str) -> No
 
     Raises
     ------
-    UnknownBoundaryError
+    CaseError
         A surface's `other` is no zone, ``outdoor`` or ``ground``, and no column holds its temperature.
-    UnknownEntityError
+    CaseError
         A column's entity is no device, zone, boundary or weather station.
     """
     zones, boundaries = building.zone_names, building.measured_boundaries
@@ -108,7 +92,7 @@ def check_columns(building: Building, columns: Collection[str], file: str) -> No
             if surface.other in boundaries and column not in columns:
                 where = f"building.yaml: surfaces[{index}] ({surface.name}): other"
                 expected = f"a zone, outdoor, ground, or a boundary with the column {column!r} in {file}"
-                raise UnknownBoundaryError(
+                raise CaseError(
                     describe(where, expected, repr(surface.other), nearest(surface.other, [*zones, OUTDOOR, GROUND]))
                 )
     entities = [*(device.name for device in building.devices), *zones, *boundaries, building.weather_station]
@@ -116,7 +100,7 @@ def check_columns(building: Building, columns: Collection[str], file: str) -> No
         entity, _ = split_column(column, file)
         if entity not in entities:
             expected = "a device, a zone, a measured boundary or the weather station before the slash"
-            raise UnknownEntityError(
+            raise CaseError(
                 describe(f"{file}: column {column!r}", expected, repr(entity), nearest(entity, entities))
             )
 
@@ -130,12 +114,12 @@ def _check_zones(building: Building, file: str) -> None:
         found = [(zone.name, f"zones[{i}]") for i, zone in enumerate(building.geometry.zones)]
     for zone, place in found:
         if zone in RESERVED:
-            raise ReservedNameError(
+            raise CaseError(
                 describe(f"{file}: {place}", "a name of the zone's own", repr(zone), "rename the zone")
             )
         if zone in places:
             advice = "zone names are unique in the building: rename one"
-            raise DuplicateZoneError(describe(f"{file}: {place}", "a new zone", f"{zone!r}, as {places[zone]}", advice))
+            raise CaseError(describe(f"{file}: {place}", "a new zone", f"{zone!r}, as {places[zone]}", advice))
         places[zone] = place
 
 
@@ -144,7 +128,7 @@ def _check_unique(names: Mapping[str, str], file: str) -> None:
     for place, name in names.items():
         if name in places:
             found = f"{name!r}, which {places[name]} is named too"
-            raise DuplicateNameError(describe(f"{file}: {place}", "a name of its own", found, "rename one"))
+            raise CaseError(describe(f"{file}: {place}", "a name of its own", found, "rename one"))
         places[name] = place
 
 
@@ -157,7 +141,7 @@ def _check_devices(building: Building, file: str) -> None:
     for i, device in enumerate(building.devices):
         if device.zone is not None and device.zone not in zones:
             where = f"{file}: devices[{i}] ({device.name}): zone"
-            raise UnknownZoneError(
+            raise CaseError(
                 describe(where, "a zone of the building", repr(device.zone), nearest(device.zone, zones))
             )
 
@@ -169,14 +153,14 @@ def _check_airflows(building: Building, file: str) -> None:
         for key, zone in (("from", airflow.source), ("to", airflow.target)):
             if zone not in building.zone_names:
                 advice = nearest(zone, building.zone_names)
-                raise UnknownZoneError(describe(f"{where}: {key}", "a zone of the building", repr(zone), advice))
+                raise CaseError(describe(f"{where}: {key}", "a zone of the building", repr(zone), advice))
         if airflow.device not in devices:
             advice = nearest(airflow.device, devices)
-            raise UnknownDeviceError(
+            raise CaseError(
                 describe(f"{where}: device", "a device of the building", repr(airflow.device), advice)
             )
         if airflow.source == airflow.target:
-            raise InvalidAirflowError(describe(f"{where}: to", "another zone than 'from'", repr(airflow.target)))
+            raise CaseError(describe(f"{where}: to", "another zone than 'from'", repr(airflow.target)))
 
 
 def _check_glazing(plans: FloorPlans, file: str) -> None:
@@ -184,16 +168,16 @@ def _check_glazing(plans: FloorPlans, file: str) -> None:
     for zone, by_facade in plans.glazing.items():
         if zone not in areas:
             where = f"{file}: glazing.{zone}"
-            raise UnknownZoneError(describe(where, "a zone of the building", repr(zone), nearest(zone, areas)))
+            raise CaseError(describe(where, "a zone of the building", repr(zone), nearest(zone, areas)))
         for facade, area in by_facade.items():
             where = f"{file}: glazing.{zone}.{facade}"
             if facade not in FACADES:
                 advice = nearest(facade, FACADES)
-                raise UnknownFacadeError(describe(where, f"a facade ({', '.join(FACADES)})", repr(facade), advice))
+                raise CaseError(describe(where, f"a facade ({', '.join(FACADES)})", repr(facade), advice))
             if not area <= areas[zone][facade] * GLAZING_TOLERANCE:
                 expected = f"at most the zone's {areas[zone][facade]:.2f} m2 of {facade} facade"
                 advice = "correct the area, the facade, or the plan"
-                raise OversizedGlazingError(describe(where, expected, f"{area:g} m2", advice))
+                raise CaseError(describe(where, expected, f"{area:g} m2", advice))
 
 
 def _check_surfaces(table: ZoneTable, file: str) -> None:
@@ -201,15 +185,15 @@ def _check_surfaces(table: ZoneTable, file: str) -> None:
     _check_unique({f"surfaces[{i}]": surface.name for i, surface in enumerate(table.surfaces)}, file)
     for name, layers in table.constructions.items():
         if not layers:
-            raise InvalidSurfaceError(describe(f"{file}: constructions.{name}", "at least one layer", "none"))
+            raise CaseError(describe(f"{file}: constructions.{name}", "at least one layer", "none"))
     for i, surface in enumerate(table.surfaces):
         where = f"{file}: surfaces[{i}] ({surface.name})"
         if surface.zone not in zones:
             advice = nearest(surface.zone, zones)
-            raise UnknownZoneError(describe(f"{where}: zone", "a zone of the building", repr(surface.zone), advice))
+            raise CaseError(describe(f"{where}: zone", "a zone of the building", repr(surface.zone), advice))
         if surface.construction is not None and surface.construction not in table.constructions:
             advice = nearest(surface.construction, table.constructions)
-            raise UnknownConstructionError(
+            raise CaseError(
                 describe(f"{where}: construction", "a name under 'constructions'", repr(surface.construction), advice)
             )
         _check_kind(surface, zones, where)
@@ -220,17 +204,17 @@ def _check_kind(surface: Surface, zones: Collection[str], where: str) -> None:
     for key in ("construction", "u_value", "solar_transmittance"):
         given = getattr(surface, key) is not None
         if key in needed and not given:
-            raise InvalidSurfaceError(describe(f"{where}: {key}", f"a value, for a {surface.kind}", "none"))
+            raise CaseError(describe(f"{where}: {key}", f"a value, for a {surface.kind}", "none"))
         if given and key not in needed:
             advice = f"of kind {surface.kind}: {', '.join(sorted(needed)) or 'only an area'}"
-            raise InvalidSurfaceError(describe(f"{where}: {key}", "no such key", repr(getattr(surface, key)), advice))
+            raise CaseError(describe(f"{where}: {key}", "no such key", repr(getattr(surface, key)), advice))
     if surface.other == OUTDOOR and surface.kind in {"wall", "window"} and surface.azimuth is None:
         advice = "give the degrees clockwise from north that the outer face looks to"
-        raise MissingAzimuthError(describe(f"{where}: azimuth", "a value", "none", advice))
+        raise CaseError(describe(f"{where}: azimuth", "a value", "none", advice))
     if surface.other == surface.zone and surface.kind not in _LAYERED:
-        raise InvalidSurfaceError(
+        raise CaseError(
             describe(f"{where}: other", "something else than the zone itself", repr(surface.other))
         )
     if surface.kind == "opening" and surface.other not in zones:
         advice = nearest(surface.other, zones)
-        raise InvalidSurfaceError(describe(f"{where}: other", "a zone, for an opening", repr(surface.other), advice))
+        raise CaseError(describe(f"{where}: other", "a zone, for an opening", repr(surface.other), advice))

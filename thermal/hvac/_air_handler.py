@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from thermal.errors import HvacParameterError, describe
+from thermal.errors import ModelError, describe
 from thermal.hvac._air import enthalpy
 from thermal.hvac._checks import fields_in_range
 from thermal.hvac._coil import WaterCoil, water_share
@@ -168,7 +168,7 @@ class AirHandler:
             fields_in_range(self, {"enthalpy_limit": ("J/kg", 0.0, 2e5)})
         if self.heating is not None and not isinstance(self.heating, WaterCoil | Heater):
             found = type(self.heating).__name__
-            raise HvacParameterError(describe("AirHandler.heating", "a WaterCoil, a Heater or None", found))
+            raise ModelError(describe("AirHandler.heating", "a WaterCoil, a Heater or None", found))
 
     def outdoor_share(
         self,

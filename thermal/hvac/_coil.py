@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from scipy.optimize import brentq
 
-from thermal.errors import HvacParameterError, describe
+from thermal.errors import ModelError, describe
 from thermal.hvac._air import WATER_HEAT_CAPACITY
 from thermal.hvac._checks import fields_in_range, in_range
 from thermal.hvac._kept import LastValue
@@ -103,7 +103,7 @@ class WaterCoil:
 
         Raises
         ------
-        HvacParameterError
+        ModelError
             No coil of any size reaches the capacity at these flows and temperatures.
 
         Examples
@@ -124,7 +124,7 @@ class WaterCoil:
         if not wanted < reachable:
             limit = f"an effectiveness below {reachable:.3f}"
             advice = "more air or a smaller fall of the water's temperature"
-            raise HvacParameterError(describe("WaterCoil.sized: capacity", limit, f"{wanted:.3f}", advice))
+            raise ModelError(describe("WaterCoil.sized: capacity", limit, f"{wanted:.3f}", advice))
         ntu = brentq(lambda n: _effectiveness(ops, n, least / most) - wanted, 1e-12, 30.0, xtol=1e-14)
         overall = ntu * least
         return cls(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from thermal.errors import HvacParameterError, describe
+from thermal.errors import ModelError, describe
 from thermal.hvac._air import EVAPORATION_HEAT, dew_point, saturation_humidity, wet_bulb
 from thermal.hvac._checks import fields_in_range
 from thermal.hvac._curves import (
@@ -113,7 +113,7 @@ class CoolingCoil:
         if self.part_load.lowest <= 0.0 and self.part_load.coefficients[0] != 0.0:
             found = f"{self.part_load.coefficients[0]:g} at no load"
             expected = "0 at no load, or a range that begins above 0"
-            raise HvacParameterError(describe("CoolingCoil.part_load", expected, found))
+            raise ModelError(describe("CoolingCoil.part_load", expected, found))
         if self.chilled_water is not None:
             fields_in_range(
                 self,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-from thermal.errors import HvacParameterError, describe
+from thermal.errors import ModelError, describe
 from thermal.hvac._operations import Operations, Value
 
 _FREEZING = 273.15  # K
@@ -33,7 +33,7 @@ class Polynomial:
     def __post_init__(self) -> None:
         if not self.coefficients or not self.lowest < self.highest:
             found = f"{len(self.coefficients)} and a range {self.lowest} to {self.highest}"
-            raise HvacParameterError(describe("polynomial", "coefficients and a rising range", found))
+            raise ModelError(describe("polynomial", "coefficients and a rising range", found))
 
     def __call__(self, ops: Operations, x: Value) -> Value:
         """Evaluate the polynomial at a share [-]."""
@@ -71,7 +71,7 @@ class Biquadratic:
     def __post_init__(self) -> None:
         if len(self.coefficients) != 6 or not (self.x_range[0] < self.x_range[1] and self.y_range[0] < self.y_range[1]):
             found = f"{len(self.coefficients)} coefficients, ranges {self.x_range} and {self.y_range}"
-            raise HvacParameterError(describe("biquadratic curve", "six coefficients and rising ranges", found))
+            raise ModelError(describe("biquadratic curve", "six coefficients and rising ranges", found))
 
     def __call__(self, ops: Operations, x: Value, y: Value) -> Value:
         """Evaluate the curve at x and y in the units of its ranges."""

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal._types import FloatArray
-from thermal.errors import HvacActionError, describe
+from thermal.errors import ModelError, describe
 from thermal.hvac._advance import advance
 from thermal.hvac._checks import action, scalar_action
 from thermal.hvac._compiled import CompiledCentral
@@ -136,7 +136,7 @@ class HvacPlant:
 
         Raises
         ------
-        HvacActionError
+        ModelError
             Something is not finite, out of its range or of another shape.
         """
         conditions, settings = self._check(conditions, actions, seconds)
@@ -173,7 +173,7 @@ class HvacPlant:
         zone, n = conditions.zone_temperature, self.system.zone_count
         if getattr(zone, "shape", None) != (n,):
             found = f"shape {np.shape(zone)}"
-            raise HvacActionError(describe("zone_temperature", f"an array of {n} zones", found))
+            raise ModelError(describe("zone_temperature", f"an array of {n} zones", found))
         action("zone_temperature", zone, "K", *_AIR)
         setpoints = (conditions.heating_setpoint, conditions.cooling_setpoint)
         if setpoints[0] is not self._checked[0] or setpoints[1] is not self._checked[1]:
@@ -229,12 +229,12 @@ class HvacPlant:
         plain: Any = value.tolist() if isinstance(value, np.ndarray | np.generic) else value
         each, n = name in _EACH and isinstance(plain, tuple | list), len(self.system.air_handlers)
         if each and len(plain) != n:
-            raise HvacActionError(describe(name, f"one value or {n}, one an air handler", f"{len(plain)} values"))
+            raise ModelError(describe(name, f"one value or {n}, one an air handler", f"{len(plain)} values"))
         values = plain if each else [plain]
         for k, one in enumerate(values):
             where = f"{name}[{k}]" if each else name
             if not isinstance(one, float | int):
-                raise HvacActionError(describe(where, f"a number of {unit}", repr(one)))
+                raise ModelError(describe(where, f"a number of {unit}", repr(one)))
             scalar_action(where, one, unit, lowest, highest)
         return tuple(map(float, values)) if each else float(values[0])
 
@@ -243,11 +243,11 @@ class HvacPlant:
         n = self.system.zone_count
         for name, values in (("heating_setpoint", heating), ("cooling_setpoint", cooling)):
             if getattr(values, "shape", None) != (n,):
-                raise HvacActionError(describe(name, f"an array of {n} zones", f"shape {np.shape(values)}"))
+                raise ModelError(describe(name, f"an array of {n} zones", f"shape {np.shape(values)}"))
             action(name, values, "K", *_AIR)
         if not (heating <= cooling).all():
             k = int(np.argmax(heating > cooling))
             found = f"{heating[k]} and {cooling[k]} K in zone {k}"
-            raise HvacActionError(describe("setpoints", "heating not above cooling", found))
+            raise ModelError(describe("setpoints", "heating not above cooling", found))
         frozen = not (heating.flags.writeable or cooling.flags.writeable)
         self._checked = (heating, cooling) if frozen else (None, None)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from thermal._types import FloatArray
-from thermal.errors import HvacParameterError, describe
+from thermal.errors import ModelError, describe
 from thermal.hvac._air_handler import Heater
 from thermal.hvac._coil import valve_position
 from thermal.hvac._operations import StepOperations
@@ -50,7 +50,7 @@ class HvacPoints:
 
     Raises
     ------
-    HvacParameterError
+    ModelError
         There are too many names, too few, or the same twice.
     """
 
@@ -67,7 +67,7 @@ class HvacPoints:
         if (len(terminals), len(air_handlers)) != wanted or len(set(names)) != len(names):
             found = f"{len(terminals)} and {len(air_handlers)}, {len(set(names))} of {len(names)} different"
             expected = f"{wanted[0]} terminals and {wanted[1]} air handlers, all named differently"
-            raise HvacParameterError(describe("HvacPoints", expected, found))
+            raise ModelError(describe("HvacPoints", expected, found))
         self.system, self._ops = system, StepOperations()
         self._heaters = [h.heating if isinstance(h.heating, Heater) else None for h in system.air_handlers]
         self._electric = [h is not None and h.electric for h in self._heaters]

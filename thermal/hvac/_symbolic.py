@@ -38,7 +38,7 @@ def hvac_function(system: HvacSystem, width: float = 0.02) -> Any:
 
     Raises
     ------
-    HvacParameterError
+    ModelError
         The width is out of its range.
 
     Examples

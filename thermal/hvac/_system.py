@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal.errors import HvacParameterError, describe
+from thermal.errors import ModelError, describe
 from thermal.hvac._air_handler import AirHandler, Heater
 from thermal.hvac._boiler import BoilerLoop
 from thermal.hvac._coil import WaterCoil
@@ -44,11 +44,11 @@ class HvacSystem:
         if n == 0 or not served or served != set(range(n)):
             expected = "at least one air handler, each with a terminal of its own"
             advice = "Terminals.air_handler holds positions in air_handlers"
-            raise HvacParameterError(describe("HvacSystem", expected, f"{n} of them and terminals at {served}", advice))
+            raise ModelError(describe("HvacSystem", expected, f"{n} of them and terminals at {served}", advice))
         zones = np.unique(self.terminals.zone)
         if len(zones) != zones[-1] + 1:
             missing = sorted(set(range(int(zones[-1]))) - set(zones.tolist()))
-            raise HvacParameterError(describe("HvacSystem", "a terminal in each zone", f"none in zones {missing[:8]}"))
+            raise ModelError(describe("HvacSystem", "a terminal in each zone", f"none in zones {missing[:8]}"))
 
     @cached_property
     def zone_count(self) -> int:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from thermal._types import FloatArray
-from thermal.errors import HvacParameterError, describe
+from thermal.errors import ModelError, describe
 from thermal.hvac._air import WATER_HEAT_CAPACITY
 from thermal.hvac._checks import all_in_range, fields_in_range, in_range
 from thermal.hvac._coil import LEAST_FLOW, WaterCoil, WaterSide, coil_conductance, water_side
@@ -84,14 +84,14 @@ class Terminals:
         for name in ("zone", "air_handler"):
             index = np.array(np.broadcast_to(np.asarray(getattr(self, name)), (n,)))
             if not np.issubdtype(index.dtype, np.integer) or (n and index.min() < 0):
-                raise HvacParameterError(describe(f"Terminals.{name}", "positions from 0 on", f"{index.dtype} {index}"))
+                raise ModelError(describe(f"Terminals.{name}", "positions from 0 on", f"{index.dtype} {index}"))
             object.__setattr__(self, name, index.astype(np.intp))
         in_order = (self.minimum_flow <= self.heating_flow) & (self.heating_flow <= self.design_flow)
         if not in_order.all():
             k = int(np.argmin(in_order))
             found = f"{self.minimum_flow[k]:g}, {self.heating_flow[k]:g} and {self.design_flow[k]:g} kg/s"
             expected = "minimum_flow <= heating_flow <= design_flow"
-            raise HvacParameterError(describe(f"Terminals: terminal {k}", expected, found))
+            raise ModelError(describe(f"Terminals: terminal {k}", expected, found))
         fields_in_range(
             self,
             {

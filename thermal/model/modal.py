@@ -11,7 +11,7 @@ import scipy.linalg as sl
 from numpy.typing import NDArray
 
 from thermal._types import FloatArray
-from thermal.errors import ModelError, SingularModelError
+from thermal.errors import ModelError
 from thermal.model.scheme import EXACT, Scheme
 
 if TYPE_CHECKING:
@@ -151,7 +151,7 @@ def modal_model(matrices: Matrices) -> ModalModel:
     ------
     ModelError
         When the matrices are sparse, that is, on the grid.
-    SingularModelError
+    ModelError
         When they are not positive definite.
     """
     if not matrices.reduced:
@@ -163,7 +163,7 @@ def modal_model(matrices: Matrices) -> ModalModel:
     try:
         c, states = sl.eigh(capacity, stiffness)
     except np.linalg.LinAlgError as error:
-        raise SingularModelError(
+        raise ModelError(
             f"the reduced model (order {n}) is not positive definite: {error}; a parameter out of range does this"
         ) from error
     return ModalModel(

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from thermal._types import FloatArray, IntArray
 from thermal.case.case import Case
-from thermal.errors import SimulationError
+from thermal.errors import ModelError
 from thermal.inputs.drivers import REFERENCE_TEMPERATURE, Drivers, signal_values
 from thermal.model.modal_series import run_along
 from thermal.model.scheme import IMPLICIT_EULER, Scheme
@@ -96,19 +96,19 @@ def replay_inputs(case: Case, network: ThermalNetwork, drivers: Drivers | None =
 
     Raises
     ------
-    SimulationError
+    ModelError
         When no zone temperature or no outdoor temperature is measured, or no step has all its inputs.
     """
     step = float(case.telemetry.step)
     zone = case.zone_temperatures()
     boundary = case.boundary_temperatures()
     if zone.isna().all(axis=None):
-        raise SimulationError(
+        raise ModelError(
             "telemetry: expected a zone_air_temperature_sensor of at least one zone, found none that is usable"
         )
     missing = [str(c) for c in boundary.columns if boundary[c].isna().all()]
     if missing:
-        raise SimulationError(
+        raise ModelError(
             f"telemetry: expected temperatures of the boundaries, found none that is usable for {missing}"
         )
     frames = [case.zone_heat(), boundary, case.airflow_rates()]
@@ -116,7 +116,7 @@ def replay_inputs(case: Case, network: ThermalNetwork, drivers: Drivers | None =
     bridged = [_bridge(f, limit) for f in frames]
     complete = np.logical_and.reduce([f.notna().all(axis=1).to_numpy() for f in bridged])
     if not complete.any():
-        raise SimulationError(f"telemetry: no step has all its inputs; {_most_missing(bridged)}")
+        raise ModelError(f"telemetry: no step has all its inputs; {_most_missing(bridged)}")
     filled = [f.interpolate(limit_direction="both").fillna(0.0).to_numpy(dtype=float) for f in bridged]
     index = pd.DatetimeIndex(zone.index)
     signals = _REFERENCE + signal_values(network.signals, drivers or Drivers(case))

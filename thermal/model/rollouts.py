@@ -11,7 +11,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from thermal._types import FloatArray
-from thermal.errors import InputShapeError, ModelError
+from thermal.errors import ModelError
 from thermal.model.scheme import IMPLICIT_EULER, Scheme, Stage
 from thermal.model.stepper import Stepper
 from thermal.model.symbolic import Matrix, SymbolicModel
@@ -52,7 +52,7 @@ class RolloutData:
 
         Raises
         ------
-        InputShapeError
+        ModelError
             Naming the array, what was expected and what came.
         """
         network = model.network
@@ -67,9 +67,9 @@ class RolloutData:
         for name, shape in wanted.items():
             value = getattr(self, name)
             if value.shape != shape:
-                raise InputShapeError(f"{name}: expected shape {shape}, came {value.shape}")
+                raise ModelError(f"{name}: expected shape {shape}, came {value.shape}")
             if not np.isfinite(value).all():
-                raise InputShapeError(f"{name}: expected finite values, came {value[~np.isfinite(value)][0]}")
+                raise ModelError(f"{name}: expected finite values, came {value[~np.isfinite(value)][0]}")
 
 
 def rollout(
@@ -101,7 +101,7 @@ def rollout(
 
     Raises
     ------
-    InputShapeError
+    ModelError
         When the data do not fit the model.
     ModelError
         When the symbolic executor is asked for a reduced model or too large a grid.

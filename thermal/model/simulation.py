@@ -10,7 +10,7 @@ import pandas as pd
 
 from thermal._types import FloatArray
 from thermal.case.case import Case
-from thermal.errors import SimulationError
+from thermal.errors import ModelError
 from thermal.model.replay import LEAST_SPIN_UP, SPIN_UP, free_runs, replay_inputs, spin_up
 from thermal.model.scheme import IMPLICIT_EULER, Scheme
 from thermal.model.symbolic import SymbolicModel
@@ -69,26 +69,26 @@ def simulate(
 
     Raises
     ------
-    SimulationError
+    ModelError
         When the interval is outside of the telemetry, leaves no spin-up, or lacks inputs for over 30 minutes.
     """
     inputs = replay_inputs(case, model.network)
     stamps = inputs.stamps
     first, last = int(stamps.searchsorted(start)), int(stamps.searchsorted(end, side="right")) - 1
     if not (start < end and first < last and stamps[0] <= start and end <= stamps[-1]):
-        raise SimulationError(
+        raise ModelError(
             f"interval {start} to {end}: expected two times in order within the telemetry, "
             f"which goes from {stamps[0]} to {stamps[-1]}"
         )
     begin = max(0, first - round(spin_up_seconds / inputs.step))
     if (first - begin) * inputs.step < LEAST_SPIN_UP:
         earliest = stamps[0] + pd.Timedelta(seconds=LEAST_SPIN_UP)
-        raise SimulationError(
+        raise ModelError(
             f"start {start}: expected at least 12 h of telemetry before it for the spin-up; earliest is {earliest}"
         )
     lacking = np.flatnonzero(~inputs.complete[first + 1 : last + 1])
     if lacking.size:
-        raise SimulationError(
+        raise ModelError(
             f"inputs are missing for over 30 minutes from {stamps[first + 1 + lacking[0]]}; choose another interval"
         )
     matrices = model.matrices(theta)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from thermal._types import FloatArray
 from thermal.case.building import Building
 from thermal.case.case import Case
-from thermal.errors import InputShapeError, ModelError
+from thermal.errors import ModelError
 from thermal.inputs.drivers import REFERENCE_TEMPERATURE
 from thermal.model.replay import LEAST_SPIN_UP, SPIN_UP, replay_inputs, spin_up
 from thermal.model.scheme import SCHEMES
@@ -272,7 +272,7 @@ class Simulator:
 
         Raises
         ------
-        InputShapeError
+        ModelError
             When an input has another shape, or a value that is not finite or not a plausible temperature.
         """
         network = self.network
@@ -354,7 +354,7 @@ class Simulator:
     def _checked(name: str, value: FloatArray, n: int, limits: tuple[float, float] | None = None) -> FloatArray:
         array = np.asarray(value, dtype=float)
         if array.shape != (n,):
-            raise InputShapeError(f"{name}: expected shape ({n},), came {array.shape}")
+            raise ModelError(f"{name}: expected shape ({n},), came {array.shape}")
         bad = ~np.isfinite(array)
         if limits is not None:
             bad |= (array < limits[0]) | (array > limits[1])
@@ -363,7 +363,7 @@ class Simulator:
             wanted = "finite values"
             if limits is not None:
                 wanted = f"kelvin from {limits[0]} to {limits[1]}" if limits == PLAUSIBLE else "a flow of zero or more"
-            raise InputShapeError(f"{name}[{where}]: expected {wanted}, came {array[where]}")
+            raise ModelError(f"{name}[{where}]: expected {wanted}, came {array[where]}")
         return array
 
 

@@ -11,7 +11,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from thermal._types import FloatArray
-from thermal.errors import ModelError, SingularModelError
+from thermal.errors import ModelError
 from thermal.model.factor import Elimination, SparseSolver
 from thermal.model.scheme import IMPLICIT_EULER, Scheme, Stage
 from thermal.model.symbolic import Matrices, Matrix
@@ -38,7 +38,7 @@ class Stepper:
 
     Raises
     ------
-    SingularModelError
+    ModelError
         When the matrix of the step cannot be factorised.
     """
 
@@ -322,7 +322,7 @@ def factorise(system: Matrix, elimination: Elimination | None = None) -> Callabl
 
     Raises
     ------
-    SingularModelError
+    ModelError
         When it is not positive definite.
     """
     try:
@@ -332,7 +332,7 @@ def factorise(system: Matrix, elimination: Elimination | None = None) -> Callabl
         inverse = sl.cho_solve(factor, np.eye(system.shape[0]))
         return lambda rhs: np.asarray(inverse @ rhs)
     except (RuntimeError, np.linalg.LinAlgError) as error:
-        raise SingularModelError(
+        raise ModelError(
             f"the matrix of the step (n = {system.shape[0]}) cannot be factorised: {error}; "
             "a volume without heat capacity and without any face, or a parameter out of range, does this"
         ) from error

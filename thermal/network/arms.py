@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from thermal._types import FloatArray, IntArray
-from thermal.errors import StructureError
+from thermal.errors import ModelError
 from thermal.network.floor import Floor
 
 #: Share of a cell below which what its chains leave to its middle is round-off [-].
@@ -28,14 +28,14 @@ class Arms:
 
     Raises
     ------
-    StructureError
+    ModelError
         When cells are split, by a number smaller than that of the nodes.
     """
 
     def __init__(self, floor: Floor, thickness: float, conductivity: float) -> None:
         wanted, split = floor.graph.structure.wall_nodes or 1, round(thickness / floor.grid.cell)
         if wanted > split > 1:
-            raise StructureError(
+            raise ModelError(
                 f"structure.wall_nodes: expected at most {split} with dx = {floor.grid.spacing:g} m, which splits a "
                 f"wall of {thickness:g} m into {split} nodes, came {wanted}; leave dx or choose fewer nodes"
             )

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal.case.schema import Surface
-from thermal.errors import ScopeError
+from thermal.errors import ModelError
 from thermal.network.grid import FACADES, FloorGrid
 
 #: Directions of a zone table's facades, each a quarter of the compass that begins 45 degrees before its own azimuth.
@@ -26,7 +26,7 @@ def facade_of(surface: Surface) -> str | None:
 
     Raises
     ------
-    ScopeError
+    ModelError
         When it is a wall or a window to outdoor without azimuth.
     """
     if surface.other != "outdoor":
@@ -34,7 +34,7 @@ def facade_of(surface: Surface) -> str | None:
     if surface.kind in _HORIZONTAL:
         return _HORIZONTAL[surface.kind]
     if surface.azimuth is None:
-        raise ScopeError(
+        raise ModelError(
             f"surface {surface.name}: expected an azimuth [deg], since a parameter has one value a facade, came none"
         )
     return _COMPASS[int((surface.azimuth + 45.0) % 360.0 // 90.0) % 4]

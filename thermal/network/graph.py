@@ -12,7 +12,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from thermal._types import FloatArray, IntArray
-from thermal.errors import ScopeError
+from thermal.errors import ModelError
 from thermal.inputs.drivers import Signal
 from thermal.network.network import CapacityClass, ConductanceClass, ThermalNetwork
 from thermal.network.structure import BASELINE, Structure
@@ -34,7 +34,7 @@ class GraphBuilder:
 
     Raises
     ------
-    ScopeError
+    ModelError
         When a scope is unknown, or a facade's value asked for what is no part of the envelope.
     """
 
@@ -335,11 +335,11 @@ class GraphBuilder:
             if scope == "global" or any(p.base == name and p.scope == scope for p in made):
                 continue
             if not any(p.base == name for p in made):
-                raise ScopeError(
+                raise ModelError(
                     f"scopes: {name} is no parameter of this building with {self.structure}; "
                     f"it has {sorted({p.base for p in made})}"
                 )
-            raise ScopeError(f"scopes: {name} belongs to no single {scope} of this building; {_fitting(name)}")
+            raise ModelError(f"scopes: {name} belongs to no single {scope} of this building; {_fitting(name)}")
 
 
 def _fitting(name: str) -> str:
@@ -351,15 +351,15 @@ def _check_scopes(scopes: Mapping[str, Scope], zones: tuple[str, ...]) -> None:
     """Refuse unknown parameters and scopes, facades of what is no envelope, and zones named as facades are."""
     unknown = sorted(set(scopes) - set(PARAMETERS))
     if unknown:
-        raise ScopeError(f"scopes name unknown parameters {unknown}; known are {sorted(PARAMETERS)}")
+        raise ModelError(f"scopes name unknown parameters {unknown}; known are {sorted(PARAMETERS)}")
     odd = {name: scope for name, scope in scopes.items() if scope not in get_args(Scope)}
     if odd:
-        raise ScopeError(f"scopes: expected one of {get_args(Scope)} for each parameter, came {odd}")
+        raise ModelError(f"scopes: expected one of {get_args(Scope)} for each parameter, came {odd}")
     inner = sorted(name for name, scope in scopes.items() if scope == "facade" and name not in ENVELOPE_PARAMETERS)
     if inner:
-        raise ScopeError(
+        raise ModelError(
             f"scopes: {inner} belong to no facade; these may have one value a facade: {list(ENVELOPE_PARAMETERS)}"
         )
     confused = sorted(zone for zone in zones if zone.startswith(FACADE_PREFIX))
     if confused and any(scope != "global" for scope in scopes.values()):
-        raise ScopeError(f"scopes: zones {confused} are named as the facades of parameters are; rename them")
+        raise ModelError(f"scopes: zones {confused} are named as the facades of parameters are; rename them")

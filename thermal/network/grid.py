@@ -12,7 +12,7 @@ from scipy.sparse.csgraph import connected_components
 
 from thermal._types import IntArray
 from thermal.case.building import FloorPlan
-from thermal.errors import CellSizeError
+from thermal.errors import ModelError
 
 #: Steps (row, column) towards the plan's sides; north is the first row.
 FACADES: dict[str, tuple[int, int]] = {"north": (-1, 0), "south": (1, 0), "west": (0, -1), "east": (0, 1)}
@@ -84,18 +84,18 @@ def _resolution(cell_size: float, dx: float | None) -> tuple[int, Fraction]:
 
     Raises
     ------
-    CellSizeError
+    ModelError
         When ``dx`` is not positive, or is finer than the plan but does not divide its cells.
     """
     if dx is None:
         return 1, Fraction(1)
     if isinstance(dx, bool) or not isinstance(dx, int | float | np.number) or not 0 < dx < np.inf:
-        raise CellSizeError(f"cell size: expected a positive number of metres, came {dx!r}")
+        raise ModelError(f"cell size: expected a positive number of metres, came {dx!r}")
     ratio = Fraction(cell_size / dx).limit_denominator(1000)
     if ratio > 1:
         if ratio.denominator != 1:
             split = max(2, round(cell_size / dx))
-            raise CellSizeError(
+            raise ModelError(
                 f"cell size {dx} m does not divide the plan's cells of {cell_size} m; "
                 f"nearest that does: {cell_size / split:g} m"
             )
@@ -120,7 +120,7 @@ def floor_grid(plan: FloorPlan, cell_size: float, dx: float | None = None) -> Fl
 
     Raises
     ------
-    CellSizeError
+    ModelError
         When ``dx`` is not positive, or is finer than the plan but does not divide its cells; also when a
         block would swallow a whole zone together with a neighbour.
     """
@@ -168,7 +168,7 @@ def _refuse_swallowed_zones(plan: FloorPlan, tokens: NDArray[np.str_], merge: fl
         rows, columns = np.nonzero(tokens == zone)
         extent = min(np.ptp(rows), np.ptp(columns)) + 1
         if extent + 1 < merge:
-            raise CellSizeError(
+            raise ModelError(
                 f"cell size {merge * cell_size:g} m on floor {plan.name}: zone {zone} is only "
                 f"{extent * cell_size:g} m wide and would merge with its neighbour; "
                 f"use at most {(extent + 1) * cell_size:g} m"

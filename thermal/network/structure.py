@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from thermal.errors import StructureError
+from thermal.errors import ModelError
 
 #: Most nodes of a chain: through 0.2 m of concrete 100 of them resolve seconds, more than any telemetry.
 MOST_NODES = 100
@@ -29,7 +29,7 @@ class Structure:
 
     Raises
     ------
-    StructureError
+    ModelError
         When a field is of another type or outside its range.
 
     Examples
@@ -46,13 +46,13 @@ class Structure:
     def __post_init__(self) -> None:
         for name in ("furniture", "radiant"):
             if not isinstance(getattr(self, name), bool):
-                raise StructureError(f"structure.{name}: expected true or false, came {getattr(self, name)!r}")
+                raise ModelError(f"structure.{name}: expected true or false, came {getattr(self, name)!r}")
         for name, least in (("slab_nodes", 0), ("wall_nodes", 1)):
             value = getattr(self, name)
             if name == "wall_nodes" and value is None:
                 continue
             if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= MOST_NODES:
-                raise StructureError(
+                raise ModelError(
                     f"structure.{name}: expected a whole number from {least} to {MOST_NODES}, came {value!r}"
                 )
 

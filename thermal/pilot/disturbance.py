@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.signal import lfilter
 
-from thermal.pilot.errors import TwinError
+from thermal.errors import ThermalError
 
 Series = npt.NDArray[np.float64]
 
@@ -45,7 +45,7 @@ def draw_disturbance(
     (288, 2)
     """
     if seed < 0 or n_time < 1 or not np.all(np.asarray(deviation) >= 0.0) or min(time_constant, step_seconds) <= 0.0:
-        raise TwinError(
+        raise ThermalError(
             "disturbance: expected a seed of 0 or more, a step, deviations of 0 or more and positive times, found "
             f"{seed}, {n_time} steps, {np.min(deviation)} W, {time_constant} s and {step_seconds} s"
         )

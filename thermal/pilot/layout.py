@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from thermal.case.building import EXTERIOR_WALL, INTERIOR_WALL, OUTSIDE, FloorPlan, FloorPlans
 from thermal.case.schema import FACADES, Device
-from thermal.pilot.errors import LayoutError
+from thermal.errors import ThermalError
 from thermal.pilot.outline import Mask, draw_outline, exterior_ring
 from thermal.pilot.partition import partition
 from thermal.pilot.regions import Region
@@ -66,7 +66,7 @@ def generate_office(
 
     Raises
     ------
-    LayoutError
+    ThermalError
         When an argument is out of its range, or no plan with these zones is found.
 
     Examples
@@ -91,7 +91,7 @@ def generate_office(
             storeys.append(FloorPlan(f"F{number}", height, _tokens(f"F{number}", mask, regions)))
         if len(storeys) == floors:
             return FloorPlans(cell_size, tuple(storeys), _glazing(rng, storeys, cell_size, window_to_wall_ratio))
-    raise LayoutError(
+    raise ThermalError(
         f"zones: expected a number that fits {floor_area} m2 on {floors} floor(s), each {min_zone_area} m2 or more, "
         f"found {zones}, for which {_OUTLINES} outlines gave no plan; ask for fewer zones, or a smaller cell_size than "
         f"{cell_size} m"
@@ -164,7 +164,7 @@ def _exposed_cells(storey: FloorPlan, turns: int) -> dict[str, int]:
 def _check_seed(seed: int) -> None:
     """Refuse a seed that numpy has no generator for."""
     if seed < 0:
-        raise LayoutError(f"seed: expected 0 or more, found {seed}")
+        raise ThermalError(f"seed: expected 0 or more, found {seed}")
 
 
 def _check_size(
@@ -174,12 +174,12 @@ def _check_size(
     given = {"floor_area": floor_area, "cell_size": cell_size, "height": height, "min_zone_area": min_zone_area}
     for name, value in given.items():
         if not (np.isfinite(value) and value > 0.0):
-            raise LayoutError(f"{name}: expected a positive number, found {value}")
+            raise ThermalError(f"{name}: expected a positive number, found {value}")
     if floors < 1 or zones < floors:
-        raise LayoutError(f"zones: expected at least one a floor on one or more floors, found {zones} on {floors}")
+        raise ThermalError(f"zones: expected at least one a floor on one or more floors, found {zones} on {floors}")
     most = int(floor_area / (_MEAN_OVER_SMALLEST * min_zone_area))
     if zones > most:
-        raise LayoutError(
+        raise ThermalError(
             f"zones: expected at most {most} on {floor_area} m2, so that they have {_MEAN_OVER_SMALLEST} times "
             f"min_zone_area ({min_zone_area} m2) on average, found {zones}"
         )
@@ -188,4 +188,4 @@ def _check_size(
 def _check_ratio(ratio: tuple[float, float]) -> None:
     """Refuse shares of glass that are none."""
     if not 0.0 <= ratio[0] <= ratio[1] <= 1.0:
-        raise LayoutError(f"window_to_wall_ratio: expected (smallest, largest) between 0 and 1, found {ratio}")
+        raise ThermalError(f"window_to_wall_ratio: expected (smallest, largest) between 0 and 1, found {ratio}")

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 import numpy.typing as npt
 
-from thermal.pilot.errors import LayoutError
+from thermal.errors import ThermalError
 
 Mask = npt.NDArray[np.bool_]
 Notch = tuple[float, float, float, float]  # left, top, width, height as fractions of the bounding box
@@ -41,7 +41,7 @@ def draw_outline(rng: np.random.Generator, floor_area: float, cell_size: float, 
 
     Raises
     ------
-    LayoutError
+    ThermalError
         When no rectangle of such cells comes within 0.5 % of the area.
     """
     for _ in range(_DRAWS):
@@ -54,7 +54,7 @@ def draw_outline(rng: np.random.Generator, floor_area: float, cell_size: float, 
         mask = _nearest_area(float(aspect), (), floor_area, cell_size)
         if mask is not None:
             return mask
-    raise LayoutError(
+    raise ThermalError(
         f"floor area: expected one that whole cells of {cell_size} m come within {AREA_TOLERANCE:.1%} of, "
         f"found {floor_area:.1f} m2 a floor; pass a smaller cell_size"
     )

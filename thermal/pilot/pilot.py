@@ -13,7 +13,7 @@ from thermal.case.case import Case
 from thermal.case.load import load_case
 from thermal.case.save import save_case
 from thermal.case.schema import Location
-from thermal.errors import CaseExistsError, describe
+from thermal.errors import CaseError, describe
 from thermal.model.simulator import Simulator
 from thermal.pilot.layout import devices, generate_office
 from thermal.pilot.telemetry import Plant, Progress, generate_telemetry
@@ -89,17 +89,17 @@ def generate_pilot(
 
     Raises
     ------
-    CaseExistsError
+    CaseError
         When the folder holds something and `overwrite` is not set.
-    LayoutError
+    ThermalError
         When there is no office of this size.
-    ClosedLoopError
+    ThermalError
         When a length is out of range or the plant does not fit the building.
     """
     target = Path(path)
     if target.exists() and not overwrite and (not target.is_dir() or any(target.iterdir())):  # before the long part
         advice = "choose another folder or pass overwrite=True"
-        raise CaseExistsError(describe(str(target), "no folder or an empty one", "something there", advice))
+        raise CaseError(describe(str(target), "no folder or an empty one", "something there", advice))
     plans = generate_office(seed, floor_area=floor_area, zones=zones, floors=floors, cell_size=cell_size)
     building = Building(name, location, orientation, plans, devices(plans), (), _STATION)
     weather = generate_weather(

@@ -13,7 +13,7 @@ from thermal.case.areas import zone_floor_areas
 from thermal.case.building import FloorPlans
 from thermal.case.points import DISCHARGE_TEMPERATURE, OUTDOOR_TEMPERATURE, SUPPLY_FLOW, ZONE_TEMPERATURE
 from thermal.case.telemetry import Telemetry
-from thermal.pilot.errors import ClosedLoopError
+from thermal.errors import ThermalError
 from thermal.pilot.thermostat import Terminals, Thermostats, draw_thermostats, size_terminals
 from thermal.units import AIR_HEAT_CAPACITY
 
@@ -129,7 +129,7 @@ def generate_telemetry(
 
     Raises
     ------
-    ClosedLoopError
+    ThermalError
         When plant, plans and weather do not fit each other, or the plant returns what is no temperature.
     """
     skipped = _check(plant, plans, weather, station, seed, spin_up_days, noise, resolution)
@@ -188,7 +188,7 @@ def _temperatures(values: Series, n_zone: int, where: str) -> Series:
     """Refuse what a plant returns when it is not one temperature a zone."""
     zone = np.asarray(values, dtype=float)
     if zone.shape != (n_zone,) or not np.isfinite(zone).all():
-        raise ClosedLoopError(
+        raise ThermalError(
             f"plant: expected {n_zone} finite temperatures from {where}, found shape {zone.shape} with "
             f"{int((~np.isfinite(zone)).sum())} that are not finite"
         )
@@ -215,23 +215,23 @@ def _check(
 ) -> int:
     """Refuse what does not fit; return the steps of the spin-up."""
     if seed < 0 or spin_up_days < 0.0 or noise < 0.0 or resolution < 0.0:
-        raise ClosedLoopError(
+        raise ThermalError(
             "telemetry: expected seed, spin_up_days, noise and resolution of 0 or more, "
             f"found {seed}, {spin_up_days} d, {noise} K and {resolution} K"
         )
     zones = {zone for floor in plans.floors for zone in floor.zone_names}
     strange = sorted(zones.symmetric_difference(plant.zone_names))
     if strange:
-        raise ClosedLoopError(f"plant: expected the zones of the plans, found a difference in {', '.join(strange[:5])}")
+        raise ThermalError(f"plant: expected the zones of the plans, found a difference in {', '.join(strange[:5])}")
     column = f"{station}/{OUTDOOR_TEMPERATURE}"
     if column not in weather or not isinstance(weather.index, pd.DatetimeIndex) or weather.index.tz is None:
-        raise ClosedLoopError(f"weather: expected a column {column!r} on a tz-aware index, found {list(weather)[:3]}")
+        raise ThermalError(f"weather: expected a column {column!r} on a tz-aware index, found {list(weather)[:3]}")
     if not np.isfinite(weather[column].to_numpy(dtype=float)).all():
-        raise ClosedLoopError(f"weather: expected a value of {column!r} at every step, found gaps")
+        raise ThermalError(f"weather: expected a value of {column!r} at every step, found gaps")
     steps = np.unique(np.diff(weather.index.as_unit("us").asi8) / 1e6)
     if not np.array_equal(steps, [plant.step_seconds]):
-        raise ClosedLoopError(f"weather: expected steps of the plant's {plant.step_seconds} s, found {steps[:3]} s")
+        raise ThermalError(f"weather: expected steps of the plant's {plant.step_seconds} s, found {steps[:3]} s")
     skipped = round(spin_up_days * 86400.0 / plant.step_seconds)
     if len(weather) < skipped + 2:
-        raise ClosedLoopError(f"weather: expected at least {skipped + 2} steps with the spin-up, found {len(weather)}")
+        raise ThermalError(f"weather: expected at least {skipped + 2} steps with the spin-up, found {len(weather)}")
     return skipped

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 import pandas as pd
 
-from thermal.pilot.errors import ClosedLoopError
+from thermal.errors import ThermalError
 from thermal.units import AIR_HEAT_CAPACITY
 
 Series = npt.NDArray[np.float64]
@@ -106,7 +106,7 @@ def draw_thermostats(seed: int, n_zone: int) -> Thermostats:
     True
     """
     if seed < 0 or n_zone < 1:
-        raise ClosedLoopError(f"thermostats: expected a seed of 0 or more and a zone, found {seed} and {n_zone} zones")
+        raise ThermalError(f"thermostats: expected a seed of 0 or more and a zone, found {seed} and {n_zone} zones")
     rng = np.random.default_rng(seed)
 
     def drawn(low: float, high: float) -> Series:
@@ -195,11 +195,11 @@ def size_terminals(seed: int, floor_area: Series, heat_flux: float = 60.0, minim
 
     Raises
     ------
-    ClosedLoopError
+    ThermalError
         When an argument is out of its range.
     """
     if seed < 0 or not np.all(floor_area > 0.0) or not heat_flux > 0.0 or not 0.0 < minimum_share <= 1.0:
-        raise ClosedLoopError(
+        raise ThermalError(
             "terminals: expected a seed of 0 or more, areas and heat_flux above 0 and minimum_share in (0, 1], "
             f"found {seed}, {np.min(floor_area)} m2, {heat_flux} W/m2 and {minimum_share}"
         )

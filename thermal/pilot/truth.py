@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from thermal.errors import ThermalError
 from thermal.parameters import Parameter
-from thermal.pilot.errors import TwinError
 
 Series = npt.NDArray[np.float64]
 
@@ -31,7 +31,7 @@ class TwinRanges:
 
     Raises
     ------
-    TwinError
+    ThermalError
         When a range is out of order, below its least value, or leads from zero to something.
     """
 
@@ -43,7 +43,7 @@ class TwinRanges:
         for name, (low, high) in vars(self).items():
             positive = low > 0.0 or (low == high == 0.0 and name != "disturbance_time")
             if not (positive and low <= high < np.inf):
-                raise TwinError(
+                raise ThermalError(
                     f"ranges: {name}: expected two positive numbers in order (or twice 0 for none), found {low}, {high}"
                 )
 

@@ -16,12 +16,11 @@ from thermal.case.building import Building, FloorPlans
 from thermal.case.case import Case
 from thermal.case.points import DISCHARGE_TEMPERATURE, OUTDOOR_TEMPERATURE, SUPPLY_FLOW, ZONE_TEMPERATURE
 from thermal.case.telemetry import Telemetry
-from thermal.errors import nearest
+from thermal.errors import ThermalError, nearest
 from thermal.model.simulator import Simulator
 from thermal.network.build import build_network
 from thermal.parameters import Parameter, Scope
 from thermal.pilot.disturbance import draw_disturbance
-from thermal.pilot.errors import TwinError
 from thermal.pilot.layout import devices
 from thermal.pilot.prbs import draw_prbs_thermostats
 from thermal.pilot.telemetry import Progress, generate_telemetry
@@ -136,11 +135,11 @@ def generate_twin(
 
     Raises
     ------
-    TwinError
+    ThermalError
         When an option is unknown or the building has no floor plans.
     ModelError
         When a fixed parameter is not of this building.
-    ClosedLoopError
+    ThermalError
         When a length is out of range.
 
     Notes
@@ -217,9 +216,11 @@ def _check(building: Building, excitation: str, meter: str) -> FloorPlans:
         ("meter", meter, ("sensors", "exact")),
     ):
         if word not in options:
-            raise TwinError(f"{name}: expected one of {', '.join(options)}, found {word!r}; {nearest(word, options)}")
+            raise ThermalError(
+                f"{name}: expected one of {', '.join(options)}, found {word!r}; {nearest(word, options)}"
+            )
     if not isinstance(building.geometry, FloorPlans):
-        raise TwinError(
+        raise ThermalError(
             f"building {building.name!r}: expected floor plans, found a zone table; "
             "its terminal units are sized by floor plans"
         )

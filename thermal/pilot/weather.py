@@ -9,7 +9,7 @@ import pvlib
 from scipy.signal import lfilter
 
 from thermal.case.schema import Location
-from thermal.pilot.errors import ClosedLoopError
+from thermal.errors import ThermalError
 
 Series = npt.NDArray[np.float64]
 
@@ -70,7 +70,7 @@ def generate_weather(
 
     Raises
     ------
-    ClosedLoopError
+    ThermalError
         When seed, length or step is out of range.
 
     Examples
@@ -81,7 +81,7 @@ def generate_weather(
     """
     n_time = round(days * _DAY / step_seconds) if step_seconds > 0.0 else 0
     if seed < 0 or n_time < 2 or step_seconds > 3600.0:
-        raise ClosedLoopError(
+        raise ThermalError(
             "weather: expected a seed of 0 or more and at least two steps of up to 3600 s, "
             f"found seed {seed}, {days} days in steps of {step_seconds} s"
         )

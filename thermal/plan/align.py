@@ -9,7 +9,7 @@ import numpy as np
 from scipy.signal import fftconvolve
 
 from thermal._types import FloatArray
-from thermal.errors import PlanSettingError, describe
+from thermal.errors import PlanError, describe
 from thermal.plan.cells import ZonedFloor
 
 _GRID = 0.1  # m, on which outlines are compared
@@ -36,14 +36,14 @@ def align_floors(
 
     Raises
     ------
-    PlanSettingError
+    PlanError
         Some floors have an anchor and others have none.
     """
     anchors = anchors or {}
     missing = [floor.name for floor in floors if floor.name not in anchors]
     if anchors and missing:
         found = f"none for {', '.join(missing)}"
-        raise PlanSettingError(describe("anchor", "one for each floor, or for none", found))
+        raise PlanError(describe("anchor", "one for each floor, or for none", found))
     moved = [replace(floors[0], offset=(0.0, 0.0))]
     for floor in floors[1:]:
         if anchors:

@@ -9,7 +9,7 @@ import numpy as np
 
 from thermal.case.building import FloorPlan, FloorPlans
 from thermal.case.plan import check_plan
-from thermal.errors import LostRoomError, PlanSettingError, RoomNameError, describe
+from thermal.errors import LostRoomError, PlanError, describe
 from thermal.plan.align import align_floors
 from thermal.plan.cells import ZonedFloor, draw_cells, drawn_areas
 from thermal.plan.guard import checked_number
@@ -99,9 +99,9 @@ def assemble_plans(
     ------
     LostRoomError
         A room has no cell of its own at this size.
-    RoomNameError
+    PlanError
         Two floors, or two zones, have the same name.
-    PlanSettingError
+    PlanError
         `cell_size` is out of its range or makes too many cells, or some floors only have an anchor.
 
     Notes
@@ -121,7 +121,7 @@ def assemble_plans(
             if cell_size is None:
                 break
             found = f"{size:g} m, which makes {cells / 1e6:.0f} million"
-            raise PlanSettingError(describe("cell_size", f"at most {_MOST_CELLS / 1e6:.0f} million cells", found))
+            raise PlanError(describe("cell_size", f"at most {_MOST_CELLS / 1e6:.0f} million cells", found))
         for phase in np.ndindex(_PHASES, _PHASES):
             try:
                 drawn, corner = draw_cells(placed, size, (phase[0] / _PHASES, phase[1] / _PHASES))
@@ -151,11 +151,11 @@ def _area_errors(floors: Sequence[ZonedFloor], plans: Sequence[FloorPlan], cell_
 
 def _check_names(floors: Sequence[ZonedFloor]) -> None:
     if not floors:
-        raise PlanSettingError(describe("floors", "at least one", "none"))
+        raise PlanError(describe("floors", "at least one", "none"))
     for what, names in (
         ("floor", [floor.name for floor in floors]),
         ("zone", [zone for floor in floors for zone in floor.names]),
     ):
         for name in names:
             if names.count(name) > 1:
-                raise RoomNameError(describe(f"{what} {name!r}", "a name of its own", "two of that name"))
+                raise PlanError(describe(f"{what} {name!r}", "a name of its own", "two of that name"))

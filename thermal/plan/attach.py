@@ -11,7 +11,7 @@ from thermal.case.case import Case
 from thermal.case.load import load_case
 from thermal.case.points import point_type
 from thermal.case.telemetry_file import check_units, read_telemetry
-from thermal.errors import PointListError, describe
+from thermal.errors import PlanError, describe
 from thermal.plan.columns import read_columns
 from thermal.plan.guard import checked_file
 from thermal.plan.match import PointMatch
@@ -44,7 +44,7 @@ def with_telemetry(
 
     Raises
     ------
-    PointListError
+    PlanError
         No column is matched, or the file lacks one that is.
     CaseError
         One of its family: the case does not load, or values cannot be read.
@@ -53,11 +53,11 @@ def with_telemetry(
     source = checked_file(Path(file), (".csv", ".parquet"))
     names = {match.column: f"{match.entity}/{match.point}" for match in matches if match.point and not match.remark}
     if not names:
-        raise PointListError(describe(source.name, "a column that is matched to a point", "none", "see points.csv"))
+        raise PlanError(describe(source.name, "a column that is matched to a point", "none", "see points.csv"))
     lacking = sorted(names.keys() - {*read_columns(source)})
     if lacking:
         found = f"no {lacking[0]!r}" + (f" and {len(lacking) - 1} more" if len(lacking) > 1 else "")
-        raise PointListError(describe(source.name, "the columns of the list of points", found))
+        raise PlanError(describe(source.name, "the columns of the list of points", found))
     given = dict(units or {})
     check_units(given)
     points = {m.point: point_type(m.point, f"points: {m.column!r}") for m in matches if m.column in names}

@@ -7,7 +7,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from thermal.errors import DeviceListError, describe
+from thermal.errors import PlanError, describe
 from thermal.plan.devices import DeviceImport, ListedPoint, import_devices, key
 from thermal.plan.extra import extra
 
@@ -73,7 +73,7 @@ def read_brick(file: Path, zones: Sequence[str]) -> DeviceImport:
 
     Raises
     ------
-    DeviceListError
+    PlanError
         It is no Turtle, or describes no equipment that serves a building's zones.
     """
     rdf = extra("rdflib")
@@ -82,7 +82,7 @@ def read_brick(file: Path, zones: Sequence[str]) -> DeviceImport:
         graph.parse(data=file.read_text(encoding="utf-8"), format="turtle")
     except Exception as error:  # rdflib's parser raises BadSyntax, which is no ValueError, and plain exceptions
         found = " ".join(str(error).split())[:200]
-        raise DeviceListError(describe(file.name, "a Brick model in Turtle", found)) from error
+        raise PlanError(describe(file.name, "a Brick model in Turtle", found)) from error
     model = _Model(graph, rdf)
     keys = {key(zone) for zone in zones}
     rows, points = [], []
@@ -93,7 +93,7 @@ def read_brick(file: Path, zones: Sequence[str]) -> DeviceImport:
         points += model.points(subject, name, kind)
     if not rows:
         advice = "does it declare brick:VAV, brick:AHU and so on?"
-        raise DeviceListError(describe(file.name, "equipment of Brick", "none", advice))
+        raise PlanError(describe(file.name, "equipment of Brick", "none", advice))
     order = sorted(range(len(rows)), key=lambda i: rows[i][0])
     return import_devices([rows[i] for i in order], zones, file.name, sorted(points, key=lambda p: p.column))
 

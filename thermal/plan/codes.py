@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import ndimage
 
-from thermal.errors import DrawingFileError, NoRoomsError, OversizedFileError, describe
+from thermal.errors import OversizedFileError, PlanError, describe
 from thermal.plan.guard import MOST_BYTES, check_pixels, checked_file, checked_number
 from thermal.plan.rooms import finish
 from thermal.plan.survey import OUTSIDE_LABEL, FloorSurvey
@@ -40,11 +40,11 @@ def read_codes(path: str | PathLike[str], cell_size: float) -> FloorSurvey:
 
     Raises
     ------
-    DrawingFileError
+    PlanError
         The file is damaged, its rows differ in length, or it holds another code.
     OversizedFileError
         It has, or unpacks to, more than any real plan.
-    NoRoomsError
+    PlanError
         It has no inside that walls part from the outside.
     """
     file = checked_file(Path(path), CODE_KINDS)
@@ -70,11 +70,11 @@ def survey_codes(codes: ArrayLike, cell_size: float, source: str = "codes") -> F
 
     Raises
     ------
-    DrawingFileError
+    PlanError
         It has another shape or another code.
     OversizedFileError
         It has more cells than any real plan.
-    NoRoomsError
+    PlanError
         It has no inside, or one that touches the outside.
 
     Examples
@@ -87,19 +87,19 @@ def survey_codes(codes: ArrayLike, cell_size: float, source: str = "codes") -> F
     array = np.asarray(codes)
     if array.ndim != 2 or array.size == 0 or array.dtype.kind not in "iufb":
         found = f"an array of shape {array.shape} and type {array.dtype}"
-        raise DrawingFileError(describe(source, "rows and columns of codes", found))
+        raise PlanError(describe(source, "rows and columns of codes", found))
     check_pixels(_REFINE * array.shape[1], _REFINE * array.shape[0], source)
     unknown = ~np.isin(array, [INSIDE, WALL, OUTSIDE])
     if unknown.any():
         row, column = (int(x) for x in np.argwhere(unknown)[0])
         where = f"{source}: row {row + 1}, column {column + 1}"
-        raise DrawingFileError(describe(where, "0 inside, 1 wall or 2 outside", repr(array[row, column].item())))
+        raise PlanError(describe(where, "0 inside, 1 wall or 2 outside", repr(array[row, column].item())))
     framed = np.pad(array.astype(np.int32), 1, constant_values=OUTSIDE)
     labels, count = ndimage.label(framed == INSIDE)
     labels = labels.astype(np.int32)
     labels[framed == OUTSIDE] = OUTSIDE_LABEL
     if count == 0:
-        raise NoRoomsError(describe(source, "cells of code 0, inside", "none"))
+        raise PlanError(describe(source, "cells of code 0, inside", "none"))
     _check_closed(labels, source)
     fine = np.repeat(np.repeat(labels, _REFINE, axis=0), _REFINE, axis=1)
     middle = 1.5 * _REFINE - 0.5
@@ -115,7 +115,7 @@ def _check_closed(labels: NDArray[np.int32], source: str) -> None:
         if open_.any():
             row, column = (int(x) for x in np.argwhere(open_)[0])
             where = f"{source}: near row {max(row, 1)}, column {max(column, 1)}"
-            raise NoRoomsError(describe(where, "a wall (1) between inside (0) and outside (2)", "none"))
+            raise PlanError(describe(where, "a wall (1) between inside (0) and outside (2)", "none"))
 
 
 def _read_csv(file: Path) -> NDArray[Any]:
@@ -123,16 +123,16 @@ def _read_csv(file: Path) -> NDArray[Any]:
         with file.open(encoding="utf-8-sig", newline="") as stream:
             rows = [row for row in csv.reader(stream, strict=True) if any(cell.strip() for cell in row)]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise DrawingFileError(describe(file.name, "a CSV of codes in UTF-8", str(error))) from error
+        raise PlanError(describe(file.name, "a CSV of codes in UTF-8", str(error))) from error
     for number, row in enumerate(rows, start=1):
         if len(row) != len(rows[0]):
             expected = f"{len(rows[0])} cells as in row 1"
-            raise DrawingFileError(describe(f"{file.name}: row {number}", expected, f"{len(row)} cells"))
+            raise PlanError(describe(f"{file.name}: row {number}", expected, f"{len(row)} cells"))
     try:
         return np.array(rows, dtype=float)
     except ValueError as error:
         found = " ".join(str(error).split())
-        raise DrawingFileError(describe(file.name, "codes 0, 1 and 2", found)) from error
+        raise PlanError(describe(file.name, "codes 0, 1 and 2", found)) from error
 
 
 def _read_numpy(file: Path) -> NDArray[Any]:
@@ -146,11 +146,11 @@ def _read_numpy(file: Path) -> NDArray[Any]:
                 expected, found = f"at most {MOST_BYTES / 1e6:.0f} MB unpacked", f"{unpacked / 1e6:.0f} MB"
                 raise OversizedFileError(describe(file.name, expected, found, "this is no plan"))
             if len(names) != 1:
-                raise DrawingFileError(describe(file.name, "one array", ", ".join(names[:5]) or "none"))
+                raise PlanError(describe(file.name, "one array", ", ".join(names[:5]) or "none"))
             with np.load(file, allow_pickle=False) as arrays:
                 return np.asarray(arrays[arrays.files[0]])
         mapped = np.load(file, mmap_mode="r", allow_pickle=False)
         return np.asarray(mapped)
     except (OSError, ValueError, EOFError, KeyError, zipfile.BadZipFile) as error:
         found = " ".join(str(error).replace(str(file), file.name).split())
-        raise DrawingFileError(describe(file.name, "a NumPy array of codes", found)) from error
+        raise PlanError(describe(file.name, "a NumPy array of codes", found)) from error

@@ -8,7 +8,7 @@ from os import PathLike
 from pathlib import Path
 
 from thermal.case.telemetry import INDEX
-from thermal.errors import DrawingFileError, PointListError, describe
+from thermal.errors import PlanError, describe
 from thermal.plan.guard import checked_file
 from thermal.plan.match import PointMatch
 
@@ -30,7 +30,7 @@ def read_columns(path: str | PathLike[str]) -> tuple[str, ...]:
 
     Raises
     ------
-    DrawingFileError
+    PlanError
         The file is missing or neither.
     """
     file = checked_file(Path(path), (".csv", ".parquet"))
@@ -44,7 +44,7 @@ def read_columns(path: str | PathLike[str]) -> tuple[str, ...]:
             names = [str(name) for name in parquet.read_schema(file).names]
     except (OSError, UnicodeDecodeError, ValueError, csv.Error) as error:
         found = " ".join(str(error).split())[:200]
-        raise DrawingFileError(describe(file.name, "telemetry with one column a point", found)) from error
+        raise PlanError(describe(file.name, "telemetry with one column a point", found)) from error
     return tuple(name for name in names if name not in (INDEX, "__index_level_0__"))
 
 
@@ -86,9 +86,9 @@ def read_matches(path: str | PathLike[str]) -> tuple[PointMatch, ...]:
 
     Raises
     ------
-    DrawingFileError
+    PlanError
         The file is missing or no CSV.
-    PointListError
+    PlanError
         A column of it is missing, or a row names a column without a name.
     """
     file = checked_file(Path(path), (".csv",))
@@ -98,14 +98,14 @@ def read_matches(path: str | PathLike[str]) -> tuple[PointMatch, ...]:
             rows, header = list(reader), tuple(reader.fieldnames or ())
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         found = " ".join(str(error).split())[:200]
-        raise DrawingFileError(describe(file.name, "a CSV in UTF-8", found)) from error
+        raise PlanError(describe(file.name, "a CSV in UTF-8", found)) from error
     if not {*_HEADER[:3]} <= {*header}:
-        raise PointListError(describe(file.name, f"columns {', '.join(_HEADER[:3])}", ", ".join(header) or "none"))
+        raise PlanError(describe(file.name, f"columns {', '.join(_HEADER[:3])}", ", ".join(header) or "none"))
     matches = []
     for number, row in enumerate(rows, start=2):
         column, entity, point = ((row[name] or "").strip() for name in _HEADER[:3])
         if not column:
-            raise PointListError(describe(f"{file.name}: line {number}", "the name of a column", "none"))
+            raise PlanError(describe(f"{file.name}: line {number}", "the name of a column", "none"))
         remark = (row.get("remark") or "").strip() or ("" if entity and point else "left out")
         matches.append(PointMatch(column, entity, point, 1.0, remark))
     return tuple(matches)

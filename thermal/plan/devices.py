@@ -10,7 +10,7 @@ from os import PathLike
 from pathlib import Path
 
 from thermal.case.schema import DEVICE_TYPES, Device
-from thermal.errors import DeviceListError, describe, nearest
+from thermal.errors import PlanError, describe, nearest
 from thermal.plan.guard import checked_file
 
 _COLUMNS = {
@@ -90,9 +90,9 @@ def read_devices(path: str | PathLike[str], zones: Sequence[str]) -> DeviceImpor
 
     Raises
     ------
-    DrawingFileError
+    PlanError
         The file is missing or of another kind.
-    DeviceListError
+    PlanError
         It cannot be understood.
     """
     file = checked_file(Path(path), (".csv", ".ttl", ".json", ".zinc"))
@@ -131,7 +131,7 @@ def import_devices(
 
     Raises
     ------
-    DeviceListError
+    PlanError
         A name stands twice, or there is no device.
     """
     by_key: dict[tuple[str, ...], list[str]] = {}
@@ -144,7 +144,7 @@ def import_devices(
     for number, (name, kind, zone) in enumerate(rows, start=1):
         if name in seen:
             found = f"{name!r}, which device {seen[name]} has too"
-            raise DeviceListError(describe(f"{where}: device {number}", "a name of its own", found))
+            raise PlanError(describe(f"{where}: device {number}", "a name of its own", found))
         seen[name] = number
         known = device_type(kind or name)
         if known is None:
@@ -154,7 +154,7 @@ def import_devices(
             unplaced[name] = zone
         devices.append(Device(name=name, type=known or kind or "unknown", zone=place[0] if len(place) == 1 else None))
     if not devices:
-        raise DeviceListError(describe(where, "at least one device", "none"))
+        raise PlanError(describe(where, "at least one device", "none"))
     return DeviceImport(tuple(devices), unplaced, unknown, tuple(points))
 
 
@@ -232,9 +232,9 @@ def _read_rows(file: Path) -> list[dict[str, str]]:
             row for row in csv.reader(text.splitlines(), delimiter=sign, strict=True) if any(x.strip() for x in row)
         ]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise DeviceListError(describe(file.name, "a CSV in UTF-8 with a header", str(error))) from error
+        raise PlanError(describe(file.name, "a CSV in UTF-8 with a header", str(error))) from error
     if not rows:
-        raise DeviceListError(describe(file.name, "a header and a row a device", "an empty file"))
+        raise PlanError(describe(file.name, "a header and a row a device", "an empty file"))
     header = ["_".join(words_of(cell)) for cell in rows[0]]
     found: dict[str, int] = {}
     for use, names in _COLUMNS.items():
@@ -243,14 +243,14 @@ def _read_rows(file: Path) -> list[dict[str, str]]:
             found[use] = places[0]
     if "name" not in found:
         advice = nearest(header[0], _COLUMNS["name"])
-        raise DeviceListError(describe(f"{file.name}: header", "a column 'name'", ", ".join(header[:6]), advice))
+        raise PlanError(describe(f"{file.name}: header", "a column 'name'", ", ".join(header[:6]), advice))
     result = []
     for number, row in enumerate(rows[1:], start=2):
         if len(row) != len(header):
             expected = f"{len(header)} cells as in the header"
-            raise DeviceListError(describe(f"{file.name}: row {number}", expected, f"{len(row)}"))
+            raise PlanError(describe(f"{file.name}: row {number}", expected, f"{len(row)}"))
         entry = {use: row[place].strip() for use, place in found.items()}
         if not entry["name"]:
-            raise DeviceListError(describe(f"{file.name}: row {number}", "the name of a device", "a blank"))
+            raise PlanError(describe(f"{file.name}: row {number}", "the name of a device", "a blank"))
         result.append(entry)
     return result

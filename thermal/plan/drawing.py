@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal.errors import DrawingFileError, MissingExtraError, OversizedFileError, PlanSettingError, describe
+from thermal.errors import MissingExtraError, OversizedFileError, PlanError, describe
 from thermal.plan.extra import extra
 from thermal.plan.guard import check_pixels, checked_file, checked_number
 
@@ -73,18 +73,18 @@ def read_drawing(
 
     Raises
     ------
-    DrawingFileError
+    PlanError
         The file is not what its name says, or damaged, or has no such page.
     OversizedFileError
         It has, or unpacks to, more than any real plan.
     MissingExtraError
         Pillow or ``pdftoppm`` is not installed.
-    PlanSettingError
+    PlanError
         `page`, `dots_per_inch` or `crop` does not fit.
     """
     file = checked_file(Path(path), RASTER_KINDS)
     if isinstance(page, bool) or not isinstance(page, int) or page < 1:
-        raise PlanSettingError(describe("page", "a number from 1", repr(page)))
+        raise PlanError(describe("page", "a number from 1", repr(page)))
     if file.suffix.lower() == ".pdf":
         dpi: float | None = checked_number(dots_per_inch, "dots_per_inch", 20.0, 600.0, "1/inch")
         grey, source = _pdf_page(file, page, dots_per_inch), f"{file.name} page {page}"
@@ -116,7 +116,7 @@ def _image(file: Path) -> NDArray[np.uint8]:
         except (OSError, SyntaxError, ValueError, TypeError) as error:  # Pillow has all of them for damaged files
             expected = f"a whole {file.suffix[1:].upper()} image"
             found = " ".join(str(error).replace(str(file), file.name).split())
-            raise DrawingFileError(describe(file.name, expected, found)) from error
+            raise PlanError(describe(file.name, expected, found)) from error
 
 
 def _pdf_page(file: Path, page: int, dpi: float) -> NDArray[np.uint8]:
@@ -126,7 +126,7 @@ def _pdf_page(file: Path, page: int, dpi: float) -> NDArray[np.uint8]:
     pages = re.search(r"^Pages:\s+(\d+)", report, re.MULTILINE)
     if size is None or pages is None or int(pages[1]) < page:
         found = f"{pages[1]} pages" if pages else "none"
-        raise DrawingFileError(describe(file.name, f"a page {page}", found))
+        raise PlanError(describe(file.name, f"a page {page}", found))
     check_pixels(float(size[1]) * dpi / 72.0, float(size[2]) * dpi / 72.0, f"{file.name} page {page}")
     with tempfile.TemporaryDirectory() as folder:
         target = Path(folder) / "page"
@@ -134,7 +134,7 @@ def _pdf_page(file: Path, page: int, dpi: float) -> NDArray[np.uint8]:
         _poppler(["pdftoppm", "-r", f"{dpi:g}", *pages_wanted, "-gray", "-png", str(file), str(target)], file)
         drawn = target.with_suffix(".png")
         if not drawn.is_file():
-            raise DrawingFileError(describe(file.name, f"a page {page} that can be drawn", "nothing drawn"))
+            raise PlanError(describe(file.name, f"a page {page} that can be drawn", "nothing drawn"))
         return _image(drawn)
 
 
@@ -150,7 +150,7 @@ def _poppler(command: list[str], file: Path) -> str:
         raise OversizedFileError(describe(file.name, expected, "one that takes longer", "export it anew")) from error
     if done.returncode != 0:
         found = " ".join(done.stderr.decode(errors="replace").replace(str(file), file.name).split())[:200]
-        raise DrawingFileError(describe(file.name, "a whole PDF file with that page", found or "an error"))
+        raise PlanError(describe(file.name, "a whole PDF file with that page", found or "an error"))
     return done.stdout.decode(errors="replace")
 
 
@@ -159,5 +159,5 @@ def _checked_crop(crop: tuple[int, int, int, int], shape: tuple[int, ...]) -> tu
     whole = len(crop) == 4 and all(isinstance(x, int) and not isinstance(x, bool) for x in crop)
     if not whole or not (0 <= crop[0] < crop[2] <= shape[1] and 0 <= crop[1] < crop[3] <= shape[0]):
         expected = f"left, top, right, bottom within {shape[1]} x {shape[0]} px"
-        raise PlanSettingError(describe("crop", expected, repr(tuple(crop))))
+        raise PlanError(describe("crop", expected, repr(tuple(crop))))
     return crop

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-from thermal.errors import DrawingFileError, OutsideFolderError, OversizedFileError, PlanSettingError, describe
+from thermal.errors import OversizedFileError, PlanError, describe
 
 #: Largest file that is opened [bytes]: a scan of a large sheet has some 20 MB.
 MOST_BYTES = 100_000_000
@@ -41,7 +41,7 @@ def checked_file(path: Path, kinds: tuple[str, ...]) -> Path:
 
     Raises
     ------
-    DrawingFileError
+    PlanError
         It is missing, has another suffix, or its first bytes are those of something else.
     OversizedFileError
         It is larger than `MOST_BYTES`.
@@ -50,10 +50,10 @@ def checked_file(path: Path, kinds: tuple[str, ...]) -> Path:
     if suffix not in kinds:
         expected = f"a file that ends in {', '.join(kinds)}"
         advice = "unpack it first" if suffix == ".zip" else ""
-        raise DrawingFileError(describe(path.name, expected, repr(suffix or path.name), advice))
+        raise PlanError(describe(path.name, expected, repr(suffix or path.name), advice))
     try:
         if not path.is_file():
-            raise DrawingFileError(describe(str(path), "a file", "a folder" if path.is_dir() else "nothing"))
+            raise PlanError(describe(str(path), "a file", "a folder" if path.is_dir() else "nothing"))
         size = path.stat().st_size
         if size > MOST_BYTES:
             found = f"{size / 1e6:.0f} MB"
@@ -61,13 +61,13 @@ def checked_file(path: Path, kinds: tuple[str, ...]) -> Path:
         with path.open("rb") as stream:
             start = stream.read(1024)
     except (OSError, ValueError) as error:  # ValueError: a NUL in the name
-        raise DrawingFileError(describe(path.name, "a file that can be read", str(error))) from error
+        raise PlanError(describe(path.name, "a file that can be read", str(error))) from error
     known = _SIGNATURES.get(suffix)
     # A PDF may have some bytes before its signature (ISO 32000-1, annex H, note 13).
     fits = known is None or (known[0] in start if suffix == ".pdf" else start.startswith(known))
     if not fits or not start:
         found = f"a file that begins with {start[:8]!r}" if start else "an empty file"
-        raise DrawingFileError(describe(path.name, f"a {suffix[1:].upper()} file", found, "export the drawing anew"))
+        raise PlanError(describe(path.name, f"a {suffix[1:].upper()} file", found, "export the drawing anew"))
     return path.absolute()
 
 
@@ -111,17 +111,17 @@ def inside_folder(folder: Path, name: str, where: str) -> Path:
 
     Raises
     ------
-    OutsideFolderError
+    PlanError
         It lies elsewhere, or is no name of a file.
     """
     try:
         target = (folder / name).resolve()
         inside = target.is_relative_to(folder.resolve())
     except (OSError, ValueError, RuntimeError) as error:  # a NUL, a name too long, links in a circle
-        raise OutsideFolderError(describe(where, "the name of a file", repr(name))) from error
+        raise PlanError(describe(where, "the name of a file", repr(name))) from error
     if not inside:
         advice = "copy the file beside the list"
-        raise OutsideFolderError(describe(where, "a file in the folder of the list", repr(name), advice))
+        raise PlanError(describe(where, "a file in the folder of the list", repr(name), advice))
     return target
 
 
@@ -146,10 +146,10 @@ def checked_number(value: object, name: str, lowest: float, highest: float, unit
 
     Raises
     ------
-    PlanSettingError
+    PlanError
         It is no finite number, or out of range.
     """
     is_number = isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
     if not is_number or not lowest <= float(value) <= highest:  # type: ignore[arg-type]
-        raise PlanSettingError(describe(name, f"a number from {lowest:g} to {highest:g} {unit}", repr(value)))
+        raise PlanError(describe(name, f"a number from {lowest:g} to {highest:g} {unit}", repr(value)))
     return float(value)  # type: ignore[arg-type]

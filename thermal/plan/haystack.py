@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from thermal.errors import DeviceListError, describe
+from thermal.errors import PlanError, describe
 from thermal.plan.devices import DeviceImport, ListedPoint, device_type, import_devices, key
 
 Entity = dict[str, str]
@@ -73,7 +73,7 @@ def read_haystack(file: Path, zones: Sequence[str]) -> DeviceImport:
 
     Raises
     ------
-    DeviceListError
+    PlanError
         The file is neither, or has no equipment.
     """
     entities = _read_json(file) if file.suffix.lower() == ".json" else _read_zinc(file)
@@ -93,7 +93,7 @@ def read_haystack(file: Path, zones: Sequence[str]) -> DeviceImport:
         if "point" in entity and owner is not None:
             points.append(ListedPoint(entity.get("id", _name(entity)), owner[0], _point(entity, owner[1])))
     if not rows:
-        raise DeviceListError(describe(file.name, "entities with the tag 'equip'", f"none of {len(entities)}"))
+        raise PlanError(describe(file.name, "entities with the tag 'equip'", f"none of {len(entities)}"))
     return import_devices(rows, zones, file.name, points)
 
 
@@ -120,10 +120,10 @@ def _read_json(file: Path) -> list[Entity]:
     try:
         content = json.loads(file.read_text(encoding="utf-8-sig"))
     except (OSError, UnicodeDecodeError, ValueError, RecursionError) as error:
-        raise DeviceListError(describe(file.name, "JSON", " ".join(str(error).split())[:200])) from error
+        raise PlanError(describe(file.name, "JSON", " ".join(str(error).split())[:200])) from error
     rows = content.get("rows") if isinstance(content, dict) else content
     if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
-        raise DeviceListError(describe(file.name, "a Haystack grid with 'rows'", type(content).__name__))
+        raise PlanError(describe(file.name, "a Haystack grid with 'rows'", type(content).__name__))
     return [{tag: text for tag, value in row.items() if (text := _json_value(value))} for row in rows]
 
 
@@ -147,9 +147,9 @@ def _read_zinc(file: Path) -> list[Entity]:
     try:
         lines = file.read_text(encoding="utf-8-sig").splitlines()
     except (OSError, UnicodeDecodeError) as error:
-        raise DeviceListError(describe(file.name, "Zinc in UTF-8", str(error))) from error
+        raise PlanError(describe(file.name, "Zinc in UTF-8", str(error))) from error
     if len(lines) < 2 or not lines[0].startswith("ver:"):
-        raise DeviceListError(describe(file.name, "Zinc, which begins with 'ver:'", repr("".join(lines[:1])[:40])))
+        raise PlanError(describe(file.name, "Zinc, which begins with 'ver:'", repr("".join(lines[:1])[:40])))
     tags = [re.match(r"\s*(\w*)", cell)[1] for cell in _cells(lines[1])]  # type: ignore[index]
     entities = []
     for number, line in enumerate(lines[2:], start=3):
@@ -158,7 +158,7 @@ def _read_zinc(file: Path) -> list[Entity]:
         cells = _cells(line)
         if len(cells) > len(tags):
             found = f"{len(cells)} of {len(tags)}"
-            raise DeviceListError(describe(f"{file.name}: line {number}", "as many cells as columns", found))
+            raise PlanError(describe(f"{file.name}: line {number}", "as many cells as columns", found))
         values = (_zinc_value(cell) for cell in cells)
         entities.append({tag: value for tag, value in zip(tags, values, strict=False) if value})
     return entities

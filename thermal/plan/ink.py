@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from thermal._types import BoolArray, FloatArray
-from thermal.errors import NoRoomsError, describe
+from thermal.errors import PlanError, describe
 from thermal.plan.drawing import Drawing
 from thermal.plan.extra import extra
 from thermal.plan.guard import check_pixels
@@ -68,7 +68,7 @@ def ink_of(drawing: Drawing, scale: float, straighten: bool) -> Ink:
 
     Raises
     ------
-    NoRoomsError
+    PlanError
         The drawing is blank.
     OversizedFileError
         It is larger than any building at this scale.
@@ -126,7 +126,7 @@ def _cover(drawing: Drawing, block: int) -> FloatArray:
     contrast = int(grey.max()) - int(grey.min()) if grey.size else 0
     if contrast < _LEAST_CONTRAST:
         found = f"one shade of grey (contrast {contrast} of 255)"
-        raise NoRoomsError(describe(drawing.source, "walls darker than the paper", found, "is the drawing blank?"))
+        raise PlanError(describe(drawing.source, "walls darker than the paper", found, "is the drawing blank?"))
     threshold = float(extra("skimage.filters").threshold_otsu(grey))
     dark = grey <= threshold
     light, black = float(grey[~dark].mean()), float(grey[dark].mean())

@@ -13,7 +13,7 @@ from thermal.case.building_file import NAME
 from thermal.case.case import Case
 from thermal.case.load import load_case
 from thermal.case.save import save_case
-from thermal.errors import CaseError, LostWorkError, describe
+from thermal.errors import CaseError, PlanError, describe
 
 #: Folder inside a case that holds what is the labelling page's own: draft, drawings, pictures, reports.
 OWN_FOLDER = "labelling"
@@ -108,10 +108,10 @@ def check_nothing_lost(path: str | PathLike[str]) -> None:
 
     Raises
     ------
-    LostWorkError
+    PlanError
         It does; the message names all of it.
     """
     held = held_work(path)
     if held:
         advice = "choose another folder, or correct the case with buildingmpc label; --force replaces all of it"
-        raise LostWorkError(describe(str(path), "nothing that would be lost", "; ".join(held), advice))
+        raise PlanError(describe(str(path), "nothing that would be lost", "; ".join(held), advice))

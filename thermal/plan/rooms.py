@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from thermal._types import Int32Array
-from thermal.errors import NoRoomsError, describe
+from thermal.errors import PlanError, describe
 from thermal.plan.basins import Basins, find_basins
 from thermal.plan.drawing import Drawing
 from thermal.plan.ink import Ink, ink_of
@@ -46,9 +46,9 @@ def find_rooms(
 
     Raises
     ------
-    NoRoomsError
+    PlanError
         The walls enclose nothing.
-    ScaleError
+    PlanError
         No building is drawn at this scale.
     """
     ink = ink_of(drawing, checked_scale(metres_per_pixel), straighten)
@@ -74,7 +74,7 @@ def survey_ink(ink: Ink, source: str, settings: PlanSettings) -> FloorSurvey:
 
     Raises
     ------
-    NoRoomsError
+    PlanError
         The walls enclose nothing, with and without the thin strokes.
     """
     margin = int(np.ceil(settings.widest_door / ink.pixel)) + 2
@@ -95,7 +95,7 @@ def survey_ink(ink: Ink, source: str, settings: PlanSettings) -> FloorSurvey:
             survey = finish(labels, ink.pixel, source, doors, ink.turned, shift, tuple(remarks))
             return replace(survey, ink=np.pad(ink.mask, margin))
     advice = "set widest_door to the widest gap in the walls, or crop to one floor's plan"
-    raise NoRoomsError(describe(source, "walls that enclose rooms, but for doors", "none", advice))
+    raise PlanError(describe(source, "walls that enclose rooms, but for doors", "none", advice))
 
 
 def finish(

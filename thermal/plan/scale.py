@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from thermal.errors import ScaleError, describe
+from thermal.errors import PlanError, describe
 
 Point = tuple[float, float]
 
@@ -29,7 +29,7 @@ def scale_from_points(first: Point, second: Point, distance: float) -> float:
 
     Raises
     ------
-    ScaleError
+    PlanError
         The points coincide, the distance is not positive, or no building is drawn at that scale.
 
     Examples
@@ -39,7 +39,7 @@ def scale_from_points(first: Point, second: Point, distance: float) -> float:
     """
     numbers = (*first, *second, distance)
     if not all(math.isfinite(x) for x in numbers):
-        raise ScaleError(describe("scale", "two points and a distance, finite", repr(numbers)))
+        raise PlanError(describe("scale", "two points and a distance, finite", repr(numbers)))
     return scale_from_length(math.dist(first, second), distance)
 
 
@@ -60,7 +60,7 @@ def scale_from_length(pixels: float, length: float) -> float:
 
     Raises
     ------
-    ScaleError
+    PlanError
         One is not positive, or no building is drawn at that scale.
 
     Examples
@@ -69,7 +69,7 @@ def scale_from_length(pixels: float, length: float) -> float:
     0.025
     """
     if not (pixels > 0 and length > 0):
-        raise ScaleError(describe("scale", "a positive length in px and in m", f"{pixels} px and {length} m"))
+        raise PlanError(describe("scale", "a positive length in px and in m", f"{pixels} px and {length} m"))
     return checked_scale(length / pixels)
 
 
@@ -90,7 +90,7 @@ def scale_from_paper(ratio: float, dots_per_inch: float) -> float:
 
     Raises
     ------
-    ScaleError
+    PlanError
         One is not positive, or no building is drawn at that scale.
 
     Examples
@@ -116,11 +116,11 @@ def checked_scale(metres_per_pixel: float) -> float:
 
     Raises
     ------
-    ScaleError
+    PlanError
         It is out of the range of plans.
     """
     if not FINEST <= metres_per_pixel <= COARSEST:
         expected = f"{FINEST:g} to {COARSEST:g} m for a pixel"
         advice = "are points in pixels and distances in metres?"
-        raise ScaleError(describe("scale", expected, f"{metres_per_pixel:g} m", advice))
+        raise PlanError(describe("scale", expected, f"{metres_per_pixel:g} m", advice))
     return metres_per_pixel

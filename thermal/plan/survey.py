@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal._types import FloatArray, Int32Array
-from thermal.errors import PlanSettingError
+from thermal.errors import PlanError
 from thermal.plan.guard import checked_number
 
 #: Labels of what is no room.
@@ -37,7 +37,7 @@ class PlanSettings:
 
     Raises
     ------
-    PlanSettingError
+    PlanError
         A value is out of its range.
     """
 
@@ -54,7 +54,7 @@ class PlanSettings:
         checked_number(self.smallest_room, "smallest_room", 0.1, 50.0, "m2")
         checked_number(self.smallest_zone, "smallest_zone", 0.0, 100.0, "m2")
         if self.thinnest_wall >= self.thickest_wall:
-            raise PlanSettingError(
+            raise PlanError(
                 f"thinnest_wall: expected less than thickest_wall ({self.thickest_wall} m), found {self.thinnest_wall}"
             )
 

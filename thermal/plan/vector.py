@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal._types import FloatArray
-from thermal.errors import DrawingFileError, DrawingUnitsError, NoRoomsError, OversizedFileError, describe
+from thermal.errors import OversizedFileError, PlanError, describe
 from thermal.plan.extra import extra
 from thermal.plan.guard import check_pixels, checked_file, checked_number
 from thermal.plan.ink import FINE, Ink
@@ -80,13 +80,13 @@ def read_dxf(
 
     Raises
     ------
-    DrawingFileError
+    PlanError
         The file is no DXF drawing, or has no lines on the layers.
-    DrawingUnitsError
+    PlanError
         It has no unit, or one that makes no building of it.
     OversizedFileError
         It has more lines than any plan.
-    NoRoomsError
+    PlanError
         Its walls enclose nothing.
     """
     file = checked_file(Path(path), VECTOR_KINDS)
@@ -114,7 +114,7 @@ def _open(file: Path) -> Any:
         RecursionError,
     ) as error:
         found = " ".join(str(error).replace(str(file), file.name).split())[:200]
-        raise DrawingFileError(describe(file.name, "a DXF drawing", found or type(error).__name__)) from error
+        raise PlanError(describe(file.name, "a DXF drawing", found or type(error).__name__)) from error
 
 
 def _unit(document: Any, unit: float | None, where: str) -> float:
@@ -123,7 +123,7 @@ def _unit(document: Any, unit: float | None, where: str) -> float:
     code = document.header.get("$INSUNITS", 0)
     if code not in _UNITS:
         expected = "a unit of length in $INSUNITS"
-        raise DrawingUnitsError(describe(where, expected, f"code {code}", "pass unit, such as 0.001 for millimetres"))
+        raise PlanError(describe(where, expected, f"code {code}", "pass unit, such as 0.001 for millimetres"))
     return _UNITS[code]
 
 
@@ -132,7 +132,7 @@ def _collect(document: Any, metres: float, walls: str, rooms: str, where: str, w
     try:
         is_wall, is_room = re.compile(walls, re.IGNORECASE), re.compile(rooms, re.IGNORECASE)
     except re.error as error:
-        raise DrawingFileError(describe(where, "a regular expression for layers", str(error))) from error
+        raise PlanError(describe(where, "a regular expression for layers", str(error))) from error
     decompose = extra("ezdxf.disassemble").recursive_decompose
     found: list[tuple[str, str, Any]] = []
     texts: list[tuple[str, float, float]] = []
@@ -153,7 +153,7 @@ def _collect(document: Any, metres: float, walls: str, rooms: str, where: str, w
     if not on_walls and not outlines:
         if wanted is not None or not found:
             layers = ", ".join(sorted({layer for _, layer, _ in found})[:12])
-            raise DrawingFileError(
+            raise PlanError(
                 describe(where, f"lines on layers like {walls!r}", f"layers {layers or 'without any'}")
             )
         on_walls = found
@@ -195,7 +195,7 @@ def _upright(
     """Angle of the walls clockwise, what takes (x, y, 1) [m] to column and row of the survey, and its shape."""
     lines = content.lines + content.solids or content.rooms
     if not lines:
-        raise NoRoomsError(describe(where, "lines", "none that can be drawn"))
+        raise PlanError(describe(where, "lines", "none that can be drawn"))
     angle = _main_angle(lines) if straighten else 0.0
     cosine, sine = math.cos(math.radians(angle)), math.sin(math.radians(angle))
     turn = np.array([[cosine, -sine], [sine, cosine]])
@@ -205,7 +205,7 @@ def _upright(
         expected = f"a building of {_SMALLEST:g} to {_LARGEST:g} m"
         found = f"{size[0]:.4g} m x {size[1]:.4g} m with {metres:g} m for a unit"
         advice = "pass unit, such as 0.001 for millimetres"
-        raise DrawingUnitsError(describe(where, expected, found, advice))
+        raise PlanError(describe(where, expected, found, advice))
     pixel = max(FINE, math.sqrt(size[0] * size[1] / 3e7))
     margin = 0.5
     left, top = points[:, 0].min() - margin, points[:, 1].max() + margin

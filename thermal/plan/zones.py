@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from thermal._types import Int32Array
 from thermal.case.validation import RESERVED
-from thermal.errors import RoomNameError, describe
+from thermal.errors import PlanError, describe
 from thermal.plan.cells import ZonedFloor, split_walls
 from thermal.plan.guard import checked_number
 from thermal.plan.survey import FloorSurvey
@@ -47,9 +47,9 @@ def propose_zones(
 
     Raises
     ------
-    RoomNameError
+    PlanError
         A name stands for two rooms, is one that plans use for themselves, or points at no room.
-    PlanSettingError
+    PlanError
         A number is out of its range.
     """
     checked_number(height, "height", 1.5, 30.0, "m")
@@ -86,12 +86,12 @@ def _given_names(survey: FloorSurvey, floor: str, names: Mapping[str, tuple[floa
         label = survey.label_at(point)
         where = f"floor {floor!r}: name {name!r}"
         if name in RESERVED or not name.strip() or name != name.strip():
-            raise RoomNameError(describe(where, "a name that plans have no use for themselves", repr(name)))
+            raise PlanError(describe(where, "a name that plans have no use for themselves", repr(name)))
         if label <= 0:
             place = f"({point[0]:g}, {point[1]:g}), a wall" if label == 0 else f"({point[0]:g}, {point[1]:g}), outside"
-            raise RoomNameError(describe(where, "a point in a room", place))
+            raise PlanError(describe(where, "a point in a room", place))
         if label in chosen:
-            raise RoomNameError(describe(where, "a room of its own", f"that of {chosen[label]!r}"))
+            raise PlanError(describe(where, "a room of its own", f"that of {chosen[label]!r}"))
         chosen[label] = name
     own = [room.name for room in survey.rooms]
     for room in survey.rooms:

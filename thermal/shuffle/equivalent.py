@@ -7,7 +7,7 @@ from typing import Any, Literal, TypeVar
 import casadi
 import numpy as np
 
-from thermal.shuffle.errors import ShuffleParameterError
+from thermal.errors import ModelError
 from thermal.shuffle.partners import disc_offsets
 
 #: A float, an array, or a CasADi expression.
@@ -39,7 +39,7 @@ def mean_square_reach(reach: float, cell_size: float) -> float:
 
     Raises
     ------
-    ShuffleParameterError
+    ModelError
         When an argument is not positive and finite.
 
     Examples
@@ -75,7 +75,7 @@ def effective_diffusivity(probability: Scalar, mean_square_reach: float, step: f
 
     Raises
     ------
-    ShuffleParameterError
+    ModelError
         When a numerical probability is outside [0, 1].
 
     Examples
@@ -108,7 +108,7 @@ def mixing_factor(probability: Scalar) -> Scalar:
 
     Raises
     ------
-    ShuffleParameterError
+    ModelError
         When a numerical probability is outside [0, 1].
 
     Examples
@@ -150,7 +150,7 @@ def mixing_rate(probability: Scalar, shuffle_step: float, step: float) -> Scalar
 
     Raises
     ------
-    ShuffleParameterError
+    ModelError
         When a numerical probability is outside [0, 1] or a step is not positive and finite.
 
     Examples
@@ -193,7 +193,7 @@ def exchange_rate(probability: Scalar, shuffle_step: float) -> Scalar:
 
     Raises
     ------
-    ShuffleParameterError
+    ModelError
         When a numerical probability is outside [0, 1] or the step is not positive and finite.
 
     Examples
@@ -230,7 +230,7 @@ def choose_equivalent(zone_extent: tuple[float, float], reach: float | None) -> 
 
     Raises
     ------
-    ShuffleParameterError
+    ModelError
         When an extent or the reach is not positive and finite.
 
     Examples
@@ -256,9 +256,9 @@ def _exp(value: Any) -> Any:
 
 def _require_probability(value: Any) -> None:
     if not _is_symbolic(value) and not np.all((np.asarray(value) >= 0.0) & (np.asarray(value) <= 1.0)):
-        raise ShuffleParameterError(f"expected a shuffle probability in [0, 1], came {value}")
+        raise ModelError(f"expected a shuffle probability in [0, 1], came {value}")
 
 
 def _require_positive(name: str, value: float, unit: str) -> None:
     if not (0.0 < value < np.inf):
-        raise ShuffleParameterError(f"expected {name} > 0 and finite [{unit}], came {value}")
+        raise ModelError(f"expected {name} > 0 and finite [{unit}], came {value}")

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from thermal.shuffle.errors import ShuffleCellError, ShuffleParameterError, ShuffleStateError
+from thermal.errors import ModelError
 from thermal.shuffle.partners import PartnerSampler
 from thermal.shuffle.swaps import FloatArray, IntArray, execute_swaps
 
@@ -41,9 +41,9 @@ class RandomShuffle:
 
     Raises
     ------
-    ShuffleParameterError
+    ModelError
         When the probability, the reach or a capacity is out of its range.
-    ShuffleCellError
+    ModelError
         When a cell does not exist, belongs to two zones or has no position, or shapes do not match.
 
     Examples
@@ -63,12 +63,12 @@ class RandomShuffle:
         capacities: npt.ArrayLike | None = None,
     ) -> None:
         if not 0.0 <= probability <= 1.0:
-            raise ShuffleParameterError(f"expected a shuffle probability in [0, 1], came {probability}")
+            raise ModelError(f"expected a shuffle probability in [0, 1], came {probability}")
         if reach is not None and not (0.0 < reach < np.inf):
-            raise ShuffleParameterError(f"expected a positive finite reach [m], or None for whole zones, came {reach}")
+            raise ModelError(f"expected a positive finite reach [m], or None for whole zones, came {reach}")
         points = np.asarray(positions, dtype=np.float64)
         if points.ndim != 2 or points.shape[1] != 2:
-            raise ShuffleCellError(f"expected positions of shape (n_cell, 2) [m], came {points.shape}")
+            raise ModelError(f"expected positions of shape (n_cell, 2) [m], came {points.shape}")
         zones = [cells for cells in _checked_zones(zone_cells, points) if cells.size > 1]
         self._probability = float(probability)
         self._n_cell = len(points)
@@ -92,12 +92,12 @@ class RandomShuffle:
 
         Raises
         ------
-        ShuffleCellError
+        ModelError
             When the shape is not ``(n_cell,)``.
         """
         shuffled = np.array(temperatures, dtype=np.float64)
         if shuffled.shape != (self._n_cell,):
-            raise ShuffleCellError(f"expected temperatures of shape ({self._n_cell},) [K], came {shuffled.shape}")
+            raise ModelError(f"expected temperatures of shape ({self._n_cell},) [K], came {shuffled.shape}")
         return execute_swaps(shuffled, *self.draw_swaps(), self._capacities)
 
     def draw_swaps(self) -> tuple[IntArray, IntArray]:
@@ -128,14 +128,14 @@ class RandomShuffle:
 
         Raises
         ------
-        ShuffleStateError
+        ModelError
             When the state is not one of this generator.
         """
         try:
             self._rng.bit_generator.state = dict(state)
         except (KeyError, TypeError, ValueError) as error:
             name = type(self._rng.bit_generator).__name__
-            raise ShuffleStateError(f"expected a state of {name} as RandomShuffle.state returns it: {error}") from error
+            raise ModelError(f"expected a state of {name} as RandomShuffle.state returns it: {error}") from error
 
 
 def _checked_zones(zone_cells: Sequence[npt.ArrayLike], points: FloatArray) -> list[IntArray]:
@@ -147,19 +147,19 @@ def _checked_zones(zone_cells: Sequence[npt.ArrayLike], points: FloatArray) -> l
         if cells.size == 0:
             continue
         if cells.ndim != 1 or not np.issubdtype(cells.dtype, np.integer):
-            raise ShuffleCellError(f"expected the cells of zone {zone} as a list of integers, came {cells!r}")
+            raise ModelError(f"expected the cells of zone {zone} as a list of integers, came {cells!r}")
         if cells.min() < 0 or cells.max() >= len(points):
-            raise ShuffleCellError(
+            raise ModelError(
                 f"expected the cells of zone {zone} in [0, {len(points)}), came {cells.min()} to {cells.max()}"
             )
         if np.unique(cells).size < cells.size:
-            raise ShuffleCellError(f"expected each cell once in zone {zone}, came repeated cells")
+            raise ModelError(f"expected each cell once in zone {zone}, came repeated cells")
         if taken[cells].any():
-            raise ShuffleCellError(
+            raise ModelError(
                 f"expected each cell in one zone, cell {cells[taken[cells]][0]} of zone {zone} is in another"
             )
         if not np.isfinite(points[cells]).all():
-            raise ShuffleCellError(f"expected finite positions [m] of the cells of zone {zone}, came NaN or infinity")
+            raise ModelError(f"expected finite positions [m] of the cells of zone {zone}, came NaN or infinity")
         taken[cells] = True
         zones.append(cells.astype(np.intp))
     return zones
@@ -169,10 +169,10 @@ def _unequal_capacities(capacities: npt.ArrayLike, zones: Sequence[IntArray], n_
     """Return the capacities [J/K] where they differ within some zone, None where plain swaps conserve energy."""
     stores = np.array(capacities, dtype=np.float64)
     if stores.shape != (n_cell,):
-        raise ShuffleCellError(f"expected capacities of shape ({n_cell},) [J/K], came {stores.shape}")
+        raise ModelError(f"expected capacities of shape ({n_cell},) [J/K], came {stores.shape}")
     for cells in zones:
         if not (np.isfinite(stores[cells]).all() and (stores[cells] > 0.0).all()):
-            raise ShuffleParameterError(
+            raise ModelError(
                 "expected positive finite capacities [J/K] of all air cells; massless cells hold none"
             )
     return stores if any(np.ptp(stores[cells]) > 0.0 for cells in zones) else None

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from thermal.shuffle.errors import ShuffleCellError, ShuffleParameterError
+from thermal.errors import ModelError
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.intp]
@@ -43,9 +43,9 @@ def apply_swaps(
 
     Raises
     ------
-    ShuffleCellError
+    ModelError
         When the shapes do not match or a swap names a cell that does not exist.
-    ShuffleParameterError
+    ModelError
         When a swapped cell has no positive capacity.
 
     Examples
@@ -55,17 +55,17 @@ def apply_swaps(
     """
     result = np.array(temperatures, dtype=np.float64)
     if result.ndim != 1:
-        raise ShuffleCellError(f"expected temperatures of shape (n_cell,) [K], came {result.shape}")
+        raise ModelError(f"expected temperatures of shape (n_cell,) [K], came {result.shape}")
     swapped = [_checked_cells(cells, result.size) for cells in (first, second)]
     if swapped[0].shape != swapped[1].shape:
-        raise ShuffleCellError(f"expected two cells a swap, came {swapped[0].size} and {swapped[1].size} cells")
+        raise ModelError(f"expected two cells a swap, came {swapped[0].size} and {swapped[1].size} cells")
     if capacities is None:
         return execute_swaps(result, swapped[0], swapped[1])
     stores = np.asarray(capacities, dtype=np.float64)
     if stores.shape != result.shape:
-        raise ShuffleCellError(f"expected capacities of shape {result.shape} as the temperatures, came {stores.shape}")
+        raise ModelError(f"expected capacities of shape {result.shape} as the temperatures, came {stores.shape}")
     if not all((stores[cells] > 0.0).all() for cells in swapped):
-        raise ShuffleParameterError("expected positive capacities [J/K] of all swapped cells")
+        raise ModelError("expected positive capacities [J/K] of all swapped cells")
     return execute_swaps(result, swapped[0], swapped[1], stores)
 
 
@@ -73,9 +73,9 @@ def _checked_cells(given: npt.ArrayLike, n_cell: int) -> IntArray:
     """Return a list of cells as indices after checking that they exist."""
     cells = np.asarray(given)
     if cells.size and not np.issubdtype(cells.dtype, np.integer):
-        raise ShuffleCellError(f"expected cells as integers, came {cells.dtype}")
+        raise ModelError(f"expected cells as integers, came {cells.dtype}")
     if cells.ndim != 1 or (cells.size and (cells.min() < 0 or cells.max() >= n_cell)):
-        raise ShuffleCellError(f"expected a list of cells in [0, {n_cell}), came {cells}")
+        raise ModelError(f"expected a list of cells in [0, {n_cell}), came {cells}")
     return cells.astype(np.intp)
 
 

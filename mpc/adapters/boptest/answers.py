@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from mpc.errors import BoptestAnswerError
+from mpc.errors import BoptestError
 from mpc.loop.actuators import Actuator
 from thermal._types import FloatArray
 from thermal.errors import describe
@@ -29,12 +29,12 @@ def time_of(values: Any, what: str) -> float:
 
     Raises
     ------
-    BoptestAnswerError
+    BoptestError
         When there is none.
     """
     time = values.get("time") if isinstance(values, dict) else None
     if isinstance(time, bool) or not isinstance(time, int | float) or not math.isfinite(time):
-        raise BoptestAnswerError(describe(f"measurements of {what}", "their time", repr(values)[:200]))
+        raise BoptestError(describe(f"measurements of {what}", "their time", repr(values)[:200]))
     return float(time)
 
 
@@ -54,18 +54,18 @@ def check_step(sent: Mapping[str, float], message: str, values: Any, expected: f
 
     Raises
     ------
-    BoptestAnswerError
+    BoptestError
         When the time is another, or the server used another value than was sent.
     """
     time = time_of(values, "a step")
     if abs(time - expected) > 1e-3:
-        raise BoptestAnswerError(describe("time of the test", f"{expected:g} s", f"{time:g} s", "does another use it?"))
+        raise BoptestError(describe("time of the test", f"{expected:g} s", f"{time:g} s", "does another use it?"))
     for name, value in sent.items():
         used = values.get(name)
         if isinstance(used, int | float) and abs(used - value) > _SAME * max(abs(value), 1.0):
-            raise BoptestAnswerError(f"input {name}: {value:g} was sent, the server used {used:g}: {message}")
+            raise BoptestError(f"input {name}: {value:g} was sent, the server used {used:g}: {message}")
     if "WARNING" in message:
-        raise BoptestAnswerError(f"the server changed what was sent: {message}")
+        raise BoptestError(f"the server changed what was sent: {message}")
 
 
 def actuator_of(name: str, entry: Mapping[str, Any]) -> Actuator:
@@ -101,13 +101,13 @@ def regular(payload: Any, points: list[str]) -> tuple[FloatArray, dict[str, Floa
 
     Raises
     ------
-    BoptestAnswerError
+    BoptestError
         When a list is missing, or there are not two values.
     """
     lists = {name: payload.get(name) if isinstance(payload, dict) else None for name in ("time", *points)}
     counts = {len(values) if isinstance(values, list) else -1 for values in lists.values()}
     if len(counts) > 1 or max(counts) < 2:
-        raise BoptestAnswerError(describe("results", "two or more values of each point", repr(sorted(counts))))
+        raise BoptestError(describe("results", "two or more values of each point", repr(sorted(counts))))
     columns = {name: np.array(values, dtype=float) for name, values in lists.items()}
     times, first = np.unique(columns.pop("time"), return_index=True)
     columns = {name: values[first] for name, values in columns.items()}

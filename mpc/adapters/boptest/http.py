@@ -7,7 +7,7 @@ import time
 from typing import TYPE_CHECKING, Any
 
 from mpc.adapters.boptest.test import Answer
-from mpc.errors import BoptestAnswerError, BoptestError, BoptestTimeoutError
+from mpc.errors import BoptestError, BoptestTimeoutError
 from thermal.errors import describe
 
 if TYPE_CHECKING:
@@ -76,7 +76,7 @@ class BoptestClient:
 
         Raises
         ------
-        BoptestAnswerError
+        BoptestError
             When the server refuses, or its answer is not of the form ``{"status", "message", "payload"}``.
         BoptestTimeoutError
             When there is no answer.
@@ -84,10 +84,10 @@ class BoptestClient:
         content = self.plain(method, path, body, repeat=repeat)
         if not isinstance(content, dict) or "payload" not in content:
             found = _short(content)
-            raise BoptestAnswerError(describe(f"{method} /{path}", "an object with status, message, payload", found))
+            raise BoptestError(describe(f"{method} /{path}", "an object with status, message, payload", found))
         message, status = str(content.get("message", "")), content.get("status", 200)
         if status != 200:
-            raise BoptestAnswerError(f"{method} /{path}: the server refuses with status {status}: {message[:500]}")
+            raise BoptestError(f"{method} /{path}: the server refuses with status {status}: {message[:500]}")
         return Answer(message, content["payload"])
 
     def plain(self, method: str, path: str, body: dict[str, Any] | None = None, *, repeat: bool = True) -> Any:
@@ -109,9 +109,9 @@ class BoptestClient:
             content = None
         if response.status_code != 200:
             said = content.get("message") or content.get("errors") if isinstance(content, dict) else response.text
-            raise BoptestAnswerError(f"{method} /{path}: status {response.status_code}: {_short(said)}")
+            raise BoptestError(f"{method} /{path}: status {response.status_code}: {_short(said)}")
         if content is None:
-            raise BoptestAnswerError(describe(f"{method} /{path}", "JSON", _short(response.text)))
+            raise BoptestError(describe(f"{method} /{path}", "JSON", _short(response.text)))
         return content
 
     def check_version(self) -> str:
@@ -119,7 +119,7 @@ class BoptestClient:
 
         Raises
         ------
-        BoptestAnswerError
+        BoptestError
             When it is not one that the client knows.
         """
         payload = self.ask("GET", "version").payload
@@ -128,7 +128,7 @@ class BoptestClient:
         number = (int(found[1]), int(found[2])) if found else (0, 0)
         if not OLDEST_VERSION <= number < NEXT_VERSION:
             expected = f"version {'.'.join(map(str, OLDEST_VERSION))} or later, below {NEXT_VERSION[0]}"
-            raise BoptestAnswerError(describe(f"BOPTEST server {self.url}", expected, repr(text)))
+            raise BoptestError(describe(f"BOPTEST server {self.url}", expected, repr(text)))
         return str(text)
 
     def stop(self, testid: str) -> None:

@@ -11,7 +11,7 @@ import pandas as pd
 from mpc.adapters.boptest.forecast import WEATHER_NAMES
 from mpc.adapters.boptest.mapping import BoptestSignals
 from mpc.adapters.boptest.prices import PRICE_POINTS
-from mpc.errors import BoptestAnswerError
+from mpc.errors import BoptestError
 from mpc.scenario.forecast import Forecast
 from thermal._types import FloatArray
 from thermal.errors import describe
@@ -84,7 +84,7 @@ def as_forecast(payload: object, sources: Mapping[str, _Source], stamps: pd.Date
 
     Raises
     ------
-    BoptestAnswerError
+    BoptestError
         When a point is missing or of another length.
     """
     count, columns = len(stamps), {}
@@ -92,7 +92,7 @@ def as_forecast(payload: object, sources: Mapping[str, _Source], stamps: pd.Date
         listed = payload.get(source.point) if isinstance(payload, dict) else None
         if not isinstance(listed, list) or len(listed) != count + 1:
             found = f"{len(listed)}" if isinstance(listed, list) else "none"
-            raise BoptestAnswerError(describe(f"forecast point {source.point}", f"{count + 1} values", found))
+            raise BoptestError(describe(f"forecast point {source.point}", f"{count + 1} values", found))
         values: FloatArray = np.array(listed, dtype=float) / source.divisor  # null becomes NaN
         columns[column] = 0.5 * (values[:-1] + values[1:]) if source.weather and not means else values[:-1]
     return Forecast(pd.DataFrame(columns, index=stamps))

@@ -21,7 +21,7 @@ from mpc.adapters.boptest.periods import PERIOD_DAYS
 from mpc.adapters.boptest.prices import PRICE_POINTS
 from mpc.adapters.boptest.signals import activation
 from mpc.adapters.boptest.test import KPI_NAMES
-from mpc.errors import BoptestAnswerError, BoptestError, PlantError
+from mpc.errors import BoptestError, PlantError
 from mpc.kpi.record import PlantRecord
 from mpc.loop.actuators import checked_actions
 from mpc.loop.conversion import conversion
@@ -204,7 +204,7 @@ class BoptestPlant:
             When the test is over, or `reset` was not called.
         BoptestTimeoutError
             When the server does not answer; the plant must then be reset.
-        BoptestAnswerError
+        BoptestError
             When the server refuses, changed a setpoint, or its clock is not where it should be.
         """
         need_running(not math.isnan(self._time))
@@ -222,7 +222,7 @@ class BoptestPlant:
             message, values = self._ask("POST", "advance", sent, repeat=False)
             if isinstance(values, dict) and not values:
                 self._end = self._time
-                raise BoptestAnswerError(f"the test is over at {self._time:g} s of the year: {message}")
+                raise BoptestError(f"the test is over at {self._time:g} s of the year: {message}")
             check_step(sent, message, values, self._time + self.control_step)
         except BoptestError as error:
             self._broken = str(error)
@@ -235,7 +235,7 @@ class BoptestPlant:
 
         Raises
         ------
-        BoptestAnswerError
+        BoptestError
             When the answer is not whole.
         """
         need_running(not math.isnan(self._time))
@@ -272,16 +272,16 @@ class BoptestPlant:
 
         Raises
         ------
-        BoptestAnswerError
+        BoptestError
             When one is neither a number nor null.
         """
         payload = self._ask("GET", "kpi").payload
         if not isinstance(payload, dict):
-            raise BoptestAnswerError(describe("indicators", "a number or null each", repr(payload)[:100]))
+            raise BoptestError(describe("indicators", "a number or null each", repr(payload)[:100]))
         found = {name: payload.get(name) for name in KPI_NAMES}
         for name, value in found.items():
             if value is not None and (isinstance(value, bool) or not isinstance(value, int | float)):
-                raise BoptestAnswerError(describe(f"indicator {name}", "a number or null", repr(value)[:100]))
+                raise BoptestError(describe(f"indicator {name}", "a number or null", repr(value)[:100]))
         return {name: None if value is None else float(value) for name, value in found.items()}
 
     def _ask(self, method: str, what: str, body: dict[str, Any] | None = None, *, repeat: bool = True) -> Any:
@@ -292,7 +292,7 @@ class BoptestPlant:
         answer = self._client.plain("POST", path, {}, repeat=False)
         testid = answer.get("testid") if isinstance(answer, dict) else None
         if not isinstance(testid, str) or not testid:
-            raise BoptestAnswerError(describe(f"POST /{path}", "a testid", repr(answer)[:200]))
+            raise BoptestError(describe(f"POST /{path}", "a testid", repr(answer)[:200]))
         return quote(testid, safe="")
 
     def _look_around(self, signals: BoptestSignals | None, year: int | None, timezone: str | None) -> None:
@@ -301,7 +301,7 @@ class BoptestPlant:
             self._ask("GET", what).payload for what in ("inputs", "measurements", "forecast_points")
         )
         if not all(isinstance(found, dict) for found in (inputs, outputs, points)):
-            raise BoptestAnswerError(describe("test case", "signals by name", "something else"))
+            raise BoptestError(describe("test case", "signals by name", "something else"))
         self.signals = own_signals(inputs, outputs) if signals is None else signals
         self.signals.check(inputs, outputs)
         about = self._ask("GET", "name").payload or {}
@@ -317,7 +317,7 @@ class BoptestPlant:
         self._ask("PUT", "step", {"step": control_step})
         found = self._ask("GET", "step").payload
         if not isinstance(found, int | float) or abs(found - control_step) > 1e-6:
-            raise BoptestAnswerError(describe("control step", f"{control_step:g} s", repr(found)))
+            raise BoptestError(describe("control step", f"{control_step:g} s", repr(found)))
         return float(found)
 
     def _find_end(self) -> float:

@@ -181,7 +181,7 @@ class EnergyPlusPlant:
             When the run is over, or `reset` was not called.
         EnergyPlusError
             When EnergyPlus breaks off or ends with severe errors.
-        EnergyPlusTimeoutError
+        EnergyPlusError
             When it does not answer.
         """
         need_running(self._number >= 0)

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from mpc.adapters.energyplus.install import data_folder
-from mpc.errors import EnergyPlusError, EnergyPlusTimeoutError
+from mpc.errors import EnergyPlusError
 from thermal.errors import describe
 
 _WORKER = Path(__file__).with_name("_worker.py")
@@ -133,7 +133,7 @@ class EnergyPlusProcess:
         ------
         EnergyPlusError
             When EnergyPlus breaks off, or has not what the job names.
-        EnergyPlusTimeoutError
+        EnergyPlusError
             When it does not answer.
         """
         try:
@@ -149,7 +149,7 @@ class EnergyPlusProcess:
         ------
         EnergyPlusError
             When it did not end well, or with severe errors.
-        EnergyPlusTimeoutError
+        EnergyPlusError
             When it does not end.
         """
         self._answer("done")
@@ -185,7 +185,7 @@ class EnergyPlusProcess:
         except queue.Empty:
             self.close()
             expected = f"an answer within {self._patience:g} s"
-            raise EnergyPlusTimeoutError(describe("EnergyPlus", expected, "none", "its process was ended")) from None
+            raise EnergyPlusError(describe("EnergyPlus", expected, "none", "its process was ended")) from None
         message: dict[str, Any] = {} if line is None else json.loads(line)
         if kind not in message:
             self._fail(_reason(message))

@@ -53,7 +53,7 @@ def controller_system(source: EnergyPlusBuilding, price_ratio: float = 1.0) -> H
     ------
     EnergyPlusError
         When a size is missing.
-    HvacParameterError
+    ModelError
         When the parts do not fit each other.
     """
     density = air_density(source.building.location.elevation)

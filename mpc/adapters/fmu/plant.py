@@ -12,7 +12,7 @@ import pandas as pd
 
 from mpc.adapters.fmu.signals import FmuSignals, actuator_of
 from mpc.adapters.fmu.unit import Unit
-from mpc.errors import FmuError, PlantError
+from mpc.errors import PlantError
 from mpc.kpi.record import PlantRecord
 from mpc.loop.actuators import checked_actions
 from mpc.loop.conversion import conversion
@@ -60,7 +60,7 @@ class FmuPlant:
 
     Raises
     ------
-    FmuError
+    PlantError
         When the unit cannot be run, or a variable is not there or of another kind.
     """
 
@@ -79,10 +79,10 @@ class FmuPlant:
         drivers: Mapping[str, FloatArray] | None = None,
     ) -> None:
         if start.tzinfo is None:
-            raise FmuError(describe("start", "a time with a time zone", str(start)))
+            raise PlantError(describe("start", "a time with a time zone", str(start)))
         if not (control_step > 0 and duration >= control_step and communication_steps >= 1 and warm_up >= 0):
             found = f"{control_step} s, {duration} s, {communication_steps} and {warm_up} s"
-            raise FmuError(describe("plant", "a positive control step within the duration, 1 step or more", found))
+            raise PlantError(describe("plant", "a positive control step within the duration, 1 step or more", found))
         self.control_step, self.signals = float(control_step), signals
         self._step, self._per_action = control_step / communication_steps, communication_steps
         self._actions, self._warm = int(duration / control_step + 1e-9), int(warm_up / self._step + 1e-9)
@@ -168,7 +168,7 @@ class FmuPlant:
             When a value is unknown, no finite number or outside its range.
         PlantError
             When the duration is over, or `reset` was not called.
-        FmuError
+        PlantError
             When the unit fails; the plant must then be reset.
         """
         need_running(self._number >= 0)
@@ -221,7 +221,7 @@ class FmuPlant:
         for name, values in self._drivers.items():
             unit.real(name, ("input",), "driver")
             if values.shape != needed or not np.isfinite(values).all():
-                raise FmuError(describe(f"driver {name}", f"{needed[0]} finite values", f"shape {values.shape}"))
+                raise PlantError(describe(f"driver {name}", f"{needed[0]} finite values", f"shape {values.shape}"))
         self._layout = PointLayout(tuple(signals.measurements), timezone)
         self._read = []
         for column, name in signals.measurements.items():
@@ -232,7 +232,7 @@ class FmuPlant:
         for name in (n for names in signals.powers.values() for n in names):
             variable = unit.real(name, _READABLE, "power")
             if variable.unit not in (None, "", "W"):
-                raise FmuError(describe(f"power {name}", "watts", repr(variable.unit)))
+                raise PlantError(describe(f"power {name}", "watts", repr(variable.unit)))
         made = [
             actuator_of(name, unit.real(variable, ("input", "parameter"), "actuator"), signals.limits.get(name))
             for name, variable in signals.actuators.items()

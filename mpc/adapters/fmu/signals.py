@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from mpc.errors import FmuError
+from mpc.errors import PlantError
 from mpc.loop.actuators import Actuator
 from mpc.loop.conversion import SIGNAL_UNITS, Conversion, conversion
 from thermal.case.points import POINT_TYPES, split_column
@@ -34,7 +34,7 @@ class FmuSignals:
 
     Raises
     ------
-    FmuError
+    PlantError
         When there is no zone, a column is of no known point, or a limit is of no actuator.
 
     Examples
@@ -54,16 +54,16 @@ class FmuSignals:
 
     def __post_init__(self) -> None:
         if not self.zones:
-            raise FmuError(describe("signals", "a variable for the temperature of a zone at least", "none"))
+            raise PlantError(describe("signals", "a variable for the temperature of a zone at least", "none"))
         for column in self.measurements:
             try:
                 split_column(column, "signals")
             except CaseError as error:
-                raise FmuError(str(error)) from error
+                raise PlantError(str(error)) from error
         for name, pair in self.limits.items():
             if name not in self.actuators or not -math.inf < pair[0] < pair[1] < math.inf:
                 advice = nearest(name, self.actuators)
-                raise FmuError(
+                raise PlantError(
                     describe(f"limits: {name}", "a lower and a higher number of an actuator", repr(pair), advice)
                 )
 

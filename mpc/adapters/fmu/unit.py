@@ -9,7 +9,7 @@ from contextlib import chdir
 from pathlib import Path
 from typing import Any
 
-from mpc.errors import FmuError
+from mpc.errors import PlantError
 from thermal.errors import describe, nearest
 
 
@@ -19,7 +19,7 @@ def _fmpy() -> Any:
         import fmpy
         import fmpy.fmi2
     except ModuleNotFoundError as error:
-        raise FmuError(f'an FMU needs {error.name}: pip install "buildingmpc[fmu]"') from error
+        raise PlantError(f'an FMU needs {error.name}: pip install "buildingmpc[fmu]"') from error
     return fmpy
 
 
@@ -33,34 +33,34 @@ class Unit:
 
     Raises
     ------
-    FmuError
+    PlantError
         When it cannot be read, is of another kind, or has no library for this machine.
     """
 
     def __init__(self, path: Path) -> None:
         fmpy = _fmpy()
         if not path.is_file():
-            raise FmuError(describe(f"FMU {path.name}", "a file", "none"))
+            raise PlantError(describe(f"FMU {path.name}", "a file", "none"))
         try:
             # makers of units are lax: what is needed of a description is checked by name
             self._description = fmpy.read_model_description(str(path), validate=False)
         except Exception as error:  # of zip, XML or a schema: FMPy lets them all through
-            raise FmuError(f"FMU {path.name}: expected a model description of FMI, found {error}") from error
+            raise PlantError(f"FMU {path.name}: expected a model description of FMI, found {error}") from error
         d = self._description
         if d.fmiVersion != "2.0" or d.coSimulation is None:
             kind = "co-simulation" if d.coSimulation is not None else "model exchange"
             found = f"{kind} of FMI {d.fmiVersion}"
-            raise FmuError(describe(f"FMU {path.name}", "co-simulation of FMI 2.0", found))
+            raise PlantError(describe(f"FMU {path.name}", "co-simulation of FMI 2.0", found))
         if fmpy.platform not in fmpy.supported_platforms(str(path)):
             found = ", ".join(fmpy.supported_platforms(str(path))) or "none"
-            raise FmuError(describe(f"FMU {path.name}", f"a library for {fmpy.platform}", found))
+            raise PlantError(describe(f"FMU {path.name}", f"a library for {fmpy.platform}", found))
         self.name = path.name
         self.variables: Mapping[str, Any] = {v.name: v for v in d.modelVariables}
         self._fmpy, self._slave = fmpy, None
         try:
             self._folder = Path(fmpy.extract(str(path)))
         except Exception as error:
-            raise FmuError(f"FMU {path.name}: cannot be unpacked: {error}") from error
+            raise PlantError(f"FMU {path.name}: cannot be unpacked: {error}") from error
 
     def real(self, name: str, kinds: Sequence[str], what: str) -> Any:
         """Look a variable up.
@@ -76,17 +76,17 @@ class Unit:
 
         Raises
         ------
-        FmuError
+        PlantError
             When there is none, or it is of another type or causality.
         """
         found = self.variables.get(name)
         if found is None:
-            raise FmuError(
+            raise PlantError(
                 describe(f"FMU {self.name}: {what}", "a variable", repr(name), nearest(name, self.variables))
             )
         if found.type != "Real" or found.causality not in kinds:
             expected = f"a real {' or '.join(kinds)}"
-            raise FmuError(describe(f"FMU {self.name}: {what} {name!r}", expected, f"{found.type} {found.causality}"))
+            raise PlantError(describe(f"FMU {self.name}: {what} {name!r}", expected, f"{found.type} {found.causality}"))
         return found
 
     def start(self, time: float, values: Mapping[str, float]) -> None:
@@ -109,7 +109,7 @@ class Unit:
                 )  # fmt: skip
             slave.instantiate()
         except Exception as error:
-            raise FmuError(f"FMU {self.name}: cannot be started: {error}") from error
+            raise PlantError(f"FMU {self.name}: cannot be started: {error}") from error
         self._slave = slave
         self._call("setupExperiment", startTime=time)
         self.set(values)
@@ -171,8 +171,8 @@ class Unit:
 
     def _call(self, function: str, *values: Any, **options: Any) -> Any:
         if self._slave is None:
-            raise FmuError(f"FMU {self.name}: was closed, or never started")
+            raise PlantError(f"FMU {self.name}: was closed, or never started")
         try:
             return getattr(self._slave, function)(*values, **options)
         except Exception as error:
-            raise FmuError(f"FMU {self.name}: {function} failed: {error}") from error
+            raise PlantError(f"FMU {self.name}: {function} failed: {error}") from error

@@ -11,7 +11,7 @@ import pandas as pd
 
 from mpc.control.problem.data import PeakData
 from mpc.control.problem.horizon import Horizon
-from mpc.errors import ForecastError
+from mpc.errors import ScenarioError
 from mpc.scenario.forecast import Forecast
 from mpc.scenario.grid import StepGrid
 from mpc.scenario.tariff import DemandCharge
@@ -75,7 +75,7 @@ def expect(
 
     Raises
     ------
-    ForecastError
+    ScenarioError
         Which column is missing, for how many steps and when first, or where the forecast ends.
     """
     per_zone = [f"{zone}/{name}" for name in ("internal_gain", "comfort_lower_temperature", "comfort_upper_temperature")
@@ -90,7 +90,7 @@ def expect(
     if fill is None and (edges[-1] < horizon.edges[-1] - 1e-6 or edges[0] > 1e-6):
         last = now + pd.Timedelta(seconds=horizon.edges[-1])
         found = f"{now + pd.Timedelta(seconds=edges[0])} to {index[-1]}"
-        raise ForecastError(describe("forecast", f"steps from {now} to {last}", found, 'pass fill="hold"'))
+        raise ScenarioError(describe("forecast", f"steps from {now} to {last}", found, 'pass fill="hold"'))
     values = forecast.values(columns, fill=fill)
     edges[0], edges[-1] = min(edges[0], 0.0), max(edges[-1], horizon.edges[-1])
     n_single, n = 3 + len(carbon), len(zones)

@@ -11,8 +11,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from calibration import CalibrationError, Interval, calibrate
-from calibration.errors import HorizonError, IntervalError, NotEnoughDataError
+from calibration import Interval, calibrate
+from calibration.errors import CalibrationError, HorizonError, NotEnoughDataError
 from calibration.evaluation.intervals import (
     alternating_intervals,
     default_intervals,
@@ -191,9 +191,9 @@ def test_what_one_kind_of_interval_leaves_serves_the_other() -> None:
     assert default_intervals(bundled(), [early])[1] == [Interval(stamps[1000], stamps[-1])]
     assert default_intervals(bundled(), [late])[1] == [Interval(stamps[0], stamps[1999])]
     assert default_intervals(bundled(), (), [late])[0] == [Interval(stamps[0], stamps[1999])]
-    with pytest.raises(IntervalError, match="leaves no telemetry"):
+    with pytest.raises(CalibrationError, match="leaves no telemetry"):
         default_intervals(bundled(), [Interval(stamps[0], stamps[-1])])
-    with pytest.raises(IntervalError, match="overlap"):
+    with pytest.raises(CalibrationError, match="overlap"):
         default_intervals(bundled(), [early, early])
 
 
@@ -267,7 +267,7 @@ def test_interval_as_text() -> None:
     ],
 )
 def test_texts_that_are_no_interval_are_refused(text: str, message: str) -> None:
-    with pytest.raises(IntervalError, match=message):
+    with pytest.raises(CalibrationError, match=message):
         parse_interval(text, bundled())
 
 

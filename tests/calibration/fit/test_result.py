@@ -14,8 +14,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from calibration import CalibrationError, CalibrationResult, calibrate, evaluate_model, load_parameters
-from calibration.errors import ParameterFileError
+from calibration import CalibrationResult, calibrate, evaluate_model, load_parameters
+from calibration.errors import CalibrationError
 from calibration.evaluation.n_step import HORIZONS
 from calibration.fit.describe import describe
 from calibration.fit.estimate import Estimate
@@ -261,14 +261,14 @@ BAD: dict[str, tuple[Any, str]] = {
 def test_files_that_hold_no_parameters_of_this_building_are_refused(tmp_path: Path, name: str) -> None:
     content, message = BAD[name]
     path = written(tmp_path, content)
-    with pytest.raises(ParameterFileError, match=message) as caught:
+    with pytest.raises(CalibrationError, match=message) as caught:
         load_parameters(path, network())
     assert str(path) in str(caught.value)
     assert isinstance(caught.value, CalibrationError)
 
 
 def test_file_that_is_not_there_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(ParameterFileError, match="nothing.json"):
+    with pytest.raises(CalibrationError, match="nothing.json"):
         load_parameters(tmp_path / "nothing.json", network())
-    with pytest.raises(ParameterFileError):
+    with pytest.raises(CalibrationError):
         load_parameters(tmp_path, network())

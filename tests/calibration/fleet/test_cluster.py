@@ -16,10 +16,11 @@ import distributed
 import pytest
 
 from calibration import calibrate_many
-from calibration.errors import ClusterError, MissingExtraError
+from calibration.errors import CalibrationError
 from calibration.fleet.cluster import ClusterExecutor
 from calibration.fleet.local import ONE_THREAD
 from calibration.fleet.run import case_folders
+from thermal.errors import MissingExtraError
 
 SETTINGS = {"horizon": "1h", "starts": 1}
 WITHOUT = "import sys; sys.modules['calibration'] = None"  # as where the package is not installed
@@ -80,28 +81,28 @@ def test_a_killed_worker_of_a_cluster_loses_nothing(
     with ClusterExecutor(scheduler, timeout=LONG, folders=[cases]) as executor:
         outcomes = calibrate_many(case_folders(cases), tmp_path / "out", SETTINGS, executor=executor, progress=kill)
         check_nothing_is_lost(tmp_path / "out", outcomes, kill.killed)
-    with pytest.raises(ClusterError, match=r"does not see .*nowhere; .* under the same path"):
+    with pytest.raises(CalibrationError, match=r"does not see .*nowhere; .* under the same path"):
         ClusterExecutor(scheduler, timeout=LONG, folders=[tmp_path / "nowhere"])
 
 
 def test_a_cluster_that_cannot_do_it_is_refused(scheduler: str, start_worker: Callable[..., None]) -> None:
-    with pytest.raises(ClusterError, match=r"at least one worker, found none within 0\.2 s; start some"):
+    with pytest.raises(CalibrationError, match=r"at least one worker, found none within 0\.2 s; start some"):
         ClusterExecutor(scheduler, timeout=0.2)
     start_worker(WITHOUT)
-    with pytest.raises(ClusterError, match=r"worker tcp://.*: expected buildingmpc .*, found ModuleNotFoundError"):
+    with pytest.raises(CalibrationError, match=r"worker tcp://.*: expected buildingmpc .*, found ModuleNotFoundError"):
         ClusterExecutor(scheduler, timeout=LONG)
 
 
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:9", "nonsense://x", "127.0.0.1"])
 def test_no_scheduler(address: str) -> None:
-    with pytest.raises(ClusterError, match=r"expected an answer within 0\.3 s"):
+    with pytest.raises(CalibrationError, match=r"expected an answer within 0\.3 s"):
         ClusterExecutor(address, timeout=0.3)
     # what is left to the garbage collector may close itself while the next client starts, and then both hang
     assert {x.status for x in gc.get_objects() if type(x) is distributed.Client} <= {"closed"}
 
 
 def test_no_address() -> None:
-    with pytest.raises(ClusterError, match="expected an address such as tcp://HOST:8786, came none"):
+    with pytest.raises(CalibrationError, match="expected an address such as tcp://HOST:8786, came none"):
         ClusterExecutor(" ")
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from mpc.control.problem.assembly import ComfortOperation, expect, peak_data
 from mpc.control.problem.horizon import Horizon
-from mpc.errors import ForecastError
+from mpc.errors import ScenarioError
 from mpc.scenario.forecast import Forecast
 from mpc.scenario.grid import StepGrid
 from mpc.scenario.tariff import DemandCharge
@@ -33,11 +33,11 @@ def test_a_missing_column_is_named_with_its_first_time(make_forecast, points) ->
     table = make_forecast().table.copy()
     name = f"{points.zones[1]}/internal_gain"
     table.loc[table.index[4] :, name] = np.nan
-    with pytest.raises(ForecastError, match=rf"lacks '{name}' for 44 of 48 steps \(first 2023-01-16 06:25\)"):
+    with pytest.raises(ScenarioError, match=rf"lacks '{name}' for 44 of 48 steps \(first 2023-01-16 06:25\)"):
         expect(Forecast(table), AHEAD, START, points.zones)
     held = expect(Forecast(table), AHEAD, START, points.zones, fill="hold")
     assert (held.gains[:, 1] == 30.0).all()
-    with pytest.raises(ForecastError, match="steps from"):
+    with pytest.raises(ScenarioError, match="steps from"):
         expect(make_forecast(count=6), AHEAD, START, points.zones)
 
 

@@ -13,7 +13,7 @@ from gymnasium.utils.env_checker import check_env
 from mpc.environment.environment import ControlEnvironment
 from mpc.environment.registration import office_environment
 from mpc.environment.reward import EconomicReward, PaperStepReward
-from mpc.errors import EnvironmentSetupError, PlantActionError
+from mpc.errors import MpcError, PlantActionError
 from mpc.kpi.record import PlantRecord
 from mpc.kpi.rewards import PaperReward, StageCost
 from mpc.loop.simulated import SimulatedPlant
@@ -186,13 +186,13 @@ def test_what_does_not_fit_is_refused_by_name(make_plant: Callable[..., Simulate
         ({"ranges": {"gas_power": (0.0, 1.0)}}, "a point that is observed"),
         ({"ranges": {"gas_power_sensor": (1.0, 0.0)}}, "a lower and a higher number"),
     ):
-        with pytest.raises(EnvironmentSetupError, match=words):
+        with pytest.raises(MpcError, match=words):
             ControlEnvironment(plant, **options)
-    with pytest.raises(EnvironmentSetupError, match="a plant or more"):
+    with pytest.raises(MpcError, match="a plant or more"):
         ControlEnvironment([])
-    with pytest.raises(EnvironmentSetupError, match="plant 1: expected the same control step"):
+    with pytest.raises(MpcError, match="plant 1: expected the same control step"):
         ControlEnvironment([plant, make_plant(control_steps=3)])
     world = ControlEnvironment(plant)
     for options, words in (({"plants": 1}, "nearest valid one is 'plant'"), ({"plant": 1}, "a plant from 0 to 0")):
-        with pytest.raises(EnvironmentSetupError, match=words):
+        with pytest.raises(MpcError, match=words):
             world.reset(options=options)

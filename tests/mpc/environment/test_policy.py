@@ -10,7 +10,7 @@ import pytest
 
 from mpc.environment.environment import ControlEnvironment
 from mpc.environment.policy import ActorNetwork, PolicyController
-from mpc.errors import EnvironmentSetupError
+from mpc.errors import MpcError
 from mpc.loop.run import run_closed_loop
 
 Make = Callable[..., ControlEnvironment]
@@ -41,7 +41,7 @@ def test_another_algorithm_is_refused() -> None:
         class policy:  # noqa: N801
             state_dict = staticmethod(dict)
 
-    with pytest.raises(EnvironmentSetupError, match="PPO or SAC"):
+    with pytest.raises(MpcError, match="PPO or SAC"):
         ActorNetwork.of_stable_baselines(DQN())
 
 
@@ -59,11 +59,11 @@ def test_what_is_no_policy_is_refused(tmp_path: Path) -> None:
     objects = {"about": np.array([{}], dtype=object)}
     np.savez(tmp_path / "objects.npz", **objects)  # type: ignore[arg-type]
     for name in ("text.npz", "other.npz", "objects.npz", "none.npz"):
-        with pytest.raises(EnvironmentSetupError, match="a file that ActorNetwork.save wrote"):
+        with pytest.raises(MpcError, match="a file that ActorNetwork.save wrote"):
             ActorNetwork.load(tmp_path / name)
-    with pytest.raises(EnvironmentSetupError, match="finite layers that fit"):
+    with pytest.raises(MpcError, match="finite layers that fit"):
         ActorNetwork((np.zeros((2, 3)), np.zeros((2, 3))), (np.zeros(2), np.zeros(2)), "tanh", True)
-    with pytest.raises(EnvironmentSetupError, match="nearest valid one is 'tanh'"):
+    with pytest.raises(MpcError, match="nearest valid one is 'tanh'"):
         ActorNetwork((np.zeros((2, 3)),), (np.zeros(2),), "tan", True)  # type: ignore[arg-type]
 
 
@@ -95,5 +95,5 @@ def test_a_controller_goes_on_without_a_forecast(make_environment: Make) -> None
 
 def test_a_policy_of_another_environment_is_refused(make_environment: Make) -> None:
     world = make_environment()
-    with pytest.raises(EnvironmentSetupError, match="5 and 2"):
+    with pytest.raises(MpcError, match="5 and 2"):
         PolicyController(random_network(5), world.layout, world.actions)

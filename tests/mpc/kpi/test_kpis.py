@@ -12,7 +12,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from mpc.errors import KpiError
+from mpc.errors import MpcError
 from mpc.kpi.kpis import Kpis, measure_kpis
 from mpc.kpi.record import PlantRecord
 from mpc.scenario.scenario import Scenario
@@ -169,5 +169,5 @@ def test_what_does_not_fit_is_refused(plain_scenario: Make) -> None:
         (lambda: measure_kpis(replace(run, co2=np.zeros((5, 2))), scenario), "co2_limit"),
         (lambda: measure_kpis(replace(run, district_heating=np.zeros(4)), scenario), "its price"),
     ):
-        with pytest.raises(KpiError, match=message):
+        with pytest.raises(MpcError, match=message):
             build()

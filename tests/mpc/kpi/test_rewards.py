@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mpc.errors import KpiError
+from mpc.errors import MpcError
 from mpc.kpi.kpis import measure_kpis
 from mpc.kpi.record import PlantRecord
 from mpc.kpi.rewards import PaperReward, StageCost
@@ -126,5 +126,5 @@ def test_what_cannot_be_is_refused() -> None:
         (lambda: PaperReward(lowest_productivity=400.0), "a productivity that rises"),
         (lambda: StageCost(-1.0), "prices of 0 or more"),
     ):
-        with pytest.raises(KpiError, match=message):
+        with pytest.raises(MpcError, match=message):
             build()

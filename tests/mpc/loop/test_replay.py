@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from mpc.errors import ReplayError
+from mpc.errors import MpcError
 from mpc.loop.noise import SensorNoise
 from mpc.loop.reduced import ReducedBuilding, reduced_building
 from mpc.loop.replay import SubsystemReplay, replay_subsystems
@@ -186,11 +186,11 @@ def test_without_a_model_zones_are_left_out(lab: Lab) -> None:
 def test_what_is_missing_is_named(lab: Lab) -> None:
     case, _ = lab.run()
     lacking = case.telemetry.frame.drop(columns="BOILER/supply_water_temperature_sensor")
-    with pytest.raises(ReplayError, match="'BOILER/supply_water_temperature_sensor'"):
+    with pytest.raises(MpcError, match="'BOILER/supply_water_temperature_sensor'"):
         replay_subsystems(Case(case.building, Telemetry.from_frame(lacking)), lab.system)
-    with pytest.raises(ReplayError, match="a day of telemetry"):
+    with pytest.raises(MpcError, match="a day of telemetry"):
         replay_subsystems(case.slice(end="2023-01-09T12:00"), lab.system)
-    with pytest.raises(ReplayError, match="tolerance"):
+    with pytest.raises(MpcError, match="tolerance"):
         replay_subsystems(case, lab.system, tolerance=2.0)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from mpc.errors import ForecastError
+from mpc.errors import ScenarioError
 from mpc.scenario.forecast import Forecast, column_unit
 
 AIR, BEAM = "outside_air_temperature_sensor", "direct_normal_irradiance_sensor"
@@ -33,18 +33,18 @@ def test_a_missing_column_is_named_with_its_first_time() -> None:
         r"forecast lacks 'direct_normal_irradiance_sensor' for 3 of 72 steps \(first 2023-07-06 07:10\); "
         r'pass fill="hold" or supply it'
     )
-    with pytest.raises(ForecastError, match=message):
+    with pytest.raises(ScenarioError, match=message):
         Forecast(broken).values([AIR, BEAM])
     assert Forecast(broken).values([BEAM], fill="hold").tolist() == [[500.0]] * 72
-    with pytest.raises(ForecastError, match="nearest valid one is 'east/internal_gain'.*72 of 72"):
+    with pytest.raises(ScenarioError, match="nearest valid one is 'east/internal_gain'.*72 of 72"):
         Forecast(table()).values(["est/internal_gain"])
-    with pytest.raises(ForecastError, match="for 72 of 72 .*; supply it"):
+    with pytest.raises(ScenarioError, match="for 72 of 72 .*; supply it"):
         Forecast(table()).values([BEAM], fill="hold")
 
 
 def test_missing_steps_are_named_or_held() -> None:
     stamps = table(80).index
-    with pytest.raises(ForecastError, match=r"for 8 of 80 steps \(first 2023-07-06 13:05\)"):
+    with pytest.raises(ScenarioError, match=r"for 8 of 80 steps \(first 2023-07-06 13:05\)"):
         Forecast(table()).values([AIR], stamps)
     held = Forecast(table()).values([AIR], stamps, fill="hold")
     assert held[72:].tolist() == [[290.0]] * 8
@@ -60,18 +60,18 @@ def test_units_of_ones_own() -> None:
         ({"electricity_price": "1/MWh"}, "the unit '1/kWh'"),
         ({AIR: "W"}, "a unit of a temperature"),
     ):
-        with pytest.raises(ForecastError, match=message):
+        with pytest.raises(ScenarioError, match=message):
             Forecast.from_table(own, units | change)
-    with pytest.raises(ForecastError, match="a unit, found none; add it"):
+    with pytest.raises(ScenarioError, match="a unit, found none; add it"):
         Forecast.from_table(own, {AIR: "degC"})
 
 
 def test_what_is_no_forecast_is_refused() -> None:
-    with pytest.raises(ForecastError, match="time zone"):
+    with pytest.raises(ScenarioError, match="time zone"):
         Forecast(table().tz_localize(None))
-    with pytest.raises(ForecastError, match="out of order"):
+    with pytest.raises(ScenarioError, match="out of order"):
         Forecast(table().iloc[::-1])
-    with pytest.raises(ForecastError, match="nearest valid one is 'electricity_price'"):
+    with pytest.raises(ScenarioError, match="nearest valid one is 'electricity_price'"):
         column_unit("electricty_price")
-    with pytest.raises(ForecastError, match="'hold' or None"):
+    with pytest.raises(ScenarioError, match="'hold' or None"):
         Forecast(table()).values([AIR], fill="zero")  # type: ignore[arg-type]

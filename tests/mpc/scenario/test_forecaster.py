@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from mpc.errors import ForecastError
+from mpc.errors import ScenarioError
 from mpc.scenario.forecaster import DAY_AHEAD_ERRORS, ErrorGrowth, Forecaster
 from mpc.scenario.occupancy import RandomOccupancy
 from mpc.scenario.paper import paper_tariff
@@ -109,5 +109,5 @@ def test_what_cannot_be_is_refused(scenario: Scenario) -> None:
         (lambda: ErrorGrowth(-1.0, 1.0), "a deviation of 0 or more"),
         (lambda: ErrorGrowth(1.0, 0.0), "a positive time"),
     ):
-        with pytest.raises(ForecastError, match=message):
+        with pytest.raises(ScenarioError, match=message):
             build()

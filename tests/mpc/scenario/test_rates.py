@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mpc.errors import TariffError
+from mpc.errors import ScenarioError
 from mpc.scenario.grid import Calendar, StepGrid
 from mpc.scenario.paper import paper_carbon, paper_tariff
 from mpc.scenario.rates import GAS_UNITS, ConstantRate, HourlyRate, MonthlyRate, SeriesRate, gas_price
@@ -77,7 +77,7 @@ def test_gas_by_the_unit_it_is_sold_in() -> None:
     for name, pints in (("therm", "therm"), ("mmBtu", "megaBtu"), ("GJ", "gigajoule"), ("MWh", "megawatt_hour")):
         assert GAS_UNITS[name] == pytest.approx(units.Quantity(1.0, pints).to("kWh").magnitude, rel=3e-4)
     assert gas_price(1.0, "kcf").value == pytest.approx(1.0 / (1.036 * GAS_UNITS["mmBtu"]))
-    with pytest.raises(TariffError, match="'barrel'"):
+    with pytest.raises(ScenarioError, match="'barrel'"):
         gas_price(1.0, "barrel")
 
 
@@ -106,5 +106,5 @@ def test_what_is_no_rate_is_refused() -> None:
         (lambda: SeriesRate(series.where(series != 3.0), "end"), "1 missing of 4, first 2023-07-03 02:00"),
         (lambda: SeriesRate(series, "start").on(grid("2023-07-03 03:30", 3600.0, 1)), "2023-07-03 04:30"),
     ):
-        with pytest.raises(TariffError, match=message):
+        with pytest.raises(ScenarioError, match=message):
             build()

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mpc.errors import TariffError
+from mpc.errors import ScenarioError
 from mpc.scenario.grid import StepGrid
 from mpc.scenario.tariff import DemandCharge, window_means
 
@@ -92,5 +92,5 @@ def test_what_is_no_charge_is_refused() -> None:
         (lambda: DemandCharge([1.0], np.zeros((24,))), "12 rows of 24"),
         (lambda: DemandCharge([1.0]).on(grid("2023-07-03", 900.0, 4)).peaks([1.0] * 5), "within 2023-07-03"),
     ):
-        with pytest.raises(TariffError, match=message):
+        with pytest.raises(ScenarioError, match=message):
             build()

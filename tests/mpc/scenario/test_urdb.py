@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from mpc.errors import TariffError
+from mpc.errors import ScenarioError
 from mpc.scenario.grid import StepGrid
 from mpc.scenario.rates import ConstantRate
 from mpc.scenario.urdb import read_urdb
@@ -87,10 +87,10 @@ def test_files_and_answers_of_the_service(tmp_path: Path) -> None:
     path.write_text(json.dumps({"items": [tariff()]}))
     assert read_urdb(path, GAS).name == "Town Light B-19"
     path.write_text(json.dumps({"items": [tariff(), tariff()]}))
-    with pytest.raises(TariffError, match=r"rate\.json: expected one tariff, found 2 items"):
+    with pytest.raises(ScenarioError, match=r"rate\.json: expected one tariff, found 2 items"):
         read_urdb(path, GAS)
     path.write_text("{")
-    with pytest.raises(TariffError, match="a JSON file"):
+    with pytest.raises(ScenarioError, match="a JSON file"):
         read_urdb(path, GAS)
 
 
@@ -98,7 +98,7 @@ def test_tiers_are_refused_unless_one_is_chosen() -> None:
     item = tariff()
     item["energyratestructure"][1] = [{"rate": 0.12, "max": 500, "unit": "kWh"}, {"rate": 0.18, "unit": "kWh"}]
     with pytest.raises(
-        TariffError, match=r"energyratestructure\[1\]: expected one tier, found 2, the first up to 500 kWh"
+        ScenarioError, match=r"energyratestructure\[1\]: expected one tier, found 2, the first up to 500 kWh"
     ):
         read_urdb(item, GAS)
     assert read_urdb(item, GAS, tier=0).electricity.on(day("2023-07-03"))[11] == pytest.approx(0.12)
@@ -126,7 +126,7 @@ def test_tiers_are_refused_unless_one_is_chosen() -> None:
 )
 def test_what_is_not_modelled_is_named(change: dict[str, Any], message: str) -> None:
     item = deepcopy(tariff()) | change
-    with pytest.raises(TariffError, match=message):
+    with pytest.raises(ScenarioError, match=message):
         read_urdb(item, GAS)
 
 

@@ -2,7 +2,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thermal.errors import HvacParameterError
+from thermal.errors import ModelError
 from thermal.hvac._air_handler import AirHandler, Heater
 from thermal.hvac._coil import WaterCoil
 from thermal.hvac._cooling import CoolingCoil
@@ -85,9 +85,9 @@ def test_without_coils_air_is_only_mixed():
 
 
 def test_parameters_out_of_range_are_refused():
-    with pytest.raises(HvacParameterError, match=r"AirHandler.minimum_outdoor_share: expected 0 to 1 -, found 1.2"):
+    with pytest.raises(ModelError, match=r"AirHandler.minimum_outdoor_share: expected 0 to 1 -, found 1.2"):
         AirHandler(Fan(1.0), minimum_outdoor_share=1.2)
-    with pytest.raises(HvacParameterError, match="expected a WaterCoil, a Heater or None, found float"):
+    with pytest.raises(ModelError, match="expected a WaterCoil, a Heater or None, found float"):
         AirHandler(Fan(1.0), heating=5.0)
-    with pytest.raises(HvacParameterError, match=r"Heater.capacity"):
+    with pytest.raises(ModelError, match=r"Heater.capacity"):
         Heater(-1.0)

@@ -2,7 +2,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thermal.errors import HvacParameterError
+from thermal.errors import ModelError
 from thermal.hvac._boiler import BoilerLoop, Pump
 from thermal.hvac._curves import CONDENSING_BOILER
 from thermal.hvac._operations import FloatOperations
@@ -75,9 +75,9 @@ def test_fuel_by_hand_and_condensing():
 
 
 def test_parameters_out_of_range_are_refused():
-    with pytest.raises(HvacParameterError, match=r"BoilerLoop.efficiency: expected 0.5 to 1 -, found 1.05"):
+    with pytest.raises(ModelError, match=r"BoilerLoop.efficiency: expected 0.5 to 1 -, found 1.05"):
         BoilerLoop(1e5, Pump(3.0), 1.05)
-    with pytest.raises(HvacParameterError, match=r"BoilerLoop.pipe_conductance"):
+    with pytest.raises(ModelError, match=r"BoilerLoop.pipe_conductance"):
         BoilerLoop(1e5, Pump(0.01), pipe_conductance=1000.0)
-    with pytest.raises(HvacParameterError, match=r"Pump.efficiency"):
+    with pytest.raises(ModelError, match=r"Pump.efficiency"):
         Pump(3.0, efficiency=0.0)

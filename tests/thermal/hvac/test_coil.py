@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import brentq
 
-from thermal.errors import HvacParameterError
+from thermal.errors import ModelError
 from thermal.hvac._coil import WaterCoil, _effectiveness, heat_share, valve_flow, valve_position, water_share
 from thermal.hvac._operations import FloatOperations
 
@@ -63,9 +63,9 @@ def test_sizing_reaches_its_capacity():
 
 
 def test_sizing_refuses_what_no_coil_reaches():
-    with pytest.raises(HvacParameterError, match="expected an effectiveness below"):
+    with pytest.raises(ModelError, match="expected an effectiveness below"):
         WaterCoil.sized(60_000.0, 1.0, 290.0, 330.0)
-    with pytest.raises(HvacParameterError, match=r"WaterCoil.air_flow: expected 1e-06 to 10000 kg/s, found -1.0"):
+    with pytest.raises(ModelError, match=r"WaterCoil.air_flow: expected 1e-06 to 10000 kg/s, found -1.0"):
         WaterCoil(100.0, 100.0, -1.0, 0.1)
 
 

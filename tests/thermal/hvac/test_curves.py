@@ -1,6 +1,6 @@
 import pytest
 
-from thermal.errors import HvacParameterError
+from thermal.errors import ModelError
 from thermal.hvac._curves import (
     CONDENSING_BOILER,
     DX_CAPACITY,
@@ -33,7 +33,7 @@ def test_arguments_are_held_within_their_ranges():
 
 
 def test_a_curve_without_range_is_refused():
-    with pytest.raises(HvacParameterError, match="six coefficients and rising ranges"):
+    with pytest.raises(ModelError, match="six coefficients and rising ranges"):
         Biquadratic((1.0, 0.0, 0.0, 0.0, 0.0, 0.0), (1.0, 0.0), (0.0, 1.0), "")
-    with pytest.raises(HvacParameterError, match="coefficients and a rising range"):
+    with pytest.raises(ModelError, match="coefficients and a rising range"):
         Polynomial((), 0.0, 1.0, "")

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thermal.errors import HvacParameterError
+from thermal.errors import ModelError
 from thermal.hvac._operations import CasadiOperations, FloatOperations, NumpyOperations, StepOperations
 
 KINDS = (FloatOperations, NumpyOperations, CasadiOperations)
@@ -94,5 +94,5 @@ def test_a_step_has_floats_for_what_there_is_one_of():
 
 
 def test_a_width_out_of_range_is_refused():
-    with pytest.raises(HvacParameterError, match=r"expected a share from 0 \(exact\) to 0.5, found 0.7"):
+    with pytest.raises(ModelError, match=r"expected a share from 0 \(exact\) to 0.5, found 0.7"):
         FloatOperations(0.7)

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from thermal.case.points import POINT_TYPES
-from thermal.errors import HvacParameterError
+from thermal.errors import ModelError
 from thermal.hvac._plant import HvacPlant
 from thermal.hvac._points import HvacPoints
 from thermal.hvac._step import Actions, Conditions
@@ -66,7 +66,7 @@ def test_pressures_are_held_while_the_drives_run(plant_system):
 
 
 def test_names_that_do_not_fit_are_refused(plant_system):
-    with pytest.raises(HvacParameterError, match="expected 5 terminals and 2 air handlers, all named differently"):
+    with pytest.raises(ModelError, match="expected 5 terminals and 2 air handlers, all named differently"):
         HvacPoints(plant_system, NAMES, ["AHU"], "BOILER")
-    with pytest.raises(HvacParameterError, match="all named differently"):
+    with pytest.raises(ModelError, match="all named differently"):
         HvacPoints(plant_system, NAMES, ["AHU", "AHU"], "BOILER")

@@ -2,7 +2,7 @@ import casadi
 import numpy as np
 import pytest
 
-from thermal.errors import HvacParameterError
+from thermal.errors import ModelError
 from thermal.hvac._plant import HvacPlant
 from thermal.hvac._step import Actions, Conditions
 from thermal.hvac._symbolic import hvac_function
@@ -121,5 +121,5 @@ def test_the_second_law_holds_for_the_smooth_plant(plant_system, seed):
 
 
 def test_a_width_out_of_range_is_refused(plant_system):
-    with pytest.raises(HvacParameterError, match="smoothing width"):
+    with pytest.raises(ModelError, match="smoothing width"):
         hvac_function(plant_system, -0.1)

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thermal.errors import HvacParameterError
+from thermal.errors import ModelError
 from thermal.hvac._operations import FloatOperations, NumpyOperations
 from thermal.hvac._thermostat import Mode, Thermostat
 
@@ -69,7 +69,7 @@ def test_the_version_without_memory_lies_between_the_branches_of_the_one_with(t)
 
 
 def test_a_range_out_of_bounds_is_refused():
-    with pytest.raises(HvacParameterError, match=r"Thermostat.throttling_range: expected 0.05 to 5 K, found 0.0"):
+    with pytest.raises(ModelError, match=r"Thermostat.throttling_range: expected 0.05 to 5 K, found 0.0"):
         Thermostat(throttling_range=0.0)
-    with pytest.raises(HvacParameterError, match=r"Thermostat.release"):
+    with pytest.raises(ModelError, match=r"Thermostat.release"):
         Thermostat(release=0.7)

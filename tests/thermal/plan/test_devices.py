@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thermal.case.schema import Device
-from thermal.errors import DeviceListError, DrawingFileError
+from thermal.errors import PlanError
 from thermal.plan.columns import read_columns, write_matches
 from thermal.plan.devices import read_devices
 from thermal.plan.match import match_points
@@ -90,7 +90,7 @@ def test_a_csv_of_any_sign(tmp_path: Path, sign: str) -> None:
 )
 def test_lists_that_are_none_are_refused(tmp_path: Path, text: str, message: str) -> None:
     (tmp_path / "d.csv").write_text(text, encoding="utf-8")
-    with pytest.raises((DeviceListError, DrawingFileError), match=message):
+    with pytest.raises((PlanError), match=message):
         read_devices(tmp_path / "d.csv", ZONES)
 
 
@@ -112,7 +112,7 @@ def test_a_brick_model(tmp_path: Path) -> None:
     (match,) = match_points(["abc-1"], found.devices, ZONES, listed=found.points)
     assert (match.entity, match.confidence, match.remark) == ("VAV_1", 1.0, "")
     (tmp_path / "b.ttl").write_text("<<<", encoding="utf-8")
-    with pytest.raises(DeviceListError, match="Turtle"):
+    with pytest.raises(PlanError, match="Turtle"):
         read_devices(tmp_path / "b.ttl", ZONES)
 
 
@@ -172,7 +172,7 @@ def test_columns_of_files(tmp_path: Path) -> None:
     frame.to_parquet(tmp_path / "t.parquet")
     assert read_columns(tmp_path / "t.csv") == read_columns(tmp_path / "t.parquet") == ("a", "b,c")
     (tmp_path / "x.parquet").write_bytes(b"nothing")
-    with pytest.raises(DrawingFileError):
+    with pytest.raises(PlanError):
         read_columns(tmp_path / "x.parquet")
     file = write_matches(match_points(["a", "b,c"], [Device(name="A", type="vav")]), tmp_path / "points.csv")
     assert file.read_text(encoding="utf-8").splitlines()[2].startswith('"b,c",')

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from thermal.errors import DrawingFileError, MissingExtraError, OversizedFileError, PlanSettingError
+from thermal.errors import MissingExtraError, OversizedFileError, PlanError
 from thermal.plan.codes import read_codes
 from thermal.plan.drawing import read_drawing
 
@@ -61,15 +61,15 @@ NEEDS_POPPLER = pytest.mark.skipif(shutil.which("pdfinfo") is None, reason="need
 )
 def test_what_is_no_drawing_is_refused(tmp_path: Path, name: str, content: bytes, message: str) -> None:
     (tmp_path / name).write_bytes(content)
-    with pytest.raises(DrawingFileError, match=message):
+    with pytest.raises(PlanError, match=message):
         read_drawing(tmp_path / name)
 
 
 def test_what_is_not_there_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(DrawingFileError, match="found nothing"):
+    with pytest.raises(PlanError, match="found nothing"):
         read_drawing(tmp_path / "none.png")
     (tmp_path / "folder.png").mkdir()
-    with pytest.raises(DrawingFileError, match="found a folder"):
+    with pytest.raises(PlanError, match="found a folder"):
         read_drawing(tmp_path / "folder.png")
 
 
@@ -79,19 +79,19 @@ def test_a_truncated_image_is_refused(tmp_path: Path) -> None:
         Image.fromarray(pixels).save(tmp_path / name)
         whole = (tmp_path / name).read_bytes()
         (tmp_path / name).write_bytes(whole[: len(whole) // 2])
-        with pytest.raises(DrawingFileError, match="whole"):
+        with pytest.raises(PlanError, match="whole"):
             read_drawing(tmp_path / name)
 
 
 def test_pages_and_crops_are_checked(office_pdf: Path, tmp_path: Path) -> None:
-    with pytest.raises(DrawingFileError, match="page"):
+    with pytest.raises(PlanError, match="page"):
         read_drawing(office_pdf, page=7)
-    with pytest.raises(PlanSettingError, match="page"):
+    with pytest.raises(PlanError, match="page"):
         read_drawing(office_pdf, page=0)
-    with pytest.raises(PlanSettingError, match="dots_per_inch"):
+    with pytest.raises(PlanError, match="dots_per_inch"):
         read_drawing(office_pdf, dots_per_inch=5000.0)
     Image.new("L", (40, 30), 255).save(tmp_path / "a.png")
-    with pytest.raises(PlanSettingError, match="40 x 30"):
+    with pytest.raises(PlanError, match="40 x 30"):
         read_drawing(tmp_path / "a.png", crop=(0, 0, 50, 10))
     assert read_drawing(tmp_path / "a.png", crop=(5, 10, 40, 30)).grey.shape == (20, 35)
 
@@ -115,7 +115,7 @@ def test_an_array_that_unpacks_to_more_than_a_plan_is_refused(tmp_path: Path) ->
 
 def test_an_array_of_objects_runs_nothing(tmp_path: Path) -> None:
     np.save(tmp_path / "object.npy", np.array([{"a": 1}], dtype=object), allow_pickle=True)
-    with pytest.raises(DrawingFileError, match="Python objects"):
+    with pytest.raises(PlanError, match="Python objects"):
         read_codes(tmp_path / "object.npy", 0.5)
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from threading import RLock
 from typing import Any
 
-from thermal.errors import MalformedRequestError, MissingExtraError, SessionHeldError, describe
+from thermal.errors import LabelError, MissingExtraError, SessionHeldError, describe
 from thermal.plan.page.access import Application, Gate
 from thermal.plan.page.convert import parse_draft
 from thermal.plan.page.draft import Draft
@@ -91,7 +91,7 @@ class LabelDesk:
         ------
         SessionHeldError
             Another window has the case, or has changed it.
-        MalformedRequestError
+        LabelError
             It is no draft.
         """
         draft = parse_draft(content, "draft")
@@ -162,13 +162,13 @@ def parse_json(body: bytes) -> Any:
 
     Raises
     ------
-    MalformedRequestError
+    LabelError
         It is no JSON, or blocks within blocks without end.
     """
     try:
         return json.loads(body)
     except (ValueError, RecursionError) as error:  # ValueError: no UTF-8, no JSON, an integer of 5000 digits
-        raise MalformedRequestError(describe("body", "JSON", f"{type(error).__name__}: {error}"[:200])) from error
+        raise LabelError(describe("body", "JSON", f"{type(error).__name__}: {error}"[:200])) from error
 
 
 def plain(value: Any) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from pydantic import ValidationError
 
 from thermal.case.building import Building, FloorPlan, FloorPlans, ZoneTable
 from thermal.case.schema import Device, Location
-from thermal.errors import LabelledCaseError, MalformedRequestError, describe
+from thermal.errors import LabelError, describe
 from thermal.plan.list import FloorEntry
 from thermal.plan.page.draft import BASIC, Draft, DraftDevice, DraftFloor, Picture, Site
 
@@ -75,7 +75,7 @@ def parse_draft(content: Any, where: str) -> Draft:
 
     Raises
     ------
-    MalformedRequestError
+    LabelError
         It is no draft; the message names the key.
     """
     try:
@@ -83,7 +83,7 @@ def parse_draft(content: Any, where: str) -> Draft:
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         place = f"{where}: {'.'.join(str(part) for part in first['loc']) or 'content'}"
-        raise MalformedRequestError(describe(place, first["msg"], repr(first["input"])[:80])) from error
+        raise LabelError(describe(place, first["msg"], repr(first["input"])[:80])) from error
     for floor in draft.floors:
         _check_runs(floor, f"{where}: floor {floor.name!r}")
     return draft
@@ -93,13 +93,13 @@ def _check_runs(floor: DraftFloor, where: str) -> None:
     runs = np.asarray(floor.runs, dtype=np.float64)  # an integer of any size
     if floor.rows * floor.columns > _MOST_CELLS:
         found = f"{floor.rows} x {floor.columns}"
-        raise MalformedRequestError(describe(where, f"at most {_MOST_CELLS} cells", found))
+        raise LabelError(describe(where, f"at most {_MOST_CELLS} cells", found))
     if floor.legend[: len(BASIC)] != BASIC or len(set(floor.legend)) < len(floor.legend):
         expected = f"a legend of different names that begins with {' '.join(BASIC)}"
-        raise MalformedRequestError(describe(where, expected, repr(floor.legend[:4])))
+        raise LabelError(describe(where, expected, repr(floor.legend[:4])))
     fits = runs.size % 2 == 0 and (runs >= 0).all() and runs[1::2].sum() == floor.rows * floor.columns
     if not fits or (runs[::2] >= len(floor.legend)).any():
-        raise MalformedRequestError(describe(where, "runs of all cells, within the legend", "others"))
+        raise LabelError(describe(where, "runs of all cells, within the legend", "others"))
 
 
 def draft_of(building: Building) -> Draft:
@@ -117,12 +117,12 @@ def draft_of(building: Building) -> Draft:
 
     Raises
     ------
-    LabelledCaseError
+    LabelError
         It has a zone table.
     """
     if isinstance(building.geometry, ZoneTable):
         advice = "a zone table is edited as text: see the case format"
-        raise LabelledCaseError(describe(building.name, "a case with floor plans", "a zone table", advice))
+        raise LabelError(describe(building.name, "a case with floor plans", "a zone table", advice))
     plans = building.geometry
     return Draft(
         name=building.name,

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal.case.building import OUTSIDE
-from thermal.errors import PlanSettingError, describe
+from thermal.errors import PlanError, describe
 from thermal.plan.align import align_floors
 from thermal.plan.assemble import assemble_plans
 from thermal.plan.cells import ZonedFloor, draw_cells
@@ -83,7 +83,7 @@ def add_floors(
     taken = {floor.name for floor in draft.floors}
     for entry in entries:
         if entry.name in taken:
-            raise PlanSettingError(describe("floors: name", "a name of its own", repr(entry.name), "choose another"))
+            raise PlanError(describe("floors: name", "a name of its own", repr(entry.name), "choose another"))
         taken.add(entry.name)
     zoned = []
     for number, entry in enumerate(entries):

@@ -121,7 +121,7 @@ class Reports:
         ------
         ReportError
             There is none.
-        OutsideFolderError
+        PlanError
             The name leads out of the report's folder.
         """
         for report in self.found():

@@ -12,9 +12,9 @@ from fastapi.responses import FileResponse, JSONResponse, Response
 from pydantic import TypeAdapter, ValidationError
 
 from thermal.errors import (
-    DrawingFileError,
-    MalformedRequestError,
+    LabelError,
     OversizedFileError,
+    PlanError,
     ReportError,
     SessionHeldError,
     ThermalError,
@@ -93,7 +93,7 @@ def _add_draft(app: FastAPI, desk: LabelDesk) -> None:
     async def open_session(request: Request) -> dict[str, Any]:
         asked = parse_json(await _body(request, _MOST_WORDS))
         if not isinstance(asked, dict) or not isinstance(asked.get("window"), str) or not asked["window"]:
-            raise MalformedRequestError(describe("session", "a window's name", repr(asked)[:80]))
+            raise LabelError(describe("session", "a window's name", repr(asked)[:80]))
         previous, take_over = str(asked.get("previous", "")), asked.get("take_over") is True
         return desk.sessions.open(asked["window"], previous=previous, take_over=take_over)
 
@@ -142,7 +142,7 @@ def _add_drawings(app: FastAPI, desk: LabelDesk) -> None:
     def show_drawing(name: str, page: int = 1, dots_per_inch: float = DOTS_PER_INCH) -> Response:
         file = inside_folder(own / "drawings", name, "drawing")
         if file.suffix.lower() not in RASTER_KINDS:
-            raise DrawingFileError(describe(file.name, "a raster drawing", repr(file.suffix)))
+            raise PlanError(describe(file.name, "a raster drawing", repr(file.suffix)))
         sheet = look_at(file, page, dots_per_inch)
         picture = picture_of(read_drawing(file, page=page, dots_per_inch=dots_per_inch).grey)
         size = {"x-width": f"{sheet.width:.0f}", "x-height": f"{sheet.height:.0f}"}
@@ -152,7 +152,7 @@ def _add_drawings(app: FastAPI, desk: LabelDesk) -> None:
     def show_picture(name: str) -> Response:
         file = inside_folder(own / "pictures", name, "picture")
         if not file.is_file() or file.suffix != ".png":
-            raise DrawingFileError(describe(name[:80], "a picture of the page", "none"))
+            raise PlanError(describe(name[:80], "a picture of the page", "none"))
         return FileResponse(file, media_type="image/png")
 
     @app.post("/api/floors")
@@ -216,7 +216,7 @@ async def _body(request: Request, most: int) -> bytes:
     """Read a body of JSON, up to a size."""
     kind = request.headers.get("content-type", "").partition(";")[0].strip()
     if kind != "application/json":
-        raise MalformedRequestError(describe("content-type", "application/json", repr(kind[:60])))
+        raise LabelError(describe("content-type", "application/json", repr(kind[:60])))
     parts, size = [], 0
     async for chunk in request.stream():
         size += len(chunk)
@@ -234,11 +234,11 @@ def _floor_request(content: Any) -> tuple[list[FloorEntry], float | None]:
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         where = f"floors: {'.'.join(str(part) for part in first['loc'])}"
-        raise MalformedRequestError(describe(where, first["msg"], repr(first["input"])[:80])) from error
+        raise LabelError(describe(where, first["msg"], repr(first["input"])[:80])) from error
     except (TypeError, KeyError, AttributeError) as error:
-        raise MalformedRequestError(describe("body", "{'floors': [...]}", repr(content)[:80])) from error
+        raise LabelError(describe("body", "{'floors': [...]}", repr(content)[:80])) from error
     if not entries:
-        raise MalformedRequestError(describe("floors", "at least one drawing", "none"))
+        raise LabelError(describe("floors", "at least one drawing", "none"))
     return entries, size
 
 
@@ -252,4 +252,4 @@ async def _malformed(request: Request, error: Exception) -> Response:
     first = error.errors()[0] if isinstance(error, RequestValidationError) else {}
     where = ".".join(str(part) for part in first.get("loc", ("request",)))
     message = describe(where, str(first.get("msg", "a valid value")), repr(first.get("input"))[:80])
-    return JSONResponse({"error": MalformedRequestError.__name__, "message": message}, 400)
+    return JSONResponse({"error": LabelError.__name__, "message": message}, 400)

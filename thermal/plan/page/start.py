@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from thermal.errors import DrawingFileError, describe
+from thermal.errors import PlanError, describe
 from thermal.plan.guard import inside_folder
 from thermal.plan.list import read_drawing_list
 from thermal.plan.page.app import LabelDesk
@@ -76,4 +76,4 @@ def _copy(source: Path, target: Path) -> None:
     try:
         write_whole(target, source.read_bytes())
     except OSError as error:
-        raise DrawingFileError(describe(source.name, "a file that can be copied", str(error))) from error
+        raise PlanError(describe(source.name, "a file that can be copied", str(error))) from error

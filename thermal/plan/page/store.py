@@ -14,7 +14,7 @@ import yaml
 from thermal.case.building_file import NAME, read_building_file
 from thermal.case.load import load_case
 from thermal.case.telemetry_file import check_units, read_telemetry
-from thermal.errors import CaseError, LabelledCaseError, ThermalError, describe
+from thermal.errors import CaseError, LabelError, ThermalError, describe
 from thermal.plan.columns import read_columns
 from thermal.plan.folder import save_plan_case
 from thermal.plan.guard import inside_folder
@@ -60,7 +60,7 @@ class CaseStore:
 
     Raises
     ------
-    LabelledCaseError
+    LabelError
         It holds something that is no case, a case with a zone table, or a damaged draft.
     CaseError
         One of its family: the case that is there cannot be read.
@@ -69,20 +69,20 @@ class CaseStore:
     def __init__(self, path: str | PathLike[str]) -> None:
         self.folder = Path(path).absolute()
         if self.folder.exists() and not self.folder.is_dir():
-            raise LabelledCaseError(describe(str(path), "a case folder", "a file"))
+            raise LabelError(describe(str(path), "a case folder", "a file"))
         own = self.folder / OWN_FOLDER
         is_case = (self.folder / NAME).is_file()
         if self.folder.is_dir() and any(self.folder.iterdir()) and not is_case and not own.is_dir():
             advice = "choose another folder"
-            raise LabelledCaseError(
+            raise LabelError(
                 describe(str(path), "a case, or an empty folder", "a folder of other files", advice)
             )
         self.draft = _read_draft(self.folder, is_case)
         if own.is_symlink() or (own.exists() and not own.is_dir()):
-            raise LabelledCaseError(describe(f"{path}: {OWN_FOLDER}", "a folder of the page's own", "something else"))
+            raise LabelError(describe(f"{path}: {OWN_FOLDER}", "a folder of the page's own", "something else"))
         for name in ("drawings", "pictures", "reports"):
             if (own / name).is_symlink():
-                raise LabelledCaseError(
+                raise LabelError(
                     describe(f"{path}: {OWN_FOLDER}/{name}", "a folder of the page's own", "a link")
                 )
             (own / name).mkdir(parents=True, exist_ok=True)
@@ -199,12 +199,12 @@ def _read_draft(folder: Path, is_case: bool) -> Draft:
     draft: Draft | None = None
     if file.is_file():
         if file.stat().st_size > _MOST_DRAFT:
-            raise LabelledCaseError(describe(str(file), f"at most {_MOST_DRAFT} bytes", f"{file.stat().st_size}"))
+            raise LabelError(describe(str(file), f"at most {_MOST_DRAFT} bytes", f"{file.stat().st_size}"))
         try:
             draft = parse_draft(json.loads(file.read_text(encoding="utf-8")), file.name)
         except (OSError, ValueError, RecursionError, ThermalError) as error:
             advice = f"move {OWN_FOLDER}/{DRAFT} away to begin with the case"
-            raise LabelledCaseError(describe(str(file), "the page's own file", str(error), advice)) from error
+            raise LabelError(describe(str(file), "the page's own file", str(error), advice)) from error
     if not is_case:
         return draft or Draft(name=folder.name)
     read_building_file(folder)

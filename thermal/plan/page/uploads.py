@@ -12,7 +12,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal.errors import DrawingFileError, OutsideFolderError, OversizedFileError, describe
+from thermal.errors import OversizedFileError, PlanError, describe
 from thermal.plan.codes import CODE_KINDS, read_codes
 from thermal.plan.drawing import RASTER_KINDS, read_drawing
 from thermal.plan.extra import extra
@@ -66,17 +66,17 @@ def checked_name(name: str, kinds: tuple[str, ...]) -> str:
 
     Raises
     ------
-    OutsideFolderError
+    PlanError
         It leads elsewhere.
-    DrawingFileError
+    PlanError
         It has another suffix, or is none.
     """
     if any(sign in name for sign in "/\\\0") or name.startswith(".") or not name.isprintable() or len(name) > 150:
-        raise OutsideFolderError(describe("upload", "the plain name of a file", repr(name[:200]), "rename the file"))
+        raise PlanError(describe("upload", "the plain name of a file", repr(name[:200]), "rename the file"))
     suffix = Path(name).suffix.lower()
     if suffix not in kinds:
         advice = "unpack it first" if suffix == ".zip" else "export it as one of these"
-        raise DrawingFileError(describe(name, f"a file that ends in {', '.join(kinds)}", repr(suffix or name), advice))
+        raise PlanError(describe(name, f"a file that ends in {', '.join(kinds)}", repr(suffix or name), advice))
     return name
 
 
@@ -94,9 +94,9 @@ class Upload:
 
     Raises
     ------
-    OutsideFolderError
+    PlanError
         The name leads elsewhere.
-    DrawingFileError
+    PlanError
         It has another suffix, or is none.
     """
 

@@ -10,7 +10,7 @@ import pytest
 
 from mpc.adapters.boptest.case import BoptestCase
 from mpc.adapters.boptest.plant import BoptestPlant, BoptestTime
-from mpc.errors import BoptestAnswerError, BoptestError, PlantActionError, PlantError
+from mpc.errors import BoptestError, PlantActionError, PlantError
 from mpc.kpi.kpis import measure_kpis
 from mpc.loop.plant import Measurements
 from mpc.loop.run import run_closed_loop
@@ -163,13 +163,13 @@ def test_wrong_use_is_refused(connect: Connect, server: object) -> None:
     plant.reset()
     with pytest.raises(PlantError, match="a step at least"):
         plant.record()
-    with pytest.raises(BoptestAnswerError, match="steps of 300 s"):
+    with pytest.raises(BoptestError, match="steps of 300 s"):
         connect(control_step=450.0)
-    with pytest.raises(BoptestAnswerError, match=r"time_period is 'peak_cool_day', but should be one of"):
+    with pytest.raises(BoptestError, match=r"time_period is 'peak_cool_day', but should be one of"):
         connect("peak_cool_day").reset()
     with pytest.raises(BoptestError, match="electricity_price"):
         connect(electricity_price="dynamc")
-    with pytest.raises(BoptestAnswerError, match="no test case 'smal'; served are small"):
+    with pytest.raises(BoptestError, match="no test case 'smal'; served are small"):
         BoptestPlant(plant._client.url, "smal", "mix_day", 300.0)
     with pytest.raises(BoptestError, match="url: expected such as"):
         BoptestPlant("127.0.0.1:80", "small", "mix_day", 300.0)

@@ -16,7 +16,7 @@ import pytest
 
 from mpc.adapters.fmu.plant import FmuPlant
 from mpc.adapters.fmu.signals import FmuSignals
-from mpc.errors import FmuError, PlantActionError, PlantError
+from mpc.errors import PlantActionError, PlantError
 from mpc.loop.run import FixedSetpoints, run_closed_loop
 
 fmpy = pytest.importorskip("fmpy", reason="needs the extra [fmu]")
@@ -138,7 +138,7 @@ def test_a_unit_that_fails_must_be_reset(plant: FmuPlant) -> None:
     with pytest.raises(PlantError, match="call reset"):
         plant.step({})
     plant.reset()
-    with pytest.raises(FmuError, match=r"room.fmu: doStep failed: .*status 3"):
+    with pytest.raises(PlantError, match=r"room.fmu: doStep failed: .*status 3"):
         plant.step({HEAT: 4950.0})
     with pytest.raises(PlantError, match="call reset"):
         plant.step({HEAT: 0.0})
@@ -173,11 +173,11 @@ def test_signals_that_do_not_fit(room: Path, changes: Mapping[str, Any], options
 
 
 def test_signals_that_make_no_sense() -> None:
-    with pytest.raises(FmuError, match="temperature of a zone"):
+    with pytest.raises(PlantError, match="temperature of a zone"):
         FmuSignals({}, {}, {})
-    with pytest.raises(FmuError, match="nearest valid"):
+    with pytest.raises(PlantError, match="nearest valid"):
         FmuSignals({"room/temperature": "TRoo"}, {}, {"room": "TRoo"})
-    with pytest.raises(FmuError, match="limits: room/heat"):
+    with pytest.raises(PlantError, match="limits: room/heat"):
         FmuSignals({}, {HEAT: "QHea"}, {"room": "TRoo"}, limits={"room/heat": (0.0, 1.0)})
 
 
@@ -196,17 +196,17 @@ def test_files_that_are_no_such_unit(room: Path, tmp_path: Path) -> None:
         (packed(tmp_path / "exchange.fmu", exchange, None), "found model exchange of FMI 2.0"),
         (packed(tmp_path / "other.fmu", text, library, "other99"), f"expected a library for {fmpy.platform}"),
     ):
-        with pytest.raises(FmuError, match=says):
+        with pytest.raises(PlantError, match=says):
             FmuPlant(path, SIGNALS, 900.0, START, 3600.0)
     broken = FmuPlant(packed(tmp_path / "broken.fmu", text, library), SIGNALS, 900.0, START, 3600.0)
     here = Path.cwd()
-    with pytest.raises(FmuError, match="cannot be started"):
+    with pytest.raises(PlantError, match="cannot be started"):
         broken.reset()
     assert Path.cwd() == here
     broken.close()
-    with pytest.raises(FmuError, match="a time with a time zone"):
+    with pytest.raises(PlantError, match="a time with a time zone"):
         FmuPlant(room, SIGNALS, 900.0, pd.Timestamp("2023-01-09"), 3600.0)
-    with pytest.raises(FmuError, match="a positive control step"):
+    with pytest.raises(PlantError, match="a positive control step"):
         FmuPlant(room, SIGNALS, 900.0, START, 600.0)
 
 
@@ -216,5 +216,5 @@ def test_a_closed_plant_leaves_no_files(room: Path) -> None:
     assert folder.is_dir()
     plant.close()
     assert not folder.exists()
-    with pytest.raises(FmuError, match="was closed, or never started"):
+    with pytest.raises(PlantError, match="was closed, or never started"):
         plant._unit.get(["TRoo"])

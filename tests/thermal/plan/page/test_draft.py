@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from thermal import Building, ZoneTable
 from thermal.case.schema import Location, ZoneEntry
-from thermal.errors import LabelledCaseError, MalformedRequestError
+from thermal.errors import LabelError
 from thermal.plan.page.convert import building_of_draft, draft_of, encode_floor, parse_draft, zones_of
 from thermal.plan.page.draft import Draft
 
@@ -43,7 +43,7 @@ def test_a_building_survives_its_draft(draft_with: Callable[..., Draft]) -> None
 def test_a_zone_table_is_refused_by_name() -> None:
     site = Location(latitude=48.0, longitude=12.0, elevation=690.0, timezone="Europe/Berlin")
     table = ZoneTable((ZoneEntry(name="A", volume=50.0, floor_area=20.0),))
-    with pytest.raises(LabelledCaseError, match="floor plans, found a zone table"):
+    with pytest.raises(LabelError, match="floor plans, found a zone table"):
         draft_of(Building("listed", site, 0.0, table))
 
 
@@ -73,7 +73,7 @@ def spoilt(**floor: Any) -> dict[str, Any]:
     ],
 )
 def test_a_spoilt_draft_is_refused_with_its_place(content: Any, told: str) -> None:
-    with pytest.raises(MalformedRequestError, match=told):
+    with pytest.raises(LabelError, match=told):
         parse_draft(content, "draft")
 
 

@@ -16,7 +16,7 @@ import yaml
 
 from thermal.case.check import check_case
 from thermal.case.load import load_case
-from thermal.errors import LabelledCaseError, UnknownEntityError
+from thermal.errors import CaseError, LabelError
 from thermal.plan.page.draft import Draft, DraftDevice
 from thermal.plan.page.store import CaseStore
 
@@ -124,18 +124,18 @@ def test_a_case_that_was_edited_by_hand_counts_more(tmp_path: Path, draft_with: 
 def test_a_damaged_draft_is_refused_by_name(tmp_path: Path, draft_with: Make, spoil: str) -> None:
     CaseStore(tmp_path / "case").save(draft_with())
     (tmp_path / "case" / "labelling" / "labelling.json").write_text(spoil, encoding="utf-8")
-    with pytest.raises(LabelledCaseError, match=r"labelling\.json"):
+    with pytest.raises(LabelError, match=r"labelling\.json"):
         CaseStore(tmp_path / "case")
 
 
 def test_a_folder_of_other_things_is_refused(tmp_path: Path, table_draft: Any) -> None:
     (tmp_path / "letters").mkdir()
     (tmp_path / "letters" / "a.txt").write_text("dear", encoding="utf-8")
-    with pytest.raises(LabelledCaseError, match="other files"):
+    with pytest.raises(LabelError, match="other files"):
         CaseStore(tmp_path / "letters")
-    with pytest.raises(LabelledCaseError, match="a file"):
+    with pytest.raises(LabelError, match="a file"):
         CaseStore(tmp_path / "letters" / "a.txt")
-    with pytest.raises(LabelledCaseError, match="zone table"):
+    with pytest.raises(LabelError, match="zone table"):
         CaseStore(table_draft.write())
 
 
@@ -143,7 +143,7 @@ def test_a_folder_of_its_own_that_leads_elsewhere_is_refused(tmp_path: Path, pla
     folder = plan_draft.write()
     (tmp_path / "elsewhere").mkdir()
     (folder / "labelling").symlink_to(tmp_path / "elsewhere")
-    with pytest.raises(LabelledCaseError, match="page's own"):
+    with pytest.raises(LabelError, match="page's own"):
         CaseStore(folder)
     assert not any((tmp_path / "elsewhere").iterdir())
 
@@ -163,7 +163,7 @@ def test_an_empty_case_can_be_simulated_once_telemetry_is_there(tmp_path: Path, 
     assert len(again.columns) == 3
     assert again.save(again.draft.model_copy(update={"orientation": 5.0}))
     assert load_case(store.folder).telemetry.frame.shape == (288, 3)
-    with pytest.raises(UnknownEntityError):
+    with pytest.raises(CaseError):
         (store.folder / "building.yaml").write_text(yaml.safe_dump({**content, "devices": []}), encoding="utf-8")
         load_case(store.folder)
 
