@@ -51,7 +51,7 @@ NAMES = {"schedule": "fixed schedule", "reset": "outdoor reset", "guideline36": 
          "mpc": "optimal control", "bound": "perfect bound"}  # fmt: skip
 COLUMNS = (
     "week", "controller", "cost, USD", "discomfort, K h", "energy, kWh/m2", "peak, W/m2", "cost with discomfort, USD",
-    "way to the bound",
+    "share of the perfect-forecast savings",
 )  # fmt: skip
 
 
@@ -157,7 +157,8 @@ def short(rows: list[dict[str, Any]]) -> str:
         cells = [f"{here[name]['cost']:.0f} ({here[name]['tdis']:.2f})" if name in here else "" for name in CONTROLLERS]
         way = shares(rows).get((season, "mpc"))
         lines.append([season, *cells, "" if way is None else f"{way:.0%}"])
-    head = ("cost, USD (discomfort, K h)", *(NAMES[name] for name in CONTROLLERS), "way to the bound")
+    names = (NAMES[name] for name in CONTROLLERS)
+    head = ("cost, USD (discomfort, K h)", *names, "share of the perfect-forecast savings")
     return markdown(head, lines) + "\n" + note(rows[0])
 
 
