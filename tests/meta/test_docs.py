@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import importlib
 import re
 from collections.abc import Callable
 from pathlib import Path
+
+import pytest
 
 from thermal.case.points import POINT_TYPES
 from thermal.effects.catalogue import CATALOGUE
@@ -18,6 +21,7 @@ DOCS = ROOT / "docs"
 NOMENCLATURE = DOCS / "nomenclature.md"
 CODE_PATH = re.compile(r"`((?:thermal|calibration|mpc|benchmarks|examples|tests)/[\w/.]+)`")
 LINK = re.compile(r"\]\((?!https?:|#)([^)#\s]+)")
+HOME = re.compile(r"https://(?:github|raw\.githubusercontent)\.com/buildingmpc/buildingmpc/(?:blob/)?main/([^)#\s]+)")
 
 
 def cells(name: str) -> list[str]:
@@ -36,9 +40,11 @@ def test_nomenclature_has_every_parameter_and_point_with_its_unit(expect_none: C
 
 def test_what_the_documentation_points_to_exists(expect_none: Check) -> None:
     problems = []
-    for page in [*DOCS.glob("*.md"), ROOT / "README.md"]:
+    for page in [*DOCS.glob("*.md"), ROOT / "README.md", ROOT / "CONTRIBUTING.md"]:
         for number, line in enumerate(page.read_text(encoding="utf-8").splitlines(), 1):
-            targets = [*(page.parent / t for t in LINK.findall(line)), *(ROOT / t for t in CODE_PATH.findall(line))]
+            relative = [t for t in LINK.findall(line) if not t.startswith("api/")]  # made while the site is built
+            whole = (*CODE_PATH.findall(line), *HOME.findall(line))
+            targets = [*(page.parent / t for t in relative), *(ROOT / t for t in whole)]
             at = f"{page.relative_to(ROOT)}:{number}"
             lost = [t.relative_to(ROOT) for t in targets if not t.exists()]
             problems += [f"{at}: points to {t}, which is not there" for t in lost]
@@ -49,3 +55,9 @@ def test_the_index_links_every_page(expect_none: Check) -> None:
     linked = set(LINK.findall((DOCS / "index.md").read_text(encoding="utf-8")))
     missing = [page.name for page in sorted(DOCS.glob("*.md")) if page.name not in linked | {"index.md"}]
     expect_none([f"docs/index.md:1: does not link {name}; add a row" for name in missing])
+
+
+def test_the_readme_has_the_published_numbers(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(ROOT / "benchmarks"))
+    summary = importlib.import_module("summary").summary()
+    assert summary.strip() in (ROOT / "README.md").read_text(encoding="utf-8"), "run benchmarks/summary.py"
