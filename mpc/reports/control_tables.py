@@ -106,8 +106,7 @@ def comparison_summary(comparison: Comparison) -> dict[str, Any]:
 
 
 def comparison_rows(comparison: Comparison) -> list[list[str]]:
-    """Rows of the table of controllers: name, cost, saving, discomfort, worst zone, energy, peak,
-    share of the perfect-forecast savings.
+    """Rows of the table of controllers, from cost to the share of the perfect-forecast savings.
 
     Parameters
     ----------
