@@ -21,8 +21,7 @@ from _table import ROOT
 from calibration import Interval, evaluate_case
 from thermal import load_case, save_case
 from thermal.pilot.building import pilot_building
-from thermal.pilot.truth import TwinTruth
-from thermal.pilot.twin import generate_twin
+from thermal.pilot.twin import TwinTruth, generate_twin
 from thermal.pilot.weather import MOUNTAIN_VIEW
 
 BROWSER = ROOT / "tests" / "browser"

@@ -14,8 +14,7 @@ from _table import ROOT, markdown, write
 
 from calibration import CalibrationResult, calibrate
 from thermal import Case, load_case
-from thermal.pilot.truth import TwinTruth
-from thermal.pilot.twin import generate_twin
+from thermal.pilot.twin import TwinTruth, generate_twin
 
 Objective = Literal["multi_step", "innovations"]
 

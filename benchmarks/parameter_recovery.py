@@ -43,9 +43,8 @@ from _table import publish, write
 from calibration import CalibrationResult, calibrate, evaluate_case
 from calibration.fit.result import ParameterEstimate
 from thermal import Building, Case, Parameter, load_case
-from thermal.pilot.layout import devices, generate_office
-from thermal.pilot.truth import TwinTruth
-from thermal.pilot.twin import Excitation, Meter, generate_twin
+from thermal.pilot.building import devices, generate_office
+from thermal.pilot.twin import Excitation, Meter, TwinTruth, generate_twin
 from thermal.pilot.weather import MOUNTAIN_VIEW
 
 NAME = "parameter_recovery"

@@ -7,7 +7,10 @@ from collections.abc import Iterable
 
 
 class ThermalError(Exception):
-    """Base of every error that `thermal` raises on purpose."""
+    """Base of every error that `thermal` raises on purpose: a message, or the parts of one as `describe` takes them."""
+
+    def __init__(self, where: str, expected: str = "", found: str = "", advice: str = "") -> None:
+        super().__init__(describe(where, expected, found, advice) if expected else where)
 
 
 class CaseError(ThermalError):

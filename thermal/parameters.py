@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
+import pandas as pd
 
 #: How many values a parameter has: one for the building, one a facade, or one a zone.
 Scope = Literal["global", "facade", "zone"]
@@ -168,104 +170,11 @@ class Parameter:
         return replace(self, name=f"{self.base}@{prefix}{member}", scope=scope, member=member)
 
 
-_ISO6946 = "ISO 6946:2017 Annex C (surface resistances)"
-_ISO13786 = "ISO 13786:2017 and ISO 52016-1:2017 Table B.14 (areal heat capacity classes)"
-_ARCH = "ISO 52016-1:2017 Table 25 (interior convective coefficients 0.7-5 W/m2/K) and radiative 5.13 W/m2/K"
-
 #: Parameters of the baseline. Wall parameters stand for a wall 1 m thick and are rescaled to the plan's wall thickness.
+_TABLE = pd.read_csv(Path(__file__).parent / "data" / "parameters.csv", dtype=str)
 PARAMETERS: dict[str, Parameter] = {
-    p.name: p
-    for p in (
-        Parameter("exterior_convection_coefficient", "W/m^2/K", 20.0, 5.0, 60.0, f"{_ISO6946}: 4 + 4 v at 0.5-14 m/s"),
-        Parameter("exterior_wall_conductivity", "W/m/K", 0.55, 0.12, 4.0, "U-values of 0.12-2.5 W/m2/K: ISO 6946:2017"),
-        Parameter("exterior_wall_heat_capacity", "J/kg/K", 1000.0, 100.0, 4000.0, _ISO13786),
-        Parameter(
-            "interior_wall_conductivity",
-            "W/m/K",
-            2.5,
-            0.4,
-            20.0,
-            "partition resistances of 0.05-2.5 m2K/W: ISO 6946:2017",
-        ),
-        Parameter("interior_wall_heat_capacity", "J/kg/K", 1000.0, 100.0, 8000.0, _ISO13786),
-        Parameter(
-            "shuffle_probability",
-            "1",
-            0.5,
-            0.02,
-            0.98,
-            "probability per 300 s step; above 0.98 the mean factor vanishes",
-            scale="logit",
-        ),
-        Parameter("interior_film_coefficient", "W/m^2/K", 2.5, 1.0, 6.0, _ARCH),
-        Parameter("radiant_coefficient", "W/m^2/K", 5.0, 1.5, 8.0, _ARCH),
-        Parameter(
-            "combined_film_coefficient",
-            "W/m^2/K",
-            7.7,
-            2.5,
-            14.0,
-            "1 / 0.13 m2K/W: ISO 6946:2017 Table 7; range: the sum of the convective and radiative ones",
-        ),
-        Parameter("slab_heat_capacity", "J/m^2/K", 1.5e5, 2.0e4, 6.0e5, _ISO13786),
-        Parameter(
-            "slab_coupling",
-            "W/m^2/K",
-            10.0,
-            0.8,
-            60.0,
-            "conductivity over thickness: carpeted 0.2 m slab to bare 0.05 m screed",
-        ),
-        Parameter(
-            "furniture_heat_capacity",
-            "J/m^2/K",
-            1.5e4,
-            5.0e2,
-            1.0e5,
-            "Johra & Heiselberg (2017), doi:10.1016/j.rser.2016.11.145",
-        ),
-        Parameter(
-            "furniture_coupling", "W/m^2/K", 5.0, 0.5, 20.0, "Johra & Heiselberg (2017), doi:10.1016/j.rser.2016.11.145"
-        ),
-        Parameter("window_u_value", "W/m^2/K", 2.5, 0.6, 6.0, "EN 673: triple to single glazing"),
-        Parameter(
-            "opening_exchange_velocity",
-            "m/s",
-            0.08,
-            0.01,
-            0.3,
-            "Allard & Utsumi (1992), Energy and Buildings 18, 133-145",
-        ),
-        Parameter(
-            "exterior_wall_conductivity_multiplier",
-            "1",
-            1.0,
-            0.33,
-            3.0,
-            "tabulated design conductivities: ISO 10456:2007",
-        ),
-        Parameter(
-            "exterior_wall_heat_capacity_multiplier", "1", 1.0, 0.33, 3.0, "tabulated design values: ISO 10456:2007"
-        ),
-        Parameter(
-            "interior_wall_conductivity_multiplier",
-            "1",
-            1.0,
-            0.33,
-            3.0,
-            "tabulated design conductivities: ISO 10456:2007",
-        ),
-        Parameter(
-            "interior_wall_heat_capacity_multiplier", "1", 1.0, 0.33, 3.0, "tabulated design values: ISO 10456:2007"
-        ),
-        Parameter(
-            "slab_conductivity_multiplier", "1", 1.0, 0.33, 3.0, "tabulated design conductivities: ISO 10456:2007"
-        ),
-        Parameter("slab_heat_capacity_multiplier", "1", 1.0, 0.33, 3.0, "tabulated design values: ISO 10456:2007"),
-        Parameter(
-            "window_conductance_multiplier", "1", 1.0, 0.5, 2.0, "panes without films: EN 673 against in-situ values"
-        ),
-    )
+    p.name: Parameter(p.name, p.unit, float(p.start), float(p.lower), float(p.upper), p.source, p.scale)
+    for p in _TABLE.itertuples()
 }
 
 #: Parameters of the envelope: those that may have one value a facade.

@@ -8,12 +8,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from thermal.case.areas import zone_floor_areas
 from thermal.case.building import Building, FloorPlans
 from thermal.case.case import Case
+from thermal.case.plan import zone_floor_areas
 from thermal.case.telemetry import Telemetry
 from thermal.errors import ThermalError
-from thermal.pilot.layout import devices, generate_office
+from thermal.pilot.building import devices, generate_office
 from thermal.pilot.telemetry import generate_telemetry
 from thermal.pilot.thermostat import draw_thermostats
 from thermal.pilot.weather import MOUNTAIN_VIEW, generate_weather

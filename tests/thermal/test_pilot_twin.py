@@ -24,14 +24,12 @@ from thermal import (
     save_case,
     spin_up,
 )
-from thermal.case.areas import zone_floor_areas
-from thermal.case.building import Building, ZoneTable
-from thermal.case.schema import Location
+from thermal.case.building import Building, Location, ZoneTable
+from thermal.case.plan import zone_floor_areas
 from thermal.errors import ThermalError
 from thermal.model.stepper import Stepper
 from thermal.pilot.building import pilot_building
-from thermal.pilot.truth import TwinRanges, TwinTruth
-from thermal.pilot.twin import _draw_conditions, _draw_values
+from thermal.pilot.twin import TwinRanges, TwinTruth, _draw_conditions, _draw_values
 from thermal.pilot.twin import generate_twin as generate
 
 QUIET = TwinRanges(disturbance_deviation=(0.0, 0.0), noise=(0.0, 0.0))

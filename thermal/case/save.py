@@ -15,12 +15,11 @@ import pandas as pd
 import yaml
 
 from thermal.case.building import Building, FloorPlan, FloorPlans
-from thermal.case.building_file import NAME
 from thermal.case.case import Case
-from thermal.case.load import load_case
+from thermal.case.load import NAME, load_case
 from thermal.case.points import POINT_TYPES, SINCE_FORMAT_2, split_column
 from thermal.case.telemetry import Telemetry
-from thermal.errors import CaseError, describe
+from thermal.errors import CaseError
 from thermal.units import QUANTITIES, from_si
 
 TELEMETRY_FILE = "telemetry.parquet"
@@ -90,16 +89,13 @@ def _check_target(target: Path, overwrite: bool) -> None:
     if not target.exists():
         return
     if not target.is_dir():
-        raise CaseError(describe(str(target), "a folder to make", "a file", "choose another path"))
+        raise CaseError(str(target), "a folder to make", "a file", "choose another path")
     if any(target.iterdir()):
         if not overwrite:
             advice = "choose another folder or pass overwrite=True"
-            raise CaseError(
-                describe(str(target), "no folder or an empty one", "a folder that holds files", advice)
-            )
+            raise CaseError(str(target), "no folder or an empty one", "a folder that holds files", advice)
         if not (target / NAME).is_file():
-            found = f"a folder without {NAME}"
-            raise CaseError(describe(str(target), "a case to overwrite", found, "choose another folder"))
+            raise CaseError(str(target), "a case to overwrite", f"a folder without {NAME}", "choose another folder")
 
 
 def _write(building: Building, frame: pd.DataFrame, folder: Path) -> None:

@@ -1,30 +1,112 @@
-"""From a zone table to control volumes and faces: one air volume a zone, each surface a chain of layers."""
+"""Control volumes and faces of a zone table."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
 
-from thermal.case.building import Building, ZoneTable
-from thermal.case.schema import Layer, Surface
+from thermal._types import FloatArray
+from thermal.case.building import Building, Layer, Surface, ZoneTable
+from thermal.errors import ModelError
 from thermal.network.assembly import Blueprint
-from thermal.network.chains import Chain
-from thermal.network.facades import facade_of
-from thermal.network.films import series
+from thermal.network.floor import Zone
 from thermal.network.graph import GraphBuilder
-from thermal.network.interior import Zone
-from thermal.network.materials import (
+from thermal.network.structure import (
+    BASELINE,
     BOUNDARY_FILM_RESISTANCE,
     LEAST_PANE_RESISTANCE,
     RATED_OUTSIDE_FILM,
     WINDOW_RATED_FILM,
+    Structure,
+    series,
 )
-from thermal.network.structure import BASELINE, Structure
 from thermal.network.topology import DOWNWARD, UPWARD, VERTICAL, GroundFace, OuterFaces, Outlook, Pane
 from thermal.parameters import Scope
 from thermal.units import AIR_HEAT_CAPACITY, air_density
+
+#: Time that a sublayer must resolve [s]: its thickness is at most sqrt(diffusivity x this), a Fourier number of one.
+SUBLAYER_TIME = 1800.0
+
+
+@dataclass(frozen=True)
+class Chain:
+    """Nodes between the two faces of a layered wall, per area of it.
+
+    Parameters
+    ----------
+    near, far : float
+        Resistance from the first face to the first node, and from the last node to the last face [m2K/W].
+    between : ndarray, shape (n - 1,)
+        Resistances from node to node [m2K/W].
+    capacity : ndarray, shape (n,)
+        Heat capacities of the nodes [J/m2/K].
+    """
+
+    near: float
+    far: float
+    between: FloatArray
+    capacity: FloatArray
+
+    @classmethod
+    def of(cls, layers: tuple[Layer, ...], nodes: int | None = None) -> Chain:
+        """Nodes of a construction, of the resistance and the heat capacity of its layers.
+
+        Parameters
+        ----------
+        layers : tuple of Layer
+            From one face to the other.
+        nodes : int, optional
+            Their number; by default each layer is cut into sublayers thin enough for `SUBLAYER_TIME`, 12 at most.
+        """
+        return _fine(layers) if nodes is None else _lumped(layers, nodes)
+
+
+def _fine(layers: tuple[Layer, ...]) -> Chain:
+    """Sublayers with a node in the middle of each."""
+    resistances: list[float] = []
+    capacity: list[float] = []
+    for layer in layers:
+        heat = layer.density * layer.heat_capacity
+        depth = np.sqrt(layer.conductivity / heat * SUBLAYER_TIME)
+        n = int(np.clip(np.ceil(layer.thickness / depth), 1, 12))
+        resistances += [layer.thickness / n / layer.conductivity] * n
+        capacity += [layer.thickness / n * heat] * n
+    resistance = np.array(resistances)
+    between = 0.5 * (resistance[:-1] + resistance[1:])
+    return Chain(0.5 * float(resistance[0]), 0.5 * float(resistance[-1]), between, np.array(capacity))
+
+
+def _lumped(layers: tuple[Layer, ...], nodes: int) -> Chain:
+    """Parts that heat takes equally long to cross, each lumped where every steady state keeps the heat it holds.
+
+    The time is ``x**2 / diffusivity``, so its root adds up over layers. In a steady state temperature is linear in the
+    resistance from a face, so the node lies at the mean resistance of its part, weighted by heat capacity.
+    """
+    thickness, conductivity = (np.array([getattr(p, k) for p in layers]) for k in ("thickness", "conductivity"))
+    heat = np.array([p.density * p.heat_capacity for p in layers])
+    edges = np.concatenate([[0.0], np.cumsum(thickness * np.sqrt(heat / conductivity))])
+    cuts = np.linspace(0.0, edges[-1], nodes + 1)
+    points = np.union1d(edges, cuts)
+    middle = 0.5 * (points[:-1] + points[1:])
+    layer = np.clip(np.searchsorted(edges, middle, side="right") - 1, 0, len(layers) - 1)
+    part = np.clip(np.searchsorted(cuts, middle, side="right") - 1, 0, nodes - 1)
+    length = np.diff(points) / np.sqrt(heat / conductivity)[layer]
+    resistance = length / conductivity[layer]
+    place = np.cumsum(resistance) - 0.5 * resistance
+    stored = length * heat[layer]
+    capacity = np.bincount(part, stored, minlength=nodes).astype(float)
+    at = np.bincount(part, stored * place, minlength=nodes) / capacity
+    return Chain(float(at[0]), float(resistance.sum() - at[-1]), np.diff(at), capacity)
+
+
+#: Directions of a zone table's facades, each a quarter of the compass that begins 45 degrees before its own azimuth.
+_COMPASS = ("north", "east", "south", "west")
+
+#: Horizontal surfaces to outdoor by kind.
+_HORIZONTAL = {"ceiling": "roof", "floor": "floor"}
 
 
 def table_blueprint(
@@ -181,3 +263,27 @@ def _add_layers(graph: GraphBuilder, zones: Mapping[str, Zone], surface: Surface
             graph.anatomy.outer.append(outer)
             if surface.kind == "wall":
                 _count_facade(graph, surface)
+
+
+def facade_of(surface: Surface) -> str | None:
+    """Facade of a surface of a zone table: its direction, ``roof`` or ``floor``; None when it does not face outdoor.
+
+    Parameters
+    ----------
+    surface : Surface
+        Of azimuth α; the facade is that whose own azimuth is nearest, the next one clockwise half way between two.
+
+    Raises
+    ------
+    ModelError
+        When it is a wall or a window to outdoor without azimuth.
+    """
+    if surface.other != "outdoor":
+        return None
+    if surface.kind in _HORIZONTAL:
+        return _HORIZONTAL[surface.kind]
+    if surface.azimuth is None:
+        raise ModelError(
+            f"surface {surface.name}: expected an azimuth [deg], since a parameter has one value a facade, came none"
+        )
+    return _COMPASS[int((surface.azimuth + 45.0) % 360.0 // 90.0) % 4]

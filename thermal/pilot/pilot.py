@@ -8,14 +8,13 @@ from pathlib import Path
 
 import pandas as pd
 
-from thermal.case.building import Building
+from thermal.case.building import Building, Location
 from thermal.case.case import Case
 from thermal.case.load import load_case
 from thermal.case.save import save_case
-from thermal.case.schema import Location
-from thermal.errors import CaseError, describe
+from thermal.errors import CaseError
 from thermal.model.simulator import Simulator
-from thermal.pilot.layout import devices, generate_office
+from thermal.pilot.building import devices, generate_office
 from thermal.pilot.telemetry import Plant, Progress, generate_telemetry
 from thermal.pilot.weather import MOUNTAIN_VIEW, generate_weather
 
@@ -99,7 +98,7 @@ def generate_pilot(
     target = Path(path)
     if target.exists() and not overwrite and (not target.is_dir() or any(target.iterdir())):  # before the long part
         advice = "choose another folder or pass overwrite=True"
-        raise CaseError(describe(str(target), "no folder or an empty one", "something there", advice))
+        raise CaseError(str(target), "no folder or an empty one", "something there", advice)
     plans = generate_office(seed, floor_area=floor_area, zones=zones, floors=floors, cell_size=cell_size)
     building = Building(name, location, orientation, plans, devices(plans), (), _STATION)
     weather = generate_weather(

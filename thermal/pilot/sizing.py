@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from thermal.case.areas import zone_floor_areas
 from thermal.case.building import Building, FloorPlans, ZoneTable
-from thermal.errors import ModelError, describe
+from thermal.case.plan import zone_floor_areas
+from thermal.errors import ModelError
 from thermal.hvac._air_handler import AirHandler
 from thermal.hvac._boiler import BoilerLoop, Pump
 from thermal.hvac._coil import WaterCoil
@@ -74,10 +74,10 @@ class DesignConditions:
     def __post_init__(self) -> None:
         rising = (200.0, self.winter_outdoor, self.supply_air, self.heating, self.cooling, self.supply_water, 373.15)
         if not (np.diff(rising) > 0.0).all():
-            raise ModelError(describe("design conditions", "temperatures in order", f"{rising[1:-1]} K"))
+            raise ModelError("design conditions", "temperatures in order", f"{rising[1:-1]} K")
         if not (1.0 <= self.oversizing <= 3.0 and min(self.gains, self.sun) >= 0.0 and self.least_flow > 0.0):
             found = f"{self.oversizing}, {self.gains}, {self.sun} and {self.least_flow}"
-            raise ModelError(describe("design conditions", "positive loads, oversizing from 1 to 3", found))
+            raise ModelError("design conditions", "positive loads, oversizing from 1 to 3", found)
 
 
 def size_system(

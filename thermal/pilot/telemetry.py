@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 import pandas as pd
 
-from thermal.case.areas import zone_floor_areas
 from thermal.case.building import FloorPlans
+from thermal.case.plan import zone_floor_areas
 from thermal.case.points import DISCHARGE_TEMPERATURE, OUTDOOR_TEMPERATURE, SUPPLY_FLOW, ZONE_TEMPERATURE
 from thermal.case.telemetry import Telemetry
 from thermal.errors import ThermalError

@@ -27,8 +27,7 @@ from thermal import (
 )
 from thermal.model.reduce import ReducedModel
 from thermal.pilot.building import pilot_building
-from thermal.pilot.truth import TwinTruth
-from thermal.pilot.twin import generate_twin
+from thermal.pilot.twin import TwinTruth, generate_twin
 
 FloatArray = NDArray[np.float64]
 

@@ -15,8 +15,8 @@ from mpc.loop.noise import SensorNoise
 from mpc.loop.sensors import plant_devices
 from mpc.loop.simulated import SimulatedPlant
 from thermal import Building, load_case, save_case
+from thermal.case.building import Device
 from thermal.case.points import POINT_TYPES, split_column
-from thermal.case.schema import Device
 from thermal.hvac._system import HvacSystem
 
 Drive = Callable[..., SimulatedPlant]

@@ -10,11 +10,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thermal.case.schema import Device
+from thermal.case.building import Device
 from thermal.errors import PlanError
-from thermal.plan.columns import read_columns, write_matches
-from thermal.plan.devices import read_devices
-from thermal.plan.match import match_points
+from thermal.plan.match import match_points, read_columns, write_matches
+from thermal.plan.models import read_devices
 
 ZONES = ["F1_R01", "F1_R02"]
 

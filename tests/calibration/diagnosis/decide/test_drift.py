@@ -14,8 +14,7 @@ from calibration.diagnosis.refit.comparison import Bench
 from calibration.errors import NotEnoughDataError
 from calibration.evaluation.settings import ModelSettings
 from thermal.pilot.building import pilot_building
-from thermal.pilot.truth import TwinRanges
-from thermal.pilot.twin import generate_twin
+from thermal.pilot.twin import TwinRanges, generate_twin
 
 FloatArray = NDArray[np.float64]
 

@@ -14,8 +14,7 @@ from calibration.evaluation.settings import ModelSettings
 from mpc.reports.diagnosis_statistics import statistics_content
 from thermal import Case, Telemetry
 from thermal.pilot.building import pilot_building
-from thermal.pilot.truth import TwinRanges
-from thermal.pilot.twin import generate_twin
+from thermal.pilot.twin import TwinRanges, generate_twin
 
 
 def errors(days: list[int], daily: list[float], weight: list[float]) -> HeldOut:

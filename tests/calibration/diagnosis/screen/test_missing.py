@@ -17,8 +17,7 @@ from calibration.estimation.heat_balance import heat_balance
 from calibration.evaluation.settings import ModelSettings
 from thermal import reduced_model
 from thermal.pilot.building import pilot_building
-from thermal.pilot.truth import TwinRanges, TwinTruth
-from thermal.pilot.twin import generate_twin
+from thermal.pilot.twin import TwinRanges, TwinTruth, generate_twin
 
 FloatArray = NDArray[np.float64]
 

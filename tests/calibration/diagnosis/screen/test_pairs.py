@@ -22,8 +22,7 @@ from calibration.evaluation.settings import ModelSettings
 from thermal import Case, Telemetry
 from thermal.effects.catalogue import CATALOGUE
 from thermal.pilot.building import pilot_building
-from thermal.pilot.truth import TwinRanges
-from thermal.pilot.twin import generate_twin
+from thermal.pilot.twin import TwinRanges, generate_twin
 
 FloatArray = NDArray[np.float64]
 

@@ -18,8 +18,7 @@ from calibration.evaluation.settings import ModelSettings
 from thermal import Case, Telemetry
 from thermal.inputs.drivers import Drivers
 from thermal.pilot.building import pilot_building
-from thermal.pilot.truth import TwinRanges
-from thermal.pilot.twin import generate_twin
+from thermal.pilot.twin import TwinRanges, generate_twin
 from thermal.units import AIR_HEAT_CAPACITY
 
 FloatArray = NDArray[np.float64]
