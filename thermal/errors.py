@@ -9,8 +9,9 @@ from collections.abc import Iterable
 class ThermalError(Exception):
     """Base of every error that `thermal` raises on purpose: a message, or the parts of one as `describe` takes them."""
 
-    def __init__(self, where: str, expected: str = "", found: str = "", advice: str = "") -> None:
-        super().__init__(describe(where, expected, found, advice) if expected else where)
+    def __str__(self) -> str:
+        """Message: the one that was given, or `describe` of its parts."""
+        return describe(*self.args) if len(self.args) > 1 else super().__str__()
 
 
 class CaseError(ThermalError):

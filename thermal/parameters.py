@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import csv
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
+from typing import Literal, cast
 
 import numpy as np
-import pandas as pd
 
 #: How many values a parameter has: one for the building, one a facade, or one a zone.
 Scope = Literal["global", "facade", "zone"]
@@ -170,11 +170,11 @@ class Parameter:
         return replace(self, name=f"{self.base}@{prefix}{member}", scope=scope, member=member)
 
 
+_ROWS = csv.reader((Path(__file__).parent / "data" / "parameters.csv").read_text(encoding="utf-8").splitlines()[1:])
 #: Parameters of the baseline. Wall parameters stand for a wall 1 m thick and are rescaled to the plan's wall thickness.
-_TABLE = pd.read_csv(Path(__file__).parent / "data" / "parameters.csv", dtype=str)
 PARAMETERS: dict[str, Parameter] = {
-    p.name: Parameter(p.name, p.unit, float(p.start), float(p.lower), float(p.upper), p.source, p.scale)
-    for p in _TABLE.itertuples()
+    name: Parameter(name, unit, float(start), float(lower), float(upper), source, cast(Scale, scale))
+    for name, unit, start, lower, upper, source, scale in _ROWS
 }
 
 #: Parameters of the envelope: those that may have one value a facade.

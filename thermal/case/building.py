@@ -16,6 +16,7 @@ Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0)]
 Azimuth = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-360, le=360)]
 Share = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0, le=1)]
+GeometryQuality = Literal["surveyed", "approximate", "generic"]
 FACADES = ("north", "east", "south", "west")
 DEVICE_TYPES = ("vav", "fan_coil", "electric_heater", "radiator", "supply_air_terminal", "ahu", "boiler", "chiller")
 
@@ -56,11 +57,14 @@ class Device(_Entry):
         One of `DEVICE_TYPES`; others are reported.
     zone
         The zone it serves; None for an air handler, a boiler.
+    fed_by
+        Devices that it gets air, water or steam from, such as the air handler and the boiler of a VAV terminal.
     """
 
     name: Text
     type: Text
     zone: Text | None = None
+    fed_by: tuple[Text, ...] = ()
 
 
 class Airflow(_Entry):
@@ -185,13 +189,15 @@ class BuildingFile(_Entry):
     Parameters
     ----------
     format
-        Version of the case format; 2 has points of pressure beside those of 1, and nothing else is new.
+        Number of the case format; 1 and 2 are migrated when read (`thermal.case.migration`).
     name
         Of the case.
     location
         Where the building stands.
     orientation
-        Degrees clockwise from true north to the plan's "up"; 0 unless given.
+        Clockwise from true north to the plan's "up" [deg]; 0 unless given.
+    geometry_quality
+        How the geometry was come by: ``surveyed``, ``approximate`` or ``generic``.
     telemetry
         File name inside the case folder.
     units
@@ -212,10 +218,11 @@ class BuildingFile(_Entry):
         The zone table.
     """
 
-    format: Literal[1, 2]
+    format: Literal[3]
     name: Text
     location: Location
     orientation: Azimuth = 0.0
+    geometry_quality: GeometryQuality = "approximate"
     telemetry: Text
     units: dict[Text, Annotated[str, Field(strict=True)]]
     devices: tuple[Device, ...] = ()
@@ -317,6 +324,9 @@ class Building:
         Where supply air goes on to.
     weather_station
         Entity whose points are the site's weather.
+    geometry_quality
+        How the geometry was come by: ``surveyed`` (measured on site or taken from a checked drawing), ``approximate``,
+        or ``generic`` (that of a typical building).
     """
 
     name: str
@@ -326,6 +336,7 @@ class Building:
     devices: tuple[Device, ...] = ()
     airflows: tuple[Airflow, ...] = ()
     weather_station: str = "weather_station"
+    geometry_quality: GeometryQuality = "approximate"
 
     @property
     def zone_names(self) -> tuple[str, ...]:

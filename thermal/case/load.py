@@ -15,6 +15,7 @@ from pydantic_core import ErrorDetails
 from thermal.case import building as schema
 from thermal.case.building import Building, BuildingFile, FloorPlan, FloorPlans, ZoneTable
 from thermal.case.case import Case
+from thermal.case.migration import migrate
 from thermal.case.plan import read_plan
 from thermal.case.telemetry import check_units, read_telemetry
 from thermal.case.validation import check_building, check_columns
@@ -64,15 +65,8 @@ def read_building_file(folder: Path) -> schema.BuildingFile:
     CaseError
         One of its family: the file is missing, no YAML, of another format, or holds a key or value that does not fit.
     """
-    content = _read_yaml(folder)
-    number = content.get("format")
-    if "format" not in content:
-        raise CaseError(f"{NAME}: format", "1 or 2", "no such key", "add 'format: 1'")
-    if type(number) is not int or number not in (1, 2):
-        advice = "use a library that reads this format, or migrate the case"
-        raise CaseError(f"{NAME}: format", "1 or 2", repr(number), advice)
     try:
-        parsed = schema.BuildingFile.model_validate(content)
+        parsed = schema.BuildingFile.model_validate(migrate(_read_yaml(folder), NAME))
     except ValidationError as error:
         raise _named(error) from error
     _check_geometry_choice(parsed)
@@ -230,6 +224,7 @@ def _building(parsed: BuildingFile, folder: Path) -> Building:
         devices=parsed.devices,
         airflows=parsed.airflows,
         weather_station=parsed.weather_station,
+        geometry_quality=parsed.geometry_quality,
     )
 
 

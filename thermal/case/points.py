@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
+import csv
 from dataclasses import dataclass
 from pathlib import Path
-
-import pandas as pd
 
 from thermal.errors import CaseError, nearest
 
@@ -36,14 +35,11 @@ class PointType:
 # The ranges are wide on purpose: they catch failed sensors (-40, 0 K, 999, 6553.5), not unusual weather or hot rooms.
 # Flow and irradiance may fall a little below zero: the zero offset of a differential pressure sensor, and the night
 # offset of a pyranometer (ISO 9060 allows 7 to 30 W/m2). 1500 W/m2 is the solar constant with cloud enhancement.
-_TABLE = pd.read_csv(Path(__file__).parents[1] / "data" / "points.csv", dtype=str)
-
+_ROWS = csv.reader((Path(__file__).parents[1] / "data" / "points.csv").read_text(encoding="utf-8").splitlines()[1:])
 POINT_TYPES: dict[str, PointType] = {
-    p.name: PointType(p.name, p.quantity, float(p.lowest), float(p.highest), p.meaning) for p in _TABLE.itertuples()
+    name: PointType(name, quantity, float(lowest), float(highest), meaning)
+    for name, quantity, lowest, highest, meaning in _ROWS
 }
-
-#: Point types that came with the second number of the format; a case that has none of them is written as format 1.
-SINCE_FORMAT_2 = frozenset(name for name, point in POINT_TYPES.items() if point.quantity == "pressure")
 
 ZONE_TEMPERATURE = "zone_air_temperature_sensor"
 OUTDOOR_TEMPERATURE = "outside_air_temperature_sensor"

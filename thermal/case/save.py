@@ -17,7 +17,8 @@ import yaml
 from thermal.case.building import Building, FloorPlan, FloorPlans
 from thermal.case.case import Case
 from thermal.case.load import NAME, load_case
-from thermal.case.points import POINT_TYPES, SINCE_FORMAT_2, split_column
+from thermal.case.migration import FORMAT
+from thermal.case.points import POINT_TYPES, split_column
 from thermal.case.telemetry import Telemetry
 from thermal.errors import CaseError
 from thermal.units import QUANTITIES, from_si
@@ -120,12 +121,13 @@ def _write_plan(floor: FloorPlan, path: Path) -> None:
 def _content(building: Building, frame: pd.DataFrame) -> dict[str, Any]:
     points = dict.fromkeys(split_column(str(column), TELEMETRY_FILE)[1] for column in frame.columns)
     return {
-        "format": 2 if SINCE_FORMAT_2 & points.keys() else 1,
+        "format": FORMAT,
         "name": building.name,
         "location": building.location.model_dump(),
         "orientation": building.orientation,
+        "geometry_quality": building.geometry_quality,
         **_geometry(building),
-        "devices": [device.model_dump(exclude_none=True) for device in building.devices],
+        "devices": [device.model_dump(mode="json", exclude_defaults=True) for device in building.devices],
         "airflows": [airflow.model_dump(by_alias=True) for airflow in building.airflows],
         "weather_station": building.weather_station,
         "telemetry": TELEMETRY_FILE,

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from graphlib import CycleError, TopologicalSorter
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from thermal.case.building import (
     OUTDOOR,
     OUTSIDE,
     Building,
+    Device,
     FloorPlan,
     FloorPlans,
     Surface,
@@ -148,6 +150,29 @@ def _check_devices(building: Building, file: str) -> None:
         if device.zone is not None and device.zone not in zones:
             where = f"{file}: devices[{i}] ({device.name}): zone"
             raise CaseError(where, "a zone of the building", repr(device.zone), nearest(device.zone, zones))
+    _check_feeders(building.devices, file)
+
+
+def _check_feeders(devices: Sequence[Device], file: str) -> None:
+    """Refuse feeders that are not there, and devices that feed themselves, through others too."""
+    fed_by = {device.name: device.fed_by for device in devices}
+    for i, device in enumerate(devices):
+        where = f"{file}: devices[{i}] ({device.name}): fed_by"
+        for feeder in device.fed_by:
+            if feeder == device.name:
+                raise CaseError(where, "other devices", f"{feeder!r}, the device itself", "drop it")
+            if feeder not in fed_by:
+                others = [name for name in fed_by if name != device.name]
+                raise CaseError(where, "a device of the building", repr(feeder), nearest(feeder, others))
+        if len({*device.fed_by}) < len(device.fed_by):
+            raise CaseError(where, "each feeder once", ", ".join(device.fed_by), "drop one")
+    try:
+        TopologicalSorter(fed_by).prepare()
+    except CycleError as error:
+        circle = error.args[1][::-1]
+        i = next(i for i, device in enumerate(devices) if device.name == circle[0])
+        where = f"{file}: devices[{i}] ({circle[0]}): fed_by"
+        raise CaseError(where, "feeders without a circle", " <- ".join(circle), "drop one of them") from error
 
 
 def _check_airflows(building: Building, file: str) -> None:

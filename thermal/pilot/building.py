@@ -109,6 +109,8 @@ def generate_office(
 def devices(plans: FloorPlans) -> tuple[Device, ...]:
     """List the devices of an office: a VAV terminal in each zone, an air handler a floor, a boiler and a chiller.
 
+    Terminals are fed by their floor's air handler and the boiler, air handlers by the boiler and the chiller.
+
     Parameters
     ----------
     plans : FloorPlans
@@ -119,10 +121,13 @@ def devices(plans: FloorPlans) -> tuple[Device, ...]:
     tuple of Device
         Terminals in the order of the zones, named ``VAV_<zone>``, then ``AHU_<floor>``, ``BOILER``, ``CHILLER``.
     """
-    zones = [zone for floor in plans.floors for zone in floor.zone_names]
     return (
-        *(Device(name=f"VAV_{zone}", type="vav", zone=zone) for zone in zones),
-        *(Device(name=f"AHU_{floor.name}", type="ahu") for floor in plans.floors),
+        *(
+            Device(name=f"VAV_{zone}", type="vav", zone=zone, fed_by=(f"AHU_{floor.name}", "BOILER"))
+            for floor in plans.floors
+            for zone in floor.zone_names
+        ),
+        *(Device(name=f"AHU_{floor.name}", type="ahu", fed_by=("BOILER", "CHILLER")) for floor in plans.floors),
         Device(name="BOILER", type="boiler"),
         Device(name="CHILLER", type="chiller"),
     )

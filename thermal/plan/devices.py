@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from thermal.case.building import DEVICE_TYPES, Device
+from thermal.case.migration import certain_feeders
 from thermal.errors import PlanError, nearest
 from thermal.plan.guard import vocabulary
 
@@ -16,6 +17,7 @@ _COLUMNS = {
     "name": ("name", "device", "device_name", "equipment", "equip", "id", "tag", "asset"),
     "type": ("type", "device_type", "class", "kind", "category", "equipment_type"),
     "zone": ("zone", "zone_name", "room", "space", "serves", "location", "area"),
+    "fed_by": ("fed_by", "supplied_by", "parent"),
 }
 
 _TYPES = vocabulary("device_words")
@@ -63,7 +65,11 @@ class DeviceImport:
 
 
 def import_devices(
-    rows: Iterable[tuple[str, str, str]], zones: Sequence[str], where: str, points: Sequence[ListedPoint] = ()
+    rows: Iterable[tuple[str, str, str]],
+    zones: Sequence[str],
+    where: str,
+    points: Sequence[ListedPoint] = (),
+    fed_by: Mapping[str, Sequence[str]] | None = None,
 ) -> DeviceImport:
     """Make devices of names, types and zones.
 
@@ -77,6 +83,8 @@ def import_devices(
         File, for messages.
     points : sequence of ListedPoint
         Points, where the list has them.
+    fed_by : mapping, optional
+        Names of what feeds it, by device, where the list says so; else those that are certain (`certain_feeders`).
 
     Returns
     -------
@@ -109,6 +117,10 @@ def import_devices(
         devices.append(Device(name=name, type=known or kind or "unknown", zone=place[0] if len(place) == 1 else None))
     if not devices:
         raise PlanError(where, "at least one device", "none")
+    certain = certain_feeders({device.name: device.type for device in devices})
+    for i, device in enumerate(devices):
+        told = tuple(f for f in dict.fromkeys((fed_by or {}).get(device.name, ())) if f in seen and f != device.name)
+        devices[i] = device.model_copy(update={"fed_by": told or certain.get(device.name, ())})
     return DeviceImport(tuple(devices), unplaced, unknown, tuple(points))
 
 

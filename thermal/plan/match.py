@@ -187,7 +187,7 @@ def _point(words: Sequence[str], kind: str) -> tuple[str, float]:
 
 
 def _weight(words: set[str]) -> float:
-    return sum(_WEIGHTS.get(word, 1.0) for word in words)
+    return sum(float(_WEIGHTS.get(word, 1.0)) for word in words)
 
 
 _HEADER = ("column", "entity", "point", "confidence", "remark")

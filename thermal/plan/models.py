@@ -27,7 +27,8 @@ def read_devices(path: str | PathLike[str], zones: Sequence[str]) -> DeviceImpor
     Parameters
     ----------
     path : str or path
-        CSV with a column of names and columns of types and zones; a Brick model (``.ttl``); Haystack as JSON or Zinc.
+        CSV with a column of names and columns of types, zones and feeders (``;`` between two); a Brick model
+        (``.ttl``); Haystack as JSON or Zinc.
     zones : sequence of str
         Zones of the building.
 
@@ -49,7 +50,9 @@ def read_devices(path: str | PathLike[str], zones: Sequence[str]) -> DeviceImpor
     if file.suffix.lower() in (".json", ".zinc"):
         return read_haystack(file, zones)
     rows = read_rows(file)
-    return import_devices(((r["name"], r.get("type", ""), r.get("zone", "")) for r in rows), zones, file.name)
+    fed_by = {row["name"]: re.split(r"\s*[;,]\s*", row.get("fed_by", "")) for row in rows}
+    named = ((row["name"], row.get("type", ""), row.get("zone", "")) for row in rows)
+    return import_devices(named, zones, file.name, fed_by=fed_by)
 
 
 def read_brick(file: Path, zones: Sequence[str]) -> DeviceImport:
@@ -80,16 +83,17 @@ def read_brick(file: Path, zones: Sequence[str]) -> DeviceImport:
         raise PlanError(file.name, "a Brick model in Turtle", " ".join(str(error).split())[:200]) from error
     model = _Model(graph, rdf)
     keys = {key(zone) for zone in zones}
-    rows, points = [], []
+    rows, points, fed_by = [], [], {}
     for subject, kind in model.instances(_BRICK_EQUIPMENT):
         name = model.name(subject)
         zone = model.zone(subject, keys)
         rows.append((name, kind, zone))
+        fed_by[name] = model.feeders(subject)
         points += model.points(subject, name, kind)
     if not rows:
         raise PlanError(file.name, "equipment of Brick", "none", "does it declare brick:VAV, brick:AHU and so on?")
-    order = sorted(range(len(rows)), key=lambda i: rows[i][0])
-    return import_devices([rows[i] for i in order], zones, file.name, sorted(points, key=lambda p: p.column))
+    rows.sort(key=lambda row: row[0])
+    return import_devices(rows, zones, file.name, sorted(points, key=lambda p: p.column), fed_by)
 
 
 class _Model:
@@ -125,6 +129,11 @@ class _Model:
     def name(self, subject: Any) -> str:
         label = self.graph.value(subject, self.rdf.RDFS.label)
         return str(label) if label is not None else _local(subject)
+
+    def feeders(self, subject: Any) -> list[str]:
+        """Names of the equipment that feeds a device."""
+        fed = [*self.graph.subjects(self.brick.feeds, subject), *self.graph.objects(subject, self.brick.isFedBy)]
+        return sorted(self.name(s) for s in fed if self._is_equipment(s))
 
     def zone(self, subject: Any, keys: set[tuple[str, ...]]) -> str:
         """Find the zone among what a device feeds, the parts of that, and where it stands."""
@@ -194,6 +203,8 @@ MARKER = "\u2713"
 
 _HAYSTACK_EQUIPMENT, _HAYSTACK_POINTS = vocabulary("haystack_equipment"), vocabulary("haystack_points")
 
+#: Tags that refer to what gives an equipment air, water or steam.
+_FEEDER = re.compile(r"(air|ahu|hotWater|chilledWater|steam|boiler|chiller)Ref")
 _CELL = re.compile(r'\s*((?:"(?:\\.|[^"\\])*"|`[^`]*`|@\S+?(?=[ ,]|$)|[^,"`@]|@)*)\s*(?:,|$)')
 
 
@@ -219,7 +230,7 @@ def read_haystack(file: Path, zones: Sequence[str]) -> DeviceImport:
     """
     entities = _read_json(file) if file.suffix.lower() == ".json" else _read_zinc(file)
     by_id = {entity["id"]: entity for entity in entities if "id" in entity}
-    rows, kinds = [], {}
+    rows, kinds, fed_by = [], {}, {}
     for entity in entities:
         if "equip" not in entity or "id" not in entity:
             continue
@@ -228,6 +239,8 @@ def read_haystack(file: Path, zones: Sequence[str]) -> DeviceImport:
         if kind or "hvac" in entity:
             kinds[entity["id"]] = (_name(entity), kind)
             rows.append((_name(entity), kind, _zone(entity, by_id, zones)))
+            refs = (reference for tag, reference in entity.items() if _FEEDER.fullmatch(tag))
+            fed_by[_name(entity)] = [_name(by_id[reference]) for reference in refs if reference in by_id]
     points = []
     for entity in entities:
         owner = kinds.get(entity.get("equipRef", ""))
@@ -235,7 +248,7 @@ def read_haystack(file: Path, zones: Sequence[str]) -> DeviceImport:
             points.append(ListedPoint(entity.get("id", _name(entity)), owner[0], _point(entity, owner[1])))
     if not rows:
         raise PlanError(file.name, "entities with the tag 'equip'", f"none of {len(entities)}")
-    return import_devices(rows, zones, file.name, points)
+    return import_devices(rows, zones, file.name, points, fed_by)
 
 
 def _name(entity: Entity) -> str:

@@ -18,6 +18,7 @@ from thermal.case.building import (
     Device,
     FloorPlan,
     FloorPlans,
+    GeometryQuality,
     Location,
     ZoneTable,
 )
@@ -105,6 +106,8 @@ class DraftDevice(_Entry):
         As in a case.
     zone
         The zone it serves.
+    fed_by
+        Devices that feed it.
     room
         What the list of devices says of its place, where no zone has that name.
     floor, x, y
@@ -114,6 +117,7 @@ class DraftDevice(_Entry):
     name: Name
     type: Name
     zone: Name | None = None
+    fed_by: tuple[Name, ...] = ()
     room: Name = ""
     floor: Name | None = None
     x: Finite | None = None
@@ -166,6 +170,8 @@ class Draft(_Entry):
         As in a case.
     weather_station
         Entity of the site's weather.
+    geometry_quality
+        How the geometry was come by.
     seconds
         Time that somebody worked on it [s].
     """
@@ -181,6 +187,7 @@ class Draft(_Entry):
     glazing: dict[Name, dict[Name, Finite]] = Field(default_factory=dict)
     airflows: tuple[Airflow, ...] = ()
     weather_station: Name = "weather_station"
+    geometry_quality: GeometryQuality = "approximate"
     seconds: Annotated[float, Field(ge=0, allow_inf_nan=False)] = 0.0
 
 
@@ -298,10 +305,11 @@ def draft_of(building: Building) -> Draft:
         orientation=building.orientation,
         cell_size=plans.cell_size,
         floors=tuple(encode_floor(floor.name, floor.height, floor.tokens) for floor in plans.floors),
-        devices=tuple(DraftDevice(name=d.name, type=d.type, zone=d.zone) for d in building.devices),
+        devices=tuple(DraftDevice(**d.model_dump()) for d in building.devices),
         glazing={zone: dict(by_facade) for zone, by_facade in plans.glazing.items()},
         airflows=building.airflows,
         weather_station=building.weather_station,
+        geometry_quality=building.geometry_quality,
     )
 
 
@@ -324,7 +332,7 @@ def building_of_draft(draft: Draft) -> Building:
         A part of the site, or a device's name or type, is missing.
     """
     floors = tuple(FloorPlan(floor.name, floor.height, floor.tokens) for floor in draft.floors)
-    devices = tuple(Device(name=d.name, type=d.type, zone=d.zone) for d in draft.devices)
+    devices = tuple(Device(name=d.name, type=d.type, zone=d.zone, fed_by=d.fed_by) for d in draft.devices)
     return Building(
         name=draft.name,
         location=Location.model_validate(draft.site.model_dump()),
@@ -333,6 +341,7 @@ def building_of_draft(draft: Draft) -> Building:
         devices=devices,
         airflows=draft.airflows,
         weather_station=draft.weather_station,
+        geometry_quality=draft.geometry_quality,
     )
 
 

@@ -13,7 +13,9 @@ from typing import Any
 
 import yaml
 
+from thermal.case.building import BuildingFile
 from thermal.case.load import NAME, load_case, read_building_file
+from thermal.case.migration import migrate
 from thermal.case.telemetry import check_units, read_telemetry
 from thermal.errors import CaseError, LabelError, SessionHeldError, ThermalError
 from thermal.plan.folder import DRAFT, OWN_FOLDER, save_plan_case
@@ -162,7 +164,7 @@ class CaseStore:
                 if files.keys() >= {f["name"] for f in content["floors"]}:
                     floor["plan"] = files[floor["name"]]
                 _replace_if_other(inside_folder(self.folder, floor["plan"], "plan"), drawn)
-        if _filled(before) == _filled(content) and not self._is_ours():
+        if before and _filled(migrate(before, NAME)) == _filled(content) and not self._is_ours():
             return  # nothing new to say: the file stays with the comments of its author
         text = yaml.safe_dump(content, sort_keys=False, allow_unicode=True, width=120)
         note = _NOTE.format(minutes=draft.seconds / 60.0)
@@ -177,7 +179,8 @@ class CaseStore:
 
 def _filled(content: dict[str, Any]) -> dict[str, Any]:
     """Leave out what is empty: a key without an entry says the same as no key."""
-    return {key: value for key, value in content.items() if value or value == 0}
+    parsed = BuildingFile.model_validate(content).model_dump()
+    return {key: value for key, value in parsed.items() if value or value == 0}
 
 
 def _replace_if_other(path: Path, content: bytes) -> None:
