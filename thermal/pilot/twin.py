@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from typing import Any, Literal
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
-import pandas as pd
 from scipy.special import ndtr, ndtri
 
 from thermal.case.building import Building, FloorPlans
@@ -21,9 +20,9 @@ from thermal.model.simulator import Simulator
 from thermal.network.build import build_network
 from thermal.parameters import Parameter, Scope
 from thermal.pilot.building import devices
-from thermal.pilot.telemetry import Progress, generate_telemetry
+from thermal.pilot.telemetry import Progress, TelemetrySettings, generate_telemetry
 from thermal.pilot.thermostat import draw_prbs_thermostats, draw_thermostats
-from thermal.pilot.weather import draw_disturbance, generate_weather
+from thermal.pilot.weather import Period, draw_disturbance
 from thermal.units import AIR_HEAT_CAPACITY
 
 Series = npt.NDArray[np.float64]
@@ -129,6 +128,53 @@ _DAY = 86400.0  # s
 _THETA, _CONDITIONS = 2, 3  # streams of random numbers of a seed; the sensors have 1
 
 
+@dataclass(frozen=True)
+class TwinSettings(Period):
+    """Period, model and sensors of a twin.
+
+    Parameters
+    ----------
+    dx : float, optional
+        Distance between control volumes [m]; the plan's cell size by default. Calibrate with the same.
+    excitation : {"schedule", "prbs"}
+        Set-points with night set-back (`draw_thermostats`), or in a pseudo-random sequence (`draw_prbs_thermostats`).
+    fixed : mapping of str to float
+        Parameters that are not drawn, with their values [parameter units].
+    scopes : mapping of str to {"global", "zone"}, optional
+        Parameters with one value a zone.
+    ranges : TwinRanges
+        Of the unmeasured heat and of the sensor noise.
+    meter : {"sensors", "exact"}
+        What the discharge sensor reports, see the notes of `generate_twin`.
+    resolution : float
+        Steps of the temperature sensors [K], 0 or more; 0 reports every digit.
+    start, days, spin_up_days, step_seconds
+        As in `Period` [-, d, d, s], by default three weeks from a Monday in winter.
+
+    Raises
+    ------
+    ThermalError
+        When an option is unknown.
+    """
+
+    start: str = "2023-01-09"
+    days: float = 21.0
+    spin_up_days: float = 7.0
+    dx: float | None = None
+    excitation: Excitation = "schedule"
+    fixed: Mapping[str, float] = field(default_factory=dict)
+    scopes: Mapping[str, Scope] | None = None
+    ranges: TwinRanges = TwinRanges()
+    meter: Meter = "sensors"
+    resolution: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name, options in (("excitation", get_args(Excitation)), ("meter", get_args(Meter))):
+            word = getattr(self, name)
+            if word not in options:
+                raise ThermalError(name, f"one of {', '.join(options)}", repr(word), nearest(word, options))
+
+
 class _DisturbedPlant:
     """A simulator that receives the unmeasured heat as well, and remembers what it did and received."""
 
@@ -164,18 +210,8 @@ class _DisturbedPlant:
 def generate_twin(
     building: Building,
     seed: int = 0,
+    settings: TwinSettings | None = None,
     *,
-    days: float = 21.0,
-    step_seconds: float = 300.0,
-    start: str = "2023-01-09",
-    spin_up_days: float = 7.0,
-    dx: float | None = None,
-    excitation: Excitation = "schedule",
-    fixed: Mapping[str, float] | None = None,
-    scopes: Mapping[str, Scope] | None = None,
-    ranges: TwinRanges | None = None,
-    meter: Meter = "sensors",
-    resolution: float = 0.0,
     progress: Progress | None = None,
 ) -> tuple[Case, TwinTruth]:
     """Make telemetry of a building under thermostats, with parameters drawn from their priors, and keep the truth.
@@ -191,28 +227,8 @@ def generate_twin(
         With floor plans. A VAV terminal a zone takes the place of its devices; its `airflows` are left out.
     seed : int
         Same seed, same twin; 0 or more. Weather, set-points, θ, disturbance and sensors all come from it.
-    days : float
-        Length of the telemetry [d], positive.
-    step_seconds : float
-        Length of an interval [s], positive, up to 3600.
-    start : str
-        Local time at which the first interval begins, ISO 8601 without offset. The default is a Monday in winter.
-    spin_up_days : float
-        Length that is simulated before it, from the steady state of the first day's outdoor air [d], 0 or more.
-    dx : float, optional
-        Distance between control volumes [m]; the plan's cell size by default. Calibrate with the same.
-    excitation : {"schedule", "prbs"}
-        Set-points with night set-back (`draw_thermostats`), or in a pseudo-random sequence (`draw_prbs_thermostats`).
-    fixed : mapping of str to float, optional
-        Parameters that are not drawn, with their values [parameter units].
-    scopes : mapping of str to {"global", "zone"}, optional
-        Parameters with one value a zone.
-    ranges : TwinRanges, optional
-        Of the unmeasured heat and of the sensor noise.
-    meter : {"sensors", "exact"}
-        What the discharge sensor reports, see the notes.
-    resolution : float
-        Steps of the temperature sensors [K], 0 or more; 0 reports every digit.
+    settings : TwinSettings, optional
+        Period, model and sensors.
     progress : callable, optional
         Called as ``progress(steps_done, steps)`` after every step.
 
@@ -224,7 +240,7 @@ def generate_twin(
     Raises
     ------
     ThermalError
-        When an option is unknown or the building has no floor plans.
+        When the building has no floor plans.
     ModelError
         When a fixed parameter is not of this building.
     ThermalError
@@ -242,43 +258,30 @@ def generate_twin(
     Examples
     --------
     >>> from thermal.data import load_bundled_case
-    >>> case, truth = generate_twin(load_bundled_case().building, 3, days=1.0, spin_up_days=1.0, dx=1.0)
+    >>> case, truth = generate_twin(load_bundled_case().building, 3, TwinSettings(days=1.0, spin_up_days=1.0, dx=1.0))
     >>> case.zone_heat().shape == truth.heat.shape
     True
     """
-    plans = _check(building, excitation, meter)
-    station = building.weather_station
+    at, plans, station = settings or TwinSettings(), building.geometry, building.weather_station
+    if not isinstance(plans, FloorPlans):
+        advice = "its terminal units are sized by floor plans"
+        raise ThermalError(f"building {building.name!r}", "floor plans", "a zone table", advice)
     twin = replace(building, name=f"{building.name}_twin_{seed}", devices=devices(plans), airflows=())
-    weather = generate_weather(
-        seed,
-        start=str(pd.Timestamp(start) - pd.Timedelta(days=spin_up_days)),
-        days=days + spin_up_days,
-        step_seconds=step_seconds,
-        location=building.location,
-        station=station,
-    )
-    parameters = build_network(twin, dx=dx, scopes=scopes).parameters
-    values = _draw_values(seed, parameters) | dict(fixed or {})
-    deviation, time_constant, noise = _draw_conditions(seed, ranges or TwinRanges())
+    weather = at.weather(seed, building.location, station)
+    parameters = build_network(twin, dx=at.dx, scopes=at.scopes).parameters
+    values = _draw_values(seed, parameters) | dict(at.fixed)
+    deviation, time_constant, noise = _draw_conditions(seed, at.ranges)
     floor_areas = zone_floor_areas(plans)
     areas = np.array([floor_areas[zone] for zone in twin.zone_names])
-    disturbance = draw_disturbance(seed, len(weather), deviation * areas, time_constant, step_seconds)
-    outdoor = weather[f"{station}/{OUTDOOR_TEMPERATURE}"].iloc[: round(_DAY / step_seconds)].mean()
-    skipped = round(spin_up_days * _DAY / step_seconds)
-    simulator = Simulator(twin, values, step_seconds, dx=dx, scopes=scopes)
+    disturbance = draw_disturbance(seed, len(weather), deviation * areas, time_constant, at.step_seconds)
+    outdoor = weather[f"{station}/{OUTDOOR_TEMPERATURE}"].iloc[: round(_DAY / at.step_seconds)].mean()
+    skipped = round(at.spin_up_days * _DAY / at.step_seconds)
+    simulator = Simulator(twin, values, at.step_seconds, dx=at.dx, scopes=at.scopes)
     plant = _DisturbedPlant(simulator, disturbance, float(outdoor), skipped)
-    draw = draw_prbs_thermostats if excitation == "prbs" else draw_thermostats
+    draw = draw_prbs_thermostats if at.excitation == "prbs" else draw_thermostats
+    sensors = TelemetrySettings(seed, at.spin_up_days, station, noise, at.resolution)
     telemetry = generate_telemetry(
-        plant,
-        plans,
-        weather,
-        seed=seed,
-        spin_up_days=spin_up_days,
-        thermostats=draw(seed, len(areas)),
-        station=station,
-        noise=noise,
-        resolution=resolution,
-        progress=progress,
+        plant, plans, weather, sensors, thermostats=draw(seed, len(areas)), progress=progress
     )
     heat = np.array(plant.heat[skipped:])
     truth = TwinTruth(
@@ -288,31 +291,15 @@ def generate_twin(
         disturbance_deviation=deviation,
         disturbance_time=time_constant,
         noise=noise,
-        resolution=resolution,
+        resolution=at.resolution,
         zone_temperatures=np.array(plant.temperatures[skipped:]),
         heat=heat,
         disturbance=disturbance[skipped:],
         states=plant.states,
     )
-    return Case(twin, telemetry if meter == "sensors" else _metered_exactly(telemetry, plant.zone_names, heat)), truth
-
-
-def _check(building: Building, excitation: str, meter: str) -> FloorPlans:
-    """Refuse what no twin can be made of."""
-    for name, word, options in (
-        ("excitation", excitation, ("schedule", "prbs")),
-        ("meter", meter, ("sensors", "exact")),
-    ):
-        if word not in options:
-            raise ThermalError(
-                f"{name}: expected one of {', '.join(options)}, found {word!r}; {nearest(word, options)}"
-            )
-    if not isinstance(building.geometry, FloorPlans):
-        raise ThermalError(
-            f"building {building.name!r}: expected floor plans, found a zone table; "
-            "its terminal units are sized by floor plans"
-        )
-    return building.geometry
+    return Case(
+        twin, telemetry if at.meter == "sensors" else _metered_exactly(telemetry, plant.zone_names, heat)
+    ), truth
 
 
 def _draw_values(seed: int, parameters: tuple[Parameter, ...]) -> dict[str, float]:

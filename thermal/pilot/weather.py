@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import numpy.typing as npt
 import pandas as pd
@@ -72,6 +74,44 @@ _WIND_TIME, _BREEZE, _WIND_MEAN = 3.0 * 3600.0, 0.6, 2.5  # s, -, m/s: a sea bre
 _WIND_FROM, _WIND_VEER = 300.0, 50.0  # deg, the north-westerly of the bay; deg, standard deviation
 _TURBIDITY, _VAPOUR = 0.10, 1.4  # aerosol optical depth at 700 nm [-], precipitable water [cm]: clean coastal air
 _DECIMALS = 3  # of every value that is reported
+
+
+@dataclass(frozen=True)
+class Period:
+    """A stretch of generated telemetry, and what is simulated before it.
+
+    Parameters
+    ----------
+    start : str
+        Local time at which the first reported interval begins, ISO 8601 without offset.
+    days : float
+        Length of the telemetry [d], positive.
+    spin_up_days : float
+        Length that is simulated before it, so that walls and mass forget how they started [d], 0 or more.
+    step_seconds : float
+        Length of an interval [s], positive, up to 3600. The default is the paper's 5 minutes.
+    """
+
+    start: str = "2023-10-02"
+    days: float = 14.0
+    spin_up_days: float = 2.0
+    step_seconds: float = 300.0
+
+    def weather(self, seed: int, location: Location, station: str) -> pd.DataFrame:
+        """Weather of the period and of the spin-up before it, as `generate_weather` gives it.
+
+        Parameters
+        ----------
+        seed : int
+            Same seed, same weather [-]; 0 or more.
+        location : Location
+            Where it is.
+        station : str
+            Entity that reports it.
+        """
+        start = str(pd.Timestamp(self.start) - pd.Timedelta(days=self.spin_up_days))
+        days, step = self.days + self.spin_up_days, self.step_seconds
+        return generate_weather(seed, start=start, days=days, step_seconds=step, location=location, station=station)
 
 
 def generate_weather(
