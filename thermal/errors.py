@@ -71,6 +71,25 @@ def nearest(word: object, options: Iterable[object]) -> str:
     return f"valid: {shown}" + (f" and {len(names) - 8} more" if len(names) > 8 else "")
 
 
+def check_known(word: str, options: Iterable[str], where: str, expected: str, kind: type[ThermalError]) -> None:
+    """Refuse a name that is none of the known ones, and name the nearest of them.
+
+    Parameters
+    ----------
+    word
+        What was given.
+    options
+        What would have been valid.
+    where, expected
+        As `describe` takes them.
+    kind
+        Error to raise.
+    """
+    known = list(options)
+    if word not in known:
+        raise kind(where, expected, repr(word), nearest(word, known))
+
+
 class EffectError(ModelError):
     """An effect is unknown, or asked for where it cannot be."""
 

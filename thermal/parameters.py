@@ -71,12 +71,12 @@ class Parameter:
             expected, ordered = "0 < lower < start < upper", 0.0 < self.lower < self.start < self.upper
         if not ordered:
             raise ValueError(
-                f"parameter {self.name}: expected {expected}, came {self.lower}, {self.start}, {self.upper}"
+                f"parameter {self.name}: expected {expected}, got {self.lower}, {self.start}, {self.upper}"
             )
         if (self.scope == "global") != (self.member is None):
             raise ValueError(
                 f"parameter {self.name}: expected a member with the scopes facade and zone only, "
-                f"came scope {self.scope!r} with member {self.member!r}"
+                f"got scope {self.scope!r} with member {self.member!r}"
             )
 
     @property
@@ -170,20 +170,15 @@ class Parameter:
         return replace(self, name=f"{self.base}@{prefix}{member}", scope=scope, member=member)
 
 
-_ROWS = csv.reader((Path(__file__).parent / "data" / "parameters.csv").read_text(encoding="utf-8").splitlines()[1:])
+_ROWS = list(csv.DictReader((Path(__file__).parent / "data" / "parameters.csv").read_text("utf-8").splitlines()))
+
 #: Parameters of the baseline. Wall parameters stand for a wall 1 m thick and are rescaled to the plan's wall thickness.
-PARAMETERS: dict[str, Parameter] = {
-    name: Parameter(name, unit, float(start), float(lower), float(upper), source, cast(Scale, scale))
-    for name, unit, start, lower, upper, source, scale in _ROWS
-}
+PARAMETERS: dict[str, Parameter] = {}
+for _row in _ROWS:
+    _start, _lower, _upper = (float(_row[key]) for key in ("start", "lower", "upper"))
+    PARAMETERS[_row["name"]] = Parameter(
+        _row["name"], _row["unit"], _start, _lower, _upper, _row["source"], cast(Scale, _row["scale"])
+    )
 
 #: Parameters of the envelope: those that may have one value a facade.
-ENVELOPE_PARAMETERS = (
-    "exterior_convection_coefficient",
-    "exterior_wall_conductivity",
-    "exterior_wall_heat_capacity",
-    "window_u_value",
-    "exterior_wall_conductivity_multiplier",
-    "exterior_wall_heat_capacity_multiplier",
-    "window_conductance_multiplier",
-)
+ENVELOPE_PARAMETERS = tuple(row["name"] for row in _ROWS if row["per_facade"] == "yes")

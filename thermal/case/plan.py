@@ -137,14 +137,12 @@ def wall_shares(tokens: NDArray[np.str_]) -> dict[Cell, tuple[str, ...]]:
     {(0, 1): ('A', 'B')}
     """
     walls: list[Cell] = [(int(row), int(col)) for row, col in np.argwhere(tokens == INTERIOR_WALL)]
-    shares: dict[Cell, set[str]] = {}
-    for cell in walls:
-        beside = _zones_at(tokens, cell, _SIDES) or _zones_at(tokens, cell, _CORNERS)
-        if beside:
-            shares[cell] = beside
+    framed = np.pad(tokens, 1, constant_values=OUTSIDE)
+    found = {cell: _zones_at(framed, cell, _SIDES) or _zones_at(framed, cell, _CORNERS) for cell in walls}
+    shares = {cell: zones for cell, zones in found.items() if zones}
     pending = [cell for cell in walls if cell not in shares]
     while pending:
-        reached = {cell: set().union(*(shares.get(other, set()) for other in _beside(cell))) for cell in pending}
+        reached = {(r, c): set().union(*(shares.get((r + y, c + x), set()) for y, x in _SIDES)) for r, c in pending}
         new = {cell: zones for cell, zones in reached.items() if zones}
         if not new:
             break
@@ -210,15 +208,12 @@ def facade_areas(plans: FloorPlans) -> dict[str, dict[str, float]]:
     """
     areas: dict[str, dict[str, float]] = {}
     for floor in plans.floors:
-        shares = wall_shares(floor.tokens)
+        shares, framed = wall_shares(floor.tokens), np.pad(floor.tokens, 1, constant_values=OUTSIDE)
         areas |= {zone: dict.fromkeys(FACADE_STEPS, 0.0) for zone in floor.zone_names}
         for facade, step in FACADE_STEPS.items():
-            leads_out = _wall_to_outside(floor.tokens, step)
-            for row, col in np.argwhere(leads_out):
+            for row, col in np.argwhere(_wall_to_outside(floor.tokens, step)):
                 inner = (int(row) - step[0], int(col) - step[1])
-                if not _inside(floor.tokens, inner):
-                    continue
-                token = str(floor.tokens[inner])
+                token = str(framed[inner[0] + 1, inner[1] + 1])
                 owners = shares[inner] if token == INTERIOR_WALL else (token,) if token in areas else ()
                 for zone in owners:
                     areas[zone][facade] += plans.cell_size * floor.height / len(owners)
@@ -226,7 +221,8 @@ def facade_areas(plans: FloorPlans) -> dict[str, dict[str, float]]:
 
 
 def _cell_counts(floor: FloorPlan) -> dict[str, float]:
-    counts = {zone: float(np.count_nonzero(floor.tokens == zone)) for zone in floor.zone_names}
+    cells = dict(zip(*(found.tolist() for found in np.unique(floor.tokens, return_counts=True)), strict=True))
+    counts = {zone: float(cells[zone]) for zone in floor.zone_names}
     for zones in wall_shares(floor.tokens).values():
         for zone in zones:
             counts[zone] += 1.0 / len(zones)
@@ -247,15 +243,7 @@ def _wall_to_outside(tokens: NDArray[np.str_], step: Cell) -> NDArray[np.bool_]:
     return np.moveaxis(result[::-1] if forwards else result, 0, axis)
 
 
-def _inside(tokens: NDArray[np.str_], cell: Cell) -> bool:
-    return bool(0 <= cell[0] < tokens.shape[0] and 0 <= cell[1] < tokens.shape[1])
-
-
-def _beside(cell: Cell) -> list[Cell]:
-    return [(cell[0] + d_row, cell[1] + d_col) for d_row, d_col in _SIDES]
-
-
-def _zones_at(tokens: NDArray[np.str_], cell: Cell, steps: tuple[Cell, ...]) -> set[str]:
-    cells = [(cell[0] + d_row, cell[1] + d_col) for d_row, d_col in steps]
-    found = {str(tokens[other]) for other in cells if _inside(tokens, other)}
+def _zones_at(framed: NDArray[np.str_], cell: Cell, steps: tuple[Cell, ...]) -> set[str]:
+    """Zones at some steps from a cell of a plan that has a row of outside around it."""
+    found = {str(framed[1 + cell[0] + d_row, 1 + cell[1] + d_col]) for d_row, d_col in steps}
     return found - {OUTSIDE, EXTERIOR_WALL, INTERIOR_WALL}

@@ -6,7 +6,7 @@ import csv
 from dataclasses import dataclass
 from pathlib import Path
 
-from thermal.errors import CaseError, nearest
+from thermal.errors import CaseError, check_known
 
 
 @dataclass(frozen=True)
@@ -73,8 +73,7 @@ def point_type(name: str, where: str) -> PointType:
     >>> point_type("wind_speed_sensor", "units").quantity
     'speed'
     """
-    if name not in POINT_TYPES:
-        raise CaseError(where, "a point type of the case format", repr(name), nearest(name, POINT_TYPES))
+    check_known(name, POINT_TYPES, where, "a point type of the case format", CaseError)
     return POINT_TYPES[name]
 
 

@@ -6,6 +6,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from graphlib import CycleError, TopologicalSorter
 
 import numpy as np
+from scipy import ndimage
 
 from thermal.case.building import (
     DEVICE_TYPES,
@@ -17,12 +18,11 @@ from thermal.case.building import (
     OUTSIDE,
     Building,
     Device,
-    FloorPlan,
     FloorPlans,
     Surface,
     ZoneTable,
 )
-from thermal.case.plan import FACADE_STEPS, check_plan, facade_areas
+from thermal.case.plan import check_plan, facade_areas
 from thermal.case.points import (
     DISCHARGE_TEMPERATURE,
     HEATING_POWER,
@@ -32,8 +32,9 @@ from thermal.case.points import (
     split_column,
 )
 from thermal.case.telemetry import Telemetry
-from thermal.errors import CaseError, nearest
+from thermal.errors import CaseError, check_known, nearest
 
+_ZONE, _DEVICE = ("a zone of the building", CaseError), ("a device of the building", CaseError)
 RESERVED = frozenset({OUTDOOR, GROUND, OUTSIDE, EXTERIOR_WALL, INTERIOR_WALL})
 GLAZING_TOLERANCE = 1.01  # drawings are rounded: a facade may be overdrawn by 1 %
 _LAYERED = frozenset({"wall", "floor", "ceiling"})
@@ -106,13 +107,11 @@ def check_columns(building: Building, columns: Collection[str], file: str) -> No
             if surface.other in boundaries and column not in columns:
                 where = f"building.yaml: surfaces[{index}] ({surface.name}): other"
                 expected = f"a zone, outdoor, ground, or a boundary with the column {column!r} in {file}"
-                raise CaseError(where, expected, repr(surface.other), nearest(surface.other, [*zones, OUTDOOR, GROUND]))
+                check_known(surface.other, [*zones, OUTDOOR, GROUND], where, expected, CaseError)
     entities = [*(device.name for device in building.devices), *zones, *boundaries, building.weather_station]
     for column in columns:
-        entity, _ = split_column(column, file)
-        if entity not in entities:
-            expected = "a device, a zone, a measured boundary or the weather station before the slash"
-            raise CaseError(f"{file}: column {column!r}", expected, repr(entity), nearest(entity, entities))
+        expected = "a device, a zone, a measured boundary or the weather station before the slash"
+        check_known(split_column(column, file)[0], entities, f"{file}: column {column!r}", expected, CaseError)
 
 
 def _check_zones(building: Building, file: str) -> None:
@@ -147,9 +146,8 @@ def _check_devices(building: Building, file: str) -> None:
     _check_unique(names | {"weather_station": building.weather_station}, file)
     _check_unique(names | {f"devices[{i}]": device.name for i, device in enumerate(building.devices)}, file)
     for i, device in enumerate(building.devices):
-        if device.zone is not None and device.zone not in zones:
-            where = f"{file}: devices[{i}] ({device.name}): zone"
-            raise CaseError(where, "a zone of the building", repr(device.zone), nearest(device.zone, zones))
+        if device.zone is not None:
+            check_known(device.zone, zones, f"{file}: devices[{i}] ({device.name}): zone", *_ZONE)
     _check_feeders(building.devices, file)
 
 
@@ -161,9 +159,7 @@ def _check_feeders(devices: Sequence[Device], file: str) -> None:
         for feeder in device.fed_by:
             if feeder == device.name:
                 raise CaseError(where, "other devices", f"{feeder!r}, the device itself", "drop it")
-            if feeder not in fed_by:
-                others = [name for name in fed_by if name != device.name]
-                raise CaseError(where, "a device of the building", repr(feeder), nearest(feeder, others))
+            check_known(feeder, [name for name in fed_by if name != device.name], where, *_DEVICE)
         if len({*device.fed_by}) < len(device.fed_by):
             raise CaseError(where, "each feeder once", ", ".join(device.fed_by), "drop one")
     try:
@@ -180,12 +176,8 @@ def _check_airflows(building: Building, file: str) -> None:
     for i, airflow in enumerate(building.airflows):
         where = f"{file}: airflows[{i}]"
         for key, zone in (("from", airflow.source), ("to", airflow.target)):
-            if zone not in building.zone_names:
-                advice = nearest(zone, building.zone_names)
-                raise CaseError(f"{where}: {key}", "a zone of the building", repr(zone), advice)
-        if airflow.device not in devices:
-            advice = nearest(airflow.device, devices)
-            raise CaseError(f"{where}: device", "a device of the building", repr(airflow.device), advice)
+            check_known(zone, building.zone_names, f"{where}: {key}", *_ZONE)
+        check_known(airflow.device, devices, f"{where}: device", *_DEVICE)
         if airflow.source == airflow.target:
             raise CaseError(f"{where}: to", "another zone than 'from'", repr(airflow.target))
 
@@ -193,12 +185,10 @@ def _check_airflows(building: Building, file: str) -> None:
 def _check_glazing(plans: FloorPlans, file: str) -> None:
     areas = facade_areas(plans)
     for zone, by_facade in plans.glazing.items():
-        if zone not in areas:
-            raise CaseError(f"{file}: glazing.{zone}", "a zone of the building", repr(zone), nearest(zone, areas))
+        check_known(zone, areas, f"{file}: glazing.{zone}", *_ZONE)
         for facade, area in by_facade.items():
             where = f"{file}: glazing.{zone}.{facade}"
-            if facade not in FACADES:
-                raise CaseError(where, f"a facade ({', '.join(FACADES)})", repr(facade), nearest(facade, FACADES))
+            check_known(facade, FACADES, where, f"a facade ({', '.join(FACADES)})", CaseError)
             if not area <= areas[zone][facade] * GLAZING_TOLERANCE:
                 expected = f"at most the zone's {areas[zone][facade]:.2f} m2 of {facade} facade"
                 raise CaseError(where, expected, f"{area:g} m2", "correct the area, the facade, or the plan")
@@ -212,14 +202,10 @@ def _check_surfaces(table: ZoneTable, file: str) -> None:
             raise CaseError(f"{file}: constructions.{name}", "at least one layer", "none")
     for i, surface in enumerate(table.surfaces):
         where = f"{file}: surfaces[{i}] ({surface.name})"
-        if surface.zone not in zones:
-            advice = nearest(surface.zone, zones)
-            raise CaseError(f"{where}: zone", "a zone of the building", repr(surface.zone), advice)
-        if surface.construction is not None and surface.construction not in table.constructions:
-            advice = nearest(surface.construction, table.constructions)
-            raise CaseError(
-                f"{where}: construction", "a name under 'constructions'", repr(surface.construction), advice
-            )
+        check_known(surface.zone, zones, f"{where}: zone", *_ZONE)
+        if surface.construction is not None:
+            layered, expected = table.constructions, "a name under 'constructions'"
+            check_known(surface.construction, layered, f"{where}: construction", expected, CaseError)
         _check_kind(surface, zones, where)
 
 
@@ -237,8 +223,8 @@ def _check_kind(surface: Surface, zones: Collection[str], where: str) -> None:
         raise CaseError(f"{where}: azimuth", "a value", "none", advice)
     if surface.other == surface.zone and surface.kind not in _LAYERED:
         raise CaseError(f"{where}: other", "something else than the zone itself", repr(surface.other))
-    if surface.kind == "opening" and surface.other not in zones:
-        raise CaseError(f"{where}: other", "a zone, for an opening", repr(surface.other), nearest(surface.other, zones))
+    if surface.kind == "opening":
+        check_known(surface.other, zones, f"{where}: other", "a zone, for an opening", CaseError)
 
 
 TERMINAL_TYPES = frozenset({"vav", "fan_coil", "electric_heater", "radiator", "supply_air_terminal"})
@@ -291,18 +277,9 @@ def unknown_device_types(building: Building) -> dict[str, str]:
 def _on_plans(building: Building) -> Iterator[str]:
     if isinstance(building.geometry, FloorPlans):
         for floor in building.geometry.floors:
-            cells = _open_partitions(floor)
-            if cells:
+            outside = ndimage.binary_dilation(floor.tokens == OUTSIDE, border_value=1)
+            if cells := np.count_nonzero(outside & (floor.tokens == INTERIOR_WALL)):
                 yield f"floor {floor.name!r}: {cells} cells of interior wall ('+') touch the outside; draw '#' there"
-
-
-def _open_partitions(floor: FloorPlan) -> int:
-    outside = np.pad(floor.tokens == OUTSIDE, 1, constant_values=True)
-    n_row, n_col = floor.tokens.shape
-    touching = np.zeros(floor.tokens.shape, dtype=bool)
-    for d_row, d_col in FACADE_STEPS.values():
-        touching |= outside[1 + d_row : 1 + d_row + n_row, 1 + d_col : 1 + d_col + n_col]
-    return int(np.count_nonzero(touching & (floor.tokens == INTERIOR_WALL)))
 
 
 def _on_devices(building: Building, columns: set[str]) -> Iterator[str]:

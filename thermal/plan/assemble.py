@@ -10,9 +10,9 @@ from scipy.signal import fftconvolve
 
 from thermal._types import FloatArray
 from thermal.case.building import FloorPlan, FloorPlans
-from thermal.case.plan import check_plan
+from thermal.case.plan import check_plan, zone_floor_areas
 from thermal.errors import LostRoomError, PlanError
-from thermal.plan.cells import ZonedFloor, draw_cells, drawn_areas
+from thermal.plan.cells import ZonedFloor, draw_cells
 from thermal.plan.guard import checked_number
 
 _GRID = 0.1  # m, on which outlines are compared
@@ -221,11 +221,8 @@ def assemble_plans(
 
 
 def _area_errors(floors: Sequence[ZonedFloor], plans: Sequence[FloorPlan], cell_size: float) -> dict[str, float]:
-    errors: dict[str, float] = {}
-    for floor, plan in zip(floors, plans, strict=True):
-        wanted, found = floor.areas, drawn_areas(plan, cell_size)
-        errors |= {zone: found.get(zone, 0.0) / wanted[zone] - 1.0 for zone in wanted}
-    return errors
+    found = zone_floor_areas(FloorPlans(cell_size, tuple(plans)))
+    return {zone: found.get(zone, 0.0) / wanted - 1.0 for floor in floors for zone, wanted in floor.areas.items()}
 
 
 def _check_names(floors: Sequence[ZonedFloor]) -> None:

@@ -15,7 +15,6 @@ from scipy import ndimage
 
 from thermal._types import BoolArray, FloatArray, Int32Array
 from thermal.case.building import EXTERIOR_WALL, INTERIOR_WALL, OUTSIDE, FloorPlan
-from thermal.case.plan import wall_shares
 from thermal.case.validation import RESERVED
 from thermal.errors import LostRoomError, PlanError
 from thermal.plan.guard import checked_number
@@ -121,31 +120,6 @@ def draw_cells(
     part = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
     corner = (frame[0] + float(columns[0]) * cell_size, frame[1] + float(rows[0]) * cell_size)
     return tuple(FloorPlan(f.name, f.height, tokens[part]) for f, tokens in zip(floors, drawn, strict=True)), corner
-
-
-def drawn_areas(plan: FloorPlan, cell_size: float) -> dict[str, float]:
-    """Floor area of the zones of a plan, with half of their interior walls.
-
-    Parameters
-    ----------
-    plan : FloorPlan
-        One floor.
-    cell_size : float
-        Side of a cell [m].
-
-    Returns
-    -------
-    dict
-        Area [m2] by zone.
-    """
-    names, cells = np.unique(plan.tokens, return_counts=True)
-    counts = {str(n): float(c) for n, c in zip(names, cells, strict=True)}
-    for token in (OUTSIDE, EXTERIOR_WALL, INTERIOR_WALL):
-        counts.pop(token, None)
-    for zones in wall_shares(plan.tokens).values():
-        for zone in zones:
-            counts[zone] += 1.0 / len(zones)
-    return {name: count * cell_size**2 for name, count in counts.items()}
 
 
 def _frame(floors: Sequence[ZonedFloor], cell_size: float, phase: tuple[float, float]) -> tuple[float, float, int, int]:

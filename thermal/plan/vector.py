@@ -102,16 +102,7 @@ def _open(file: Path) -> Any:
     ezdxf = extra("ezdxf")
     try:
         return ezdxf.readfile(file)
-    except (
-        OSError,
-        ezdxf.DXFError,
-        ValueError,
-        TypeError,
-        IndexError,
-        KeyError,
-        StopIteration,
-        RecursionError,
-    ) as error:
+    except (OSError, ezdxf.DXFError, ValueError, TypeError, LookupError, StopIteration, RecursionError) as error:
         found = " ".join(str(error).replace(str(file), file.name).split())[:200]
         raise PlanError(file.name, "a DXF drawing", found or type(error).__name__) from error
 
