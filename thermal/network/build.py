@@ -24,75 +24,11 @@ from thermal.parameters import Scope
 from thermal.units import AIR_HEAT_CAPACITY, air_density
 
 
-def plan_blueprint(
-    building: Building,
-    plans: FloorPlans,
-    dx: float | None = None,
-    reach: float | None = None,
-    scopes: Mapping[str, Scope] | None = None,
-    diffusers: Mapping[str, NDArray[np.bool_]] | None = None,
-    mean_shuffle: bool = True,
-    structure: Structure = BASELINE,
-) -> Blueprint:
-    """Build the baseline of a building given by floor plans.
-
-    Parameters
-    ----------
-    building : Building
-        For its location, zones and airflows.
-    plans : FloorPlans
-        Its geometry.
-    dx : float, optional
-        Distance between control volumes [m]; the plan's cell size by default.
-    reach : float, optional
-        Reach of the shuffle [m]; None is the whole zone.
-    scopes : mapping of str to {"global", "facade", "zone"}, optional
-        Parameters with one value a facade (a side of the plan) or a zone.
-    diffusers : mapping of str to ndarray of bool, optional
-        Per zone, a mask of the shape of its floor's plan with the cells that have a diffuser; all air cells by default.
-    mean_shuffle : bool
-        Whether the mean of the shuffle is a term of K; off for a simulator that shuffles at random.
-    structure : Structure
-        What the model is made of.
-
-    Returns
-    -------
-    Blueprint
-        Boundary ``outdoor``; slabs adiabatic at their back; no air exchange between zones (both are effects of the
-        catalogue).
-    """
-    graph = GraphBuilder(building.zone_names, ("outdoor",), scopes or {}, structure)
-    unknown = sorted(set(diffusers or {}) - set(building.zone_names))
-    if unknown:
-        raise ModelError(f"diffusers: zones {unknown} are not of this building; it has {list(building.zone_names)}")
-    areas = zone_floor_areas(plans)
-    density = air_density(building.location.elevation)
-    graph.anatomy.air_heat_capacity = density * AIR_HEAT_CAPACITY
-    diffuser_weight: dict[int, FloatArray] = {}
-    zones: dict[str, Zone] = {}
-    shapes = []
-    for number, plan in enumerate(plans.floors):
-        grid = floor_grid(plan, plans.cell_size, dx)
-        shapes.append(grid.shape)
-        floor = Floor(graph, plan, grid, number)
-        for name in (z for z in building.zone_names if (grid.token == z).any()):
-            zones[name] = floor.zone(name, areas[name], density, reach, mean_shuffle)
-            mask = (diffusers or {}).get(name)
-            diffuser_weight[zones[name].number] = floor.diffuser_weight(name, mask)
-        Walls(floor, zones, plans.cell_size, building.orientation).add(plans.glazing)
-        graph.anatomy.partitions |= partition_areas(plan, plans.cell_size)
-    _remember(graph, building, plans, zones, areas)
-    columns = [(z.air, np.full(z.air.size, z.number), z.share, diffuser_weight[z.number]) for z in zones.values()]
-    air, zone, mean, share = (np.concatenate([c[k] for c in columns]) for k in range(4))
-    return Blueprint(graph, air, zone, mean, share, grid.spacing, tuple(shapes))
-
-
 def _remember(
     graph: GraphBuilder, building: Building, plans: FloorPlans, zones: Mapping[str, Zone], areas: Mapping[str, float]
 ) -> None:
     """Complete the anatomy: rooms, what lies above and below them, and their facades."""
     anatomy = graph.anatomy
-    anatomy.airflows = tuple((graph.zones.index(a.source), graph.zones.index(a.target)) for a in building.airflows)
     for plan in plans.floors:
         for name in plan.zone_names:
             zones[name].room(areas[name], areas[name] * plan.height)
@@ -200,7 +136,31 @@ def blueprint(
     >>> len(baseline.network().signals), len(baseline.network(chosen({"solar_gain": ()})).signals) > 0
     (0, True)
     """
-    geometry = building.geometry
-    if isinstance(geometry, ZoneTable):
-        return table_blueprint(building, geometry, scopes, structure)
-    return plan_blueprint(building, geometry, dx, reach, scopes, diffusers, mean_shuffle, structure)
+    boundaries = ("outdoor", *building.measured_boundaries)
+    graph, plans = GraphBuilder(building.zone_names, boundaries, scopes or {}, structure), building.geometry
+    graph.anatomy.air_heat_capacity = air_density(building.location.elevation) * AIR_HEAT_CAPACITY
+    place = graph.zones.index
+    graph.anatomy.airflows = tuple((place(a.source), place(a.target)) for a in building.airflows)
+    if isinstance(plans, ZoneTable):
+        return table_blueprint(graph, plans)
+    unknown = sorted(set(diffusers or {}) - set(building.zone_names))
+    if unknown:
+        raise ModelError(f"diffusers: zones {unknown} are not of this building; it has {list(building.zone_names)}")
+    areas = zone_floor_areas(plans)
+    diffuser_weight: dict[int, FloatArray] = {}
+    zones: dict[str, Zone] = {}
+    shapes = []
+    for number, plan in enumerate(plans.floors):
+        grid = floor_grid(plan, plans.cell_size, dx)
+        shapes.append(grid.shape)
+        floor = Floor(graph, plan, grid, number)
+        for name in (z for z in building.zone_names if (grid.token == z).any()):
+            zones[name] = floor.zone(name, areas[name], reach, mean_shuffle)
+            mask = (diffusers or {}).get(name)
+            diffuser_weight[zones[name].number] = floor.diffuser_weight(name, mask)
+        Walls(floor, zones, plans.cell_size, building.orientation).add(plans.glazing)
+        graph.anatomy.partitions |= partition_areas(plan, plans.cell_size)
+    _remember(graph, building, plans, zones, areas)
+    columns = [(z.air, np.full(z.air.size, z.number), z.share, diffuser_weight[z.number]) for z in zones.values()]
+    air, zone, mean, share = (np.concatenate([c[k] for c in columns]) for k in range(4))
+    return Blueprint(graph, air, zone, mean, share, grid.spacing, tuple(shapes))

@@ -21,7 +21,6 @@ from thermal.network.structure import (
 )
 from thermal.network.topology import VERTICAL, OuterFaces, Outlook, Pane, Room
 from thermal.shuffle.equivalent import choose_equivalent, effective_diffusivity, exchange_rate, mean_square_reach
-from thermal.units import AIR_HEAT_CAPACITY
 
 #: Parameters of the inside films with a radiant node, and of the one film without.
 _FILMS = {True: ("interior_film_coefficient", "radiant_coefficient"), False: ("combined_film_coefficient",)}
@@ -128,19 +127,8 @@ class Zone:
     def room(self, floor_area: float, volume: float) -> None:
         """Remember the zone with what is in it, once it is complete [m2, m3]."""
         radiant = self._inside[1] if self._inside is not None else -1
-        self.graph.anatomy.rooms[self.name] = Room(
-            self.name,
-            self.number,
-            self.air,
-            self.share,
-            self.mean,
-            radiant,
-            self._floor,
-            self._ceiling,
-            self._furniture,
-            floor_area,
-            volume,
-        )
+        place, mass = (self.name, self.number, self.air, self.share), (self._floor, self._ceiling, self._furniture)
+        self.graph.anatomy.rooms[self.name] = Room(*place, self.mean, radiant, *mass, floor_area, volume)
 
     def slabs(self, area: float) -> None:
         """Floor and ceiling slab, adiabatic at their backs: a chain of nodes each, of one make [area: of each, m2]."""
@@ -218,13 +206,13 @@ class Floor:
                 self.node[mask] = graph.volumes(k, zone[mask], place[mask])
         self.cells = np.bincount(grid.volume[grid.volume >= 0], minlength=token.size)
 
-    def zone(self, name: str, area: float, density: float, reach: float | None, mean_shuffle: bool) -> Zone:
+    def zone(self, name: str, area: float, reach: float | None, mean_shuffle: bool) -> Zone:
         """Air of one zone with its shuffle, slabs and furniture."""
         graph, grid = self.graph, self.grid
         mine = grid.token == name
         air, count = self.node[mine], self.cells[mine]
         zone = Zone(graph, name, air, count / count.sum())
-        heat = density * AIR_HEAT_CAPACITY
+        heat = graph.anatomy.air_heat_capacity
         graph.capacity("air", heat, air, area * self.plan.height * zone.share)
         if air.size > 1:
             self._air(zone, area, heat, reach, mean_shuffle)
