@@ -240,7 +240,7 @@ def partition(
     list of Region or None
         As many as `zones`; None when the floor cannot be cut so.
     """
-    exposed = _beside(exterior_ring(mask)) & mask
+    exposed = ndimage.binary_dilation(exterior_ring(mask)) & mask
     for _ in range(_TRIES):
         regions = _bands(rng, mask, exposed, cell_size)
         habitable = all(is_habitable(region, cell_size, min_zone_area) for region in regions)
@@ -281,16 +281,6 @@ def _walls_are_thin(mask: Mask, regions: list[Region]) -> bool:
         (row, column), (n_row, n_column) = region.corner, region.mask.shape
         wall[row : row + n_row, column : column + n_column] &= ~region.mask
     return not (wall[1:, 1:] & wall[:-1, 1:] & wall[1:, :-1] & wall[:-1, :-1]).any()
-
-
-def _beside(cells: Mask) -> Mask:
-    """Cells with one of these as a neighbour across a side."""
-    beside = np.zeros_like(cells)
-    beside[1:] |= cells[:-1]
-    beside[:-1] |= cells[1:]
-    beside[:, 1:] |= cells[:, :-1]
-    beside[:, :-1] |= cells[:, 1:]
-    return beside
 
 
 def _bands(rng: np.random.Generator, mask: Mask, exposed: Mask, cell_size: float) -> list[Region]:

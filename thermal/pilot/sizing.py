@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from thermal._types import FloatArray
 from thermal.case.building import Building, FloorPlans, ZoneTable
 from thermal.case.plan import zone_floor_areas
 from thermal.errors import ModelError
@@ -22,8 +23,6 @@ from thermal.model.stepper import Stepper
 from thermal.model.symbolic import SymbolicModel
 from thermal.network.build import build_network
 from thermal.units import AIR_HEAT_CAPACITY, air_density
-
-Series = npt.NDArray[np.float64]
 
 _LONG_RUN = 1e8  # s: one implicit step to the steady state
 _COARSE = 1.0  # m: loads need no finer grid
@@ -146,7 +145,7 @@ def _air_handler(flow: float, at: DesignConditions, density: float) -> AirHandle
     return AirHandler(supply, exhaust, CoolingCoil(cooling), heating, enthalpy_limit=64_000.0)
 
 
-def _heat_loss(building: Building, at: DesignConditions) -> Series:
+def _heat_loss(building: Building, at: DesignConditions) -> FloatArray:
     """Heat that holds the zones at their temperature in the winter, shape (n_zone,) [W]."""
     network = build_network(building, dx=_COARSE if isinstance(building.geometry, FloorPlans) else None)
     matrices = SymbolicModel(network).matrices(network.start())
@@ -156,7 +155,7 @@ def _heat_loss(building: Building, at: DesignConditions) -> Series:
     return stepper.hold(at.heating * matrices.uniform[:, None], outside, zones)[2]
 
 
-def _floor_areas(building: Building) -> Series:
+def _floor_areas(building: Building) -> FloatArray:
     """Floor area of each zone, shape (n_zone,) [m2]."""
     if isinstance(building.geometry, ZoneTable):
         return np.array([zone.floor_area for zone in building.geometry.zones])
@@ -164,7 +163,7 @@ def _floor_areas(building: Building) -> Series:
     return np.array([areas[zone] for zone in building.zone_names])
 
 
-def _glass(building: Building) -> Series:
+def _glass(building: Building) -> FloatArray:
     """Glazed area of each zone, shape (n_zone,) [m2]."""
     if isinstance(building.geometry, ZoneTable):
         windows = [s for s in building.geometry.surfaces if s.kind == "window"]

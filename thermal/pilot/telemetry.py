@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-import numpy.typing as npt
 import pandas as pd
 
+from thermal._types import FloatArray
 from thermal.case.building import FloorPlans
 from thermal.case.plan import zone_floor_areas
 from thermal.case.points import DISCHARGE_TEMPERATURE, OUTDOOR_TEMPERATURE, SUPPLY_FLOW, ZONE_TEMPERATURE
@@ -18,7 +18,6 @@ from thermal.errors import ThermalError
 from thermal.pilot.thermostat import Terminals, Thermostats, draw_thermostats, size_terminals
 from thermal.units import AIR_HEAT_CAPACITY
 
-Series = npt.NDArray[np.float64]
 #: Is told the steps that are done and all steps [-].
 Progress = Callable[[int, int], None]
 
@@ -42,7 +41,7 @@ class Plant(Protocol):
     def zone_names(self) -> tuple[str, ...]:
         """Names of the zones, in the order of its arrays."""
 
-    def reset(self, zone_temperatures: Series, /) -> Series:
+    def reset(self, zone_temperatures: FloatArray, /) -> FloatArray:
         """Start anew.
 
         Parameters
@@ -56,7 +55,7 @@ class Plant(Protocol):
             Air temperatures of the zones [K].
         """
 
-    def step(self, zone_heat: Series, boundary_temperatures: Series, /) -> Series:
+    def step(self, zone_heat: FloatArray, boundary_temperatures: FloatArray, /) -> FloatArray:
         """Go one step.
 
         Parameters
@@ -170,7 +169,7 @@ def generate_telemetry(
     temperature, flow, heat = _run(plant, terminals, outdoor, setpoints, progress)
     discharge = temperature + heat / (AIR_HEAT_CAPACITY * flow)
     rng = np.random.default_rng([settings.seed, 1])  # not the stream of the thermostats
-    points: dict[str, Series] = {
+    points: dict[str, FloatArray] = {
         ZONE_TEMPERATURE: _measured(rng, temperature, settings),
         SUPPLY_FLOW: flow.astype(np.float32).astype(float),
         DISCHARGE_TEMPERATURE: _measured(rng, discharge, settings),
@@ -187,8 +186,12 @@ def generate_telemetry(
 
 
 def _run(
-    plant: Plant, terminals: Terminals, outdoor: Series, setpoints: tuple[Series, Series], progress: Progress | None
-) -> tuple[Series, Series, Series]:
+    plant: Plant,
+    terminals: Terminals,
+    outdoor: FloatArray,
+    setpoints: tuple[FloatArray, FloatArray],
+    progress: Progress | None,
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Close the loop: zone temperatures [K], supply flows [kg/s] and heats [W], each of shape (n_time, n_zone)."""
     heating, cooling = setpoints
     temperature, flow, heat = (np.empty_like(heating) for _ in range(3))
@@ -211,7 +214,7 @@ def _run(
     return temperature, flow, heat
 
 
-def _temperatures(values: Series, n_zone: int, where: str) -> Series:
+def _temperatures(values: FloatArray, n_zone: int, where: str) -> FloatArray:
     """Refuse what a plant returns when it is not one temperature a zone."""
     zone = np.asarray(values, dtype=float)
     if zone.shape != (n_zone,) or not np.isfinite(zone).all():
@@ -222,7 +225,7 @@ def _temperatures(values: Series, n_zone: int, where: str) -> Series:
     return zone
 
 
-def _measured(rng: np.random.Generator, temperature: Series, sensors: TelemetrySettings) -> Series:
+def _measured(rng: np.random.Generator, temperature: FloatArray, sensors: TelemetrySettings) -> FloatArray:
     """Report what a sensor does [K]: with noise, in steps of its resolution counted from 0 degC."""
     celsius = temperature - _FREEZING + sensors.noise * rng.standard_normal(temperature.shape)
     if sensors.resolution > 0.0:

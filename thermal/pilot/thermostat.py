@@ -5,14 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 import pandas as pd
 from scipy.signal import max_len_seq
 
+from thermal._types import BoolArray, FloatArray, IntArray
 from thermal.errors import ThermalError
 from thermal.units import AIR_HEAT_CAPACITY
-
-Series = npt.NDArray[np.float64]
 
 _FREEZING = 273.15  # K
 _SATURDAY = 5  # day of the week, Monday is 0
@@ -35,15 +33,15 @@ class Thermostats:
         Whether a zone is occupied from its start to 13:00 on Saturdays.
     """
 
-    heating: Series
-    cooling: Series
-    heating_set_back: Series
-    cooling_set_back: Series
-    start: Series
-    stop: Series
-    saturday: npt.NDArray[np.bool_]
+    heating: FloatArray
+    cooling: FloatArray
+    heating_set_back: FloatArray
+    cooling_set_back: FloatArray
+    start: FloatArray
+    stop: FloatArray
+    saturday: BoolArray
 
-    def occupied(self, times: pd.DatetimeIndex) -> npt.NDArray[np.bool_]:
+    def occupied(self, times: pd.DatetimeIndex) -> BoolArray:
         """Tell when the schedules hold the occupied setpoints.
 
         Parameters
@@ -62,7 +60,7 @@ class Thermostats:
         morning = (day == _SATURDAY) & self.saturday & (hour >= self.start) & (hour < _SATURDAY_STOP)
         return np.asarray(weekday | morning, dtype=bool)
 
-    def setpoints(self, times: pd.DatetimeIndex) -> tuple[Series, Series]:
+    def setpoints(self, times: pd.DatetimeIndex) -> tuple[FloatArray, FloatArray]:
         """Read the schedules.
 
         Parameters
@@ -110,7 +108,7 @@ def draw_thermostats(seed: int, n_zone: int) -> Thermostats:
         raise ThermalError(f"thermostats: expected a seed of 0 or more and a zone, found {seed} and {n_zone} zones")
     rng = np.random.default_rng(seed)
 
-    def drawn(low: float, high: float) -> Series:
+    def drawn(low: float, high: float) -> FloatArray:
         return np.asarray(rng.uniform(low, high, n_zone), dtype=float)
 
     heating = np.round(_FREEZING + drawn(20.0, 22.0), 2)
@@ -142,13 +140,13 @@ class Terminals:
         within 12-35 degC, so that the zone's drift during the step leaves it in that range.
     """
 
-    design_heat: Series
-    design_flow: Series
-    minimum_flow: Series
+    design_heat: FloatArray
+    design_flow: FloatArray
+    minimum_flow: FloatArray
     coldest: float = _FREEZING + 13.0
     warmest: float = _FREEZING + 34.0
 
-    def supply(self, demand: Series, zone_temperature: Series) -> tuple[Series, Series]:
+    def supply(self, demand: FloatArray, zone_temperature: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Meet a demand for heat with as little air as can carry it.
 
         Parameters
@@ -174,7 +172,7 @@ class Terminals:
         return np.asarray(flow, dtype=float), np.asarray(np.clip(wanted, -most, most), dtype=float)
 
 
-def size_terminals(seed: int, floor_area: Series, heat_flux: float = 60.0, minimum_share: float = 0.2) -> Terminals:
+def size_terminals(seed: int, floor_area: FloatArray, heat_flux: float = 60.0, minimum_share: float = 0.2) -> Terminals:
     """Size terminal units by floor area, with the scatter of real ones.
 
     Parameters
@@ -237,11 +235,11 @@ class PrbsThermostats(Thermostats):
         Distance of either level from these setpoints [K].
     """
 
-    clock: npt.NDArray[np.int64]
-    phase: npt.NDArray[np.int64]
+    clock: IntArray
+    phase: IntArray
     amplitude: float
 
-    def setpoints(self, times: pd.DatetimeIndex) -> tuple[Series, Series]:
+    def setpoints(self, times: pd.DatetimeIndex) -> tuple[FloatArray, FloatArray]:
         """Read the sequences.
 
         Parameters

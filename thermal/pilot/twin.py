@@ -7,9 +7,9 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Literal, get_args
 
 import numpy as np
-import numpy.typing as npt
 from scipy.special import ndtr, ndtri
 
+from thermal._types import FloatArray
 from thermal.case.building import Building, FloorPlans
 from thermal.case.case import Case
 from thermal.case.plan import zone_floor_areas
@@ -24,8 +24,6 @@ from thermal.pilot.telemetry import Progress, TelemetrySettings, generate_teleme
 from thermal.pilot.thermostat import draw_prbs_thermostats, draw_thermostats
 from thermal.pilot.weather import Period, draw_disturbance
 from thermal.units import AIR_HEAT_CAPACITY
-
-Series = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -94,15 +92,15 @@ class TwinTruth:
 
     seed: int
     parameters: tuple[Parameter, ...]
-    theta: Series
+    theta: FloatArray
     disturbance_deviation: float
     disturbance_time: float
     noise: float
     resolution: float
-    zone_temperatures: Series
-    heat: Series
-    disturbance: Series
-    states: Series
+    zone_temperatures: FloatArray
+    heat: FloatArray
+    disturbance: FloatArray
+    states: FloatArray
 
     @property
     def values(self) -> dict[str, float]:
@@ -178,12 +176,12 @@ class TwinSettings(Period):
 class _DisturbedPlant:
     """A simulator that receives the unmeasured heat as well, and remembers what it did and received."""
 
-    def __init__(self, simulator: Simulator, disturbance: Series, outdoor_at_start: float, skipped: int) -> None:
+    def __init__(self, simulator: Simulator, disturbance: FloatArray, outdoor_at_start: float, skipped: int) -> None:
         self._simulator, self._disturbance, self._outdoor = simulator, disturbance, outdoor_at_start
         self._skipped = skipped
-        self.heat: list[Series] = []
-        self.temperatures: list[Series] = []
-        self.states: Series = np.empty(0)
+        self.heat: list[FloatArray] = []
+        self.temperatures: list[FloatArray] = []
+        self.states: FloatArray = np.empty(0)
 
     @property
     def step_seconds(self) -> float:
@@ -193,11 +191,11 @@ class _DisturbedPlant:
     def zone_names(self) -> tuple[str, ...]:
         return self._simulator.zone_names
 
-    def reset(self, zone_temperatures: Series, /) -> Series:
+    def reset(self, zone_temperatures: FloatArray, /) -> FloatArray:
         # walls between the zones and the season's outdoor air, not as warm as the zones all through
         return self._simulator.reset(zone_temperatures, np.array([self._outdoor]))
 
-    def step(self, zone_heat: Series, boundary_temperatures: Series, /) -> Series:
+    def step(self, zone_heat: FloatArray, boundary_temperatures: FloatArray, /) -> FloatArray:
         number = len(self.heat)
         zone = self._simulator.step(zone_heat + self._disturbance[number], boundary_temperatures)
         self.heat.append(zone_heat)
@@ -324,7 +322,7 @@ def _draw_conditions(seed: int, ranges: TwinRanges) -> tuple[float, float, float
     return float(drawn[0]), float(drawn[1]), float(drawn[2])
 
 
-def _metered_exactly(telemetry: Telemetry, zones: tuple[str, ...], heat: Series) -> Telemetry:
+def _metered_exactly(telemetry: Telemetry, zones: tuple[str, ...], heat: FloatArray) -> Telemetry:
     """Report the discharge temperatures [K] that belong to the heat and to what the other sensors report."""
     frame = telemetry.frame.copy()
     for number, zone in enumerate(zones):

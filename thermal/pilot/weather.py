@@ -5,22 +5,20 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 import pandas as pd
 import pvlib
 from scipy.signal import lfilter
 
+from thermal._types import FloatArray
 from thermal.case.building import Location
 from thermal.errors import ThermalError
-
-Series = npt.NDArray[np.float64]
 
 _STREAM = 4  # of random numbers of a seed
 
 
 def draw_disturbance(
-    seed: int, n_time: int, deviation: Series, time_constant: float, step_seconds: float = 300.0
-) -> Series:
+    seed: int, n_time: int, deviation: FloatArray, time_constant: float, step_seconds: float = 300.0
+) -> FloatArray:
     """Draw the unmeasured heat of zones: an Ornstein-Uhlenbeck process each, sampled exactly, stationary at once.
 
     ``d_{k+1} = φ d_k + σ sqrt(1 − φ²) w_k`` with ``φ = exp(−Δt / τ)`` and ``d_0 ~ N(0, σ²)``, so that the
@@ -186,7 +184,7 @@ def generate_weather(
     return pd.DataFrame(reported, index=index)
 
 
-def _process(rng: np.random.Generator, n_time: int, step: float, time_constant: float) -> Series:
+def _process(rng: np.random.Generator, n_time: int, step: float, time_constant: float) -> FloatArray:
     """Stationary second-order autoregressive process of unit variance: smooth from step to step."""
     keep = np.exp(-step / time_constant)
     start = int(np.ceil(8.0 * time_constant / step))
@@ -197,14 +195,14 @@ def _process(rng: np.random.Generator, n_time: int, step: float, time_constant: 
     return np.asarray(twice[start:] / np.sqrt(variance), dtype=float)
 
 
-def _cloud(rng: np.random.Generator, n_time: int, step: float) -> Series:
+def _cloud(rng: np.random.Generator, n_time: int, step: float) -> FloatArray:
     """Share of the sky that is covered [-]."""
     systems = _process(rng, n_time, step, _CLOUD_TIME) + _CLOUDIER
     patches = _PATCHES * _process(rng, n_time, step, _PATCH_TIME)
     return np.asarray(1.0 / (1.0 + np.exp(-1.8 * (systems + patches))), dtype=float)
 
 
-def _air_temperature(rng: np.random.Generator, middle: pd.DatetimeIndex, step: float, cloud: Series) -> Series:
+def _air_temperature(rng: np.random.Generator, middle: pd.DatetimeIndex, step: float, cloud: FloatArray) -> FloatArray:
     """Temperature of the outdoor air [K]: season, day, fronts."""
     day, hour = _clock(middle)
     season = _YEAR_MEAN - _YEAR_SWING * np.cos(2.0 * np.pi * (day - _COLDEST_DAY) / 365.25)
@@ -216,13 +214,13 @@ def _air_temperature(rng: np.random.Generator, middle: pd.DatetimeIndex, step: f
     return np.asarray(season + daily * damping + fronts, dtype=float)
 
 
-def _smooth(cloud: Series, step: float, time_constant: float = 3.0 * 3600.0) -> Series:
+def _smooth(cloud: FloatArray, step: float, time_constant: float = 3.0 * 3600.0) -> FloatArray:
     """Low-pass a series: the air answers to clouds with a delay."""
     keep = np.exp(-step / time_constant)
     return np.asarray(lfilter([1.0 - keep], [1.0, -keep], cloud, zi=[keep * cloud[0]])[0], dtype=float)
 
 
-def _wind(rng: np.random.Generator, middle: pd.DatetimeIndex, step: float) -> dict[str, Series]:
+def _wind(rng: np.random.Generator, middle: pd.DatetimeIndex, step: float) -> dict[str, FloatArray]:
     """Wind speed [m/s] and direction [deg from north]."""
     _, hour = _clock(middle)
     breeze = 1.0 + _BREEZE * np.cos(2.0 * np.pi * (hour - _WARMEST_HOUR - 1.0) / 24.0)
@@ -231,7 +229,7 @@ def _wind(rng: np.random.Generator, middle: pd.DatetimeIndex, step: float) -> di
     return {"wind_speed_sensor": speed, "wind_direction_sensor": np.mod(direction, 360.0)}
 
 
-def _sun(middle: pd.DatetimeIndex, location: Location, cloud: Series) -> dict[str, Series]:
+def _sun(middle: pd.DatetimeIndex, location: Location, cloud: FloatArray) -> dict[str, FloatArray]:
     """Direct normal, diffuse horizontal and global horizontal irradiance [W/m2] in the middle of each interval."""
     position = pvlib.solarposition.get_solarposition(
         middle, location.latitude, location.longitude, altitude=location.elevation
@@ -252,7 +250,7 @@ def _sun(middle: pd.DatetimeIndex, location: Location, cloud: Series) -> dict[st
     }
 
 
-def _sky_radiation(air: Series, cloud: Series, step: float) -> Series:
+def _sky_radiation(air: FloatArray, cloud: FloatArray, step: float) -> FloatArray:
     """Longwave radiation of the sky on the horizontal [W/m2].
 
     ``ε = (0.787 + 0.764 ln(T_dew / 273)) (1 + 0.0224 n - 0.0035 n² + 0.00028 n³)``, n in tenths (Clark and Allen 1978;
@@ -266,7 +264,7 @@ def _sky_radiation(air: Series, cloud: Series, step: float) -> Series:
     return np.asarray(np.minimum(emissivity, 1.0) * _STEFAN_BOLTZMANN * air**4, dtype=float)
 
 
-def _clock(times: pd.DatetimeIndex) -> tuple[Series, Series]:
+def _clock(times: pd.DatetimeIndex) -> tuple[FloatArray, FloatArray]:
     """Day of the year and local hour, both with fractions."""
     hour = times.hour + times.minute / 60.0 + times.second / 3600.0
     return np.asarray(times.day_of_year + hour / 24.0, dtype=float), np.asarray(hour, dtype=float)
