@@ -22,7 +22,7 @@ from mpc.loop.reduced import ReducedBuilding
 from mpc.loop.simulated import SimulatedPlant
 from mpc.scenario.forecast import Forecast
 from thermal import Building
-from thermal.case.schema import Device
+from thermal.case.building import Device
 from thermal.model.reduce import ReducedModel
 
 #: Our plant has hot water; electric reheat is a loop of this name whose water is always as warm as the coils can use.

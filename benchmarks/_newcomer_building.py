@@ -21,8 +21,7 @@ from _table import ROOT
 from calibration import Interval, evaluate_case
 from thermal import load_case, save_case
 from thermal.pilot.building import pilot_building
-from thermal.pilot.truth import TwinTruth
-from thermal.pilot.twin import generate_twin
+from thermal.pilot.twin import TwinSettings, TwinTruth, generate_twin
 from thermal.pilot.weather import MOUNTAIN_VIEW
 
 BROWSER = ROOT / "tests" / "browser"
@@ -104,7 +103,7 @@ def raise_building(home: Path, size: Size) -> Standing:
     written_out = json.loads(json.dumps(listed))  # a list of drawings has no aliases
     (drawings / "plans.yaml").write_text(yaml.safe_dump(written_out, sort_keys=False), encoding="utf-8")
     building = pilot_building(size.seed, floor_area=size.floor_area, zones=size.zones, floors=size.floors)
-    case, truth = generate_twin(building, SEED, days=size.days, dx=size.dx)
+    case, truth = generate_twin(building, SEED, TwinSettings(days=size.days, dx=size.dx))
     frame = pd.read_parquet(save_case(case, home / "truth") / "telemetry.parquet")
     export_telemetry(frame, home / "export.csv")
     end = frame.index[-1].floor("D")

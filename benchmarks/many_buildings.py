@@ -35,7 +35,7 @@ from _table import markdown, write
 from calibration import calibrate_many
 from calibration.fleet.record import CaseOutcome
 from calibration.fleet.run import case_folders
-from thermal.pilot.pilot import generate_pilot
+from thermal.pilot.pilot import PilotSettings, generate_pilot
 
 BUILDINGS = 40
 OFFICE: dict[str, Any] = {
@@ -163,7 +163,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         cases = Path(folder)
         for seed in range(options.buildings):
-            generate_pilot(cases / f"office_{seed:02d}", seed=seed, name=f"office_{seed:02d}", **OFFICE)
+            generate_pilot(cases / f"office_{seed:02d}", PilotSettings(name=f"office_{seed:02d}", **OFFICE), seed=seed)
         rows = [
             measure(cases, "1 process", 1, False, nullcontext()),
             measure(cases, "2 processes", 2, False, nullcontext()),

@@ -14,8 +14,7 @@ from _table import ROOT, markdown, write
 
 from calibration import CalibrationResult, calibrate
 from thermal import Case, load_case
-from thermal.pilot.truth import TwinTruth
-from thermal.pilot.twin import generate_twin
+from thermal.pilot.twin import TwinSettings, TwinTruth, generate_twin
 
 Objective = Literal["multi_step", "innovations"]
 
@@ -77,7 +76,7 @@ def subjects(folder: Path, names: list[str], seeds: list[int]) -> Iterator[tuple
         yield name, load_case(folder / name), None
     for seed in seeds:
         building = load_case(folder / names[0]).building
-        case, truth = generate_twin(building, seed, dx=1.0, excitation="prbs" if seed % 2 else "schedule")
+        case, truth = generate_twin(building, seed, TwinSettings(dx=1.0, excitation="prbs" if seed % 2 else "schedule"))
         yield f"twin {seed}", case, truth
 
 

@@ -43,9 +43,8 @@ from _table import publish, write
 from calibration import CalibrationResult, calibrate, evaluate_case
 from calibration.fit.result import ParameterEstimate
 from thermal import Building, Case, Parameter, load_case
-from thermal.pilot.layout import devices, generate_office
-from thermal.pilot.truth import TwinTruth
-from thermal.pilot.twin import Excitation, Meter, generate_twin
+from thermal.pilot.building import devices, generate_office
+from thermal.pilot.twin import Excitation, Meter, TwinSettings, TwinTruth, generate_twin
 from thermal.pilot.weather import MOUNTAIN_VIEW
 
 NAME = "parameter_recovery"
@@ -72,10 +71,8 @@ class Study:
 
     def twin(self, seed: int) -> tuple[Case, TwinTruth]:
         """Make the twin of a seed."""
-        excitation = self.excitation_of(seed)
-        return generate_twin(
-            self.building(seed), seed, days=self.days, dx=self.dx, excitation=excitation, meter=self.meter
-        )
+        settings = TwinSettings(days=self.days, dx=self.dx, excitation=self.excitation_of(seed), meter=self.meter)
+        return generate_twin(self.building(seed), seed, settings)
 
     def excitation_of(self, seed: int) -> Excitation:
         """Choose the set-points of a seed's twin."""

@@ -41,7 +41,7 @@ from thermal.model.scheme import IMPLICIT_EULER, TR_BDF2, Scheme
 from thermal.model.stepper import Stepper, factorise
 from thermal.model.symbolic import Matrices
 from thermal.network.network import ThermalNetwork
-from thermal.pilot.layout import devices, generate_office
+from thermal.pilot.building import devices, generate_office
 from thermal.pilot.weather import MOUNTAIN_VIEW
 from thermal.shuffle.random import RandomShuffle
 

@@ -3,12 +3,12 @@
 import sys
 
 from thermal import Case
-from thermal.pilot.pilot import generate_pilot
+from thermal.pilot.pilot import PilotSettings, generate_pilot
 
 
 def small(path: str) -> Case:
     """Generate an office of 600 m2 with 12 zones and two days of telemetry."""
-    return generate_pilot(path, floor_area=600.0, zones=12, days=2.0, cell_size=1.0, seed=1)
+    return generate_pilot(path, PilotSettings(floor_area=600.0, zones=12, days=2.0, cell_size=1.0), seed=1)
 
 
 if __name__ == "__main__":

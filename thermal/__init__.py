@@ -1,11 +1,10 @@
 """A building as a thermal system: cases, control volumes and faces, the symbolic model and what steps it."""
 
 from thermal.case.building import Building, FloorPlan, FloorPlans, ZoneTable
-from thermal.case.case import Case
+from thermal.case.case import Case, local_timestamp
 from thermal.case.load import load_case
 from thermal.case.save import save_case
 from thermal.case.telemetry import Telemetry
-from thermal.case.times import local_timestamp
 from thermal.data import load_bundled_case
 from thermal.errors import CaseError, ModelError, PlanError, ThermalError
 from thermal.model.reduce import reduced_model

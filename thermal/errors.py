@@ -7,7 +7,11 @@ from collections.abc import Iterable
 
 
 class ThermalError(Exception):
-    """Base of every error that `thermal` raises on purpose."""
+    """Base of every error that `thermal` raises on purpose: a message, or the parts of one as `describe` takes them."""
+
+    def __str__(self) -> str:
+        """Message: the one that was given, or `describe` of its parts."""
+        return describe(*self.args) if len(self.args) > 1 else super().__str__()
 
 
 class CaseError(ThermalError):
@@ -65,6 +69,25 @@ def nearest(word: object, options: Iterable[object]) -> str:
         return "there is none to choose from"
     shown = ", ".join(names[:8])
     return f"valid: {shown}" + (f" and {len(names) - 8} more" if len(names) > 8 else "")
+
+
+def check_known(word: str, options: Iterable[str], where: str, expected: str, kind: type[ThermalError]) -> None:
+    """Refuse a name that is none of the known ones, and name the nearest of them.
+
+    Parameters
+    ----------
+    word
+        What was given.
+    options
+        What would have been valid.
+    where, expected
+        As `describe` takes them.
+    kind
+        Error to raise.
+    """
+    known = list(options)
+    if word not in known:
+        raise kind(where, expected, repr(word), nearest(word, known))
 
 
 class EffectError(ModelError):

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import csv
 from dataclasses import dataclass, replace
-from typing import Literal
+from pathlib import Path
+from typing import Literal, cast
 
 import numpy as np
 
@@ -69,12 +71,12 @@ class Parameter:
             expected, ordered = "0 < lower < start < upper", 0.0 < self.lower < self.start < self.upper
         if not ordered:
             raise ValueError(
-                f"parameter {self.name}: expected {expected}, came {self.lower}, {self.start}, {self.upper}"
+                f"parameter {self.name}: expected {expected}, got {self.lower}, {self.start}, {self.upper}"
             )
         if (self.scope == "global") != (self.member is None):
             raise ValueError(
                 f"parameter {self.name}: expected a member with the scopes facade and zone only, "
-                f"came scope {self.scope!r} with member {self.member!r}"
+                f"got scope {self.scope!r} with member {self.member!r}"
             )
 
     @property
@@ -168,113 +170,15 @@ class Parameter:
         return replace(self, name=f"{self.base}@{prefix}{member}", scope=scope, member=member)
 
 
-_ISO6946 = "ISO 6946:2017 Annex C (surface resistances)"
-_ISO13786 = "ISO 13786:2017 and ISO 52016-1:2017 Table B.14 (areal heat capacity classes)"
-_ARCH = "ISO 52016-1:2017 Table 25 (interior convective coefficients 0.7-5 W/m2/K) and radiative 5.13 W/m2/K"
+_ROWS = list(csv.DictReader((Path(__file__).parent / "data" / "parameters.csv").read_text("utf-8").splitlines()))
 
 #: Parameters of the baseline. Wall parameters stand for a wall 1 m thick and are rescaled to the plan's wall thickness.
-PARAMETERS: dict[str, Parameter] = {
-    p.name: p
-    for p in (
-        Parameter("exterior_convection_coefficient", "W/m^2/K", 20.0, 5.0, 60.0, f"{_ISO6946}: 4 + 4 v at 0.5-14 m/s"),
-        Parameter("exterior_wall_conductivity", "W/m/K", 0.55, 0.12, 4.0, "U-values of 0.12-2.5 W/m2/K: ISO 6946:2017"),
-        Parameter("exterior_wall_heat_capacity", "J/kg/K", 1000.0, 100.0, 4000.0, _ISO13786),
-        Parameter(
-            "interior_wall_conductivity",
-            "W/m/K",
-            2.5,
-            0.4,
-            20.0,
-            "partition resistances of 0.05-2.5 m2K/W: ISO 6946:2017",
-        ),
-        Parameter("interior_wall_heat_capacity", "J/kg/K", 1000.0, 100.0, 8000.0, _ISO13786),
-        Parameter(
-            "shuffle_probability",
-            "1",
-            0.5,
-            0.02,
-            0.98,
-            "probability per 300 s step; above 0.98 the mean factor vanishes",
-            scale="logit",
-        ),
-        Parameter("interior_film_coefficient", "W/m^2/K", 2.5, 1.0, 6.0, _ARCH),
-        Parameter("radiant_coefficient", "W/m^2/K", 5.0, 1.5, 8.0, _ARCH),
-        Parameter(
-            "combined_film_coefficient",
-            "W/m^2/K",
-            7.7,
-            2.5,
-            14.0,
-            "1 / 0.13 m2K/W: ISO 6946:2017 Table 7; range: the sum of the convective and radiative ones",
-        ),
-        Parameter("slab_heat_capacity", "J/m^2/K", 1.5e5, 2.0e4, 6.0e5, _ISO13786),
-        Parameter(
-            "slab_coupling",
-            "W/m^2/K",
-            10.0,
-            0.8,
-            60.0,
-            "conductivity over thickness: carpeted 0.2 m slab to bare 0.05 m screed",
-        ),
-        Parameter(
-            "furniture_heat_capacity",
-            "J/m^2/K",
-            1.5e4,
-            5.0e2,
-            1.0e5,
-            "Johra & Heiselberg (2017), doi:10.1016/j.rser.2016.11.145",
-        ),
-        Parameter(
-            "furniture_coupling", "W/m^2/K", 5.0, 0.5, 20.0, "Johra & Heiselberg (2017), doi:10.1016/j.rser.2016.11.145"
-        ),
-        Parameter("window_u_value", "W/m^2/K", 2.5, 0.6, 6.0, "EN 673: triple to single glazing"),
-        Parameter(
-            "opening_exchange_velocity",
-            "m/s",
-            0.08,
-            0.01,
-            0.3,
-            "Allard & Utsumi (1992), Energy and Buildings 18, 133-145",
-        ),
-        Parameter(
-            "exterior_wall_conductivity_multiplier",
-            "1",
-            1.0,
-            0.33,
-            3.0,
-            "tabulated design conductivities: ISO 10456:2007",
-        ),
-        Parameter(
-            "exterior_wall_heat_capacity_multiplier", "1", 1.0, 0.33, 3.0, "tabulated design values: ISO 10456:2007"
-        ),
-        Parameter(
-            "interior_wall_conductivity_multiplier",
-            "1",
-            1.0,
-            0.33,
-            3.0,
-            "tabulated design conductivities: ISO 10456:2007",
-        ),
-        Parameter(
-            "interior_wall_heat_capacity_multiplier", "1", 1.0, 0.33, 3.0, "tabulated design values: ISO 10456:2007"
-        ),
-        Parameter(
-            "slab_conductivity_multiplier", "1", 1.0, 0.33, 3.0, "tabulated design conductivities: ISO 10456:2007"
-        ),
-        Parameter("slab_heat_capacity_multiplier", "1", 1.0, 0.33, 3.0, "tabulated design values: ISO 10456:2007"),
-        Parameter(
-            "window_conductance_multiplier", "1", 1.0, 0.5, 2.0, "panes without films: EN 673 against in-situ values"
-        ),
+PARAMETERS: dict[str, Parameter] = {}
+for _row in _ROWS:
+    _start, _lower, _upper = (float(_row[key]) for key in ("start", "lower", "upper"))
+    PARAMETERS[_row["name"]] = Parameter(
+        _row["name"], _row["unit"], _start, _lower, _upper, _row["source"], cast(Scale, _row["scale"])
     )
-}
 
 #: Parameters of the envelope: those that may have one value a facade.
-ENVELOPE_PARAMETERS = (
-    "exterior_convection_coefficient",
-    "exterior_wall_conductivity",
-    "exterior_wall_heat_capacity",
-    "window_u_value",
-    "exterior_wall_conductivity_multiplier",
-    "exterior_wall_heat_capacity_multiplier",
-    "window_conductance_multiplier",
-)
+ENVELOPE_PARAMETERS = tuple(row["name"] for row in _ROWS if row["per_facade"] == "yes")

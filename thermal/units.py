@@ -190,15 +190,13 @@ def _line(unit: str, quantity: str, elevation: float, where: str) -> tuple[float
     parsed = _parse(unit, target, where)
     registry = _registry()
     if "delta_" in str(parsed):
-        raise CaseError(
-            describe(where, f"{target.name} ({target.examples})", repr(unit), "this is a difference")
-        )
+        raise CaseError(where, f"{target.name} ({target.examples})", repr(unit), "this is a difference")
     if quantity == "air_flow" and parsed.dimensionality == registry.parse_units("m^3/s").dimensionality:
         return float(registry.Quantity(1.0, parsed).to("m^3/s").magnitude) * air_density(elevation), 0.0
     is_angle = "radian" in str(registry.Quantity(1.0, parsed).to_root_units().units)
     if parsed.dimensionality != registry.parse_units(target.unit).dimensionality or is_angle != (quantity == "angle"):
         hint = {"C": "write degC", "F": "write degF"}.get(unit, f"use one of {target.examples}")
-        raise CaseError(describe(where, f"a unit of {target.name}", repr(unit), hint))
+        raise CaseError(where, f"a unit of {target.name}", repr(unit), hint)
     zero, one = (float(registry.Quantity(x, parsed).to(target.unit).magnitude) for x in (0.0, 1.0))
     return one - zero, zero
 

@@ -13,7 +13,7 @@ from scipy.signal import lfilter
 from energyplus_trials.errors import EnergyPlusMissingError
 from energyplus_trials.sites import GENERATED
 from energyplus_trials.specification import Climate
-from thermal.case.schema import Location
+from thermal.case.building import Location
 from thermal.pilot.weather import generate_weather
 
 Series = NDArray[np.float64]

@@ -17,8 +17,8 @@ import yaml
 from energyplus_trials import climate, model, plan, readings
 from energyplus_trials.errors import TrialGeometryError
 from energyplus_trials.specification import TrialSpec
-from thermal.case.areas import zone_floor_areas
 from thermal.case.load import load_case
+from thermal.case.plan import zone_floor_areas
 
 AREA_TOLERANCE = 0.015  # [-]: where walls meet, the case counts cells and EnergyPlus has rectangles
 

@@ -12,8 +12,7 @@ import pandas as pd
 
 from calibration.errors import CalibrationError, HorizonError, NotEnoughDataError
 from thermal._types import IntArray
-from thermal.case.case import Case
-from thermal.case.times import local_timestamp
+from thermal.case.case import Case, local_timestamp
 from thermal.errors import CaseError
 from thermal.model.replay import LEAST_SPIN_UP, SPIN_UP, Inputs
 

@@ -15,7 +15,7 @@ from calibration.errors import CalibrationError, ResultsExistError
 from calibration.evaluation.intervals import Interval
 from calibration.fit.calibrate import calibrate
 from calibration.results import to_json
-from thermal.case.building_file import NAME, read_building_file
+from thermal.case.load import NAME, read_building_file
 from thermal.errors import CaseError, nearest
 
 #: File in the results of each case: what they were made from, and how it went.

@@ -21,7 +21,7 @@ from calibration.fleet.cluster import ClusterExecutor, killed_worker
 from calibration.fleet.local import LocalProcesses, available_cores
 from calibration.fleet.record import RECORD, CaseOutcome, check_settings, earlier_outcome
 from calibration.results import check_results_folder, to_json
-from thermal.case.building_file import NAME
+from thermal.case.load import NAME
 
 #: File in the folder of results with an entry a case.
 SUMMARY = "summary.json"

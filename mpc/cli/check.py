@@ -10,8 +10,7 @@ import typer
 from mpc.cli.console import Force, Json, is_narrow, say, show_table, write_json
 
 if TYPE_CHECKING:
-    from thermal.case.check import CaseCheck
-    from thermal.case.summary import PointSummary
+    from thermal.case.check import CaseCheck, PointSummary
 
 
 def check(

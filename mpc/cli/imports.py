@@ -26,10 +26,9 @@ def import_plan(
     json: Json = False,
 ) -> int:
     """Make a case of drawings."""
-    from thermal.plan.devices import read_devices
-    from thermal.plan.folder import building_of, save_plan_case
-    from thermal.plan.kept import check_nothing_lost, held_work
+    from thermal.plan.folder import building_of, check_nothing_lost, held_work, save_plan_case
     from thermal.plan.list import import_drawings, read_drawing_list
+    from thermal.plan.models import read_devices
     from thermal.plan.picture import import_page
 
     if not force:
@@ -75,11 +74,9 @@ def import_devices(
 ) -> int:
     """Give a case its devices, and match columns of telemetry to them."""
     from thermal.case.load import load_case
-    from thermal.plan.columns import read_columns, write_matches
-    from thermal.plan.devices import read_devices
-    from thermal.plan.folder import with_devices
-    from thermal.plan.kept import save_with_labels
-    from thermal.plan.match import match_points
+    from thermal.plan.folder import save_with_labels, with_devices
+    from thermal.plan.match import match_points, read_columns, write_matches
+    from thermal.plan.models import read_devices
 
     zones = load_case(case).building.zone_names
     served = read_devices(devices, zones)
@@ -117,10 +114,8 @@ def import_telemetry(
 ) -> int:
     """Give a case its telemetry, whatever its columns are called."""
     from thermal.case.load import load_case
-    from thermal.plan.attach import with_telemetry
-    from thermal.plan.columns import read_columns, read_matches, write_matches
-    from thermal.plan.kept import save_with_labels
-    from thermal.plan.match import match_points
+    from thermal.plan.folder import save_with_labels
+    from thermal.plan.match import match_points, read_columns, read_matches, with_telemetry, write_matches
 
     units = _units(unit or ())
     if points is not None:

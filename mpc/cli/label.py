@@ -16,7 +16,7 @@ from mpc.cli.console import say
 if TYPE_CHECKING:
     from multiprocessing.connection import Connection
 
-    from thermal.plan.page.app import LabelDesk
+    from thermal.plan.page.desk import LabelDesk
 
 #: Folder of a new case, where the command names none.
 _NEW = Path("case")
@@ -45,7 +45,7 @@ def label(
     ] = False,
 ) -> int:
     """Open the labelling page of a case until Ctrl-C."""
-    from thermal.plan.page.app import LabelDesk
+    from thermal.plan.page.desk import LabelDesk
     from thermal.plan.page.serve import serve_page
 
     case, drawings = _case_of(target, out)
@@ -86,7 +86,7 @@ def _prepare(desk: LabelDesk, drawings: Path) -> None:
     """Put a drawing, or all floors of a list, on the page of a new case."""
     from mpc.cli.console import Waiting
     from thermal.errors import LabelError, describe
-    from thermal.plan.page.start import import_list, import_sheet
+    from thermal.plan.page.desk import import_list, import_sheet
 
     if desk.store.draft.floors:
         advice = "open the case itself, and import the drawing on the page"

@@ -28,8 +28,8 @@ def simulate(
     from calibration.evaluation.case_model import case_model
     from calibration.results import check_results_folder
     from mpc.reports.case import simulation_summary, simulation_verdict, write_simulation
+    from thermal.case.case import local_timestamp
     from thermal.case.load import load_case
-    from thermal.case.times import local_timestamp
     from thermal.model.simulation import simulate as replay
 
     if out is not None:

@@ -14,7 +14,7 @@ from thermal.case.case import Case
 from thermal.effects.effect import Chosen
 from thermal.errors import EffectError, describe
 from thermal.inputs.drivers import Drivers, Signal
-from thermal.network.extension import Extension
+from thermal.network.assembly import Extension
 from thermal.network.graph import GraphBuilder
 from thermal.network.network import ThermalNetwork
 

@@ -17,8 +17,8 @@ from thermal.model.modal import ModalModel, modal_model
 from thermal.model.reduce import ReducedModel, reduced_model
 from thermal.model.scheme import IMPLICIT_EULER
 from thermal.model.symbolic import SymbolicModel
+from thermal.network.assembly import Extension
 from thermal.network.build import build_network
-from thermal.network.extension import Extension
 
 
 class ReducedBuilding:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from mpc.errors import ScenarioError
 from thermal._types import FloatArray
 from thermal.case.building import Building
-from thermal.case.times import local_timestamp
+from thermal.case.case import local_timestamp
 from thermal.errors import describe
 
 #: Local clocks, schedules and tariffs change on multiples of this [s]; offsets of time zones are whole quarter hours.

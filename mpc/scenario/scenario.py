@@ -18,9 +18,9 @@ from mpc.scenario.occupancy import OFFICE_AREA_PER_PERSON, Occupancy, ScheduledO
 from mpc.scenario.tariff import DemandBuckets, Tariff
 from mpc.scenario.weather import Weather
 from thermal._types import FloatArray
-from thermal.case.areas import zone_floor_areas
 from thermal.case.building import Building, ZoneTable
 from thermal.case.case import Case
+from thermal.case.plan import zone_floor_areas
 from thermal.case.points import OUTDOOR_TEMPERATURE, ZONE_TEMPERATURE
 from thermal.case.quality import QualityReport
 from thermal.case.telemetry import Telemetry

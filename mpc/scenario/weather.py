@@ -16,8 +16,8 @@ from mpc.errors import WeatherError
 from mpc.scenario.averages import means_by_shape, means_of_means, means_of_readings
 from mpc.scenario.grid import StepGrid, index_seconds
 from thermal._types import FloatArray
+from thermal.case.building import Location
 from thermal.case.points import OUTDOOR_TEMPERATURE, POINT_TYPES
-from thermal.case.schema import Location
 from thermal.errors import describe, nearest
 from thermal.inputs.sun import Sun, sun_of
 

@@ -12,9 +12,9 @@ import pandas as pd
 from mpc.errors import WeatherError
 from mpc.scenario.weather import DIRECTION, SKY, SUN_POINTS, WEATHER_POINTS, Weather
 from thermal._types import FloatArray
+from thermal.case.building import Location
 from thermal.case.case import Case
 from thermal.case.points import OUTDOOR_TEMPERATURE, POINT_TYPES
-from thermal.case.schema import Location
 from thermal.errors import CaseError, describe, nearest
 from thermal.units import QUANTITIES, to_si
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from thermal.case.building import Building
-from thermal.case.schema import Device
+from thermal.case.building import Building, Device
 
 
 def equip(building: Building) -> tuple[Building, tuple[str, ...]]:

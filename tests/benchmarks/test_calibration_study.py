@@ -17,7 +17,7 @@ from thermal import Case
 from thermal.model.replay import SPIN_UP
 from thermal.network.structure import BASELINE
 from thermal.pilot.building import pilot_building
-from thermal.pilot.twin import generate_twin
+from thermal.pilot.twin import TwinSettings, generate_twin
 
 SCRIPTS = Path(__file__).parents[2] / "benchmarks"
 
@@ -38,7 +38,7 @@ def tables(study: ModuleType, script: Callable[[str], ModuleType]) -> ModuleType
 def case() -> Case:
     """Nine days of a twin with two zones, from a Friday on."""
     building = pilot_building(1, floor_area=60.0, zones=2, floors=1, name="office")
-    return generate_twin(building, 1, days=9.0, start="2023-01-13")[0]
+    return generate_twin(building, 1, TwinSettings(days=9.0, start="2023-01-13"))[0]
 
 
 @pytest.fixture(scope="module")

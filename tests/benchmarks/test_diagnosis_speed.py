@@ -11,7 +11,7 @@ import pytest
 
 from thermal.case.save import save_case
 from thermal.pilot.building import pilot_building
-from thermal.pilot.twin import generate_twin
+from thermal.pilot.twin import TwinSettings, generate_twin
 
 
 @pytest.fixture(scope="module")
@@ -23,7 +23,7 @@ def speed(script: Callable[[str], ModuleType]) -> ModuleType:
 
 def test_a_case_is_diagnosed_by_the_command_and_timed(speed: ModuleType, tmp_path: Path) -> None:
     office = pilot_building(3, floor_area=120.0, zones=4, floors=1, name="office")
-    twin = generate_twin(office, 3, days=9.0, step_seconds=1800.0, dx=1.0, meter="exact")[0]
+    twin = generate_twin(office, 3, TwinSettings(days=9.0, step_seconds=1800.0, dx=1.0, meter="exact"))[0]
     path = tmp_path / "office"
     save_case(twin, path)
     before = resource.getrusage(resource.RUSAGE_CHILDREN)

@@ -9,9 +9,8 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from thermal.case.areas import facade_areas, zone_floor_areas
 from thermal.case.building import FloorPlan, FloorPlans
-from thermal.case.plan import check_plan
+from thermal.case.plan import check_plan, facade_areas, zone_floor_areas
 
 SEEDS = range(60)
 

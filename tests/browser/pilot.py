@@ -13,9 +13,9 @@ import numpy as np
 from PIL import Image
 
 from thermal import FloorPlans
-from thermal.case.areas import zone_floor_areas
 from thermal.case.building import EXTERIOR_WALL, INTERIOR_WALL
-from thermal.pilot.layout import devices, generate_office
+from thermal.case.plan import zone_floor_areas
+from thermal.pilot.building import devices, generate_office
 
 MARGIN = 40  # px of paper around the building
 

@@ -24,7 +24,7 @@ from calibration.estimation.state_space import state_space
 from calibration.fleet.record import RECORD, CaseOutcome
 from thermal import Inputs
 from thermal.model.symbolic import Matrices
-from thermal.pilot.pilot import generate_pilot
+from thermal.pilot.pilot import PilotSettings, generate_pilot
 
 FILES = ["calibration.json", RECORD, "evaluation.json", "predictions.parquet", "report.html"]
 FloatArray = NDArray[np.float64]
@@ -111,8 +111,7 @@ def cases(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Two offices of one zone, and one that does not load."""
     folder = tmp_path_factory.mktemp("many") / "all cases"
     for seed in range(2):
-        generate_pilot(folder / f"office {seed}", seed=seed, days=2.0, spin_up_days=0.5, step_seconds=1800.0,
-                       floor_area=40.0, zones=1, floors=1, cell_size=1.0)  # fmt: skip
+        generate_pilot(folder / f"office {seed}", PilotSettings(days=2.0, spin_up_days=0.5, step_seconds=1800.0, floor_area=40.0, zones=1, floors=1, cell_size=1.0), seed=seed)  # fmt: skip
     shutil.copytree(folder / "office 0", folder / "broken")
     text = (folder / "broken" / "building.yaml").read_text(encoding="utf-8")
     (folder / "broken" / "building.yaml").write_text(text.replace("zone: F1", "zone: G1"), encoding="utf-8")

@@ -16,7 +16,7 @@ from mpc.scenario.scenario import Scenario, build_scenario
 from mpc.scenario.tariff import Tariff
 from mpc.scenario.weather import Weather
 from thermal import Building, ZoneTable
-from thermal.case.schema import Location, ZoneEntry
+from thermal.case.building import Location, ZoneEntry
 
 BAY = Location(latitude=37.4, longitude=-122.1, elevation=20.0, timezone="America/Los_Angeles")
 

@@ -21,7 +21,7 @@ from typer.testing import CliRunner
 import calibration.fleet.cluster
 from calibration import calibrate
 from mpc.cli.app import app
-from thermal.pilot.pilot import generate_pilot
+from thermal.pilot.pilot import PilotSettings, generate_pilot
 
 OPTIONS = ("--horizon", "1h", "--starts", "1")
 NAMES = [f"office {k}" for k in range(3)]
@@ -60,8 +60,7 @@ def cases(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Offices of one zone, and a folder that is no case."""
     folder = tmp_path_factory.mktemp("many") / "all cases"
     for seed, name in enumerate(NAMES):
-        generate_pilot(folder / name, seed=seed, days=2.0, spin_up_days=0.5, step_seconds=1800.0, floor_area=40.0,
-                       zones=1, floors=1, cell_size=1.0)  # fmt: skip
+        generate_pilot(folder / name, PilotSettings(days=2.0, spin_up_days=0.5, step_seconds=1800.0, floor_area=40.0, zones=1, floors=1, cell_size=1.0), seed=seed)  # fmt: skip
     (folder / "photographs").mkdir()
     return folder
 

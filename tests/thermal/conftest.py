@@ -13,7 +13,7 @@ import pytest
 import yaml
 
 from thermal import Building, Case, FloorPlan, FloorPlans, Telemetry, ZoneTable
-from thermal.case.schema import Airflow, Device, Layer, Location, Surface, ZoneEntry
+from thermal.case.building import Airflow, Device, Layer, Location, Surface, ZoneEntry
 
 SHARED_CASES = Path(__file__).parents[2].parent / "shared" / "cases"
 

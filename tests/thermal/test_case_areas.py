@@ -3,9 +3,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from thermal.case.areas import facade_areas, wall_shares, zone_floor_areas, zone_volumes
 from thermal.case.building import FloorPlan, FloorPlans
 from thermal.case.load import load_case
+from thermal.case.plan import facade_areas, wall_shares, zone_floor_areas, zone_volumes
 
 
 def plans(*floors: tuple[str, ...], cell_size: float = 1.0, height: float = 3.0) -> FloorPlans:

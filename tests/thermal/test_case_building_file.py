@@ -65,15 +65,15 @@ def test_key_that_stands_twice(plan_draft: Any) -> None:
         load_case(folder)
 
 
-@pytest.mark.parametrize("number", [3, 0, "1", True, 1.5])
+@pytest.mark.parametrize("number", [4, 0, "1", True, 1.5])
 def test_other_format_numbers(plan_draft: Any, number: object) -> None:
     plan_draft.content["format"] = number
-    with pytest.raises(CaseError, match=r"building\.yaml: format: expected 1 or 2, found"):
+    with pytest.raises(CaseError, match=r"building\.yaml: format: expected 1, 2 or 3, found"):
         load_case(plan_draft.write())
 
 
 def test_format_is_looked_at_before_anything_else(plan_draft: Any) -> None:
-    plan_draft.content |= {"format": 3, "new_key_of_format_3": 1}
+    plan_draft.content |= {"format": 4, "new_key_of_format_4": 1}
     with pytest.raises(CaseError):
         load_case(plan_draft.write())
 

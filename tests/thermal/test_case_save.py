@@ -7,11 +7,10 @@ import pandas as pd
 import pytest
 
 import thermal.case.save as saving
-from thermal.case.building import Building, FloorPlan, FloorPlans, ZoneTable
+from thermal.case.building import Building, Device, FloorPlan, FloorPlans, Location, ZoneEntry, ZoneTable
 from thermal.case.case import Case
 from thermal.case.load import load_case
 from thermal.case.save import save_case
-from thermal.case.schema import Device, Location, ZoneEntry
 from thermal.case.telemetry import Telemetry
 from thermal.errors import CaseError
 

@@ -4,9 +4,8 @@ from typing import Any
 import pandas as pd
 import pytest
 
-from thermal.case.case import Case
+from thermal.case.case import Case, local_timestamp
 from thermal.case.load import load_case
-from thermal.case.times import local_timestamp
 from thermal.errors import CaseError
 
 

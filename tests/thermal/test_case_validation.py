@@ -32,6 +32,25 @@ def test_unknown_zone_of_a_device_in_a_zone_table(table_draft: Any) -> None:
     refused(table_draft, CaseError, "found 'rom'; the nearest valid one is 'room'")
 
 
+@pytest.mark.parametrize(
+    ("fed_by", "message"),
+    [
+        (["AHUU"], r"devices\[0\] \(VAV_A\): fed_by: expected a device of the building, found 'AHUU'; the nearest valid one is 'AHU'"),
+        (["AHU", "VAV_A"], r"devices\[0\] \(VAV_A\): fed_by: expected other devices, found 'VAV_A', the device itself"),
+        (["AHU", "AHU"], r"devices\[0\] \(VAV_A\): fed_by: expected each feeder once, found AHU, AHU"),
+        (["RAD_B"], r"fed_by: expected feeders without a circle, found (VAV_A <- RAD_B <- VAV_A|RAD_B <- VAV_A <- RAD_B)"),
+        ("AHU", r"devices\[0\]\.fed_by: expected a list, found 'AHU'"),
+        ([""], r"devices\[0\]\.fed_by\[0\]: "),
+    ],
+)
+def test_feeders_that_cannot_be(plan_draft: Any, fed_by: object, message: str) -> None:
+    plan_draft.content |= {"format": 3}
+    vav_a, radiator, _ = plan_draft.content["devices"]
+    radiator["fed_by"] = ["VAV_A"]
+    vav_a["fed_by"] = fed_by
+    refused(plan_draft, CaseError, message)
+
+
 def test_two_devices_of_one_name(plan_draft: Any) -> None:
     plan_draft.content["devices"][2]["name"] = "VAV_A"
     refused(plan_draft, CaseError, r"devices\[2\]: .*'VAV_A', which devices\[0\] is named too")
@@ -101,7 +120,7 @@ def test_plan_files_that_are_missing_or_elsewhere(plan_draft: Any, plan: str) ->
     (plan_draft.folder.parent / "plan_F1.csv").write_text("#\n")
     plan_draft.content["floors"][0]["plan"] = plan
     outside = plan.startswith(("..", "/", "sub"))
-    expected = "a file inside" if outside else "a file of the case folder"
+    expected = "a file inside" if outside else "a file of the case folder" if plan else "String should have at least 1 char"
     with pytest.raises(CaseError, match=rf"floors\[0\]\.plan: expected {expected}"):
         load_case(plan_draft.write())
 

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 from pvlib import irradiance, solarposition
 
-from thermal.case.schema import Location
+from thermal.case.building import Location
 from thermal.errors import EffectError
 from thermal.inputs.sun import Sun, incidence_modifier, sun_of
 

@@ -27,7 +27,7 @@ from thermal import (
     replay_inputs,
     spin_up,
 )
-from thermal.case.schema import Airflow, Layer, Location, Surface, ZoneEntry
+from thermal.case.building import Airflow, Layer, Location, Surface, ZoneEntry
 from thermal.errors import ModelError
 from thermal.model.scheme import IMPLICIT_EULER, SCHEMES
 from thermal.model.stepper import Stepper

@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from thermal import Building, FloorPlan, FloorPlans, SymbolicModel, ZoneTable, build_network
-from thermal.case.schema import Airflow, Layer, Location, Surface, ZoneEntry
+from thermal.case.building import Airflow, Layer, Location, Surface, ZoneEntry
 from thermal.errors import ModelError
 from thermal.model.rollouts import RolloutData, rollout, symbolic_step
 from thermal.model.scheme import IMPLICIT_EULER, SCHEMES

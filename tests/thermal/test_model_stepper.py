@@ -22,7 +22,7 @@ from thermal import (
     load_bundled_case,
     load_case,
 )
-from thermal.case.schema import Airflow, Layer, Location, Surface, ZoneEntry
+from thermal.case.building import Airflow, Layer, Location, Surface, ZoneEntry
 from thermal.errors import ModelError
 from thermal.model.scheme import IMPLICIT_EULER, SCHEMES, TR_BDF2, Scheme
 from thermal.model.stepper import Stepper, factorise

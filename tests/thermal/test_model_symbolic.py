@@ -11,7 +11,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from thermal import Building, FloorPlan, FloorPlans, SymbolicModel, ZoneTable, build_network, load_bundled_case
-from thermal.case.schema import Airflow, Layer, Location, Surface, ZoneEntry
+from thermal.case.building import Airflow, Layer, Location, Surface, ZoneEntry
 from thermal.errors import ModelError
 
 FloatArray = NDArray[np.float64]

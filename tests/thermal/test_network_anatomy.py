@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from thermal import Building, Case, FloorPlan, FloorPlans, build_network
-from thermal.case.schema import Location
+from thermal.case.building import Location
 from thermal.network.network import ThermalNetwork
 from thermal.network.structure import BASELINE
 from thermal.network.topology import Anatomy

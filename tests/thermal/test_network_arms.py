@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from thermal import Building, FloorPlan, FloorPlans, Structure, SymbolicModel, ThermalNetwork, build_network
-from thermal.case.schema import Location
+from thermal.case.building import Location
 from thermal.errors import ModelError
 
 SITE = Location(latitude=42.0, longitude=-88.0, elevation=120.0, timezone="Etc/GMT+6")

@@ -7,8 +7,8 @@ import pytest
 from numpy.typing import NDArray
 
 from thermal import Building, Structure, SymbolicModel, ThermalNetwork, ZoneTable, build_network
-from thermal.case.schema import Layer, Location, Surface, ZoneEntry
-from thermal.network.chains import Chain
+from thermal.case.building import Layer, Location, Surface, ZoneEntry
+from thermal.network.table import Chain
 
 SITE = Location(latitude=48.0, longitude=12.0, elevation=690.0, timezone="Etc/GMT-1")
 PERIODS = {"a day": 86400.0, "six hours": 21600.0, "an hour": 3600.0}

@@ -11,13 +11,13 @@ import pytest
 from numpy.typing import NDArray
 
 from thermal import Building, FloorPlan, FloorPlans, Structure, SymbolicModel, ThermalNetwork, ZoneTable, build_network
-from thermal.case.schema import Layer, Location, Surface, ZoneEntry
+from thermal.case.building import Layer, Location, Surface, ZoneEntry
 from thermal.errors import ModelError
-from thermal.network.facades import facade_of, wall_facades
 from thermal.network.graph import GraphBuilder
-from thermal.network.grid import floor_grid
+from thermal.network.grid import floor_grid, wall_facades
+from thermal.network.table import facade_of
 from thermal.parameters import ENVELOPE_PARAMETERS, PARAMETERS, Scope
-from thermal.pilot.layout import generate_office
+from thermal.pilot.building import generate_office
 
 FloatArray = NDArray[np.float64]
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from thermal.network.films import series, surface_mesh
+from thermal.network.structure import series, surface_mesh
 
 FloatArray = NDArray[np.float64]
 

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
 from thermal import Building, FloorPlan, FloorPlans, SymbolicModel, ThermalNetwork, build_network, load_bundled_case
-from thermal.case.areas import zone_floor_areas
-from thermal.case.schema import Location
+from thermal.case.building import Location
+from thermal.case.plan import zone_floor_areas
 from thermal.errors import ModelError
 from thermal.shuffle.equivalent import mean_square_reach
 from thermal.units import air_density

@@ -10,8 +10,8 @@ import pytest
 from numpy.typing import NDArray
 
 from thermal import Building, FloorPlan, FloorPlans, SymbolicModel, ThermalNetwork, build_network
-from thermal.case.areas import zone_floor_areas
-from thermal.case.schema import Location
+from thermal.case.building import Location
+from thermal.case.plan import zone_floor_areas
 from thermal.units import air_density
 
 FloatArray = NDArray[np.float64]

@@ -23,7 +23,7 @@ from thermal import (
     build_network,
     load_bundled_case,
 )
-from thermal.case.schema import Layer, Location, Surface, ZoneEntry
+from thermal.case.building import Layer, Location, Surface, ZoneEntry
 from thermal.errors import ModelError
 from thermal.units import air_density
 

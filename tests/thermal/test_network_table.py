@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from thermal import Building, SymbolicModel, ThermalNetwork, ZoneTable, build_network
-from thermal.case.schema import Airflow, Layer, Location, Surface, ZoneEntry
+from thermal.case.building import Airflow, Layer, Location, Surface, ZoneEntry
 from thermal.errors import ThermalError
 from thermal.units import air_density
 

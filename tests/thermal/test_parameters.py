@@ -70,7 +70,7 @@ def test_parameters_of_a_facade_and_of_a_zone_keep_base_and_prior() -> None:
 
 @pytest.mark.parametrize(("scope", "member"), [("global", "south"), ("facade", None), ("zone", None)])
 def test_scope_and_member_that_contradict_each_other_are_refused(scope: Scope, member: str | None) -> None:
-    with pytest.raises(ValueError, match=f"film: expected a member .* came scope '{scope}' with member {member!r}"):
+    with pytest.raises(ValueError, match=f"film: expected a member .* got scope '{scope}' with member {member!r}"):
         Parameter("film", "W/m^2/K", 2.0, 1.0, 4.0, "made up", scope=scope, member=member)
 
 

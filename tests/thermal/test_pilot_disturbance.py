@@ -7,7 +7,7 @@ import pytest
 from scipy import stats
 
 from thermal.errors import ThermalError
-from thermal.pilot.disturbance import draw_disturbance
+from thermal.pilot.weather import draw_disturbance
 
 TIME = 3600.0  # s
 

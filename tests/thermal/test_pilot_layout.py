@@ -11,10 +11,10 @@ import pytest
 from hypothesis import given, reject, settings
 from hypothesis import strategies as st
 
-from thermal.case.areas import zone_floor_areas
 from thermal.case.building import FloorPlan, FloorPlans
+from thermal.case.plan import zone_floor_areas
 from thermal.errors import ThermalError
-from thermal.pilot.layout import devices, generate_office
+from thermal.pilot.building import devices, generate_office
 
 WALLS = {".", "#", "+"}
 NEIGHBOURS = [(-1, 0), (0, 1), (1, 0), (0, -1), (-1, -1), (-1, 1), (1, 1), (1, -1)]

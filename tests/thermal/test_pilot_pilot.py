@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,7 @@ from thermal.case.building import Building, FloorPlans
 from thermal.case.case import Case
 from thermal.case.load import load_case
 from thermal.errors import CaseError
-from thermal.pilot.pilot import generate_pilot
+from thermal.pilot.pilot import PilotSettings, generate_pilot
 
 
 class HeldPlant:
@@ -35,7 +36,7 @@ class HeldPlant:
 @pytest.fixture(scope="module")
 def case(tmp_path_factory: pytest.TempPathFactory) -> Case:
     folder = tmp_path_factory.mktemp("cases") / "pilot"
-    return generate_pilot(folder, plant_factory=HeldPlant, days=1.0, spin_up_days=0.5)
+    return generate_pilot(folder, PilotSettings(days=1.0, spin_up_days=0.5), plant_factory=HeldPlant)
 
 
 def test_the_pilot_case(case: Case) -> None:
@@ -59,8 +60,10 @@ def test_the_case_gives_the_models_signals(case: Case) -> None:
 
 
 def test_same_seed_same_case(tmp_path: Path) -> None:
-    small = {"plant_factory": HeldPlant, "days": 0.25, "spin_up_days": 0.0, "floor_area": 600.0, "zones": 12}
-    frames = [generate_pilot(tmp_path / str(n), seed=n % 2, **small).telemetry.frame for n in range(3)]
+    small = PilotSettings(days=0.25, spin_up_days=0.0, floor_area=600.0, zones=12)
+    frames = [
+        generate_pilot(tmp_path / str(n), small, seed=n % 2, plant_factory=HeldPlant).telemetry.frame for n in range(3)
+    ]
     assert frames[0].equals(frames[2])
     assert not frames[0].equals(frames[1])
 
@@ -77,7 +80,7 @@ def test_a_folder_that_holds_something_is_left_alone(tmp_path: Path) -> None:
 
 
 def test_a_case_is_replaced_when_asked_for(tmp_path: Path) -> None:
-    small = {"plant_factory": HeldPlant, "days": 0.1, "spin_up_days": 0.0, "floor_area": 600.0}
-    generate_pilot(tmp_path / "case", zones=12, **small)
-    generate_pilot(tmp_path / "case", zones=14, overwrite=True, **small)
+    small = PilotSettings(days=0.1, spin_up_days=0.0, floor_area=600.0)
+    generate_pilot(tmp_path / "case", replace(small, zones=12), plant_factory=HeldPlant)
+    generate_pilot(tmp_path / "case", replace(small, zones=14), plant_factory=HeldPlant, overwrite=True)
     assert len(load_case(tmp_path / "case").building.zone_names) == 14

@@ -7,8 +7,7 @@ import pandas as pd
 import pytest
 
 from thermal.errors import ThermalError
-from thermal.pilot.prbs import draw_prbs_thermostats
-from thermal.pilot.thermostat import draw_thermostats
+from thermal.pilot.thermostat import draw_prbs_thermostats, draw_thermostats
 
 TIMES = pd.date_range("2023-01-09", periods=21 * 96, freq="15min", tz="Etc/GMT+8")
 

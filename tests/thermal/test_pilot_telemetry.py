@@ -8,13 +8,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from thermal.case.areas import zone_floor_areas
 from thermal.case.building import Building, FloorPlans
 from thermal.case.case import Case
+from thermal.case.plan import zone_floor_areas
 from thermal.case.telemetry import Telemetry
 from thermal.errors import ThermalError
-from thermal.pilot.layout import devices, generate_office
-from thermal.pilot.telemetry import generate_telemetry
+from thermal.pilot.building import devices, generate_office
+from thermal.pilot.telemetry import TelemetrySettings, generate_telemetry
 from thermal.pilot.thermostat import draw_thermostats
 from thermal.pilot.weather import MOUNTAIN_VIEW, generate_weather
 
@@ -61,13 +61,13 @@ def weather() -> pd.DataFrame:
 @pytest.fixture(scope="module")
 def exact(plans: FloorPlans, weather: pd.DataFrame) -> tuple[TwoNodePlant, Telemetry]:
     plant = TwoNodePlant(plans)
-    return plant, generate_telemetry(plant, plans, weather, seed=5, spin_up_days=1.0, noise=0.0, resolution=0.0)
+    return plant, generate_telemetry(plant, plans, weather, TelemetrySettings(seed=5, spin_up_days=1.0, noise=0.0, resolution=0.0))
 
 
 @pytest.fixture(scope="module")
 def measured(plans: FloorPlans, weather: pd.DataFrame) -> tuple[TwoNodePlant, Telemetry]:
     plant = TwoNodePlant(plans)
-    return plant, generate_telemetry(plant, plans, weather, seed=5, spin_up_days=1.0)
+    return plant, generate_telemetry(plant, plans, weather, TelemetrySettings(seed=5, spin_up_days=1.0))
 
 
 def case_of(plans: FloorPlans, telemetry: Telemetry) -> Case:
@@ -168,7 +168,7 @@ def test_the_loop_is_stable_on_air_alone(plans: FloorPlans, weather: pd.DataFram
             self.air = (3600.0 / 300.0 * self.air + gain) / (3600.0 / 300.0 + 3.0)
             return self.air.copy()
 
-    telemetry = generate_telemetry(AirPlant(plans), plans, weather, noise=0.0, resolution=0.0)
+    telemetry = generate_telemetry(AirPlant(plans), plans, weather, TelemetrySettings(noise=0.0, resolution=0.0))
     zone, heating = (
         points(telemetry, point) for point in ("zone_air_temperature_sensor", "zone_air_heating_temperature_setpoint")
     )
@@ -178,7 +178,7 @@ def test_the_loop_is_stable_on_air_alone(plans: FloorPlans, weather: pd.DataFram
 
 def test_same_seed_same_telemetry(plans: FloorPlans, weather: pd.DataFrame) -> None:
     day = weather.iloc[:288]
-    runs = [generate_telemetry(TwoNodePlant(plans), plans, day, seed=seed).frame for seed in (1, 1, 2)]
+    runs = [generate_telemetry(TwoNodePlant(plans), plans, day, TelemetrySettings(seed=seed)).frame for seed in (1, 1, 2)]
     pd.testing.assert_frame_equal(runs[0], runs[1])
     assert not runs[0].equals(runs[2])
 
@@ -206,7 +206,7 @@ def test_bad_arguments_are_refused(
     plans: FloorPlans, weather: pd.DataFrame, arguments: dict[str, Any], named: str
 ) -> None:
     with pytest.raises(ThermalError, match=named):
-        generate_telemetry(TwoNodePlant(plans), plans, weather, **arguments)
+        generate_telemetry(TwoNodePlant(plans), plans, weather, TelemetrySettings(**arguments))
 
 
 def test_what_does_not_fit_is_refused(plans: FloorPlans, weather: pd.DataFrame) -> None:

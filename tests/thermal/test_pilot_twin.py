@@ -24,14 +24,12 @@ from thermal import (
     save_case,
     spin_up,
 )
-from thermal.case.areas import zone_floor_areas
-from thermal.case.building import Building, ZoneTable
-from thermal.case.schema import Location
+from thermal.case.building import Building, Location, ZoneTable
+from thermal.case.plan import zone_floor_areas
 from thermal.errors import ThermalError
 from thermal.model.stepper import Stepper
 from thermal.pilot.building import pilot_building
-from thermal.pilot.truth import TwinRanges, TwinTruth
-from thermal.pilot.twin import _draw_conditions, _draw_values
+from thermal.pilot.twin import TwinRanges, TwinSettings, TwinTruth, _draw_conditions, _draw_values
 from thermal.pilot.twin import generate_twin as generate
 
 QUIET = TwinRanges(disturbance_deviation=(0.0, 0.0), noise=(0.0, 0.0))
@@ -47,17 +45,17 @@ def building() -> Building:
 
 @pytest.fixture(scope="module")
 def quiet(building: Building) -> Twin:
-    return generate(building, 1, ranges=QUIET, meter="exact", **SHORT)
+    return generate(building, 1, TwinSettings(ranges=QUIET, meter="exact", **SHORT))
 
 
 @pytest.fixture(scope="module")
 def sensed(building: Building) -> Twin:
-    return generate(building, 1, ranges=LOUD, **SHORT)
+    return generate(building, 1, TwinSettings(ranges=LOUD, **SHORT))
 
 
 @pytest.fixture(scope="module")
 def metered(building: Building) -> Twin:
-    return generate(building, 1, ranges=LOUD, meter="exact", **SHORT)
+    return generate(building, 1, TwinSettings(ranges=LOUD, meter="exact", **SHORT))
 
 
 def flow(case: Case) -> np.ndarray:
@@ -90,7 +88,7 @@ def test_without_disturbance_and_noise_the_true_model_replays_it(quiet: Twin) ->
 def test_after_a_long_hold_it_replays_without_the_true_states(building: Building) -> None:
     """Light walls and slabs forget their start within four days of zones held at their temperatures."""
     fixed = {"exterior_wall_heat_capacity": 200.0, "interior_wall_heat_capacity": 200.0, "slab_heat_capacity": 3e4}
-    case, truth = generate(building, 2, days=5.0, spin_up_days=1.0, dx=1.5, ranges=QUIET, meter="exact", fixed=fixed)
+    case, truth = generate(building, 2, TwinSettings(days=5.0, spin_up_days=1.0, dx=1.5, ranges=QUIET, meter="exact", fixed=fixed))
     network = build_network(case.building, dx=1.5)
     matrices, inputs = SymbolicModel(network).matrices(truth.theta), replay_inputs(case, network)
     starts = np.array([4 * 288 + 12 * hour for hour in (2, 4, 13, 15)])
@@ -159,7 +157,7 @@ def innovations(case: Case, truth: TwinTruth, dx: float) -> np.ndarray:
 def test_a_filter_that_knows_the_truth_finds_nothing_else() -> None:
     """Heat, its process, its timing within the step, and the noise are what the truth says: innovations are white."""
     office = pilot_building(1, floor_area=80.0, zones=2, floors=1, name="office")
-    twin = generate(office, 1, days=6.0, spin_up_days=0.5, dx=2.0, ranges=LOUD, meter="exact")
+    twin = generate(office, 1, TwinSettings(days=6.0, spin_up_days=0.5, dx=2.0, ranges=LOUD, meter="exact"))
     white = innovations(*twin, dx=2.0)
     assert np.mean(white**2) == pytest.approx(1.0, abs=4.0 * np.sqrt(2.0 / white.size))
     for lag in (1, 2, 12):
@@ -199,20 +197,20 @@ def test_noise_is_white_and_of_its_deviation(sensed: Twin) -> None:
 
 def test_the_disturbance_is_as_large_as_said(building: Building) -> None:
     areas = np.array(list(zone_floor_areas(building.geometry).values()))  # type: ignore[arg-type]
-    per_area = [generate(building, seed, ranges=LOUD, days=1.0, spin_up_days=1.0, dx=1.5)[1] for seed in range(8)]
+    per_area = [generate(building, seed, TwinSettings(ranges=LOUD, days=1.0, spin_up_days=1.0, dx=1.5))[1] for seed in range(8)]
     values = np.stack([truth.disturbance[::72] / areas for truth in per_area])  # 6 h: three correlation times
     assert values.std() == pytest.approx(2.0, rel=0.15)
 
 
 def test_sensors_may_have_a_resolution(building: Building) -> None:
-    case, truth = generate(building, 1, ranges=LOUD, resolution=0.1, **SHORT)
+    case, truth = generate(building, 1, TwinSettings(ranges=LOUD, resolution=0.1, **SHORT))
     degrees = case.zone_temperatures().to_numpy() - 273.15
     assert np.allclose(degrees, np.round(degrees, 1), atol=1e-9)
     assert noise_of((case, truth)).std() == pytest.approx(np.sqrt(0.05**2 + 0.1**2 / 12.0), rel=0.05)
 
 
 def test_same_seed_same_twin(building: Building, sensed: Twin) -> None:
-    again, other = (generate(building, seed, ranges=LOUD, **SHORT) for seed in (1, 2))
+    again, other = (generate(building, seed, TwinSettings(ranges=LOUD, **SHORT)) for seed in (1, 2))
     assert again[0].telemetry.frame.equals(sensed[0].telemetry.frame)
     for name in ("theta", "heat", "disturbance", "states", "zone_temperatures"):
         assert np.array_equal(getattr(again[1], name), getattr(sensed[1], name))
@@ -220,7 +218,7 @@ def test_same_seed_same_twin(building: Building, sensed: Twin) -> None:
 
 
 def test_excitation_changes_setpoints_only(building: Building, sensed: Twin) -> None:
-    case, truth = generate(building, 1, ranges=LOUD, excitation="prbs", **SHORT)
+    case, truth = generate(building, 1, TwinSettings(ranges=LOUD, excitation="prbs", **SHORT))
     assert np.array_equal(truth.theta, sensed[1].theta)
     assert np.array_equal(truth.disturbance, sensed[1].disturbance)
     assert case.weather().equals(sensed[0].weather())
@@ -259,16 +257,16 @@ def test_conditions_are_spread_over_their_ranges() -> None:
 
 
 def test_fixed_and_zone_parameters(building: Building, sensed: Twin) -> None:
-    _, fixed = generate(building, 1, fixed={"radiant_coefficient": 4.0}, **SHORT)
+    _, fixed = generate(building, 1, TwinSettings(fixed={"radiant_coefficient": 4.0}, **SHORT))
     assert fixed.values == {**sensed[1].values, "radiant_coefficient": 4.0}
-    _, zonal = generate(building, 1, scopes={"slab_coupling": "zone"}, **SHORT)
+    _, zonal = generate(building, 1, TwinSettings(scopes={"slab_coupling": "zone"}, **SHORT))
     couplings = [value for name, value in zonal.values.items() if name.startswith("slab_coupling@")]
     assert len(set(couplings)) == 5
 
 
 def test_a_twin_of_a_generated_office() -> None:
     office = pilot_building(3, floor_area=300.0, zones=6, floors=1, name="office")
-    case, truth = generate(office, 3, days=1.0, spin_up_days=0.5, dx=1.0, step_seconds=600.0)
+    case, truth = generate(office, 3, TwinSettings(days=1.0, spin_up_days=0.5, dx=1.0, step_seconds=600.0))
     assert case.building.name == "office_twin_3"
     assert truth.heat.shape == (144, 6)
     assert case.step == 600.0
@@ -289,7 +287,8 @@ def test_bad_arguments_are_refused(
     building: Building, arguments: dict[str, Any], error: type[Exception], named: str
 ) -> None:
     with pytest.raises(error, match=named):
-        generate(building, **{**SHORT, **arguments})
+        seed = arguments.get("seed", 0)
+        generate(building, seed, TwinSettings(**{**SHORT, **{k: v for k, v in arguments.items() if k != "seed"}}))
 
 
 def test_a_zone_table_is_refused() -> None:

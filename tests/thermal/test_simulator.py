@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from thermal import Building, FloorPlan, FloorPlans, Simulator, SymbolicModel, ZoneTable, load_bundled_case
-from thermal.case.schema import Airflow, Layer, Location, Surface, ZoneEntry
+from thermal.case.building import Airflow, Layer, Location, Surface, ZoneEntry
 from thermal.errors import ModelError, ThermalError
 from thermal.model.replay import free_runs, replay_inputs, spin_up
 from thermal.model.scheme import TR_BDF2

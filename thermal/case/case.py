@@ -1,4 +1,4 @@
-"""A case: a building with a stretch of its telemetry, and the signals that the model takes from it."""
+"""A case: a building and what it reported."""
 
 from __future__ import annotations
 
@@ -6,25 +6,68 @@ from dataclasses import dataclass, field, replace
 from datetime import datetime
 from functools import cached_property
 from pathlib import Path
+from zoneinfo import ZoneInfo
 
 import numpy as np
 import pandas as pd
 
-from thermal.case.building import OUTDOOR, Building
-from thermal.case.points import (
-    DISCHARGE_TEMPERATURE,
-    HEATING_POWER,
-    OUTDOOR_TEMPERATURE,
-    SUPPLY_FLOW,
-    ZONE_TEMPERATURE,
-)
+from thermal.case.building import OUTDOOR, Building, Device
+from thermal.case.points import DISCHARGE_TEMPERATURE, HEATING_POWER, OUTDOOR_TEMPERATURE, SUPPLY_FLOW, ZONE_TEMPERATURE
 from thermal.case.quality import QualityReport, assess, usable
-from thermal.case.remarks import TERMINAL_TYPES, remarks
-from thermal.case.schema import Device
 from thermal.case.telemetry import Telemetry
-from thermal.case.times import local_timestamp
-from thermal.errors import CaseError, describe
+from thermal.case.validation import TERMINAL_TYPES, remarks
+from thermal.errors import CaseError
 from thermal.units import AIR_HEAT_CAPACITY
+
+
+def local_timestamp(time: str | datetime, building: Building) -> pd.Timestamp:
+    """Read a time.
+
+    Parameters
+    ----------
+    time
+        ISO 8601 text, or a datetime; without an offset it is local to the building.
+    building
+        Building whose time zone counts.
+
+    Returns
+    -------
+    Timestamp
+        In the building's time zone.
+
+    Raises
+    ------
+    CaseError
+        It is not ISO 8601, or a local time that the clock skips or shows twice.
+
+    Examples
+    --------
+    >>> from thermal.case.building import Building, Location, ZoneEntry, ZoneTable
+    >>> site = Location(latitude=48, longitude=12, elevation=690, timezone="Europe/Berlin")
+    >>> house = Building("house", site, 0.0, ZoneTable((ZoneEntry(name="room", volume=50, floor_area=20),)))
+    >>> local_timestamp("2023-07-06T07:10", house).isoformat()
+    '2023-07-06T07:10:00+02:00'
+    """
+    zone = building.location.timezone
+    try:
+        parsed = datetime.fromisoformat(time.strip()) if isinstance(time, str) else time
+        stamp = pd.Timestamp(parsed)
+        if pd.isna(stamp):
+            raise ValueError("no time")
+    except (TypeError, ValueError, OverflowError) as error:
+        raise CaseError("time", "ISO 8601, such as 2023-07-06T07:10", repr(time)) from error
+    if stamp.tzinfo is not None:
+        return stamp.tz_convert(zone)
+    return _localised(stamp, zone)
+
+
+def _localised(stamp: pd.Timestamp, zone: str) -> pd.Timestamp:
+    naive = stamp.to_pydatetime()
+    first, second = (naive.replace(tzinfo=ZoneInfo(zone), fold=fold).utcoffset() for fold in (0, 1))
+    if first != second:
+        advice = "give the time with its offset, such as +02:00"
+        raise CaseError("time", f"a time that the clocks of {zone} show once", stamp.isoformat(), advice)
+    return stamp.tz_localize(zone)
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,7 +145,7 @@ class Case:
         frame = self.telemetry.frame.loc[first:last]
         if len(frame) < 2:
             expected = f"an interval with stamps of the telemetry, {stamps[0]} to {stamps[-1]}"
-            raise CaseError(describe("interval", expected, f"{first} to {last}"))
+            raise CaseError("interval", expected, f"{first} to {last}")
         ends = (frame.index[0], frame.index[-1])
         missing = tuple(stamp for stamp in self.telemetry.missing_rows if ends[0] <= stamp <= ends[1])
         telemetry = Telemetry(frame=frame, step=self.step, missing_rows=missing)

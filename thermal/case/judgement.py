@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal._types import BoolArray, FloatArray
 from thermal.case.points import PointType
 
-Values = NDArray[np.float64]
 Stretch = tuple[int, int, str]  # first and last position, what was seen
 
 # A temperature that repeats itself to the last digit for 6 h is not measured: sensors of the shared cases (0.02 K
@@ -39,7 +39,7 @@ SPIKE_SAMPLES = 3
 SPIKE_RETURN = 1.0 / 3.0  # before and after agree to a third of the jump
 
 
-def runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
+def runs(mask: BoolArray) -> list[tuple[int, int]]:
     """Find the stretches where a mask is true.
 
     Parameters
@@ -61,7 +61,7 @@ def runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
     return [(int(first), int(last) - 1) for first, last in zip(edges[::2], edges[1::2], strict=True)]
 
 
-def impossible_values(values: Values, point: PointType) -> list[Stretch]:
+def impossible_values(values: FloatArray, point: PointType) -> list[Stretch]:
     """Find values outside the physically possible range of a point.
 
     Parameters
@@ -85,7 +85,9 @@ def impossible_values(values: Values, point: PointType) -> list[Stretch]:
     return found
 
 
-def flat_lines(values: Values, reference: Values | None, step: float, *, is_input: bool = False) -> list[Stretch]:
+def flat_lines(
+    values: FloatArray, reference: FloatArray | None, step: float, *, is_input: bool = False
+) -> list[Stretch]:
     """Find stretches where a temperature sensor repeats itself for too long to be measuring.
 
     Parameters
@@ -135,7 +137,7 @@ def flat_lines(values: Values, reference: Values | None, step: float, *, is_inpu
     return found
 
 
-def spikes(values: Values, step: float) -> list[Stretch]:
+def spikes(values: FloatArray, step: float) -> list[Stretch]:
     """Find short jumps of a temperature, there and back.
 
     Parameters
@@ -171,7 +173,7 @@ def spikes(values: Values, step: float) -> list[Stretch]:
     return found
 
 
-def _spike_width(values: Values, first: int, widest: int, size: float) -> int:
+def _spike_width(values: FloatArray, first: int, widest: int, size: float) -> int:
     """Count the samples of the spike that begins at `first`; 0 when there is none."""
     before = values[first - 1]
     for width in range(1, widest + 1):
@@ -185,14 +187,14 @@ def _spike_width(values: Values, first: int, widest: int, size: float) -> int:
     return 0
 
 
-def _resolution(series: Values) -> float | None:
+def _resolution(series: FloatArray) -> float | None:
     """Smallest step of a sensor [K]: the fifth percentile of its changes; None when it never changes."""
     changes = np.abs(np.diff(series))
     changes = changes[changes > 0.0]
     return float(np.quantile(changes, 0.05)) if changes.size else None
 
 
-def _ordinary(seconds: Values) -> float:
+def _ordinary(seconds: FloatArray) -> float:
     """Length of long but ordinary repeats [s]: of the samples in repeats below 6 h, 98 % lie in one no longer."""
     short = np.sort(seconds[seconds < FLAT_SECONDS])
     if short.size == 0:
@@ -201,7 +203,7 @@ def _ordinary(seconds: Values) -> float:
     return float(short[np.searchsorted(covered, 0.98)])
 
 
-def _moved(reference: Values) -> bool:
+def _moved(reference: FloatArray) -> bool:
     """Whether the outdoors moved; yes, too, when its own sensor was out (flat, say) for most of the time."""
     finite = reference[np.isfinite(reference)]
     return bool(2 * finite.size < reference.size or np.ptp(finite) >= OUTDOOR_RANGE)

@@ -2,17 +2,164 @@
 
 from __future__ import annotations
 
+from collections.abc import Hashable
 from os import PathLike
 from pathlib import Path
+from typing import Any
+from zoneinfo import ZoneInfo, available_timezones
 
-from thermal.case.building import Building, FloorPlan, FloorPlans, ZoneTable
-from thermal.case.building_file import read_building_file
+import yaml
+from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails
+
+from thermal.case import building as schema
+from thermal.case.building import Building, BuildingFile, FloorPlan, FloorPlans, ZoneTable
 from thermal.case.case import Case
+from thermal.case.migration import migrate
 from thermal.case.plan import read_plan
-from thermal.case.schema import BuildingFile
-from thermal.case.telemetry_file import check_units, read_telemetry
+from thermal.case.telemetry import check_units, read_telemetry
 from thermal.case.validation import check_building, check_columns
-from thermal.errors import CaseError, describe
+from thermal.errors import CaseError, describe, nearest
+
+NAME = "building.yaml"
+_ENTRIES: dict[str, type[BaseModel]] = {
+    "location": schema.Location,
+    "devices": schema.Device,
+    "airflows": schema.Airflow,
+    "floors": schema.FloorEntry,
+    "zones": schema.ZoneEntry,
+    "surfaces": schema.Surface,
+    "constructions": schema.Layer,
+}
+
+
+class _Loader(yaml.SafeLoader):
+    """The safe loader, which also refuses a key that stands twice (plain YAML keeps the last one in silence)."""
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, Any]:
+        """Build a mapping after a look at its keys."""
+        lines: dict[str, int] = {}
+        for key, _ in node.value:
+            line = key.start_mark.line + 1
+            if key.value != "<<" and isinstance(key.value, str) and lines.setdefault(key.value, line) != line:
+                found = f"{key.value!r}, which line {lines[key.value]} holds too"
+                raise CaseError(f"{NAME}: line {line}", "a new key", found, "keep one of the two")
+        return super().construct_mapping(node, deep=deep)
+
+
+def read_building_file(folder: Path) -> schema.BuildingFile:
+    """Read and check `building.yaml` by itself, without the files it names.
+
+    Parameters
+    ----------
+    folder
+        Case folder.
+
+    Returns
+    -------
+    BuildingFile
+        What the file holds.
+
+    Raises
+    ------
+    CaseError
+        One of its family: the file is missing, no YAML, of another format, or holds a key or value that does not fit.
+    """
+    try:
+        parsed = schema.BuildingFile.model_validate(migrate(_read_yaml(folder), NAME))
+    except ValidationError as error:
+        raise _named(error) from error
+    _check_geometry_choice(parsed)
+    _check_time_zone(parsed.location.timezone)
+    return parsed
+
+
+def _read_yaml(folder: Path) -> dict[str, Any]:
+    if not folder.is_dir():
+        found = "a file" if folder.exists() else "nothing"
+        raise CaseError("path", "a case folder", found, f"give the folder that holds {NAME}")
+    path = folder / NAME
+    if not path.is_file():
+        raise CaseError(NAME, "the description of the building", "no such file")
+    try:
+        content = yaml.load(path.read_text(encoding="utf-8-sig"), Loader=_Loader)
+    except (OSError, UnicodeDecodeError) as error:
+        raise CaseError(NAME, "YAML in UTF-8", f"{error}") from error
+    except (yaml.YAMLError, ValueError, RecursionError) as error:  # ValueError: a date such as 2023-13-45
+        raise CaseError(NAME, "YAML", " ".join(str(error).split())) from error
+    if not isinstance(content, dict):
+        raise CaseError(NAME, "a mapping of keys", f"{type(content).__name__}")
+    return content
+
+
+def _check_time_zone(name: str) -> None:
+    try:
+        ZoneInfo(name)
+    except (KeyError, ValueError, OSError) as error:
+        advice = nearest(name, sorted(available_timezones()))
+        raise CaseError(f"{NAME}: location.timezone", "an IANA name", repr(name), advice) from error
+
+
+def _check_geometry_choice(parsed: schema.BuildingFile) -> None:
+    plans = [key for key in ("cell_size", "floors", "glazing") if getattr(parsed, key) is not None]
+    table = [key for key in ("zones", "surfaces", "constructions") if getattr(parsed, key) is not None]
+    if plans and table:
+        raise CaseError(NAME, "floor plans or a zone table", f"keys of both: {', '.join(plans + table)}", "drop one")
+    if not plans and not table:
+        raise CaseError(NAME, "'floors' (plans) or 'zones' (a zone table)", "neither", "add one")
+    for key in ("cell_size", "floors") if plans else ("zones",):
+        if getattr(parsed, key) is None:
+            raise CaseError(f"{NAME}: {key}", "a value", "no such key", f"needed beside {plans + table}")
+        if getattr(parsed, key) == ():
+            raise CaseError(f"{NAME}: {key}", "at least one entry", "none")
+
+
+def _named(error: ValidationError) -> CaseError:
+    """Turn the first of pydantic's findings into an error of the family; say how many more there are."""
+    details = error.errors(include_url=False)
+    first = details[0]
+    where = f"{NAME}: {_key_path(first['loc'])}"
+    more = f" (and {len(details) - 1} more in this file)" if len(details) > 1 else ""
+    if first["type"] == "extra_forbidden":
+        advice = nearest(first["loc"][-1], _keys_at(first["loc"]))
+        return CaseError(describe(where, "a key of the format", repr(first["loc"][-1]), advice) + more)
+    if first["type"] == "missing":
+        return CaseError(describe(where, "a value", "no such key") + more)
+    return CaseError(describe(where, _expected(first), _short(first["input"]), _advice(first)) + more)
+
+
+def _expected(detail: ErrorDetails) -> str:
+    kinds = {"tuple_type": "a list", "dict_type": "a mapping", "model_type": "a mapping", "string_type": "text"}
+    return kinds.get(detail["type"], detail["msg"].removeprefix("Input should be ").replace("a valid ", "a "))
+
+
+def _short(value: object) -> str:
+    text = repr(value)
+    return text if len(text) <= 80 else text[:77] + "..."
+
+
+def _advice(detail: ErrorDetails) -> str:
+    if detail["type"] == "string_type":
+        return "put it in quotes" if detail["input"] is not None else ""
+    if detail["type"] == "float_type" and isinstance(detail["input"], str):
+        return "write a plain number (YAML takes 1e-3 for text: write 1.0e-3 or 0.001)"
+    if detail["type"] == "literal_error":
+        return nearest(
+            detail["input"], str(detail["ctx"]["expected"]).replace("'", "").replace(" or ", ", ").split(", ")
+        )
+    return ""
+
+
+def _key_path(location: tuple[int | str, ...]) -> str:
+    path = ""
+    for part in location:
+        path += f"[{part}]" if isinstance(part, int) else f".{part}"
+    return path.removeprefix(".")
+
+
+def _keys_at(location: tuple[int | str, ...]) -> list[str]:
+    model = schema.BuildingFile if len(location) == 1 else _ENTRIES[str(location[0])]
+    return [field.alias or name for name, field in model.model_fields.items()]
 
 
 def load_case(path: str | PathLike[str]) -> Case:
@@ -77,6 +224,7 @@ def _building(parsed: BuildingFile, folder: Path) -> Building:
         devices=parsed.devices,
         airflows=parsed.airflows,
         weather_station=parsed.weather_station,
+        geometry_quality=parsed.geometry_quality,
     )
 
 
@@ -87,13 +235,9 @@ def _inside(folder: Path, name: str, key: str) -> Path:
         target = (folder / name).resolve()
         is_file = target.is_file()
     except (OSError, ValueError, RuntimeError) as error:  # a NUL, a name too long, links in a circle
-        raise CaseError(describe(where, "the name of a file", repr(name))) from error
+        raise CaseError(where, "the name of a file", repr(name)) from error
     if not target.is_relative_to(folder.resolve()):
-        raise CaseError(
-            describe(where, "a file inside the case folder", repr(name), "copy the file into the case")
-        )
+        raise CaseError(where, "a file inside the case folder", repr(name), "copy the file into the case")
     if not is_file:
-        raise CaseError(
-            describe(where, "a file of the case folder", repr(name), "add the file or correct the name")
-        )
+        raise CaseError(where, "a file of the case folder", repr(name), "add the file or correct the name")
     return target

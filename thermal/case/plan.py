@@ -1,4 +1,4 @@
-"""Reading a floor plan, and what a plan must keep to."""
+"""Floor plans of tokens: reading, what a plan must keep to, and the areas and volumes of its zones."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from thermal.case.building import EXTERIOR_WALL, INTERIOR_WALL, OUTSIDE
-from thermal.errors import CaseError, describe
+from thermal.case.building import EXTERIOR_WALL, INTERIOR_WALL, OUTSIDE, FloorPlan, FloorPlans
+from thermal.errors import CaseError
 
 
 def read_plan(path: Path) -> NDArray[np.str_]:
@@ -41,18 +41,17 @@ def read_plan(path: Path) -> NDArray[np.str_]:
         with path.open(encoding="utf-8-sig", newline="") as stream:
             rows = [[token.strip() for token in row] for row in csv.reader(stream, strict=True)]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise CaseError(describe(path.name, "a CSV of tokens in UTF-8", f"{error}")) from error
+        raise CaseError(path.name, "a CSV of tokens in UTF-8", f"{error}") from error
     while rows and not any(rows[-1]):
         rows.pop()
     if not rows:
-        raise CaseError(describe(path.name, "rows of tokens", "no row"))
+        raise CaseError(path.name, "rows of tokens", "no row")
     for number, row in enumerate(rows, start=1):
         if len(row) != len(rows[0]):
-            expected = f"{len(rows[0])} cells as in row 1"
-            raise CaseError(describe(f"{path.name}: row {number}", expected, f"{len(row)} cells"))
+            raise CaseError(f"{path.name}: row {number}", f"{len(rows[0])} cells as in row 1", f"{len(row)} cells")
         if "" in row:
             where = f"{path.name}: row {number}, column {row.index('') + 1}"
-            raise CaseError(describe(where, "'.', '#', '+' or a zone", "a blank", "write '.' for outside"))
+            raise CaseError(where, "'.', '#', '+' or a zone", "a blank", "write '.' for outside")
     return np.array(rows, dtype=np.str_)
 
 
@@ -78,10 +77,10 @@ def check_plan(tokens: NDArray[np.str_], where: str) -> None:
     """
     tokens = np.asarray(tokens, dtype=np.str_)
     if tokens.ndim != 2 or tokens.size == 0:
-        raise CaseError(describe(where, "rows and columns of tokens", f"an array of shape {tokens.shape}"))
+        raise CaseError(where, "rows and columns of tokens", f"an array of shape {tokens.shape}")
     is_zone = ~np.isin(tokens, [OUTSIDE, EXTERIOR_WALL, INTERIOR_WALL])
     if not is_zone.any():
-        raise CaseError(describe(where, "at least one zone", "none"))
+        raise CaseError(where, "at least one zone", "none")
     _check_walls(tokens, is_zone, where)
     for zone in np.unique(tokens[is_zone]):
         parts, n_part = ndimage.label(tokens == zone)
@@ -90,7 +89,7 @@ def check_plan(tokens: NDArray[np.str_], where: str) -> None:
             found = f"{n_part} parts, with cells at row {cells[0][0]}, column {cells[0][1]} and row {cells[1][0]}, "
             found += f"column {cells[1][1]}"
             advice = "give the parts names of their own, or join them"
-            raise CaseError(describe(f"{where}: zone {str(zone)!r}", "cells that hang together", found, advice))
+            raise CaseError(f"{where}: zone {str(zone)!r}", "cells that hang together", found, advice)
 
 
 def _check_walls(tokens: NDArray[np.str_], is_zone: NDArray[np.bool_], where: str) -> None:
@@ -104,4 +103,147 @@ def _check_walls(tokens: NDArray[np.str_], is_zone: NDArray[np.bool_], where: st
             row, col = (int(x) for x in np.argwhere(touching)[0])
             what = "the edge of the plan" if at_edge[rows, cols][row, col] else "the outside ('.')"
             at = f"{where}: row {row + 1}, column {col + 1} (zone {str(tokens[row, col])!r})"
-            raise CaseError(describe(at, f"a wall {side}", what, "draw '#' between zone and outside"))
+            raise CaseError(at, f"a wall {side}", what, "draw '#' between zone and outside")
+
+
+Cell = tuple[int, int]
+_SIDES: tuple[Cell, ...] = ((-1, 0), (0, 1), (1, 0), (0, -1))
+_CORNERS: tuple[Cell, ...] = ((-1, 1), (1, 1), (1, -1), (-1, -1))
+FACADE_STEPS: dict[str, Cell] = dict(zip(("north", "east", "south", "west"), _SIDES, strict=True))
+
+
+def wall_shares(tokens: NDArray[np.str_]) -> dict[Cell, tuple[str, ...]]:
+    """Say which zones share each interior wall cell, in equal parts.
+
+    Parameters
+    ----------
+    tokens
+        Shape (n_row, n_col), text; a floor plan.
+
+    Returns
+    -------
+    dict
+        Zones, sorted, by (row, column) of each ``+`` cell; an empty tuple where no zone can be reached through ``+``.
+
+    Notes
+    -----
+    The zones beside the cell share it: the two sides of a straight wall get half each, a stub inside a zone is all
+    that zone's. Where walls cross and no zone is beside the cell, those at its corners share it. Inside walls thicker
+    than that, the zones that are the fewest cells away do.
+
+    Examples
+    --------
+    >>> wall_shares(np.array([["A", "+", "B"]]))
+    {(0, 1): ('A', 'B')}
+    """
+    walls: list[Cell] = [(int(row), int(col)) for row, col in np.argwhere(tokens == INTERIOR_WALL)]
+    framed = np.pad(tokens, 1, constant_values=OUTSIDE)
+    found = {cell: _zones_at(framed, cell, _SIDES) or _zones_at(framed, cell, _CORNERS) for cell in walls}
+    shares = {cell: zones for cell, zones in found.items() if zones}
+    pending = [cell for cell in walls if cell not in shares]
+    while pending:
+        reached = {(r, c): set().union(*(shares.get((r + y, c + x), set()) for y, x in _SIDES)) for r, c in pending}
+        new = {cell: zones for cell, zones in reached.items() if zones}
+        if not new:
+            break
+        shares |= new
+        pending = [cell for cell in pending if cell not in new]
+    return {cell: tuple(sorted(shares.get(cell, ()))) for cell in walls}
+
+
+def zone_floor_areas(plans: FloorPlans) -> dict[str, float]:
+    """Floor area of each zone, with its share of the interior walls.
+
+    Parameters
+    ----------
+    plans
+        Floor plans.
+
+    Returns
+    -------
+    dict
+        Area [m2] by zone, in the building's order of zones.
+
+    Notes
+    -----
+    A ``+`` cell counts half to each side (`wall_shares`); ``#`` and ``.`` cells count to nobody.
+    """
+    return {zone: count * plans.cell_size**2 for floor in plans.floors for zone, count in _cell_counts(floor).items()}
+
+
+def zone_volumes(plans: FloorPlans) -> dict[str, float]:
+    """Volume of each zone, with its share of the interior walls.
+
+    Parameters
+    ----------
+    plans
+        Floor plans.
+
+    Returns
+    -------
+    dict
+        Volume [m3] by zone: floor area times the clear height of its floor.
+    """
+    areas = zone_floor_areas(plans)
+    return {zone: areas[zone] * floor.height for floor in plans.floors for zone in floor.zone_names}
+
+
+def facade_areas(plans: FloorPlans) -> dict[str, dict[str, float]]:
+    """Area of exterior wall of each zone by facade, seen from inside.
+
+    Parameters
+    ----------
+    plans
+        Floor plans.
+
+    Returns
+    -------
+    dict
+        Area [m2] by zone and by facade of the plan (``north`` is the first row, before rotation).
+
+    Notes
+    -----
+    A cell of a zone has a facade where the wall cells beside it lead straight to the outside. The ends of interior
+    walls count as in `wall_shares`; the corners of the exterior wall count to nobody.
+    """
+    areas: dict[str, dict[str, float]] = {}
+    for floor in plans.floors:
+        shares, framed = wall_shares(floor.tokens), np.pad(floor.tokens, 1, constant_values=OUTSIDE)
+        areas |= {zone: dict.fromkeys(FACADE_STEPS, 0.0) for zone in floor.zone_names}
+        for facade, step in FACADE_STEPS.items():
+            for row, col in np.argwhere(_wall_to_outside(floor.tokens, step)):
+                inner = (int(row) - step[0], int(col) - step[1])
+                token = str(framed[inner[0] + 1, inner[1] + 1])
+                owners = shares[inner] if token == INTERIOR_WALL else (token,) if token in areas else ()
+                for zone in owners:
+                    areas[zone][facade] += plans.cell_size * floor.height / len(owners)
+    return areas
+
+
+def _cell_counts(floor: FloorPlan) -> dict[str, float]:
+    cells = dict(zip(*(found.tolist() for found in np.unique(floor.tokens, return_counts=True)), strict=True))
+    counts = {zone: float(cells[zone]) for zone in floor.zone_names}
+    for zones in wall_shares(floor.tokens).values():
+        for zone in zones:
+            counts[zone] += 1.0 / len(zones)
+    return counts
+
+
+def _wall_to_outside(tokens: NDArray[np.str_], step: Cell) -> NDArray[np.bool_]:
+    """Mark wall cells from which a straight walk through walls, along `step`, ends outside."""
+    axis = 0 if step[0] else 1
+    forwards = step[axis] > 0
+    lines = np.moveaxis(tokens, axis, 0)
+    lines = lines[::-1] if forwards else lines  # start where the walk would end
+    result = np.zeros(lines.shape, dtype=bool)
+    beyond = np.ones(lines.shape[1], dtype=bool)
+    for index, line in enumerate(lines):
+        result[index] = (line == EXTERIOR_WALL) & beyond
+        beyond = (line == OUTSIDE) | result[index]
+    return np.moveaxis(result[::-1] if forwards else result, 0, axis)
+
+
+def _zones_at(framed: NDArray[np.str_], cell: Cell, steps: tuple[Cell, ...]) -> set[str]:
+    """Zones at some steps from a cell of a plan that has a row of outside around it."""
+    found = {str(framed[1 + cell[0] + d_row, 1 + cell[1] + d_col]) for d_row, d_col in steps}
+    return found - {OUTSIDE, EXTERIOR_WALL, INTERIOR_WALL}

@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
+from thermal._types import FloatArray
 from thermal.case.building import Building
 from thermal.case.judgement import flat_lines, impossible_values, runs, spikes
 from thermal.case.points import OUTDOOR_TEMPERATURE, POINT_TYPES, ZONE_TEMPERATURE, split_column
@@ -231,23 +231,21 @@ def usable(frame: pd.DataFrame, report: QualityReport) -> pd.DataFrame:
     return pd.DataFrame(values, index=frame.index, columns=frame.columns)
 
 
-def _outdoor_reference(building: Building, clean: dict[str, NDArray[np.float64]]) -> NDArray[np.float64] | None:
+def _outdoor_reference(building: Building, clean: dict[str, FloatArray]) -> FloatArray | None:
     station = clean.get(f"{building.weather_station}/{OUTDOOR_TEMPERATURE}")
     others = [values for name, values in clean.items() if name.endswith(f"/{OUTDOOR_TEMPERATURE}")]
     return station if station is not None else (others[0] if others else None)
 
 
 def _take_out(
-    values: NDArray[np.float64], marks: list[tuple[str, int, int, str]], kind: str, found: list[tuple[int, int, str]]
+    values: FloatArray, marks: list[tuple[str, int, int, str]], kind: str, found: list[tuple[int, int, str]]
 ) -> None:
     for first, last, detail in found:
         values[first : last + 1] = np.nan
         marks.append((kind, first, last, detail))
 
 
-def _column(
-    name: str, marks: list[tuple[str, int, int, str]], clean: NDArray[np.float64], index: pd.Index
-) -> ColumnQuality:
+def _column(name: str, marks: list[tuple[str, int, int, str]], clean: FloatArray, index: pd.Index) -> ColumnQuality:
     missing = sum(last - first + 1 for kind, first, last, _ in marks if kind == GAP)
     findings = tuple(_finding(index, mark) for mark in sorted(marks, key=lambda mark: (mark[1], mark[0])))
     return ColumnQuality(name, missing / len(clean), float(np.isnan(clean).mean()), findings)

@@ -15,12 +15,12 @@ import pandas as pd
 import yaml
 
 from thermal.case.building import Building, FloorPlan, FloorPlans
-from thermal.case.building_file import NAME
 from thermal.case.case import Case
-from thermal.case.load import load_case
-from thermal.case.points import POINT_TYPES, SINCE_FORMAT_2, split_column
+from thermal.case.load import NAME, load_case
+from thermal.case.migration import FORMAT
+from thermal.case.points import POINT_TYPES, split_column
 from thermal.case.telemetry import Telemetry
-from thermal.errors import CaseError, describe
+from thermal.errors import CaseError
 from thermal.units import QUANTITIES, from_si
 
 TELEMETRY_FILE = "telemetry.parquet"
@@ -90,16 +90,13 @@ def _check_target(target: Path, overwrite: bool) -> None:
     if not target.exists():
         return
     if not target.is_dir():
-        raise CaseError(describe(str(target), "a folder to make", "a file", "choose another path"))
+        raise CaseError(str(target), "a folder to make", "a file", "choose another path")
     if any(target.iterdir()):
         if not overwrite:
             advice = "choose another folder or pass overwrite=True"
-            raise CaseError(
-                describe(str(target), "no folder or an empty one", "a folder that holds files", advice)
-            )
+            raise CaseError(str(target), "no folder or an empty one", "a folder that holds files", advice)
         if not (target / NAME).is_file():
-            found = f"a folder without {NAME}"
-            raise CaseError(describe(str(target), "a case to overwrite", found, "choose another folder"))
+            raise CaseError(str(target), "a case to overwrite", f"a folder without {NAME}", "choose another folder")
 
 
 def _write(building: Building, frame: pd.DataFrame, folder: Path) -> None:
@@ -124,12 +121,13 @@ def _write_plan(floor: FloorPlan, path: Path) -> None:
 def _content(building: Building, frame: pd.DataFrame) -> dict[str, Any]:
     points = dict.fromkeys(split_column(str(column), TELEMETRY_FILE)[1] for column in frame.columns)
     return {
-        "format": 2 if SINCE_FORMAT_2 & points.keys() else 1,
+        "format": FORMAT,
         "name": building.name,
         "location": building.location.model_dump(),
         "orientation": building.orientation,
+        "geometry_quality": building.geometry_quality,
         **_geometry(building),
-        "devices": [device.model_dump(exclude_none=True) for device in building.devices],
+        "devices": [device.model_dump(mode="json", exclude_defaults=True) for device in building.devices],
         "airflows": [airflow.model_dump(by_alias=True) for airflow in building.airflows],
         "weather_station": building.weather_station,
         "telemetry": TELEMETRY_FILE,

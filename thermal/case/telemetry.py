@@ -1,13 +1,22 @@
-"""Telemetry: what the sensors of a building reported, in SI units, on a regular clock."""
+"""Telemetry: what the sensors of a building reported, read from any file and units, in SI units on a regular clock."""
 
 from __future__ import annotations
 
+import csv
+import re
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from decimal import Decimal
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
-from thermal.errors import CaseError, describe
+from thermal.case.building import Location
+from thermal.case.points import POINT_TYPES, point_type, split_column
+from thermal.errors import CaseError
+from thermal.units import check_unit, to_si
 
 INDEX = "timestamp"
 LONGEST_STEP = 3600.0  # s: "steps of up to 60 minutes are valid" (case format)
@@ -62,11 +71,10 @@ class Telemetry:
         """
         doubled = frame.columns[frame.columns.duplicated()]
         if len(doubled):
-            found = f"{str(doubled[0])!r} twice"
-            raise CaseError(describe(f"{where}: columns", "names of their own", found, "drop one"))
+            raise CaseError(f"{where}: columns", "names of their own", f"{str(doubled[0])!r} twice", "drop one")
         if len(frame) < 2 or frame.shape[1] == 0:
             found = f"{len(frame)} rows and {frame.shape[1]} columns"
-            raise CaseError(describe(where, "at least two rows and one column", found))
+            raise CaseError(where, "at least two rows and one column", found)
         index = _checked_index(frame.index, where)
         step = _regular_step(index, where)
         full = pd.date_range(index[0], index[-1], freq=pd.Timedelta(step, unit="s"), name=INDEX)
@@ -87,33 +95,30 @@ def _as_numbers(frame: pd.DataFrame, where: str) -> pd.DataFrame:
             try:
                 frame[column].astype(float)
             except (TypeError, ValueError) as error:
-                at = f"{where}: column {str(column)!r}"
-                found = " ".join(str(error).split())
-                raise CaseError(describe(at, "numbers", found)) from error
+                raise CaseError(f"{where}: column {str(column)!r}", "numbers", " ".join(str(error).split())) from error
         raise
 
 
 def _checked_index(index: pd.Index, where: str) -> pd.DatetimeIndex:
     if not isinstance(index, pd.DatetimeIndex) or index.name != INDEX:
         found = f"an index {index.name!r} of {index.dtype}"
-        raise CaseError(describe(where, f"an index {INDEX!r} of time stamps", found, "rename or set the index"))
+        raise CaseError(where, f"an index {INDEX!r} of time stamps", found, "rename or set the index")
     if index.tz is None:
-        found = f"{index[0]} without one"
         advice = "write stamps with their offset, or localise them to the building's time zone"
-        raise CaseError(describe(f"{where}: {INDEX}", "stamps with a time zone", found, advice))
+        raise CaseError(f"{where}: {INDEX}", "stamps with a time zone", f"{index[0]} without one", advice)
     if index.hasnans:
         row = int(np.flatnonzero(index.isna())[0]) + 1
-        raise CaseError(describe(f"{where}: data row {row}", "a time stamp", "nothing", "drop the row"))
+        raise CaseError(f"{where}: data row {row}", "a time stamp", "nothing", "drop the row")
     gaps = np.diff(index.as_unit("us").asi8)
     if (gaps <= 0).any():
         row = int(np.flatnonzero(gaps <= 0)[0]) + 1
         at = f"{where}: data row {row + 1}"
         if gaps[row - 1] == 0:
-            raise CaseError(describe(at, "a new stamp", f"{index[row]} again", "drop or merge the row"))
+            raise CaseError(at, "a new stamp", f"{index[row]} again", "drop or merge the row")
         found = f"{index[row]} after {index[row - 1]}"
         if (index == index[row]).sum() > 1:
-            raise CaseError(describe(at, "a new stamp", f"{index[row]} again", "drop or merge the row"))
-        raise CaseError(describe(at, "stamps that go forwards", found, "sort the rows"))
+            raise CaseError(at, "a new stamp", f"{index[row]} again", "drop or merge the row")
+        raise CaseError(at, "stamps that go forwards", found, "sort the rows")
     return index.as_unit("us")
 
 
@@ -127,15 +132,168 @@ def _regular_step(index: pd.DatetimeIndex, where: str) -> float:
         row = int(off[0]) + 1
         expected = f"a whole number of steps of {step / 1e6:g} s"
         found = f"{index[row]}, {gaps[row - 1] / 1e6:g} s after the row before"
-        advice = "resample the telemetry to one step"
-        raise CaseError(describe(f"{where}: data row {row + 1}", expected, found, advice))
+        raise CaseError(f"{where}: data row {row + 1}", expected, found, "resample the telemetry to one step")
     if step / 1e6 > LONGEST_STEP:
-        raise CaseError(describe(where, f"steps of up to {LONGEST_STEP:g} s", f"{step / 1e6:g} s"))
+        raise CaseError(where, f"steps of up to {LONGEST_STEP:g} s", f"{step / 1e6:g} s")
     if gaps.sum() // step > FILL_LIMIT * len(index) + FILL_LIMIT:
         row = int(np.argmax(gaps)) + 1
         found = f"{index[row]} after {index[row - 1]}"
         advice = "correct the stamp, or make a case of each stretch"
-        raise CaseError(
-            describe(f"{where}: data row {row + 1}", "telemetry without years of gaps", found, advice)
-        )
+        raise CaseError(f"{where}: data row {row + 1}", "telemetry without years of gaps", found, advice)
     return step / 1e6
+
+
+SUFFIXES = (".parquet", ".csv")
+MISSING = frozenset({"", "nan", "na", "n/a", "null", "none", "<na>"})  # in a CSV, in any case of letters
+_OFFSET = re.compile(r"(?:[zZ]|[+-]\d{2}:?\d{2}(?::\d{2})?|[+-]\d{2})$")
+
+
+def read_telemetry(
+    path: Path, units: Mapping[str, str], location: Location, names: Mapping[str, str] | None = None
+) -> Telemetry:
+    """Read a telemetry file.
+
+    Parameters
+    ----------
+    path
+        ``.parquet`` or ``.csv``.
+    units
+        Unit of each point type in the file.
+    location
+        Site: its time zone is the telemetry's, its elevation gives the density for volume flows.
+    names
+        Columns to read, and what they are in the case format; by default all, as they are.
+
+    Returns
+    -------
+    Telemetry
+        In the library's units, in the building's time zone.
+
+    Raises
+    ------
+    CaseError
+        One of its family, for the first thing in the file that does not fit.
+    """
+    if path.suffix.lower() not in SUFFIXES:
+        raise CaseError("building.yaml: telemetry", "a .parquet or a .csv file", repr(path.name))
+    raw = _read_csv(path) if path.suffix.lower() == ".csv" else _read_parquet(path)
+    if names is not None:
+        raw = raw.loc[:, [str(column) in names for column in raw.columns]]
+        raw = raw.set_axis([names[str(column)] for column in raw.columns], axis=1)
+    if isinstance(raw.index, pd.DatetimeIndex) and raw.index.tz is not None:
+        raw = raw.tz_convert(location.timezone)
+    columns = [str(column) for column in raw.columns]
+    converted: dict[str, NDArray[np.float64]] = {}
+    for position, column in enumerate(columns):
+        _, point = split_column(column, path.name)
+        if point not in units:
+            expected = f"a unit for {point}, which {path.name} has"
+            raise CaseError("building.yaml: units", expected, "no such key", f"add '{point}: <unit>'")
+        if column in converted:
+            raise CaseError(f"{path.name}: columns", "names of their own", f"{column!r} twice")
+        numbers = _numbers(raw.iloc[:, position], f"{path.name}: column {column!r}")
+        quantity = POINT_TYPES[point].quantity
+        converted[column] = to_si(numbers, units[point], quantity, elevation=location.elevation)
+    return Telemetry.from_frame(pd.DataFrame(converted, index=raw.index), where=path.name)
+
+
+def check_units(units: Mapping[str, str]) -> None:
+    """Refuse units that pint does not know, or that do not measure their point.
+
+    Parameters
+    ----------
+    units
+        Unit by point type.
+
+    Raises
+    ------
+    CaseError
+        A key is no point type.
+    CaseError
+        Pint does not know a unit, or it is one of something else (`CaseError`).
+    """
+    for point, unit in units.items():
+        where = f"building.yaml: units.{point}"
+        check_unit(unit, point_type(point, where).quantity, where)
+
+
+def _read_parquet(path: Path) -> pd.DataFrame:
+    try:
+        frame = pd.read_parquet(path)
+    except Exception as error:  # pyarrow raises a family of its own, and plain ValueError and OSError
+        raise CaseError(path.name, "a Parquet file", " ".join(str(error).split())) from error
+    return frame.set_index(INDEX) if INDEX in frame.columns else frame
+
+
+def _read_csv(path: Path) -> pd.DataFrame:
+    """Read a CSV as text; numbers are made of it later, where a message can name what stood there."""
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as stream:
+            rows = [row for row in csv.reader(stream, strict=True) if row]
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise CaseError(path.name, "a CSV in UTF-8", " ".join(str(error).split())) from error
+    if not rows:
+        raise CaseError(path.name, "a CSV with one header row", "an empty file")
+    header = [name.strip() for name in rows.pop(0)]
+    if header.count(INDEX) != 1:
+        if INDEX in header:
+            raise CaseError(f"{path.name}: columns", "names of their own", f"{INDEX!r} twice")
+        raise CaseError(f"{path.name}: header", f"a column {INDEX!r}", ", ".join(header[:3]))
+    for number, row in enumerate(rows, start=1):
+        if len(row) != len(header):
+            expected = f"{len(header)} cells as in the header"
+            raise CaseError(f"{path.name}: data row {number}", expected, f"{len(row)} cells")
+    columns = dict(enumerate(zip(*rows, strict=True))) if rows else dict.fromkeys(range(len(header)), ())
+    stamps = _parse_stamps(columns.pop(header.index(INDEX)), path.name)
+    names = [header[position] for position in columns]
+    values = [
+        _parse_numbers(texts, stamps, f"{path.name}: column {name!r}")
+        for name, texts in zip(names, columns.values(), strict=True)
+    ]
+    frame = pd.DataFrame(dict(enumerate(values)), index=stamps, columns=range(len(names)))
+    return frame.set_axis(names, axis=1)
+
+
+def _parse_numbers(texts: Sequence[str], stamps: pd.DatetimeIndex, where: str) -> NDArray[np.float64]:
+    values = np.full(len(texts), np.nan)
+    for position, text in enumerate(texts):
+        try:
+            if text.strip().casefold() not in MISSING:
+                values[position] = float(text)
+        except ValueError as error:
+            raise _not_numeric(where, stamps[position], text) from error
+    return values
+
+
+def _parse_stamps(texts: Iterable[str], file: str) -> pd.DatetimeIndex:
+    listed = [text.strip() for text in texts]
+    for row, text in enumerate(listed, start=1):
+        if not re.match(r"\d{4}-?\d{2}-?\d{2}", text):
+            raise CaseError(f"{file}: data row {row}", "an ISO 8601 time stamp with offset", repr(text))
+        if ("T" not in text and " " not in text) or not _OFFSET.search(text):
+            advice = "write 2023-07-06T07:10:00+02:00"
+            raise CaseError(f"{file}: data row {row}", "a time stamp with offset", repr(text), advice)
+    try:
+        stamps = pd.to_datetime(listed, utc=True, format="ISO8601")
+    except (ValueError, OverflowError) as error:
+        raise CaseError(f"{file}: {INDEX}", "ISO 8601 time stamps with offset", " ".join(str(error).split())) from error
+    return pd.DatetimeIndex(stamps, name=INDEX)
+
+
+def _numbers(column: pd.Series, where: str) -> NDArray[np.float64]:
+    if pd.api.types.is_numeric_dtype(column.dtype) and not (
+        pd.api.types.is_bool_dtype(column.dtype) or pd.api.types.is_complex_dtype(column.dtype)
+    ):
+        return column.to_numpy(dtype=float, na_value=np.nan)
+    values = np.full(len(column), np.nan)
+    for position, (stamp, value) in enumerate(column.items()):
+        if isinstance(value, int | float | Decimal) and not isinstance(value, bool):
+            values[position] = float(value)
+        elif value is not None and value is not pd.NA and value is not pd.NaT:
+            raise _not_numeric(where, stamp, value)
+    return values
+
+
+def _not_numeric(where: str, stamp: object, value: object) -> CaseError:
+    advice = "leave a missing value blank or NaN"
+    return CaseError(f"{where}, stamp {stamp}", "a number", repr(value), advice)

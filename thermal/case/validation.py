@@ -1,25 +1,40 @@
-"""What must hold between the parts of a building: every name leads somewhere, every surface makes sense."""
+"""What must hold between the parts of a building, and what is worth a remark."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from graphlib import CycleError, TopologicalSorter
 
-from thermal.case.areas import facade_areas
+import numpy as np
+from scipy import ndimage
+
 from thermal.case.building import (
+    DEVICE_TYPES,
     EXTERIOR_WALL,
+    FACADES,
     GROUND,
     INTERIOR_WALL,
     OUTDOOR,
     OUTSIDE,
     Building,
+    Device,
     FloorPlans,
+    Surface,
     ZoneTable,
 )
-from thermal.case.plan import check_plan
-from thermal.case.points import ZONE_TEMPERATURE, split_column
-from thermal.case.schema import FACADES, Surface
-from thermal.errors import CaseError, describe, nearest
+from thermal.case.plan import check_plan, facade_areas
+from thermal.case.points import (
+    DISCHARGE_TEMPERATURE,
+    HEATING_POWER,
+    OUTDOOR_TEMPERATURE,
+    SUPPLY_FLOW,
+    ZONE_TEMPERATURE,
+    split_column,
+)
+from thermal.case.telemetry import Telemetry
+from thermal.errors import CaseError, check_known, nearest
 
+_ZONE, _DEVICE = ("a zone of the building", CaseError), ("a device of the building", CaseError)
 RESERVED = frozenset({OUTDOOR, GROUND, OUTSIDE, EXTERIOR_WALL, INTERIOR_WALL})
 GLAZING_TOLERANCE = 1.01  # drawings are rounded: a facade may be overdrawn by 1 %
 _LAYERED = frozenset({"wall", "floor", "ceiling"})
@@ -92,17 +107,11 @@ def check_columns(building: Building, columns: Collection[str], file: str) -> No
             if surface.other in boundaries and column not in columns:
                 where = f"building.yaml: surfaces[{index}] ({surface.name}): other"
                 expected = f"a zone, outdoor, ground, or a boundary with the column {column!r} in {file}"
-                raise CaseError(
-                    describe(where, expected, repr(surface.other), nearest(surface.other, [*zones, OUTDOOR, GROUND]))
-                )
+                check_known(surface.other, [*zones, OUTDOOR, GROUND], where, expected, CaseError)
     entities = [*(device.name for device in building.devices), *zones, *boundaries, building.weather_station]
     for column in columns:
-        entity, _ = split_column(column, file)
-        if entity not in entities:
-            expected = "a device, a zone, a measured boundary or the weather station before the slash"
-            raise CaseError(
-                describe(f"{file}: column {column!r}", expected, repr(entity), nearest(entity, entities))
-            )
+        expected = "a device, a zone, a measured boundary or the weather station before the slash"
+        check_known(split_column(column, file)[0], entities, f"{file}: column {column!r}", expected, CaseError)
 
 
 def _check_zones(building: Building, file: str) -> None:
@@ -114,12 +123,10 @@ def _check_zones(building: Building, file: str) -> None:
         found = [(zone.name, f"zones[{i}]") for i, zone in enumerate(building.geometry.zones)]
     for zone, place in found:
         if zone in RESERVED:
-            raise CaseError(
-                describe(f"{file}: {place}", "a name of the zone's own", repr(zone), "rename the zone")
-            )
+            raise CaseError(f"{file}: {place}", "a name of the zone's own", repr(zone), "rename the zone")
         if zone in places:
             advice = "zone names are unique in the building: rename one"
-            raise CaseError(describe(f"{file}: {place}", "a new zone", f"{zone!r}, as {places[zone]}", advice))
+            raise CaseError(f"{file}: {place}", "a new zone", f"{zone!r}, as {places[zone]}", advice)
         places[zone] = place
 
 
@@ -128,7 +135,7 @@ def _check_unique(names: Mapping[str, str], file: str) -> None:
     for place, name in names.items():
         if name in places:
             found = f"{name!r}, which {places[name]} is named too"
-            raise CaseError(describe(f"{file}: {place}", "a name of its own", found, "rename one"))
+            raise CaseError(f"{file}: {place}", "a name of its own", found, "rename one")
         places[name] = place
 
 
@@ -139,11 +146,29 @@ def _check_devices(building: Building, file: str) -> None:
     _check_unique(names | {"weather_station": building.weather_station}, file)
     _check_unique(names | {f"devices[{i}]": device.name for i, device in enumerate(building.devices)}, file)
     for i, device in enumerate(building.devices):
-        if device.zone is not None and device.zone not in zones:
-            where = f"{file}: devices[{i}] ({device.name}): zone"
-            raise CaseError(
-                describe(where, "a zone of the building", repr(device.zone), nearest(device.zone, zones))
-            )
+        if device.zone is not None:
+            check_known(device.zone, zones, f"{file}: devices[{i}] ({device.name}): zone", *_ZONE)
+    _check_feeders(building.devices, file)
+
+
+def _check_feeders(devices: Sequence[Device], file: str) -> None:
+    """Refuse feeders that are not there, and devices that feed themselves, through others too."""
+    fed_by = {device.name: device.fed_by for device in devices}
+    for i, device in enumerate(devices):
+        where = f"{file}: devices[{i}] ({device.name}): fed_by"
+        for feeder in device.fed_by:
+            if feeder == device.name:
+                raise CaseError(where, "other devices", f"{feeder!r}, the device itself", "drop it")
+            check_known(feeder, [name for name in fed_by if name != device.name], where, *_DEVICE)
+        if len({*device.fed_by}) < len(device.fed_by):
+            raise CaseError(where, "each feeder once", ", ".join(device.fed_by), "drop one")
+    try:
+        TopologicalSorter(fed_by).prepare()
+    except CycleError as error:
+        circle = error.args[1][::-1]
+        i = next(i for i, device in enumerate(devices) if device.name == circle[0])
+        where = f"{file}: devices[{i}] ({circle[0]}): fed_by"
+        raise CaseError(where, "feeders without a circle", " <- ".join(circle), "drop one of them") from error
 
 
 def _check_airflows(building: Building, file: str) -> None:
@@ -151,33 +176,22 @@ def _check_airflows(building: Building, file: str) -> None:
     for i, airflow in enumerate(building.airflows):
         where = f"{file}: airflows[{i}]"
         for key, zone in (("from", airflow.source), ("to", airflow.target)):
-            if zone not in building.zone_names:
-                advice = nearest(zone, building.zone_names)
-                raise CaseError(describe(f"{where}: {key}", "a zone of the building", repr(zone), advice))
-        if airflow.device not in devices:
-            advice = nearest(airflow.device, devices)
-            raise CaseError(
-                describe(f"{where}: device", "a device of the building", repr(airflow.device), advice)
-            )
+            check_known(zone, building.zone_names, f"{where}: {key}", *_ZONE)
+        check_known(airflow.device, devices, f"{where}: device", *_DEVICE)
         if airflow.source == airflow.target:
-            raise CaseError(describe(f"{where}: to", "another zone than 'from'", repr(airflow.target)))
+            raise CaseError(f"{where}: to", "another zone than 'from'", repr(airflow.target))
 
 
 def _check_glazing(plans: FloorPlans, file: str) -> None:
     areas = facade_areas(plans)
     for zone, by_facade in plans.glazing.items():
-        if zone not in areas:
-            where = f"{file}: glazing.{zone}"
-            raise CaseError(describe(where, "a zone of the building", repr(zone), nearest(zone, areas)))
+        check_known(zone, areas, f"{file}: glazing.{zone}", *_ZONE)
         for facade, area in by_facade.items():
             where = f"{file}: glazing.{zone}.{facade}"
-            if facade not in FACADES:
-                advice = nearest(facade, FACADES)
-                raise CaseError(describe(where, f"a facade ({', '.join(FACADES)})", repr(facade), advice))
+            check_known(facade, FACADES, where, f"a facade ({', '.join(FACADES)})", CaseError)
             if not area <= areas[zone][facade] * GLAZING_TOLERANCE:
                 expected = f"at most the zone's {areas[zone][facade]:.2f} m2 of {facade} facade"
-                advice = "correct the area, the facade, or the plan"
-                raise CaseError(describe(where, expected, f"{area:g} m2", advice))
+                raise CaseError(where, expected, f"{area:g} m2", "correct the area, the facade, or the plan")
 
 
 def _check_surfaces(table: ZoneTable, file: str) -> None:
@@ -185,17 +199,13 @@ def _check_surfaces(table: ZoneTable, file: str) -> None:
     _check_unique({f"surfaces[{i}]": surface.name for i, surface in enumerate(table.surfaces)}, file)
     for name, layers in table.constructions.items():
         if not layers:
-            raise CaseError(describe(f"{file}: constructions.{name}", "at least one layer", "none"))
+            raise CaseError(f"{file}: constructions.{name}", "at least one layer", "none")
     for i, surface in enumerate(table.surfaces):
         where = f"{file}: surfaces[{i}] ({surface.name})"
-        if surface.zone not in zones:
-            advice = nearest(surface.zone, zones)
-            raise CaseError(describe(f"{where}: zone", "a zone of the building", repr(surface.zone), advice))
-        if surface.construction is not None and surface.construction not in table.constructions:
-            advice = nearest(surface.construction, table.constructions)
-            raise CaseError(
-                describe(f"{where}: construction", "a name under 'constructions'", repr(surface.construction), advice)
-            )
+        check_known(surface.zone, zones, f"{where}: zone", *_ZONE)
+        if surface.construction is not None:
+            layered, expected = table.constructions, "a name under 'constructions'"
+            check_known(surface.construction, layered, f"{where}: construction", expected, CaseError)
         _check_kind(surface, zones, where)
 
 
@@ -204,17 +214,123 @@ def _check_kind(surface: Surface, zones: Collection[str], where: str) -> None:
     for key in ("construction", "u_value", "solar_transmittance"):
         given = getattr(surface, key) is not None
         if key in needed and not given:
-            raise CaseError(describe(f"{where}: {key}", f"a value, for a {surface.kind}", "none"))
+            raise CaseError(f"{where}: {key}", f"a value, for a {surface.kind}", "none")
         if given and key not in needed:
             advice = f"of kind {surface.kind}: {', '.join(sorted(needed)) or 'only an area'}"
-            raise CaseError(describe(f"{where}: {key}", "no such key", repr(getattr(surface, key)), advice))
+            raise CaseError(f"{where}: {key}", "no such key", repr(getattr(surface, key)), advice)
     if surface.other == OUTDOOR and surface.kind in {"wall", "window"} and surface.azimuth is None:
         advice = "give the degrees clockwise from north that the outer face looks to"
-        raise CaseError(describe(f"{where}: azimuth", "a value", "none", advice))
+        raise CaseError(f"{where}: azimuth", "a value", "none", advice)
     if surface.other == surface.zone and surface.kind not in _LAYERED:
-        raise CaseError(
-            describe(f"{where}: other", "something else than the zone itself", repr(surface.other))
-        )
-    if surface.kind == "opening" and surface.other not in zones:
-        advice = nearest(surface.other, zones)
-        raise CaseError(describe(f"{where}: other", "a zone, for an opening", repr(surface.other), advice))
+        raise CaseError(f"{where}: other", "something else than the zone itself", repr(surface.other))
+    if surface.kind == "opening":
+        check_known(surface.other, zones, f"{where}: other", "a zone, for an opening", CaseError)
+
+
+TERMINAL_TYPES = frozenset({"vav", "fan_coil", "electric_heater", "radiator", "supply_air_terminal"})
+"""Devices that give heat to the zone they serve: without flow or power, that heat is unknown."""
+
+
+def remarks(building: Building, telemetry: Telemetry) -> tuple[str, ...]:
+    """List what is valid in a case, and yet worth a look.
+
+    Parameters
+    ----------
+    building
+        Building of the case.
+    telemetry
+        Telemetry of the case.
+
+    Returns
+    -------
+    tuple of str
+        One sentence each; empty when there is nothing to say.
+    """
+    columns = {str(column) for column in telemetry.frame.columns}
+    silent = [str(column) for column in telemetry.frame.columns if telemetry.frame[column].isna().all()]
+    return (
+        *_on_plans(building),
+        *_on_devices(building, columns),
+        *_on_airflows(building, columns),
+        *_on_temperatures(building, columns),
+        *_on_entities(building, columns),
+        *(f"column {column!r} never reports a value" for column in silent),
+    )
+
+
+def unknown_device_types(building: Building) -> dict[str, str]:
+    """Find devices of a type that the library does not know: they are read, and reported.
+
+    Parameters
+    ----------
+    building
+        Building with devices.
+
+    Returns
+    -------
+    dict
+        Type by name of the device.
+    """
+    return {device.name: device.type for device in building.devices if device.type not in DEVICE_TYPES}
+
+
+def _on_plans(building: Building) -> Iterator[str]:
+    if isinstance(building.geometry, FloorPlans):
+        for floor in building.geometry.floors:
+            outside = ndimage.binary_dilation(floor.tokens == OUTSIDE, border_value=1)
+            if cells := np.count_nonzero(outside & (floor.tokens == INTERIOR_WALL)):
+                yield f"floor {floor.name!r}: {cells} cells of interior wall ('+') touch the outside; draw '#' there"
+
+
+def _on_devices(building: Building, columns: set[str]) -> Iterator[str]:
+    for name, kind in unknown_device_types(building).items():
+        yield f"device {name!r} has the unknown type {kind!r} ({nearest(kind, DEVICE_TYPES)})"
+    for device in building.devices:
+        has = {p for p in (SUPPLY_FLOW, DISCHARGE_TEMPERATURE, HEATING_POWER) if f"{device.name}/{p}" in columns}
+        if not any(column.startswith(f"{device.name}/") for column in columns):
+            yield f"device {device.name!r} has no telemetry"
+        if device.zone is None:
+            if device.type in TERMINAL_TYPES or has & {HEATING_POWER, DISCHARGE_TEMPERATURE}:
+                yield f"device {device.name!r} ({device.type}) serves no zone: its heat is not counted"
+        elif has == {DISCHARGE_TEMPERATURE} or (device.type in TERMINAL_TYPES and not has):
+            yield f"device {device.name!r} reports neither flow nor power: the heat of zone {device.zone!r} is unknown"
+        elif SUPPLY_FLOW in has and DISCHARGE_TEMPERATURE not in has:
+            zone = f"the heat of zone {device.zone!r} is unknown while air flows"
+            yield f"device {device.name!r} reports a flow without a discharge temperature: {zone}"
+
+
+def _on_airflows(building: Building, columns: set[str]) -> Iterator[str]:
+    zone_of = {device.name: device.zone for device in building.devices}
+    for name in dict.fromkeys(airflow.device for airflow in building.airflows):
+        if f"{name}/{SUPPLY_FLOW}" not in columns:
+            yield f"airflows: device {name!r} reports no flow: the air that goes on is unknown"
+        surplus: dict[str, float] = {}
+        for airflow in building.airflows:
+            if airflow.device == name:
+                surplus[airflow.source] = surplus.get(airflow.source, 0.0) - airflow.fraction
+                surplus[airflow.target] = surplus.get(airflow.target, 0.0) + airflow.fraction
+        for zone, share in surplus.items():
+            if share + (1.0 if zone_of[name] == zone else 0.0) < -1e-6:
+                yield f"airflows: more of the air of {name!r} leaves zone {zone!r} than enters it"
+
+
+def _on_temperatures(building: Building, columns: set[str]) -> Iterator[str]:
+    for zone in building.zone_names:
+        entities = [zone, *(device.name for device in building.devices_of(zone))]
+        if not any(f"{entity}/{ZONE_TEMPERATURE}" in columns for entity in entities):
+            yield f"nothing measures the temperature of zone {zone!r}"
+    if f"{building.weather_station}/{OUTDOOR_TEMPERATURE}" not in columns:
+        others = sorted(column for column in columns if column.endswith(f"/{OUTDOOR_TEMPERATURE}"))
+        source = f"{', '.join(others)} stands in" if others else "nothing measures the outdoors"
+        yield f"the weather station {building.weather_station!r} has no {OUTDOOR_TEMPERATURE}: {source}"
+
+
+def _on_entities(building: Building, columns: set[str]) -> Iterator[str]:
+    places = {*building.zone_names, *building.measured_boundaries, building.weather_station}
+    devices = {device.name: device for device in building.devices}
+    for column in sorted(columns):
+        entity, _, point = column.rpartition("/")
+        if entity in places and point in {SUPPLY_FLOW, DISCHARGE_TEMPERATURE, HEATING_POWER}:
+            yield f"column {column!r} is not of a device: it is not used"
+        if entity in devices and point == ZONE_TEMPERATURE and devices[entity].zone is None:
+            yield f"column {column!r} is of a device that serves no zone: it is not used"

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from thermal._types import FloatArray
 from thermal.effects.effect import CONSTANT, Effect, Joining, paired, shape, strength, without_facades
 from thermal.inputs.drivers import REFERENCE_TEMPERATURE, Drivers, Signal
-from thermal.network.materials import RATED_OUTSIDE_FILM
+from thermal.network.structure import RATED_OUTSIDE_FILM
 from thermal.network.topology import UPWARD, Anatomy, OuterFaces, Outlook, Room
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from thermal._types import FloatArray
-from thermal.case.schema import Location
+from thermal.case.building import Location
 from thermal.errors import EffectError
 
 #: Reflectance of the ground [-]: grass and worn concrete (ASHRAE Fundamentals 2017, ch. 14, table 5).

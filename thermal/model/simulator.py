@@ -17,9 +17,9 @@ from thermal.model.replay import LEAST_SPIN_UP, SPIN_UP, replay_inputs, spin_up
 from thermal.model.scheme import SCHEMES
 from thermal.model.stepper import Stepper
 from thermal.model.symbolic import Matrices, SymbolicModel
+from thermal.network.assembly import Extension
 from thermal.network.build import build_network
-from thermal.network.extension import Extension
-from thermal.network.materials import SHUFFLE_STEP
+from thermal.network.structure import SHUFFLE_STEP
 from thermal.parameters import Scope
 from thermal.shuffle.random import RandomShuffle
 

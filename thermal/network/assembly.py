@@ -1,16 +1,29 @@
-"""A building's baseline, from which its networks with one set of effects after another are made."""
+"""Joining of a graph and what effects extend it by into a network."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import scipy.sparse as sp
 
 from thermal._types import FloatArray, IntArray
-from thermal.network.extension import Extension
 from thermal.network.graph import GraphBuilder
 from thermal.network.network import ThermalNetwork
+
+
+class Extension(Protocol):
+    """An effect, as the builders of a network see it."""
+
+    def extend(self, graph: GraphBuilder) -> None:
+        """Add its volumes, faces, sources and parameters to a graph whose baseline is complete.
+
+        Parameters
+        ----------
+        graph : GraphBuilder
+            With its anatomy.
+        """
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""One entry for both kinds of geometry."""
+"""Building of the network of a plan or a zone table."""
 
 from __future__ import annotations
 
@@ -7,14 +7,40 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal.case.building import Building, ZoneTable
-from thermal.network.assembly import Blueprint
-from thermal.network.extension import Extension
+from thermal._types import FloatArray
+from thermal.case.building import Building, FloorPlans, ZoneTable
+from thermal.case.plan import facade_areas, zone_floor_areas
+from thermal.errors import ModelError
+from thermal.network.assembly import Blueprint, Extension
+from thermal.network.floor import Floor, Zone
+from thermal.network.graph import GraphBuilder
+from thermal.network.grid import floor_grid
 from thermal.network.network import ThermalNetwork
-from thermal.network.plan import plan_blueprint
 from thermal.network.structure import BASELINE, Structure
 from thermal.network.table import table_blueprint
+from thermal.network.topology import UNKNOWN_GLAZING, VERTICAL, Pane, azimuth_of, partition_areas, stacked_areas
+from thermal.network.walls import Walls
 from thermal.parameters import Scope
+from thermal.units import AIR_HEAT_CAPACITY, air_density
+
+
+def _remember(
+    graph: GraphBuilder, building: Building, plans: FloorPlans, zones: Mapping[str, Zone], areas: Mapping[str, float]
+) -> None:
+    """Complete the anatomy: rooms, what lies above and below them, and their facades."""
+    anatomy = graph.anatomy
+    for plan in plans.floors:
+        for name in plan.zone_names:
+            zones[name].room(areas[name], areas[name] * plan.height)
+    anatomy.windows_told = bool(plans.glazing)
+    anatomy.stacked, anatomy.under_roof, anatomy.on_ground = stacked_areas(plans, areas)
+    for zone, sides in facade_areas(plans).items():
+        for side, area in sides.items():
+            if area > 0.0:
+                azimuth = azimuth_of(side, building.orientation)
+                anatomy.facades[zone, azimuth] = area
+                if not plans.glazing:
+                    anatomy.panes.append(Pane(zone, azimuth, VERTICAL, UNKNOWN_GLAZING * area))
 
 
 def build_network(
@@ -110,7 +136,31 @@ def blueprint(
     >>> len(baseline.network().signals), len(baseline.network(chosen({"solar_gain": ()})).signals) > 0
     (0, True)
     """
-    geometry = building.geometry
-    if isinstance(geometry, ZoneTable):
-        return table_blueprint(building, geometry, scopes, structure)
-    return plan_blueprint(building, geometry, dx, reach, scopes, diffusers, mean_shuffle, structure)
+    boundaries = ("outdoor", *building.measured_boundaries)
+    graph, plans = GraphBuilder(building.zone_names, boundaries, scopes or {}, structure), building.geometry
+    graph.anatomy.air_heat_capacity = air_density(building.location.elevation) * AIR_HEAT_CAPACITY
+    place = graph.zones.index
+    graph.anatomy.airflows = tuple((place(a.source), place(a.target)) for a in building.airflows)
+    if isinstance(plans, ZoneTable):
+        return table_blueprint(graph, plans)
+    unknown = sorted(set(diffusers or {}) - set(building.zone_names))
+    if unknown:
+        raise ModelError(f"diffusers: zones {unknown} are not of this building; it has {list(building.zone_names)}")
+    areas = zone_floor_areas(plans)
+    diffuser_weight: dict[int, FloatArray] = {}
+    zones: dict[str, Zone] = {}
+    shapes = []
+    for number, plan in enumerate(plans.floors):
+        grid = floor_grid(plan, plans.cell_size, dx)
+        shapes.append(grid.shape)
+        floor = Floor(graph, plan, grid, number)
+        for name in (z for z in building.zone_names if (grid.token == z).any()):
+            zones[name] = floor.zone(name, areas[name], reach, mean_shuffle)
+            mask = (diffusers or {}).get(name)
+            diffuser_weight[zones[name].number] = floor.diffuser_weight(name, mask)
+        Walls(floor, zones, plans.cell_size, building.orientation).add(plans.glazing)
+        graph.anatomy.partitions |= partition_areas(plan, plans.cell_size)
+    _remember(graph, building, plans, zones, areas)
+    columns = [(z.air, np.full(z.air.size, z.number), z.share, diffuser_weight[z.number]) for z in zones.values()]
+    air, zone, mean, share = (np.concatenate([c[k] for c in columns]) for k in range(4))
+    return Blueprint(graph, air, zone, mean, share, grid.spacing, tuple(shapes))

@@ -173,3 +173,37 @@ def _refuse_swallowed_zones(plan: FloorPlan, tokens: NDArray[np.str_], merge: fl
                 f"{extent * cell_size:g} m wide and would merge with its neighbour; "
                 f"use at most {(extent + 1) * cell_size:g} m"
             )
+
+
+def wall_facades(grid: FloorGrid) -> dict[str, NDArray[np.float64]]:
+    """Share of each cell of exterior wall that belongs to each facade of a plan.
+
+    A cell with outer faces belongs to their facades in equal parts, one behind it to those of the wall cells that are
+    nearest to it on the way outside. Exterior wall that no wall joins to the outside belongs to none.
+
+    Parameters
+    ----------
+    grid : FloorGrid
+        Cells of a floor.
+
+    Returns
+    -------
+    dict
+        Shares by facade, each of the shape of the grid's tokens; they sum to 1, or to 0 for a cell of no facade.
+    """
+    wall, outside = grid.tokens == "#", grid.tokens == "."
+    shares = np.array([wall & _beyond(outside, step) for step in FACADES.values()], dtype=float)
+    known = shares.any(axis=0)
+    shares[:, known] /= shares[:, known].sum(axis=0)
+    while True:  # one ring of cells inwards at a time
+        reached = np.sum([[_beyond(share, step) for share in shares] for step in FACADES.values()], axis=0)
+        ring = wall & ~known & (reached.sum(axis=0) > 0.0)
+        if not ring.any():
+            return dict(zip(FACADES, shares, strict=True))
+        shares[:, ring] = reached[:, ring] / reached[:, ring].sum(axis=0)
+        known |= ring
+
+
+def _beyond(cells: NDArray[np.generic], step: tuple[int, int]) -> NDArray[np.generic]:
+    """Value of the next cell in a direction; the rim of outside cells is its own neighbour across the grid."""
+    return np.roll(cells, (-step[0], -step[1]), axis=(0, 1))

@@ -1,10 +1,79 @@
-"""Baseline structures to choose between: what a zone holds, and how many masses stand in a row."""
+"""Structure of a network, material constants, and conductances that are joined."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 from thermal.errors import ModelError
+
+#: Molecular conductivity of air at 20 degC [W/m/K] (Incropera, Fundamentals of Heat and Mass Transfer, Table A.4).
+AIR_CONDUCTIVITY = 0.026
+
+#: Resistance of the structural layer of an exterior wall [m2K/W], which carries its mass inside the insulation: 0.2 m
+#: of concrete or brick at 1.4 W/m/K (ISO 10456:2007 Table 3).
+STRUCTURE_RESISTANCE = 0.15
+
+#: Nominal areal mass of an exterior wall's structure and of a partition [kg/m2]; only mass times heat capacity is
+#: determined.
+EXTERIOR_WALL_MASS = 150.0
+INTERIOR_WALL_MASS = 60.0
+
+#: Inside surface resistance towards a space that is not simulated [m2K/W] (ISO 6946:2017 Table 7).
+BOUNDARY_FILM_RESISTANCE = 0.13
+
+#: Inside film that the rated u-value of a window contains [W/m2/K] (EN 673:2011, h_i).
+WINDOW_RATED_FILM = 7.7
+
+#: Combined outside film that rated u-values contain [W/m2/K] (EN 673:2011, h_e).
+RATED_OUTSIDE_FILM = 25.0
+
+#: Resistance of a single pane [m2K/W], 4 mm of glass at 1 W/m/K (EN 673:2011): the least that rated u-values may leave.
+LEAST_PANE_RESISTANCE = 0.004
+
+#: Step of the paper's shuffle [s].
+SHUFFLE_STEP = 300.0
+
+
+def series(*conductances: Any) -> Any:
+    """Conductance of conductances in series, ``1 / Σ 1/g``.
+
+    Parameters
+    ----------
+    *conductances : float or casadi.SX
+        Conductances per area [W/m2/K], positive.
+
+    Returns
+    -------
+    float or casadi.SX
+        Conductance per area [W/m2/K].
+    """
+    return 1.0 / sum(1.0 / g for g in conductances)
+
+
+def surface_mesh(film: Any, radiant: Any, solid: Any) -> tuple[Any, Any, Any]:
+    """Eliminate the massless surface where film, radiation and solid meet (star-mesh transform).
+
+    A surface at ``T_s`` exchanges ``h_c (T_air - T_s)`` with the air, ``h_r (T_rad - T_s)`` with the zone's radiant
+    node and
+    ``g (T_solid - T_s)`` with the solid behind it. Without its own mass the three become three direct conductances,
+    exactly
+    (Kirchhoff; e.g. Desoer & Kuh, Basic Circuit Theory, 1969, ch. 2):
+    ``g_ij = g_i g_j / (h_c + h_r + g)``.
+
+    Parameters
+    ----------
+    film, radiant, solid : float or casadi.SX
+        ``h_c``, ``h_r`` and ``g`` [W/m2/K], positive.
+
+    Returns
+    -------
+    tuple
+        Conductances air-solid, radiant-solid, air-radiant per area [W/m2/K].
+    """
+    total = film + radiant + solid
+    return film * solid / total, radiant * solid / total, film * radiant / total
+
 
 #: Most nodes of a chain: through 0.2 m of concrete 100 of them resolve seconds, more than any telemetry.
 MOST_NODES = 100

@@ -1,50 +1,119 @@
-"""From a zone table to control volumes and faces: one air volume a zone, each surface a chain of layers."""
+"""Control volumes and faces of a zone table."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
 
-from thermal.case.building import Building, ZoneTable
-from thermal.case.schema import Layer, Surface
+from thermal._types import FloatArray
+from thermal.case.building import Layer, Surface, ZoneTable
+from thermal.errors import ModelError
 from thermal.network.assembly import Blueprint
-from thermal.network.chains import Chain
-from thermal.network.facades import facade_of
-from thermal.network.films import series
+from thermal.network.floor import Zone
 from thermal.network.graph import GraphBuilder
-from thermal.network.interior import Zone
-from thermal.network.materials import (
+from thermal.network.structure import (
     BOUNDARY_FILM_RESISTANCE,
     LEAST_PANE_RESISTANCE,
     RATED_OUTSIDE_FILM,
     WINDOW_RATED_FILM,
+    series,
 )
-from thermal.network.structure import BASELINE, Structure
 from thermal.network.topology import DOWNWARD, UPWARD, VERTICAL, GroundFace, OuterFaces, Outlook, Pane
-from thermal.parameters import Scope
-from thermal.units import AIR_HEAT_CAPACITY, air_density
+
+#: Time that a sublayer must resolve [s]: its thickness is at most sqrt(diffusivity x this), a Fourier number of one.
+SUBLAYER_TIME = 1800.0
 
 
-def table_blueprint(
-    building: Building,
-    table: ZoneTable,
-    scopes: Mapping[str, Scope] | None = None,
-    structure: Structure = BASELINE,
-) -> Blueprint:
+@dataclass(frozen=True)
+class Chain:
+    """Nodes between the two faces of a layered wall, per area of it.
+
+    Parameters
+    ----------
+    near, far : float
+        Resistance from the first face to the first node, and from the last node to the last face [m2K/W].
+    between : ndarray, shape (n - 1,)
+        Resistances from node to node [m2K/W].
+    capacity : ndarray, shape (n,)
+        Heat capacities of the nodes [J/m2/K].
+    """
+
+    near: float
+    far: float
+    between: FloatArray
+    capacity: FloatArray
+
+    @classmethod
+    def of(cls, layers: tuple[Layer, ...], nodes: int | None = None) -> Chain:
+        """Nodes of a construction, of the resistance and the heat capacity of its layers.
+
+        Parameters
+        ----------
+        layers : tuple of Layer
+            From one face to the other.
+        nodes : int, optional
+            Their number; by default each layer is cut into sublayers thin enough for `SUBLAYER_TIME`, 12 at most.
+        """
+        return _fine(layers) if nodes is None else _lumped(layers, nodes)
+
+
+def _fine(layers: tuple[Layer, ...]) -> Chain:
+    """Sublayers with a node in the middle of each."""
+    resistances: list[float] = []
+    capacity: list[float] = []
+    for layer in layers:
+        heat = layer.density * layer.heat_capacity
+        depth = np.sqrt(layer.conductivity / heat * SUBLAYER_TIME)
+        n = int(np.clip(np.ceil(layer.thickness / depth), 1, 12))
+        resistances += [layer.thickness / n / layer.conductivity] * n
+        capacity += [layer.thickness / n * heat] * n
+    resistance = np.array(resistances)
+    between = 0.5 * (resistance[:-1] + resistance[1:])
+    return Chain(0.5 * float(resistance[0]), 0.5 * float(resistance[-1]), between, np.array(capacity))
+
+
+def _lumped(layers: tuple[Layer, ...], nodes: int) -> Chain:
+    """Parts that heat takes equally long to cross, each lumped where every steady state keeps the heat it holds.
+
+    The time is ``x**2 / diffusivity``, so its root adds up over layers. In a steady state temperature is linear in the
+    resistance from a face, so the node lies at the mean resistance of its part, weighted by heat capacity.
+    """
+    thickness, conductivity = (np.array([getattr(p, k) for p in layers]) for k in ("thickness", "conductivity"))
+    heat = np.array([p.density * p.heat_capacity for p in layers])
+    edges = np.concatenate([[0.0], np.cumsum(thickness * np.sqrt(heat / conductivity))])
+    cuts = np.linspace(0.0, edges[-1], nodes + 1)
+    points = np.union1d(edges, cuts)
+    middle = 0.5 * (points[:-1] + points[1:])
+    layer = np.clip(np.searchsorted(edges, middle, side="right") - 1, 0, len(layers) - 1)
+    part = np.clip(np.searchsorted(cuts, middle, side="right") - 1, 0, nodes - 1)
+    length = np.diff(points) / np.sqrt(heat / conductivity)[layer]
+    resistance = length / conductivity[layer]
+    place = np.cumsum(resistance) - 0.5 * resistance
+    stored = length * heat[layer]
+    capacity = np.bincount(part, stored, minlength=nodes).astype(float)
+    at = np.bincount(part, stored * place, minlength=nodes) / capacity
+    return Chain(float(at[0]), float(resistance.sum() - at[-1]), np.diff(at), capacity)
+
+
+#: Directions of a zone table's facades, each a quarter of the compass that begins 45 degrees before its own azimuth.
+_COMPASS = ("north", "east", "south", "west")
+
+#: Horizontal surfaces to outdoor by kind.
+_HORIZONTAL = {"ceiling": "roof", "floor": "floor"}
+
+
+def table_blueprint(graph: GraphBuilder, table: ZoneTable) -> Blueprint:
     """Build the baseline of a building given by a zone table.
 
     Parameters
     ----------
-    building : Building
-        For its location, zones, boundaries and airflows.
+    graph : GraphBuilder
+        Empty but for the building's zones, boundaries and airflows.
     table : ZoneTable
-        Its geometry.
-    scopes : mapping of str to {"global", "facade", "zone"}, optional
-        Parameters with one value a facade (`thermal.network.facades.facade_of`) or a zone.
-    structure : Structure
-        What the model is made of.
+        The building's geometry.
 
     Returns
     -------
@@ -52,44 +121,38 @@ def table_blueprint(
         Boundaries ``outdoor`` and the measured ones. Surfaces to ``ground`` are adiabatic at their back
         (``ground_exchange`` is an effect of the catalogue).
     """
-    graph = GraphBuilder(building.zone_names, ("outdoor", *building.measured_boundaries), scopes or {}, structure)
-    density = air_density(building.location.elevation)
-    graph.anatomy.air_heat_capacity = density * AIR_HEAT_CAPACITY
     zones: dict[str, Zone] = {}
     for entry in table.zones:
         air = graph.volumes("air", graph.zones.index(entry.name))
-        graph.capacity("air", density * AIR_HEAT_CAPACITY, air, entry.volume)
+        graph.capacity("air", graph.anatomy.air_heat_capacity, air, entry.volume)
         zones[entry.name] = Zone(graph, entry.name, air, np.ones(1))
         zones[entry.name].furniture(entry.floor_area)
     for surface in table.surfaces:
-        _add_surface(graph, zones, surface, table, density)
+        _add_surface(graph, zones, surface, table)
     for entry in table.zones:
         zones[entry.name].room(entry.floor_area, entry.volume)
-    graph.anatomy.airflows = tuple(
-        (graph.zones.index(a.source), graph.zones.index(a.target)) for a in building.airflows
-    )
     air, ones = np.concatenate([zones[z].air for z in graph.zones]), np.ones(len(zones))
     return Blueprint(graph, air, np.arange(len(zones)), ones, ones)
 
 
-def _add_surface(
-    graph: GraphBuilder, zones: Mapping[str, Zone], surface: Surface, table: ZoneTable, density: float
-) -> None:
+def _add_surface(graph: GraphBuilder, zones: Mapping[str, Zone], surface: Surface, table: ZoneTable) -> None:
     """Add one row of the surface table."""
     zone, other = zones[surface.zone], surface.other
     if other == "ground" and surface.kind in ("bridge", "window"):
         return  # adiabatic in the baseline, and without mass nothing is left of them
+    if surface.kind in ("wall", "window") and other == "outdoor":
+        side = (zone.name, _azimuth(surface))
+        graph.anatomy.facades[side] = graph.anatomy.facades.get(side, 0.0) + surface.area
     if surface.kind == "opening":
-        velocity = graph.parameter("opening_exchange_velocity")
-        graph.face("opening", velocity * density * AIR_HEAT_CAPACITY, zone.air, zones[other].air, surface.area)
+        exchange = graph.parameter("opening_exchange_velocity") * graph.anatomy.air_heat_capacity
+        graph.face("opening", exchange, zone.air, zones[other].air, surface.area)
     elif surface.kind == "bridge":
         far = zones[other].air[0] if other in zones else graph.boundary(other)
         graph.face("bridge", ca.SX(1.0), zone.air, far, surface.area * float(surface.u_value or 0.0))
     elif surface.kind == "window":
         _add_window(graph, zones, surface)
     else:
-        layers = table.constructions[str(surface.construction)]
-        _add_layers(graph, zones, surface, layers)
+        _add_layers(graph, zones, surface, table.constructions[str(surface.construction)])
 
 
 def _facade(graph: GraphBuilder, surface: Surface) -> str | None:
@@ -100,33 +163,22 @@ def _facade(graph: GraphBuilder, surface: Surface) -> str | None:
 def _add_window(graph: GraphBuilder, zones: Mapping[str, Zone], surface: Surface) -> None:
     """Glass: rated air-to-air u-value with its films replaced by the building's own."""
     zone, rated, facade = zones[surface.zone], float(surface.u_value or 0.0), _facade(graph, surface)
-    outlook = None
     multiplier = graph.parameter("window_conductance_multiplier", facade=facade)
     if surface.other in zones:
-        far = zones[surface.other]
-        graph.face(f"window u={rated:g} between zones", rated * multiplier, zone.air, far.air, surface.area)
+        behind = zones[surface.other].air
+        graph.face(f"window u={rated:g} between zones", rated * multiplier, zone.air, behind, surface.area)
         return
     pane = multiplier / max(1.0 / rated - 1.0 / WINDOW_RATED_FILM - 1.0 / RATED_OUTSIDE_FILM, LEAST_PANE_RESISTANCE)
+    side, value, outlook = "boundary", series(pane, 1.0 / BOUNDARY_FILM_RESISTANCE), None
     if surface.other == "outdoor":
         film = graph.parameter("exterior_convection_coefficient", facade=facade)
-        value = series(pane, film)
-        azimuth = _azimuth(surface)
-        outlook = Outlook(azimuth, VERTICAL, film, glass=True)
-        transmittance = surface.solar_transmittance
-        graph.anatomy.panes.append(Pane(zone.name, azimuth, VERTICAL, surface.area, transmittance))
-        _count_facade(graph, surface)
-    else:
-        value = series(pane, 1.0 / BOUNDARY_FILM_RESISTANCE)
-    kind = f"window u={rated:g} {'outdoor' if surface.other == 'outdoor' else 'boundary'}"
+        azimuth, sun = _azimuth(surface), surface.solar_transmittance
+        side, value, outlook = "outdoor", series(pane, film), Outlook(azimuth, VERTICAL, film, glass=True)
+        graph.anatomy.panes.append(Pane(zone.name, azimuth, VERTICAL, surface.area, sun))
+    kind = f"window u={rated:g} {side}"
     depends = ("window_conductance_multiplier", "exterior_convection_coefficient")
-    far_side = graph.boundary(surface.other)
-    zone.surface(kind, value, far_side, surface.area, depends=depends, facade=facade, outlook=outlook)
-
-
-def _count_facade(graph: GraphBuilder, surface: Surface) -> None:
-    """Add a wall's or a window's area to its facade."""
-    key = (surface.zone, _azimuth(surface))
-    graph.anatomy.facades[key] = graph.anatomy.facades.get(key, 0.0) + surface.area
+    far = graph.boundary(surface.other)
+    zone.surface(kind, value, far, surface.area, depends=depends, facade=facade, outlook=outlook)
 
 
 def _azimuth(surface: Surface) -> float:
@@ -134,16 +186,10 @@ def _azimuth(surface: Surface) -> float:
     return float(surface.azimuth or 0.0) % 360.0
 
 
-def _group(surface: Surface) -> str:
-    """Which multipliers a surface's layers share."""
-    if surface.kind in ("floor", "ceiling"):
-        return "slab"
-    return "exterior_wall" if surface.other == "outdoor" else "interior_wall"
-
-
 def _add_layers(graph: GraphBuilder, zones: Mapping[str, Zone], surface: Surface, layers: tuple[Layer, ...]) -> None:
     """Add a chain of nodes from the zone to what lies behind, scaled by its group's multipliers."""
-    group, facade = _group(surface), _facade(graph, surface)
+    upright = "exterior_wall" if surface.other == "outdoor" else "interior_wall"
+    group, facade = "slab" if surface.kind in ("floor", "ceiling") else upright, _facade(graph, surface)
     conductivity, heat_capacity = f"{group}_conductivity_multiplier", f"{group}_heat_capacity_multiplier"
     scale = graph.parameter(conductivity, facade=facade)
     heat = graph.parameter(heat_capacity, facade=facade)
@@ -179,5 +225,26 @@ def _add_layers(graph: GraphBuilder, zones: Mapping[str, Zone], surface: Surface
             outlook = Outlook(_azimuth(surface), tilt, film, glass=False)
             outer = OuterFaces(value, nodes[-1:], np.array([float(surface.area)]), outlook)
             graph.anatomy.outer.append(outer)
-            if surface.kind == "wall":
-                _count_facade(graph, surface)
+
+
+def facade_of(surface: Surface) -> str | None:
+    """Facade of a surface of a zone table: its direction, ``roof`` or ``floor``; None when it does not face outdoor.
+
+    Parameters
+    ----------
+    surface : Surface
+        Of azimuth α; the facade is that whose own azimuth is nearest, the next one clockwise half way between two.
+
+    Raises
+    ------
+    ModelError
+        When it is a wall or a window to outdoor without azimuth.
+    """
+    if surface.other != "outdoor":
+        return None
+    if surface.kind in _HORIZONTAL:
+        return _HORIZONTAL[surface.kind]
+    if surface.azimuth is None:
+        expected = "an azimuth [deg], since a parameter has one value a facade"
+        raise ModelError(f"surface {surface.name}", expected, "none")
+    return _COMPASS[int((surface.azimuth + 45.0) % 360.0 // 90.0) % 4]

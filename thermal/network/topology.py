@@ -266,32 +266,19 @@ def stacked_areas(
             mine = grids[level] == zone
             per_cell = areas[zone] / np.count_nonzero(mine)
             above = grids[level + 1][mine] if level + 1 < len(grids) else np.full(mine.sum(), ".")
-            _count(above, per_cell, stacked, roof, zone)
+            names, counts = np.unique(above, return_counts=True)
+            number = dict(zip(names.tolist(), counts.tolist(), strict=True))
+            walls = sum(number.pop(token, 0) for token in ("#", "+"))
+            total = sum(number.values())  # none under nothing but walls
+            for name, n in number.items():
+                area = per_cell * n * (1.0 + walls / total)
+                if name == ".":
+                    roof[zone] = area
+                else:
+                    stacked[zone, name] = area
             if level == 0:
                 ground[zone] = areas[zone]
     return stacked, roof, ground
-
-
-def _count(
-    above: NDArray[np.str_],
-    per_cell: float,
-    stacked: dict[tuple[str, str], float],
-    roof: dict[str, float],
-    zone: str,
-) -> None:
-    """Share a zone's ceiling among what lies above it; walls above take part with the zones beside them."""
-    names, counts = np.unique(above, return_counts=True)
-    number = dict(zip(names.tolist(), counts.tolist(), strict=True))
-    walls = sum(number.pop(token, 0) for token in ("#", "+"))
-    total = sum(number.values())
-    if not total:  # under nothing but walls
-        return
-    for name, n in number.items():
-        area = per_cell * n * (1.0 + walls / total)
-        if name == ".":
-            roof[zone] = area
-        else:
-            stacked[zone, name] = area
 
 
 def _padded(floor: FloorPlan, shape: tuple[int, ...]) -> NDArray[np.str_]:

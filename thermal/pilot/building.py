@@ -1,10 +1,207 @@
-"""The pilot building whole: plans, devices and place."""
+"""Plans, devices and building of a generated office."""
 
 from __future__ import annotations
 
-from thermal.case.building import Building
-from thermal.pilot.layout import devices, generate_office
+from types import MappingProxyType
+
+import numpy as np
+import numpy.typing as npt
+
+from thermal.case.building import (
+    EXTERIOR_WALL,
+    FACADES,
+    INTERIOR_WALL,
+    OUTSIDE,
+    Building,
+    Device,
+    FloorPlan,
+    FloorPlans,
+)
+from thermal.errors import ThermalError
+from thermal.pilot.outline import Mask, draw_outline, exterior_ring
+from thermal.pilot.partition import Region, partition
 from thermal.pilot.weather import MOUNTAIN_VIEW
+
+_OUTLINES = 6  # outlines to draw before a size is refused
+_NOTCHED_FROM = (1500.0, 20)  # m2 and zones a floor, from here on outlines may have notches
+_MEAN_OVER_SMALLEST = 2.5  # -, denser than this hardly any outline can be cut
+_GLAZING_DECIMALS = 2  # of m2, as drawings give it
+
+
+def generate_office(
+    seed: int = 0,
+    *,
+    floor_area: float = 6317.0,
+    zones: int = 123,
+    floors: int = 2,
+    cell_size: float = 0.5,
+    height: float = 3.0,
+    window_to_wall_ratio: tuple[float, float] = (0.2, 0.5),
+    min_zone_area: float = 8.0,
+) -> FloorPlans:
+    """Draw an office building: rooms along the facades, corridors behind them, a core, a window in every facade.
+
+    All floors have the same outline, and each its own rooms. The floor area is that of zones and interior walls, all
+    that is inside the exterior wall. Zone names tell floor and place: ``F1_S03`` is a room at a south facade,
+    ``F1_H01`` a corridor, ``F1_C01`` a room of the core.
+
+    Parameters
+    ----------
+    seed : int
+        Same seed, same building; 0 or more.
+    floor_area : float
+        Of all floors together [m2], positive, met within 0.5 %. The default is the pilot building of Goldfeder and
+        Sipple (2023), section 5: 68,000 square feet.
+    zones : int
+        On all floors together, at least one a floor, spread evenly. The default leaves 4 of the pilot's 127 devices for
+        the plant.
+    floors : int
+        Number of storeys, at least 1; two in the pilot building.
+    cell_size : float
+        Side of a plan cell [m], positive; walls are one cell thick. Default as in the shared cases.
+    height : float
+        Clear height of a storey [m], positive. Default as in the shared cases.
+    window_to_wall_ratio : tuple of float
+        Smallest and largest share of glass in a zone's facade [-], from 0 to 1. The default is the usual range of
+        offices (ASHRAE 90.1 allows 0.4 without further proof).
+    min_zone_area : float
+        Smallest zone [m2], positive; zones must have 2.5 times that on average. The default is a single office.
+
+    Returns
+    -------
+    FloorPlans
+        Plans of all floors, lowest first, and the glazed area of each zone and facade.
+
+    Raises
+    ------
+    ThermalError
+        When an argument is out of its range, or no plan with these zones is found.
+
+    Examples
+    --------
+    >>> plans = generate_office(1, floor_area=600.0, zones=12)
+    >>> [len(floor.zone_names) for floor in plans.floors]
+    [6, 6]
+    """
+    _check_seed(seed)
+    _check_size(floor_area, zones, floors, cell_size, height, min_zone_area)
+    _check_ratio(window_to_wall_ratio)
+    counts = [zones // floors + (floor < zones % floors) for floor in range(floors)]
+    for attempt in range(_OUTLINES):
+        rng = np.random.default_rng([seed, attempt])
+        notched = floor_area / floors >= _NOTCHED_FROM[0] and counts[-1] >= _NOTCHED_FROM[1]
+        mask = draw_outline(rng, floor_area / floors, cell_size, notched)
+        storeys: list[FloorPlan] = []
+        for number, count in enumerate(counts, start=1):
+            regions = partition(rng, mask, count, cell_size, min_zone_area)
+            if regions is None:
+                break
+            storeys.append(FloorPlan(f"F{number}", height, _tokens(f"F{number}", mask, regions)))
+        if len(storeys) == floors:
+            return FloorPlans(cell_size, tuple(storeys), _glazing(rng, storeys, cell_size, window_to_wall_ratio))
+    raise ThermalError(
+        f"zones: expected a number that fits {floor_area} m2 on {floors} floor(s), each {min_zone_area} m2 or more, "
+        f"found {zones}, for which {_OUTLINES} outlines gave no plan; ask for fewer zones, or a smaller cell_size than "
+        f"{cell_size} m"
+    )
+
+
+def devices(plans: FloorPlans) -> tuple[Device, ...]:
+    """List the devices of an office: a VAV terminal in each zone, an air handler a floor, a boiler and a chiller.
+
+    Terminals are fed by their floor's air handler and the boiler, air handlers by the boiler and the chiller.
+
+    Parameters
+    ----------
+    plans : FloorPlans
+        The building; the pilot's 123 zones on two floors make the paper's 127 devices.
+
+    Returns
+    -------
+    tuple of Device
+        Terminals in the order of the zones, named ``VAV_<zone>``, then ``AHU_<floor>``, ``BOILER``, ``CHILLER``.
+    """
+    return (
+        *(
+            Device(name=f"VAV_{zone}", type="vav", zone=zone, fed_by=(f"AHU_{floor.name}", "BOILER"))
+            for floor in plans.floors
+            for zone in floor.zone_names
+        ),
+        *(Device(name=f"AHU_{floor.name}", type="ahu", fed_by=("BOILER", "CHILLER")) for floor in plans.floors),
+        Device(name="BOILER", type="boiler"),
+        Device(name="CHILLER", type="chiller"),
+    )
+
+
+def _tokens(floor: str, mask: Mask, regions: list[Region]) -> npt.NDArray[np.str_]:
+    """Write zones and walls into the cells of a floor, numbering the zones of each place row by row."""
+    tokens = np.full(mask.shape, OUTSIDE, dtype="U16")
+    tokens[mask] = INTERIOR_WALL
+    tokens[exterior_ring(mask)] = EXTERIOR_WALL
+    count: dict[str, int] = {}
+    for region in sorted(regions, key=lambda region: region.corner):
+        place = FACADES[region.side][0].upper() if region.side >= 0 else {"corridor": "H", "core": "C"}[region.kind]
+        count[place] = count.get(place, 0) + 1
+        (row, column), (n_row, n_column) = region.corner, region.mask.shape
+        tokens[row : row + n_row, column : column + n_column][region.mask] = f"{floor}_{place}{count[place]:02d}"
+    return tokens
+
+
+def _glazing(
+    rng: np.random.Generator, storeys: list[FloorPlan], cell_size: float, ratio: tuple[float, float]
+) -> MappingProxyType[str, MappingProxyType[str, float]]:
+    """Draw the glazed area [m2] of each zone and facade."""
+    glazing = {}
+    for storey in storeys:
+        exposed = {side: _exposed_cells(storey, turns) for turns, side in enumerate(FACADES)}
+        for zone in storey.zone_names:
+            areas = {
+                side: round(cells[zone] * cell_size * storey.height * rng.uniform(*ratio), _GLAZING_DECIMALS)
+                for side, cells in exposed.items()
+                if zone in cells
+            }
+            if areas:
+                glazing[zone] = MappingProxyType(areas)
+    return MappingProxyType(glazing)
+
+
+def _exposed_cells(storey: FloorPlan, turns: int) -> dict[str, int]:
+    """Count the cells of each zone that have the exterior wall on one side."""
+    tokens = np.rot90(storey.tokens, turns)
+    beside = tokens[1:][tokens[:-1] == EXTERIOR_WALL]
+    names, cells = np.unique(beside, return_counts=True)
+    walls = {OUTSIDE, EXTERIOR_WALL, INTERIOR_WALL}
+    return {name: count for name, count in zip(names.tolist(), cells.tolist(), strict=True) if name not in walls}
+
+
+def _check_seed(seed: int) -> None:
+    """Refuse a seed that numpy has no generator for."""
+    if seed < 0:
+        raise ThermalError(f"seed: expected 0 or more, found {seed}")
+
+
+def _check_size(
+    floor_area: float, zones: int, floors: int, cell_size: float, height: float, min_zone_area: float
+) -> None:
+    """Refuse sizes that are no building."""
+    given = {"floor_area": floor_area, "cell_size": cell_size, "height": height, "min_zone_area": min_zone_area}
+    for name, value in given.items():
+        if not (np.isfinite(value) and value > 0.0):
+            raise ThermalError(f"{name}: expected a positive number, found {value}")
+    if floors < 1 or zones < floors:
+        raise ThermalError(f"zones: expected at least one a floor on one or more floors, found {zones} on {floors}")
+    most = int(floor_area / (_MEAN_OVER_SMALLEST * min_zone_area))
+    if zones > most:
+        raise ThermalError(
+            f"zones: expected at most {most} on {floor_area} m2, so that they have {_MEAN_OVER_SMALLEST} times "
+            f"min_zone_area ({min_zone_area} m2) on average, found {zones}"
+        )
+
+
+def _check_ratio(ratio: tuple[float, float]) -> None:
+    """Refuse shares of glass that are none."""
+    if not 0.0 <= ratio[0] <= ratio[1] <= 1.0:
+        raise ThermalError(f"window_to_wall_ratio: expected (smallest, largest) between 0 and 1, found {ratio}")
 
 
 def pilot_building(

@@ -6,7 +6,9 @@ from collections.abc import Iterator
 
 import numpy as np
 import numpy.typing as npt
+from scipy import ndimage
 
+from thermal.case.judgement import runs
 from thermal.errors import ThermalError
 
 Mask = npt.NDArray[np.bool_]
@@ -89,13 +91,7 @@ def grow(mask: Mask) -> Mask:
     numpy.ndarray of bool, shape (n_row, n_col)
         These cells and their neighbours.
     """
-    rows = mask.copy()
-    rows[1:] |= mask[:-1]
-    rows[:-1] |= mask[1:]
-    both = rows.copy()
-    both[:, 1:] |= rows[:, :-1]
-    both[:, :-1] |= rows[:, 1:]
-    return both
+    return np.asarray(ndimage.binary_dilation(mask, np.ones((3, 3))))
 
 
 def facade_runs(mask: Mask) -> Iterator[tuple[int, int, int, bool, bool]]:
@@ -115,8 +111,8 @@ def facade_runs(mask: Mask) -> Iterator[tuple[int, int, int, bool, bool]]:
     exposed = mask.copy()
     exposed[1:] &= ~mask[:-1]
     for row in np.flatnonzero(exposed.any(axis=1)):
-        for start, stop in _runs(exposed[row]):
-            yield int(row), start, stop, bool(mask[row, start - 1]), bool(mask[row, stop])
+        for first, last in runs(exposed[row]):
+            yield int(row), first, last + 1, bool(mask[row, first - 1]), bool(mask[row, last + 1])
 
 
 def row_runs(mask: Mask) -> npt.NDArray[np.int_]:
@@ -150,12 +146,6 @@ def run_lengths(mask: Mask) -> npt.NDArray[np.int_]:
         Lengths [cells].
     """
     return np.concatenate([row_runs(mask), row_runs(mask.T)])
-
-
-def _runs(line: npt.NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """First index and last index + 1 of each run of True."""
-    edges = np.flatnonzero(np.diff(np.pad(line, 1).astype(np.int8)))
-    return [(int(start), int(stop)) for start, stop in zip(edges[::2], edges[1::2], strict=True)]
 
 
 def _draw_notches(rng: np.random.Generator) -> tuple[Notch, ...]:

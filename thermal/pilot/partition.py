@@ -1,12 +1,214 @@
-"""One floor of an office: rows of rooms along the facades, a corridor behind them, a core inside it, cut into zones."""
+"""Partition of an outline into zones."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Literal
+
 import numpy as np
+import numpy.typing as npt
 from scipy import ndimage
 
-from thermal.pilot.outline import DEEP_WING, THIN_WING, Mask, exterior_ring, facade_runs, grow, row_runs
-from thermal.pilot.regions import SHARE, Region, cut, is_habitable, parts, width_cells
+from thermal.pilot.outline import DEEP_WING, THIN_WING, Mask, exterior_ring, facade_runs, grow, row_runs, run_lengths
+
+Kind = Literal["perimeter", "corridor", "core"]
+
+NARROWEST = {"perimeter": 2.4, "corridor": 1.5, "core": 3.0}  # m, clear width of a zone
+SHARE = {"perimeter": 1.0, "corridor": 2.2, "core": 2.6}  # -, usual area of a zone over that of a room at the facade
+_SPREAD = 0.3  # -, log standard deviation that every cut gives the shares, so that some rooms stay large
+
+
+@dataclass(frozen=True, eq=False)
+class Region:
+    """A connected part of a floor with walls all around it.
+
+    Parameters
+    ----------
+    kind : {"perimeter", "corridor", "core"}
+        What it is used for.
+    side : int
+        Side that its facade looks to: 0 north, 1 east, 2 south, 3 west of the plan; -1 without its own facade.
+    corner : tuple of int
+        Row and column of the mask's first cell on the floor.
+    mask : numpy.ndarray of bool, shape (n_row, n_col)
+        Its cells in its bounding box.
+    exposed : numpy.ndarray of bool, shape (n_row, n_col)
+        Those of its cells that touch the exterior wall.
+    share : float
+        Area that it should have [relative to a room at the facade], positive.
+    """
+
+    kind: Kind
+    side: int
+    corner: tuple[int, int]
+    mask: Mask
+    exposed: Mask
+    share: float
+
+    @property
+    def cells(self) -> int:
+        """Number of cells."""
+        return int(self.mask.sum())
+
+
+def parts(kind: Kind, side: int, cells: Mask, exposed: Mask, share: float) -> list[Region]:
+    """Make a region of each connected part of some cells.
+
+    Parameters
+    ----------
+    kind, side, share
+        As of `Region`.
+    cells, exposed : numpy.ndarray of bool, shape (n_row, n_col)
+        Cells on the floor, and the cells of the floor that touch the exterior wall.
+
+    Returns
+    -------
+    list of Region
+        In row-major order; empty without cells.
+    """
+    labels, _ = ndimage.label(cells)
+    return _labelled(kind, side, labels, exposed, share)
+
+
+def _labelled(
+    kind: Kind, side: int, labels: npt.NDArray[np.signedinteger], exposed: Mask, share: float
+) -> list[Region]:
+    """Make a region of each label above 0."""
+    regions = []
+    for number, box in enumerate(ndimage.find_objects(labels), start=1):
+        mask = labels[box] == number
+        regions.append(Region(kind, side, (box[0].start, box[1].start), mask, mask & exposed[box], share))
+    return regions
+
+
+def is_habitable(region: Region, cell_size: float, min_zone_area: float) -> bool:
+    """Tell whether a region is wide and large enough for a zone, and has the facade that its kind needs.
+
+    Parameters
+    ----------
+    region : Region
+        The region.
+    cell_size : float
+        Side of a cell [m], positive.
+    min_zone_area : float
+        Smallest area of a zone [m2], positive.
+
+    Returns
+    -------
+    bool
+        True when it can be a zone.
+    """
+    if region.cells * cell_size**2 < min_zone_area:
+        return False
+    narrowest = width_cells(region.kind, cell_size)
+    if region.side >= 0 and int(region.exposed.sum()) < narrowest:
+        return False
+    return int(run_lengths(region.mask).min()) >= narrowest
+
+
+def width_cells(kind: Kind, cell_size: float) -> int:
+    """Clear width that a zone of a kind needs.
+
+    Parameters
+    ----------
+    kind : {"perimeter", "corridor", "core"}
+        What the zone is used for.
+    cell_size : float
+        Side of a cell [m], positive.
+
+    Returns
+    -------
+    int
+        Width [cells], at least 1.
+    """
+    return max(1, int(np.ceil(NARROWEST[kind] / cell_size - 1e-9)))
+
+
+def cut(
+    rng: np.random.Generator, region: Region, cell_size: float, min_zone_area: float, most: int, tries: int = 10
+) -> list[Region]:
+    """Cut a region by one straight wall, one cell thick, where the parts come out best.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+        Source of the variety.
+    region : Region
+        What to cut.
+    cell_size : float
+        Side of a cell [m], positive.
+    min_zone_area : float
+        Smallest area of a part [m2], positive.
+    most : int
+        Parts at most, at least 2.
+    tries : int
+        Places to look at.
+
+    Returns
+    -------
+    list of Region
+        The parts; empty when no place is good.
+    """
+    best: tuple[float, list[Region]] = (-np.inf, [])
+    for wall, axis in _walls(rng, region, cell_size, tries):
+        labels, _ = ndimage.label(region.mask & ~wall)
+        before, behind = (labels[np.roll(wall, step, axis)] for step in (-1, 1))
+        if np.any(before == behind):
+            continue  # some of it would part nothing
+        pieces = _labelled(region.kind, region.side, labels, region.exposed, region.share)
+        if 2 <= len(pieces) <= most and all(is_habitable(piece, cell_size, min_zone_area) for piece in pieces):
+            score = _quality(pieces) + 0.3 * rng.random()
+            best = max(best, (score, pieces), key=lambda scored: scored[0])
+    return [
+        replace(
+            piece,
+            corner=(piece.corner[0] + region.corner[0], piece.corner[1] + region.corner[1]),
+            share=region.share * float(np.exp(rng.normal(0.0, _SPREAD))),
+        )
+        for piece in best[1]
+    ]
+
+
+def _walls(rng: np.random.Generator, region: Region, cell_size: float, tries: int) -> Iterator[tuple[Mask, int]]:
+    """Walls to try: across a row of rooms; anywhere, and first in line with its corners, in other regions."""
+    n_row, n_column = region.mask.shape
+    margin = width_cells(region.kind, cell_size)
+    along = [0, 1] if region.side < 0 else [1 - region.side % 2]  # axis that the wall's position counts on
+    places: list[tuple[int, int]] = []
+    for axis in along:
+        count = (n_row, n_column)[axis]
+        middle = range(max(margin, int(0.3 * count)), min(count - margin, int(np.ceil(0.7 * count))))
+        turns = np.flatnonzero(np.diff(region.mask.astype(np.int8), axis=axis).any(axis=1 - axis))
+        corners = [int(turn) + step for turn in turns for step in (0, 1) if 0 < turn + step < count - 1]
+        drawn = rng.permutation(middle)[:tries]
+        places += [(axis, place) for place in corners] + [(axis, int(place)) for place in drawn]
+    order = rng.permutation(len(places))[: 2 * tries]
+    for axis, place in (places[index] for index in order):
+        yield from ((wall, axis) for wall in _wall_stretches(region.mask, axis, place))
+
+
+def _wall_stretches(mask: Mask, axis: int, place: int) -> Iterator[Mask]:
+    """Wall along a whole line, and along each of its stretches where there are several; none beside another wall."""
+    line = np.zeros_like(mask)
+    at = (slice(None), place) if axis else (place, slice(None))
+    line[at] = mask[at]
+    labels, count = ndimage.label(line)
+    beside = np.roll(mask, 1, axis) & np.roll(mask, -1, axis)
+    stretches = [stretch for stretch in (labels == number for number in range(1, count + 1)) if beside[stretch].all()]
+    if len(stretches) > 1:
+        yield np.logical_or.reduce(stretches)
+    yield from stretches
+
+
+def _quality(pieces: list[Region]) -> float:
+    """Score parts: compact, not too long, and of like size."""
+    areas: npt.NDArray[np.float64] = np.array([piece.cells for piece in pieces], dtype=float)
+    compact = np.array([piece.mask.mean() for piece in pieces])
+    square = np.array([min(piece.mask.shape) / max(piece.mask.shape) for piece in pieces])
+    weight = areas / areas.sum()
+    return float(weight @ compact + 0.5 * weight @ square + 0.4 * areas.min() / areas.max())
+
 
 ROOM_DEPTH = (4.0, 6.0)  # m, from the facade to the wall of the corridor
 CORRIDOR_WIDTH = (1.5, 2.5)  # m, clear
@@ -38,7 +240,7 @@ def partition(
     list of Region or None
         As many as `zones`; None when the floor cannot be cut so.
     """
-    exposed = _beside(exterior_ring(mask)) & mask
+    exposed = ndimage.binary_dilation(exterior_ring(mask)) & mask
     for _ in range(_TRIES):
         regions = _bands(rng, mask, exposed, cell_size)
         habitable = all(is_habitable(region, cell_size, min_zone_area) for region in regions)
@@ -79,16 +281,6 @@ def _walls_are_thin(mask: Mask, regions: list[Region]) -> bool:
         (row, column), (n_row, n_column) = region.corner, region.mask.shape
         wall[row : row + n_row, column : column + n_column] &= ~region.mask
     return not (wall[1:, 1:] & wall[:-1, 1:] & wall[1:, :-1] & wall[:-1, :-1]).any()
-
-
-def _beside(cells: Mask) -> Mask:
-    """Cells with one of these as a neighbour across a side."""
-    beside = np.zeros_like(cells)
-    beside[1:] |= cells[:-1]
-    beside[:-1] |= cells[1:]
-    beside[:, 1:] |= cells[:, :-1]
-    beside[:, :-1] |= cells[:, 1:]
-    return beside
 
 
 def _bands(rng: np.random.Generator, mask: Mask, exposed: Mask, cell_size: float) -> list[Region]:

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from thermal.case.areas import zone_floor_areas
+from thermal._types import FloatArray
 from thermal.case.building import Building, FloorPlans, ZoneTable
-from thermal.errors import ModelError, describe
+from thermal.case.plan import zone_floor_areas
+from thermal.errors import ModelError
 from thermal.hvac._air_handler import AirHandler
 from thermal.hvac._boiler import BoilerLoop, Pump
 from thermal.hvac._coil import WaterCoil
@@ -22,8 +23,6 @@ from thermal.model.stepper import Stepper
 from thermal.model.symbolic import SymbolicModel
 from thermal.network.build import build_network
 from thermal.units import AIR_HEAT_CAPACITY, air_density
-
-Series = npt.NDArray[np.float64]
 
 _LONG_RUN = 1e8  # s: one implicit step to the steady state
 _COARSE = 1.0  # m: loads need no finer grid
@@ -74,10 +73,10 @@ class DesignConditions:
     def __post_init__(self) -> None:
         rising = (200.0, self.winter_outdoor, self.supply_air, self.heating, self.cooling, self.supply_water, 373.15)
         if not (np.diff(rising) > 0.0).all():
-            raise ModelError(describe("design conditions", "temperatures in order", f"{rising[1:-1]} K"))
+            raise ModelError("design conditions", "temperatures in order", f"{rising[1:-1]} K")
         if not (1.0 <= self.oversizing <= 3.0 and min(self.gains, self.sun) >= 0.0 and self.least_flow > 0.0):
             found = f"{self.oversizing}, {self.gains}, {self.sun} and {self.least_flow}"
-            raise ModelError(describe("design conditions", "positive loads, oversizing from 1 to 3", found))
+            raise ModelError("design conditions", "positive loads, oversizing from 1 to 3", found)
 
 
 def size_system(
@@ -146,7 +145,7 @@ def _air_handler(flow: float, at: DesignConditions, density: float) -> AirHandle
     return AirHandler(supply, exhaust, CoolingCoil(cooling), heating, enthalpy_limit=64_000.0)
 
 
-def _heat_loss(building: Building, at: DesignConditions) -> Series:
+def _heat_loss(building: Building, at: DesignConditions) -> FloatArray:
     """Heat that holds the zones at their temperature in the winter, shape (n_zone,) [W]."""
     network = build_network(building, dx=_COARSE if isinstance(building.geometry, FloorPlans) else None)
     matrices = SymbolicModel(network).matrices(network.start())
@@ -156,7 +155,7 @@ def _heat_loss(building: Building, at: DesignConditions) -> Series:
     return stepper.hold(at.heating * matrices.uniform[:, None], outside, zones)[2]
 
 
-def _floor_areas(building: Building) -> Series:
+def _floor_areas(building: Building) -> FloatArray:
     """Floor area of each zone, shape (n_zone,) [m2]."""
     if isinstance(building.geometry, ZoneTable):
         return np.array([zone.floor_area for zone in building.geometry.zones])
@@ -164,7 +163,7 @@ def _floor_areas(building: Building) -> Series:
     return np.array([areas[zone] for zone in building.zone_names])
 
 
-def _glass(building: Building) -> Series:
+def _glass(building: Building) -> FloatArray:
     """Glazed area of each zone, shape (n_zone,) [m2]."""
     if isinstance(building.geometry, ZoneTable):
         windows = [s for s in building.geometry.surfaces if s.kind == "window"]

@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-import numpy.typing as npt
 import pandas as pd
 
-from thermal.case.areas import zone_floor_areas
+from thermal._types import FloatArray
 from thermal.case.building import FloorPlans
+from thermal.case.plan import zone_floor_areas
 from thermal.case.points import DISCHARGE_TEMPERATURE, OUTDOOR_TEMPERATURE, SUPPLY_FLOW, ZONE_TEMPERATURE
 from thermal.case.telemetry import Telemetry
 from thermal.errors import ThermalError
 from thermal.pilot.thermostat import Terminals, Thermostats, draw_thermostats, size_terminals
 from thermal.units import AIR_HEAT_CAPACITY
 
-Series = npt.NDArray[np.float64]
 #: Is told the steps that are done and all steps [-].
 Progress = Callable[[int, int], None]
 
@@ -41,7 +41,7 @@ class Plant(Protocol):
     def zone_names(self) -> tuple[str, ...]:
         """Names of the zones, in the order of its arrays."""
 
-    def reset(self, zone_temperatures: Series, /) -> Series:
+    def reset(self, zone_temperatures: FloatArray, /) -> FloatArray:
         """Start anew.
 
         Parameters
@@ -55,7 +55,7 @@ class Plant(Protocol):
             Air temperatures of the zones [K].
         """
 
-    def step(self, zone_heat: Series, boundary_temperatures: Series, /) -> Series:
+    def step(self, zone_heat: FloatArray, boundary_temperatures: FloatArray, /) -> FloatArray:
         """Go one step.
 
         Parameters
@@ -72,18 +72,51 @@ class Plant(Protocol):
         """
 
 
+@dataclass(frozen=True)
+class TelemetrySettings:
+    """Seed, spin-up and sensors of generated telemetry.
+
+    Parameters
+    ----------
+    seed : int
+        Same seed, same thermostats, terminals and noise [-]; 0 or more.
+    spin_up_days : float
+        Length at the start of the weather that is simulated but not reported [d], 0 or more.
+    station : str
+        Entity that reports the weather.
+    noise : float
+        Standard deviation of the temperature sensors [K], 0 or more. Default as in the shared practice cases.
+    resolution : float
+        Steps of the temperature sensors [K], 0 or more; 0 reports every digit. Default as in the shared practice cases.
+
+    Raises
+    ------
+    ThermalError
+        When a number is negative.
+    """
+
+    seed: int = 0
+    spin_up_days: float = 0.0
+    station: str = "weather_station"
+    noise: float = 0.03
+    resolution: float = 0.02
+
+    def __post_init__(self) -> None:
+        if min(self.seed, self.spin_up_days, self.noise, self.resolution) < 0.0:
+            raise ThermalError(
+                "telemetry: expected seed, spin_up_days, noise and resolution of 0 or more, "
+                f"found {self.seed}, {self.spin_up_days} d, {self.noise} K and {self.resolution} K"
+            )
+
+
 def generate_telemetry(
     plant: Plant,
     plans: FloorPlans,
     weather: pd.DataFrame,
+    settings: TelemetrySettings | None = None,
     *,
-    seed: int = 0,
-    spin_up_days: float = 0.0,
     thermostats: Thermostats | None = None,
     terminals: Terminals | None = None,
-    station: str = "weather_station",
-    noise: float = 0.03,
-    resolution: float = 0.02,
     progress: Progress | None = None,
 ) -> Telemetry:
     """Run a plant under thermostats and report what its sensors see.
@@ -104,20 +137,12 @@ def generate_telemetry(
     weather : pandas.DataFrame
         Shape (n_time, n_point), columns ``<station>/<point>`` in SI units, tz-aware index at the ends of steps of the
         plant's length, as of `generate_weather`.
-    seed : int
-        Same seed, same thermostats, terminals and noise; 0 or more.
-    spin_up_days : float
-        Length at the start of the weather that is simulated but not reported [d], 0 or more.
+    settings : TelemetrySettings, optional
+        Seed, spin-up and sensors.
     thermostats : Thermostats, optional
         Schedules in the order of the plant's zones; drawn by default.
     terminals : Terminals, optional
         Units in the order of the plant's zones; sized by floor area by default.
-    station : str
-        Entity that reports the weather.
-    noise : float
-        Standard deviation of the temperature sensors [K], 0 or more. Default as in the shared practice cases.
-    resolution : float
-        Steps of the temperature sensors [K], 0 or more; 0 reports every digit. Default as in the shared practice cases.
     progress : callable, optional
         Called as ``progress(steps_done, steps)`` after every step.
 
@@ -132,21 +157,22 @@ def generate_telemetry(
     ThermalError
         When plant, plans and weather do not fit each other, or the plant returns what is no temperature.
     """
-    skipped = _check(plant, plans, weather, station, seed, spin_up_days, noise, resolution)
+    settings = settings or TelemetrySettings()
+    skipped = _check(plant, plans, weather, settings)
     areas = zone_floor_areas(plans)
     floor_area = np.array([areas[zone] for zone in plant.zone_names])
-    thermostats = thermostats or draw_thermostats(seed, len(floor_area))
-    terminals = terminals or size_terminals(seed, floor_area)
+    thermostats = thermostats or draw_thermostats(settings.seed, len(floor_area))
+    terminals = terminals or size_terminals(settings.seed, floor_area)
     index = pd.DatetimeIndex(weather.index)
     setpoints = thermostats.setpoints(index - pd.Timedelta(seconds=plant.step_seconds))
-    outdoor = weather[f"{station}/{OUTDOOR_TEMPERATURE}"].to_numpy(dtype=float)
+    outdoor = weather[f"{settings.station}/{OUTDOOR_TEMPERATURE}"].to_numpy(dtype=float)
     temperature, flow, heat = _run(plant, terminals, outdoor, setpoints, progress)
     discharge = temperature + heat / (AIR_HEAT_CAPACITY * flow)
-    rng = np.random.default_rng([seed, 1])  # not the stream of the thermostats
-    points: dict[str, Series] = {
-        ZONE_TEMPERATURE: _measured(rng, temperature, noise, resolution),
+    rng = np.random.default_rng([settings.seed, 1])  # not the stream of the thermostats
+    points: dict[str, FloatArray] = {
+        ZONE_TEMPERATURE: _measured(rng, temperature, settings),
         SUPPLY_FLOW: flow.astype(np.float32).astype(float),
-        DISCHARGE_TEMPERATURE: _measured(rng, discharge, noise, resolution),
+        DISCHARGE_TEMPERATURE: _measured(rng, discharge, settings),
         HEATING_SETPOINT: setpoints[0],
         COOLING_SETPOINT: setpoints[1],
     }
@@ -160,8 +186,12 @@ def generate_telemetry(
 
 
 def _run(
-    plant: Plant, terminals: Terminals, outdoor: Series, setpoints: tuple[Series, Series], progress: Progress | None
-) -> tuple[Series, Series, Series]:
+    plant: Plant,
+    terminals: Terminals,
+    outdoor: FloatArray,
+    setpoints: tuple[FloatArray, FloatArray],
+    progress: Progress | None,
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Close the loop: zone temperatures [K], supply flows [kg/s] and heats [W], each of shape (n_time, n_zone)."""
     heating, cooling = setpoints
     temperature, flow, heat = (np.empty_like(heating) for _ in range(3))
@@ -184,7 +214,7 @@ def _run(
     return temperature, flow, heat
 
 
-def _temperatures(values: Series, n_zone: int, where: str) -> Series:
+def _temperatures(values: FloatArray, n_zone: int, where: str) -> FloatArray:
     """Refuse what a plant returns when it is not one temperature a zone."""
     zone = np.asarray(values, dtype=float)
     if zone.shape != (n_zone,) or not np.isfinite(zone).all():
@@ -195,35 +225,21 @@ def _temperatures(values: Series, n_zone: int, where: str) -> Series:
     return zone
 
 
-def _measured(rng: np.random.Generator, temperature: Series, noise: float, resolution: float) -> Series:
+def _measured(rng: np.random.Generator, temperature: FloatArray, sensors: TelemetrySettings) -> FloatArray:
     """Report what a sensor does [K]: with noise, in steps of its resolution counted from 0 degC."""
-    celsius = temperature - _FREEZING + noise * rng.standard_normal(temperature.shape)
-    if resolution > 0.0:
-        celsius = resolution * np.round(celsius / resolution)
+    celsius = temperature - _FREEZING + sensors.noise * rng.standard_normal(temperature.shape)
+    if sensors.resolution > 0.0:
+        celsius = sensors.resolution * np.round(celsius / sensors.resolution)
     return np.asarray(celsius + _FREEZING, dtype=float)
 
 
-def _check(
-    plant: Plant,
-    plans: FloorPlans,
-    weather: pd.DataFrame,
-    station: str,
-    seed: int,
-    spin_up_days: float,
-    noise: float,
-    resolution: float,
-) -> int:
+def _check(plant: Plant, plans: FloorPlans, weather: pd.DataFrame, settings: TelemetrySettings) -> int:
     """Refuse what does not fit; return the steps of the spin-up."""
-    if seed < 0 or spin_up_days < 0.0 or noise < 0.0 or resolution < 0.0:
-        raise ThermalError(
-            "telemetry: expected seed, spin_up_days, noise and resolution of 0 or more, "
-            f"found {seed}, {spin_up_days} d, {noise} K and {resolution} K"
-        )
     zones = {zone for floor in plans.floors for zone in floor.zone_names}
     strange = sorted(zones.symmetric_difference(plant.zone_names))
     if strange:
         raise ThermalError(f"plant: expected the zones of the plans, found a difference in {', '.join(strange[:5])}")
-    column = f"{station}/{OUTDOOR_TEMPERATURE}"
+    column = f"{settings.station}/{OUTDOOR_TEMPERATURE}"
     if column not in weather or not isinstance(weather.index, pd.DatetimeIndex) or weather.index.tz is None:
         raise ThermalError(f"weather: expected a column {column!r} on a tz-aware index, found {list(weather)[:3]}")
     if not np.isfinite(weather[column].to_numpy(dtype=float)).all():
@@ -231,7 +247,7 @@ def _check(
     steps = np.unique(np.diff(weather.index.as_unit("us").asi8) / 1e6)
     if not np.array_equal(steps, [plant.step_seconds]):
         raise ThermalError(f"weather: expected steps of the plant's {plant.step_seconds} s, found {steps[:3]} s")
-    skipped = round(spin_up_days * 86400.0 / plant.step_seconds)
+    skipped = round(settings.spin_up_days * 86400.0 / plant.step_seconds)
     if len(weather) < skipped + 2:
         raise ThermalError(f"weather: expected at least {skipped + 2} steps with the spin-up, found {len(weather)}")
     return skipped

@@ -1,17 +1,16 @@
-"""Thermostats with set-back and the terminal units that they drive."""
+"""Thermostats and terminal units of a generated office, with schedules or pseudo-random binary set-points."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 import pandas as pd
+from scipy.signal import max_len_seq
 
+from thermal._types import BoolArray, FloatArray, IntArray
 from thermal.errors import ThermalError
 from thermal.units import AIR_HEAT_CAPACITY
-
-Series = npt.NDArray[np.float64]
 
 _FREEZING = 273.15  # K
 _SATURDAY = 5  # day of the week, Monday is 0
@@ -34,15 +33,15 @@ class Thermostats:
         Whether a zone is occupied from its start to 13:00 on Saturdays.
     """
 
-    heating: Series
-    cooling: Series
-    heating_set_back: Series
-    cooling_set_back: Series
-    start: Series
-    stop: Series
-    saturday: npt.NDArray[np.bool_]
+    heating: FloatArray
+    cooling: FloatArray
+    heating_set_back: FloatArray
+    cooling_set_back: FloatArray
+    start: FloatArray
+    stop: FloatArray
+    saturday: BoolArray
 
-    def occupied(self, times: pd.DatetimeIndex) -> npt.NDArray[np.bool_]:
+    def occupied(self, times: pd.DatetimeIndex) -> BoolArray:
         """Tell when the schedules hold the occupied setpoints.
 
         Parameters
@@ -61,7 +60,7 @@ class Thermostats:
         morning = (day == _SATURDAY) & self.saturday & (hour >= self.start) & (hour < _SATURDAY_STOP)
         return np.asarray(weekday | morning, dtype=bool)
 
-    def setpoints(self, times: pd.DatetimeIndex) -> tuple[Series, Series]:
+    def setpoints(self, times: pd.DatetimeIndex) -> tuple[FloatArray, FloatArray]:
         """Read the schedules.
 
         Parameters
@@ -109,7 +108,7 @@ def draw_thermostats(seed: int, n_zone: int) -> Thermostats:
         raise ThermalError(f"thermostats: expected a seed of 0 or more and a zone, found {seed} and {n_zone} zones")
     rng = np.random.default_rng(seed)
 
-    def drawn(low: float, high: float) -> Series:
+    def drawn(low: float, high: float) -> FloatArray:
         return np.asarray(rng.uniform(low, high, n_zone), dtype=float)
 
     heating = np.round(_FREEZING + drawn(20.0, 22.0), 2)
@@ -141,13 +140,13 @@ class Terminals:
         within 12-35 degC, so that the zone's drift during the step leaves it in that range.
     """
 
-    design_heat: Series
-    design_flow: Series
-    minimum_flow: Series
+    design_heat: FloatArray
+    design_flow: FloatArray
+    minimum_flow: FloatArray
     coldest: float = _FREEZING + 13.0
     warmest: float = _FREEZING + 34.0
 
-    def supply(self, demand: Series, zone_temperature: Series) -> tuple[Series, Series]:
+    def supply(self, demand: FloatArray, zone_temperature: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Meet a demand for heat with as little air as can carry it.
 
         Parameters
@@ -173,7 +172,7 @@ class Terminals:
         return np.asarray(flow, dtype=float), np.asarray(np.clip(wanted, -most, most), dtype=float)
 
 
-def size_terminals(seed: int, floor_area: Series, heat_flux: float = 60.0, minimum_share: float = 0.2) -> Terminals:
+def size_terminals(seed: int, floor_area: FloatArray, heat_flux: float = 60.0, minimum_share: float = 0.2) -> Terminals:
     """Size terminal units by floor area, with the scatter of real ones.
 
     Parameters
@@ -207,3 +206,84 @@ def size_terminals(seed: int, floor_area: Series, heat_flux: float = 60.0, minim
     design_heat = heat_flux * scatter * floor_area
     design_flow = design_heat / (AIR_HEAT_CAPACITY * 14.0)
     return Terminals(design_heat, design_flow, minimum_share * design_flow)
+
+
+_STREAM = 5  # of random numbers of a seed; thermostats have the seed itself
+_BITS = 9  # of the shift register: 511 levels before the sequence repeats, 21 days of one hour
+_CLOCK = (1.0, 4.0)  # h, between the time constants of the air and of the slabs
+_AMPLITUDE = 1.5  # K, about both set-points: no more than a night set-back takes
+
+
+@dataclass(frozen=True, eq=False)
+class PrbsThermostats(Thermostats):
+    """Thermostats whose two set-points go up and down together in a pseudo-random binary sequence, day and night.
+
+    Such a signal is as good as white up to its clock, unlike a schedule, which repeats every day as the weather does;
+    identification experiments in buildings use it (Bacher and Madsen 2011, doi:10.1016/j.enbuild.2011.02.005).
+
+    Parameters
+    ----------
+    heating, cooling : numpy.ndarray, shape (n_zone,)
+        Setpoints half-way between the two levels [K], heating below cooling.
+    heating_set_back, cooling_set_back, start, stop, saturday : numpy.ndarray, shape (n_zone,)
+        As in `Thermostats` [K], [h] and [-]; without effect here.
+    clock : numpy.ndarray of int, shape (n_zone,)
+        Time between two levels of a zone's sequence [s], positive.
+    phase : numpy.ndarray of int, shape (n_zone,)
+        Where each zone is in the sequence of 511 levels at the epoch [-].
+    amplitude : float
+        Distance of either level from these setpoints [K].
+    """
+
+    clock: IntArray
+    phase: IntArray
+    amplitude: float
+
+    def setpoints(self, times: pd.DatetimeIndex) -> tuple[FloatArray, FloatArray]:
+        """Read the sequences.
+
+        Parameters
+        ----------
+        times : pandas.DatetimeIndex
+            Local times, shape (n_time,).
+
+        Returns
+        -------
+        tuple of numpy.ndarray, shape (n_time, n_zone)
+            Heating and cooling setpoints [K].
+        """
+        levels = 2.0 * max_len_seq(_BITS)[0] - 1.0
+        ticks = times.as_unit("s").asi8[:, np.newaxis] // self.clock + self.phase
+        shift = self.amplitude * levels[ticks % levels.size]
+        return self.heating + shift, self.cooling + shift
+
+
+def draw_prbs_thermostats(seed: int, n_zone: int) -> PrbsThermostats:
+    """Draw pseudo-random set-points about those of `draw_thermostats`.
+
+    Parameters
+    ----------
+    seed : int
+        Same seed, same set-points; 0 or more.
+    n_zone : int
+        Number of zones, at least 1.
+
+    Returns
+    -------
+    PrbsThermostats
+        Levels 1.5 K above and below the occupied set-points, each zone's with a clock of its own, 1 to 4 h in quarter
+        hours: fast enough to show the air, slow enough to show what lies behind it.
+
+    Examples
+    --------
+    >>> hours = pd.date_range("2023-01-09", periods=240, freq="h", tz="UTC")
+    >>> heating, cooling = draw_prbs_thermostats(0, 2).setpoints(hours)
+    >>> bool(np.allclose(np.ptp(heating, axis=0), 3.0))
+    True
+    """
+    base = draw_thermostats(seed, n_zone)
+    rng = np.random.default_rng([seed, _STREAM])
+    clock = 900 * np.round(4.0 * rng.uniform(*_CLOCK, n_zone)).astype(np.int64)
+    return PrbsThermostats(
+        **vars(base), clock=clock, phase=rng.integers(2**_BITS - 1, size=n_zone), amplitude=_AMPLITUDE
+    )

@@ -1,35 +1,120 @@
-"""Twins: telemetry of a building whose parameters, unmeasured heat and sensor noise are known, all from a seed."""
+"""Twin: a case made by the library's own model, with the truth beside it."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
-from typing import Literal
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal, get_args
 
 import numpy as np
-import numpy.typing as npt
-import pandas as pd
 from scipy.special import ndtr, ndtri
 
-from thermal.case.areas import zone_floor_areas
+from thermal._types import FloatArray
 from thermal.case.building import Building, FloorPlans
 from thermal.case.case import Case
+from thermal.case.plan import zone_floor_areas
 from thermal.case.points import DISCHARGE_TEMPERATURE, OUTDOOR_TEMPERATURE, SUPPLY_FLOW, ZONE_TEMPERATURE
 from thermal.case.telemetry import Telemetry
 from thermal.errors import ThermalError, nearest
 from thermal.model.simulator import Simulator
 from thermal.network.build import build_network
 from thermal.parameters import Parameter, Scope
-from thermal.pilot.disturbance import draw_disturbance
-from thermal.pilot.layout import devices
-from thermal.pilot.prbs import draw_prbs_thermostats
-from thermal.pilot.telemetry import Progress, generate_telemetry
-from thermal.pilot.thermostat import draw_thermostats
-from thermal.pilot.truth import TwinRanges, TwinTruth
-from thermal.pilot.weather import generate_weather
+from thermal.pilot.building import devices
+from thermal.pilot.telemetry import Progress, TelemetrySettings, generate_telemetry
+from thermal.pilot.thermostat import draw_prbs_thermostats, draw_thermostats
+from thermal.pilot.weather import Period, draw_disturbance
 from thermal.units import AIR_HEAT_CAPACITY
 
-Series = npt.NDArray[np.float64]
+
+@dataclass(frozen=True)
+class TwinRanges:
+    """What a twin's unmeasured heat and sensors are drawn from, each log-uniformly between two values.
+
+    Parameters
+    ----------
+    disturbance_deviation : tuple of float
+        Stationary standard deviation of a zone's unmeasured heat per floor area [W/m2], 0 or more. The default goes
+        from a well metered zone to an office whose people, plugs and sun nobody records.
+    disturbance_time : tuple of float
+        Its correlation time [s], positive. The default is half an hour (doors, meetings) to 8 hours (a working day).
+    noise : tuple of float
+        Standard deviation of the temperature sensors [K], 0 or more. The default goes from a calibrated probe to a wall
+        thermostat.
+
+    Raises
+    ------
+    ThermalError
+        When a range is out of order, below its least value, or leads from zero to something.
+    """
+
+    disturbance_deviation: tuple[float, float] = (0.3, 3.0)
+    disturbance_time: tuple[float, float] = (1800.0, 28800.0)
+    noise: tuple[float, float] = (0.02, 0.1)
+
+    def __post_init__(self) -> None:
+        for name, (low, high) in vars(self).items():
+            positive = low > 0.0 or (low == high == 0.0 and name != "disturbance_time")
+            if not (positive and low <= high < np.inf):
+                raise ThermalError(
+                    f"ranges: {name}: expected two positive numbers in order (or twice 0 for none), found {low}, {high}"
+                )
+
+
+@dataclass(frozen=True, eq=False)
+class TwinTruth:
+    """What is true of a twin, and what its telemetry does not say.
+
+    Parameters
+    ----------
+    seed : int
+        That it was made from.
+    parameters : tuple of Parameter
+        Of its model.
+    theta : numpy.ndarray, shape (n_parameter,)
+        Their true values [parameter units].
+    disturbance_deviation : float
+        Stationary standard deviation of the unmeasured heat per floor area [W/m2].
+    disturbance_time : float
+        Its correlation time [s].
+    noise : float
+        Standard deviation of the temperature sensors [K].
+    resolution : float
+        Steps of the temperature sensors [K], 0 for none.
+    zone_temperatures : numpy.ndarray, shape (n_time, n_zone)
+        Mean air temperatures over the steps of the telemetry [K].
+    heat : numpy.ndarray, shape (n_time, n_zone)
+        Heat that the terminal units brought into the air [W].
+    disturbance : numpy.ndarray, shape (n_time, n_zone)
+        Unmeasured heat that entered the air beside it [W].
+    states : numpy.ndarray, shape (n_node,)
+        Temperatures of all control volumes at the first stamp [K].
+    """
+
+    seed: int
+    parameters: tuple[Parameter, ...]
+    theta: FloatArray
+    disturbance_deviation: float
+    disturbance_time: float
+    noise: float
+    resolution: float
+    zone_temperatures: FloatArray
+    heat: FloatArray
+    disturbance: FloatArray
+    states: FloatArray
+
+    @property
+    def values(self) -> dict[str, float]:
+        """True value of each parameter by name, as `Simulator` takes them [parameter units]."""
+        return {p.name: float(value) for p, value in zip(self.parameters, self.theta, strict=True)}
+
+    def to_dict(self) -> dict[str, Any]:
+        """Give all but the series as plain types, for JSON; ``parameters`` is what `load_parameters` reads."""
+        names = ("seed", "disturbance_deviation", "disturbance_time", "noise", "resolution")
+        return {
+            **{name: getattr(self, name) for name in names},
+            "parameters": {name: {"value": value} for name, value in self.values.items()},
+        }
+
 
 #: How set-points move: by schedule with night set-back, or in a pseudo-random binary sequence [-].
 Excitation = Literal["schedule", "prbs"]
@@ -41,15 +126,62 @@ _DAY = 86400.0  # s
 _THETA, _CONDITIONS = 2, 3  # streams of random numbers of a seed; the sensors have 1
 
 
+@dataclass(frozen=True)
+class TwinSettings(Period):
+    """Period, model and sensors of a twin.
+
+    Parameters
+    ----------
+    dx : float, optional
+        Distance between control volumes [m]; the plan's cell size by default. Calibrate with the same.
+    excitation : {"schedule", "prbs"}
+        Set-points with night set-back (`draw_thermostats`), or in a pseudo-random sequence (`draw_prbs_thermostats`).
+    fixed : mapping of str to float
+        Parameters that are not drawn, with their values [parameter units].
+    scopes : mapping of str to {"global", "zone"}, optional
+        Parameters with one value a zone.
+    ranges : TwinRanges
+        Of the unmeasured heat and of the sensor noise.
+    meter : {"sensors", "exact"}
+        What the discharge sensor reports, see the notes of `generate_twin`.
+    resolution : float
+        Steps of the temperature sensors [K], 0 or more; 0 reports every digit.
+    start, days, spin_up_days, step_seconds
+        As in `Period` [-, d, d, s], by default three weeks from a Monday in winter.
+
+    Raises
+    ------
+    ThermalError
+        When an option is unknown.
+    """
+
+    start: str = "2023-01-09"
+    days: float = 21.0
+    spin_up_days: float = 7.0
+    dx: float | None = None
+    excitation: Excitation = "schedule"
+    fixed: Mapping[str, float] = field(default_factory=dict)
+    scopes: Mapping[str, Scope] | None = None
+    ranges: TwinRanges = TwinRanges()
+    meter: Meter = "sensors"
+    resolution: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name, options in (("excitation", get_args(Excitation)), ("meter", get_args(Meter))):
+            word = getattr(self, name)
+            if word not in options:
+                raise ThermalError(name, f"one of {', '.join(options)}", repr(word), nearest(word, options))
+
+
 class _DisturbedPlant:
     """A simulator that receives the unmeasured heat as well, and remembers what it did and received."""
 
-    def __init__(self, simulator: Simulator, disturbance: Series, outdoor_at_start: float, skipped: int) -> None:
+    def __init__(self, simulator: Simulator, disturbance: FloatArray, outdoor_at_start: float, skipped: int) -> None:
         self._simulator, self._disturbance, self._outdoor = simulator, disturbance, outdoor_at_start
         self._skipped = skipped
-        self.heat: list[Series] = []
-        self.temperatures: list[Series] = []
-        self.states: Series = np.empty(0)
+        self.heat: list[FloatArray] = []
+        self.temperatures: list[FloatArray] = []
+        self.states: FloatArray = np.empty(0)
 
     @property
     def step_seconds(self) -> float:
@@ -59,11 +191,11 @@ class _DisturbedPlant:
     def zone_names(self) -> tuple[str, ...]:
         return self._simulator.zone_names
 
-    def reset(self, zone_temperatures: Series, /) -> Series:
+    def reset(self, zone_temperatures: FloatArray, /) -> FloatArray:
         # walls between the zones and the season's outdoor air, not as warm as the zones all through
         return self._simulator.reset(zone_temperatures, np.array([self._outdoor]))
 
-    def step(self, zone_heat: Series, boundary_temperatures: Series, /) -> Series:
+    def step(self, zone_heat: FloatArray, boundary_temperatures: FloatArray, /) -> FloatArray:
         number = len(self.heat)
         zone = self._simulator.step(zone_heat + self._disturbance[number], boundary_temperatures)
         self.heat.append(zone_heat)
@@ -76,18 +208,8 @@ class _DisturbedPlant:
 def generate_twin(
     building: Building,
     seed: int = 0,
+    settings: TwinSettings | None = None,
     *,
-    days: float = 21.0,
-    step_seconds: float = 300.0,
-    start: str = "2023-01-09",
-    spin_up_days: float = 7.0,
-    dx: float | None = None,
-    excitation: Excitation = "schedule",
-    fixed: Mapping[str, float] | None = None,
-    scopes: Mapping[str, Scope] | None = None,
-    ranges: TwinRanges | None = None,
-    meter: Meter = "sensors",
-    resolution: float = 0.0,
     progress: Progress | None = None,
 ) -> tuple[Case, TwinTruth]:
     """Make telemetry of a building under thermostats, with parameters drawn from their priors, and keep the truth.
@@ -103,28 +225,8 @@ def generate_twin(
         With floor plans. A VAV terminal a zone takes the place of its devices; its `airflows` are left out.
     seed : int
         Same seed, same twin; 0 or more. Weather, set-points, θ, disturbance and sensors all come from it.
-    days : float
-        Length of the telemetry [d], positive.
-    step_seconds : float
-        Length of an interval [s], positive, up to 3600.
-    start : str
-        Local time at which the first interval begins, ISO 8601 without offset. The default is a Monday in winter.
-    spin_up_days : float
-        Length that is simulated before it, from the steady state of the first day's outdoor air [d], 0 or more.
-    dx : float, optional
-        Distance between control volumes [m]; the plan's cell size by default. Calibrate with the same.
-    excitation : {"schedule", "prbs"}
-        Set-points with night set-back (`draw_thermostats`), or in a pseudo-random sequence (`draw_prbs_thermostats`).
-    fixed : mapping of str to float, optional
-        Parameters that are not drawn, with their values [parameter units].
-    scopes : mapping of str to {"global", "zone"}, optional
-        Parameters with one value a zone.
-    ranges : TwinRanges, optional
-        Of the unmeasured heat and of the sensor noise.
-    meter : {"sensors", "exact"}
-        What the discharge sensor reports, see the notes.
-    resolution : float
-        Steps of the temperature sensors [K], 0 or more; 0 reports every digit.
+    settings : TwinSettings, optional
+        Period, model and sensors.
     progress : callable, optional
         Called as ``progress(steps_done, steps)`` after every step.
 
@@ -136,7 +238,7 @@ def generate_twin(
     Raises
     ------
     ThermalError
-        When an option is unknown or the building has no floor plans.
+        When the building has no floor plans.
     ModelError
         When a fixed parameter is not of this building.
     ThermalError
@@ -154,43 +256,30 @@ def generate_twin(
     Examples
     --------
     >>> from thermal.data import load_bundled_case
-    >>> case, truth = generate_twin(load_bundled_case().building, 3, days=1.0, spin_up_days=1.0, dx=1.0)
+    >>> case, truth = generate_twin(load_bundled_case().building, 3, TwinSettings(days=1.0, spin_up_days=1.0, dx=1.0))
     >>> case.zone_heat().shape == truth.heat.shape
     True
     """
-    plans = _check(building, excitation, meter)
-    station = building.weather_station
+    at, plans, station = settings or TwinSettings(), building.geometry, building.weather_station
+    if not isinstance(plans, FloorPlans):
+        advice = "its terminal units are sized by floor plans"
+        raise ThermalError(f"building {building.name!r}", "floor plans", "a zone table", advice)
     twin = replace(building, name=f"{building.name}_twin_{seed}", devices=devices(plans), airflows=())
-    weather = generate_weather(
-        seed,
-        start=str(pd.Timestamp(start) - pd.Timedelta(days=spin_up_days)),
-        days=days + spin_up_days,
-        step_seconds=step_seconds,
-        location=building.location,
-        station=station,
-    )
-    parameters = build_network(twin, dx=dx, scopes=scopes).parameters
-    values = _draw_values(seed, parameters) | dict(fixed or {})
-    deviation, time_constant, noise = _draw_conditions(seed, ranges or TwinRanges())
+    weather = at.weather(seed, building.location, station)
+    parameters = build_network(twin, dx=at.dx, scopes=at.scopes).parameters
+    values = _draw_values(seed, parameters) | dict(at.fixed)
+    deviation, time_constant, noise = _draw_conditions(seed, at.ranges)
     floor_areas = zone_floor_areas(plans)
     areas = np.array([floor_areas[zone] for zone in twin.zone_names])
-    disturbance = draw_disturbance(seed, len(weather), deviation * areas, time_constant, step_seconds)
-    outdoor = weather[f"{station}/{OUTDOOR_TEMPERATURE}"].iloc[: round(_DAY / step_seconds)].mean()
-    skipped = round(spin_up_days * _DAY / step_seconds)
-    simulator = Simulator(twin, values, step_seconds, dx=dx, scopes=scopes)
+    disturbance = draw_disturbance(seed, len(weather), deviation * areas, time_constant, at.step_seconds)
+    outdoor = weather[f"{station}/{OUTDOOR_TEMPERATURE}"].iloc[: round(_DAY / at.step_seconds)].mean()
+    skipped = round(at.spin_up_days * _DAY / at.step_seconds)
+    simulator = Simulator(twin, values, at.step_seconds, dx=at.dx, scopes=at.scopes)
     plant = _DisturbedPlant(simulator, disturbance, float(outdoor), skipped)
-    draw = draw_prbs_thermostats if excitation == "prbs" else draw_thermostats
+    draw = draw_prbs_thermostats if at.excitation == "prbs" else draw_thermostats
+    sensors = TelemetrySettings(seed, at.spin_up_days, station, noise, at.resolution)
     telemetry = generate_telemetry(
-        plant,
-        plans,
-        weather,
-        seed=seed,
-        spin_up_days=spin_up_days,
-        thermostats=draw(seed, len(areas)),
-        station=station,
-        noise=noise,
-        resolution=resolution,
-        progress=progress,
+        plant, plans, weather, sensors, thermostats=draw(seed, len(areas)), progress=progress
     )
     heat = np.array(plant.heat[skipped:])
     truth = TwinTruth(
@@ -200,31 +289,15 @@ def generate_twin(
         disturbance_deviation=deviation,
         disturbance_time=time_constant,
         noise=noise,
-        resolution=resolution,
+        resolution=at.resolution,
         zone_temperatures=np.array(plant.temperatures[skipped:]),
         heat=heat,
         disturbance=disturbance[skipped:],
         states=plant.states,
     )
-    return Case(twin, telemetry if meter == "sensors" else _metered_exactly(telemetry, plant.zone_names, heat)), truth
-
-
-def _check(building: Building, excitation: str, meter: str) -> FloorPlans:
-    """Refuse what no twin can be made of."""
-    for name, word, options in (
-        ("excitation", excitation, ("schedule", "prbs")),
-        ("meter", meter, ("sensors", "exact")),
-    ):
-        if word not in options:
-            raise ThermalError(
-                f"{name}: expected one of {', '.join(options)}, found {word!r}; {nearest(word, options)}"
-            )
-    if not isinstance(building.geometry, FloorPlans):
-        raise ThermalError(
-            f"building {building.name!r}: expected floor plans, found a zone table; "
-            "its terminal units are sized by floor plans"
-        )
-    return building.geometry
+    return Case(
+        twin, telemetry if at.meter == "sensors" else _metered_exactly(telemetry, plant.zone_names, heat)
+    ), truth
 
 
 def _draw_values(seed: int, parameters: tuple[Parameter, ...]) -> dict[str, float]:
@@ -249,7 +322,7 @@ def _draw_conditions(seed: int, ranges: TwinRanges) -> tuple[float, float, float
     return float(drawn[0]), float(drawn[1]), float(drawn[2])
 
 
-def _metered_exactly(telemetry: Telemetry, zones: tuple[str, ...], heat: Series) -> Telemetry:
+def _metered_exactly(telemetry: Telemetry, zones: tuple[str, ...], heat: FloatArray) -> Telemetry:
     """Report the discharge temperatures [K] that belong to the heat and to what the other sensors report."""
     frame = telemetry.frame.copy()
     for number, zone in enumerate(zones):

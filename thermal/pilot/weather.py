@@ -1,17 +1,62 @@
-"""Seeded synthetic weather: a daily cycle under passing fronts and clouds, with sun and sky that belong to it."""
+"""Weather and disturbances of a generated office: random processes drawn from a seed."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
-import numpy.typing as npt
 import pandas as pd
 import pvlib
 from scipy.signal import lfilter
 
-from thermal.case.schema import Location
+from thermal._types import FloatArray
+from thermal.case.building import Location
 from thermal.errors import ThermalError
 
-Series = npt.NDArray[np.float64]
+_STREAM = 4  # of random numbers of a seed
+
+
+def draw_disturbance(
+    seed: int, n_time: int, deviation: FloatArray, time_constant: float, step_seconds: float = 300.0
+) -> FloatArray:
+    """Draw the unmeasured heat of zones: an Ornstein-Uhlenbeck process each, sampled exactly, stationary at once.
+
+    ``d_{k+1} = φ d_k + σ sqrt(1 − φ²) w_k`` with ``φ = exp(−Δt / τ)`` and ``d_0 ~ N(0, σ²)``, so that the
+    autocovariance is ``σ² exp(−|t| / τ)`` at any step (Gillespie 1996, doi:10.1103/PhysRevE.54.2084).
+
+    Parameters
+    ----------
+    seed : int
+        Same seed, same heat; 0 or more.
+    n_time : int
+        Number of steps, at least 1.
+    deviation : numpy.ndarray, shape (n_zone,)
+        Stationary standard deviation σ of each zone [W], 0 or more.
+    time_constant : float
+        Correlation time τ [s], positive.
+    step_seconds : float
+        Length of a step Δt [s], positive.
+
+    Returns
+    -------
+    numpy.ndarray, shape (n_time, n_zone)
+        Heat during each step [W], independent between zones.
+
+    Examples
+    --------
+    >>> draw_disturbance(0, 288, np.array([100.0, 50.0]), 3600.0).shape
+    (288, 2)
+    """
+    if seed < 0 or n_time < 1 or not np.all(np.asarray(deviation) >= 0.0) or min(time_constant, step_seconds) <= 0.0:
+        raise ThermalError(
+            "disturbance: expected a seed of 0 or more, a step, deviations of 0 or more and positive times, found "
+            f"{seed}, {n_time} steps, {np.min(deviation)} W, {time_constant} s and {step_seconds} s"
+        )
+    keep = np.exp(-step_seconds / time_constant)
+    drive = np.random.default_rng([seed, _STREAM]).standard_normal((n_time, len(deviation)))
+    drive[1:] *= np.sqrt(1.0 - keep**2)
+    return np.asarray(deviation * lfilter([1.0], [1.0, -keep], drive, axis=0), dtype=float)
+
 
 #: The town of the paper's pilot building [degrees, m], without daylight saving.
 MOUNTAIN_VIEW = Location(latitude=37.4, longitude=-122.1, elevation=20.0, timezone="Etc/GMT+8")
@@ -27,6 +72,44 @@ _WIND_TIME, _BREEZE, _WIND_MEAN = 3.0 * 3600.0, 0.6, 2.5  # s, -, m/s: a sea bre
 _WIND_FROM, _WIND_VEER = 300.0, 50.0  # deg, the north-westerly of the bay; deg, standard deviation
 _TURBIDITY, _VAPOUR = 0.10, 1.4  # aerosol optical depth at 700 nm [-], precipitable water [cm]: clean coastal air
 _DECIMALS = 3  # of every value that is reported
+
+
+@dataclass(frozen=True)
+class Period:
+    """A stretch of generated telemetry, and what is simulated before it.
+
+    Parameters
+    ----------
+    start : str
+        Local time at which the first reported interval begins, ISO 8601 without offset.
+    days : float
+        Length of the telemetry [d], positive.
+    spin_up_days : float
+        Length that is simulated before it, so that walls and mass forget how they started [d], 0 or more.
+    step_seconds : float
+        Length of an interval [s], positive, up to 3600. The default is the paper's 5 minutes.
+    """
+
+    start: str = "2023-10-02"
+    days: float = 14.0
+    spin_up_days: float = 2.0
+    step_seconds: float = 300.0
+
+    def weather(self, seed: int, location: Location, station: str) -> pd.DataFrame:
+        """Weather of the period and of the spin-up before it, as `generate_weather` gives it.
+
+        Parameters
+        ----------
+        seed : int
+            Same seed, same weather [-]; 0 or more.
+        location : Location
+            Where it is.
+        station : str
+            Entity that reports it.
+        """
+        start = str(pd.Timestamp(self.start) - pd.Timedelta(days=self.spin_up_days))
+        days, step = self.days + self.spin_up_days, self.step_seconds
+        return generate_weather(seed, start=start, days=days, step_seconds=step, location=location, station=station)
 
 
 def generate_weather(
@@ -101,7 +184,7 @@ def generate_weather(
     return pd.DataFrame(reported, index=index)
 
 
-def _process(rng: np.random.Generator, n_time: int, step: float, time_constant: float) -> Series:
+def _process(rng: np.random.Generator, n_time: int, step: float, time_constant: float) -> FloatArray:
     """Stationary second-order autoregressive process of unit variance: smooth from step to step."""
     keep = np.exp(-step / time_constant)
     start = int(np.ceil(8.0 * time_constant / step))
@@ -112,14 +195,14 @@ def _process(rng: np.random.Generator, n_time: int, step: float, time_constant: 
     return np.asarray(twice[start:] / np.sqrt(variance), dtype=float)
 
 
-def _cloud(rng: np.random.Generator, n_time: int, step: float) -> Series:
+def _cloud(rng: np.random.Generator, n_time: int, step: float) -> FloatArray:
     """Share of the sky that is covered [-]."""
     systems = _process(rng, n_time, step, _CLOUD_TIME) + _CLOUDIER
     patches = _PATCHES * _process(rng, n_time, step, _PATCH_TIME)
     return np.asarray(1.0 / (1.0 + np.exp(-1.8 * (systems + patches))), dtype=float)
 
 
-def _air_temperature(rng: np.random.Generator, middle: pd.DatetimeIndex, step: float, cloud: Series) -> Series:
+def _air_temperature(rng: np.random.Generator, middle: pd.DatetimeIndex, step: float, cloud: FloatArray) -> FloatArray:
     """Temperature of the outdoor air [K]: season, day, fronts."""
     day, hour = _clock(middle)
     season = _YEAR_MEAN - _YEAR_SWING * np.cos(2.0 * np.pi * (day - _COLDEST_DAY) / 365.25)
@@ -131,13 +214,13 @@ def _air_temperature(rng: np.random.Generator, middle: pd.DatetimeIndex, step: f
     return np.asarray(season + daily * damping + fronts, dtype=float)
 
 
-def _smooth(cloud: Series, step: float, time_constant: float = 3.0 * 3600.0) -> Series:
+def _smooth(cloud: FloatArray, step: float, time_constant: float = 3.0 * 3600.0) -> FloatArray:
     """Low-pass a series: the air answers to clouds with a delay."""
     keep = np.exp(-step / time_constant)
     return np.asarray(lfilter([1.0 - keep], [1.0, -keep], cloud, zi=[keep * cloud[0]])[0], dtype=float)
 
 
-def _wind(rng: np.random.Generator, middle: pd.DatetimeIndex, step: float) -> dict[str, Series]:
+def _wind(rng: np.random.Generator, middle: pd.DatetimeIndex, step: float) -> dict[str, FloatArray]:
     """Wind speed [m/s] and direction [deg from north]."""
     _, hour = _clock(middle)
     breeze = 1.0 + _BREEZE * np.cos(2.0 * np.pi * (hour - _WARMEST_HOUR - 1.0) / 24.0)
@@ -146,7 +229,7 @@ def _wind(rng: np.random.Generator, middle: pd.DatetimeIndex, step: float) -> di
     return {"wind_speed_sensor": speed, "wind_direction_sensor": np.mod(direction, 360.0)}
 
 
-def _sun(middle: pd.DatetimeIndex, location: Location, cloud: Series) -> dict[str, Series]:
+def _sun(middle: pd.DatetimeIndex, location: Location, cloud: FloatArray) -> dict[str, FloatArray]:
     """Direct normal, diffuse horizontal and global horizontal irradiance [W/m2] in the middle of each interval."""
     position = pvlib.solarposition.get_solarposition(
         middle, location.latitude, location.longitude, altitude=location.elevation
@@ -167,7 +250,7 @@ def _sun(middle: pd.DatetimeIndex, location: Location, cloud: Series) -> dict[st
     }
 
 
-def _sky_radiation(air: Series, cloud: Series, step: float) -> Series:
+def _sky_radiation(air: FloatArray, cloud: FloatArray, step: float) -> FloatArray:
     """Longwave radiation of the sky on the horizontal [W/m2].
 
     ``ε = (0.787 + 0.764 ln(T_dew / 273)) (1 + 0.0224 n - 0.0035 n² + 0.00028 n³)``, n in tenths (Clark and Allen 1978;
@@ -181,7 +264,7 @@ def _sky_radiation(air: Series, cloud: Series, step: float) -> Series:
     return np.asarray(np.minimum(emissivity, 1.0) * _STEFAN_BOLTZMANN * air**4, dtype=float)
 
 
-def _clock(times: pd.DatetimeIndex) -> tuple[Series, Series]:
+def _clock(times: pd.DatetimeIndex) -> tuple[FloatArray, FloatArray]:
     """Day of the year and local hour, both with fractions."""
     hour = times.hour + times.minute / 60.0 + times.second / 3600.0
     return np.asarray(times.day_of_year + hour / 24.0, dtype=float), np.asarray(hour, dtype=float)

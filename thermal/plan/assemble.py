@@ -1,18 +1,97 @@
-"""From floors to the plans of a case: above each other, on one grid, with the areas of the drawings."""
+"""Assembly of floors: alignment one above the other, and the grid that keeps their areas."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.signal import fftconvolve
 
+from thermal._types import FloatArray
 from thermal.case.building import FloorPlan, FloorPlans
-from thermal.case.plan import check_plan
-from thermal.errors import LostRoomError, PlanError, describe
-from thermal.plan.align import align_floors
-from thermal.plan.cells import ZonedFloor, draw_cells, drawn_areas
+from thermal.case.plan import check_plan, zone_floor_areas
+from thermal.errors import LostRoomError, PlanError
+from thermal.plan.cells import ZonedFloor, draw_cells
 from thermal.plan.guard import checked_number
+
+_GRID = 0.1  # m, on which outlines are compared
+_LEAST_OVERLAP = 0.6  # -, of the smaller floor; below it outlines say nothing
+
+
+def align_floors(
+    floors: Sequence[ZonedFloor], anchors: Mapping[str, tuple[float, float]] | None = None
+) -> tuple[ZonedFloor, ...]:
+    """Bring floors above each other.
+
+    Parameters
+    ----------
+    floors : sequence of ZonedFloor
+        Lowest first.
+    anchors : mapping, optional
+        One and the same spot of the building, such as the corner of a lift shaft, as a point of each floor's drawing
+        [px], by floor. Without it the floors are moved until their outlines overlap most.
+
+    Returns
+    -------
+    tuple of ZonedFloor
+        With their offsets from the common origin, the lowest floor's corner.
+
+    Raises
+    ------
+    PlanError
+        Some floors have an anchor and others have none.
+    """
+    anchors = anchors or {}
+    missing = [floor.name for floor in floors if floor.name not in anchors]
+    if anchors and missing:
+        raise PlanError("anchor", "one for each floor, or for none", f"none for {', '.join(missing)}")
+    moved = [replace(floors[0], offset=(0.0, 0.0))]
+    for floor in floors[1:]:
+        if anchors:
+            moved.append(replace(floor, offset=_by_anchor(floors[0], floor, anchors)))
+            continue
+        offset, overlap = _by_outline(floors[0], floor)
+        survey = floor.survey
+        if overlap < _LEAST_OVERLAP:
+            remark = f"its outline covers {overlap:.0%} of the lowest floor's at best; give an anchor for each floor"
+            survey = replace(survey, remarks=(*survey.remarks, remark))
+        moved.append(replace(floor, offset=offset, survey=survey))
+    return tuple(moved)
+
+
+def _by_anchor(base: ZonedFloor, floor: ZonedFloor, anchors: Mapping[str, tuple[float, float]]) -> tuple[float, float]:
+    """Offset at which the anchors fall together."""
+    first, second = (
+        np.array(f.survey.place(anchors[f.name])) * f.survey.pixel + f.survey.pixel / 2.0 for f in (base, floor)
+    )
+    return float(first[0] - second[0]), float(first[1] - second[1])
+
+
+def _by_outline(base: ZonedFloor, floor: ZonedFloor) -> tuple[tuple[float, float], float]:
+    """Offset at which the outlines overlap most, and the share of the smaller that then overlaps."""
+    first, second = (_outline(f) for f in (base, floor))
+    match = fftconvolve(first, second[::-1, ::-1])
+    row, column = np.unravel_index(int(match.argmax()), match.shape)
+    # The peak of a plateau: a smaller floor fits in many places, and the middle of them is the fairest.
+    level = match >= match.max() - 0.5
+    parts = np.argwhere(level)
+    near = parts[np.abs(parts - [row, column]).max(axis=1) <= 0.5 * max(match.shape)]
+    row, column = near.mean(axis=0)
+    shift = (column - (second.shape[1] - 1)) * _GRID, (row - (second.shape[0] - 1)) * _GRID
+    return (float(shift[0]), float(shift[1])), float(match.max() / min(first.sum(), second.sum()))
+
+
+def _outline(floor: ZonedFloor) -> FloatArray:
+    """Mark what is inside the exterior wall, on a grid of its own."""
+    pixel = floor.survey.pixel
+    index = []
+    for count in floor.zones.shape:
+        places = (np.arange(int(np.ceil(count * pixel / _GRID - 1e-6))) + 0.5) * _GRID / pixel
+        index.append(np.minimum(np.floor(places + 1e-6).astype(int), count - 1))
+    inside = floor.zones[np.ix_(*index)] > 0
+    return np.asarray(inside, dtype=float)
+
 
 #: Sides of cells that are tried, largest first [m].
 CELL_SIZES = (0.5, 0.4, 0.25, 0.2, 0.1, 0.05)
@@ -121,7 +200,7 @@ def assemble_plans(
             if cell_size is None:
                 break
             found = f"{size:g} m, which makes {cells / 1e6:.0f} million"
-            raise PlanError(describe("cell_size", f"at most {_MOST_CELLS / 1e6:.0f} million cells", found))
+            raise PlanError("cell_size", f"at most {_MOST_CELLS / 1e6:.0f} million cells", found)
         for phase in np.ndindex(_PHASES, _PHASES):
             try:
                 drawn, corner = draw_cells(placed, size, (phase[0] / _PHASES, phase[1] / _PHASES))
@@ -142,20 +221,17 @@ def assemble_plans(
 
 
 def _area_errors(floors: Sequence[ZonedFloor], plans: Sequence[FloorPlan], cell_size: float) -> dict[str, float]:
-    errors: dict[str, float] = {}
-    for floor, plan in zip(floors, plans, strict=True):
-        wanted, found = floor.areas, drawn_areas(plan, cell_size)
-        errors |= {zone: found.get(zone, 0.0) / wanted[zone] - 1.0 for zone in wanted}
-    return errors
+    found = zone_floor_areas(FloorPlans(cell_size, tuple(plans)))
+    return {zone: found.get(zone, 0.0) / wanted - 1.0 for floor in floors for zone, wanted in floor.areas.items()}
 
 
 def _check_names(floors: Sequence[ZonedFloor]) -> None:
     if not floors:
-        raise PlanError(describe("floors", "at least one", "none"))
+        raise PlanError("floors", "at least one", "none")
     for what, names in (
         ("floor", [floor.name for floor in floors]),
         ("zone", [zone for floor in floors for zone in floor.names]),
     ):
         for name in names:
             if names.count(name) > 1:
-                raise PlanError(describe(f"{what} {name!r}", "a name of its own", "two of that name"))
+                raise PlanError(f"{what} {name!r}", "a name of its own", "two of that name")

@@ -4,32 +4,23 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from os import PathLike
 from pathlib import Path
 
-from thermal.case.schema import DEVICE_TYPES, Device
-from thermal.errors import PlanError, describe, nearest
-from thermal.plan.guard import checked_file
+from thermal.case.building import DEVICE_TYPES, Device
+from thermal.case.migration import certain_feeders
+from thermal.errors import PlanError, nearest
+from thermal.plan.guard import vocabulary
 
 _COLUMNS = {
     "name": ("name", "device", "device_name", "equipment", "equip", "id", "tag", "asset"),
     "type": ("type", "device_type", "class", "kind", "category", "equipment_type"),
     "zone": ("zone", "zone_name", "room", "space", "serves", "location", "area"),
+    "fed_by": ("fed_by", "supplied_by", "parent"),
 }
 
-# Words of the trade, longest first where one is part of another.
-_TYPES: tuple[tuple[str, str], ...] = (
-    (r"fan ?coil|\bfcu?\b", "fan_coil"),
-    (r"\b[rcdv]?vav|variable air volume|\bcav\b|constant air volume|reheat box|terminal unit", "vav"),
-    (r"electric (heater|radiator|baseboard)|unit heater|space heater", "electric_heater"),
-    (r"radiator|baseboard|convector|radiant panel", "radiator"),
-    (r"\bahu\b|air ?hand|roof ?top|\brtu\b|\bdoas\b", "ahu"),
-    (r"boiler", "boiler"),
-    (r"chiller", "chiller"),
-    (r"diffuser|supply air terminal|air terminal|grille", "supply_air_terminal"),
-)
+_TYPES = vocabulary("device_words")
 
 
 @dataclass(frozen=True)
@@ -73,43 +64,12 @@ class DeviceImport:
     points: tuple[ListedPoint, ...] = ()
 
 
-def read_devices(path: str | PathLike[str], zones: Sequence[str]) -> DeviceImport:
-    """Read a list of devices.
-
-    Parameters
-    ----------
-    path : str or path
-        CSV with a column of names and columns of types and zones; a Brick model (``.ttl``); Haystack as JSON or Zinc.
-    zones : sequence of str
-        Zones of the building.
-
-    Returns
-    -------
-    DeviceImport
-        Devices, and what could not be placed.
-
-    Raises
-    ------
-    PlanError
-        The file is missing or of another kind.
-    PlanError
-        It cannot be understood.
-    """
-    file = checked_file(Path(path), (".csv", ".ttl", ".json", ".zinc"))
-    if file.suffix.lower() == ".ttl":
-        from thermal.plan.brick import read_brick
-
-        return read_brick(file, zones)
-    if file.suffix.lower() in (".json", ".zinc"):
-        from thermal.plan.haystack import read_haystack
-
-        return read_haystack(file, zones)
-    rows = _read_rows(file)
-    return import_devices(((r["name"], r.get("type", ""), r.get("zone", "")) for r in rows), zones, file.name)
-
-
 def import_devices(
-    rows: Iterable[tuple[str, str, str]], zones: Sequence[str], where: str, points: Sequence[ListedPoint] = ()
+    rows: Iterable[tuple[str, str, str]],
+    zones: Sequence[str],
+    where: str,
+    points: Sequence[ListedPoint] = (),
+    fed_by: Mapping[str, Sequence[str]] | None = None,
 ) -> DeviceImport:
     """Make devices of names, types and zones.
 
@@ -123,6 +83,8 @@ def import_devices(
         File, for messages.
     points : sequence of ListedPoint
         Points, where the list has them.
+    fed_by : mapping, optional
+        Names of what feeds it, by device, where the list says so; else those that are certain (`certain_feeders`).
 
     Returns
     -------
@@ -144,7 +106,7 @@ def import_devices(
     for number, (name, kind, zone) in enumerate(rows, start=1):
         if name in seen:
             found = f"{name!r}, which device {seen[name]} has too"
-            raise PlanError(describe(f"{where}: device {number}", "a name of its own", found))
+            raise PlanError(f"{where}: device {number}", "a name of its own", found)
         seen[name] = number
         known = device_type(kind or name)
         if known is None:
@@ -154,7 +116,11 @@ def import_devices(
             unplaced[name] = zone
         devices.append(Device(name=name, type=known or kind or "unknown", zone=place[0] if len(place) == 1 else None))
     if not devices:
-        raise PlanError(describe(where, "at least one device", "none"))
+        raise PlanError(where, "at least one device", "none")
+    certain = certain_feeders({device.name: device.type for device in devices})
+    for i, device in enumerate(devices):
+        told = tuple(f for f in dict.fromkeys((fed_by or {}).get(device.name, ())) if f in seen and f != device.name)
+        devices[i] = device.model_copy(update={"fed_by": told or certain.get(device.name, ())})
     return DeviceImport(tuple(devices), unplaced, unknown, tuple(points))
 
 
@@ -181,7 +147,7 @@ def device_type(words: str) -> str | None:
         return plain
     # "VAV_1" and "VAV-F1": signs and digits part words, but not for the pattern's \b.
     plain = " ".join(re.findall(r"[a-z]+", plain))
-    return next((kind for pattern, kind in _TYPES if re.search(pattern, plain)), None)
+    return next((kind for pattern, kind in _TYPES.items() if re.search(pattern, plain)), None)
 
 
 def key(name: str) -> tuple[str, ...]:
@@ -222,7 +188,7 @@ def words_of(name: str) -> list[str]:
     return re.findall(r"[^\W\d_]+|\d+", parted.casefold())
 
 
-def _read_rows(file: Path) -> list[dict[str, str]]:
+def read_rows(file: Path) -> list[dict[str, str]]:
     """Rows of a CSV by what their columns are for."""
     try:
         text = file.read_text(encoding="utf-8-sig")
@@ -232,9 +198,9 @@ def _read_rows(file: Path) -> list[dict[str, str]]:
             row for row in csv.reader(text.splitlines(), delimiter=sign, strict=True) if any(x.strip() for x in row)
         ]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise PlanError(describe(file.name, "a CSV in UTF-8 with a header", str(error))) from error
+        raise PlanError(file.name, "a CSV in UTF-8 with a header", str(error)) from error
     if not rows:
-        raise PlanError(describe(file.name, "a header and a row a device", "an empty file"))
+        raise PlanError(file.name, "a header and a row a device", "an empty file")
     header = ["_".join(words_of(cell)) for cell in rows[0]]
     found: dict[str, int] = {}
     for use, names in _COLUMNS.items():
@@ -243,14 +209,13 @@ def _read_rows(file: Path) -> list[dict[str, str]]:
             found[use] = places[0]
     if "name" not in found:
         advice = nearest(header[0], _COLUMNS["name"])
-        raise PlanError(describe(f"{file.name}: header", "a column 'name'", ", ".join(header[:6]), advice))
+        raise PlanError(f"{file.name}: header", "a column 'name'", ", ".join(header[:6]), advice)
     result = []
     for number, row in enumerate(rows[1:], start=2):
         if len(row) != len(header):
-            expected = f"{len(header)} cells as in the header"
-            raise PlanError(describe(f"{file.name}: row {number}", expected, f"{len(row)}"))
+            raise PlanError(f"{file.name}: row {number}", f"{len(header)} cells as in the header", f"{len(row)}")
         entry = {use: row[place].strip() for use, place in found.items()}
         if not entry["name"]:
-            raise PlanError(describe(f"{file.name}: row {number}", "the name of a device", "a blank"))
+            raise PlanError(f"{file.name}: row {number}", "the name of a device", "a blank")
         result.append(entry)
     return result

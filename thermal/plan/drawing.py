@@ -1,7 +1,8 @@
-"""Raster drawings: PNG, JPEG and pages of a PDF, as an array of grey."""
+"""Drawings as grey pixels, and their scale."""
 
 from __future__ import annotations
 
+import math
 import re
 import subprocess
 import tempfile
@@ -13,9 +14,127 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal.errors import MissingExtraError, OversizedFileError, PlanError, describe
-from thermal.plan.extra import extra
-from thermal.plan.guard import check_pixels, checked_file, checked_number
+from thermal.errors import MissingExtraError, OversizedFileError, PlanError
+from thermal.plan.guard import check_pixels, checked_file, checked_number, extra
+
+Point = tuple[float, float]
+
+#: Range of scales that are believed [m/px]: a detail at 1:20 and 600 dots per inch, walls of one pixel.
+FINEST, COARSEST = 5e-4, 0.5
+
+
+def scale_from_points(first: Point, second: Point, distance: float) -> float:
+    """Scale of a drawing from two points of it, two clicks, and how far apart they are in the building.
+
+    Parameters
+    ----------
+    first, second : tuple of float
+        Column and row of each [px].
+    distance : float
+        Between them [m].
+
+    Returns
+    -------
+    float
+        [m/px].
+
+    Raises
+    ------
+    PlanError
+        The points coincide, the distance is not positive, or no building is drawn at that scale.
+
+    Examples
+    --------
+    >>> scale_from_points((100, 50), (500, 50), 8.0)
+    0.02
+    """
+    numbers = (*first, *second, distance)
+    if not all(math.isfinite(x) for x in numbers):
+        raise PlanError("scale", "two points and a distance, finite", repr(numbers))
+    return scale_from_length(math.dist(first, second), distance)
+
+
+def scale_from_length(pixels: float, length: float) -> float:
+    """Scale of a drawing from a length on it that is known, such as a dimension line's.
+
+    Parameters
+    ----------
+    pixels : float
+        Length on the drawing [px].
+    length : float
+        The same in the building [m].
+
+    Returns
+    -------
+    float
+        [m/px].
+
+    Raises
+    ------
+    PlanError
+        One is not positive, or no building is drawn at that scale.
+
+    Examples
+    --------
+    >>> scale_from_length(500.0, 12.5)
+    0.025
+    """
+    if not (pixels > 0 and length > 0):
+        raise PlanError("scale", "a positive length in px and in m", f"{pixels} px and {length} m")
+    return checked_scale(length / pixels)
+
+
+def scale_from_paper(ratio: float, dots_per_inch: float) -> float:
+    """Scale of a page that was printed to scale.
+
+    Parameters
+    ----------
+    ratio : float
+        100 for 1:100 [-].
+    dots_per_inch : float
+        Resolution of the drawing [1/inch].
+
+    Returns
+    -------
+    float
+        [m/px].
+
+    Raises
+    ------
+    PlanError
+        One is not positive, or no building is drawn at that scale.
+
+    Examples
+    --------
+    >>> round(scale_from_paper(100, 150), 5)
+    0.01693
+    """
+    return scale_from_length(dots_per_inch, 0.0254 * ratio)
+
+
+def checked_scale(metres_per_pixel: float) -> float:
+    """Refuse a scale at which no building is drawn.
+
+    Parameters
+    ----------
+    metres_per_pixel : float
+        Scale [m/px].
+
+    Returns
+    -------
+    float
+        The same [m/px].
+
+    Raises
+    ------
+    PlanError
+        It is out of the range of plans.
+    """
+    if not FINEST <= metres_per_pixel <= COARSEST:
+        advice = "are points in pixels and distances in metres?"
+        raise PlanError("scale", f"{FINEST:g} to {COARSEST:g} m for a pixel", f"{metres_per_pixel:g} m", advice)
+    return metres_per_pixel
+
 
 RASTER_KINDS = (".png", ".jpg", ".jpeg", ".pdf")
 
@@ -84,7 +203,7 @@ def read_drawing(
     """
     file = checked_file(Path(path), RASTER_KINDS)
     if isinstance(page, bool) or not isinstance(page, int) or page < 1:
-        raise PlanError(describe("page", "a number from 1", repr(page)))
+        raise PlanError("page", "a number from 1", repr(page))
     if file.suffix.lower() == ".pdf":
         dpi: float | None = checked_number(dots_per_inch, "dots_per_inch", 20.0, 600.0, "1/inch")
         grey, source = _pdf_page(file, page, dots_per_inch), f"{file.name} page {page}"
@@ -112,11 +231,10 @@ def _image(file: Path) -> NDArray[np.uint8]:
                     image = image.point(lambda value: value / 256.0).convert("L")
                 return np.asarray(image.convert("L"), dtype=np.uint8)
         except (image_of.DecompressionBombError, MemoryError) as error:
-            raise OversizedFileError(describe(file.name, "an image of a plan", str(error), "export it anew")) from error
+            raise OversizedFileError(file.name, "an image of a plan", str(error), "export it anew") from error
         except (OSError, SyntaxError, ValueError, TypeError) as error:  # Pillow has all of them for damaged files
-            expected = f"a whole {file.suffix[1:].upper()} image"
             found = " ".join(str(error).replace(str(file), file.name).split())
-            raise PlanError(describe(file.name, expected, found)) from error
+            raise PlanError(file.name, f"a whole {file.suffix[1:].upper()} image", found) from error
 
 
 def _pdf_page(file: Path, page: int, dpi: float) -> NDArray[np.uint8]:
@@ -125,8 +243,7 @@ def _pdf_page(file: Path, page: int, dpi: float) -> NDArray[np.uint8]:
     size = re.search(r"^Page\s+\d+ size:\s+([\d.e+]+) x ([\d.e+]+) pts", report, re.MULTILINE)
     pages = re.search(r"^Pages:\s+(\d+)", report, re.MULTILINE)
     if size is None or pages is None or int(pages[1]) < page:
-        found = f"{pages[1]} pages" if pages else "none"
-        raise PlanError(describe(file.name, f"a page {page}", found))
+        raise PlanError(file.name, f"a page {page}", f"{pages[1]} pages" if pages else "none")
     check_pixels(float(size[1]) * dpi / 72.0, float(size[2]) * dpi / 72.0, f"{file.name} page {page}")
     with tempfile.TemporaryDirectory() as folder:
         target = Path(folder) / "page"
@@ -134,7 +251,7 @@ def _pdf_page(file: Path, page: int, dpi: float) -> NDArray[np.uint8]:
         _poppler(["pdftoppm", "-r", f"{dpi:g}", *pages_wanted, "-gray", "-png", str(file), str(target)], file)
         drawn = target.with_suffix(".png")
         if not drawn.is_file():
-            raise PlanError(describe(file.name, f"a page {page} that can be drawn", "nothing drawn"))
+            raise PlanError(file.name, f"a page {page} that can be drawn", "nothing drawn")
         return _image(drawn)
 
 
@@ -144,13 +261,13 @@ def _poppler(command: list[str], file: Path) -> str:
         done = subprocess.run(command, capture_output=True, timeout=_PATIENCE, check=False)
     except FileNotFoundError as error:
         advice = "run: apt install poppler-utils"
-        raise MissingExtraError(describe("plan import", f"the program {command[0]!r}", "none", advice)) from error
+        raise MissingExtraError("plan import", f"the program {command[0]!r}", "none", advice) from error
     except subprocess.TimeoutExpired as error:
         expected = f"a page that is drawn within {_PATIENCE:.0f} s"
-        raise OversizedFileError(describe(file.name, expected, "one that takes longer", "export it anew")) from error
+        raise OversizedFileError(file.name, expected, "one that takes longer", "export it anew") from error
     if done.returncode != 0:
         found = " ".join(done.stderr.decode(errors="replace").replace(str(file), file.name).split())[:200]
-        raise PlanError(describe(file.name, "a whole PDF file with that page", found or "an error"))
+        raise PlanError(file.name, "a whole PDF file with that page", found or "an error")
     return done.stdout.decode(errors="replace")
 
 
@@ -158,6 +275,5 @@ def _checked_crop(crop: tuple[int, int, int, int], shape: tuple[int, ...]) -> tu
     """Refuse a crop that is no part of the drawing."""
     whole = len(crop) == 4 and all(isinstance(x, int) and not isinstance(x, bool) for x in crop)
     if not whole or not (0 <= crop[0] < crop[2] <= shape[1] and 0 <= crop[1] < crop[3] <= shape[0]):
-        expected = f"left, top, right, bottom within {shape[1]} x {shape[0]} px"
-        raise PlanError(describe("crop", expected, repr(tuple(crop))))
+        raise PlanError("crop", f"left, top, right, bottom within {shape[1]} x {shape[0]} px", repr(tuple(crop)))
     return crop

@@ -1,11 +1,42 @@
-"""What no file may be: missing, larger than a real plan, of another kind than its name says, outside of its folder."""
+"""Guards of the import: files, numbers and packages that it is given."""
 
 from __future__ import annotations
 
+import importlib
 import math
+from functools import cache
 from pathlib import Path
+from typing import Any
 
-from thermal.errors import OversizedFileError, PlanError, describe
+import yaml
+
+from thermal.errors import MissingExtraError, OversizedFileError, PlanError
+
+
+def extra(module: str) -> Any:
+    """Import a module of the extra ``[plan]``.
+
+    Parameters
+    ----------
+    module : str
+        Its full name.
+
+    Returns
+    -------
+    module
+        The module.
+
+    Raises
+    ------
+    MissingExtraError
+        It is not installed; the message has the line that adds it.
+    """
+    try:
+        return importlib.import_module(module)
+    except ImportError as error:
+        advice = 'run: pip install "buildingmpc[plan]"'
+        raise MissingExtraError("plan import", f"the package {module!r}", str(error), advice) from error
+
 
 #: Largest file that is opened [bytes]: a scan of a large sheet has some 20 MB.
 MOST_BYTES = 100_000_000
@@ -22,6 +53,24 @@ _SIGNATURES: dict[str, tuple[bytes, ...]] = {
     ".npy": (b"\x93NUMPY",),
     ".npz": (b"PK\x03\x04",),
 }
+
+
+@cache
+def vocabulary(section: str) -> dict[str, Any]:
+    """Words of other lists and what they mean in the case format, from ``vocabulary.yaml`` of the package's data.
+
+    Parameters
+    ----------
+    section : str
+        Part of the file, such as ``brick_points``.
+
+    Returns
+    -------
+    dict
+        Meaning, or weight [-], by word, in the order of the file.
+    """
+    content = yaml.safe_load((Path(__file__).parents[1] / "data" / "vocabulary.yaml").read_text(encoding="utf-8"))
+    return dict(content[section])
 
 
 def checked_file(path: Path, kinds: tuple[str, ...]) -> Path:
@@ -48,26 +97,25 @@ def checked_file(path: Path, kinds: tuple[str, ...]) -> Path:
     """
     suffix = path.suffix.lower()
     if suffix not in kinds:
-        expected = f"a file that ends in {', '.join(kinds)}"
         advice = "unpack it first" if suffix == ".zip" else ""
-        raise PlanError(describe(path.name, expected, repr(suffix or path.name), advice))
+        raise PlanError(path.name, f"a file that ends in {', '.join(kinds)}", repr(suffix or path.name), advice)
     try:
         if not path.is_file():
-            raise PlanError(describe(str(path), "a file", "a folder" if path.is_dir() else "nothing"))
+            raise PlanError(str(path), "a file", "a folder" if path.is_dir() else "nothing")
         size = path.stat().st_size
         if size > MOST_BYTES:
             found = f"{size / 1e6:.0f} MB"
-            raise OversizedFileError(describe(path.name, f"at most {MOST_BYTES / 1e6:.0f} MB", found, "export it anew"))
+            raise OversizedFileError(path.name, f"at most {MOST_BYTES / 1e6:.0f} MB", found, "export it anew")
         with path.open("rb") as stream:
             start = stream.read(1024)
     except (OSError, ValueError) as error:  # ValueError: a NUL in the name
-        raise PlanError(describe(path.name, "a file that can be read", str(error))) from error
+        raise PlanError(path.name, "a file that can be read", str(error)) from error
     known = _SIGNATURES.get(suffix)
     # A PDF may have some bytes before its signature (ISO 32000-1, annex H, note 13).
     fits = known is None or (known[0] in start if suffix == ".pdf" else start.startswith(known))
     if not fits or not start:
         found = f"a file that begins with {start[:8]!r}" if start else "an empty file"
-        raise PlanError(describe(path.name, f"a {suffix[1:].upper()} file", found, "export the drawing anew"))
+        raise PlanError(path.name, f"a {suffix[1:].upper()} file", found, "export the drawing anew")
     return path.absolute()
 
 
@@ -89,7 +137,7 @@ def check_pixels(columns: float, rows: float, where: str) -> None:
     if not 0 < columns * rows <= MOST_PIXELS:
         expected = f"1 to {MOST_PIXELS / 1e6:.0f} million pixels"
         found = f"{columns:.0f} x {rows:.0f} = {columns * rows / 1e6:.0f} million"
-        raise OversizedFileError(describe(where, expected, found, "export it at fewer dots per inch"))
+        raise OversizedFileError(where, expected, found, "export it at fewer dots per inch")
 
 
 def inside_folder(folder: Path, name: str, where: str) -> Path:
@@ -118,10 +166,9 @@ def inside_folder(folder: Path, name: str, where: str) -> Path:
         target = (folder / name).resolve()
         inside = target.is_relative_to(folder.resolve())
     except (OSError, ValueError, RuntimeError) as error:  # a NUL, a name too long, links in a circle
-        raise PlanError(describe(where, "the name of a file", repr(name))) from error
+        raise PlanError(where, "the name of a file", repr(name)) from error
     if not inside:
-        advice = "copy the file beside the list"
-        raise PlanError(describe(where, "a file in the folder of the list", repr(name), advice))
+        raise PlanError(where, "a file in the folder of the list", repr(name), "copy the file beside the list")
     return target
 
 
@@ -151,5 +198,5 @@ def checked_number(value: object, name: str, lowest: float, highest: float, unit
     """
     is_number = isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
     if not is_number or not lowest <= float(value) <= highest:  # type: ignore[arg-type]
-        raise PlanError(describe(name, f"a number from {lowest:g} to {highest:g} {unit}", repr(value)))
+        raise PlanError(name, f"a number from {lowest:g} to {highest:g} {unit}", repr(value))
     return float(value)  # type: ignore[arg-type]

@@ -1,4 +1,4 @@
-"""From grey to ink: what is drawn, upright, at a resolution that its walls need."""
+"""Ink of a drawing, and the walls among it."""
 
 from __future__ import annotations
 
@@ -10,10 +10,75 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from thermal._types import BoolArray, FloatArray
-from thermal.errors import PlanError, describe
+from thermal.errors import PlanError
 from thermal.plan.drawing import Drawing
-from thermal.plan.extra import extra
-from thermal.plan.guard import check_pixels
+from thermal.plan.guard import check_pixels, extra
+from thermal.plan.survey import PlanSettings
+
+_SPECK = 0.35  # m: smaller pieces of ink that stand alone are letters and symbols, not piers between doors
+
+
+def walls_of(ink: BoolArray, pixel: float, settings: PlanSettings) -> BoolArray:
+    """Find the walls in what is drawn.
+
+    Parameters
+    ----------
+    ink : ndarray of bool, shape (n_row, n_col)
+        What is drawn.
+    pixel : float
+        Side of an element [m].
+    settings : PlanSettings
+        What counts as a wall.
+
+    Returns
+    -------
+    ndarray of bool, shape (n_row, n_col)
+        Solid walls, with gaps at doors.
+    """
+    solid = _fill_narrow(ink, pixel, settings.thickest_wall)
+    least = settings.thinnest_wall / pixel
+    if least > 2.0:
+        # A stroke of n pixels has distances up to (n + 1) / 2 to the nearest pixel beside it, a ragged one half less.
+        reach = least / 2.0
+        core = ndimage.distance_transform_edt(solid) >= reach - 1e-6
+        solid = ndimage.distance_transform_edt(~core) < reach - 1e-6 if core.any() else core
+    return _without_specks(solid, pixel)
+
+
+def _fill_narrow(ink: BoolArray, pixel: float, width: float) -> BoolArray:
+    """Fill closed spaces that are nowhere wider than a wall: between its faces, between the panes of a window.
+
+    Parameters
+    ----------
+    ink : ndarray of bool, shape (n_row, n_col)
+        What is drawn.
+    pixel : float
+        Side of an element [m].
+    width : float
+        Of the widest space to fill [m].
+
+    Returns
+    -------
+    ndarray of bool, shape (n_row, n_col)
+        Ink and what was filled.
+    """
+    framed = np.pad(ink, 1)
+    spaces, count = ndimage.label(~framed)
+    depth = ndimage.maximum(ndimage.distance_transform_edt(~framed), spaces, np.arange(count + 1))
+    narrow = 2.0 * np.asarray(depth) * pixel <= width + 2.0 * pixel
+    narrow[[0, spaces[0, 0]]] = False
+    filled: BoolArray = framed | narrow[spaces]
+    return filled[1:-1, 1:-1]
+
+
+def _without_specks(ink: BoolArray, pixel: float) -> BoolArray:
+    pieces, _ = ndimage.label(ink, np.ones((3, 3)))
+    keep = [False]
+    for rows, columns in ndimage.find_objects(pieces):
+        keep.append(np.hypot(rows.stop - rows.start, columns.stop - columns.start) * pixel >= _SPECK)
+    kept: BoolArray = np.asarray(keep)[pieces]
+    return kept
+
 
 #: Side of a pixel that a drawing is worked on at [m]: a partition of 75 mm is four; coarser drawings are refined.
 FINE, COARSE = 0.02, 0.025
@@ -126,7 +191,7 @@ def _cover(drawing: Drawing, block: int) -> FloatArray:
     contrast = int(grey.max()) - int(grey.min()) if grey.size else 0
     if contrast < _LEAST_CONTRAST:
         found = f"one shade of grey (contrast {contrast} of 255)"
-        raise PlanError(describe(drawing.source, "walls darker than the paper", found, "is the drawing blank?"))
+        raise PlanError(drawing.source, "walls darker than the paper", found, "is the drawing blank?")
     threshold = float(extra("skimage.filters").threshold_otsu(grey))
     dark = grey <= threshold
     light, black = float(grey[~dark].mean()), float(grey[dark].mean())

@@ -9,18 +9,23 @@ from typing import Annotated, Any, Literal
 import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from thermal.case.schema import Location
-from thermal.errors import PlanError, describe
+from thermal.case.building import Location
+from thermal.errors import PlanError
 from thermal.plan.assemble import PlanImport, Progress, assemble_plans
-from thermal.plan.cells import ZonedFloor
-from thermal.plan.codes import CODE_KINDS, read_codes
-from thermal.plan.drawing import DOTS_PER_INCH, RASTER_KINDS, Drawing, read_drawing
+from thermal.plan.cells import ZonedFloor, propose_zones
+from thermal.plan.drawing import (
+    DOTS_PER_INCH,
+    RASTER_KINDS,
+    Drawing,
+    read_drawing,
+    scale_from_length,
+    scale_from_paper,
+    scale_from_points,
+)
 from thermal.plan.guard import checked_file, inside_folder
 from thermal.plan.rooms import find_rooms
-from thermal.plan.scale import scale_from_length, scale_from_paper, scale_from_points
-from thermal.plan.survey import FloorSurvey, PlanSettings
+from thermal.plan.survey import CODE_KINDS, FloorSurvey, PlanSettings, read_codes
 from thermal.plan.vector import VECTOR_KINDS, read_dxf
-from thermal.plan.zones import propose_zones
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Point = tuple[Finite, Finite]
@@ -87,10 +92,10 @@ class DrawingScale(_Entry):
             return scale_from_length(1.0, self.metres_per_pixel)
         if given == ["paper"] and self.paper is not None:
             if drawing.dots_per_inch is None:
-                raise PlanError(describe(f"{drawing.source}: scale", "a page of a PDF for 'paper'", "an image"))
+                raise PlanError(f"{drawing.source}: scale", "a page of a PDF for 'paper'", "an image")
             return scale_from_paper(self.paper, drawing.dots_per_inch)
         expected = "points and distance, or pixels and length, or paper, or metres_per_pixel"
-        raise PlanError(describe(f"{drawing.source}: scale", expected, ", ".join(given) or "none"))
+        raise PlanError(f"{drawing.source}: scale", expected, ", ".join(given) or "none")
 
 
 class FloorEntry(_Entry):
@@ -200,21 +205,21 @@ def read_drawing_list(path: str | PathLike[str]) -> DrawingList:
     """
     file = checked_file(Path(path), (".yaml", ".yml"))
     if file.stat().st_size > _MOST_YAML:
-        raise PlanError(describe(file.name, f"at most {_MOST_YAML} bytes", f"{file.stat().st_size}"))
+        raise PlanError(file.name, f"at most {_MOST_YAML} bytes", f"{file.stat().st_size}")
     try:
         text = file.read_text(encoding="utf-8-sig")
         if any(isinstance(event, yaml.AliasEvent) for event in yaml.parse(text, Loader=yaml.SafeLoader)):
-            raise PlanError(describe(file.name, "YAML without aliases ('*')", "one", "write it out"))
+            raise PlanError(file.name, "YAML without aliases ('*')", "one", "write it out")
         content: Any = yaml.safe_load(text)
     except (OSError, UnicodeDecodeError, yaml.YAMLError, ValueError, RecursionError) as error:
-        raise PlanError(describe(file.name, "YAML in UTF-8", " ".join(str(error).split()))) from error
+        raise PlanError(file.name, "YAML in UTF-8", " ".join(str(error).split())) from error
     try:
         return DrawingList.model_validate(content)
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         where = f"{file.name}: {'.'.join(str(part) for part in first['loc']) or 'content'}"
         found = repr(first["input"])
-        raise PlanError(describe(where, first["msg"], found[:80])) from error
+        raise PlanError(where, first["msg"], found[:80]) from error
 
 
 def import_drawings(path: str | PathLike[str], *, progress: Progress | None = None) -> PlanImport:
@@ -279,16 +284,15 @@ def _survey(entry: FloorEntry, file: Path) -> FloorSurvey:
     kind = file.suffix.lower()
     if kind in CODE_KINDS:
         if entry.cell_size is None:
-            raise PlanError(describe(f"{file.name}: cell_size", "the side of a cell in metres", "none"))
+            raise PlanError(f"{file.name}: cell_size", "the side of a cell in metres", "none")
         return read_codes(file, entry.cell_size)
     if kind in VECTOR_KINDS:
         layers = {"wall_layers": entry.wall_layers, "room_layers": entry.room_layers}
         return read_dxf(file, unit=entry.unit, **layers, settings=settings, straighten=entry.straighten)
     if kind not in RASTER_KINDS:
-        expected = f"a drawing: {', '.join((*RASTER_KINDS, *VECTOR_KINDS, *CODE_KINDS))}"
-        raise PlanError(describe(file.name, expected, repr(kind)))
+        raise PlanError(file.name, f"a drawing: {', '.join((*RASTER_KINDS, *VECTOR_KINDS, *CODE_KINDS))}", repr(kind))
     drawing = read_drawing(file, page=entry.page, dots_per_inch=entry.dots_per_inch, crop=entry.crop)
     if entry.scale is None:
         advice = "give two points of the drawing and their distance"
-        raise PlanError(describe(f"{file.name}: scale", "the scale of the drawing", "none", advice))
+        raise PlanError(f"{file.name}: scale", "the scale of the drawing", "none", advice)
     return find_rooms(drawing, entry.scale.of(drawing), settings=settings, straighten=entry.straighten)

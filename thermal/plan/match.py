@@ -1,87 +1,31 @@
-"""Columns of telemetry matched to devices and point types by their names."""
+"""Matching of telemetry columns to devices and points, and the list of matches."""
 
 from __future__ import annotations
 
+import csv
 import difflib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from os import PathLike
+from pathlib import Path
 
-from thermal.case.points import POINT_TYPES
-from thermal.case.schema import Device
+from thermal.case.building import Device
+from thermal.case.case import Case
+from thermal.case.load import load_case
+from thermal.case.points import POINT_TYPES, point_type
+from thermal.case.telemetry import INDEX, check_units, read_telemetry
+from thermal.errors import PlanError
 from thermal.plan.devices import ListedPoint, key, words_of
+from thermal.plan.guard import checked_file, vocabulary
+from thermal.units import QUANTITIES
 
 _LEAST = 0.5  # -, of the confidence of a match that is offered
 _ALIKE = 0.85  # -, of two names that differ by a slip of the pen
 
 # What names in building automation stand for, in the words of the point types.
-_SHORT = {
-    "zat": "zone air temperature",
-    "znt": "zone air temperature",
-    "rmt": "zone air temperature",
-    "dat": "discharge air temperature",
-    "sat": "supply air temperature",
-    "rat": "return air temperature",
-    "mat": "mixed air temperature",
-    "oat": "outside air temperature",
-    "hwst": "supply water temperature",
-    "hwrt": "return water temperature",
-    "zn": "zone",
-    "room": "zone",
-    "rm": "zone",
-    "space": "zone",
-    "spc": "zone",
-    "da": "discharge air",
-    "sa": "supply air",
-    "ra": "return air",
-    "ma": "mixed air",
-    "oa": "outside air",
-    "outdoor": "outside",
-    "ambient": "outside air",
-    "hw": "water",
-    "hws": "supply water",
-    "hwr": "return water",
-    "temp": "temperature",
-    "tmp": "temperature",
-    "t": "temperature",
-    "airflow": "air flowrate",
-    "flow": "flowrate",
-    "flw": "flowrate",
-    "cfm": "air flowrate",
-    "sp": "setpoint",
-    "stpt": "setpoint",
-    "spt": "setpoint",
-    "htg": "heating",
-    "heat": "heating",
-    "clg": "cooling",
-    "cool": "cooling",
-    "dmp": "damper",
-    "dmpr": "damper",
-    "dpr": "damper",
-    "vlv": "valve",
-    "reheat": "heating valve",
-    "pos": "command",
-    "position": "command",
-    "cmd": "command",
-    "pct": "percentage",
-    "percent": "percentage",
-    "kw": "power",
-    "elec": "electrical",
-    "occ": "occupancy",
-    "people": "occupancy count",
-    "ghi": "global horizontal irradiance",
-    "dni": "direct normal irradiance",
-    "dhi": "diffuse horizontal irradiance",
-}
+_SHORT = vocabulary("abbreviations")
 # Words that say little: many names leave them out.
-_WEIGHTS = {
-    "sensor": 0.1,
-    "air": 0.4,
-    "percentage": 0.1,
-    "command": 0.4,
-    "concentration": 0.1,
-    "supply": 0.6,
-    "count": 0.4,
-}
+_WEIGHTS = vocabulary("weights")
 _TERMINALS = frozenset({"vav", "fan_coil", "supply_air_terminal"})
 
 
@@ -243,4 +187,149 @@ def _point(words: Sequence[str], kind: str) -> tuple[str, float]:
 
 
 def _weight(words: set[str]) -> float:
-    return sum(_WEIGHTS.get(word, 1.0) for word in words)
+    return sum(float(_WEIGHTS.get(word, 1.0)) for word in words)
+
+
+_HEADER = ("column", "entity", "point", "confidence", "remark")
+
+
+def read_columns(path: str | PathLike[str]) -> tuple[str, ...]:
+    """Read the names of the columns of a telemetry file, without its values.
+
+    Parameters
+    ----------
+    path : str or path
+        CSV or Parquet.
+
+    Returns
+    -------
+    tuple of str
+        All but the first of a CSV, and all but ``timestamp``.
+
+    Raises
+    ------
+    PlanError
+        The file is missing or neither.
+    """
+    file = checked_file(Path(path), (".csv", ".parquet"))
+    try:
+        if file.suffix.lower() == ".csv":
+            with file.open(encoding="utf-8-sig", newline="") as stream:
+                names = next(csv.reader(stream, strict=True), [])[1:]
+        else:
+            from pyarrow import parquet
+
+            names = [str(name) for name in parquet.read_schema(file).names]
+    except (OSError, UnicodeDecodeError, ValueError, csv.Error) as error:
+        raise PlanError(file.name, "telemetry with one column a point", " ".join(str(error).split())[:200]) from error
+    return tuple(name for name in names if name not in (INDEX, "__index_level_0__"))
+
+
+def write_matches(matches: Sequence[PointMatch], path: str | PathLike[str]) -> Path:
+    """Write what columns were matched to as CSV.
+
+    Parameters
+    ----------
+    matches : sequence of PointMatch
+        From `match_points`.
+    path : str or path
+        File to write.
+
+    Returns
+    -------
+    Path
+        The file: column, entity, point, confidence, remark.
+    """
+    file = Path(path)
+    with file.open("w", encoding="utf-8", newline="") as stream:
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerow(_HEADER)
+        writer.writerows([m.column, m.entity, m.point, f"{m.confidence:.3f}", m.remark] for m in matches)
+    return file
+
+
+def read_matches(path: str | PathLike[str]) -> tuple[PointMatch, ...]:
+    """Read what columns were matched to, as a person has corrected it.
+
+    Parameters
+    ----------
+    path : str or path
+        CSV of `write_matches`: columns ``column``, ``entity`` and ``point``; others are not needed.
+
+    Returns
+    -------
+    tuple of PointMatch
+        One a row. A row with a remark, or without an entity or a point, is a column that is left out.
+
+    Raises
+    ------
+    PlanError
+        The file is missing or no CSV.
+    PlanError
+        A column of it is missing, or a row names a column without a name.
+    """
+    file = checked_file(Path(path), (".csv",))
+    try:
+        with file.open(encoding="utf-8-sig", newline="") as stream:
+            reader = csv.DictReader(stream, strict=True)
+            rows, header = list(reader), tuple(reader.fieldnames or ())
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise PlanError(file.name, "a CSV in UTF-8", " ".join(str(error).split())[:200]) from error
+    if not {*_HEADER[:3]} <= {*header}:
+        raise PlanError(file.name, f"columns {', '.join(_HEADER[:3])}", ", ".join(header) or "none")
+    matches = []
+    for number, row in enumerate(rows, start=2):
+        column, entity, point = ((row[name] or "").strip() for name in _HEADER[:3])
+        if not column:
+            raise PlanError(f"{file.name}: line {number}", "the name of a column", "none")
+        remark = (row.get("remark") or "").strip() or ("" if entity and point else "left out")
+        matches.append(PointMatch(column, entity, point, 1.0, remark))
+    return tuple(matches)
+
+
+def with_telemetry(
+    path: str | PathLike[str],
+    file: str | PathLike[str],
+    matches: Sequence[PointMatch],
+    units: Mapping[str, str] | None = None,
+) -> Case:
+    """Load a case and give it other telemetry.
+
+    Parameters
+    ----------
+    path : str or path
+        Case folder.
+    file : str or path
+        CSV or Parquet: a column ``timestamp`` of ISO 8601 with offset, and a column a point under any name.
+    matches : sequence of PointMatch
+        What its columns are; those without an entity or a point, or with a remark, are left out.
+    units : mapping of str to str, optional
+        Unit in the file by point type; those of the case format's table for the rest.
+
+    Returns
+    -------
+    Case
+        Not saved yet, which is when its columns are held against its devices.
+
+    Raises
+    ------
+    PlanError
+        No column is matched, or the file lacks one that is.
+    CaseError
+        One of its family: the case does not load, or values cannot be read.
+    """
+    case = load_case(path)
+    source = checked_file(Path(file), (".csv", ".parquet"))
+    names = {match.column: f"{match.entity}/{match.point}" for match in matches if match.point and not match.remark}
+    if not names:
+        raise PlanError(source.name, "a column that is matched to a point", "none", "see points.csv")
+    lacking = sorted(names.keys() - {*read_columns(source)})
+    if lacking:
+        found = f"no {lacking[0]!r}" + (f" and {len(lacking) - 1} more" if len(lacking) > 1 else "")
+        raise PlanError(source.name, "the columns of the list of points", found)
+    given = dict(units or {})
+    check_units(given)
+    points = {m.point: point_type(m.point, f"points: {m.column!r}") for m in matches if m.column in names}
+    usual = {point: QUANTITIES[kind.quantity].file_unit for point, kind in points.items()}
+    telemetry = read_telemetry(source, usual | given, case.building.location, names)
+    return replace(case, telemetry=telemetry, judged=None)

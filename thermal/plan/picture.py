@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from thermal.case.schema import Device
+from thermal.case.building import Device
 from thermal.plan.assemble import AREA_TOLERANCE, PlanImport
 from thermal.plan.cells import ZonedFloor, split_walls
 from thermal.plan.devices import DeviceImport
-from thermal.plan.extra import extra
+from thermal.plan.guard import extra
 from thermal.plan.survey import OUTSIDE_LABEL, WALL_LABEL
 
 _WIDEST = 1600  # px of the picture's ground; text and marks are drawn as vectors

@@ -1,15 +1,21 @@
-"""What was understood of one floor's drawing: walls, rooms, doors, and how large all of it is."""
+"""Survey of a floor: settings, rooms and doors, and surveys from arrays of codes."""
 
 from __future__ import annotations
 
+import csv
+import zipfile
 from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
+from scipy import ndimage
 
 from thermal._types import FloatArray, Int32Array
-from thermal.errors import PlanError
-from thermal.plan.guard import checked_number
+from thermal.errors import OversizedFileError, PlanError
+from thermal.plan.guard import MOST_BYTES, check_pixels, checked_file, checked_number
 
 #: Labels of what is no room.
 OUTSIDE_LABEL, WALL_LABEL = -1, 0
@@ -169,3 +175,184 @@ class FloorSurvey:
         column, row = (round(x) for x in self.place(point))
         n_row, n_col = self.labels.shape
         return int(self.labels[row, column]) if 0 <= row < n_row and 0 <= column < n_col else OUTSIDE_LABEL
+
+
+def finish(
+    labels: Int32Array,
+    pixel: float,
+    source: str,
+    doors: tuple[Door, ...],
+    turned: float,
+    placement: FloatArray,
+    remarks: tuple[str, ...],
+) -> FloorSurvey:
+    """Measure the rooms of a floor whose elements are labelled.
+
+    Parameters
+    ----------
+    labels : ndarray of int, shape (n_row, n_col)
+        -1 outside, 0 wall, else rooms from 1 on.
+    pixel : float
+        Side of an element [m].
+    source : str
+        The drawing.
+    doors : tuple of Door
+        Closed gaps.
+    turned : float
+        Angle taken out [deg].
+    placement : ndarray, shape (3, 3)
+        Takes (column, row, 1) of the drawing to those of `labels` [px].
+    remarks : tuple of str
+        So far.
+
+    Returns
+    -------
+    FloorSurvey
+        With areas and innermost points.
+    """
+    count = int(labels.max())
+    areas = np.bincount(labels[labels > 0].ravel(), minlength=count + 1) * pixel**2
+    rooms = []
+    for label, where in enumerate(ndimage.find_objects(np.maximum(labels, 0), count), start=1):
+        inside = np.pad(labels[where] == label, 1)
+        depth = ndimage.distance_transform_edt(inside)
+        row, column = np.unravel_index(int(depth.argmax()), depth.shape)
+        centre = (float(column - 1 + where[1].start), float(row - 1 + where[0].start))
+        rooms.append(Room(label, float(areas[label]), centre))
+    return FloorSurvey(source, labels, pixel, tuple(rooms), doors, turned, placement, remarks)
+
+
+CODE_KINDS = (".csv", ".npy", ".npz")
+INSIDE, WALL, OUTSIDE = 0, 1, 2
+
+_REFINE = 4  # parts a cell's side, so that a wall of one cell can be split between its two sides
+
+
+def read_codes(path: str | PathLike[str], cell_size: float) -> FloorSurvey:
+    """Read a plan of codes.
+
+    Parameters
+    ----------
+    path : str or path
+        CSV, ``.npy``, or ``.npz`` with one array; each cell 0 inside, 1 wall, 2 outside.
+    cell_size : float
+        Side of a cell [m], 0.01 to 5.
+
+    Returns
+    -------
+    FloorSurvey
+        Its rooms are the parts of the inside that hang together by their sides; doors must be closed already.
+
+    Raises
+    ------
+    PlanError
+        The file is damaged, its rows differ in length, or it holds another code.
+    OversizedFileError
+        It has, or unpacks to, more than any real plan.
+    PlanError
+        It has no inside that walls part from the outside.
+    """
+    file = checked_file(Path(path), CODE_KINDS)
+    return survey_codes(_read_csv(file) if file.suffix.lower() == ".csv" else _read_numpy(file), cell_size, file.name)
+
+
+def survey_codes(codes: ArrayLike, cell_size: float, source: str = "codes") -> FloorSurvey:
+    """Find the rooms in an array of codes.
+
+    Parameters
+    ----------
+    codes : array_like of int, shape (n_row, n_col)
+        0 inside, 1 wall, 2 outside [-]; the first row is the plan's "up".
+    cell_size : float
+        Side of a cell [m], 0.01 to 5.
+    source : str
+        For messages and pictures.
+
+    Returns
+    -------
+    FloorSurvey
+        Walls, rooms and the outside.
+
+    Raises
+    ------
+    PlanError
+        It has another shape or another code.
+    OversizedFileError
+        It has more cells than any real plan.
+    PlanError
+        It has no inside, or one that touches the outside.
+
+    Examples
+    --------
+    >>> codes = np.pad(np.pad(np.zeros((4, 5), dtype=int), 1, constant_values=1), 1, constant_values=2)
+    >>> survey_codes(codes, 0.5).rooms[0].area
+    5.0
+    """
+    checked_number(cell_size, "cell_size", 0.01, 5.0, "m")
+    array = np.asarray(codes)
+    if array.ndim != 2 or array.size == 0 or array.dtype.kind not in "iufb":
+        raise PlanError(source, "rows and columns of codes", f"an array of shape {array.shape} and type {array.dtype}")
+    check_pixels(_REFINE * array.shape[1], _REFINE * array.shape[0], source)
+    unknown = ~np.isin(array, [INSIDE, WALL, OUTSIDE])
+    if unknown.any():
+        row, column = (int(x) for x in np.argwhere(unknown)[0])
+        where = f"{source}: row {row + 1}, column {column + 1}"
+        raise PlanError(where, "0 inside, 1 wall or 2 outside", repr(array[row, column].item()))
+    framed = np.pad(array.astype(np.int32), 1, constant_values=OUTSIDE)
+    labels, count = ndimage.label(framed == INSIDE)
+    labels = labels.astype(np.int32)
+    labels[framed == OUTSIDE] = OUTSIDE_LABEL
+    if count == 0:
+        raise PlanError(source, "cells of code 0, inside", "none")
+    _check_closed(labels, source)
+    fine = np.repeat(np.repeat(labels, _REFINE, axis=0), _REFINE, axis=1)
+    middle = 1.5 * _REFINE - 0.5
+    placement = np.array([[_REFINE, 0, middle], [0, _REFINE, middle], [0, 0, 1]], dtype=float)
+    return finish(fine, cell_size / _REFINE, source, (), 0.0, placement, ())
+
+
+def _check_closed(labels: NDArray[np.int32], source: str) -> None:
+    """Refuse a room that has the outside, or the edge, beside it."""
+    for here, there in ((np.s_[:, :-1], np.s_[:, 1:]), (np.s_[:-1], np.s_[1:])):
+        a, b = labels[here], labels[there]
+        open_ = ((a > 0) & (b == OUTSIDE_LABEL)) | ((b > 0) & (a == OUTSIDE_LABEL))
+        if open_.any():
+            row, column = (int(x) for x in np.argwhere(open_)[0])
+            where = f"{source}: near row {max(row, 1)}, column {max(column, 1)}"
+            raise PlanError(where, "a wall (1) between inside (0) and outside (2)", "none")
+
+
+def _read_csv(file: Path) -> NDArray[Any]:
+    try:
+        with file.open(encoding="utf-8-sig", newline="") as stream:
+            rows = [row for row in csv.reader(stream, strict=True) if any(cell.strip() for cell in row)]
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise PlanError(file.name, "a CSV of codes in UTF-8", str(error)) from error
+    for number, row in enumerate(rows, start=1):
+        if len(row) != len(rows[0]):
+            raise PlanError(f"{file.name}: row {number}", f"{len(rows[0])} cells as in row 1", f"{len(row)} cells")
+    try:
+        return np.array(rows, dtype=float)
+    except ValueError as error:
+        raise PlanError(file.name, "codes 0, 1 and 2", " ".join(str(error).split())) from error
+
+
+def _read_numpy(file: Path) -> NDArray[Any]:
+    """Read an array, never an object that runs code, and nothing that unpacks to more than a plan."""
+    try:
+        if file.suffix.lower() == ".npz":
+            with zipfile.ZipFile(file) as archive:
+                unpacked = sum(entry.file_size for entry in archive.infolist())
+                names = archive.namelist()
+            if unpacked > MOST_BYTES:
+                expected, found = f"at most {MOST_BYTES / 1e6:.0f} MB unpacked", f"{unpacked / 1e6:.0f} MB"
+                raise OversizedFileError(file.name, expected, found, "this is no plan")
+            if len(names) != 1:
+                raise PlanError(file.name, "one array", ", ".join(names[:5]) or "none")
+            with np.load(file, allow_pickle=False) as arrays:
+                return np.asarray(arrays[arrays.files[0]])
+        mapped = np.load(file, mmap_mode="r", allow_pickle=False)
+        return np.asarray(mapped)
+    except (OSError, ValueError, EOFError, KeyError, zipfile.BadZipFile) as error:
+        found = " ".join(str(error).replace(str(file), file.name).split())
+        raise PlanError(file.name, "a NumPy array of codes", found) from error

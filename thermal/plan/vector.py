@@ -15,12 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal._types import FloatArray
-from thermal.errors import OversizedFileError, PlanError, describe
-from thermal.plan.extra import extra
-from thermal.plan.guard import check_pixels, checked_file, checked_number
+from thermal.errors import OversizedFileError, PlanError
+from thermal.plan.guard import check_pixels, checked_file, checked_number, extra
 from thermal.plan.ink import FINE, Ink
-from thermal.plan.rooms import finish, survey_ink
-from thermal.plan.survey import FloorSurvey, PlanSettings
+from thermal.plan.rooms import survey_ink
+from thermal.plan.survey import FloorSurvey, PlanSettings, finish
 
 VECTOR_KINDS = (".dxf",)
 
@@ -103,18 +102,9 @@ def _open(file: Path) -> Any:
     ezdxf = extra("ezdxf")
     try:
         return ezdxf.readfile(file)
-    except (
-        OSError,
-        ezdxf.DXFError,
-        ValueError,
-        TypeError,
-        IndexError,
-        KeyError,
-        StopIteration,
-        RecursionError,
-    ) as error:
+    except (OSError, ezdxf.DXFError, ValueError, TypeError, LookupError, StopIteration, RecursionError) as error:
         found = " ".join(str(error).replace(str(file), file.name).split())[:200]
-        raise PlanError(describe(file.name, "a DXF drawing", found or type(error).__name__)) from error
+        raise PlanError(file.name, "a DXF drawing", found or type(error).__name__) from error
 
 
 def _unit(document: Any, unit: float | None, where: str) -> float:
@@ -123,7 +113,7 @@ def _unit(document: Any, unit: float | None, where: str) -> float:
     code = document.header.get("$INSUNITS", 0)
     if code not in _UNITS:
         expected = "a unit of length in $INSUNITS"
-        raise PlanError(describe(where, expected, f"code {code}", "pass unit, such as 0.001 for millimetres"))
+        raise PlanError(where, expected, f"code {code}", "pass unit, such as 0.001 for millimetres")
     return _UNITS[code]
 
 
@@ -132,7 +122,7 @@ def _collect(document: Any, metres: float, walls: str, rooms: str, where: str, w
     try:
         is_wall, is_room = re.compile(walls, re.IGNORECASE), re.compile(rooms, re.IGNORECASE)
     except re.error as error:
-        raise PlanError(describe(where, "a regular expression for layers", str(error))) from error
+        raise PlanError(where, "a regular expression for layers", str(error)) from error
     decompose = extra("ezdxf.disassemble").recursive_decompose
     found: list[tuple[str, str, Any]] = []
     texts: list[tuple[str, float, float]] = []
@@ -140,22 +130,20 @@ def _collect(document: Any, metres: float, walls: str, rooms: str, where: str, w
         for count, entity in enumerate(islice(decompose(document.modelspace()), _MOST_ENTITIES + 1)):
             if count == _MOST_ENTITIES:
                 expected = f"at most {_MOST_ENTITIES} lines and arcs"
-                raise OversizedFileError(describe(where, expected, "more", "explode less, or export one floor"))
+                raise OversizedFileError(where, expected, "more", "explode less, or export one floor")
             kind, layer = entity.dxftype(), str(entity.dxf.layer)
             if kind in ("TEXT", "MTEXT"):
                 texts.append(_text(entity, metres))
             elif kind in ("LINE", "LWPOLYLINE", "POLYLINE", "ARC", "HATCH", "SOLID"):
                 found.append((kind, layer, entity))
     except RecursionError as error:
-        raise OversizedFileError(describe(where, "blocks that end", "blocks within blocks", "explode them")) from error
+        raise OversizedFileError(where, "blocks that end", "blocks within blocks", "explode them") from error
     on_walls = [item for item in found if is_wall.search(item[1])]
     outlines = [item for item in found if is_room.search(item[1]) and not is_wall.search(item[1])]
     if not on_walls and not outlines:
         if wanted is not None or not found:
             layers = ", ".join(sorted({layer for _, layer, _ in found})[:12])
-            raise PlanError(
-                describe(where, f"lines on layers like {walls!r}", f"layers {layers or 'without any'}")
-            )
+            raise PlanError(where, f"lines on layers like {walls!r}", f"layers {layers or 'without any'}")
         on_walls = found
     content = _Content([], [], [], texts)
     for kind, _, entity in on_walls:
@@ -195,7 +183,7 @@ def _upright(
     """Angle of the walls clockwise, what takes (x, y, 1) [m] to column and row of the survey, and its shape."""
     lines = content.lines + content.solids or content.rooms
     if not lines:
-        raise PlanError(describe(where, "lines", "none that can be drawn"))
+        raise PlanError(where, "lines", "none that can be drawn")
     angle = _main_angle(lines) if straighten else 0.0
     cosine, sine = math.cos(math.radians(angle)), math.sin(math.radians(angle))
     turn = np.array([[cosine, -sine], [sine, cosine]])
@@ -204,8 +192,7 @@ def _upright(
     if not _SMALLEST <= size.max() <= _LARGEST:
         expected = f"a building of {_SMALLEST:g} to {_LARGEST:g} m"
         found = f"{size[0]:.4g} m x {size[1]:.4g} m with {metres:g} m for a unit"
-        advice = "pass unit, such as 0.001 for millimetres"
-        raise PlanError(describe(where, expected, found, advice))
+        raise PlanError(where, expected, found, "pass unit, such as 0.001 for millimetres")
     pixel = max(FINE, math.sqrt(size[0] * size[1] / 3e7))
     margin = 0.5
     left, top = points[:, 0].min() - margin, points[:, 1].max() + margin

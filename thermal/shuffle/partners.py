@@ -7,9 +7,10 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from thermal.shuffle.swaps import FloatArray, IntArray
+from thermal._types import BoolArray, FloatArray
 
-BoolArray = npt.NDArray[np.bool_]
+#: Positions in an array, in the machine's own integers.
+IndexArray = npt.NDArray[np.intp]
 #: Relative slack of "within the reach", so that 3 x 0.1 m is within 0.3 m in spite of round-off [-].
 REACH_SLACK = 1e-9
 #: Deviation of cell centres from a regular grid that is still round-off, as a share of the spacing [-].
@@ -18,7 +19,7 @@ GRID_SLACK = 1e-6
 BOX_LIMIT = 64
 
 
-def disc_offsets(reach: float, spacing: tuple[float, float]) -> IntArray:
+def disc_offsets(reach: float, spacing: tuple[float, float]) -> IndexArray:
     """List the grid offsets within a reach, the null offset among them.
 
     Parameters
@@ -61,7 +62,7 @@ class PartnerSampler:
         self._starts = np.cumsum(self._sizes) - self._sizes
         self._zones = np.repeat(np.arange(len(positions)), self._sizes)
         self._slots = np.arange(self._zones.size)
-        self._proposals: list[tuple[BoolArray, Callable[..., IntArray]]] = []
+        self._proposals: list[tuple[BoolArray, Callable[..., IndexArray]]] = []
         diagonals = [float(np.hypot(*np.ptp(points, axis=0))) for points in positions]
         if reach is None or all(diagonal <= reach for diagonal in diagonals):
             return
@@ -78,7 +79,7 @@ class PartnerSampler:
             if zones.any():
                 self._proposals.append((zones[self._zones], propose))
 
-    def draw(self, rng: np.random.Generator, slots: IntArray) -> IntArray:
+    def draw(self, rng: np.random.Generator, slots: IndexArray) -> IndexArray:
         """Draw one partner for each slot.
 
         Parameters
@@ -103,18 +104,18 @@ class PartnerSampler:
                 pending = pending[~accepted]
         return partners
 
-    def _from_zone(self, rng: np.random.Generator, slots: IntArray) -> IntArray:
+    def _from_zone(self, rng: np.random.Generator, slots: IndexArray) -> IndexArray:
         """Propose any cell of the same zone."""
         zones = self._zones[slots]
         return self._starts[zones] + (rng.random(slots.size) * self._sizes[zones]).astype(np.intp)
 
-    def _from_zone_in_reach(self, rng: np.random.Generator, slots: IntArray) -> IntArray:
+    def _from_zone_in_reach(self, rng: np.random.Generator, slots: IndexArray) -> IndexArray:
         """Propose any cell of the same zone; -1 where it is out of reach."""
         candidates = self._from_zone(rng, slots)
         difference = self._points[candidates] - self._points[slots]
         return np.where(np.square(difference).sum(axis=1) <= self._squared_reach, candidates, -1)
 
-    def _from_disc(self, rng: np.random.Generator, slots: IntArray) -> IntArray:
+    def _from_disc(self, rng: np.random.Generator, slots: IndexArray) -> IndexArray:
         """Propose any place of the disc; -1 where the zone has no cell there."""
         chosen = (rng.random(slots.size) * len(self._offsets)).astype(np.intp)
         columns, rows = self._offsets[:, 0][chosen], self._offsets[:, 1][chosen]
@@ -129,7 +130,7 @@ class PartnerSampler:
         regular = np.zeros(len(positions), dtype=np.bool_)
         self._keys, self._strides = np.zeros_like(self._zones), np.zeros_like(self._zones)
         margin = self._offsets.max(axis=0)
-        tables: list[IntArray] = []
+        tables: list[IndexArray] = []
         for zone, points in enumerate(positions):
             exact = (points - points.min(axis=0)) / spacing
             places = np.rint(exact).astype(np.intp)
@@ -145,7 +146,7 @@ class PartnerSampler:
             regular[zone], self._strides[own] = True, stride
             self._keys[own] = keys + sum(earlier.size for earlier in tables)
             tables.append(table)
-        self._slot_at: IntArray = np.concatenate(tables) if tables else np.empty(0, dtype=np.intp)
+        self._slot_at: IndexArray = np.concatenate(tables) if tables else np.empty(0, dtype=np.intp)
         return regular
 
 

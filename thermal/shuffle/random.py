@@ -1,4 +1,4 @@
-"""The paper's randomized shuffling of air within zones."""
+"""Random shuffle of the paper: air cells of a zone swap places."""
 
 from __future__ import annotations
 
@@ -8,9 +8,73 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from thermal._types import FloatArray
 from thermal.errors import ModelError
-from thermal.shuffle.partners import PartnerSampler
-from thermal.shuffle.swaps import FloatArray, IntArray, execute_swaps
+from thermal.shuffle.partners import IndexArray, PartnerSampler
+
+
+def execute_swaps(
+    temperatures: FloatArray, first: IndexArray, second: IndexArray, capacities: FloatArray | None = None
+) -> FloatArray:
+    """Execute swaps in place, one after the other as a sequential loop would, bit for bit.
+
+    Two swaps that share no cell commute. Each round therefore executes at once all swaps neither of whose cells has an
+    earlier swap pending; a random list of swaps takes a number of rounds that grows with the logarithm of its length.
+
+    Cells of equal capacity exchange their temperatures. Between cells of unequal capacity an exchange of temperatures
+    would create or destroy energy; there the smaller cell's whole air changes places with an equal air mass of the
+    larger one, which is then mixed: with ``m = min(C_i, C_j)``, ``T_i += m / C_i (T_j - T_i)`` and
+    ``T_j += m / C_j (T_i - T_j)``, the right-hand sides taken before the exchange. Both rules conserve energy.
+
+    Parameters
+    ----------
+    temperatures : ndarray, shape (n_cell,)
+        Temperatures [K], overwritten.
+    first, second : ndarray of int, shape (n_swap,)
+        The two cells of each swap [-], in the order of execution.
+    capacities : ndarray, shape (n_cell,), optional
+        Heat capacities of the cells [J/K], > 0 where a cell is swapped.
+
+    Returns
+    -------
+    ndarray, shape (n_cell,)
+        The same array of temperatures [K].
+
+    Examples
+    --------
+    >>> execute_swaps(np.array([20.0, 21.0, 22.0]), np.array([0, 1]), np.array([1, 2]))
+    array([21., 22., 20.])
+    """
+    # Latest swap first: of several writes to one place numpy keeps the last, which is then the earliest pending swap.
+    effective = np.flatnonzero(first != second)[::-1]
+    left, right = first[effective], second[effective]
+    ranks = np.arange(left.size)
+    rank_of_both = np.repeat(ranks, 2)
+    both = np.empty((left.size, 2), dtype=np.intp)
+    next_swap = np.empty(temperatures.size, dtype=np.intp)
+    while left.size:
+        n = left.size
+        both[:n, 0], both[:n, 1] = left, right
+        next_swap[both[:n].ravel()] = rank_of_both[: 2 * n]
+        ready = (next_swap[left] == ranks[:n]) & (next_swap[right] == ranks[:n])
+        now = np.flatnonzero(ready)
+        _exchange(temperatures, left[now], right[now], capacities)
+        later = np.flatnonzero(~ready)
+        left, right = left[later], right[later]
+    return temperatures
+
+
+def _exchange(temperatures: FloatArray, left: IndexArray, right: IndexArray, capacities: FloatArray | None) -> None:
+    """Exchange air between pairs of cells of which no two pairs share a cell, in place."""
+    T_left, T_right = temperatures[left], temperatures[right]
+    if capacities is None:
+        temperatures[left], temperatures[right] = T_right, T_left
+        return
+    smaller = np.minimum(capacities[left], capacities[right])
+    for cells, own, other in ((left, T_left, T_right), (right, T_right, T_left)):
+        share = smaller / capacities[cells]
+        # a share of exactly one is a plain swap: written as such it stays free of round-off
+        temperatures[cells] = np.where(share == 1.0, other, own + share * (other - own))
 
 
 class RandomShuffle:
@@ -37,7 +101,7 @@ class RandomShuffle:
         Seed (runs of equal seed are equal bit for bit) or the generator to draw from [-].
     capacities : array_like, shape (n_cell,), optional
         Heat capacities [J/K], > 0 for the cells of the zones. Needed only where they differ within a zone: a swap of
-        temperatures would not conserve energy there, so that equal air masses are exchanged (see `apply_swaps`).
+        temperatures would not conserve energy there, so that equal air masses are exchanged (see `execute_swaps`).
 
     Raises
     ------
@@ -72,7 +136,7 @@ class RandomShuffle:
         zones = [cells for cells in _checked_zones(zone_cells, points) if cells.size > 1]
         self._probability = float(probability)
         self._n_cell = len(points)
-        self._cells: IntArray = np.concatenate(zones) if zones else np.empty(0, dtype=np.intp)
+        self._cells: IndexArray = np.concatenate(zones) if zones else np.empty(0, dtype=np.intp)
         self._partners = PartnerSampler([points[cells] for cells in zones], reach)
         self._capacities = None if capacities is None else _unequal_capacities(capacities, zones, self._n_cell)
         self._rng = np.random.default_rng(seed)
@@ -100,7 +164,7 @@ class RandomShuffle:
             raise ModelError(f"expected temperatures of shape ({self._n_cell},) [K], came {shuffled.shape}")
         return execute_swaps(shuffled, *self.draw_swaps(), self._capacities)
 
-    def draw_swaps(self) -> tuple[IntArray, IntArray]:
+    def draw_swaps(self) -> tuple[IndexArray, IndexArray]:
         """Draw the swaps of one step, as `apply` does.
 
         Returns
@@ -138,9 +202,9 @@ class RandomShuffle:
             raise ModelError(f"expected a state of {name} as RandomShuffle.state returns it: {error}") from error
 
 
-def _checked_zones(zone_cells: Sequence[npt.ArrayLike], points: FloatArray) -> list[IntArray]:
+def _checked_zones(zone_cells: Sequence[npt.ArrayLike], points: FloatArray) -> list[IndexArray]:
     """Return the zones' cells as index arrays after checking them against the positions."""
-    zones: list[IntArray] = []
+    zones: list[IndexArray] = []
     taken = np.zeros(len(points), dtype=np.bool_)
     for zone, given in enumerate(zone_cells):
         cells = np.asarray(given)
@@ -165,14 +229,12 @@ def _checked_zones(zone_cells: Sequence[npt.ArrayLike], points: FloatArray) -> l
     return zones
 
 
-def _unequal_capacities(capacities: npt.ArrayLike, zones: Sequence[IntArray], n_cell: int) -> FloatArray | None:
+def _unequal_capacities(capacities: npt.ArrayLike, zones: Sequence[IndexArray], n_cell: int) -> FloatArray | None:
     """Return the capacities [J/K] where they differ within some zone, None where plain swaps conserve energy."""
     stores = np.array(capacities, dtype=np.float64)
     if stores.shape != (n_cell,):
         raise ModelError(f"expected capacities of shape ({n_cell},) [J/K], came {stores.shape}")
     for cells in zones:
         if not (np.isfinite(stores[cells]).all() and (stores[cells] > 0.0).all()):
-            raise ModelError(
-                "expected positive finite capacities [J/K] of all air cells; massless cells hold none"
-            )
+            raise ModelError("expected positive finite capacities [J/K] of all air cells; massless cells hold none")
     return stores if any(np.ptp(stores[cells]) > 0.0 for cells in zones) else None

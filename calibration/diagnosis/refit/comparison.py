@@ -29,9 +29,8 @@ from thermal.inputs.drivers import Drivers
 from thermal.model.reduce import ReducedModel
 from thermal.model.replay import Inputs, replay_inputs
 from thermal.model.symbolic import SymbolicModel
-from thermal.network.assembly import Blueprint
+from thermal.network.assembly import Blueprint, Extension
 from thermal.network.build import blueprint
-from thermal.network.extension import Extension
 from thermal.network.network import ThermalNetwork
 from thermal.network.topology import Anatomy
 

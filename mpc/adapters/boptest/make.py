@@ -16,9 +16,8 @@ from mpc.loop.reduced import ReducedBuilding
 from mpc.scenario.weather import Weather
 from mpc.scenario.weather_files import read_epw, read_tmy3, read_weather_csv, weather_of_case
 from thermal._types import FloatArray
-from thermal.case.building import Building
+from thermal.case.building import Building, Device
 from thermal.case.case import Case
-from thermal.case.schema import Device
 from thermal.errors import describe
 from thermal.model.reduce import reduced_model
 from thermal.model.symbolic import SymbolicModel

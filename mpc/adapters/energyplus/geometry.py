@@ -11,8 +11,7 @@ from mpc.adapters.energyplus.input import InputFile
 from mpc.adapters.energyplus.layout import PlantLayout
 from mpc.adapters.energyplus.points import entity
 from mpc.scenario.weather_files import read_epw
-from thermal.case.building import Building, ZoneTable
-from thermal.case.schema import Device, Layer, Surface, ZoneEntry
+from thermal.case.building import Building, Device, Layer, Surface, ZoneEntry, ZoneTable
 
 Kind = Literal["wall", "floor", "ceiling"]
 

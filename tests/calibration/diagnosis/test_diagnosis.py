@@ -20,8 +20,7 @@ from calibration.evaluation.settings import ModelSettings
 from thermal import Case, Telemetry
 from thermal.effects.catalogue import CATALOGUE
 from thermal.pilot.building import pilot_building
-from thermal.pilot.truth import TwinRanges
-from thermal.pilot.twin import generate_twin
+from thermal.pilot.twin import TwinRanges, TwinSettings, generate_twin
 
 #: Share by which the flow of one zone is under-reported [-].
 ERROR = 0.25
@@ -32,7 +31,7 @@ def twin() -> Case:
     """Three weeks of an office of four zones, quiet but for its thermostats."""
     building = pilot_building(3, floor_area=120.0, zones=4, floors=1, name="office")
     quiet = TwinRanges(disturbance_deviation=(0.05, 0.1), noise=(0.005, 0.01))
-    return generate_twin(building, 3, days=15.0, step_seconds=900.0, dx=1.0, meter="exact", ranges=quiet)[0]
+    return generate_twin(building, 3, TwinSettings(days=15.0, step_seconds=900.0, dx=1.0, meter="exact", ranges=quiet))[0]
 
 
 def changed(zone: str) -> Case:

@@ -27,8 +27,7 @@ from thermal import (
 )
 from thermal.model.reduce import ReducedModel
 from thermal.pilot.building import pilot_building
-from thermal.pilot.truth import TwinTruth
-from thermal.pilot.twin import generate_twin
+from thermal.pilot.twin import TwinSettings, TwinTruth, generate_twin
 
 FloatArray = NDArray[np.float64]
 
@@ -171,7 +170,7 @@ def test_precision_is_the_information_and_white_innovations_have_no_excess() -> 
 def twin() -> tuple[Case, TwinTruth]:
     """Six days of a small office whose parameters are known."""
     building = pilot_building(1, floor_area=80.0, zones=2, floors=1, name="office")
-    return generate_twin(building, 1, days=6.0, dx=2.0, step_seconds=900.0, excitation="prbs")
+    return generate_twin(building, 1, TwinSettings(days=6.0, dx=2.0, step_seconds=900.0, excitation="prbs"))
 
 
 def without(case: Case) -> Case:

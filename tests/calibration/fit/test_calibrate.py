@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from calibration import CalibrationError, CalibrationResult, Interval
 from calibration import calibrate as calibrate_from_several_starts
 from thermal import Building, Case, Inputs, Simulator, Telemetry, ThermalError, ZoneTable, build_network
-from thermal.case.schema import Airflow, Device, Layer, Location, Surface, ZoneEntry
+from thermal.case.building import Airflow, Device, Layer, Location, Surface, ZoneEntry
 
 FloatArray = NDArray[np.float64]
 

@@ -15,8 +15,8 @@ from mpc.loop.noise import SensorNoise
 from mpc.loop.sensors import plant_devices
 from mpc.loop.simulated import SimulatedPlant
 from thermal import Building, load_case, save_case
+from thermal.case.building import Device
 from thermal.case.points import POINT_TYPES, split_column
-from thermal.case.schema import Device
 from thermal.hvac._system import HvacSystem
 
 Drive = Callable[..., SimulatedPlant]
@@ -94,7 +94,7 @@ def test_pressures_are_in_the_telemetry_and_in_the_case(make_plant: Drive, drive
     assert frame["BOILER/differential_pressure_sensor"].iloc[-1] == pytest.approx(4e4, rel=0.05)
     saved = [yaml.safe_load((save_case(p.case(), tmp_path / name) / "building.yaml").read_text())
              for name, p in (("with", plant), ("without", plain))]  # fmt: skip
-    assert [content["format"] for content in saved] == [2, 1]
+    assert [content["format"] for content in saved] == [3, 3]
     assert saved[0]["units"]["differential_pressure_sensor"] == "Pa"
     again = load_case(tmp_path / "with").telemetry.frame
     np.testing.assert_allclose(again[frame.columns], frame)

@@ -32,8 +32,8 @@ from thermal import (
     load_bundled_case,
     local_timestamp,
 )
+from thermal.case.building import Location, ZoneEntry
 from thermal.case.check import describe_case
-from thermal.case.schema import Location, ZoneEntry
 from thermal.model.simulation import simulate
 
 LARGEST_PAGE = 5e6  # bytes

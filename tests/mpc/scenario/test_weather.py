@@ -11,7 +11,7 @@ from pvlib.solarposition import get_solarposition
 from mpc.errors import WeatherError
 from mpc.scenario.grid import StepGrid
 from mpc.scenario.weather import Weather
-from thermal.case.schema import Location
+from thermal.case.building import Location
 
 BAY = Location(latitude=37.4, longitude=-122.1, elevation=20.0, timezone="America/Los_Angeles")
 AIR, WIND, FROM = "outside_air_temperature_sensor", "wind_speed_sensor", "wind_direction_sensor"

@@ -16,7 +16,7 @@ from mpc.errors import WeatherError
 from mpc.scenario.grid import StepGrid
 from mpc.scenario.weather_files import read_epw, read_tmy3, read_weather_csv, sky_radiation, weather_of_case
 from thermal import Case, Telemetry, load_bundled_case
-from thermal.case.schema import Location
+from thermal.case.building import Location
 
 BAY = Location(latitude=37.4, longitude=-122.1, elevation=20.0, timezone="America/Los_Angeles")
 AIR, WIND, FROM = "outside_air_temperature_sensor", "wind_speed_sensor", "wind_direction_sensor"

@@ -9,17 +9,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from thermal.case.areas import zone_floor_areas
+from thermal.case.building import Location
 from thermal.case.check import check_case
-from thermal.case.schema import Location
+from thermal.case.plan import zone_floor_areas
 from thermal.errors import LostRoomError, PlanError
-from thermal.pilot.layout import devices, generate_office
+from thermal.pilot.building import devices, generate_office
 from thermal.plan.assemble import assemble_plans
-from thermal.plan.codes import read_codes, survey_codes
-from thermal.plan.devices import read_devices
+from thermal.plan.cells import propose_zones
 from thermal.plan.folder import building_of, save_plan_case
+from thermal.plan.models import read_devices
 from thermal.plan.picture import draw_floor
-from thermal.plan.zones import propose_zones
+from thermal.plan.survey import read_codes, survey_codes
 
 SITE = Location(latitude=37.4, longitude=-122.1, elevation=20.0, timezone="America/Los_Angeles")
 
@@ -53,8 +53,10 @@ def test_the_pilot_comes_back_from_its_codes_with_its_127_devices(tmp_path: Path
     assert found.largest_error < 0.02
     wanted = zone_floor_areas(plans)
     assert zone_floor_areas(found.plans) == pytest.approx(wanted, rel=0.02)
-    lines = ["Device,Type,Zone"]
-    lines += [f"{d.name},{d.type.upper()},{(d.zone or '').replace('_', '-').lower()}" for d in devices(plans)]
+    lines = ["Device,Type,Zone,Fed by"]
+    lines += [
+        f"{d.name},{d.type.upper()},{(d.zone or '').replace('_', '-').lower()},{'; '.join(d.fed_by)}" for d in devices(plans)
+    ]
     (tmp_path / "devices.csv").write_text("\n".join(lines), encoding="utf-8")
     served = read_devices(tmp_path / "devices.csv", list(wanted))
     assert served.devices == devices(plans) and len(served.devices) == 127

@@ -10,11 +10,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thermal.case.schema import Device
+from thermal.case.building import Device
 from thermal.errors import PlanError
-from thermal.plan.columns import read_columns, write_matches
-from thermal.plan.devices import read_devices
-from thermal.plan.match import match_points
+from thermal.plan.match import match_points, read_columns, write_matches
+from thermal.plan.models import read_devices
 
 ZONES = ["F1_R01", "F1_R02"]
 
@@ -30,7 +29,7 @@ BRICK = """
 :D1 a brick:Discharge_Air_Temperature_Sensor .
 :AHU a brick:AHU ; brick:feeds :VAV_1 ; brick:hasPoint :S1 .
 :S1 a brick:Supply_Air_Temperature_Sensor .
-:Far a brick:Fan_Coil_Unit ; brick:feeds :Z9 .
+:Far a brick:Fan_Coil_Unit ; brick:feeds :Z9 ; brick:isFedBy :AHU .
 :Z9 a brick:HVAC_Zone .
 """
 
@@ -38,7 +37,8 @@ ENTITIES = [
     {"id": "@vav1", "dis": "VAV-1", "equip": "M", "vav": "M", "spaceRef": "@r1"},
     {"id": "@r1", "dis": "F1 R01", "space": "M"},
     {"id": "@p1", "point": "M", "equipRef": "@vav1", "zone": "M", "air": "M", "temp": "M", "sensor": "M"},
-    {"id": "@ahu", "dis": "AHU, main", "equip": "M", "ahu": "M"},
+    {"id": "@ahu", "dis": "AHU, main", "equip": "M", "ahu": "M", "hotWaterRef": "@b"},
+    {"id": "@b", "dis": "B", "equip": "M", "boiler": "M"},
     {"id": "@p2", "point": "M", "equipRef": "@ahu", "discharge": "M", "air": "M", "temp": "M", "sensor": "M"},
 ]
 
@@ -72,7 +72,7 @@ def test_a_csv_of_any_sign(tmp_path: Path, sign: str) -> None:
     rows += [["AHU-1", "", ""]]
     (tmp_path / "d.csv").write_text("\n".join(sign.join(row) for row in rows), encoding="utf-8")
     found = read_devices(tmp_path / "d.csv", ZONES)
-    assert found.devices[0] == Device(name="VAV 1", type="vav", zone="F1_R01")
+    assert found.devices[0] == Device(name="VAV 1", type="vav", zone="F1_R01", fed_by=("AHU-1",))
     assert found.devices[2] == Device(name="AHU-1", type="ahu")
     assert found.unplaced == {"X": "attic"} and found.unknown_types == {"X": "Flux capacitor"}
 
@@ -104,6 +104,7 @@ def test_a_brick_model(tmp_path: Path) -> None:
         "AHU": ("ahu", None),
         "Far": ("fan_coil", None),
     }
+    assert {d.name: d.fed_by for d in found.devices} == {"VAV_1": ("AHU",), "AHU": (), "Far": ("AHU",)}
     assert found.unplaced == {"Far": "Z9"}
     points = {p.column: (p.entity, p.point) for p in found.points}
     assert points["abc-1"] == ("VAV_1", "zone_air_temperature_sensor")
@@ -120,8 +121,9 @@ def test_a_brick_model(tmp_path: Path) -> None:
 def test_a_haystack_export(tmp_path: Path, name: str) -> None:
     found = read_devices(haystack(tmp_path / name), ZONES)
     assert found.devices == (
-        Device(name="VAV-1", type="vav", zone="F1_R01"),
-        Device(name="AHU, main", type="ahu"),
+        Device(name="VAV-1", type="vav", zone="F1_R01", fed_by=("AHU, main",)),
+        Device(name="AHU, main", type="ahu", fed_by=("B",)),
+        Device(name="B", type="boiler"),
     )
     points = {p.column: (p.entity, p.point) for p in found.points}
     assert points == {

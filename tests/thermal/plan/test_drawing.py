@@ -13,8 +13,8 @@ import pytest
 from PIL import Image
 
 from thermal.errors import MissingExtraError, OversizedFileError, PlanError
-from thermal.plan.codes import read_codes
 from thermal.plan.drawing import read_drawing
+from thermal.plan.survey import read_codes
 
 
 def png_of(path: Path, width: int, height: int) -> Path:

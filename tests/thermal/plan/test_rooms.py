@@ -12,11 +12,10 @@ import pytest
 from PIL import Image
 
 from thermal.errors import PlanError
-from thermal.plan.drawing import Drawing, read_drawing
+from thermal.plan.cells import propose_zones
+from thermal.plan.drawing import Drawing, read_drawing, scale_from_paper, scale_from_points
 from thermal.plan.rooms import find_rooms
-from thermal.plan.scale import scale_from_paper, scale_from_points
 from thermal.plan.survey import PlanSettings
-from thermal.plan.zones import propose_zones
 
 Office = Callable[..., Any]
 

@@ -10,8 +10,8 @@ import ezdxf
 import pytest
 
 from thermal.errors import OversizedFileError, PlanError
+from thermal.plan.cells import propose_zones
 from thermal.plan.vector import read_dxf
-from thermal.plan.zones import propose_zones
 
 NAMES = ("A", "B", "C", "D", "corridor", "E", "F", "G")
 

@@ -1,15 +1,28 @@
-"""What is on the labelling page: a building that may be unfinished, as it is saved after every change."""
+"""Draft of the labelling page, and its translation from and to buildings."""
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from thermal.case.building import EXTERIOR_WALL, INTERIOR_WALL, OUTSIDE
-from thermal.case.schema import Airflow
+from thermal.case.building import (
+    EXTERIOR_WALL,
+    INTERIOR_WALL,
+    OUTSIDE,
+    Airflow,
+    Building,
+    Device,
+    FloorPlan,
+    FloorPlans,
+    GeometryQuality,
+    Location,
+    ZoneTable,
+)
+from thermal.errors import LabelError
 from thermal.plan.list import FloorEntry
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
@@ -93,6 +106,8 @@ class DraftDevice(_Entry):
         As in a case.
     zone
         The zone it serves.
+    fed_by
+        Devices that feed it.
     room
         What the list of devices says of its place, where no zone has that name.
     floor, x, y
@@ -102,6 +117,7 @@ class DraftDevice(_Entry):
     name: Name
     type: Name
     zone: Name | None = None
+    fed_by: tuple[Name, ...] = ()
     room: Name = ""
     floor: Name | None = None
     x: Finite | None = None
@@ -154,6 +170,8 @@ class Draft(_Entry):
         As in a case.
     weather_station
         Entity of the site's weather.
+    geometry_quality
+        How the geometry was come by.
     seconds
         Time that somebody worked on it [s].
     """
@@ -169,4 +187,187 @@ class Draft(_Entry):
     glazing: dict[Name, dict[Name, Finite]] = Field(default_factory=dict)
     airflows: tuple[Airflow, ...] = ()
     weather_station: Name = "weather_station"
+    geometry_quality: GeometryQuality = "approximate"
     seconds: Annotated[float, Field(ge=0, allow_inf_nan=False)] = 0.0
+
+
+_MOST_CELLS = 4_000_000  # of one floor, as in the import of drawings
+
+
+def encode_floor(
+    name: str,
+    height: float,
+    tokens: NDArray[np.str_],
+    drawing: FloorEntry | None = None,
+    picture: Picture | None = None,
+) -> DraftFloor:
+    """Write a plan of tokens as runs.
+
+    Parameters
+    ----------
+    name : str
+        Of the floor.
+    height : float
+        Clear height [m].
+    tokens : ndarray of str, shape (n_row, n_col)
+        As in a case.
+    drawing : FloorEntry, optional
+        What it was made from.
+    picture : Picture, optional
+        Drawing under it.
+
+    Returns
+    -------
+    DraftFloor
+        The floor.
+    """
+    names, cells = np.unique(tokens, return_inverse=True)
+    legend = (*BASIC, *(str(n) for n in names if n not in BASIC))
+    number = np.array([legend.index(str(n)) for n in names])[cells.ravel()]
+    starts = np.flatnonzero(np.concatenate([[True], number[1:] != number[:-1]]))
+    counts = np.diff(np.concatenate([starts, [number.size]]))
+    runs = np.column_stack([number[starts], counts]).ravel().tolist()
+    rows, columns = tokens.shape
+    return DraftFloor(
+        name=name, height=height, rows=rows, columns=columns, legend=legend, runs=tuple(runs), drawing=drawing,
+        picture=picture,
+    )  # fmt: skip
+
+
+def parse_draft(content: Any, where: str) -> Draft:
+    """Make a draft of JSON, after a look at everything that could break what works on it.
+
+    Parameters
+    ----------
+    content : object
+        What the JSON holds.
+    where : str
+        Where it comes from, for messages.
+
+    Returns
+    -------
+    Draft
+        Each floor has as many cells as its rows and columns say, all of its legend.
+
+    Raises
+    ------
+    LabelError
+        It is no draft; the message names the key.
+    """
+    try:
+        draft = Draft.model_validate(content)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        place = f"{where}: {'.'.join(str(part) for part in first['loc']) or 'content'}"
+        raise LabelError(place, first["msg"], repr(first["input"])[:80]) from error
+    for floor in draft.floors:
+        _check_runs(floor, f"{where}: floor {floor.name!r}")
+    return draft
+
+
+def _check_runs(floor: DraftFloor, where: str) -> None:
+    runs = np.asarray(floor.runs, dtype=np.float64)  # an integer of any size
+    if floor.rows * floor.columns > _MOST_CELLS:
+        raise LabelError(where, f"at most {_MOST_CELLS} cells", f"{floor.rows} x {floor.columns}")
+    if floor.legend[: len(BASIC)] != BASIC or len(set(floor.legend)) < len(floor.legend):
+        expected = f"a legend of different names that begins with {' '.join(BASIC)}"
+        raise LabelError(where, expected, repr(floor.legend[:4]))
+    fits = runs.size % 2 == 0 and (runs >= 0).all() and runs[1::2].sum() == floor.rows * floor.columns
+    if not fits or (runs[::2] >= len(floor.legend)).any():
+        raise LabelError(where, "runs of all cells, within the legend", "others")
+
+
+def draft_of(building: Building) -> Draft:
+    """Put a building on the page.
+
+    Parameters
+    ----------
+    building : Building
+        With floor plans.
+
+    Returns
+    -------
+    Draft
+        The same.
+
+    Raises
+    ------
+    LabelError
+        It has a zone table.
+    """
+    if isinstance(building.geometry, ZoneTable):
+        advice = "a zone table is edited as text: see the case format"
+        raise LabelError(building.name, "a case with floor plans", "a zone table", advice)
+    plans = building.geometry
+    return Draft(
+        name=building.name,
+        site=Site(**building.location.model_dump()),
+        orientation=building.orientation,
+        cell_size=plans.cell_size,
+        floors=tuple(encode_floor(floor.name, floor.height, floor.tokens) for floor in plans.floors),
+        devices=tuple(DraftDevice(**d.model_dump()) for d in building.devices),
+        glazing={zone: dict(by_facade) for zone, by_facade in plans.glazing.items()},
+        airflows=building.airflows,
+        weather_station=building.weather_station,
+        geometry_quality=building.geometry_quality,
+    )
+
+
+def building_of_draft(draft: Draft) -> Building:
+    """Make a building of what is on the page.
+
+    Parameters
+    ----------
+    draft : Draft
+        Its site, names and types are there; whether its parts fit together is not asked.
+
+    Returns
+    -------
+    Building
+        For a case.
+
+    Raises
+    ------
+    pydantic.ValidationError
+        A part of the site, or a device's name or type, is missing.
+    """
+    floors = tuple(FloorPlan(floor.name, floor.height, floor.tokens) for floor in draft.floors)
+    devices = tuple(Device(name=d.name, type=d.type, zone=d.zone, fed_by=d.fed_by) for d in draft.devices)
+    return Building(
+        name=draft.name,
+        location=Location.model_validate(draft.site.model_dump()),
+        orientation=draft.orientation,
+        geometry=FloorPlans(draft.cell_size, floors, _glazing(draft.glazing)),
+        devices=devices,
+        airflows=draft.airflows,
+        weather_station=draft.weather_station,
+        geometry_quality=draft.geometry_quality,
+    )
+
+
+def _glazing(glazing: Mapping[str, Mapping[str, float]]) -> dict[str, dict[str, float]]:
+    """Leave out facades without glass."""
+    kept = {zone: {side: area for side, area in by_facade.items() if area} for zone, by_facade in glazing.items()}
+    return {zone: by_facade for zone, by_facade in kept.items() if by_facade}
+
+
+def zones_of(floors: Sequence[DraftFloor]) -> dict[str, list[str]]:
+    """Floors on which each zone stands; more than one when a name stands twice.
+
+    Parameters
+    ----------
+    floors : sequence of DraftFloor
+        Floors of the draft.
+
+    Returns
+    -------
+    dict
+        Names of floors, by zone, in the order of floors and legends.
+    """
+    found: dict[str, list[str]] = {}
+    for floor in floors:
+        used = {number for number, count in zip(floor.runs[::2], floor.runs[1::2], strict=True) if count}
+        for number in sorted(used):
+            if number >= len(BASIC):
+                found.setdefault(floor.legend[number], []).append(floor.name)
+    return found

@@ -13,15 +13,11 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 from scipy import ndimage
 
-from thermal.case.areas import facade_areas, zone_floor_areas
-from thermal.case.building import INTERIOR_WALL, FloorPlan, FloorPlans
-from thermal.case.plan import check_plan
-from thermal.case.remarks import TERMINAL_TYPES
-from thermal.case.schema import DEVICE_TYPES, Location
-from thermal.case.validation import GLAZING_TOLERANCE, RESERVED, check_building, check_columns
+from thermal.case.building import DEVICE_TYPES, INTERIOR_WALL, FloorPlan, FloorPlans, Location
+from thermal.case.plan import check_plan, facade_areas, zone_floor_areas
+from thermal.case.validation import GLAZING_TOLERANCE, RESERVED, TERMINAL_TYPES, check_building, check_columns
 from thermal.errors import CaseError, nearest
-from thermal.plan.page.convert import building_of_draft, zones_of
-from thermal.plan.page.draft import BASIC, Draft, DraftFloor
+from thermal.plan.page.draft import BASIC, Draft, DraftFloor, building_of_draft, zones_of
 
 _PLACE = re.compile(r"(?<!')\b(row|column) (\d+)")  # of a cell, not in the name of a zone
 

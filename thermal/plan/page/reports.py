@@ -1,20 +1,146 @@
-"""Reports of a case on the page: those that are there, and those that are made when somebody asks for them."""
+"""Reports beside a case, and the jobs that make them."""
 
 from __future__ import annotations
 
 import hashlib
 import html
 import re
+import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
 from pathlib import Path
+from threading import Event, Lock
 from typing import Any
 
-from thermal.errors import ReportError, describe, nearest
+from thermal.errors import LabelError, ReportError, nearest
+from thermal.plan.folder import OWN_FOLDER
 from thermal.plan.guard import inside_folder
-from thermal.plan.kept import OWN_FOLDER
 
 Progress = Callable[[str, int, int], None]
+Work = Callable[[Progress], Any]
+
+_KEPT = 50  # jobs whose end is remembered
+
+
+class _StoppedError(LabelError):
+    """A job that was stopped."""
+
+
+@dataclass
+class _Job:
+    """A piece of work.
+
+    Parameters
+    ----------
+    number : int
+        To ask for it [-].
+    kind : str
+        What is being done.
+    """
+
+    number: int
+    kind: str
+    state: str = "waiting"
+    stage: str = ""
+    done: int = 0
+    total: int = 0
+    result: Any = None
+    error: dict[str, str] | None = None
+    started: float = field(default_factory=time.monotonic)
+    stop: Event = field(default_factory=Event)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Give it as plain types, for JSON."""
+        keys = ("number", "kind", "state", "stage", "done", "total", "result", "error")
+        return {key: getattr(self, key) for key in keys} | {"seconds": round(time.monotonic() - self.started, 1)}
+
+
+class Jobs:
+    """The work of a page, done one piece after another."""
+
+    def __init__(self) -> None:
+        self._pool = ThreadPoolExecutor(max_workers=1, thread_name_prefix="label")
+        self._jobs: dict[int, _Job] = {}
+        self._lock = Lock()
+        self._count = 0
+
+    def start(self, kind: str, work: Work) -> _Job:
+        """Begin a piece of work.
+
+        Parameters
+        ----------
+        kind : str
+            What is being done.
+        work : callable
+            Called with a progress callback; returns plain types.
+
+        Returns
+        -------
+        _Job
+            To be asked for by its number.
+        """
+        with self._lock:
+            self._count += 1
+            job = self._jobs[self._count] = _Job(self._count, kind)
+            for number in [n for n in self._jobs if n <= self._count - _KEPT]:
+                del self._jobs[number]
+        self._pool.submit(self._run, job, work)
+        return job
+
+    def get(self, number: int) -> _Job | None:
+        """Look a job up.
+
+        Parameters
+        ----------
+        number : int
+            Of the job [-].
+
+        Returns
+        -------
+        _Job or None
+            None when there is none of that number.
+        """
+        return self._jobs.get(number)
+
+    def busy(self, kind: str) -> _Job | None:
+        """Find a job of a kind that is not done.
+
+        Parameters
+        ----------
+        kind : str
+            What is being done.
+
+        Returns
+        -------
+        _Job or None
+            The first.
+        """
+        return next((job for job in self._jobs.values() if job.kind == kind and job.state in ("waiting", "runs")), None)
+
+    def end(self) -> None:
+        """Stop what is being done, at its next sign of progress."""
+        for job in self._jobs.values():
+            job.stop.set()
+        self._pool.shutdown(wait=False, cancel_futures=True)
+
+    def _run(self, job: _Job, work: Work) -> None:
+        def progress(stage: str, done: int, total: int) -> None:
+            if job.stop.is_set():
+                raise _StoppedError("stopped")
+            job.stage, job.done, job.total = stage, done, total
+
+        job.state, job.started = "runs", time.monotonic()
+        try:
+            progress("", 0, 0)
+            job.result = work(progress)
+            job.state = "done"
+        except _StoppedError:
+            job.state = "stopped"
+        except Exception as error:  # whatever it is, the page says so
+            job.error = {"error": type(error).__name__, "message": str(error)}
+            job.state = "failed"
+
 
 #: Makes a report of a case: case folder, folder of the results, progress.
 ReportMaker = Callable[[Path, Path, Progress], None]
@@ -129,7 +255,7 @@ class Reports:
                 path = inside_folder(report.path.parent, name, "report")
                 if path.name == _PAGE and path.is_file():
                     return path
-        raise ReportError(describe("report", "one of the list", repr(key[:40]), "load the list anew"))
+        raise ReportError("report", "one of the list", repr(key[:40]), "load the list anew")
 
     def make(self, kind: str, progress: Progress) -> dict[str, Any]:
         """Make a report.
@@ -153,7 +279,7 @@ class Reports:
         """
         out = self._case / OWN_FOLDER / "reports" / self.checked_kind(kind)
         if out.is_symlink():
-            raise ReportError(describe(str(out), "a folder of the page's own", "a link", "remove it"))
+            raise ReportError(str(out), "a folder of the page's own", "a link", "remove it")
         self._makers[kind](self._case, out, progress)
         return self._report(out / _PAGE).to_dict()
 
@@ -176,7 +302,7 @@ class Reports:
             It is not one of `kinds`.
         """
         if kind not in self._makers:
-            raise ReportError(describe("report", "one that can be made", repr(kind[:40]), nearest(kind, self._makers)))
+            raise ReportError("report", "one that can be made", repr(kind[:40]), nearest(kind, self._makers))
         return kind
 
     def _report(self, page: Path) -> _Report:

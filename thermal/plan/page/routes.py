@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+from dataclasses import asdict
 from importlib.resources import files
 from typing import Annotated, Any
 
@@ -20,17 +22,20 @@ from thermal.errors import (
     ThermalError,
     describe,
 )
-from thermal.plan.devices import read_devices
 from thermal.plan.drawing import DOTS_PER_INCH, RASTER_KINDS, read_drawing
 from thermal.plan.guard import inside_folder
 from thermal.plan.list import FloorEntry
-from thermal.plan.page.access import REPORT_POLICY
-from thermal.plan.page.app import LabelDesk, parse_json, plain
-from thermal.plan.page.convert import zones_of
-from thermal.plan.page.floors import add_floors
-from thermal.plan.page.jobs import Progress
-from thermal.plan.page.uploads import DEVICE_KINDS, DRAWING_KINDS, Upload, look_at, picture_of
+from thermal.plan.models import read_devices
+from thermal.plan.page.desk import LabelDesk
+from thermal.plan.page.draft import zones_of
+from thermal.plan.page.drawings import DEVICE_KINDS, DRAWING_KINDS, Upload, add_floors, look_at, picture_of
+from thermal.plan.page.reports import Progress
 
+#: What a report may do: its own script in a box without access to the page.
+_REPORT_POLICY = (
+    "sandbox allow-scripts allow-popups; default-src 'none'; script-src 'unsafe-inline' 'unsafe-eval'; "
+    "style-src 'unsafe-inline'; img-src data: blob:; font-src data:"
+)
 _MOST_BODY = 60_000_000  # bytes of JSON: four floors of a million cells
 _MOST_WORDS = 100_000  # bytes of any other request
 _TYPES = {".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml"}
@@ -74,7 +79,7 @@ def _add_page(app: FastAPI) -> None:
     @app.get("/static/{name}")
     def file(name: str) -> Response:
         if name not in known:
-            raise ReportError(describe("address", "a file of the page", repr(name[:80])))
+            raise ReportError("address", "a file of the page", repr(name[:80]))
         kind = _TYPES.get(name[name.rfind(".") :], "application/octet-stream")
         return Response(known[name].read_bytes(), media_type=kind)
 
@@ -86,14 +91,14 @@ def _add_draft(app: FastAPI, desk: LabelDesk) -> None:
 
     @app.put("/api/draft")
     async def save(request: Request, window: Window) -> dict[str, Any]:
-        content = parse_json(await _body(request, _MOST_BODY))
+        content = _parse_json(await _body(request, _MOST_BODY))
         return await run_in_threadpool(desk.save, window, content)
 
     @app.post("/api/session")
     async def open_session(request: Request) -> dict[str, Any]:
-        asked = parse_json(await _body(request, _MOST_WORDS))
+        asked = _parse_json(await _body(request, _MOST_WORDS))
         if not isinstance(asked, dict) or not isinstance(asked.get("window"), str) or not asked["window"]:
-            raise LabelError(describe("session", "a window's name", repr(asked)[:80]))
+            raise LabelError("session", "a window's name", repr(asked)[:80])
         previous, take_over = str(asked.get("previous", "")), asked.get("take_over") is True
         return desk.sessions.open(asked["window"], previous=previous, take_over=take_over)
 
@@ -119,7 +124,7 @@ def _add_drawings(app: FastAPI, desk: LabelDesk) -> None:
             key = (file.name, file.stat().st_mtime_ns)
             if key not in seen:
                 try:
-                    seen[key] = plain(look_at(file))
+                    seen[key] = asdict(look_at(file))
                 except ThermalError as error:  # somebody else has put it there: say so beside it
                     seen[key] = {"file": file.name, "kind": "unreadable", "message": str(error)}
         return {"drawings": [seen[file.name, file.stat().st_mtime_ns] for file in files_there]}
@@ -136,13 +141,13 @@ def _add_drawings(app: FastAPI, desk: LabelDesk) -> None:
         with Upload(own / "drawings", name, DRAWING_KINDS) as upload:
             async for chunk in request.stream():
                 upload.write(chunk)
-            return plain(await run_in_threadpool(upload.keep_drawing))
+            return asdict(await run_in_threadpool(upload.keep_drawing))
 
     @app.get("/api/drawings/{name}")
     def show_drawing(name: str, page: int = 1, dots_per_inch: float = DOTS_PER_INCH) -> Response:
         file = inside_folder(own / "drawings", name, "drawing")
         if file.suffix.lower() not in RASTER_KINDS:
-            raise PlanError(describe(file.name, "a raster drawing", repr(file.suffix)))
+            raise PlanError(file.name, "a raster drawing", repr(file.suffix))
         sheet = look_at(file, page, dots_per_inch)
         picture = picture_of(read_drawing(file, page=page, dots_per_inch=dots_per_inch).grey)
         size = {"x-width": f"{sheet.width:.0f}", "x-height": f"{sheet.height:.0f}"}
@@ -152,18 +157,18 @@ def _add_drawings(app: FastAPI, desk: LabelDesk) -> None:
     def show_picture(name: str) -> Response:
         file = inside_folder(own / "pictures", name, "picture")
         if not file.is_file() or file.suffix != ".png":
-            raise PlanError(describe(name[:80], "a picture of the page", "none"))
+            raise PlanError(name[:80], "a picture of the page", "none")
         return FileResponse(file, media_type="image/png")
 
     @app.post("/api/floors")
     async def make_floors(request: Request, window: Window) -> dict[str, Any]:
         desk.sessions.check(window)
-        entries, size = _floor_request(parse_json(await _body(request, _MOST_WORDS)))
+        entries, size = _floor_request(_parse_json(await _body(request, _MOST_WORDS)))
         draft = desk.store.draft
 
         def work(progress: Progress) -> dict[str, Any]:
             found = add_floors(draft, entries, own, size, progress)
-            return plain(found) | {"floors": [floor.model_dump() for floor in found.floors]}
+            return asdict(found) | {"floors": [floor.model_dump() for floor in found.floors]}
 
         return desk.jobs.start("floors", work).to_dict()
 
@@ -183,7 +188,7 @@ def _add_jobs(app: FastAPI, desk: LabelDesk) -> None:
     def ask(number: int) -> dict[str, Any]:
         job = desk.jobs.get(number)
         if job is None:
-            raise ReportError(describe("job", "one that was started", str(number)))
+            raise ReportError("job", "one that was started", str(number))
         return job.to_dict()
 
     @app.post("/api/jobs/{number}/stop")
@@ -209,19 +214,19 @@ def _add_reports(app: FastAPI, desk: LabelDesk) -> None:
     @app.get("/reports/{key}/{name:path}")
     def show(key: str, name: str) -> Response:
         page = desk.reports.page(key, name)
-        return FileResponse(page, media_type="text/html", headers={"content-security-policy": REPORT_POLICY})
+        return FileResponse(page, media_type="text/html", headers={"content-security-policy": _REPORT_POLICY})
 
 
 async def _body(request: Request, most: int) -> bytes:
     """Read a body of JSON, up to a size."""
     kind = request.headers.get("content-type", "").partition(";")[0].strip()
     if kind != "application/json":
-        raise LabelError(describe("content-type", "application/json", repr(kind[:60])))
+        raise LabelError("content-type", "application/json", repr(kind[:60]))
     parts, size = [], 0
     async for chunk in request.stream():
         size += len(chunk)
         if size > most:
-            raise OversizedFileError(describe("body", f"at most {most / 1e6:g} MB", "more"))
+            raise OversizedFileError("body", f"at most {most / 1e6:g} MB", "more")
         parts.append(chunk)
     return b"".join(parts)
 
@@ -234,11 +239,11 @@ def _floor_request(content: Any) -> tuple[list[FloorEntry], float | None]:
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         where = f"floors: {'.'.join(str(part) for part in first['loc'])}"
-        raise LabelError(describe(where, first["msg"], repr(first["input"])[:80])) from error
+        raise LabelError(where, first["msg"], repr(first["input"])[:80]) from error
     except (TypeError, KeyError, AttributeError) as error:
-        raise LabelError(describe("body", "{'floors': [...]}", repr(content)[:80])) from error
+        raise LabelError("body", "{'floors': [...]}", repr(content)[:80]) from error
     if not entries:
-        raise LabelError(describe("floors", "at least one drawing", "none"))
+        raise LabelError("floors", "at least one drawing", "none")
     return entries, size
 
 
@@ -253,3 +258,27 @@ async def _malformed(request: Request, error: Exception) -> Response:
     where = ".".join(str(part) for part in first.get("loc", ("request",)))
     message = describe(where, str(first.get("msg", "a valid value")), repr(first.get("input"))[:80])
     return JSONResponse({"error": LabelError.__name__, "message": message}, 400)
+
+
+def _parse_json(body: bytes) -> Any:
+    """Read the body of a request.
+
+    Parameters
+    ----------
+    body : bytes
+        JSON in UTF-8.
+
+    Returns
+    -------
+    object
+        Plain types.
+
+    Raises
+    ------
+    LabelError
+        It is no JSON, or blocks within blocks without end.
+    """
+    try:
+        return json.loads(body)
+    except (ValueError, RecursionError) as error:  # ValueError: no UTF-8, no JSON, an integer of 5000 digits
+        raise LabelError("body", "JSON", f"{type(error).__name__}: {error}"[:200]) from error

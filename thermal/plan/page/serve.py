@@ -1,15 +1,110 @@
-"""Serving the labelling page on this machine, until Ctrl-C."""
+"""Serving of the labelling page on this machine, behind a token."""
 
 from __future__ import annotations
 
+import hmac
+import json
 import secrets
 import socket
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable, MutableMapping
+from typing import Any
 
 from thermal.errors import LabelError, MissingExtraError, describe
-from thermal.plan.page.app import LabelDesk, create_app
+from thermal.plan.page.desk import LabelDesk
+
+Scope = MutableMapping[str, Any]
+Message = MutableMapping[str, Any]
+Receive = Callable[[], Awaitable[Message]]
+Send = Callable[[Message], Awaitable[None]]
+Application = Callable[[Scope, Receive, Send], Awaitable[None]]
+
+_HOSTS = ("127.0.0.1", "localhost", "[::1]")
+_READING = ("GET", "HEAD")
+
+#: What the page may load: its own files and pictures, nothing from elsewhere.
+PAGE_POLICY = (
+    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; connect-src 'self'; "
+    "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+)
+
+_HEADERS = {
+    "content-security-policy": PAGE_POLICY,
+    "referrer-policy": "no-referrer",
+    "x-content-type-options": "nosniff",
+    "x-frame-options": "DENY",
+    "cross-origin-opener-policy": "same-origin",
+    "cross-origin-resource-policy": "same-origin",
+    "cache-control": "no-store",
+}
+
+
+class Gate:
+    """Lets through what comes with the token, from this machine, from the page itself.
+
+    The token is the first part of every path, so that it needs no cookie, and no other page can make the browser send
+    it. The host is checked against pages that have their name point at this machine (DNS rebinding).
+
+    Parameters
+    ----------
+    inner : callable
+        The application behind the gate.
+    token : str
+        First part of every path.
+    """
+
+    def __init__(self, inner: Application, token: str) -> None:
+        self._inner = inner
+        self._token = token.encode("ascii")
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer a request, or pass it on without the token."""
+        if scope["type"] == "lifespan":
+            await self._inner(scope, receive, send)
+            return
+        if scope["type"] != "http":
+            return
+        headers = {key.decode("latin-1").lower(): value.decode("latin-1") for key, value in scope["headers"]}
+        trouble = self._trouble(scope, headers)
+        if trouble is not None:
+            await _refuse(send, *trouble)
+            return
+        first, _, rest = scope["path"].lstrip("/").partition("/")
+        inner = {**scope, "path": f"/{rest}", "raw_path": f"/{rest}".encode()}
+        inner["token"] = first
+
+        async def guarded(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                given = {key.lower() for key, _ in message.get("headers", ())}
+                extra = [(k.encode(), v.encode()) for k, v in _HEADERS.items() if k.encode() not in given]
+                message = {**message, "headers": [*message.get("headers", ()), *extra]}
+            await send(message)
+
+        await self._inner(inner, receive, guarded)
+
+    def _trouble(self, scope: Scope, headers: dict[str, str]) -> tuple[int, str] | None:
+        """Status and message of a request that is not let through."""
+        host = headers.get("host", "")
+        if host.rpartition(":")[0] not in _HOSTS and host not in _HOSTS:
+            return 403, describe("host", "this machine, 127.0.0.1", repr(host[:80]))
+        first = scope["path"].lstrip("/").partition("/")[0]
+        if not hmac.compare_digest(first.encode("utf-8", "replace"), self._token):
+            return 404, describe("address", "the one that buildingmpc label wrote, with its token", "another")
+        origin, site = headers.get("origin"), headers.get("sec-fetch-site", "none")
+        if origin not in (None, f"http://{host}"):
+            return 403, describe("origin", f"the page itself, http://{host}", repr(str(origin)[:80]))
+        if scope["method"] not in _READING and site not in ("same-origin", "none"):
+            return 403, describe("request", "one that the page itself makes", f"one that is {site[:20]}")
+        return None
+
+
+async def _refuse(send: Send, status: int, message: str) -> None:
+    body = json.dumps({"error": LabelError.__name__, "message": message}).encode("utf-8")
+    headers = [(b"content-type", b"application/json"), *((k.encode(), v.encode()) for k, v in _HEADERS.items())]
+    await send({"type": "http.response.start", "status": status, "headers": headers})
+    await send({"type": "http.response.body", "body": body})
+
 
 HOST = "127.0.0.1"
 
@@ -37,7 +132,7 @@ def serve_page(desk: LabelDesk, *, port: int = 0, ready: Callable[[str], None] |
         import uvicorn
     except ImportError as error:
         advice = 'run: pip install "buildingmpc[pages]"'
-        raise MissingExtraError(describe("labelling page", "uvicorn", str(error), advice)) from error
+        raise MissingExtraError("labelling page", "uvicorn", str(error), advice) from error
     token = secrets.token_urlsafe(24)
     try:
         app = create_app(desk, token)
@@ -56,6 +151,34 @@ def serve_page(desk: LabelDesk, *, port: int = 0, ready: Callable[[str], None] |
         desk.end()
 
 
+def create_app(desk: LabelDesk, token: str) -> Application:
+    """Make the server of a labelling page.
+
+    Parameters
+    ----------
+    desk : LabelDesk
+        What it works on.
+    token : str
+        First part of every address; without it nothing is answered.
+
+    Returns
+    -------
+    callable
+        ASGI application.
+
+    Raises
+    ------
+    MissingExtraError
+        The extra ``[pages]`` is not installed.
+    """
+    try:
+        from thermal.plan.page.routes import routes_of
+    except ImportError as error:
+        advice = 'run: pip install "buildingmpc[pages]"'
+        raise MissingExtraError("labelling page", "FastAPI", str(error), advice) from error
+    return Gate(routes_of(desk), token)
+
+
 def _listen(port: int) -> socket.socket:
     listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -63,9 +186,7 @@ def _listen(port: int) -> socket.socket:
         listener.bind((HOST, port))
     except (OSError, OverflowError) as error:
         listener.close()
-        raise LabelError(
-            describe("port", "a free one on this machine", f"{port}: {error}", "choose another")
-        ) from error
+        raise LabelError("port", "a free one on this machine", f"{port}: {error}", "choose another") from error
     return listener
 
 

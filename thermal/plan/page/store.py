@@ -1,26 +1,27 @@
-"""The case folder that is being labelled: the draft after each change, and the case whenever the draft is one."""
+"""Case folder behind the labelling page, and who has it open."""
 
 from __future__ import annotations
 
 import json
 import os
 import tempfile
+import time
+from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
 import yaml
 
-from thermal.case.building_file import NAME, read_building_file
-from thermal.case.load import load_case
-from thermal.case.telemetry_file import check_units, read_telemetry
-from thermal.errors import CaseError, LabelError, ThermalError, describe
-from thermal.plan.columns import read_columns
-from thermal.plan.folder import save_plan_case
+from thermal.case.building import BuildingFile
+from thermal.case.load import NAME, load_case, read_building_file
+from thermal.case.migration import migrate
+from thermal.case.telemetry import check_units, read_telemetry
+from thermal.errors import CaseError, LabelError, SessionHeldError, ThermalError
+from thermal.plan.folder import DRAFT, OWN_FOLDER, save_plan_case
 from thermal.plan.guard import inside_folder
-from thermal.plan.kept import DRAFT, OWN_FOLDER
-from thermal.plan.page.convert import building_of_draft, draft_of, parse_draft
-from thermal.plan.page.draft import Draft
+from thermal.plan.match import read_columns
+from thermal.plan.page.draft import Draft, building_of_draft, draft_of, parse_draft
 from thermal.plan.page.findings import DraftFinding, find_faults
 
 _MOST_DRAFT = 50_000_000  # bytes
@@ -69,22 +70,18 @@ class CaseStore:
     def __init__(self, path: str | PathLike[str]) -> None:
         self.folder = Path(path).absolute()
         if self.folder.exists() and not self.folder.is_dir():
-            raise LabelError(describe(str(path), "a case folder", "a file"))
+            raise LabelError(str(path), "a case folder", "a file")
         own = self.folder / OWN_FOLDER
         is_case = (self.folder / NAME).is_file()
         if self.folder.is_dir() and any(self.folder.iterdir()) and not is_case and not own.is_dir():
             advice = "choose another folder"
-            raise LabelError(
-                describe(str(path), "a case, or an empty folder", "a folder of other files", advice)
-            )
+            raise LabelError(str(path), "a case, or an empty folder", "a folder of other files", advice)
         self.draft = _read_draft(self.folder, is_case)
         if own.is_symlink() or (own.exists() and not own.is_dir()):
-            raise LabelError(describe(f"{path}: {OWN_FOLDER}", "a folder of the page's own", "something else"))
+            raise LabelError(f"{path}: {OWN_FOLDER}", "a folder of the page's own", "something else")
         for name in ("drawings", "pictures", "reports"):
             if (own / name).is_symlink():
-                raise LabelError(
-                    describe(f"{path}: {OWN_FOLDER}/{name}", "a folder of the page's own", "a link")
-                )
+                raise LabelError(f"{path}: {OWN_FOLDER}/{name}", "a folder of the page's own", "a link")
             (own / name).mkdir(parents=True, exist_ok=True)
         self.columns: tuple[str, ...] = ()
         self.telemetry, self._trouble = "", ""
@@ -167,7 +164,7 @@ class CaseStore:
                 if files.keys() >= {f["name"] for f in content["floors"]}:
                     floor["plan"] = files[floor["name"]]
                 _replace_if_other(inside_folder(self.folder, floor["plan"], "plan"), drawn)
-        if _filled(before) == _filled(content) and not self._is_ours():
+        if before and _filled(migrate(before, NAME)) == _filled(content) and not self._is_ours():
             return  # nothing new to say: the file stays with the comments of its author
         text = yaml.safe_dump(content, sort_keys=False, allow_unicode=True, width=120)
         note = _NOTE.format(minutes=draft.seconds / 60.0)
@@ -182,7 +179,8 @@ class CaseStore:
 
 def _filled(content: dict[str, Any]) -> dict[str, Any]:
     """Leave out what is empty: a key without an entry says the same as no key."""
-    return {key: value for key, value in content.items() if value or value == 0}
+    parsed = BuildingFile.model_validate(content).model_dump()
+    return {key: value for key, value in parsed.items() if value or value == 0}
 
 
 def _replace_if_other(path: Path, content: bytes) -> None:
@@ -199,12 +197,12 @@ def _read_draft(folder: Path, is_case: bool) -> Draft:
     draft: Draft | None = None
     if file.is_file():
         if file.stat().st_size > _MOST_DRAFT:
-            raise LabelError(describe(str(file), f"at most {_MOST_DRAFT} bytes", f"{file.stat().st_size}"))
+            raise LabelError(str(file), f"at most {_MOST_DRAFT} bytes", f"{file.stat().st_size}")
         try:
             draft = parse_draft(json.loads(file.read_text(encoding="utf-8")), file.name)
         except (OSError, ValueError, RecursionError, ThermalError) as error:
             advice = f"move {OWN_FOLDER}/{DRAFT} away to begin with the case"
-            raise LabelError(describe(str(file), "the page's own file", str(error), advice)) from error
+            raise LabelError(str(file), "the page's own file", str(error), advice) from error
     if not is_case:
         return draft or Draft(name=folder.name)
     read_building_file(folder)
@@ -239,3 +237,128 @@ def _with_positions(fresh: Draft, draft: Draft) -> Draft:
     ]
     update = {"floors": tuple(kept), "devices": tuple(devices), "seconds": draft.seconds, "revision": draft.revision}
     return fresh.model_copy(update=update)
+
+
+_LOCK = "open.json"
+
+#: A window that has said nothing for so long is gone [s]; browsers let hidden windows speak once a minute.
+PATIENCE = 150.0
+
+
+@dataclass
+class _Holder:
+    window: str
+    since: float
+    seen: float
+
+
+class Sessions:
+    """The window that may change a case, and the lock that tells other programs so.
+
+    Parameters
+    ----------
+    own : Path
+        The page's own folder of the case.
+    take_over : bool
+        Whether to take the case from another program.
+
+    Raises
+    ------
+    SessionHeldError
+        Another program that is still running labels the case.
+    """
+
+    def __init__(self, own: Path, *, take_over: bool = False) -> None:
+        self._file = own / _LOCK
+        self._id = f"{os.getpid()}-{time.time_ns()}"
+        self._holder: _Holder | None = None
+        other = self._lock()
+        if other is not None and not take_over and _is_running(other.get("process")):
+            expected = "a case that nobody labels at the moment"
+            found = f"one that process {other.get('process')} has open since {other.get('since')}"
+            raise SessionHeldError(str(own.parent), expected, found, "close that one, or pass --take-over")
+        since = time.strftime("%Y-%m-%d %H:%M")
+        content = {"program": self._id, "process": os.getpid(), "since": since}
+        write_whole(self._file, json.dumps(content).encode("utf-8"))
+
+    def _lock(self) -> dict[str, Any] | None:
+        try:
+            content = json.loads(self._file.read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            return None
+        return content if isinstance(content, dict) else None
+
+    def open(self, window: str, *, previous: str = "", take_over: bool = False) -> dict[str, Any]:
+        """Ask for the case.
+
+        Parameters
+        ----------
+        window : str
+            Who asks.
+        previous : str
+            Who that was before it was loaded anew.
+        take_over : bool
+            Whether to take the case from another window.
+
+        Returns
+        -------
+        dict
+            ``mine``: whether the window may change the case; else ``since`` and ``seen``, how long ago another window
+            came and last said something [s].
+        """
+        now = time.monotonic()
+        holder = self._holder
+        if holder is None or take_over or now - holder.seen > PATIENCE or holder.window in (window, previous):
+            self._holder = _Holder(window, now, now)
+            return {"mine": True}
+        return {"mine": False, "since": now - holder.since, "seen": now - holder.seen}
+
+    def close(self, window: str) -> None:
+        """Give the case back, when it is that window's.
+
+        Parameters
+        ----------
+        window : str
+            Who closes.
+        """
+        if self._holder is not None and self._holder.window == window:
+            self._holder = None
+
+    def check(self, window: str) -> None:
+        """Refuse a change by a window that does not have the case.
+
+        Parameters
+        ----------
+        window : str
+            Who asks.
+
+        Raises
+        ------
+        SessionHeldError
+            Another window, or another program, has it.
+        """
+        lock = self._lock()
+        if lock is None or lock.get("program") != self._id:
+            raise SessionHeldError("session", "a case that this program has open", "another program has it")
+        if self._holder is None or self._holder.window != window:
+            raise SessionHeldError("session", "the window that has the case", "another window has taken it")
+        self._holder.seen = time.monotonic()
+
+    def end(self) -> None:
+        """Take the lock away, when it is this program's."""
+        lock = self._lock()
+        if lock is not None and lock.get("program") == self._id:
+            self._file.unlink(missing_ok=True)
+
+
+def _is_running(process: object) -> bool:
+    """Whether a process is there; one of another user is."""
+    if not isinstance(process, int) or process <= 0 or process == os.getpid():
+        return False
+    try:
+        os.kill(process, 0)
+    except PermissionError:
+        return True
+    except (OSError, OverflowError):
+        return False
+    return True

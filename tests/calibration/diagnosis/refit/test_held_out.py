@@ -14,8 +14,7 @@ from calibration.evaluation.settings import ModelSettings
 from mpc.reports.diagnosis_statistics import statistics_content
 from thermal import Case, Telemetry
 from thermal.pilot.building import pilot_building
-from thermal.pilot.truth import TwinRanges
-from thermal.pilot.twin import generate_twin
+from thermal.pilot.twin import TwinRanges, TwinSettings, generate_twin
 
 
 def errors(days: list[int], daily: list[float], weight: list[float]) -> HeldOut:
@@ -42,7 +41,7 @@ def late_heat() -> Case:
     """A twin of 15 days in which a meter of one zone misses half of the air in the last five."""
     building = pilot_building(3, floor_area=120.0, zones=4, floors=1, name="office")
     quiet = TwinRanges(disturbance_deviation=(0.05, 0.1), noise=(0.005, 0.01))
-    case = generate_twin(building, 3, days=15.0, step_seconds=900.0, dx=1.0, meter="exact", ranges=quiet)[0]
+    case = generate_twin(building, 3, TwinSettings(days=15.0, step_seconds=900.0, dx=1.0, meter="exact", ranges=quiet))[0]
     frame = case.telemetry.frame.copy()
     (device,) = building.devices_of(building.zone_names[1])
     flow = frame.columns.get_loc(f"{device.name}/supply_air_flowrate_sensor")

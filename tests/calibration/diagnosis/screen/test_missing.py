@@ -17,8 +17,7 @@ from calibration.estimation.heat_balance import heat_balance
 from calibration.evaluation.settings import ModelSettings
 from thermal import reduced_model
 from thermal.pilot.building import pilot_building
-from thermal.pilot.truth import TwinRanges, TwinTruth
-from thermal.pilot.twin import generate_twin
+from thermal.pilot.twin import TwinRanges, TwinSettings, TwinTruth, generate_twin
 
 FloatArray = NDArray[np.float64]
 
@@ -30,9 +29,7 @@ EXTRA, ZONE = 200.0, 1
 def twin(seed: int, noise: float) -> tuple[Bench, TwinTruth]:
     building = pilot_building(3, floor_area=120.0, zones=4, floors=1, name="office")
     ranges = TwinRanges(disturbance_deviation=(0.3, 1.0), noise=(noise, noise))
-    case, truth = generate_twin(
-        building, seed, days=15.0, step_seconds=900.0, dx=1.0, meter="exact", ranges=ranges
-    )  # fmt: skip
+    case, truth = generate_twin(building, seed, TwinSettings(days=15.0, step_seconds=900.0, dx=1.0, meter="exact", ranges=ranges))  # fmt: skip
     return Bench(case, ModelSettings(dx=1.0)), truth
 
 

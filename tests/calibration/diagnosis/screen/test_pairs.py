@@ -22,8 +22,7 @@ from calibration.evaluation.settings import ModelSettings
 from thermal import Case, Telemetry
 from thermal.effects.catalogue import CATALOGUE
 from thermal.pilot.building import pilot_building
-from thermal.pilot.truth import TwinRanges
-from thermal.pilot.twin import generate_twin
+from thermal.pilot.twin import TwinRanges, TwinSettings, generate_twin
 
 FloatArray = NDArray[np.float64]
 
@@ -127,7 +126,7 @@ def biased_and_misread() -> tuple[Bench, str, str]:
     """A twin whose meter of one zone reads low and whose sensor of another reads high; the two zones."""
     building = pilot_building(3, floor_area=120.0, zones=4, floors=1, name="office")
     quiet = TwinRanges(disturbance_deviation=(0.05, 0.1), noise=(0.005, 0.01))
-    case = generate_twin(building, 3, days=15.0, step_seconds=900.0, dx=1.0, meter="exact", ranges=quiet)[0]
+    case = generate_twin(building, 3, TwinSettings(days=15.0, step_seconds=900.0, dx=1.0, meter="exact", ranges=quiet))[0]
     low, high = building.zone_names[1], building.zone_names[3]
     frame = case.telemetry.frame.copy()
     (device,) = building.devices_of(low)

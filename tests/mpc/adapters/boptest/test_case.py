@@ -22,7 +22,7 @@ from mpc.errors import BoptestError, BoptestRequestError, PlantError
 from mpc.scenario.grid import StepGrid
 from mpc.scenario.rates import HourlyRate
 from thermal import load_bundled_case, load_case
-from thermal.case.schema import Device
+from thermal.case.building import Device
 
 DAY = 86_400.0
 SHARED = Path(__file__).parents[4].parent / "shared" / "cases"

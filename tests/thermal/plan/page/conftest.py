@@ -17,9 +17,9 @@ with warnings.catch_warnings():
     warnings.simplefilter("ignore")  # newer versions of starlette prefer another client to httpx
     from starlette.testclient import TestClient
 
-from thermal.plan.page.app import LabelDesk, create_app
-from thermal.plan.page.convert import encode_floor
-from thermal.plan.page.draft import Draft, DraftDevice, Site
+from thermal.plan.page.desk import LabelDesk
+from thermal.plan.page.draft import Draft, DraftDevice, Site, encode_floor
+from thermal.plan.page.serve import create_app
 
 TOKEN = "t0ken"
 HOST = "http://127.0.0.1:8000"

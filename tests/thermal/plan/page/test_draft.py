@@ -12,10 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thermal import Building, ZoneTable
-from thermal.case.schema import Location, ZoneEntry
+from thermal.case.building import Location, ZoneEntry
 from thermal.errors import LabelError
-from thermal.plan.page.convert import building_of_draft, draft_of, encode_floor, parse_draft, zones_of
-from thermal.plan.page.draft import Draft
+from thermal.plan.page.draft import Draft, building_of_draft, draft_of, encode_floor, parse_draft, zones_of
 
 
 @given(

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from thermal.case.schema import Airflow
+from thermal.case.building import Airflow
 from thermal.plan.page.draft import Draft, DraftDevice, Site
 from thermal.plan.page.findings import find_faults, zone_facts
 

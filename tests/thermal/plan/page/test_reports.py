@@ -9,7 +9,8 @@ from typing import Any
 
 import pytest
 
-from thermal.plan.page.app import LabelDesk, create_app
+from thermal.plan.page.desk import LabelDesk
+from thermal.plan.page.serve import create_app
 
 Progress = Callable[[str, int, int], None]
 

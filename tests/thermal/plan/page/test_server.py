@@ -17,8 +17,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from thermal.plan.page import routes, uploads
-from thermal.plan.page.app import LabelDesk
+from thermal.plan.page import drawings as uploads
+from thermal.plan.page import routes
+from thermal.plan.page.desk import LabelDesk
 from thermal.plan.page.draft import Draft
 
 Make = Callable[..., Draft]

@@ -153,7 +153,7 @@ export function renameDevice(from, to) {
   if (!name || name === from) return;
   if (page.draft.devices.some((d) => d.name === name)) { toast(`There is a device ${name} already.`, "error"); return; }
   change(`rename ${from}`, {
-    devices: touch([from], { name }),
+    devices: touch([from], { name }).map((d) => ({ ...d, fed_by: (d.fed_by || []).map((f) => (f === from ? name : f)) })),
     airflows: page.draft.airflows.map((a) => (a.device === from ? { ...a, device: name } : a)),
   });
   select({ devices: [name] });
@@ -162,7 +162,7 @@ export function renameDevice(from, to) {
 export function dropDevices(names) {
   const gone = new Set(names);
   change(`remove ${names.length} device${names.length > 1 ? "s" : ""}`, {
-    devices: page.draft.devices.filter((d) => !gone.has(d.name)),
+    devices: page.draft.devices.filter((d) => !gone.has(d.name)).map((d) => ({ ...d, fed_by: (d.fed_by || []).filter((f) => !gone.has(f)) })),
     airflows: page.draft.airflows.filter((a) => !gone.has(a.device)),
   });
 }
@@ -183,7 +183,7 @@ export function takeDevices(list, file) {
   for (const device of list) {
     const old = known.get(device.name);
     if (!old) added++;
-    known.set(device.name, old ? { ...old, type: device.type, zone: old.zone || device.zone, room: device.room } : { ...device, ...placed });
+    known.set(device.name, old ? { ...old, type: device.type, fed_by: device.fed_by, zone: old.zone || device.zone, room: device.room } : { ...device, ...placed });
   }
   change(`import ${file}`, { devices: [...known.values()] });
   const placedNow = list.filter((d) => d.zone).length;

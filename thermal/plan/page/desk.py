@@ -1,23 +1,20 @@
-"""The server of the labelling page: what the page asks for, and what it is answered."""
+"""Desk of the labelling page: the draft of one case, its jobs, sessions and reports."""
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
 from pathlib import Path
 from threading import RLock
 from typing import Any
 
-from thermal.errors import LabelError, MissingExtraError, SessionHeldError, describe
-from thermal.plan.page.access import Application, Gate
-from thermal.plan.page.convert import parse_draft
-from thermal.plan.page.draft import Draft
+from thermal.errors import PlanError, SessionHeldError
+from thermal.plan.guard import inside_folder
+from thermal.plan.list import read_drawing_list
+from thermal.plan.page.draft import Draft, Site, parse_draft
+from thermal.plan.page.drawings import DRAWING_KINDS, Progress, add_floors, checked_name, look_at
 from thermal.plan.page.findings import zone_facts
-from thermal.plan.page.jobs import Jobs
-from thermal.plan.page.reports import ReportMaker, Reports
-from thermal.plan.page.sessions import Sessions
-from thermal.plan.page.store import CaseStore
+from thermal.plan.page.reports import Jobs, ReportMaker, Reports
+from thermal.plan.page.store import CaseStore, Sessions, write_whole
 
 
 class LabelDesk:
@@ -100,7 +97,7 @@ class LabelDesk:
             revision = self.store.draft.revision
             if draft.revision != revision:
                 found = f"a change of revision {draft.revision}"
-                raise SessionHeldError(describe("draft", f"one of revision {revision}", found, "load the page anew"))
+                raise SessionHeldError("draft", f"one of revision {revision}", found, "load the page anew")
             if window != self._saver:
                 self._saver, self._since = window, revision
             saved = draft.model_copy(update={"revision": revision + 1})
@@ -119,69 +116,66 @@ class LabelDesk:
         return {"findings": findings, "zones": zone_facts(draft), "telemetry": telemetry}
 
 
-def create_app(desk: LabelDesk, token: str) -> Application:
-    """Make the server of a labelling page.
+def import_sheet(desk: LabelDesk, path: Path) -> None:
+    """Put a drawing among those of the page; the page asks for its scale.
 
     Parameters
     ----------
     desk : LabelDesk
-        What it works on.
-    token : str
-        First part of every address; without it nothing is answered.
-
-    Returns
-    -------
-    callable
-        ASGI application.
+        Of a new case.
+    path : Path
+        PNG, JPEG, PDF, DXF; CSV, ``.npy`` or ``.npz`` of codes.
 
     Raises
     ------
-    MissingExtraError
-        The extra ``[pages]`` is not installed.
+    PlanError
+        One of its family: it is not what its name says.
     """
-    try:
-        from thermal.plan.page.routes import routes_of
-    except ImportError as error:
-        advice = 'run: pip install "buildingmpc[pages]"'
-        raise MissingExtraError(describe("labelling page", "FastAPI", str(error), advice)) from error
-    return Gate(routes_of(desk), token)
+    checked_name(path.name, DRAWING_KINDS)
+    look_at(path)
+    _copy(path, desk.store.own / "drawings" / path.name)
 
 
-def parse_json(body: bytes) -> Any:
-    """Read the body of a request.
+def import_list(desk: LabelDesk, path: Path, progress: Progress) -> None:
+    """Put all floors of a list of drawings on the page.
 
     Parameters
     ----------
-    body : bytes
-        JSON in UTF-8.
-
-    Returns
-    -------
-    object
-        Plain types.
+    desk : LabelDesk
+        Of a new case.
+    path : Path
+        YAML file of a `thermal.plan.DrawingList`; drawings lie in its folder.
+    progress : callable
+        Told stage, steps done and all steps.
 
     Raises
     ------
-    LabelError
-        It is no JSON, or blocks within blocks without end.
+    PlanError
+        One of its family, for the first thing that does not fit.
     """
+    listed = read_drawing_list(path)
+    own, entries = desk.store.own, []
+    for entry in listed.floors:
+        source = inside_folder(path.absolute().parent, entry.file, f"floors: {entry.name}: file")
+        look_at(source)
+        # Two folders of the list may hold files of the same name; a PDF may have several floors.
+        name = entry.file.replace("\\", "/").replace("/", "_")
+        _copy(source, own / "drawings" / checked_name(name, DRAWING_KINDS))
+        entries.append(entry.model_copy(update={"file": name}))
+    found = add_floors(desk.store.draft, entries, own, listed.cell_size, progress)
+    turned = listed.orientation + (found.orientation or 0.0)
+    changes = {
+        "name": listed.name,
+        "site": Site(**listed.location.model_dump()),
+        "orientation": round((turned + 180.0) % 360.0 - 180.0, 2),
+        "cell_size": found.cell_size,
+        "floors": found.floors,
+    }
+    desk.store.save(desk.store.draft.model_copy(update=changes))
+
+
+def _copy(source: Path, target: Path) -> None:
     try:
-        return json.loads(body)
-    except (ValueError, RecursionError) as error:  # ValueError: no UTF-8, no JSON, an integer of 5000 digits
-        raise LabelError(describe("body", "JSON", f"{type(error).__name__}: {error}"[:200])) from error
-
-
-def plain(value: Any) -> dict[str, Any]:
-    """Give a dataclass as plain types.
-
-    Parameters
-    ----------
-    value : object
-        Dataclass instance.
-
-    Returns
-    -------
-    dict
-        Its fields.
-    """
-    return asdict(value)
+        write_whole(target, source.read_bytes())
+    except OSError as error:
+        raise PlanError(source.name, "a file that can be copied", str(error)) from error
