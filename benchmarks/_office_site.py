@@ -26,8 +26,7 @@ from _site import POLICIES, Site, Week, World
 from calibration import calibrate
 from calibration.diagnosis.diagnosis import diagnose
 from mpc.baselines.guideline36 import Guideline36
-from mpc.baselines.reset import OutdoorReset
-from mpc.baselines.schedule import day_schedule
+from mpc.baselines.rules import OutdoorReset, day_schedule
 from mpc.control.controller.action import ControllerSettings
 from mpc.control.controller.controller import MpcController
 from mpc.control.problem.back_off import Margin

@@ -10,12 +10,11 @@ import numpy as np
 import pandas as pd
 
 from mpc.errors import ScenarioError
-from mpc.scenario.carbon import CarbonIntensity
 from mpc.scenario.comfort import ComfortBand
 from mpc.scenario.gains import InternalGains
 from mpc.scenario.grid import StepGrid
 from mpc.scenario.occupancy import OFFICE_AREA_PER_PERSON, Occupancy, ScheduledOccupancy
-from mpc.scenario.tariff import DemandBuckets, Tariff
+from mpc.scenario.tariff import CarbonIntensity, DemandBuckets, Tariff
 from mpc.scenario.weather import Weather
 from thermal._types import FloatArray
 from thermal.case.areas import zone_floor_areas

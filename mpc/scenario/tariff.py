@@ -1,17 +1,17 @@
-"""What energy costs: energy prices, and charges for the highest demand of a month."""
+"""What energy costs and emits: prices, charges for the highest demand of a month, carbon."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from mpc.errors import ScenarioError
 from mpc.scenario.grid import Calendar, StepGrid
-from mpc.scenario.rates import Rate, by_month_and_hour
+from mpc.scenario.rates import ConstantRate, Rate, by_month_and_hour
 from thermal._types import FloatArray, IntArray
 from thermal.errors import describe
 
@@ -226,3 +226,39 @@ class Tariff:
         """Give what a report says of the tariff, as plain types."""
         charges = [{"name": d.name, "rates": [float(r) for r in d.rates], "window": d.window} for d in self.demand]
         return {"name": self.name, "currency": self.currency, "demand_charges": charges}
+
+
+#: Carbon dioxide of natural gas by its upper heating value [kg/kWh]: 53.06 kg/mmBtu (40 CFR 98, table C-1).
+GAS_CARBON = 53.06 / 293.0711
+
+
+@dataclass(frozen=True, eq=False)
+class CarbonIntensity:
+    """Emissions of a kilowatt-hour of electricity and of gas.
+
+    Average intensity (all emissions of the grid over all generation) is what inventories count; marginal intensity
+    (of the plants that follow a change of demand) is what a shift of load changes. They may differ in sign of their
+    slope over a day, so that there is no default.
+
+    Parameters
+    ----------
+    electricity : Rate
+        Constant, by the local hour or a published series [kg/kWh].
+    kind : str
+        ``average`` or ``marginal``: which of the two `electricity` is.
+    gas : Rate
+        By the upper heating value [kg/kWh]; default `GAS_CARBON`, burnt on site.
+
+    Raises
+    ------
+    ScenarioError
+        When the kind is none of the two.
+    """
+
+    electricity: Rate
+    kind: Literal["average", "marginal"]
+    gas: Rate = field(default_factory=lambda: ConstantRate(GAS_CARBON))
+
+    def __post_init__(self) -> None:
+        if self.kind not in ("average", "marginal"):
+            raise ScenarioError(describe("carbon: kind", "'average' or 'marginal'", repr(self.kind)))

@@ -13,8 +13,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from mpc.errors import WeatherError
-from mpc.scenario.averages import means_by_shape, means_of_means, means_of_readings
-from mpc.scenario.grid import StepGrid, index_seconds
+from mpc.scenario.grid import StepGrid, index_seconds, means_by_shape, means_of_means, means_of_readings
 from thermal._types import FloatArray
 from thermal.case.points import OUTDOOR_TEMPERATURE, POINT_TYPES
 from thermal.case.schema import Location

@@ -18,7 +18,6 @@ from mpc.loop.building import BuildingModel, GridBuilding
 from mpc.loop.noise import SensorNoise
 from mpc.loop.reduced import ReducedBuilding
 from mpc.loop.simulated import SimulatedPlant
-from mpc.scenario.carbon import CarbonIntensity
 from mpc.scenario.comfort import ComfortBand
 from mpc.scenario.forecaster import ErrorGrowth, Forecaster
 from mpc.scenario.gains import InternalGains
@@ -26,7 +25,7 @@ from mpc.scenario.grid import StepGrid
 from mpc.scenario.occupancy import Occupancy
 from mpc.scenario.paper import paper_carbon, paper_tariff
 from mpc.scenario.scenario import Scenario, build_scenario
-from mpc.scenario.tariff import Tariff
+from mpc.scenario.tariff import CarbonIntensity, Tariff
 from mpc.scenario.weather import Weather
 from mpc.studies.controller import MODEL_STEP
 from mpc.studies.devices import equip

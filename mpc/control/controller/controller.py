@@ -10,16 +10,12 @@ import pandas as pd
 
 from mpc.control.controller.action import Action, ControllerSettings, Source
 from mpc.control.controller.observer import Observer
-from mpc.control.controller.reading import Readings, SitePoints
-from mpc.control.controller.start_up import past_forecast, past_steps
-from mpc.control.controller.watch import FarFromModel, StuckSensors
-from mpc.control.problem.assembly import Expected, expect, peak_data
-from mpc.control.problem.data import HorizonData
-from mpc.control.problem.demand_count import DemandCount
-from mpc.control.problem.explain import explain_comfort
+from mpc.control.controller.reading import Readings, SitePoints, past_forecast, past_steps
+from mpc.control.controller.watch import FarFromModel, StuckSensors, explain_comfort
+from mpc.control.problem.assembly import DemandCount, Expected, expect, peak_data
+from mpc.control.problem.horizon import HorizonData
 from mpc.control.problem.problem import ControlProblem
-from mpc.control.solvers.solution import Solution, Solver, Status
-from mpc.control.solvers.starts import Starts
+from mpc.control.solvers.solution import Solution, Solver, Starts, Status
 from mpc.errors import ControlError, MpcError
 from mpc.scenario.forecast import Forecast
 from thermal._types import FloatArray

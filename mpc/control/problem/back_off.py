@@ -9,8 +9,7 @@ import numpy as np
 from scipy.special import ndtri
 
 from calibration.estimation.kalman import KalmanFilter
-from mpc.control.problem.data import HorizonData
-from mpc.control.problem.horizon import Horizon
+from mpc.control.problem.horizon import Horizon, HorizonData
 from mpc.errors import ControlError
 from mpc.scenario.forecaster import ErrorGrowth
 from thermal._types import BoolArray, FloatArray

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mpc.control.predictor.predictor import Predictor, Rollout, Sensitivity
-from mpc.control.problem.data import HorizonData
+from mpc.control.problem.horizon import HorizonData
 from mpc.errors import ControlError
 from mpc.scenario.rates import KILOWATT_HOUR
 from thermal._types import FloatArray

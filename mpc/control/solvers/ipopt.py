@@ -10,7 +10,7 @@ import casadi as ca
 import numpy as np
 
 from mpc.control.predictor.predictor import Rollout
-from mpc.control.problem.data import HorizonData
+from mpc.control.problem.horizon import HorizonData
 from mpc.control.problem.problem import ControlProblem
 from mpc.control.solvers.solution import Solution, Status
 from mpc.errors import MpcError

@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mpc.control.predictor.predictor import Predictor, Rollout, Sensitivity
-from mpc.control.problem.data import HorizonData
-from mpc.control.problem.horizon import Horizon
+from mpc.control.problem.horizon import Horizon, HorizonData
 from mpc.control.problem.problem import ControlProblem, CostTerms
 from mpc.control.solvers.sequential import SequentialSolver
 from mpc.control.solvers.solution import Solution, Solver

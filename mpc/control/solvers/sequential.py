@@ -9,9 +9,9 @@ from typing import NamedTuple
 import numpy as np
 
 from mpc.control.predictor.predictor import Rollout, Sensitivity
-from mpc.control.problem.data import HorizonData
+from mpc.control.problem.horizon import HorizonData
 from mpc.control.problem.problem import ControlProblem, CostTerms
-from mpc.control.solvers.quadratic import QuadraticSolver, solve_quadratic
+from mpc.control.solvers.convex import QuadraticSolver, solve_quadratic
 from mpc.control.solvers.solution import Solution, Status
 from thermal._types import FloatArray
 

@@ -6,9 +6,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from mpc.baselines.guideline36 import Guideline36, Guideline36Settings
-from mpc.baselines.requests import HysteresisRequests, SuppressedRequests
-from mpc.baselines.reset import OutdoorReset
+from mpc.baselines.guideline36 import Guideline36, Guideline36Settings, HysteresisRequests, SuppressedRequests
+from mpc.baselines.rules import OutdoorReset
 from mpc.control.controller.reading import SitePoints
 from mpc.errors import ControlError
 from mpc.loop.actuators import Actuator

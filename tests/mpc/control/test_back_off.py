@@ -14,7 +14,7 @@ from mpc.control.predictor.heat import HeatPredictor, heat_channels
 from mpc.control.problem.back_off import BackOff, Margin
 from mpc.control.problem.horizon import Horizon
 from mpc.control.problem.problem import ControlProblem
-from mpc.control.solvers.linear import LinearSolver
+from mpc.control.solvers.convex import LinearSolver
 from mpc.errors import ControlError
 from mpc.scenario.forecaster import ErrorGrowth
 from thermal.model.scheme import IMPLICIT_EULER

@@ -1,4 +1,4 @@
-"""Outdoor reset as a controller."""
+"""Baselines by rule: a fixed schedule, outdoor reset, and all of them by name."""
 
 from __future__ import annotations
 
@@ -6,11 +6,57 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from mpc.control.controller.rules import ResetRule
+from mpc.control.controller.action import ResetRule
 from mpc.control.problem.channels import Channel
 from mpc.loop.actuators import Actuator
+from mpc.loop.run import FixedSetpoints
 from mpc.scenario.forecast import Forecast
 from thermal.case.points import OUTDOOR_TEMPERATURE
+
+_AIR, _WATER = "supply_air_temperature_setpoint", "supply_water_temperature_setpoint"
+
+
+def day_schedule(
+    actuators: Sequence[Actuator],
+    *,
+    air: float = 285.95,
+    water: float = 355.35,
+    night_water: float = 333.15,
+    day: tuple[float, float] = (4.0, 20.0),
+) -> FixedSetpoints:
+    """Hold the design temperatures, as a building does whose setpoints were never looked at again.
+
+    Parameters
+    ----------
+    actuators : sequence of Actuator
+        Of the plant: those of supply air and supply water are set, each within its range.
+    air, water : float
+        By day [K]; the defaults are those that plants are sized for (`thermal.pilot.DesignConditions`), 12.8 and
+        82.2 degC, as in the U.S. DOE's reference buildings.
+    night_water : float
+        From the end of the day to its begin [K].
+    day : tuple of float
+        Local hours between which the water is hot [h].
+
+    Returns
+    -------
+    FixedSetpoints
+        A controller.
+
+    Examples
+    --------
+    >>> boiler = Actuator("BOILER/supply_water_temperature_setpoint", "K", 310.0, 355.0)
+    >>> schedule = day_schedule((boiler,))
+    >>> [schedule.at_hour(hour)[boiler.name] for hour in (3.0, 12.0, 22.0)]
+    [333.15, 355.0, 333.15]
+    """
+    used = tuple(a for a in actuators if a.name.rpartition("/")[2] in (_AIR, _WATER))
+
+    def of(water_now: float) -> dict[str, float]:
+        wanted = {_AIR: air, _WATER: water_now}
+        return {a.name: min(max(wanted[a.name.rpartition("/")[2]], a.lowest), a.highest) for a in used}
+
+    return FixedSetpoints(of(night_water), used, {day[0]: of(water), day[1]: of(night_water)})
 
 
 class OutdoorReset:
