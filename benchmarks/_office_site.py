@@ -110,7 +110,8 @@ def scenario_of(start: str, seed: int, days: float, gains: InternalGains | None 
     begin = pd.Timestamp(start)
     grid = StepGrid.between(start, (begin + pd.Timedelta(days=days)).isoformat(), STEP, office(size))
     weather = pilot_weather(seed, start, int(days) + 1.0)
-    return build_scenario(office(size), grid, weather, paper_tariff(), carbon=paper_carbon(), gains=gains, seed=seed)
+    everybody = build_scenario(office(size), grid, weather, paper_tariff(), carbon=paper_carbon(), gains=gains)
+    return everybody.redrawn(seed)
 
 
 @cache

@@ -121,8 +121,8 @@ def simulated_plant(
     grid = StepGrid.between(start, end, step_seconds, building)
     scenario = build_scenario(
         building, grid, weather, tariff or paper_tariff(), carbon=carbon or paper_carbon(), occupancy=occupancy,
-        gains=gains, seed=seed,
-    )  # fmt: skip
+        gains=gains,
+    ).redrawn(seed)  # fmt: skip
     built: BuildingModel
     extras: tuple[Extension, ...] = (*effects, RadiantGains()) if scenario.heat.radiates else effects
     if model == "reduced":

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from mpc.errors import ScenarioError
-from mpc.scenario.grid import SATURDAY, SUNDAY, WEEKDAY, Calendar, StepGrid, local_hours
+from mpc.scenario.grid import Calendar, StepGrid, local_hours
 from thermal._types import FloatArray
 from thermal.errors import describe
 
@@ -59,11 +59,9 @@ class ComfortBand:
         grid : StepGrid
             Steps in the building's time zone.
         """
-        kind, hour = self.calendar.kinds_on(grid.middles), local_hours(grid.middles)
-        inside = np.zeros(len(hour))
-        for number, hours in ((WEEKDAY, self.weekday), (SATURDAY, self.saturday), (SUNDAY, self.sunday)):
-            if hours is not None:
-                inside += (kind == number) & (hour >= hours[0]) & (hour < hours[1])
+        of_kind = np.array([hours or (0.0, 0.0) for hours in (self.weekday, self.saturday, self.sunday)])
+        hour, (first, last) = local_hours(grid.middles), of_kind[self.calendar.kinds_on(grid.middles)].T
+        inside = ((hour >= first) & (hour < last)).astype(float)
         return grid.mean(inside)
 
     def on(self, grid: StepGrid) -> tuple[FloatArray, FloatArray]:

@@ -13,7 +13,7 @@ from scipy.signal import lfilter
 
 from mpc.errors import ScenarioError
 from mpc.scenario.forecast import Forecast
-from mpc.scenario.scenario import OCCUPANCY_POINT, Scenario
+from mpc.scenario.scenario import Scenario
 from mpc.scenario.weather import SKY, SUN_POINTS
 from thermal._types import FloatArray
 from thermal.case.points import OUTDOOR_TEMPERATURE
@@ -148,13 +148,10 @@ class Forecaster:
                 raise ScenarioError(describe("errors", "a known one", repr(name), nearest(name, ERROR_POINTS)))
         self.scenario, self.horizon, self.seed = scenario, horizon, seed
         self.errors, self.issue_every = dict(errors or {}), issue_every
-        columns = _columns(scenario, actual=occupancy == "actual")
-        self.columns = tuple(columns)
-        self._wrong = {
-            name: [self.columns.index(point) for point in ERROR_POINTS[name] if point in columns]
-            for name in self.errors
-        }
-        self._truth = np.column_stack(list(columns.values()))
+        truth = scenario.to_frame(expected=occupancy == "expected")
+        self.columns = tuple(truth)
+        self._wrong = {name: np.flatnonzero(truth.columns.isin(ERROR_POINTS[name])) for name in self.errors}
+        self._truth = np.ascontiguousarray(truth.to_numpy())
         self._truth.setflags(write=False)
         self._issue: tuple[int, dict[str, FloatArray]] = (-1, {})
 
@@ -188,14 +185,13 @@ class Forecaster:
         since = int((begin - issue * self.issue_every) // self.scenario.grid.step)
         paths = self._paths(issue)
         for name, path in paths.items():
-            error = path[since : since + self.horizon]
-            for column in self._wrong[name]:
-                if name == "sun":
-                    values[:, column] *= np.maximum(1.0 + error, 0.0)
-                elif name == "wind":
-                    values[:, column] = np.maximum(values[:, column] + error, 0.0)
-                else:
-                    values[:, column] += error
+            at, error = self._wrong[name], path[since : since + self.horizon, None]
+            if name == "sun":
+                values[:, at] *= np.maximum(1.0 + error, 0.0)
+            else:
+                values[:, at] += error
+            if name == "wind":
+                values[:, at] = np.maximum(values[:, at], 0.0)
         return values
 
     def table(self, k: int) -> Forecast:
@@ -218,22 +214,3 @@ class Forecaster:
                 paths[name] = error.path(rng, count, self.scenario.grid.step)
             self._issue = (issue, paths)
         return self._issue[1]
-
-
-def _columns(scenario: Scenario, actual: bool) -> dict[str, FloatArray]:
-    columns = {str(point): scenario.weather.frame[point].to_numpy(dtype=float) for point in scenario.weather.frame}
-    columns |= {
-        "electricity_price": scenario.electricity_price,
-        "gas_price": scenario.gas_price,
-        "electricity_carbon_intensity": scenario.electricity_carbon,
-        "gas_carbon_intensity": scenario.gas_carbon,
-    }
-    of_zones = {
-        OCCUPANCY_POINT: scenario.occupancy if actual else scenario.expected_occupancy,
-        "internal_gain": scenario.gains if actual else scenario.expected_gains,
-        "comfort_lower_temperature": scenario.lower,
-        "comfort_upper_temperature": scenario.upper,
-    }
-    for name, values in of_zones.items():
-        columns |= {f"{zone}/{name}": values[:, i] for i, zone in enumerate(scenario.zones)}
-    return columns

@@ -204,6 +204,45 @@ def local_hours(times: pd.DatetimeIndex) -> FloatArray:
     return np.asarray(times.hour + times.minute / 60.0 + times.second / 3600.0, dtype=float)
 
 
+def by_clock(table: FloatArray, calendar: Calendar, grid: StepGrid) -> FloatArray:
+    """Look a table of the local clock up at the pieces of a grid, shape (n_steps * per_step,).
+
+    Parameters
+    ----------
+    table : ndarray, shape (3, 12, 24)
+        A value a kind of day, month and local hour [any]; axes may have length 1 where they make no difference.
+    calendar : Calendar
+        Which days are holidays.
+    grid : StepGrid
+        Steps in the building's time zone.
+    """
+    times, whole = grid.middles, np.broadcast_to(table, (3, 12, 24))
+    return np.asarray(whole[calendar.kinds_on(times), np.asarray(times.month) - 1, np.asarray(times.hour)])
+
+
+def means_of_steps(source: FloatArray, values: FloatArray, edges: FloatArray) -> FloatArray:
+    """Average over steps what is constant over other intervals, exactly.
+
+    Parameters
+    ----------
+    source : ndarray, shape (n_interval + 1,)
+        Edges of the intervals [s].
+    values : ndarray, shape (n_interval,) or (n_interval, m)
+        Over each of them [any].
+    edges : ndarray, shape (n_steps + 1,)
+        Edges of the steps [s], within those of the intervals.
+
+    Returns
+    -------
+    ndarray, shape (n_steps,) or (n_steps, m)
+        Means [as given].
+    """
+    total = np.concatenate([np.zeros_like(values[:1]), np.cumsum((values.T * np.diff(source)).T, axis=0)])
+    k = np.clip(np.searchsorted(source, edges, side="right") - 1, 0, len(values) - 1)
+    integral = total[k] + (values[k].T * (edges - source[k])).T
+    return np.asarray((np.diff(integral, axis=0).T / np.diff(edges)).T)
+
+
 def means_of_readings(times: FloatArray, values: FloatArray, edges: FloatArray) -> FloatArray:
     """Average straight lines between readings over steps, exactly.
 

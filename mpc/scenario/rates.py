@@ -11,7 +11,7 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from mpc.errors import ScenarioError
-from mpc.scenario.grid import WEEKDAY, Calendar, StepGrid, index_seconds
+from mpc.scenario.grid import Calendar, StepGrid, by_clock, index_seconds, means_of_steps
 from thermal._types import FloatArray
 from thermal.errors import describe
 
@@ -113,24 +113,8 @@ class HourlyRate:
         grid : StepGrid
             Steps in the building's time zone.
         """
-        return grid.mean(by_month_and_hour(np.asarray(self.weekday), np.asarray(self.weekend), self.calendar, grid))
-
-
-def by_month_and_hour(weekday: FloatArray, weekend: FloatArray, calendar: Calendar, grid: StepGrid) -> FloatArray:
-    """Look tables of months and hours up at the pieces of a grid, shape (n_steps * per_step,).
-
-    Parameters
-    ----------
-    weekday, weekend : ndarray, shape (12, 24)
-        What they hold [any].
-    calendar : Calendar
-        Which days are holidays.
-    grid : StepGrid
-        Steps in the building's time zone.
-    """
-    times = grid.middles
-    month, hour = np.asarray(times.month) - 1, np.asarray(times.hour)
-    return np.asarray(np.where(calendar.kinds_on(times) == WEEKDAY, weekday[month, hour], weekend[month, hour]))
+        tables = np.stack([np.asarray(self.weekday), *[np.asarray(self.weekend)] * 2])
+        return grid.mean(by_clock(tables, self.calendar, grid))
 
 
 def _month_hours(values: ArrayLike, name: str) -> FloatArray:
@@ -141,9 +125,8 @@ def _month_hours(values: ArrayLike, name: str) -> FloatArray:
     return np.array(np.broadcast_to(table, (12, 24)))
 
 
-@dataclass(frozen=True, eq=False)
-class MonthlyRate:
-    """A rate that changes with the local month.
+def monthly_rate(values: Sequence[float]) -> HourlyRate:
+    """Rate that changes with the local month.
 
     Parameters
     ----------
@@ -155,22 +138,9 @@ class MonthlyRate:
     ScenarioError
         When there are not 12 finite numbers.
     """
-
-    values: Sequence[float]
-
-    def __post_init__(self) -> None:
-        if np.shape(self.values) != (12,) or not np.isfinite(self.values).all():
-            raise ScenarioError(describe("monthly rate", "12 finite numbers", repr(self.values)))
-
-    def on(self, grid: StepGrid) -> FloatArray:
-        """Average over each step of a grid, shape (n_steps,) [per kWh].
-
-        Parameters
-        ----------
-        grid : StepGrid
-            Steps in the building's time zone.
-        """
-        return grid.mean(np.asarray(self.values, dtype=float)[np.asarray(grid.middles.month) - 1])
+    if np.shape(values) != (12,) or not np.isfinite(values).all():
+        raise ScenarioError(describe("monthly rate", "12 finite numbers", repr(values)))
+    return HourlyRate(np.repeat(np.asarray(values, dtype=float)[:, None], 24, axis=1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -233,8 +203,7 @@ class SeriesRate:
             first, last = (pd.Timestamp(int(e), unit="s", tz=zone) for e in (edges[0], edges[-1]))
             found = f"{first} to {last}"
             raise ScenarioError(describe("series", f"values from {grid.start} to {grid.stamps[-1]}", found))
-        total = np.concatenate([[0.0], np.cumsum(self.series.to_numpy(dtype=float))]) * length
-        return np.asarray(np.diff(np.interp(grid.edges, edges, total)) / grid.step)
+        return means_of_steps(edges.astype(float), self.series.to_numpy(dtype=float), grid.edges)
 
 
 def gas_price(value: float, unit: str) -> ConstantRate:

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mpc.errors import ScenarioError
-from mpc.scenario.grid import Calendar, StepGrid
-from mpc.scenario.rates import ConstantRate, Rate, by_month_and_hour
+from mpc.scenario.grid import Calendar, StepGrid, by_clock, means_of_steps
+from mpc.scenario.rates import ConstantRate, Rate
 from thermal._types import FloatArray, IntArray
 from thermal.errors import describe
 
@@ -40,13 +40,11 @@ def window_means(power: ArrayLike, starts: ArrayLike, step: float, window: float
     begin : ndarray, shape (n_window,)
         When each window begins [s].
     """
-    values, first = np.asarray(power, dtype=float), np.asarray(starts, dtype=float)
+    first = np.asarray(starts, dtype=float)
     edges = np.append(first, first[-1] + step)
     inner = np.arange(np.floor(edges[0] / window) + 1, np.ceil(edges[-1] / window)) * window
     bounds = np.concatenate([edges[:1], inner, edges[-1:]])
-    energy = np.concatenate([[0.0], np.cumsum(values) * step])
-    mean = np.diff(np.interp(bounds, edges, energy)) / np.diff(bounds)
-    return np.asarray(mean), bounds[:-1]
+    return means_of_steps(edges, np.asarray(power, dtype=float), bounds), bounds[:-1]
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,9 +182,9 @@ class DemandCharge:
         grid : StepGrid
             Steps in the building's time zone.
         """
-        period = by_month_and_hour(np.asarray(self.weekday), np.asarray(self.weekend), self.calendar, grid)
+        tables = np.stack([np.asarray(self.weekday), *[np.asarray(self.weekend)] * 2])
         first = grid.middles[:: grid.per_step]
-        number = np.asarray(period[:: grid.per_step], dtype=np.int64)
+        number = by_clock(tables, self.calendar, grid)[:: grid.per_step].astype(np.int64)
         keys = (np.asarray(first.year) * 12 + np.asarray(first.month) - 1) * len(self.rates) + number
         keys[number < 0] = -1
         known = np.unique(keys[keys >= 0])

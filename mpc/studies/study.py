@@ -272,8 +272,8 @@ def make_study(
     prices = tariff or paper_tariff()
     scenario = build_scenario(
         ready, longer, _prolonged(weather, grid, longer), prices, carbon=carbon or paper_carbon(),
-        occupancy=occupancy, gains=gains, comfort=comfort, seed=seed,
-    )  # fmt: skip
+        occupancy=occupancy, gains=gains, comfort=comfort,
+    ).redrawn(seed)  # fmt: skip
     truth = reduced(built, ready, parameters, order)
     model = truth
     if controller_parameters is not None:

@@ -13,7 +13,7 @@ import scipy.sparse as sp
 from mpc.control.predictor.heat import HeatPredictor
 from mpc.control.problem.horizon import HorizonData
 from mpc.control.problem.problem import ControlProblem
-from mpc.control.solvers.solution import Solution, Status
+from mpc.control.solvers.solution import Solution, Solver, Status
 from mpc.errors import ControlError
 from mpc.scenario.rates import KILOWATT_HOUR
 from thermal._types import FloatArray
@@ -34,7 +34,7 @@ class QuadraticResult(NamedTuple):
     x : ndarray, shape (n,)
         Minimiser [as the caller's].
     solved : bool
-        Whether the solver reached its tolerance.
+        Whether the solver reached its tolerance, and all is finite.
     status : str
         The solver's own word.
     """
@@ -68,44 +68,33 @@ def solve_quadratic(
         ``clarabel`` or ``osqp``.
     """
     size = max(float(np.abs(gradient).max(initial=0.0)), float(np.abs(hessian).max(initial=0.0)), 1e-12)
-    half = sp.csc_matrix(np.triu(hessian / size))
-    run = _clarabel if solver == "clarabel" else _osqp
-    return run(half, gradient / size, rows, lower, upper)
+    half, scaled = sp.csc_matrix(np.triu(hessian / size)), gradient / size
+    if solver == "clarabel":
+        import clarabel  # here: a second for whoever imports the package and solves nothing
 
+        top, bottom = np.isfinite(upper), np.isfinite(lower)
+        both = sp.csc_matrix(np.vstack([rows[top], -rows[bottom]]))
+        limits = np.concatenate([upper[top], -lower[bottom]])
+        settings = clarabel.DefaultSettings()
+        settings.verbose, settings.max_threads = False, 1
+        cones = [clarabel.NonnegativeConeT(len(limits))]
+        found = clarabel.DefaultSolver(half, scaled, both, limits, cones, settings).solve()
+        word = str(found.status)
+    else:
+        import osqp
 
-def _clarabel(
-    half: Any, gradient: FloatArray, rows: FloatArray, lower: FloatArray, upper: FloatArray
-) -> QuadraticResult:
-    import clarabel  # here: a second for whoever imports the package and solves nothing
-
-    top, bottom = np.isfinite(upper), np.isfinite(lower)
-    both = sp.csc_matrix(np.vstack([rows[top], -rows[bottom]]))
-    limits = np.concatenate([upper[top], -lower[bottom]])
-    settings = clarabel.DefaultSettings()
-    settings.verbose, settings.max_threads = False, 1
-    found = clarabel.DefaultSolver(
-        half, gradient, both, limits, [clarabel.NonnegativeConeT(len(limits))], settings
-    ).solve()
-    status = str(found.status)
-    return QuadraticResult(np.asarray(found.x), status in ("Solved", "AlmostSolved"), status)
-
-
-def _osqp(half: Any, gradient: FloatArray, rows: FloatArray, lower: FloatArray, upper: FloatArray) -> QuadraticResult:
-    import osqp
-
-    solver = osqp.OSQP()
-    solver.setup(half, gradient, sp.csc_matrix(rows), lower, upper, **_OSQP)
-    found = solver.solve(raise_error=False)
-    return QuadraticResult(np.asarray(found.x), found.info.status == "solved", str(found.info.status))
+        splitting = osqp.OSQP()
+        splitting.setup(half, scaled, sp.csc_matrix(rows), lower, upper, **_OSQP)
+        found = splitting.solve(raise_error=False)
+        word = str(found.info.status)
+    x = np.asarray(found.x)
+    return QuadraticResult(x, Status.of(word) is Status.CONVERGED and bool(np.isfinite(x).all()), word)
 
 
 _KILOWATT = 1000.0  # W
-_ENDS = {
-    "optimal": Status.CONVERGED, "optimal_inaccurate": Status.STALLED, "user_limit": Status.TIME_LIMIT,
-}  # fmt: skip
 
 
-class LinearSolver:
+class LinearSolver(Solver):
     """The control problem of a `HeatPredictor` as one convex programme, by cvxpy and Clarabel.
 
     Parameters
@@ -131,12 +120,7 @@ class LinearSolver:
             found = type(problem.predictor).__name__
             raise ControlError(describe("linear solver", "a problem of a HeatPredictor", found))
         self.problem, self.predictor = problem, problem.predictor
-        self.memory: FloatArray | None = None  # nothing is kept between solves
         self._built: dict[tuple[int, int], _Programme] = {}
-
-    def forget(self) -> None:
-        """Nothing is kept between solves."""
-        self.memory = None
 
     def solve(self, data: HorizonData, plan: FloatArray, time_limit: float | None = None) -> Solution:
         """Solve for one horizon; see `Solver`.
@@ -151,13 +135,12 @@ class LinearSolver:
             Wall time after which the plan given is returned [s].
         """
         begin, problem = time.perf_counter(), self.problem
-        first = self.predictor.rollout(data, plan)
-        start = problem.terms(data, first)
+        rollout = self.predictor.rollout(data, plan)
+        start = terms = problem.terms(data, rollout)
         key = len(data.peaks.offset), data.peaks.rate.size
         if key not in self._built:
-            self._built[key] = _Programme(problem, self.predictor, *key)
+            self._built[key] = _Programme(problem, self.predictor, data)
         shares, status, message, steps = self._built[key].solve(data, time_limit)
-        rollout, terms = first, start
         if shares is not None:
             rollout = self.predictor.rollout(data, problem.plan(np.clip(shares, 0.0, 1.0)))
             terms = problem.terms(data, rollout)
@@ -167,68 +150,68 @@ class LinearSolver:
 
 
 class _Programme:
-    """The compiled programme for a number of demand windows and peaks."""
+    """The compiled programme for the number of demand windows and peaks that a horizon has."""
 
-    def __init__(self, problem: ControlProblem, predictor: HeatPredictor, n_window: int, n_peak: int) -> None:
+    def __init__(self, problem: ControlProblem, predictor: HeatPredictor, data: HorizonData) -> None:
         # here: seconds for whoever imports the package and solves nothing; it is typed in part
         cp: Any = importlib.import_module("cvxpy")
         self._problem, self._predictor, self._cp = problem, predictor, cp
-        count, n, r = len(predictor.horizon), predictor.n_zone, predictor.modes.capacity.size
-        m, size = len(predictor.channels), problem.span.size
-        self._start, self._drive = cp.Parameter(r), cp.Parameter((count, r))
-        self._lower, self._upper = cp.Parameter((count, n)), cp.Parameter((count, n))
-        self._weight = cp.Parameter((count, n), nonneg=True)
-        self._electricity, self._gas, self._end = cp.Parameter(count), cp.Parameter(count), cp.Parameter(r)
-        self._before = cp.Parameter(size)
-        self._u = cp.Variable(size)
-        x, bent, straight = cp.Variable((count + 1, r)), cp.Variable((count, n)), cp.Variable((count, n))
-        heat = cp.reshape(self._u, (problem.shape[0], m), order="C")[predictor.horizon.block_of]
+        given = {
+            name: cp.Parameter(np.shape(values), nonneg=name in ("weight", "owner", "rate"))
+            for name, values in self._values(data).items()
+        }
+        self._given, self._u = given, cp.Variable(problem.span.size)
+        count, m = len(predictor.horizon), problem.shape[1]
+        x = cp.Variable((count + 1, predictor.modes.capacity.size))
+        bent, straight = cp.Variable((count, predictor.n_zone)), cp.Variable((count, predictor.n_zone))
+        heat = cp.reshape(self._u, problem.shape, order="C")[predictor.horizon.block_of]
         span, least = problem.span[:m], problem.lower[:m]
         zone = x[1:] @ predictor.modes.output.T
-        change = problem.differences @ self._u - self._before
-        rules = [x[0] == self._start, self._u >= 0, self._u <= 1, bent >= 0, straight >= 0]
-        rules += [bent + straight >= self._lower - zone, bent + straight >= zone - self._upper]
+        change = problem.differences @ self._u - given["before"]
+        rules = [x[0] == given["start"], self._u >= 0, self._u <= 1, bent >= 0, straight >= 0]
+        rules += [bent + straight >= given["lower"] - zone, bent + straight >= zone - given["upper"]]
         for dt in np.unique(predictor.horizon.steps):
             rows = np.flatnonzero(predictor.horizon.steps == dt)
             keep, push = predictor.transition(float(dt))
-            added = heat[rows] @ (push * span).T + np.tile(push @ least, (rows.size, 1))
-            rules.append(x[rows + 1] == cp.multiply(x[rows], np.tile(keep, (rows.size, 1))) + added + self._drive[rows])
+            added = heat[rows] @ (push * span).T + np.tile(push @ least, (rows.size, 1)) + given["drive"][rows]
+            rules.append(x[rows + 1] == cp.multiply(x[rows], np.tile(keep, (rows.size, 1))) + added)
         limited = np.flatnonzero(np.isfinite(problem.most_change))
         if limited.size:
             rules.append(cp.abs(change[limited]) <= problem.most_change[limited])
         power, fuel = predictor.electric_per_channel / _KILOWATT, predictor.fuel_per_channel / _KILOWATT
         electric = heat @ (span * power) + float(least @ power)
-        cost = self._electricity @ electric + self._gas @ (heat @ (span * fuel)) - self._end @ x[count]
-        cost += cp.sum(cp.multiply(self._weight, cp.square(bent) / (2.0 * problem.softness) + straight))
+        cost = given["electricity"] @ electric + given["gas"] @ (heat @ (span * fuel)) - given["end"] @ x[count]
+        cost += cp.sum(cp.multiply(given["weight"], cp.square(bent) / (2.0 * problem.softness) + straight))
         cost += problem.move_weight * cp.sum_squares(change)
-        if n_window:
-            self._windows, self._used = cp.Parameter((n_window, count)), cp.Parameter(n_window)
-            self._owner = cp.Parameter((n_window, n_peak), nonneg=True)
-            self._rate, self._so_far = cp.Parameter(n_peak, nonneg=True), cp.Parameter(n_peak)
-            highest = cp.Variable(n_peak)
-            rules += [highest >= self._so_far, self._owner @ highest >= self._windows @ electric + self._used]
-            cost += self._rate @ highest
+        if "windows" in given:
+            highest = cp.Variable(data.peaks.rate.size)
+            above = given["owner"] @ highest >= given["windows"] @ electric + given["used"]
+            rules += [highest >= given["so_far"], above]
+            cost += given["rate"] @ highest
         self._programme = cp.Problem(cp.Minimize(cost), rules)
 
-    def _fill(self, data: HorizonData) -> None:
-        problem, predictor = self._problem, self._predictor
-        self._start.value, self._drive.value = data.state, predictor.drive(data)
-        self._lower.value, self._upper.value = data.lower - REFERENCE_TEMPERATURE, data.upper - REFERENCE_TEMPERATURE
-        # the slope of a kelvin far outside is what a kelvin costs in a step
-        self._weight.value = problem.penalty(data, data.upper + 100.0).slope
-        self._electricity.value = data.electricity_price * problem.hours
-        self._gas.value = data.gas_price * problem.hours
-        self._end.value = data.heat_value / KILOWATT_HOUR * predictor.heat_row
-        self._before.value = problem.standing(data)
-        if data.peaks.offset.size:
-            peaks = data.peaks
-            self._windows.value, self._used.value = peaks.weights, peaks.offset / _KILOWATT
-            self._owner.value = np.eye(peaks.rate.size)[peaks.bucket]
-            self._rate.value, self._so_far.value = peaks.rate, peaks.so_far / _KILOWATT
+    def _values(self, data: HorizonData) -> dict[str, FloatArray]:
+        """Parameters of the programme."""
+        problem, predictor, peaks = self._problem, self._predictor, data.peaks
+        values = {
+            "start": data.state, "drive": predictor.drive(data), "before": problem.standing(data),
+            "lower": data.lower - REFERENCE_TEMPERATURE, "upper": data.upper - REFERENCE_TEMPERATURE,
+            # the slope of a kelvin far outside is what a kelvin costs in a step
+            "weight": problem.penalty(data, data.upper + 100.0).slope,
+            "electricity": data.electricity_price * problem.hours, "gas": data.gas_price * problem.hours,
+            "end": data.heat_value / KILOWATT_HOUR * predictor.heat_row,
+        }  # fmt: skip
+        if peaks.offset.size:
+            values |= {
+                "windows": peaks.weights, "used": peaks.offset / _KILOWATT, "rate": peaks.rate,
+                "owner": np.eye(peaks.rate.size)[peaks.bucket], "so_far": peaks.so_far / _KILOWATT,
+            }  # fmt: skip
+        return values
 
     def solve(self, data: HorizonData, time_limit: float | None) -> tuple[FloatArray | None, Status, str, int]:
         """Solve: decisions in shares of their ranges or None, status, word, iterations."""
-        self._fill(data)
+        for name, values in self._values(data).items():
+            self._given[name].value = values
         options: dict[str, Any] = {} if time_limit is None else {"time_limit": time_limit}
         try:
             with warnings.catch_warnings():
@@ -236,7 +219,7 @@ class _Programme:
                 self._programme.solve(solver=self._cp.CLARABEL, ignore_dpp=False, enforce_dpp=True, **options)
         except self._cp.error.SolverError as error:
             return None, Status.FAILED, str(error), 0
-        word = str(self._programme.status)
+        word, found = str(self._programme.status), self._u.value
         steps = int(self._programme.solver_stats.num_iters or 0)
-        usable = self._u.value is not None and bool(np.isfinite(self._u.value).all()) and word != "user_limit"
-        return self._u.value if usable else None, _ENDS.get(word, Status.FAILED), word, steps
+        usable = found is not None and bool(np.isfinite(found).all()) and word != "user_limit"
+        return found if usable else None, Status.of(word), word, steps

@@ -5,10 +5,8 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mpc.control.predictor.predictor import Predictor, Rollout, Sensitivity
 from mpc.control.problem.horizon import Horizon, HorizonData
@@ -57,11 +55,10 @@ def outdoor_scenarios(
         error = share * error + drive[:, k]
         paths[:, k] = error
     found = [data] if count % 2 else []
-    for path in paths:
-        for signed in (path, -path):
-            boundary = data.boundary.copy()
-            boundary[:, 0] += signed
-            found.append(replace(data, outdoor_temperature=data.outdoor_temperature + signed, boundary=boundary))
+    for signed in (sign * path for path in paths for sign in (1.0, -1.0)):
+        boundary = data.boundary.copy()
+        boundary[:, 0] += signed
+        found.append(replace(data, outdoor_temperature=data.outdoor_temperature + signed, boundary=boundary))
     return tuple(found)
 
 
@@ -74,9 +71,7 @@ class _Tree(HorizonData):
     @classmethod
     def of(cls, parts: Sequence[HorizonData]) -> _Tree:
         """Put scenarios together; each counts with its share."""
-        first = parts[0]
-        given = {name: getattr(first, name) for name in first.__dataclass_fields__}
-        given |= {name: np.concatenate([getattr(p, name) for p in parts], axis=-1) for name in _ZONES}
+        given = vars(parts[0]) | {name: np.concatenate([getattr(p, name) for p in parts], axis=-1) for name in _ZONES}
         given["comfort_price"] = given["comfort_price"] / len(parts)
         return cls(**given, parts=tuple(parts))
 
@@ -106,14 +101,10 @@ class _TreePredictor(Predictor):
             self.base.rollout(one, plan[blocks], at)
             for one, blocks, at in zip(data.parts, self.blocks, nears, strict=True)  # type: ignore[attr-defined]
         ]
-        zone, seen, heat = (np.hstack([getattr(run, name) for run in runs]) for name in ("zone", "seen", "heat"))
-        electric, fuel, end = (
-            np.mean([getattr(run, n) for run in runs], axis=0) for n in ("electric", "fuel", "end_state")
-        )
-        first = runs[0]
-        return _TreeRollout(
-            plan, zone, seen, electric, fuel, end, first.knobs, first.sums, heat, first.air, first.water, tuple(runs)
-        )
+        given = vars(runs[0]) | {"plan": plan}
+        given |= {name: np.hstack([getattr(run, name) for run in runs]) for name in ("zone", "seen", "heat")}
+        given |= {n: np.mean([getattr(run, n) for run in runs], axis=0) for n in ("electric", "fuel", "end_state")}
+        return _TreeRollout(**given, parts=tuple(runs))
 
     def reached(self, data: HorizonData, rollout: Rollout) -> FloatArray:
         plan = rollout.plan.copy()
@@ -129,40 +120,15 @@ class _TreePredictor(Predictor):
         electric, fuel = np.zeros((count, self.n_decision)), np.zeros((count, self.n_decision))
         end = np.zeros((rollout.end_state.size, self.n_decision))
         for s, (one, run) in enumerate(zip(data.parts, rollout.parts, strict=True)):  # type: ignore[attr-defined]
-            slopes = self.base.sensitivity(one, run)
+            by_plan = self.base.sensitivity(one, run)
             columns = (self.blocks[s][:, None] * m + np.arange(m)).ravel()
-            zone[:, s * n : (s + 1) * n, columns] = slopes.zone
-            for total, part in ((electric, slopes.electric), (fuel, slopes.fuel), (end, slopes.end_state)):
+            zone[:, s * n : (s + 1) * n, columns] = by_plan.zone
+            for total, part in ((electric, by_plan.electric), (fuel, by_plan.fuel), (end, by_plan.end_state)):
                 total[:, columns] += share * part
         return Sensitivity(zone, electric, fuel, end)
 
 
-class _TreeProblem(ControlProblem):
-    """The problem of all scenarios: the mean of their costs."""
-
-    predictor: _TreePredictor
-
-    @property
-    def shape(self) -> tuple[int, int]:
-        return self.predictor.n_block, len(self.predictor.channels)
-
-    @property
-    def predecessors(self) -> NDArray[np.int64]:
-        before = np.full(self.shape[0], -1, dtype=np.int64)
-        for blocks in self.predictor.blocks:
-            before[blocks[1:]] = blocks[:-1]
-        return before
-
-    @cached_property
-    def most_change(self) -> FloatArray:
-        base = ControlProblem(self.predictor.base).most_change.reshape(-1, self.shape[1])
-        most = np.empty(self.shape)
-        for blocks in self.predictor.blocks:
-            most[blocks] = base
-        return most.ravel()
-
-
-class ScenarioSolver:
+class ScenarioSolver(Solver):
     """Least mean cost over a handful of scenarios that share their first blocks.
 
     Parameters
@@ -202,8 +168,7 @@ class ScenarioSolver:
             expected = f"2 scenarios or more, and 1 to {problem.shape[0]} common blocks"
             raise ControlError(describe("scenario solver", expected, f"{count} and {common}"))
         self.problem, self.draw, self._tree = problem, draw, _TreePredictor(problem.predictor, count, common)
-        whole = _TreeProblem(self._tree, problem.softness, problem.terminal_time, problem.move_weight)
-        self._solver = solver(whole)
+        self._solver = solver(replace(problem, predictor=self._tree, paths=self._tree.blocks))
 
     @property
     def memory(self) -> FloatArray | None:
@@ -213,10 +178,6 @@ class ScenarioSolver:
     @memory.setter
     def memory(self, kept: FloatArray | None) -> None:
         self._solver.memory = kept
-
-    def forget(self) -> None:
-        """Drop what was learned in earlier solves."""
-        self._solver.forget()
 
     def solve(self, data: HorizonData, plan: FloatArray, time_limit: float | None = None) -> Solution:
         """Solve for one horizon; see `Solver`.
@@ -244,11 +205,9 @@ class ScenarioSolver:
         found = self._solver.solve(_Tree.of(parts), first, time_limit)
         mean = np.mean([found.plan[each] for each in blocks], axis=0)
         rollout = self.problem.predictor.rollout(data, mean)
-        terms = self._mean(parts, found.plan)
-        start = self._mean(parts, first)
         return Solution(
-            mean, rollout, terms, start.total, found.status, found.message, found.iterations,
-            time.perf_counter() - begin, f"scenarios, {found.solver}",
+            mean, rollout, self._mean(parts, found.plan), self._mean(parts, first).total, found.status, found.message,
+            found.iterations, time.perf_counter() - begin, f"scenarios, {found.solver}",
         )  # fmt: skip
 
     def _mean(self, parts: Sequence[HorizonData], plan: FloatArray) -> CostTerms:

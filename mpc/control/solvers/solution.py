@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Protocol
 
 import numpy as np
 import pandas as pd
@@ -25,6 +25,28 @@ class Status(StrEnum):
     TIME_LIMIT = "time limit"
     STALLED = "stalled"
     FAILED = "failed"
+
+    @classmethod
+    def of(cls, word: str, success: bool = False) -> Status:
+        """Tell the status by a solver's own word.
+
+        Parameters
+        ----------
+        word : str
+            Of Clarabel, OSQP, cvxpy, Ipopt or fatrop; what is not known is a failure.
+        success : bool
+            Whether the solver said so beside.
+        """
+        return cls.CONVERGED if success else _WORDS.get(word, cls.FAILED)
+
+
+# fatrop counts: 1 is most iterations reached, 2 a step that is too short
+_WORDS = {
+    "Solved": Status.CONVERGED, "AlmostSolved": Status.CONVERGED, "solved": Status.CONVERGED,
+    "optimal": Status.CONVERGED, "optimal_inaccurate": Status.STALLED, "user_limit": Status.TIME_LIMIT,
+    "Maximum_Iterations_Exceeded": Status.ITERATION_LIMIT, "Search_Direction_Becomes_Too_Small": Status.STALLED,
+    "1": Status.ITERATION_LIMIT, "2": Status.STALLED,
+}  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,20 +93,18 @@ class Solution:
         return bool(np.isfinite(self.terms.total) and self.terms.total <= self.start + 1e-9 * max(1.0, abs(self.start)))
 
 
-class Solver(Protocol):
-    """What solves a control problem."""
+class Solver(ABC):
+    """What solves a control problem, which is its attribute `problem`."""
 
-    @property
-    def problem(self) -> ControlProblem:
-        """The problem that it was built for."""
+    problem: ControlProblem
+    #: What is kept from solve to solve, to be saved with a controller's state [its own]; nothing by default.
+    memory: FloatArray | None = None
 
-    @property
-    def memory(self) -> FloatArray | None:
-        """What it keeps from solve to solve, to be saved with a controller's state [its own]."""
+    def forget(self) -> None:
+        """Drop what was learned in earlier solves."""
+        self.memory = None
 
-    @memory.setter
-    def memory(self, kept: FloatArray | None) -> None: ...
-
+    @abstractmethod
     def solve(self, data: HorizonData, plan: FloatArray, time_limit: float | None = None) -> Solution:
         """Solve for one horizon.
 
@@ -97,9 +117,6 @@ class Solver(Protocol):
         time_limit : float, optional
             Wall time after which the best plan so far is returned [s].
         """
-
-    def forget(self) -> None:
-        """Drop what was learned in earlier solves."""
 
 
 #: Share of the cost by which a plan begun anew has to be cheaper [-]: of plans of equal cost the carried one is kept,
