@@ -203,7 +203,7 @@ class SeriesRate:
             first, last = (pd.Timestamp(int(e), unit="s", tz=zone) for e in (edges[0], edges[-1]))
             found = f"{first} to {last}"
             raise ScenarioError(describe("series", f"values from {grid.start} to {grid.stamps[-1]}", found))
-        return means_of_steps(edges.astype(float), self.series.to_numpy(dtype=float), grid.edges)
+        return means_of_steps(edges.astype(float), self.series.to_numpy(dtype=float), grid.edges.astype(float))
 
 
 def gas_price(value: float, unit: str) -> ConstantRate:

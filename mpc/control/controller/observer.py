@@ -5,13 +5,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from calibration.estimation.kalman import KalmanFilter
 from mpc.control.solvers.convex import solve_quadratic
 from mpc.control.solvers.solution import Status
 from mpc.errors import ControlError
-from thermal._types import FloatArray
+from thermal._types import BoolArray, FloatArray
 from thermal.errors import describe
 from thermal.inputs.drivers import REFERENCE_TEMPERATURE
 from thermal.model.modal import ModalModel
@@ -127,14 +126,18 @@ class Observer:
         counted[: counted.size - self.modes.n_signal] -= REFERENCE_TEMPERATURE
         return counted
 
-    def _gain(self, reported: NDArray[np.bool_]) -> FloatArray:
+    def _gain(self, reported: BoolArray) -> FloatArray:
         key = reported.tobytes()
         if key not in self._gains:
-            seen = self.kalman.whole.observation[reported]
-            reach = self._covariance @ seen.T
-            innovation = seen @ reach + np.diag(self.kalman.whole.noise_variance[reported])
-            self._gains[key] = np.asarray(np.linalg.solve(innovation, reach.T).T, dtype=float)
+            self._gains[key] = self._correction(self._covariance, reported)[0]
         return self._gains[key]
+
+    def _correction(self, covariance: FloatArray, reported: BoolArray) -> tuple[FloatArray, FloatArray]:
+        """Gain of the sensors that reported, and covariance of state and readings, shape (n, n_reported) each."""
+        seen = self.kalman.whole.observation[reported]
+        cross = covariance @ seen.T
+        innovation = seen @ cross + np.diag(self.kalman.whole.noise_variance[reported])
+        return np.asarray(np.linalg.solve(innovation, cross.T).T, dtype=float), cross
 
 
 _ROUND_OFF = 1e-6  # W: bounds that are missed by less are met
@@ -243,14 +246,11 @@ class MovingHorizonObserver(Observer):
         self.state = self.trajectory()[-1]
         return error
 
-    def _carried(self, covariance: FloatArray, reported: NDArray[np.bool_]) -> FloatArray:
+    def _carried(self, covariance: FloatArray, reported: BoolArray) -> FloatArray:
         """Covariance of the prediction one step on, after those sensors that reported."""
-        whole = self.kalman.whole
-        seen = whole.observation[reported]
-        reach = covariance @ seen.T
-        innovation = seen @ reach + np.diag(whole.noise_variance[reported])
-        left = covariance - reach @ np.linalg.solve(innovation, reach.T)
-        return whole.propagate(0.5 * (left + left.T))
+        gain, cross = self._correction(covariance, reported)
+        left = covariance - gain @ cross.T
+        return self.kalman.whole.propagate(0.5 * (left + left.T))
 
     def trajectory(self) -> FloatArray:
         """Estimate of the window: states at its edges, shape (h + 1, n) [(W K)^0.5 and W].
@@ -261,22 +261,19 @@ class MovingHorizonObserver(Observer):
         values, vectors = np.linalg.eigh(self._arrival)
         root = vectors * np.sqrt(np.maximum(values, 0.0))
         states = np.zeros((count + 1, n))  # without noise
-        slopes = np.zeros((count + 1, n, n + count * zones))  # by the arrival and by what each step adds
+        response = np.zeros((count + 1, n, n + count * zones))  # to the arrival and to what each step adds
         states[0] = self._window[0].prior
+        for k in range(count + 1):
+            response[k, :, :n] = self._powers[k] @ root
+            for j in range(k):
+                added = self._powers[k - 1 - j][:, self.order :] * self._noise
+                response[k, :, n + j * zones : n + (j + 1) * zones] = added
         for k, step in enumerate(self._window):
             states[k + 1] = whole.advance(states[k])
             states[k + 1, : self.order] += self.kalman.space.drive @ step.u
-            slopes[k, :, :n] = self._powers[k] @ root
-            for j in range(k):
-                part = self._powers[k - 1 - j][:, self.order :] * self._noise
-                slopes[k, :, n + j * zones : n + (j + 1) * zones] = part
-        slopes[count, :, :n] = self._powers[count] @ root
-        for j in range(count):
-            part = self._powers[count - 1 - j][:, self.order :] * self._noise
-            slopes[count, :, n + j * zones : n + (j + 1) * zones] = part
-        return states + slopes @ self._whitened(states, slopes)
+        return states + response @ self._whitened(states, response)
 
-    def _whitened(self, states: FloatArray, slopes: FloatArray) -> FloatArray:
+    def _whitened(self, states: FloatArray, response: FloatArray) -> FloatArray:
         """Solve for arrival and noise, in their own deviations."""
         whole, space = self.kalman.whole, self.kalman.space
         rows, left = [], []
@@ -284,12 +281,12 @@ class MovingHorizonObserver(Observer):
             reported = np.isfinite(step.zone)
             weight = 1.0 / np.sqrt(whole.noise_variance[reported])
             predicted = whole.observation @ states[k] + space.feedthrough @ step.u
-            rows.append(weight[:, None] * (whole.observation[reported] @ slopes[k]))
+            rows.append(weight[:, None] * (whole.observation[reported] @ response[k]))
             left.append(weight * (step.zone - predicted)[reported])
         seen, missing = np.vstack(rows), np.concatenate(left)
         # by the smaller of the two: as many equations as measurements
         free = seen.T @ np.linalg.solve(np.eye(missing.size) + seen @ seen.T, missing)
-        heat, moved = states[:, self.order :], slopes[:, self.order :]
+        heat, moved = states[:, self.order :], response[:, self.order :]
         found = heat + moved @ free
         self.status = Status.CONVERGED
         if (found >= self.lower - _ROUND_OFF).all() and (found <= self.upper + _ROUND_OFF).all():
@@ -302,7 +299,7 @@ class MovingHorizonObserver(Observer):
         outcome = solve_quadratic(
             np.eye(free.size) + seen.T @ seen, -(seen.T @ missing), limited / size[:, None], lower / size, upper / size
         )
-        if not (outcome.solved and np.isfinite(outcome.x).all()):
+        if not outcome.solved:
             self.status = Status.FAILED  # the unbounded estimate stands
             return np.asarray(free)
         return outcome.x

@@ -81,7 +81,7 @@ class SitePoints:
         return named
 
 
-class _Reading(NamedTuple):
+class Reading(NamedTuple):
     """What was measured over a control step.
 
     Parameters
@@ -130,7 +130,7 @@ class Readings:
             raise ControlError(describe("site points", expected, "{}, {}, {}".format(*found)))
         self.points, self.place = points, system.terminals.zone
 
-    def read(self, measurements: Mapping[str, float]) -> _Reading:
+    def read(self, measurements: Mapping[str, float]) -> Reading:
         """Read a control step.
 
         Parameters
@@ -161,7 +161,7 @@ class Readings:
         missing += [f"flow or discharge temperature of {name!r} is missing: the plan's heat is taken" for name in names]
         if not np.isfinite(water):
             missing.append(f"supply water temperature of {points.boiler!r} is missing: its last value is taken")
-        return _Reading(zone, heat, outdoor, water, power, tuple(missing))
+        return Reading(zone, heat, outdoor, water, power, tuple(missing))
 
 
 def _value(measurements: Mapping[str, float], column: str) -> float:

@@ -12,9 +12,9 @@ import pandas as pd
 from mpc.control.problem.horizon import Horizon, PeakData
 from mpc.errors import ScenarioError
 from mpc.scenario.forecast import Forecast
-from mpc.scenario.grid import StepGrid
+from mpc.scenario.grid import StepGrid, means_of_steps
 from mpc.scenario.tariff import DemandCharge
-from thermal._types import FloatArray
+from thermal._types import FloatArray, IntArray
 from thermal.case.points import OUTDOOR_TEMPERATURE
 from thermal.errors import describe
 
@@ -93,23 +93,14 @@ def expect(
     values = forecast.values(columns, fill=fill)
     edges[0], edges[-1] = min(edges[0], 0.0), max(edges[-1], horizon.edges[-1])
     n_single, n = 3 + len(carbon), len(zones)
-    flowing = _means(edges, values[:, : n_single + n], horizon.edges)
-    lower = _extremes(edges, values[:, n_single + n : n_single + 2 * n], horizon.edges, np.maximum)
-    upper = _extremes(edges, values[:, n_single + 2 * n :], horizon.edges, np.minimum)
+    flowing, edge = means_of_steps(edges, values[:, : n_single + n], horizon.edges), n_single + 2 * n
+    lower = _extremes(edges, values[:, n_single + n : edge], horizon.edges, np.maximum)
+    upper = _extremes(edges, values[:, edge:], horizon.edges, np.minimum)
     emitted = flowing[:, 3:n_single] * carbon_price if carbon else np.zeros((len(horizon), 2))
     return Expected(
         flowing[:, 0], flowing[:, n_single:], np.maximum(lower, np.vstack([lower[1:], lower[-1:]])),
-        np.minimum(upper, np.vstack([upper[1:], upper[-1:]])), (lower, upper), flowing[:, 1] + emitted[:, 0],
-        flowing[:, 2] + emitted[:, 1],
+        np.minimum(upper, np.vstack([upper[1:], upper[-1:]])), (lower, upper), *(flowing[:, 1:3] + emitted).T,
     )  # fmt: skip
-
-
-def _means(edges: FloatArray, values: FloatArray, steps: FloatArray) -> FloatArray:
-    """Means over steps of what is constant between edges."""
-    total = np.vstack([np.zeros(values.shape[1]), np.cumsum(values * np.diff(edges)[:, None], axis=0)])
-    k = np.clip(np.searchsorted(edges, steps, side="right") - 1, 0, len(values) - 1)
-    at = total[k] + values[k] * (steps - edges[k])[:, None]
-    return np.asarray(np.diff(at, axis=0) / np.diff(steps)[:, None])
 
 
 def _extremes(edges: FloatArray, values: FloatArray, steps: FloatArray, of: np.ufunc) -> FloatArray:
@@ -205,33 +196,25 @@ def peak_data(
     used : sequence of float
         Mean power since the window of now began, of each charge [W]; default none.
     """
-    parts: list[PeakData] = []
-    seconds = horizon.edges
+    parts: list[tuple[FloatArray | IntArray, ...]] = []
+    seconds, count, begin = horizon.edges, 0, now.timestamp()
     for charge, power in zip(charges, used or [0.0] * len(charges), strict=True):
-        begin = now.timestamp()
         first = np.floor(begin / charge.window) * charge.window - begin
         bounds = np.arange(first, seconds[-1], charge.window)
         overlap = np.minimum(seconds[1:], bounds[:, None] + charge.window) - np.maximum(seconds[:-1], bounds[:, None])
         weights = np.maximum(overlap, 0.0)
-        offset = np.zeros(len(bounds))
-        offset[0] = power * -first / charge.window
         # windows that the horizon's end cuts count with the mean of their part
-        whole = np.where(np.arange(len(bounds)) == 0, charge.window, np.maximum(weights.sum(axis=1), 1e-9))
-        grid = StepGrid(now + pd.Timedelta(seconds=float(first)), charge.window, len(bounds))
-        buckets = charge.on(grid)
+        whole = np.maximum(weights.sum(axis=1), 1e-9)
+        offset, whole[0] = np.zeros(len(bounds)), charge.window
+        offset[0] = power * -first / charge.window
+        buckets = charge.on(StepGrid(now + pd.Timedelta(seconds=float(first)), charge.window, len(bounds)))
         kept = buckets.bucket >= 0
         before = np.array([(so_far or {}).get(name, 0.0) for name in buckets.names])
         parts.append(
-            PeakData(weights[kept] / whole[kept, None], offset[kept], buckets.bucket[kept], buckets.rate, before)
+            (weights[kept] / whole[kept, None], offset[kept], buckets.bucket[kept] + count, buckets.rate, before)
         )
-    if not parts:
-        return PeakData.none(len(horizon))
-    shift = np.cumsum([0, *(len(p.rate) for p in parts[:-1])])
-    return PeakData(
-        np.vstack([p.weights for p in parts]), np.concatenate([p.offset for p in parts]),
-        np.concatenate([p.bucket + s for p, s in zip(parts, shift, strict=True)]).astype(np.int64),
-        np.concatenate([p.rate for p in parts]), np.concatenate([p.so_far for p in parts]),
-    )  # fmt: skip
+        count += len(buckets.rate)
+    return PeakData(*map(np.concatenate, zip(*parts, strict=True))) if parts else PeakData.none(len(horizon))
 
 
 class DemandCount:

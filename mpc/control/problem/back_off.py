@@ -91,26 +91,24 @@ class BackOff:
         p = np.zeros((r + zones + 1,) * 2)
         p[:-1, :-1] = self.kalman.steady(measured)[0]
         found: list[FloatArray] = []
-        parts = {dt: modes.propagator(float(dt), self.scheme) for dt in np.unique(self.horizon.steps)}
         for dt, end in zip(self.horizon.steps, self.horizon.edges[1:], strict=True):
+            if found and end > self.recourse + 1e-6:
+                found.append(found[-1])
+                continue
             keep, added = self.kalman.disturbance.discrete(float(dt))
             fading = np.exp(-dt / growth.time_constant)
             # the forecast's error acts in the step that it belongs to, as scenarios draw it
             p[-1] *= fading
             p[:, -1] *= fading
             p[-1, -1] += growth.deviation**2 * (1.0 - fading**2)
-            part = parts[dt]
-            step = np.zeros_like(p)
+            part, step = modes.propagator(float(dt), self.scheme), np.zeros_like(p)
             step[:r, :r] = np.diag(part.end)
             step[:r, r:-1] = part.end_gain[:, None] * modes.heating
             step[:r, -1] = part.end_gain * modes.boundary[:, 0]
             step[r:-1, r:-1], step[-1, -1] = keep * np.eye(zones), 1.0
             p = step @ p @ step.T
-            p[np.arange(r, r + zones), np.arange(r, r + zones)] += np.broadcast_to(added**2, (zones,))
-            if found and end > self.recourse + 1e-6:
-                found.append(found[-1])
-            else:
-                found.append(np.sqrt(np.einsum("zi,ij,zj->z", output, p[:r, :r], output).clip(0.0)))
+            p[range(r, r + zones), range(r, r + zones)] += added**2
+            found.append(np.sqrt(np.einsum("zi,ij,zj->z", output, p[:r, :r], output).clip(0.0)))
         return np.array(found)
 
     def narrow(self, data: HorizonData) -> HorizonData:

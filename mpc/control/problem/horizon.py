@@ -8,10 +8,10 @@ from functools import cached_property
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from mpc.errors import ControlError
-from thermal._types import FloatArray
+from mpc.scenario.grid import means_of_steps
+from thermal._types import FloatArray, IntArray
 from thermal.errors import describe
 
 #: Longest step of the predictor [s]: the water of the loop and the air's mixing are lost in longer ones.
@@ -45,7 +45,7 @@ class Horizon:
     """
 
     steps: FloatArray
-    first_steps: NDArray[np.int64]
+    first_steps: IntArray
     control_step: float
 
     def __post_init__(self) -> None:
@@ -127,7 +127,7 @@ class Horizon:
         return np.concatenate([[0.0], np.cumsum(self.steps)])
 
     @cached_property
-    def block_of(self) -> NDArray[np.int64]:
+    def block_of(self) -> IntArray:
         """Block of each step, shape (N,)."""
         return np.searchsorted(self.first_steps, np.arange(len(self)), side="right") - 1
 
@@ -151,11 +151,9 @@ class Horizon:
         ndarray, shape (n_block, n_channel)
             On the blocks of the new start [unit of the channel].
         """
-        ends = np.append(self.block_starts[1:], self.edges[-1])
-        knots = np.append(self.block_starts, self.edges[-1] + seconds)
-        summed = np.vstack([np.zeros(plan.shape[1]), np.cumsum(plan * np.diff(knots)[:, None], axis=0)])
-        at = [np.interp(np.array([self.block_starts, ends]) + seconds, knots, column) for column in summed.T]
-        return np.stack([(late - early) / (ends - self.block_starts) for early, late in at], axis=1)
+        ends = np.append(self.block_starts, self.edges[-1])
+        held = np.append(self.block_starts, self.edges[-1] + seconds)
+        return means_of_steps(held, plan, ends + seconds)
 
     def stamps(self, now: pd.Timestamp) -> pd.DatetimeIndex:
         """Give the ends of the steps.
@@ -188,7 +186,7 @@ class PeakData:
 
     weights: FloatArray
     offset: FloatArray
-    bucket: NDArray[np.int64]
+    bucket: IntArray
     rate: FloatArray
     so_far: FloatArray
 

@@ -6,7 +6,7 @@ import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Literal, get_args
+from typing import Any, Literal, NamedTuple, get_args
 
 import casadi as ca
 import numpy as np
@@ -85,7 +85,7 @@ class StageProblem:
         decisions : ndarray, shape (N, m)
             Of the steps [as the decisions].
         """
-        costs = np.array(self._mapped(len(decisions))[0](states[:-1].T, decisions.T, data.parameters.T)[1])
+        costs = np.array(self._along(len(decisions)).steps(states[:-1].T, decisions.T, data.parameters.T)[1])
         outside = data.price * self.outside(data, states)
         return float(costs.sum() + outside.sum()) + float(self.end(states[-1])[0])
 
@@ -99,7 +99,7 @@ class StageProblem:
         states : ndarray, shape (N + 1, n)
             At the edges of the steps [as the state].
         """
-        seen = np.array(self._mapped(len(states) - 1)[1](states.T)[1]).T
+        seen = np.array(self._along(len(states) - 1).ends(states.T)[1]).T
         return np.maximum(0.0, np.maximum(data.lower - seen, seen - data.upper))
 
     def follow(self, data: StageData, decisions: FloatArray) -> FloatArray:
@@ -112,25 +112,27 @@ class StageProblem:
         decisions : ndarray, shape (N, m)
             Of the steps [as the decisions].
         """
-        count = len(decisions)
-        if count not in self._courses:
-            self._courses[count] = self.step.mapaccum("course", count)
-        followed = self._courses[count](data.start, decisions.T, data.parameters.T)[0]
+        followed = self._along(len(decisions)).course(data.start, decisions.T, data.parameters.T)[0]
         return np.vstack([data.start, np.array(followed).T])
 
     @cached_property
-    def _courses(self) -> dict[int, ca.Function]:
+    def _made(self) -> dict[int, _Along]:
         return {}
 
-    @cached_property
-    def _costs(self) -> dict[int, tuple[ca.Function, ca.Function]]:
-        return {}
+    def _along(self, count: int) -> _Along:
+        """Functions of a whole horizon, made once for a number of steps."""
+        if count not in self._made:
+            course = self.step.mapaccum("course", count)
+            self._made[count] = _Along(course, self.step.map(count), self.end.map(count + 1))
+        return self._made[count]
 
-    def _mapped(self, count: int) -> tuple[ca.Function, ca.Function]:
-        """Step and end over all steps of a horizon, made once."""
-        if count not in self._costs:
-            self._costs[count] = self.step.map(count), self.end.map(count + 1)
-        return self._costs[count]
+
+class _Along(NamedTuple):
+    """Step and end over all steps of a horizon: states one after the other, costs, and what is banded."""
+
+    course: ca.Function
+    steps: ca.Function
+    ends: ca.Function
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,15 +177,6 @@ _NEAR = {"mu_init": 3e-4, "bound_push": 1e-2, "bound_frac": 1e-2}
 _QUIET: dict[str, dict[str, object]] = {
     "fatrop": {"fatrop.print_level": 0},
     "ipopt": {"ipopt.print_level": 0, "ipopt.sb": "yes"},
-}
-
-
-# the solvers' own words; fatrop counts: most iterations reached, step too short
-_ENDS = {
-    "Maximum_Iterations_Exceeded": Status.ITERATION_LIMIT,
-    "1": Status.ITERATION_LIMIT,
-    "2": Status.STALLED,
-    "Search_Direction_Becomes_Too_Small": Status.STALLED,
 }
 
 
@@ -302,18 +295,18 @@ class StageSolver:
 
     def _limits(self, data: StageData) -> Mapping[str, FloatArray]:
         (n, m, b), count = self._sizes, self.n_steps
-        lower, upper = np.full((count + 1, n + m + b), -np.inf), np.full((count + 1, n + m + b), np.inf)
-        lower[:, n : n + m], upper[:, n : n + m], lower[:, n + m :] = self.problem.lower, self.problem.upper, 0.0
-        least, most = np.zeros((count + 1, n + 2 * b)), np.zeros((count + 1, n + 2 * b))
-        least[:, n : n + b], least[:, n + b :] = data.lower, -np.inf
-        most[:, n : n + b], most[:, n + b :] = np.inf, data.upper
-        zeros = np.zeros(n)  # rows of a stage: next state, at the start the state itself, then bands
-        first_least, first_most = (np.concatenate([a[0, :n], zeros, a[0, n:]]) for a in (least, most))
+        free = np.full((count + 1, n), np.inf)
+        lower, upper = (np.broadcast_to(ends, (count + 1, m)) for ends in (self.problem.lower, self.problem.upper))
+        slack, open_band = np.zeros((count + 1, b)), np.full((count + 1, b), np.inf)
+        # rows of a stage: next state, then bands from below and above; first of all the start, last no next state
+        zeros = np.zeros((count + 1, n))
+        least, most = np.hstack([zeros, data.lower, -open_band]), np.hstack([zeros, open_band, data.upper])
         return {
-            "lbx": _packed(lower, n, m), "ubx": _packed(upper, n, m),
-            "lbg": np.concatenate([first_least, least[1:-1].ravel(), least[-1, n:]]),
-            "ubg": np.concatenate([first_most, most[1:-1].ravel(), most[-1, n:]]),
-        }  # fmt: skip
+            "lbx": _packed(np.hstack([-free, lower, slack]), n, m),
+            "ubx": _packed(np.hstack([free, upper, open_band]), n, m),
+            "lbg": np.concatenate([least[0, :n], least[:-1].ravel(), least[-1, n:]]),
+            "ubg": np.concatenate([most[0, :n], most[:-1].ravel(), most[-1, n:]]),
+        }
 
     def solve(self, data: StageData, states: FloatArray, decisions: FloatArray) -> StageSolution:
         """Solve for one horizon.
@@ -340,14 +333,13 @@ class StageSolver:
         guess[:, n + m :] = self.problem.outside(data, states)
         given = np.concatenate([data.start, data.parameters.ravel(), data.price.ravel()])
         try:
-            found = self._solver(x0=_packed(guess, n, m), p=given, **self._limits(data))
-            values = np.array(found["x"]).ravel()
+            values = np.array(self._solver(x0=_packed(guess, n, m), p=given, **self._limits(data))["x"]).ravel()
         except RuntimeError as error:
             values, word, status, steps = _packed(guess, n, m), str(error), Status.FAILED, 0
         else:
             stats = self._solver.stats()
             word, steps = str(stats["return_status"]), int(stats.get("iter_count", 0))
-            status = _status(word, bool(stats["success"]), np.isfinite(values).all())
+            status = Status.of(word, bool(stats["success"]))
         whole = np.insert(values, values.size - b, np.zeros(m)).reshape(count + 1, -1)
         plan = whole[:-1, n : n + m]
         followed = self.problem.follow(data, plan)
@@ -359,9 +351,3 @@ class StageSolver:
 def _packed(whole: FloatArray, n: int, m: int) -> FloatArray:
     """Flatten by stages; the last stage has no decisions."""
     return np.concatenate([whole[:-1].ravel(), whole[-1, :n], whole[-1, n + m :]])
-
-
-def _status(word: str, success: bool, finite: bool) -> Status:
-    if not finite:
-        return Status.FAILED
-    return Status.CONVERGED if success else _ENDS.get(word, Status.FAILED)
