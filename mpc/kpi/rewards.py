@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from scipy.special import expit
 
 from mpc.errors import MpcError
-from mpc.kpi.kpis import excess
+from mpc.kpi.record import excess
 from mpc.scenario.rates import KILOWATT_HOUR
 from mpc.scenario.scenario import Scenario
 from thermal._types import FloatArray
