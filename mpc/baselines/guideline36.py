@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from mpc.control.controller.reading import SitePoints
+from mpc.control.controller.reading import SitePoints, values_of
 from mpc.errors import ControlError
 from mpc.loop.actuators import Actuator
 from mpc.loop.plant import Measurements
@@ -210,6 +210,10 @@ class SuppressedRequests:
 
 
 _AIR, _WATER = "supply_air_temperature_setpoint", "supply_water_temperature_setpoint"
+_OF_TERMINALS = (
+    ZONE_TEMPERATURE, "zone_air_heating_temperature_setpoint", "zone_air_cooling_temperature_setpoint",
+    "discharge_air_temperature_sensor", "heating_water_valve_percentage_command",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -323,12 +327,12 @@ class Guideline36:
         self._last = measurements.stamp
         cooling, heating = self.requests(measurements, seconds)
         chosen: dict[str, float] = {}
-        outdoor = self._values(measurements, [self.points.weather_station], OUTDOOR_TEMPERATURE)[0]
+        outdoor = values_of(measurements, [self.points.weather_station], OUTDOOR_TEMPERATURE)[0]
         for k, name in enumerate(self.points.air_handlers):
-            on = not self._values(measurements, [name], "supply_fan_power_sensor")[0] <= 0.0
+            on = not values_of(measurements, [name], "supply_fan_power_sensor")[0] <= 0.0
             warmest = self._air[k].advance(on, int(cooling[self._serving == k].sum()), seconds)
             chosen[f"{name}/{_AIR}"] = self._by_outdoor(warmest, float(outdoor))
-        on = not self._values(measurements, [self.points.boiler], "pump_power_sensor")[0] <= 0.0
+        on = not values_of(measurements, [self.points.boiler], "pump_power_sensor")[0] <= 0.0
         chosen[f"{self.points.boiler}/{_WATER}"] = self._water.advance(on, int(heating.sum()), seconds)
         held = {name: self._range[name] for name in chosen if name in self._range}
         return {name: float(np.clip(chosen[name], *ends)) for name, ends in held.items()}
@@ -344,16 +348,10 @@ class Guideline36:
             Time since the last call [s].
         """
         s, terminals = self.settings, self.points.terminals
-        zone, low, high, discharge, valve = (
-            self._values(measurements, terminals, point)
-            for point in (
-                ZONE_TEMPERATURE, "zone_air_heating_temperature_setpoint", "zone_air_cooling_temperature_setpoint",
-                "discharge_air_temperature_sensor", "heating_water_valve_percentage_command",
-            )
-        )  # fmt: skip
+        zone, low, high, discharge, valve = (values_of(measurements, terminals, point) for point in _OF_TERMINALS)
         excess = self._suppressed.distance(zone - high, high, seconds)
         cooling = self._cooling.count((zone - high) / s.throttling_range, excess, seconds)
-        supply = self._values(measurements, self.points.air_handlers, "supply_air_temperature_setpoint")[self._serving]
+        supply = values_of(measurements, self.points.air_handlers, "supply_air_temperature_setpoint")[self._serving]
         call = np.clip((low - zone) / s.throttling_range, 0.0, 1.0)
         wanted = supply + np.minimum(2.0 * call, 1.0) * np.maximum(low + s.discharge_rise - supply, 0.0)
         heating = self._heating.count(valve, np.where(call > 0.0, wanted - discharge, 0.0), seconds)
@@ -364,7 +362,3 @@ class Guideline36:
         low, high = self.settings.outdoor
         share = float(np.clip((outdoor - low) / (high - low), 0.0, 1.0)) if np.isfinite(outdoor) else 0.0
         return warmest + share * (self.settings.coldest_air - warmest)
-
-    def _values(self, measurements: Mapping[str, float], entities: Sequence[str], point: str) -> FloatArray:
-        names = (f"{entity}/{point}" for entity in entities)
-        return np.array([measurements[n] if n in measurements else np.nan for n in names], dtype=float)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
-import numpy as np
-
+from mpc.baselines.guideline36 import Guideline36
 from mpc.control.controller.action import ResetRule
-from mpc.control.problem.channels import Channel
+from mpc.control.controller.reading import SitePoints, values_of
+from mpc.control.problem.channels import Channel, Quantity
 from mpc.loop.actuators import Actuator
+from mpc.loop.plant import Controller
 from mpc.loop.run import FixedSetpoints
 from mpc.scenario.forecast import Forecast
 from thermal.case.points import OUTDOOR_TEMPERATURE
@@ -81,12 +82,9 @@ class OutdoorReset:
 
     def __init__(self, actuators: Sequence[Actuator], weather_station: str, rule: ResetRule | None = None) -> None:
         self.rule, self._outdoor = rule or ResetRule(), f"{weather_station}/{OUTDOOR_TEMPERATURE}"
-        self._channels: dict[str, Channel] = {}
-        for a in actuators:
-            if a.name.endswith("/supply_air_temperature_setpoint"):
-                self._channels[a.name] = Channel("supply_air_temperature", a.lowest, a.highest)
-            elif a.name.endswith("/supply_water_temperature_setpoint"):
-                self._channels[a.name] = Channel("supply_water_temperature", a.lowest, a.highest)
+        kinds: dict[str, Quantity] = {_AIR: "supply_air_temperature", _WATER: "supply_water_temperature"}
+        named = [(a, kinds.get(a.name.rpartition("/")[2])) for a in actuators]
+        self._channels = {a.name: Channel(kind, a.lowest, a.highest) for a, kind in named if kind}
 
     def step(self, measurements: Mapping[str, float], forecast: Forecast | None) -> dict[str, float]:
         """Choose setpoints [K].
@@ -98,6 +96,17 @@ class OutdoorReset:
         forecast : Forecast or None
             Without effect.
         """
-        outdoor = float(measurements[self._outdoor]) if self._outdoor in measurements else np.nan
+        outdoor = float(values_of(measurements, [self._outdoor])[0])
         values = self.rule.setpoints(list(self._channels.values()), outdoor)
         return {name: float(value) for name, value in zip(self._channels, values, strict=True)}
+
+
+#: Makes a controller of a plant's points, of the air handler of each terminal, and of the actuators.
+Baseline = Callable[[SitePoints, Sequence[int], Sequence[Actuator]], Controller]
+
+#: Every baseline by name, made in one and the same way: ``BASELINES["reset"](points, serving, actuators)``.
+BASELINES: dict[str, Baseline] = {
+    "schedule": lambda points, serving, actuators: day_schedule(actuators),
+    "reset": lambda points, serving, actuators: OutdoorReset(actuators, points.weather_station),
+    "guideline36": Guideline36,
+}

@@ -139,20 +139,20 @@ class Readings:
             By ``ENTITY/POINT`` [library's units].
         """
         points, place, n_zone = self.points, self.place, len(self.points.zones)
-        seen = np.array([_value(measurements, f"{name}/{ZONE_TEMPERATURE}") for name in points.terminals])
+        seen, flow, warm = (
+            values_of(measurements, points.terminals, point)
+            for point in (ZONE_TEMPERATURE, "supply_air_flowrate_sensor", "discharge_air_temperature_sensor")
+        )
         known = np.isfinite(seen)
-        count = np.bincount(place[known], minlength=n_zone)
-        total = np.bincount(place[known], seen[known], n_zone)
+        count, total = (np.bincount(place[known], weights, n_zone) for weights in (None, seen[known]))
         zone = np.where(count > 0, total / np.maximum(count, 1), np.nan)
-        own = np.array([_value(measurements, f"{name}/{ZONE_TEMPERATURE}") for name in points.zones])
+        own = values_of(measurements, points.zones, ZONE_TEMPERATURE)
         zone = np.where(np.isfinite(own), own, zone)
-        flow = np.array([_value(measurements, f"{name}/supply_air_flowrate_sensor") for name in points.terminals])
-        warm = np.array([_value(measurements, f"{name}/discharge_air_temperature_sensor") for name in points.terminals])
         each = AIR_HEAT_CAPACITY * flow * (warm - zone[place])
         heat = np.asarray(np.bincount(place, each, n_zone), dtype=float)
-        outdoor = _value(measurements, f"{points.weather_station}/{OUTDOOR_TEMPERATURE}")
-        water = _value(measurements, f"{points.boiler}/supply_water_temperature_sensor")
-        power = sum((_value(measurements, column) for column in points.meters), 0.0)
+        outdoor = float(values_of(measurements, [points.weather_station], OUTDOOR_TEMPERATURE)[0])
+        water = float(values_of(measurements, [points.boiler], "supply_water_temperature_sensor")[0])
+        power = float(values_of(measurements, points.meters).sum())
         missing = [f"zone temperature of {z!r} is missing: its model goes on alone"
                    for z, t in zip(points.zones, zone, strict=True) if not np.isfinite(t)]  # fmt: skip
         # where the zone itself did not report, its heat is unknown too and has been said
@@ -164,13 +164,21 @@ class Readings:
         return Reading(zone, heat, outdoor, water, power, tuple(missing))
 
 
-def _value(measurements: Mapping[str, float], column: str) -> float:
-    if column not in measurements:
-        return float("nan")
-    try:
-        return float(measurements[column])
-    except (TypeError, ValueError):
-        return float("nan")
+def values_of(measurements: Mapping[str, float], entities: Sequence[str], point: str = "") -> FloatArray:
+    """Look a point of several entities up, shape (n_entity,) [library's units]; NaN where it is missing or no number.
+
+    Parameters
+    ----------
+    measurements : mapping of str to float
+        By ``ENTITY/POINT`` [library's units].
+    entities : sequence of str
+        Zones or devices; whole columns where there is no point.
+    point : str
+        What is measured.
+    """
+    columns = [f"{entity}/{point}" if point else entity for entity in entities]
+    found = pd.Series([measurements[c] if c in measurements else np.nan for c in columns], dtype=object)
+    return pd.to_numeric(found, errors="coerce").to_numpy(dtype=float)
 
 
 class _PastStep(NamedTuple):
