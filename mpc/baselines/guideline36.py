@@ -299,9 +299,8 @@ class Guideline36:
         actuators: Sequence[Actuator],
         settings: Guideline36Settings | None = None,
     ) -> None:
-        if len(serving) != len(points.terminals):
-            expected = f"an air handler for each of {len(points.terminals)} terminals"
-            raise ControlError(describe("Guideline 36", expected, f"{len(serving)}"))
+        expected = f"an air handler for each of {len(points.terminals)} terminals"
+        ControlError.unless(len(serving) == len(points.terminals), "Guideline 36", expected, f"{len(serving)}")
         self.points, self.settings = points, settings or Guideline36Settings()
         self._serving, n = np.asarray(serving, dtype=int), len(points.terminals)
         self._range = {a.name: (a.lowest, a.highest) for a in actuators}

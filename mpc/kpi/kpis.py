@@ -250,8 +250,7 @@ def register_kpi(name: str, function: Callable[[MeasuredRun], float | None], uni
     'K'
     """
     taken = name in Kpis.__dataclass_fields__ or (name in KPIS and KPIS[name].function is not function)
-    if taken or not name.isidentifier():
-        raise MpcError(describe("indicator", f"a name beside {', '.join(KPIS)}", repr(name)))
+    MpcError.unless(name.isidentifier() and not taken, "indicator", f"a name beside {', '.join(KPIS)}", repr(name))
     KPIS[name] = Indicator(function, unit, description)
 
 

@@ -87,8 +87,7 @@ class PlantRecord:
                 continue
             values = np.asarray(given, dtype=float)
             shape = shapes.get(name, values.shape)
-            if values.shape != shape:
-                raise MpcError(describe(f"record: {name}", f"shape {shape}", f"shape {values.shape}"))
+            MpcError.unless(values.shape == shape, f"record: {name}", f"shape {shape}", f"shape {values.shape}")
             if not np.isfinite(values).all():
                 at = int(np.argmax(~np.isfinite(values).reshape(len(values), -1).all(axis=1)))
                 raise MpcError(describe(f"record: {name}", "finite numbers", f"{values[at]} in row {at}"))

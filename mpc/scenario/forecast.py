@@ -113,8 +113,7 @@ class Forecast:
         """
         converted = table.copy()
         for column in table.columns:
-            if column not in units:
-                raise ScenarioError(describe(f"forecast: column {column!r}", "a unit", "none", "add it to `units`"))
+            ScenarioError.unless(column in units, f"forecast: column {column!r}", "a unit", "none", "add it to `units`")
             wanted, name = column_unit(str(column)), str(column).rpartition("/")[2]
             quantity = _QUANTITY.get(name) or (POINT_TYPES[name].quantity if name in POINT_TYPES else None)
             where = f"forecast: column {column!r}"
@@ -163,8 +162,7 @@ class Forecast:
         part = self.table.reindex(columns=list(columns)).reindex(index)
         if fill == "hold":
             part = part.ffill().bfill()
-        elif fill is not None:
-            raise ScenarioError(describe("fill", "'hold' or None", repr(fill)))
+        ScenarioError.unless(fill in (None, "hold"), "fill", "'hold' or None", repr(fill))
         values = part.to_numpy(dtype=float)
         empty = np.isnan(values)
         if empty.any():

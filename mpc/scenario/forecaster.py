@@ -17,7 +17,7 @@ from mpc.scenario.scenario import Scenario
 from mpc.scenario.weather import SKY, SUN_POINTS
 from thermal._types import FloatArray
 from thermal.case.points import OUTDOOR_TEMPERATURE
-from thermal.errors import describe, nearest
+from thermal.errors import describe
 
 _STREAM = 12  # of random numbers of a seed
 
@@ -144,8 +144,7 @@ class Forecaster:
         if occupancy not in ("expected", "actual"):
             raise ScenarioError(describe("occupancy", "'expected' or 'actual'", repr(occupancy)))
         for name in errors or {}:
-            if name not in ERROR_POINTS:
-                raise ScenarioError(describe("errors", "a known one", repr(name), nearest(name, ERROR_POINTS)))
+            ScenarioError.unless_known(name, ERROR_POINTS, "errors", "a known one")
         self.scenario, self.horizon, self.seed = scenario, horizon, seed
         self.errors, self.issue_every = dict(errors or {}), issue_every
         truth = scenario.to_frame(expected=occupancy == "expected")

@@ -83,9 +83,8 @@ class StepGrid:
         """
         first, last = (local_timestamp(time, building) for time in (start, end))
         count = (last - first).total_seconds() / step if step > 0 else 0.0
-        if count < 1 or not count.is_integer():
-            expected = f"a whole number of steps of {step:g} s from start to end"
-            raise ScenarioError(describe("grid", expected, f"{first} to {last}"))
+        expected = f"a whole number of steps of {step:g} s from start to end"
+        ScenarioError.unless(count >= 1 and count.is_integer(), "grid", expected, f"{first} to {last}")
         return cls(first, step, int(count))
 
     @cached_property

@@ -243,8 +243,7 @@ class RandomOccupancy(Occupancy):
         ScenarioError
             When the seed is negative.
         """
-        if seed < 0:
-            raise ScenarioError(describe("seed", "0 or more", repr(seed)))
+        ScenarioError.unless(seed >= 0, "seed", "0 or more", repr(seed))
         days = [d for d, kind in zip(grid.days, self.calendar.kind(grid.days), strict=True) if kind == WEEKDAY]
         count = np.zeros((grid.n_steps, len(zones)))
         for k, (zone, people) in enumerate(zip(zones, self.people(zones), strict=True)):

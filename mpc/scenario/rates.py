@@ -50,8 +50,7 @@ class ConstantRate:
     value: float
 
     def __post_init__(self) -> None:
-        if not np.isfinite(self.value):
-            raise ScenarioError(describe("rate", "a finite number per kWh", repr(self.value)))
+        ScenarioError.unless(np.isfinite(self.value), "rate", "a finite number per kWh", repr(self.value))
 
     def on(self, grid: StepGrid) -> FloatArray:
         """Average over each step of a grid, shape (n_steps,) [per kWh].
@@ -226,6 +225,5 @@ def gas_price(value: float, unit: str) -> ConstantRate:
     >>> round(gas_price(1.2, "therm").value, 4)
     0.0409
     """
-    if unit not in GAS_UNITS:
-        raise ScenarioError(describe("gas price", f"a price per {', '.join(GAS_UNITS)}", repr(unit)))
+    ScenarioError.unless(unit in GAS_UNITS, "gas price", f"a price per {', '.join(GAS_UNITS)}", repr(unit))
     return ConstantRate(value / GAS_UNITS[unit])

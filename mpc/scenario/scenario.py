@@ -24,7 +24,7 @@ from thermal.case.case import Case
 from thermal.case.points import OUTDOOR_TEMPERATURE, ZONE_TEMPERATURE
 from thermal.case.quality import QualityReport
 from thermal.case.telemetry import Telemetry
-from thermal.errors import describe, nearest
+from thermal.errors import nearest
 
 OCCUPANCY_POINT = "occupancy_count_sensor"
 
@@ -251,6 +251,5 @@ def zone_areas(building: Building) -> FloatArray:
 def _band(comfort: ComfortBand | Mapping[str, ComfortBand] | None, zone: str) -> ComfortBand:
     if not isinstance(comfort, Mapping):
         return comfort or ComfortBand()
-    if zone not in comfort:
-        raise ScenarioError(describe("comfort", f"a band of zone {zone!r}", "none", nearest(zone, comfort)))
+    ScenarioError.unless(zone in comfort, "comfort", f"a band of zone {zone!r}", "none", nearest(zone, comfort))
     return comfort[zone]

@@ -164,8 +164,7 @@ class DemandCharge:
         rates = np.asarray(self.rates, dtype=float)
         if rates.ndim != 1 or not len(rates) or not (np.isfinite(rates) & (rates >= 0)).all():
             raise ScenarioError(describe("demand charge: rates", "numbers of 0 or more", repr(self.rates)))
-        if self.window <= 0:
-            raise ScenarioError(describe("demand charge: window", "seconds above 0", repr(self.window)))
+        ScenarioError.unless(self.window > 0, "demand charge: window", "seconds above 0", repr(self.window))
         weekday = np.zeros((12, 24)) if self.weekday is None else np.asarray(self.weekday)
         weekend = weekday if self.weekend is None else np.asarray(self.weekend)
         for key, table in (("weekday", weekday), ("weekend", weekend)):

@@ -79,9 +79,7 @@ class Weather:
             found = f"{index[row + 1]} after {index[row]}"
             raise WeatherError(describe("weather", f"one step of up to {_LONGEST_STEP:g} s", found, "fill the gap"))
         for column in self.frame.columns:
-            if column not in WEATHER_POINTS:
-                advice = nearest(column, WEATHER_POINTS)
-                raise WeatherError(describe("weather: column", "a weather point", repr(column), advice))
+            WeatherError.unless_known(column, WEATHER_POINTS, "weather: column", "a weather point")
         if self.typical and (len(index) != 8760 or gaps[0] != 3600):
             found = f"{len(index)} rows, a step of {gaps[0]} s"
             raise WeatherError(describe("typical year", "8760 hours", found))
@@ -220,9 +218,8 @@ class Weather:
         stamps = index_seconds(self.stamps)
         first = int(stamps[0] - self.step)
         piece = math.gcd(int(self.step), int(grid.step), int(grid.edges[0]) - first)
-        if piece < _SHORTEST_PIECE:
-            expected = "clocks of weather and grid that differ by whole minutes"
-            raise WeatherError(describe("weather", expected, f"{piece} s"))
+        expected = "clocks of weather and grid that differ by whole minutes"
+        WeatherError.unless(piece >= _SHORTEST_PIECE, "weather", expected, f"{piece} s")
         edges = np.arange(first, stamps[-1] + piece, piece)
         middles = pd.to_datetime(edges[:-1] + piece / 2.0, unit="s", utc=True)
         place = self.location

@@ -108,8 +108,7 @@ def sky_radiation(air: FloatArray, dew_point: FloatArray, cloud: FloatArray) -> 
 
 
 def _read(read: Any, path: str | Path) -> tuple[pd.DataFrame, dict[str, Any]]:
-    if not Path(path).is_file():
-        raise WeatherError(describe(str(path), "a weather file", "none"))
+    WeatherError.unless(Path(path).is_file(), str(path), "a weather file", "none")
     try:
         data, meta = read(str(path), coerce_year=_YEAR)
     except Exception as error:  # pvlib lets whatever its parser stumbles on through
@@ -170,19 +169,14 @@ def read_weather_csv(
     WeatherError
         When the file, a column, a stamp or a unit is not as it should be.
     """
-    if not Path(path).is_file():
-        raise WeatherError(describe(str(path), "a CSV file", "none"))
+    WeatherError.unless(Path(path).is_file(), str(path), "a CSV file", "none")
     raw = pd.read_csv(path)
     named = dict(columns) if columns is not None else {point: point for point in WEATHER_POINTS if point in raw}
     for name in (stamp, *named):
-        if name not in raw:
-            raise WeatherError(describe(f"{path}: columns", repr(name), str(list(raw)), nearest(name, raw)))
+        WeatherError.unless(name in raw, f"{path}: columns", repr(name), str(list(raw)), nearest(name, raw))
     for point in (*named.values(), *(units or {})):
-        if point not in WEATHER_POINTS:
-            advice = nearest(point, WEATHER_POINTS)
-            raise WeatherError(describe(f"{path}: column", "a weather point", repr(point), advice))
-    if not named:
-        raise WeatherError(describe(f"{path}: columns", f"one of {', '.join(WEATHER_POINTS)}", str(list(raw))))
+        WeatherError.unless_known(point, WEATHER_POINTS, f"{path}: column", "a weather point")
+    WeatherError.unless(named, f"{path}: columns", f"one of {', '.join(WEATHER_POINTS)}", str(list(raw)))
     frame = pd.DataFrame(index=_stamps(raw[stamp], location, path))
     for name, point in named.items():
         quantity = POINT_TYPES[point].quantity

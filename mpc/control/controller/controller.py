@@ -20,7 +20,6 @@ from mpc.control.solvers.solution import Solution, Solver, Starts, Status
 from mpc.errors import ControlError, MpcError
 from mpc.scenario.forecast import Forecast
 from thermal._types import FloatArray
-from thermal.errors import describe
 
 _USUAL_HUMIDITY = 0.006  # kg/kg, as `thermal.hvac` has it where none is measured
 
@@ -155,8 +154,7 @@ class MpcController:
                 self.observer.start(np.where(seen, read.zone, read.zone[seen].mean()), boundary)
                 started = True
             self._count(read, step.stamp)
-        if not started:
-            raise ControlError(describe("start-up: telemetry", "a zone that reports", "none that does"))
+        ControlError.unless(started, "start-up: telemetry", "a zone that reports", "none that does")
         self._known.started, self._known.gains = True, steps[-1].gains
 
     def _now(

@@ -125,9 +125,8 @@ class Readings:
     def __init__(self, points: SitePoints, system: HvacSystem) -> None:
         found = (len(points.zones), len(points.terminals), len(points.air_handlers))
         wanted = (system.zone_count, len(system.terminals), len(system.air_handlers))
-        if found != wanted:
-            expected = "names of {} zones, {} terminals, {} air handlers".format(*wanted)
-            raise ControlError(describe("site points", expected, "{}, {}, {}".format(*found)))
+        expected = "names of {} zones, {} terminals, {} air handlers".format(*wanted)
+        ControlError.unless(found == wanted, "site points", expected, "{}, {}, {}".format(*found))
         self.points, self.place = points, system.terminals.zone
 
     def read(self, measurements: Mapping[str, float]) -> Reading:

@@ -147,8 +147,7 @@ class Margin:
     width: float
 
     def __post_init__(self) -> None:
-        if not self.width >= 0.0:
-            raise ControlError(describe("margin", "0 K or more", f"{self.width!r} K"))
+        ControlError.unless(self.width >= 0.0, "margin", "0 K or more", f"{self.width!r} K")
 
     def narrow(self, data: HorizonData) -> HorizonData:
         """Narrow the bands of a horizon; one that is too narrow for both edges shrinks to its middle.

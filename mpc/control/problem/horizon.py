@@ -307,9 +307,8 @@ class HorizonData:
             if not np.isfinite(values).all():
                 at = np.argwhere(~np.isfinite(np.atleast_1d(values)))[0].tolist()
                 raise ControlError(describe(f"horizon data: {name}", "finite numbers", f"{values.ravel()[0]} at {at}"))
-        if self.peaks.weights.shape[1:] != each:
-            expected, found = f"weights of {n_steps} steps", f"{self.peaks.weights.shape}"
-            raise ControlError(describe("horizon data: peaks", expected, found))
+        expected, found = f"weights of {n_steps} steps", f"{self.peaks.weights.shape}"
+        ControlError.unless(self.peaks.weights.shape[1:] == each, "horizon data: peaks", expected, found)
 
     @property
     def n_zone(self) -> int:

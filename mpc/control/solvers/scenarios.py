@@ -46,8 +46,7 @@ def outdoor_scenarios(
     ControlError
         When there are fewer than two.
     """
-    if count < 2:
-        raise ControlError(describe("scenarios", "2 or more", f"{count}"))
+    ControlError.unless(count >= 2, "scenarios", "2 or more", f"{count}")
     keep = np.exp(-horizon.steps / growth.time_constant)
     drive = growth.deviation * np.sqrt(1.0 - keep**2) * rng.standard_normal((count // 2, len(horizon)))
     paths, error = np.zeros_like(drive), np.zeros(count // 2)
@@ -197,8 +196,7 @@ class ScenarioSolver(Solver):
             When another number of scenarios is drawn than was said.
         """
         begin, blocks, parts = time.perf_counter(), self._tree.blocks, tuple(self.draw(data))
-        if len(parts) != len(blocks):
-            raise ControlError(describe("scenarios", f"{len(blocks)}", f"{len(parts)}"))
+        ControlError.unless(len(parts) == len(blocks), "scenarios", f"{len(blocks)}", f"{len(parts)}")
         first = np.empty((self._tree.n_block, plan.shape[1]))
         for each in blocks:
             first[each] = plan

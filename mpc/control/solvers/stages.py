@@ -14,7 +14,7 @@ import numpy as np
 from mpc.control.solvers.solution import Status
 from mpc.errors import ControlError
 from thermal._types import FloatArray
-from thermal.errors import describe, nearest
+from thermal.errors import describe
 
 
 @dataclass(frozen=True, eq=False)
@@ -255,9 +255,7 @@ class StageSolver:
         tolerance: float = 1e-4,
         iterations: int = 300,
     ) -> None:
-        if method not in get_args(StageMethod):
-            advice = nearest(method, get_args(StageMethod))
-            raise ControlError(describe("stage solver: method", "an interior point", repr(method), advice))
+        ControlError.unless_known(method, get_args(StageMethod), "stage solver: method", "an interior point")
         self.problem, self.n_steps, self.method = problem, n_steps, method
         self._sizes = problem.state.numel(), problem.decision.numel(), problem.banded.numel()
         self._solver = self._build(tolerance, iterations)
