@@ -29,8 +29,8 @@ from mpc.baselines.guideline36 import Guideline36
 from mpc.baselines.rules import OutdoorReset, day_schedule
 from mpc.control.controller.action import ControllerSettings
 from mpc.control.controller.controller import MpcController
-from mpc.control.problem.back_off import Margin
 from mpc.control.problem.horizon import Horizon
+from mpc.control.solvers.uncertainty import Margin
 from mpc.environment.actions import SUPPLY_SETPOINTS
 from mpc.environment.environment import ScenarioPlant
 from mpc.loop.make import pilot_weather
@@ -40,7 +40,7 @@ from mpc.loop.reduced import ReducedBuilding
 from mpc.loop.run import FixedSetpoints
 from mpc.loop.simulated import SimulatedPlant
 from mpc.reports.diagnosis import write_diagnosis
-from mpc.scenario.forecaster import DAY_AHEAD_ERRORS, Forecaster
+from mpc.scenario.forecast import DAY_AHEAD_ERRORS, Forecaster
 from mpc.scenario.gains import InternalGains
 from mpc.scenario.grid import StepGrid
 from mpc.scenario.paper import paper_carbon, paper_tariff

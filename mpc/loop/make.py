@@ -15,7 +15,7 @@ from mpc.loop.noise import SensorNoise
 from mpc.loop.reduced import reduced_building
 from mpc.loop.run import FixedSetpoints
 from mpc.loop.simulated import SimulatedPlant
-from mpc.scenario.forecaster import Forecaster
+from mpc.scenario.forecast import Forecaster
 from mpc.scenario.gains import InternalGains
 from mpc.scenario.grid import StepGrid
 from mpc.scenario.occupancy import Occupancy

@@ -10,10 +10,9 @@ import numpy as np
 import pandas as pd
 
 from mpc.errors import ScenarioError
-from mpc.scenario.comfort import ComfortBand
 from mpc.scenario.gains import InternalGains
 from mpc.scenario.grid import StepGrid
-from mpc.scenario.occupancy import OFFICE_AREA_PER_PERSON, Occupancy, ScheduledOccupancy
+from mpc.scenario.occupancy import OFFICE_AREA_PER_PERSON, ComfortBand, Occupancy, ScheduledOccupancy
 from mpc.scenario.rates import ConstantRate
 from mpc.scenario.tariff import CarbonIntensity, DemandBuckets, Tariff
 from mpc.scenario.weather import Weather

@@ -18,11 +18,10 @@ from mpc.loop.building import BuildingModel, GridBuilding
 from mpc.loop.noise import SensorNoise
 from mpc.loop.reduced import ReducedBuilding
 from mpc.loop.simulated import SimulatedPlant
-from mpc.scenario.comfort import ComfortBand
-from mpc.scenario.forecaster import ErrorGrowth, Forecaster
+from mpc.scenario.forecast import ErrorGrowth, Forecaster
 from mpc.scenario.gains import InternalGains
 from mpc.scenario.grid import StepGrid
-from mpc.scenario.occupancy import Occupancy
+from mpc.scenario.occupancy import ComfortBand, Occupancy
 from mpc.scenario.paper import paper_carbon, paper_tariff
 from mpc.scenario.scenario import Scenario, build_scenario
 from mpc.scenario.tariff import CarbonIntensity, Tariff

@@ -20,9 +20,8 @@ from mpc.errors import BoptestRequestError, PlantError
 from mpc.loop.building import BuildingModel
 from mpc.loop.noise import SensorNoise
 from mpc.loop.operation import Operation, scheduled_operation
-from mpc.scenario.comfort import ComfortBand
 from mpc.scenario.grid import StepGrid
-from mpc.scenario.occupancy import Occupancy
+from mpc.scenario.occupancy import ComfortBand, Occupancy
 from mpc.scenario.paper import paper_carbon, paper_tariff
 from mpc.scenario.rates import Rate
 from mpc.scenario.scenario import Scenario, build_scenario

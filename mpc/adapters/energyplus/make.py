@@ -13,10 +13,10 @@ from mpc.adapters.energyplus.holidays import holidays
 from mpc.adapters.energyplus.install import CHICAGO
 from mpc.adapters.energyplus.plant import EnergyPlusPlant
 from mpc.loop.noise import SensorNoise
-from mpc.scenario.comfort import ComfortBand
-from mpc.scenario.forecaster import ErrorGrowth, Forecaster
+from mpc.scenario.forecast import ErrorGrowth, Forecaster
 from mpc.scenario.gains import InternalGains
 from mpc.scenario.grid import Calendar, StepGrid
+from mpc.scenario.occupancy import ComfortBand
 from mpc.scenario.paper import paper_tariff
 from mpc.scenario.scenario import Scenario, build_scenario
 from mpc.scenario.tariff import CarbonIntensity, Tariff

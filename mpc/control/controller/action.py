@@ -11,9 +11,9 @@ import pandas as pd
 
 from mpc.control.predictor.predictor import Predictor
 from mpc.control.problem.assembly import ComfortOperation
-from mpc.control.problem.back_off import BackOff, Margin
 from mpc.control.problem.channels import Channel
 from mpc.control.solvers.solution import Solution
+from mpc.control.solvers.uncertainty import BackOff, Margin
 from mpc.kpi.rewards import DISCOMFORT_PRICE
 from mpc.scenario.tariff import DemandCharge
 from thermal._types import FloatArray

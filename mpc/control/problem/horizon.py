@@ -50,19 +50,18 @@ class Horizon:
 
     def __post_init__(self) -> None:
         steps, first = np.atleast_1d(np.asarray(self.steps, dtype=float)), np.atleast_1d(np.asarray(self.first_steps))
-        if steps.ndim != 1 or not (np.isfinite(steps) & (steps > 0) & (steps <= LONGEST_STEP)).all():
-            expected = f"steps above 0 and up to {LONGEST_STEP:g} s"
-            raise ControlError(describe("horizon: steps", expected, repr(self.steps)))
+        possible = steps.ndim == 1 and bool(((steps > 0) & (steps <= LONGEST_STEP)).all())
+        ControlError.unless(possible, "horizon: steps", f"steps above 0 and up to {LONGEST_STEP:g} s", self.steps)
         rising = first[0] == 0 and (np.diff(first) > 0).all() and first[-1] < len(steps)
-        if not np.issubdtype(first.dtype, np.integer) or not rising:
-            expected = f"numbers of steps that rise from 0, below {len(steps)}"
-            raise ControlError(describe("horizon: first_steps", expected, repr(self.first_steps)))
+        expected = f"numbers of steps that rise from 0, below {len(steps)}"
+        whole = np.issubdtype(first.dtype, np.integer)
+        ControlError.unless(rising and whole, "horizon: first_steps", expected, repr(self.first_steps))
         object.__setattr__(self, "steps", steps)
         object.__setattr__(self, "first_steps", first.astype(np.int64))
         first_end = self.edges[first[1]] if len(first) > 1 else self.edges[-1]
-        if not np.isclose(self.edges, self.control_step).any() or not 0.0 < self.control_step <= first_end:
-            expected = f"a whole number of steps, up to the first block's {first_end:g} s"
-            raise ControlError(describe("horizon: control_step", expected, f"{self.control_step!r} s"))
+        whole = bool(np.isclose(self.edges, self.control_step).any()) and 0.0 < self.control_step <= first_end
+        expected = f"a whole number of steps, up to the first block's {first_end:g} s"
+        ControlError.unless(whole, "horizon: control_step", expected, f"{self.control_step!r} s")
 
     @classmethod
     def regular(cls, hours: float, step: float, blocks: int, control_step: float | None = None) -> Horizon:
@@ -80,9 +79,9 @@ class Horizon:
             Time between two actions [s]; one step by default.
         """
         count = round(hours * 3600.0 / step) if step > 0 else 0
-        if count < 1 or not 1 <= blocks <= count or abs(count * step - hours * 3600.0) > 1e-6:
-            found = f"{hours} h, {step} s and {blocks} blocks"
-            raise ControlError(describe("horizon", "a whole number of steps, and at most as many blocks", found))
+        whole = 1 <= blocks <= count and abs(count * step - hours * 3600.0) <= 1e-6
+        expected, found = "a whole number of steps, and at most as many blocks", f"{hours} h, {step} s, {blocks} blocks"
+        ControlError.unless(whole, "horizon", expected, found)
         first = np.floor(np.arange(blocks) * count / blocks).astype(np.int64)
         return cls(np.full(count, float(step)), first, step if control_step is None else control_step)
 

@@ -17,11 +17,11 @@ from mpc.control.controller.controller import MpcController
 from mpc.control.controller.observer import Observer
 from mpc.control.controller.reading import SitePoints
 from mpc.control.predictor.predictor import Predictor
-from mpc.control.problem.back_off import BackOff
 from mpc.control.problem.channels import supply_channels
 from mpc.control.problem.horizon import Horizon
 from mpc.control.solvers.sequential import SequentialSolver
 from mpc.control.solvers.solution import Status
+from mpc.control.solvers.uncertainty import BackOff
 
 START = pd.Timestamp("2023-01-16 07:00", tz="Etc/GMT+8")
 STEPS, FAULT = 15, 3  # of 5 minutes, and the step from which on there is a fault

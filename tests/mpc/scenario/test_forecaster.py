@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from mpc.errors import ScenarioError
-from mpc.scenario.forecaster import DAY_AHEAD_ERRORS, ErrorGrowth, Forecaster
+from mpc.scenario.forecast import DAY_AHEAD_ERRORS, ErrorGrowth, Forecaster
 from mpc.scenario.occupancy import RandomOccupancy
 from mpc.scenario.paper import paper_tariff
 from mpc.scenario.scenario import Scenario, build_scenario

@@ -9,10 +9,9 @@ import pandas as pd
 import pytest
 
 from mpc.errors import ScenarioError, WeatherError
-from mpc.scenario.comfort import ComfortBand
 from mpc.scenario.gains import InternalGains
 from mpc.scenario.grid import StepGrid
-from mpc.scenario.occupancy import RandomOccupancy
+from mpc.scenario.occupancy import ComfortBand, RandomOccupancy
 from mpc.scenario.paper import paper_carbon, paper_tariff
 from mpc.scenario.scenario import Scenario, build_scenario, zone_areas
 from mpc.scenario.weather import Weather
