@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
@@ -37,6 +37,7 @@ class _Known:
     water: float = 293.15
 
 
+@dataclass(eq=False, repr=False)
 class MpcController:
     """Optimal setpoints over a receding horizon, with an honest fallback.
 
@@ -60,27 +61,22 @@ class MpcController:
     The order is: optimal plan, the previous plan as far as it reaches, rules.
     """
 
-    def __init__(
-        self,
-        solver: Solver,
-        observer: Observer,
-        points: SitePoints,
-        settings: ControllerSettings | None = None,
-        signals: Callable[[Forecast, pd.DatetimeIndex], FloatArray] | None = None,
-    ) -> None:
-        self.solver, self.observer, self.points = solver, observer, points
-        self.settings, self.signals = settings or ControllerSettings(), signals
-        self.problem: ControlProblem = solver.problem
+    solver: Solver
+    observer: Observer
+    points: SitePoints
+    settings: ControllerSettings = field(default_factory=ControllerSettings)
+    signals: Callable[[Forecast, pd.DatetimeIndex], FloatArray] | None = None
+
+    def __post_init__(self) -> None:
+        self.problem: ControlProblem = self.solver.problem
         self._horizon, self._channels = self.problem.predictor.horizon, self.problem.predictor.channels
-        self._readings = Readings(points, self.problem.predictor.hvac.system)
+        self._readings = Readings(self.points, self.problem.predictor.hvac.system)
         self._known = _Known(self.settings.rule.setpoints(self._channels, 283.15))
         self._starts = Starts(self.settings.second_start)
         self._demand = DemandCount(self.settings.demand)
-        self._stuck = StuckSensors(
-            points.zones, np.sqrt(observer.kalman.whole.noise_variance), self.settings.false_alarm,
-            self.settings.resolution,
-        )  # fmt: skip
-        self._far = FarFromModel(points.zones, observer.innovation_deviation)
+        noise = np.sqrt(self.observer.kalman.whole.noise_variance)
+        self._stuck = StuckSensors(self.points.zones, noise, self.settings.false_alarm, self.settings.resolution)
+        self._far = FarFromModel(self.points.zones, self.observer.innovation_deviation)
 
     def step(
         self, measurements: Mapping[str, float], forecast: Forecast | None, now: pd.Timestamp | None = None
@@ -191,19 +187,17 @@ class MpcController:
         if self.signals is not None:
             boundary = np.hstack([boundary, self.signals(forecast, horizon.stamps(now))])
         self._estimate(measurements, expected, boundary[0].copy(), now, reasons)
-        schedule = settings.operation.schedule(expected.band, horizon.edges)
+        schedule, given = settings.operation.schedule(expected.band, horizon.edges), expected._asdict()
+        del given["band"]
         every = np.ones(self.problem.predictor.hvac.n_air_handler)
         return HorizonData(
-            state=self.observer.modal_state.copy(), water=self._known.water,
+            **given, state=self.observer.modal_state.copy(), water=self._known.water,
             disturbance=self.observer.disturbance.copy(), previous=self._known.previous, boundary=boundary,
-            outdoor_temperature=expected.outdoor_temperature,
-            outdoor_humidity=np.full(len(horizon), _USUAL_HUMIDITY), gains=expected.gains, lower=expected.lower,
-            upper=expected.upper, heating_setpoint=schedule.heating, cooling_setpoint=schedule.cooling,
-            running=np.outer(schedule.running, every), ventilation=np.outer(schedule.ventilation, every),
-            boiler=schedule.running, electricity_price=expected.electricity_price, gas_price=expected.gas_price,
-            comfort_price=np.full(expected.gains.shape, settings.comfort_price),
+            outdoor_humidity=np.full(len(horizon), _USUAL_HUMIDITY), heating_setpoint=schedule.heating,
+            cooling_setpoint=schedule.cooling, running=np.outer(schedule.running, every),
+            ventilation=np.outer(schedule.ventilation, every), boiler=schedule.running,
+            comfort_price=np.full(expected.gains.shape, settings.comfort_price), heat_value=settings.heat_value,
             peaks=peak_data(settings.demand, horizon, now, self._demand.peaks, self._demand.used(now)),
-            heat_value=settings.heat_value,
         )  # fmt: skip
 
     def _estimate(

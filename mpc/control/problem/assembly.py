@@ -16,9 +16,9 @@ from mpc.scenario.grid import StepGrid, means_of_steps
 from mpc.scenario.tariff import DemandCharge
 from thermal._types import FloatArray, IntArray
 from thermal.case.points import OUTDOOR_TEMPERATURE
-from thermal.errors import describe
 
 _HOUR = 3600.0  # s
+_NARROWEST = (np.maximum, np.minimum)  # of lower and of upper edges
 
 
 class Expected(NamedTuple):
@@ -77,29 +77,26 @@ def expect(
     ScenarioError
         Which column is missing, for how many steps and when first, or where the forecast ends.
     """
-    per_zone = [f"{zone}/{name}" for name in ("internal_gain", "comfort_lower_temperature", "comfort_upper_temperature")
-                for zone in zones]  # fmt: skip
-    prices = ["electricity_price", "gas_price"]
     carbon = ["electricity_carbon_intensity", "gas_carbon_intensity"] if carbon_price else []
-    columns = [OUTDOOR_TEMPERATURE, *prices, *carbon, *per_zone]
+    flowing = [OUTDOOR_TEMPERATURE, "electricity_price", "gas_price", *carbon, *(f"{z}/internal_gain" for z in zones)]
+    sides = [[f"{zone}/comfort_{side}_temperature" for zone in zones] for side in ("lower", "upper")]
     index = pd.DatetimeIndex(forecast.table.index)
     ends = (index - now).total_seconds().to_numpy()
     step = float(np.median(np.diff(ends))) if len(ends) > 1 else float(horizon.control_step)
     edges = np.concatenate([[ends[0] - step], ends])
-    if fill is None and (edges[-1] < horizon.edges[-1] - 1e-6 or edges[0] > 1e-6):
-        last = now + pd.Timedelta(seconds=horizon.edges[-1])
-        found = f"{now + pd.Timedelta(seconds=edges[0])} to {index[-1]}"
-        raise ScenarioError(describe("forecast", f"steps from {now} to {last}", found, 'pass fill="hold"'))
-    values = forecast.values(columns, fill=fill)
+    first, last = now + pd.Timedelta(seconds=edges[0]), now + pd.Timedelta(seconds=horizon.edges[-1])
+    covered = fill is not None or (edges[-1] >= horizon.edges[-1] - 1e-6 and edges[0] <= 1e-6)
+    advice = 'pass fill="hold"'
+    ScenarioError.unless(covered, "forecast", f"steps from {now} to {last}", f"{first} to {index[-1]}", advice)
+    values = forecast.values([*flowing, *sides[0], *sides[1]], fill=fill)
     edges[0], edges[-1] = min(edges[0], 0.0), max(edges[-1], horizon.edges[-1])
-    n_single, n = 3 + len(carbon), len(zones)
-    flowing, edge = means_of_steps(edges, values[:, : n_single + n], horizon.edges), n_single + 2 * n
-    lower = _extremes(edges, values[:, n_single + n : edge], horizon.edges, np.maximum)
-    upper = _extremes(edges, values[:, edge:], horizon.edges, np.minimum)
-    emitted = flowing[:, 3:n_single] * carbon_price if carbon else np.zeros((len(horizon), 2))
+    flows, *bands = np.split(values, [len(flowing), len(flowing) + len(zones)], axis=1)
+    mean = means_of_steps(edges, flows, horizon.edges)
+    lower, upper = (_extremes(edges, b, horizon.edges, of) for b, of in zip(bands, _NARROWEST, strict=True))
+    emitted = mean[:, 3:5] * carbon_price if carbon else np.zeros((len(horizon), 2))
     return Expected(
-        flowing[:, 0], flowing[:, n_single:], np.maximum(lower, np.vstack([lower[1:], lower[-1:]])),
-        np.minimum(upper, np.vstack([upper[1:], upper[-1:]])), (lower, upper), *(flowing[:, 1:3] + emitted).T,
+        mean[:, 0], mean[:, 3 + len(carbon) :], np.maximum(lower, np.vstack([lower[1:], lower[-1:]])),
+        np.minimum(upper, np.vstack([upper[1:], upper[-1:]])), (lower, upper), *(mean[:, 1:3] + emitted).T,
     )  # fmt: skip
 
 

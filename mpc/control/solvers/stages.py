@@ -218,6 +218,7 @@ class StageSolution:
         return np.vstack([self.states[1:], self.states[-1:]]), np.vstack([self.decisions[1:], self.decisions[-1:]])
 
 
+@dataclass(eq=False)
 class StageSolver:
     """An interior point on a problem in stages, built once for a horizon.
 
@@ -247,20 +248,18 @@ class StageSolver:
     not pay here: it makes fewer stages, but their Hessians dense.
     """
 
-    def __init__(
-        self,
-        problem: StageProblem,
-        n_steps: int,
-        method: StageMethod = "fatrop",
-        tolerance: float = 1e-4,
-        iterations: int = 300,
-    ) -> None:
-        ControlError.unless_known(method, get_args(StageMethod), "stage solver: method", "an interior point")
-        self.problem, self.n_steps, self.method = problem, n_steps, method
-        self._sizes = problem.state.numel(), problem.decision.numel(), problem.banded.numel()
-        self._solver = self._build(tolerance, iterations)
+    problem: StageProblem
+    n_steps: int
+    method: StageMethod = "fatrop"
+    tolerance: float = 1e-4
+    iterations: int = 300
 
-    def _build(self, tolerance: float, iterations: int) -> Any:
+    def __post_init__(self) -> None:
+        ControlError.unless_known(self.method, get_args(StageMethod), "stage solver: method", "an interior point")
+        self._sizes = self.problem.state.numel(), self.problem.decision.numel(), self.problem.banded.numel()
+        self._solver = self._build()
+
+    def _build(self) -> Any:
         (n, m, b), count, problem = self._sizes, self.n_steps, self.problem
         x = [ca.MX.sym(f"x_{k}", n) for k in range(count + 1)]
         u = [ca.MX.sym(f"u_{k}", m) for k in range(count)]
@@ -286,7 +285,7 @@ class StageSolver:
                "g": ca.vertcat(*rows)}  # fmt: skip
         options: dict[str, Any] = {"print_time": False, "expand": True, **_QUIET[self.method]}
         options |= {f"{self.method}.{name}": value for name, value in _NEAR.items()}
-        options |= {f"{self.method}.tol": tolerance, f"{self.method}.max_iter": iterations}
+        options |= {f"{self.method}.tol": self.tolerance, f"{self.method}.max_iter": self.iterations}
         if self.method == "fatrop":
             options |= {"structure_detection": "auto", "equality": equal}
         return ca.nlpsol("stages", self.method, nlp, options)

@@ -19,7 +19,6 @@ from mpc.control.solvers.solution import Solution, Solver
 from mpc.errors import ControlError
 from mpc.scenario.forecast import ErrorGrowth
 from thermal._types import BoolArray, FloatArray
-from thermal.errors import describe
 from thermal.model.modal import ModalModel
 from thermal.model.scheme import IMPLICIT_EULER, Scheme
 
@@ -70,9 +69,9 @@ class BackOff:
     scheme: Scheme = IMPLICIT_EULER
 
     def __post_init__(self) -> None:
-        if not (0.0 < self.violation <= 0.5 and self.recourse > 0.0):
-            found = f"{self.violation!r}, {self.recourse!r} s"
-            raise ControlError(describe("back-off", "a probability up to 0.5 and a positive time", found))
+        possible = 0.0 < self.violation <= 0.5 and self.recourse > 0.0
+        expected, found = "a probability up to 0.5 and a positive time", f"{self.violation!r}, {self.recourse!r} s"
+        ControlError.unless(possible, "back-off", expected, found)
 
     @property
     def quantile(self) -> float:
@@ -281,6 +280,7 @@ class _TreePredictor(Predictor):
         return Sensitivity(zone, electric, fuel, end)
 
 
+@dataclass(eq=False)
 class ScenarioSolver(Solver):
     """Least mean cost over a handful of scenarios that share their first blocks.
 
@@ -309,19 +309,18 @@ class ScenarioSolver(Solver):
     scenarios. Peaks are those of the mean power, which is less than the mean of peaks.
     """
 
-    def __init__(
-        self,
-        problem: ControlProblem,
-        draw: Callable[[HorizonData], Sequence[HorizonData]],
-        count: int = 5,
-        common: int = 1,
-        solver: Callable[[ControlProblem], Solver] = SequentialSolver,
-    ) -> None:
-        if count < 2 or not 1 <= common <= problem.shape[0]:
-            expected = f"2 scenarios or more, and 1 to {problem.shape[0]} common blocks"
-            raise ControlError(describe("scenario solver", expected, f"{count} and {common}"))
-        self.problem, self.draw, self._tree = problem, draw, _TreePredictor(problem.predictor, count, common)
-        self._solver = solver(replace(problem, predictor=self._tree, paths=self._tree.blocks))
+    problem: ControlProblem
+    draw: Callable[[HorizonData], Sequence[HorizonData]]
+    count: int = 5
+    common: int = 1
+    solver: Callable[[ControlProblem], Solver] = SequentialSolver
+
+    def __post_init__(self) -> None:
+        most, possible = self.problem.shape[0], self.count >= 2 and 1 <= self.common <= self.problem.shape[0]
+        expected, found = f"2 scenarios or more, and 1 to {most} common blocks", f"{self.count} and {self.common}"
+        ControlError.unless(possible, "scenario solver", expected, found)
+        self._tree = _TreePredictor(self.problem.predictor, self.count, self.common)
+        self._solver = self.solver(replace(self.problem, predictor=self._tree, paths=self._tree.blocks))
 
     @property
     def memory(self) -> FloatArray | None:
