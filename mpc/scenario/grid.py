@@ -11,7 +11,7 @@ from functools import cached_property
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
-from scipy.interpolate import PchipInterpolator
+from scipy.interpolate import PchipInterpolator, make_interp_spline
 
 from mpc.errors import ScenarioError
 from thermal._types import FloatArray
@@ -147,6 +147,58 @@ def index_seconds(stamps: pd.DatetimeIndex) -> NDArray[np.int64]:
     return np.asarray(stamps.as_unit("s").asi8, dtype=np.int64)
 
 
+def regular_steps(
+    index: pd.Index, where: str, error: type[ScenarioError], step: float = 0.0, longest: float = np.inf
+) -> float:
+    """Step of regular stamps with a time zone [s].
+
+    Parameters
+    ----------
+    index : Index
+        Stamps.
+    where : str
+        What they belong to, for the message.
+    error : type
+        Raised when they are no such stamps, fewer than two, or irregular.
+    step : float
+        What their step should be [s]; 0, the default, for any; where it is given one stamp will do.
+    longest : float
+        Longest step that is allowed, unless it is the given one [s].
+    """
+    if not isinstance(index, pd.DatetimeIndex) or index.tz is None or len(index) < 1 + (not step):
+        found = f"{len(index)} of {index.dtype}"
+        raise error(describe(where, "at least two stamps with a time zone", found))
+    gaps = np.diff(index_seconds(index)) if len(index) > 1 else np.array([int(step)])
+    uneven = (gaps != (step or gaps[0])) | (gaps <= 0) | (gaps > max(longest, step))
+    if uneven.any():
+        row, expected = (
+            int(np.argmax(uneven)),
+            "one step" + (f" of up to {longest:g} s" if np.isfinite(longest) else ""),
+        )
+        found, advice = f"{index[row + 1]} after {index[row]}", "fill the gap, and sort the stamps"
+        raise error(describe(where, expected, found, advice))
+    return float(gaps[0])
+
+
+def require_cover(grid: StepGrid, first: float, last: float, where: str, error: type[ScenarioError]) -> None:
+    """Refuse what does not cover a grid.
+
+    Parameters
+    ----------
+    grid : StepGrid
+        Steps.
+    first, last : float
+        What there is, seconds since 1970 [s].
+    where : str
+        Of what, for the message.
+    error : type
+        Raised when that is less than the grid.
+    """
+    begin, end = (pd.Timestamp(int(edge), unit="s", tz="UTC").tz_convert(grid.start.tz) for edge in (first, last))
+    covered = first <= grid.edges[0] and grid.edges[-1] <= last
+    error.unless(covered, where, f"{where} from {grid.start} to {grid.stamps[-1]}", f"{begin} to {end}")
+
+
 @dataclass(frozen=True)
 class Calendar:
     """Which days are working days.
@@ -259,13 +311,8 @@ def means_of_readings(times: FloatArray, values: FloatArray, edges: FloatArray) 
     ndarray, shape (n_steps,)
         Means [as given].
     """
-    width = np.diff(times)
-    total = np.concatenate([[0.0], np.cumsum(0.5 * (values[1:] + values[:-1]) * width)])
-    k = np.clip(np.searchsorted(times, edges, side="right") - 1, 0, len(width) - 1)
-    into = edges - times[k]
-    slope = np.diff(values)[k] / width[k]
-    integral = total[k] + values[k] * into + 0.5 * slope * into**2
-    return np.asarray(np.diff(integral) / np.diff(edges))
+    integral = make_interp_spline(times, values, k=1).antiderivative()
+    return np.asarray(np.diff(integral(edges)) / np.diff(edges))
 
 
 def means_of_means(source: FloatArray, values: FloatArray, edges: FloatArray) -> FloatArray:

@@ -11,7 +11,7 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from mpc.errors import ScenarioError
-from mpc.scenario.grid import Calendar, StepGrid, by_clock, index_seconds, means_of_steps
+from mpc.scenario.grid import Calendar, StepGrid, by_clock, index_seconds, means_of_steps, regular_steps, require_cover
 from thermal._types import FloatArray
 from thermal.errors import describe
 
@@ -165,17 +165,9 @@ class SeriesRate:
 
     def __post_init__(self) -> None:
         index = self.series.index
-        if self.stamped not in ("start", "end"):
-            raise ScenarioError(describe("series: stamped", "'start' or 'end'", repr(self.stamped)))
-        if not isinstance(index, pd.DatetimeIndex) or index.tz is None or len(index) < 2:
-            raise ScenarioError(
-                describe("series", "at least two stamps with a time zone", f"an index of {index.dtype}")
-            )
-        gaps = np.diff(index_seconds(index))
-        if (gaps != gaps[0]).any() or gaps[0] <= 0:
-            row = int(np.flatnonzero((gaps != gaps[0]) | (gaps <= 0))[0])
-            expected = f"a stamp {gaps[0]} s after {index[row]}"
-            raise ScenarioError(describe("series", expected, str(index[row + 1]), "fill gaps, and sort the stamps"))
+        possible = self.stamped in ("start", "end")
+        ScenarioError.unless(possible, "series: stamped", "'start' or 'end'", repr(self.stamped))
+        regular_steps(index, "series", ScenarioError)
         empty = self.series.isna().to_numpy()
         if empty.any():
             found = f"{empty.sum()} missing of {len(empty)}, first {index[int(np.argmax(empty))]}"
@@ -197,11 +189,7 @@ class SeriesRate:
         stamps = index_seconds(pd.DatetimeIndex(self.series.index))
         length = stamps[1] - stamps[0]
         edges = np.append(stamps, stamps[-1] + length) - (length if self.stamped == "end" else 0)
-        if grid.edges[0] < edges[0] or grid.edges[-1] > edges[-1]:
-            zone = grid.start.tz
-            first, last = (pd.Timestamp(int(e), unit="s", tz=zone) for e in (edges[0], edges[-1]))
-            found = f"{first} to {last}"
-            raise ScenarioError(describe("series", f"values from {grid.start} to {grid.stamps[-1]}", found))
+        require_cover(grid, edges[0], edges[-1], "series", ScenarioError)
         return means_of_steps(edges.astype(float), self.series.to_numpy(dtype=float), grid.edges.astype(float))
 
 
