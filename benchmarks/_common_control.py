@@ -15,7 +15,7 @@ import casadi as ca
 import numpy as np
 from scipy.linalg import expm
 
-from mpc.control.problem.stages import StageData, StageProblem
+from mpc.control.solvers.stages import StageData, StageProblem
 
 ZONES, STEPS, STEP, SEED = 10, 72, 300.0, 0
 HEAT_CAPACITY = 1006.0  # J/kg/K, of air

@@ -25,7 +25,7 @@ import numpy as np
 
 from mpc.control.controller.controller import MpcController
 from mpc.control.predictor.predictor import Rollout
-from mpc.control.problem.data import HorizonData
+from mpc.control.problem.horizon import HorizonData
 from mpc.control.problem.problem import ControlProblem
 from mpc.control.solvers.solution import Solution, Status
 from thermal.hvac._symbolic import hvac_function

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from _common_control import COMFORT_PRICE, STEP, STEPS, ZONES
 
-from mpc.control.problem.stages import StageData, StageProblem
+from mpc.control.solvers.stages import StageData, StageProblem
 
 QUIET = {"ipopt.print_level": 0, "ipopt.sb": "yes", "print_time": 0}
 

@@ -24,7 +24,7 @@ from _site import POLICIES, Site, Week, World
 
 from mpc.adapters.energyplus.building import energyplus_building
 from mpc.adapters.energyplus.plant import EnergyPlusPlant
-from mpc.baselines.reset import OutdoorReset
+from mpc.baselines.rules import OutdoorReset
 from mpc.environment.environment import ScenarioPlant
 from mpc.loop.plant import Controller
 from mpc.loop.run import FixedSetpoints

@@ -26,12 +26,11 @@ from _site import POLICIES, Site, Week, World
 from calibration import calibrate
 from calibration.diagnosis.diagnosis import diagnose
 from mpc.baselines.guideline36 import Guideline36
-from mpc.baselines.reset import OutdoorReset
-from mpc.baselines.schedule import day_schedule
+from mpc.baselines.rules import OutdoorReset, day_schedule
 from mpc.control.controller.action import ControllerSettings
 from mpc.control.controller.controller import MpcController
-from mpc.control.problem.back_off import Margin
 from mpc.control.problem.horizon import Horizon
+from mpc.control.solvers.uncertainty import Margin
 from mpc.environment.actions import SUPPLY_SETPOINTS
 from mpc.environment.environment import ScenarioPlant
 from mpc.loop.make import pilot_weather
@@ -41,7 +40,7 @@ from mpc.loop.reduced import ReducedBuilding
 from mpc.loop.run import FixedSetpoints
 from mpc.loop.simulated import SimulatedPlant
 from mpc.reports.diagnosis import write_diagnosis
-from mpc.scenario.forecaster import DAY_AHEAD_ERRORS, Forecaster
+from mpc.scenario.forecast import DAY_AHEAD_ERRORS, Forecaster
 from mpc.scenario.gains import InternalGains
 from mpc.scenario.grid import StepGrid
 from mpc.scenario.paper import paper_carbon, paper_tariff
@@ -111,7 +110,8 @@ def scenario_of(start: str, seed: int, days: float, gains: InternalGains | None 
     begin = pd.Timestamp(start)
     grid = StepGrid.between(start, (begin + pd.Timedelta(days=days)).isoformat(), STEP, office(size))
     weather = pilot_weather(seed, start, int(days) + 1.0)
-    return build_scenario(office(size), grid, weather, paper_tariff(), carbon=paper_carbon(), gains=gains, seed=seed)
+    everybody = build_scenario(office(size), grid, weather, paper_tariff(), carbon=paper_carbon(), gains=gains)
+    return everybody.redrawn(seed)
 
 
 @cache

@@ -37,7 +37,7 @@ from simulator_speed import use_one_thread
 
 from mpc.loop.make import pilot_weather
 from mpc.loop.noise import SensorNoise
-from mpc.scenario.forecaster import DAY_AHEAD_ERRORS
+from mpc.scenario.forecast import DAY_AHEAD_ERRORS
 from mpc.studies.run import prediction_errors, run_controller
 from mpc.studies.study import Study, make_study
 from thermal import Building

@@ -36,7 +36,7 @@ from _energyplus_offices import CONTROL_DAYS, HORIZON, OFFICES, Office, prepared
 from _table import markdown, write
 
 from mpc.adapters.energyplus.plant import EnergyPlusPlant
-from mpc.baselines.reset import OutdoorReset
+from mpc.baselines.rules import OutdoorReset
 from mpc.errors import EnergyPlusError
 from mpc.kpi.kpis import measure_kpis
 from mpc.loop.run import run_closed_loop

@@ -32,17 +32,15 @@ from _do_mpc_peer import SETTINGS, DoMpc
 from _table import markdown, publish, write
 from simulator_speed import pilot
 
-from mpc.control.controller.rules import ResetRule
+from mpc.control.controller.action import ResetRule
 from mpc.control.predictor.predictor import Predictor
 from mpc.control.problem.channels import supply_channels
-from mpc.control.problem.data import HorizonData, PeakData
-from mpc.control.problem.horizon import Horizon
+from mpc.control.problem.horizon import Horizon, HorizonData, PeakData
 from mpc.control.problem.problem import ControlProblem
-from mpc.control.problem.stages import StageData
 from mpc.control.solvers.ipopt import IpoptSolver
 from mpc.control.solvers.sequential import SequentialSolver
 from mpc.control.solvers.solution import Status
-from mpc.control.solvers.stage_solver import StageMethod, StageSolution, StageSolver
+from mpc.control.solvers.stages import StageData, StageMethod, StageSolution, StageSolver
 from mpc.scenario.scenario import zone_areas
 from thermal import SymbolicModel, build_network, reduced_model
 from thermal.hvac._air_handler import AirHandler

@@ -2,9 +2,47 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
+from thermal.errors import describe, nearest
+
 
 class MpcError(Exception):
     """Base of every error that `mpc` raises on purpose."""
+
+    @classmethod
+    def unless(cls, valid: object, where: str, expected: str, found: object, advice: str = "") -> None:
+        """Refuse what is not valid, in the words of `thermal.errors.describe`.
+
+        Parameters
+        ----------
+        valid : bool
+            Whether all is well.
+        where, expected : str
+            What is checked, and what would have been right.
+        found : object
+            What stood there, in words.
+        advice : str
+            What to do about it; empty when that is plain.
+        """
+        if not valid:
+            raise cls(describe(where, expected, str(found), advice))
+
+    @classmethod
+    def unless_known(cls, value: object, options: Collection[object], where: str, expected: str) -> None:
+        """Refuse an option that is not known, and name the nearest one.
+
+        Parameters
+        ----------
+        value : object
+            What was asked for.
+        options : collection
+            What there is.
+        where, expected : str
+            What is checked, and what would have been right.
+        """
+        if value not in options:
+            raise cls(describe(where, expected, repr(value), nearest(value, options)))
 
 
 class ScenarioError(MpcError):

@@ -9,18 +9,211 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from mpc.baselines.requests import HysteresisRequests, SuppressedRequests
-from mpc.baselines.trim_respond import TrimRespond, TrimRespondLoop
-from mpc.control.controller.reading import SitePoints
+from mpc.control.controller.reading import SitePoints, values_of
 from mpc.errors import ControlError
 from mpc.loop.actuators import Actuator
 from mpc.loop.plant import Measurements
 from mpc.scenario.forecast import Forecast
-from thermal._types import FloatArray
+from thermal._types import FloatArray, IntArray
 from thermal.case.points import OUTDOOR_TEMPERATURE, ZONE_TEMPERATURE
 from thermal.errors import describe
 
+
+@dataclass(frozen=True)
+class TrimRespond:
+    """Parameters of trim and respond under the guideline's names (Table 5.1.14.3).
+
+    Every `time_step` the setpoint changes by `trim`; with more than `ignored` requests it changes back by `respond` for
+    each one above, by no more than `most_response`.
+
+    Parameters
+    ----------
+    initial : float
+        SP0, held while the device is off and for `delay` after its start [K].
+    lowest, highest : float
+        SPmin and SPmax [K].
+    trim, respond, most_response : float
+        SPtrim, SPres and SPres-max [K]; the latter two have the sign that `trim` has not.
+    delay, time_step : float
+        Td and T [s].
+    ignored : int
+        I, requests that are left unanswered.
+
+    Raises
+    ------
+    ControlError
+        When a number is out of its range or a sign is wrong.
+    """
+
+    initial: float
+    lowest: float
+    highest: float
+    trim: float
+    respond: float
+    most_response: float
+    delay: float = 600.0
+    time_step: float = 120.0
+    ignored: int = 2
+
+    def __post_init__(self) -> None:
+        if not self.lowest <= self.initial <= self.highest:
+            found = f"{self.lowest:g}, {self.initial:g} and {self.highest:g} K"
+            raise ControlError(describe("trim and respond", "lowest <= initial <= highest", found))
+        if not (self.trim * self.respond < 0.0 and self.respond * self.most_response > 0.0):
+            found = f"{self.trim:g}, {self.respond:g} and {self.most_response:g} K"
+            raise ControlError(describe("trim and respond", "a response against the trim", found))
+        if not (self.delay >= 0.0 and self.time_step > 0.0 and self.ignored >= 0):
+            found = f"{self.delay:g} s, {self.time_step:g} s and {self.ignored}"
+            raise ControlError(describe("trim and respond", "a delay, a positive time step, no negative count", found))
+
+    def change(self, requests: int) -> float:
+        """Give the change of the setpoint in a time step [K].
+
+        Parameters
+        ----------
+        requests : int
+            R.
+
+        Examples
+        --------
+        >>> air = TrimRespond(291.15, 285.15, 291.15, 0.1, -0.2, -0.6)
+        >>> [round(air.change(r), 1) for r in (0, 2, 3, 4, 9)]
+        [0.1, 0.1, -0.1, -0.3, -0.5]
+        """
+        answered = max(requests - self.ignored, 0) * self.respond
+        limit = self.most_response
+        return self.trim + (max(answered, limit) if limit < 0.0 else min(answered, limit))
+
+
+class TrimRespondLoop:
+    """Trim and respond as it runs.
+
+    Parameters
+    ----------
+    parameters : TrimRespond
+        Its parameters.
+    """
+
+    def __init__(self, parameters: TrimRespond) -> None:
+        self.parameters = parameters
+        #: Setpoint now [K].
+        self.setpoint = parameters.initial
+        self._running = 0.0
+
+    def advance(self, on: bool, requests: int, seconds: float) -> float:
+        """Pass some time, with requests that stay as they are meanwhile.
+
+        Parameters
+        ----------
+        on : bool
+            Whether the device is proven on.
+        requests : int
+            R.
+        seconds : float
+            How long [s].
+
+        Returns
+        -------
+        float
+            Setpoint [K].
+        """
+        if not on:
+            self.setpoint, self._running = self.parameters.initial, 0.0
+            return self.setpoint
+        ticks = self._ticks(self._running + seconds) - self._ticks(self._running)
+        self._running += seconds
+        for _ in range(ticks):
+            moved = self.setpoint + self.parameters.change(requests)
+            self.setpoint = min(max(moved, self.parameters.lowest), self.parameters.highest)
+        return self.setpoint
+
+    def _ticks(self, running: float) -> int:
+        """Count the time steps that have come since the start: the first when the delay is over."""
+        over = running - self.parameters.delay
+        return 0 if over < 0.0 else 1 + int(over / self.parameters.time_step + 1e-9)
+
+
+#: Share of a loop or valve above which it asks once, and below which it stops asking [-] (5.6.8.1.c, 5.6.8.3.c).
+ASKING, CONTENT = 0.95, 0.85
+
+#: Suppression after a change of a setpoint (5.1.20): time per kelvin [s/K], and the longest [s].
+SUPPRESSION, LONGEST_SUPPRESSION = 540.0, 1800.0
+
+
+class HysteresisRequests:
+    """One request each from above 95 % until below 85 %; two and three for distances that last.
+
+    Parameters
+    ----------
+    count : int
+        Number of loops or valves.
+    two, three : float
+        Distances from the setpoint that are worth two and three requests [K].
+    lasting : float
+        How long such a distance must last [s].
+    """
+
+    def __init__(self, count: int, two: float, three: float, lasting: float) -> None:
+        self.two, self.three, self.lasting = two, three, lasting
+        self._asking = np.zeros(count, dtype=bool)
+        self._since = np.zeros((2, count))
+
+    def count(self, share: FloatArray, distance: FloatArray, seconds: float) -> IntArray:
+        """Count the requests of each, shape (n,); what is not known asks for nothing.
+
+        Parameters
+        ----------
+        share : ndarray, shape (n,)
+            Output of the loop, or position of the valve [-].
+        distance : ndarray, shape (n,)
+            From the setpoint, positive where it is missed [K].
+        seconds : float
+            Time over which they were measured [s].
+        """
+        self._asking = np.where(share > ASKING, True, self._asking & (share >= CONTENT))
+        beyond = np.stack([distance > self.two, distance > self.three])
+        self._since = np.where(beyond, self._since + seconds, 0.0)
+        lasts = self._since >= self.lasting
+        return np.where(lasts[1], 3, np.where(lasts[0], 2, self._asking.astype(int))).astype(np.int64)
+
+
+class SuppressedRequests:
+    """Keeps distances quiet for a while after a setpoint has changed: 9 minutes a kelvin, up to half an hour.
+
+    Parameters
+    ----------
+    count : int
+        Number of setpoints.
+    """
+
+    def __init__(self, count: int) -> None:
+        self._before = np.full(count, np.nan)
+        self._quiet = np.zeros(count)
+
+    def distance(self, distance: FloatArray, setpoint: FloatArray, seconds: float) -> FloatArray:
+        """Give the distances that count, shape (n,) [K]: zero where a setpoint has just changed.
+
+        Parameters
+        ----------
+        distance : ndarray, shape (n,)
+            From the setpoint [K].
+        setpoint : ndarray, shape (n,)
+            Now [K].
+        seconds : float
+            Time since the last call [s].
+        """
+        change = np.nan_to_num(np.abs(setpoint - self._before))
+        fresh = np.minimum(SUPPRESSION * change, LONGEST_SUPPRESSION)
+        self._quiet = np.where(change > 0.0, fresh, np.maximum(self._quiet - seconds, 0.0))
+        self._before = setpoint.copy()
+        return np.where(self._quiet > 0.0, 0.0, distance)
+
+
 _AIR, _WATER = "supply_air_temperature_setpoint", "supply_water_temperature_setpoint"
+_OF_TERMINALS = (
+    ZONE_TEMPERATURE, "zone_air_heating_temperature_setpoint", "zone_air_cooling_temperature_setpoint",
+    "discharge_air_temperature_sensor", "heating_water_valve_percentage_command",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -106,9 +299,8 @@ class Guideline36:
         actuators: Sequence[Actuator],
         settings: Guideline36Settings | None = None,
     ) -> None:
-        if len(serving) != len(points.terminals):
-            expected = f"an air handler for each of {len(points.terminals)} terminals"
-            raise ControlError(describe("Guideline 36", expected, f"{len(serving)}"))
+        expected = f"an air handler for each of {len(points.terminals)} terminals"
+        ControlError.unless(len(serving) == len(points.terminals), "Guideline 36", expected, f"{len(serving)}")
         self.points, self.settings = points, settings or Guideline36Settings()
         self._serving, n = np.asarray(serving, dtype=int), len(points.terminals)
         self._range = {a.name: (a.lowest, a.highest) for a in actuators}
@@ -134,12 +326,12 @@ class Guideline36:
         self._last = measurements.stamp
         cooling, heating = self.requests(measurements, seconds)
         chosen: dict[str, float] = {}
-        outdoor = self._values(measurements, [self.points.weather_station], OUTDOOR_TEMPERATURE)[0]
+        outdoor = values_of(measurements, [self.points.weather_station], OUTDOOR_TEMPERATURE)[0]
         for k, name in enumerate(self.points.air_handlers):
-            on = not self._values(measurements, [name], "supply_fan_power_sensor")[0] <= 0.0
+            on = not values_of(measurements, [name], "supply_fan_power_sensor")[0] <= 0.0
             warmest = self._air[k].advance(on, int(cooling[self._serving == k].sum()), seconds)
             chosen[f"{name}/{_AIR}"] = self._by_outdoor(warmest, float(outdoor))
-        on = not self._values(measurements, [self.points.boiler], "pump_power_sensor")[0] <= 0.0
+        on = not values_of(measurements, [self.points.boiler], "pump_power_sensor")[0] <= 0.0
         chosen[f"{self.points.boiler}/{_WATER}"] = self._water.advance(on, int(heating.sum()), seconds)
         held = {name: self._range[name] for name in chosen if name in self._range}
         return {name: float(np.clip(chosen[name], *ends)) for name, ends in held.items()}
@@ -155,16 +347,10 @@ class Guideline36:
             Time since the last call [s].
         """
         s, terminals = self.settings, self.points.terminals
-        zone, low, high, discharge, valve = (
-            self._values(measurements, terminals, point)
-            for point in (
-                ZONE_TEMPERATURE, "zone_air_heating_temperature_setpoint", "zone_air_cooling_temperature_setpoint",
-                "discharge_air_temperature_sensor", "heating_water_valve_percentage_command",
-            )
-        )  # fmt: skip
+        zone, low, high, discharge, valve = (values_of(measurements, terminals, point) for point in _OF_TERMINALS)
         excess = self._suppressed.distance(zone - high, high, seconds)
         cooling = self._cooling.count((zone - high) / s.throttling_range, excess, seconds)
-        supply = self._values(measurements, self.points.air_handlers, "supply_air_temperature_setpoint")[self._serving]
+        supply = values_of(measurements, self.points.air_handlers, "supply_air_temperature_setpoint")[self._serving]
         call = np.clip((low - zone) / s.throttling_range, 0.0, 1.0)
         wanted = supply + np.minimum(2.0 * call, 1.0) * np.maximum(low + s.discharge_rise - supply, 0.0)
         heating = self._heating.count(valve, np.where(call > 0.0, wanted - discharge, 0.0), seconds)
@@ -175,7 +361,3 @@ class Guideline36:
         low, high = self.settings.outdoor
         share = float(np.clip((outdoor - low) / (high - low), 0.0, 1.0)) if np.isfinite(outdoor) else 0.0
         return warmest + share * (self.settings.coldest_air - warmest)
-
-    def _values(self, measurements: Mapping[str, float], entities: Sequence[str], point: str) -> FloatArray:
-        names = (f"{entity}/{point}" for entity in entities)
-        return np.array([measurements[n] if n in measurements else np.nan for n in names], dtype=float)

@@ -152,7 +152,7 @@ def _study(
     seed: int,
 ) -> Study:
     from mpc.loop.noise import SensorNoise
-    from mpc.scenario.forecaster import DAY_AHEAD_ERRORS
+    from mpc.scenario.forecast import DAY_AHEAD_ERRORS
     from mpc.scenario.paper import paper_tariff
     from mpc.scenario.urdb import read_urdb
     from mpc.scenario.weather_files import weather_of_case

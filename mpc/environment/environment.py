@@ -19,7 +19,7 @@ from mpc.errors import MpcError
 from mpc.kpi.kpis import measure_kpis
 from mpc.loop.history import RecentSteps
 from mpc.loop.plant import Measurements, Plant
-from mpc.scenario.forecaster import Forecaster
+from mpc.scenario.forecast import Forecaster
 from mpc.scenario.scenario import Scenario
 from thermal._types import FloatArray
 from thermal.errors import describe, nearest

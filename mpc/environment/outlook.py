@@ -12,8 +12,7 @@ import numpy as np
 
 from mpc.environment.features import OBSERVED_RANGES, Feature, scaling
 from mpc.errors import MpcError
-from mpc.scenario.forecast import Forecast, column_unit
-from mpc.scenario.forecaster import Forecaster
+from mpc.scenario.forecast import Forecast, Forecaster, column_unit
 from thermal._types import FloatArray
 from thermal.errors import describe
 

@@ -1,20 +1,21 @@
-"""Key performance indicators of a closed loop, under BOPTEST's names and formulas."""
+"""Key performance indicators of a closed loop: BOPTEST's names and formulas, and those that users register."""
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-from typing import Any
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, field
+from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+import pandas as pd
 
 from mpc.errors import MpcError
-from mpc.kpi.integrals import excess
-from mpc.kpi.record import PlantRecord
+from mpc.kpi.record import PlantRecord, excess
 from mpc.scenario.rates import KILOWATT_HOUR
 from mpc.scenario.scenario import Scenario
 from mpc.scenario.tariff import window_means
-from thermal._types import FloatArray
+from thermal._types import FloatArray, IntArray
 from thermal.errors import describe
 
 #: Length of the mean whose highest value is a peak [s], as in BOPTEST.
@@ -52,7 +53,208 @@ class ZoneComfort:
     occupied_hours_outside: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
+class MeasuredRun:
+    """A run as indicators see it: what the plant did, and the scenario in which it did so.
+
+    Parameters
+    ----------
+    record : PlantRecord
+        Of whole steps of the scenario, in one or more steps of the plant each.
+    scenario : Scenario
+        Bands, prices, emissions and people.
+    first_step : int
+        Step of the scenario in which the run began.
+    co2_limit : float
+        Upper limit of carbon dioxide as a share of volume, such as 1e-3 [-]; needed where the plant simulates it.
+    district_price, district_carbon : float
+        Price [currency/kWh] and emissions [kg/kWh] of district heating; needed where the plant has it.
+    control_step : float
+        Time between actions [s]; default the scenario's step.
+
+    Raises
+    ------
+    MpcError
+        When the record does not fit the scenario, or a limit or price is needed.
+    """
+
+    record: PlantRecord
+    scenario: Scenario
+    first_step: int = 0
+    co2_limit: float | None = None
+    district_price: float | None = None
+    district_carbon: float | None = None
+    control_step: float | None = None
+
+    def __post_init__(self) -> None:
+        record, grid, counted = self.record, self.scenario.grid, bool(self.scenario.carbon_kind)
+        each, steps = grid.step / record.step, record.n_steps * record.step / grid.step
+        if not (each >= 1 and float(each).is_integer() and float(steps).is_integer()):
+            found = f"{record.n_steps} steps of {record.step:g} s"
+            raise MpcError(describe("record", f"whole steps of {grid.step:g} s of the scenario", found))
+        if self.first_step < 0 or self.first_step + steps > grid.n_steps:
+            found = f"{self.first_step} to {self.first_step + steps:g}"
+            raise MpcError(describe("record", f"steps within the scenario's {grid.n_steps}", found))
+        if record.zone_temperature.shape[1] != len(self.scenario.zones):
+            found = f"{record.zone_temperature.shape[1]}"
+            raise MpcError(describe("record: zone_temperature", f"{len(self.scenario.zones)} zones", found))
+        lacking = self.district_price is None or (counted and self.district_carbon is None)
+        if record.district_heating is not None and lacking:
+            raise MpcError(describe("district heating", "its price, and its emissions where they count", "none"))
+        if record.co2 is not None and (self.co2_limit is None or not 0 < self.co2_limit < 1):
+            raise MpcError(describe("co2_limit", "a share of volume, such as 1e-3", repr(self.co2_limit)))
+
+    @cached_property
+    def rows(self) -> IntArray:
+        """Row of the scenario that each step of the plant lies in, shape (n,)."""
+        return self.first_step + np.arange(self.record.n_steps) // int(self.scenario.grid.step / self.record.step)
+
+    @cached_property
+    def zones(self) -> tuple[ZoneComfort, ...]:
+        """Comfort of each zone."""
+        start, end = self.record.zone_temperature[:-1], self.record.zone_temperature[1:]
+        lower, upper = self.scenario.lower[self.rows], self.scenario.upper[self.rows]
+        occupied, hours = self.scenario.occupancy[self.rows] > 0.0, self.record.step / _HOUR
+        sides = [(lower - start, lower - end), (start - upper, end - upper)]
+        means, shares = zip(*(excess(*ends) for ends in sides), strict=True)
+        columns = [mean.sum(0) * hours for mean in means]
+        columns += [(mean * occupied).sum(0) * hours for mean in means]
+        columns += [np.maximum(np.maximum(*ends).max(0), 0.0) for ends in sides]
+        columns += [occupied.sum(0) * hours, sum((share * occupied).sum(0) * hours for share in shares)]
+        rows = zip(self.scenario.zones, np.array(columns).T.tolist(), strict=True)
+        return tuple(ZoneComfort(zone, *row) for zone, row in rows)
+
+    def energy(self, electricity: FloatArray | float, gas: FloatArray | float, district: float | None) -> float:
+        """Energy over the run, each carrier times a factor per kilowatt-hour, per floor area [unit of the factor/m2].
+
+        Parameters
+        ----------
+        electricity, gas : float or ndarray, shape (n,)
+            Factor [1/kWh], the same always or of each step.
+        district : float or None
+            That of district heating [1/kWh]; counted where the plant has it.
+        """
+        powers = (self.record.electricity, self.record.gas, self.record.district_heating)
+        factors = (np.asarray(factor, dtype=float) for factor in (electricity, gas, district))
+        terms = zip(powers, factors, strict=True)
+        total = sum(float(np.sum(power * factor)) for power, factor in terms if power is not None)
+        return total * self.record.step / KILOWATT_HOUR / self.scenario.floor_area
+
+    def peak(self, power: FloatArray | None) -> float | None:
+        """Highest mean over a quarter of an hour, per floor area [kW/m2]; None for a plant without.
+
+        Parameters
+        ----------
+        power : ndarray, shape (n,), or None
+            Means over the steps [W].
+        """
+        if power is None:
+            return None
+        starts = self.scenario.grid.edges[self.first_step] + np.arange(self.record.n_steps) * self.record.step
+        means, _ = window_means(power, starts, self.record.step, PEAK_WINDOW)
+        return float(means.max() / 1000.0) / self.scenario.floor_area
+
+
+class Indicator(NamedTuple):
+    """An indicator as it is registered.
+
+    Parameters
+    ----------
+    function : callable
+        Called as ``function(run)`` with a `MeasuredRun`; gives a number, or None for what a plant does not have.
+    unit : str
+        Of the number; ``currency`` stands for that of the run.
+    description : str
+        What it says, for reports.
+    """
+
+    function: Callable[[MeasuredRun], float | None]
+    unit: str
+    description: str
+
+
+def _comfort(run: MeasuredRun) -> float:
+    return float(np.mean([zone.below + zone.above for zone in run.zones]))
+
+
+def _air(run: MeasuredRun) -> float | None:
+    co2, limit = run.record.co2, run.co2_limit
+    if co2 is None or limit is None:
+        return None
+    mean, _ = excess(co2[:-1] - limit, co2[1:] - limit)
+    return float(mean.sum(0).mean() * run.record.step / _HOUR * 1e6)
+
+
+def _cost(run: MeasuredRun) -> float:
+    prices = run.scenario.electricity_price[run.rows], run.scenario.gas_price[run.rows]
+    return run.energy(*prices, run.district_price)
+
+
+def _emissions(run: MeasuredRun) -> float | None:
+    carbons = run.scenario.electricity_carbon[run.rows], run.scenario.gas_carbon[run.rows]
+    return run.energy(*carbons, run.district_carbon) if run.scenario.carbon_kind else None
+
+
+def _time_ratio(run: MeasuredRun) -> float | None:
+    seconds, between = run.record.controller_seconds, run.control_step
+    if seconds is None or not len(seconds):
+        return None
+    return float(np.mean(seconds)) / (run.scenario.grid.step if between is None else between)
+
+
+def _demand(run: MeasuredRun) -> float:
+    power, step = run.record.electricity, run.record.step
+    return sum(c.cost(power, step, run.first_step) for c in run.scenario.demand) / run.scenario.floor_area
+
+
+#: Every indicator by name: BOPTEST's, demand charges, then those of users.
+KPIS: dict[str, Indicator] = {
+    "tdis_tot": Indicator(_comfort, "K h", "thermal discomfort, mean of the zones"),
+    "idis_tot": Indicator(_air, "ppm h", "discomfort of indoor air, mean of the zones"),
+    "ener_tot": Indicator(lambda run: run.energy(1.0, 1.0, 1.0), "kWh/m2", "energy"),
+    "cost_tot": Indicator(_cost, "currency/m2", "cost of energy, demand charges apart"),
+    "emis_tot": Indicator(_emissions, "kg/m2", "emissions"),
+    "pele_tot": Indicator(lambda run: run.peak(run.record.electricity), "kW/m2", "peak of electricity"),
+    "pgas_tot": Indicator(lambda run: run.peak(run.record.gas), "kW/m2", "peak of gas"),
+    "pdih_tot": Indicator(lambda run: run.peak(run.record.district_heating), "kW/m2", "peak of district heating"),
+    "time_rat": Indicator(_time_ratio, "-", "time that the controller took over the time between actions"),
+    "demand_cost": Indicator(_demand, "currency/m2", "demand charges"),
+}
+
+
+def register_kpi(name: str, function: Callable[[MeasuredRun], float | None], unit: str, description: str) -> None:
+    """Have an indicator measured with every run: `measure_kpis`, comparisons and reports show it beside BOPTEST's.
+
+    Parameters
+    ----------
+    name : str
+        A valid name that no other indicator has; the same function may be registered again.
+    function : callable
+        Called as ``function(run)`` with a `MeasuredRun`; gives a number, or None for what a plant does not have.
+    unit : str
+        Of the number; ``currency`` stands for that of the run.
+    description : str
+        What it says, for reports.
+
+    Raises
+    ------
+    MpcError
+        When the name is taken or none.
+
+    Examples
+    --------
+    >>> def warmest(run):
+    ...     return float(run.record.zone_temperature.max())
+    >>> register_kpi("warmest_zone", warmest, "K", "highest temperature of any zone")
+    >>> KPIS.pop("warmest_zone").unit
+    'K'
+    """
+    taken = name in Kpis.__dataclass_fields__ or (name in KPIS and KPIS[name].function is not function)
+    MpcError.unless(name.isidentifier() and not taken, "indicator", f"a name beside {', '.join(KPIS)}", repr(name))
+    KPIS[name] = Indicator(function, unit, description)
+
+
+@dataclass(frozen=True, repr=False)
 class Kpis:
     """Indicators of a run, per floor area of the building where BOPTEST has them so.
 
@@ -83,6 +285,8 @@ class Kpis:
         Length of the run [h].
     zones : tuple of ZoneComfort
         One a zone.
+    own : mapping of str to float or None
+        What users have registered by `register_kpi` [its unit].
     """
 
     tdis_tot: float
@@ -100,12 +304,29 @@ class Kpis:
     floor_area: float
     hours: float
     zones: tuple[ZoneComfort, ...]
+    own: Mapping[str, float | None] = field(default_factory=dict)
+
+    @property
+    def values(self) -> dict[str, float | None]:
+        """Every indicator by name: BOPTEST's, then those of users [its unit]."""
+        return {name: getattr(self, name) for name in KPIS if name in vars(self)} | dict(self.own)
 
     def to_dict(self) -> dict[str, Any]:
         """Give the indicators as plain types, for JSON; zones by name."""
         plain = asdict(self)
         plain["zones"] = {zone.pop("zone"): zone for zone in plain["zones"]}
-        return plain
+        return plain | dict(plain.pop("own"))
+
+    def to_frame(self) -> pd.DataFrame:
+        """Table of the indicators by name, with unit and description."""
+        rows = [(value, KPIS[name].unit.replace("currency", self.currency), KPIS[name].description)
+                for name, value in self.values.items()]  # fmt: skip
+        index = pd.Index(list(self.values), name="indicator")
+        return pd.DataFrame(rows, columns=["value", "unit", "description"], index=index)
+
+    def __repr__(self) -> str:
+        known = ", ".join(f"{name}={value:.4g}" for name, value in self.values.items() if value is not None)
+        return f"Kpis({self.hours:g} h, {known})"
 
 
 def measure_kpis(
@@ -150,86 +371,10 @@ def measure_kpis(
     MpcError
         When the record does not fit the scenario, or a limit or price is needed.
     """
-    rows = _rows(record, scenario, first_step)
-    comfort = _comfort(record, scenario, rows)
-    powers = {"electricity": record.electricity, "gas": record.gas, "district heating": record.district_heating}
-    area = scenario.floor_area
-    peaks = [None if power is None else _peak(power, record, scenario, first_step) / area for power in powers.values()]
-    prices = (scenario.electricity_price[rows], scenario.gas_price[rows], district_price)
-    carbons = (scenario.electricity_carbon[rows], scenario.gas_carbon[rows], district_carbon)
-    counted = bool(scenario.carbon_kind)
-    if record.district_heating is not None and (district_price is None or (counted and district_carbon is None)):
-        raise MpcError(describe("district heating", "its price, and its emissions where they count", "none"))
-    energy = sum(float(power.sum()) for power in powers.values() if power is not None) * record.step / KILOWATT_HOUR
-    seconds = record.controller_seconds
-    between = scenario.grid.step if control_step is None else control_step
+    run = MeasuredRun(record, scenario, first_step, co2_limit, district_price, district_carbon, control_step)
+    values: dict[str, Any] = {name: indicator.function(run) for name, indicator in KPIS.items()}
+    own = {name: values.pop(name) for name in tuple(values) if name not in Kpis.__dataclass_fields__}
     return Kpis(
-        tdis_tot=float(np.mean([zone.below + zone.above for zone in comfort])),
-        idis_tot=None if record.co2 is None else _air_discomfort(record, co2_limit),
-        ener_tot=energy / area,
-        cost_tot=_weighed(powers.values(), prices, record.step) / area,
-        emis_tot=_weighed(powers.values(), carbons, record.step) / area if counted else None,
-        pele_tot=peaks[0],
-        pgas_tot=peaks[1],
-        pdih_tot=peaks[2],
-        time_rat=None if seconds is None or not len(seconds) else float(np.mean(seconds)) / between,
-        demand_cost=sum(charge.cost(record.electricity, record.step, first_step) for charge in scenario.demand) / area,
-        currency=scenario.currency,
-        carbon_kind=scenario.carbon_kind,
-        floor_area=area,
-        hours=record.n_steps * record.step / _HOUR,
-        zones=comfort,
-    )
-
-
-def _rows(record: PlantRecord, scenario: Scenario, first_step: int) -> NDArray[np.int64]:
-    """Row of the scenario that each step of the plant lies in."""
-    each = scenario.grid.step / record.step
-    steps = record.n_steps / each
-    if not (each >= 1 and float(each).is_integer() and float(steps).is_integer()):
-        expected = f"whole steps of {scenario.grid.step:g} s of the scenario"
-        raise MpcError(describe("record", expected, f"{record.n_steps} steps of {record.step:g} s"))
-    if first_step < 0 or first_step + steps > scenario.grid.n_steps:
-        expected = f"steps within the scenario's {scenario.grid.n_steps}"
-        raise MpcError(describe("record", expected, f"{first_step} to {first_step + steps:g}"))
-    if record.zone_temperature.shape[1] != len(scenario.zones):
-        found = f"{record.zone_temperature.shape[1]}"
-        raise MpcError(describe("record: zone_temperature", f"{len(scenario.zones)} zones", found))
-    return first_step + np.arange(record.n_steps) // int(each)
-
-
-def _comfort(record: PlantRecord, scenario: Scenario, rows: NDArray[np.int64]) -> tuple[ZoneComfort, ...]:
-    start, end = record.zone_temperature[:-1], record.zone_temperature[1:]
-    lower, upper, occupied = scenario.lower[rows], scenario.upper[rows], scenario.occupancy[rows] > 0.0
-    sides = [(lower - start, lower - end), (start - upper, end - upper)]
-    hours = record.step / _HOUR
-    columns: list[FloatArray] = []
-    outside = np.zeros(len(scenario.zones))
-    for first, last in sides:
-        mean, share = excess(first, last)
-        columns.append(np.stack([mean.sum(0), (mean * occupied).sum(0)]) * hours)
-        columns.append(np.maximum(np.maximum(first, last).max(0), 0.0)[None])
-        outside += (share * occupied).sum(0) * hours
-    (below, below_in), (least,), (above, above_in), (most,) = columns
-    time_in = occupied.sum(0) * hours
-    table = np.stack([below, above, below_in, above_in, least, most, time_in, outside], axis=1)
-    return tuple(ZoneComfort(zone, *map(float, row)) for zone, row in zip(scenario.zones, table, strict=True))
-
-
-def _air_discomfort(record: PlantRecord, limit: float | None) -> float:
-    if limit is None or record.co2 is None or not 0 < limit < 1:
-        raise MpcError(describe("co2_limit", "a share of volume, such as 1e-3", repr(limit)))
-    mean, _ = excess(record.co2[:-1] - limit, record.co2[1:] - limit)
-    return float(mean.sum(0).mean() * record.step / _HOUR * 1e6)
-
-
-def _weighed(powers: Any, factors: Any, step: float) -> float:
-    """Sum of energies times their price or emission, powers that are not there left out."""
-    terms = (float(np.sum(power * factor)) for power, factor in zip(powers, factors, strict=True) if power is not None)
-    return sum(terms) * step / KILOWATT_HOUR
-
-
-def _peak(power: FloatArray, record: PlantRecord, scenario: Scenario, first_step: int) -> float:
-    """Highest mean over a quarter of an hour [kW]."""
-    starts = scenario.grid.edges[first_step] + np.arange(record.n_steps) * record.step
-    return float(window_means(power, starts, record.step, PEAK_WINDOW)[0].max() / 1000.0)
+        **values, currency=scenario.currency, carbon_kind=scenario.carbon_kind, floor_area=scenario.floor_area,
+        hours=record.n_steps * record.step / _HOUR, zones=run.zones, own=own,
+    )  # fmt: skip

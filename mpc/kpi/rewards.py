@@ -10,11 +10,11 @@ from numpy.typing import ArrayLike
 from scipy.special import expit
 
 from mpc.errors import MpcError
-from mpc.kpi.integrals import excess
+from mpc.kpi.record import excess
 from mpc.scenario.rates import KILOWATT_HOUR
 from mpc.scenario.scenario import Scenario
 from thermal._types import FloatArray
-from thermal.errors import describe, nearest
+from thermal.errors import describe
 
 _HOUR = 3600.0  # s
 
@@ -93,10 +93,7 @@ class PaperReward:
 
     def __post_init__(self) -> None:
         terms = ("productivity", "setpoint_deviation")
-        if self.comfort not in terms:
-            raise MpcError(
-                describe("reward: comfort", "a known term", repr(self.comfort), nearest(self.comfort, terms))
-            )
+        MpcError.unless_known(self.comfort, terms, "reward: comfort", "a known term")
         weights = (self.comfort_weight, self.cost_weight, self.carbon_weight)
         if min(weights) < 0 or not sum(weights) > 0:
             raise MpcError(describe("reward: weights", "numbers of 0 or more, not all 0", repr(weights)))

@@ -15,14 +15,13 @@ from mpc.loop.noise import SensorNoise
 from mpc.loop.reduced import reduced_building
 from mpc.loop.run import FixedSetpoints
 from mpc.loop.simulated import SimulatedPlant
-from mpc.scenario.carbon import CarbonIntensity
-from mpc.scenario.forecaster import Forecaster
+from mpc.scenario.forecast import Forecaster
 from mpc.scenario.gains import InternalGains
 from mpc.scenario.grid import StepGrid
 from mpc.scenario.occupancy import Occupancy
 from mpc.scenario.paper import paper_carbon, paper_tariff
 from mpc.scenario.scenario import build_scenario
-from mpc.scenario.tariff import Tariff
+from mpc.scenario.tariff import CarbonIntensity, Tariff
 from mpc.scenario.weather import Weather
 from thermal.case.building import Building
 from thermal.case.case import Case
@@ -122,8 +121,8 @@ def simulated_plant(
     grid = StepGrid.between(start, end, step_seconds, building)
     scenario = build_scenario(
         building, grid, weather, tariff or paper_tariff(), carbon=carbon or paper_carbon(), occupancy=occupancy,
-        gains=gains, seed=seed,
-    )  # fmt: skip
+        gains=gains,
+    ).redrawn(seed)  # fmt: skip
     built: BuildingModel
     extras: tuple[Extension, ...] = (*effects, RadiantGains()) if scenario.heat.radiates else effects
     if model == "reduced":

@@ -21,8 +21,7 @@ from mpc.loop.operation import Operation, scheduled_operation, shared_rows
 from mpc.loop.plant import Measurements, need_running
 from mpc.loop.sensors import Sensors, plant_devices
 from mpc.loop.signals import EffectSignals
-from mpc.scenario.forecast import Forecast
-from mpc.scenario.forecaster import Forecaster
+from mpc.scenario.forecast import Forecast, Forecaster
 from mpc.scenario.scenario import Scenario
 from thermal._types import FloatArray
 from thermal.case.case import Case

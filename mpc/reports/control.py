@@ -119,6 +119,8 @@ def _frame(run: ControlRun, verdict: str, title: str) -> dict[str, Any]:
         (f"{significant(k.tdis_tot, 2)} K h", "outside of the comfort band, mean zone"),
         (f"{1e3 * (k.pele_tot or 0.0):.1f} W/m²", "highest quarter of an hour of electricity"),
     ]
+    own = k.to_frame().loc[[*k.own]].dropna(subset="value")
+    cards += [(f"{significant(value)} {unit}", words) for value, unit, words in own.itertuples(index=False)]
     if run.decisions:
         cards.append((f"{planned} of {len(run.decisions)}", "actions from an optimal plan"))
     area = f"{significant(k.floor_area)} m²"

@@ -1,4 +1,4 @@
-"""The clock of a closed loop: regular steps in the building's time zone, and its calendar."""
+"""The clock of a closed loop: regular steps in the building's time zone, its calendar, and means from other clocks."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from functools import cached_property
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
+from scipy.interpolate import PchipInterpolator, make_interp_spline
 
 from mpc.errors import ScenarioError
 from thermal._types import FloatArray
@@ -82,9 +83,8 @@ class StepGrid:
         """
         first, last = (local_timestamp(time, building) for time in (start, end))
         count = (last - first).total_seconds() / step if step > 0 else 0.0
-        if count < 1 or not count.is_integer():
-            expected = f"a whole number of steps of {step:g} s from start to end"
-            raise ScenarioError(describe("grid", expected, f"{first} to {last}"))
+        expected = f"a whole number of steps of {step:g} s from start to end"
+        ScenarioError.unless(count >= 1 and count.is_integer(), "grid", expected, f"{first} to {last}")
         return cls(first, step, int(count))
 
     @cached_property
@@ -147,6 +147,58 @@ def index_seconds(stamps: pd.DatetimeIndex) -> NDArray[np.int64]:
     return np.asarray(stamps.as_unit("s").asi8, dtype=np.int64)
 
 
+def regular_steps(
+    index: pd.Index, where: str, error: type[ScenarioError], step: float = 0.0, longest: float = np.inf
+) -> float:
+    """Step of regular stamps with a time zone [s].
+
+    Parameters
+    ----------
+    index : Index
+        Stamps.
+    where : str
+        What they belong to, for the message.
+    error : type
+        Raised when they are no such stamps, fewer than two, or irregular.
+    step : float
+        What their step should be [s]; 0, the default, for any; where it is given one stamp will do.
+    longest : float
+        Longest step that is allowed, unless it is the given one [s].
+    """
+    if not isinstance(index, pd.DatetimeIndex) or index.tz is None or len(index) < 1 + (not step):
+        found = f"{len(index)} of {index.dtype}"
+        raise error(describe(where, "at least two stamps with a time zone", found))
+    gaps = np.diff(index_seconds(index)) if len(index) > 1 else np.array([int(step)])
+    uneven = (gaps != (step or gaps[0])) | (gaps <= 0) | (gaps > max(longest, step))
+    if uneven.any():
+        row, expected = (
+            int(np.argmax(uneven)),
+            "one step" + (f" of up to {longest:g} s" if np.isfinite(longest) else ""),
+        )
+        found, advice = f"{index[row + 1]} after {index[row]}", "fill the gap, and sort the stamps"
+        raise error(describe(where, expected, found, advice))
+    return float(gaps[0])
+
+
+def require_cover(grid: StepGrid, first: float, last: float, where: str, error: type[ScenarioError]) -> None:
+    """Refuse what does not cover a grid.
+
+    Parameters
+    ----------
+    grid : StepGrid
+        Steps.
+    first, last : float
+        What there is, seconds since 1970 [s].
+    where : str
+        Of what, for the message.
+    error : type
+        Raised when that is less than the grid.
+    """
+    begin, end = (pd.Timestamp(int(edge), unit="s", tz="UTC").tz_convert(grid.start.tz) for edge in (first, last))
+    covered = first <= grid.edges[0] and grid.edges[-1] <= last
+    error.unless(covered, where, f"{where} from {grid.start} to {grid.stamps[-1]}", f"{begin} to {end}")
+
+
 @dataclass(frozen=True)
 class Calendar:
     """Which days are working days.
@@ -201,3 +253,117 @@ def local_hours(times: pd.DatetimeIndex) -> FloatArray:
         Local.
     """
     return np.asarray(times.hour + times.minute / 60.0 + times.second / 3600.0, dtype=float)
+
+
+def by_clock(table: FloatArray, calendar: Calendar, grid: StepGrid) -> FloatArray:
+    """Look a table of the local clock up at the pieces of a grid, shape (n_steps * per_step,).
+
+    Parameters
+    ----------
+    table : ndarray, shape (3, 12, 24)
+        A value a kind of day, month and local hour [any]; axes may have length 1 where they make no difference.
+    calendar : Calendar
+        Which days are holidays.
+    grid : StepGrid
+        Steps in the building's time zone.
+    """
+    times, whole = grid.middles, np.broadcast_to(table, (3, 12, 24))
+    return np.asarray(whole[calendar.kinds_on(times), np.asarray(times.month) - 1, np.asarray(times.hour)])
+
+
+def means_of_steps(source: FloatArray, values: FloatArray, edges: FloatArray) -> FloatArray:
+    """Average over steps what is constant over other intervals, exactly.
+
+    Parameters
+    ----------
+    source : ndarray, shape (n_interval + 1,)
+        Edges of the intervals [s].
+    values : ndarray, shape (n_interval,) or (n_interval, m)
+        Over each of them [any].
+    edges : ndarray, shape (n_steps + 1,)
+        Edges of the steps [s], within those of the intervals.
+
+    Returns
+    -------
+    ndarray, shape (n_steps,) or (n_steps, m)
+        Means [as given].
+    """
+    total = np.concatenate([np.zeros_like(values[:1]), np.cumsum((values.T * np.diff(source)).T, axis=0)])
+    k = np.clip(np.searchsorted(source, edges, side="right") - 1, 0, len(values) - 1)
+    integral = total[k] + (values[k].T * (edges - source[k])).T
+    return np.asarray((np.diff(integral, axis=0).T / np.diff(edges)).T)
+
+
+def means_of_readings(times: FloatArray, values: FloatArray, edges: FloatArray) -> FloatArray:
+    """Average straight lines between readings over steps, exactly.
+
+    Parameters
+    ----------
+    times : ndarray, shape (n_reading,)
+        When they were taken [s]; rising.
+    values : ndarray, shape (n_reading,)
+        What they were [any].
+    edges : ndarray, shape (n_steps + 1,)
+        Edges of the steps [s], within the times.
+
+    Returns
+    -------
+    ndarray, shape (n_steps,)
+        Means [as given].
+    """
+    integral = make_interp_spline(times, values, k=1).antiderivative()
+    return np.asarray(np.diff(integral(edges)) / np.diff(edges))
+
+
+def means_of_means(source: FloatArray, values: FloatArray, edges: FloatArray) -> FloatArray:
+    """Average over steps what is known as means over other intervals, keeping those means.
+
+    The integral of the values is known at the edges of their intervals. Between them it is a monotone cubic (Fritsch
+    and Carlson 1980, doi:10.1137/0717021), whose derivative is continuous, and not negative where the values are not.
+
+    Parameters
+    ----------
+    source : ndarray, shape (n_interval + 1,)
+        Edges of the intervals [s].
+    values : ndarray, shape (n_interval,)
+        Means over them [any].
+    edges : ndarray, shape (n_steps + 1,)
+        Edges of the steps [s], within those of the intervals.
+
+    Returns
+    -------
+    ndarray, shape (n_steps,)
+        Means [as given]; where steps and intervals are the same, the values themselves.
+    """
+    start = np.searchsorted(source, edges[0])
+    same = source[start : start + len(edges)]
+    if len(same) == len(edges) and (same == edges).all():
+        return np.asarray(values[start : start + len(edges) - 1])
+    integral = np.concatenate([[0.0], np.cumsum(values * np.diff(source))])
+    return np.asarray(np.diff(PchipInterpolator(source, integral)(edges)) / np.diff(edges))
+
+
+def means_by_shape(source: FloatArray, values: FloatArray, pieces: FloatArray, shape: FloatArray) -> FloatArray:
+    """Spread means over intervals to their pieces in proportion to a shape, keeping the means.
+
+    Parameters
+    ----------
+    source : ndarray, shape (n_interval + 1,)
+        Edges of the intervals [s].
+    values : ndarray, shape (n_interval,)
+        Means over them [any].
+    pieces : ndarray, shape (n_piece + 1,)
+        Edges of equal pieces [s], each within one interval; together they cover the intervals from first to last.
+    shape : ndarray, shape (n_piece,)
+        Not negative [-]; where it is 0 throughout an interval, the value is spread evenly.
+
+    Returns
+    -------
+    ndarray, shape (n_piece,)
+        Means over the pieces [as given].
+    """
+    owner = np.searchsorted(source, 0.5 * (pieces[1:] + pieces[:-1])) - 1
+    count = np.bincount(owner, minlength=len(values))
+    mean = np.bincount(owner, shape, minlength=len(values)) / np.maximum(count, 1)
+    even = mean[owner] <= 0.0
+    return np.asarray(values[owner] * np.where(even, 1.0, shape / np.where(even, 1.0, mean[owner])))

@@ -1,19 +1,20 @@
-"""Who is in: schedules, and people who come and go at random."""
+"""Who is in and when: schedules, people who come and go at random, and the comfort bands of occupied hours."""
 
 from __future__ import annotations
 
 import zlib
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import date
-from typing import Literal, Protocol
+from typing import Literal
 
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
 from mpc.errors import ScenarioError
-from mpc.scenario.grid import RESOLUTION, WEEKDAY, Calendar, StepGrid, index_seconds, local_hours
+from mpc.scenario.grid import RESOLUTION, WEEKDAY, Calendar, StepGrid, by_clock, index_seconds, local_hours
 from thermal._types import FloatArray
 from thermal.errors import describe
 
@@ -31,8 +32,33 @@ OFFICE_AREA_PER_PERSON = 18.58
 _STREAM = 11  # of random numbers of a seed
 
 
-class Occupancy(Protocol):
-    """People in the zones over time."""
+@dataclass(frozen=True, eq=False)
+class Occupancy(ABC):
+    """People in the zones over time.
+
+    Parameters
+    ----------
+    assigned : float or mapping of str to float
+        People assigned to each zone, or to each of the zones named (others have none) [-]; default one a zone.
+    calendar : Calendar
+        Which days are holidays; default none.
+
+    Raises
+    ------
+    ScenarioError
+        When a number of people is negative or not finite.
+    """
+
+    assigned: float | Mapping[str, float] = 1.0
+    calendar: Calendar = field(default_factory=Calendar, kw_only=True)
+
+    def __post_init__(self) -> None:
+        if not all(np.isfinite(count) and count >= 0 for count in self._counts):
+            raise ScenarioError(describe("assigned", "people of 0 or more", repr(self.assigned)))
+
+    @property
+    def _counts(self) -> list[float]:
+        return [*self.assigned.values()] if isinstance(self.assigned, Mapping) else [self.assigned]
 
     def people(self, zones: Sequence[str]) -> FloatArray:
         """People assigned to each zone, shape (n_zone,) [-].
@@ -42,8 +68,10 @@ class Occupancy(Protocol):
         zones : sequence of str
             Names.
         """
-        ...
+        each = self.assigned if isinstance(self.assigned, Mapping) else dict.fromkeys(zones, self.assigned)
+        return np.array([float(each.get(zone, 0.0)) for zone in zones])
 
+    @abstractmethod
     def expected(self, grid: StepGrid, zones: Sequence[str]) -> FloatArray:
         """Mean number of people expected in each zone over each step, shape (n_steps, n_zone) [-].
 
@@ -54,10 +82,11 @@ class Occupancy(Protocol):
         zones : sequence of str
             Names.
         """
-        ...
 
     def draw(self, grid: StepGrid, zones: Sequence[str], seed: int) -> FloatArray:
         """Mean number of people in each zone over each step, as it came out, shape (n_steps, n_zone) [-].
+
+        What is `expected`, unless a class draws at random.
 
         Parameters
         ----------
@@ -68,11 +97,11 @@ class Occupancy(Protocol):
         seed : int
             Same seed, same people at the same times, whatever grid or zones are asked for; 0 or more.
         """
-        ...
+        return self.expected(grid, zones)
 
 
 @dataclass(frozen=True, eq=False)
-class ScheduledOccupancy:
+class ScheduledOccupancy(Occupancy):
     """People who come and go by the clock.
 
     Parameters
@@ -91,26 +120,14 @@ class ScheduledOccupancy:
         When the table has another shape, or a number is out of range.
     """
 
-    assigned: float | Mapping[str, float]
     presence: ArrayLike = OFFICE_PRESENCE
-    calendar: Calendar = field(default_factory=Calendar)
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         table = np.asarray(self.presence, dtype=float)
         if table.shape != (3, 24) or not ((table >= 0) & (table <= 1)).all():
             expected = "3 rows (weekday, Saturday, Sunday) of 24 shares from 0 to 1"
             raise ScenarioError(describe("presence", expected, f"shape {table.shape}"))
-        _check_assigned(self.assigned)
-
-    def people(self, zones: Sequence[str]) -> FloatArray:
-        """People assigned to each zone, shape (n_zone,) [-].
-
-        Parameters
-        ----------
-        zones : sequence of str
-            Names.
-        """
-        return _assigned(self.assigned, zones)
 
     def expected(self, grid: StepGrid, zones: Sequence[str]) -> FloatArray:
         """Mean number of people expected in each zone over each step, shape (n_steps, n_zone) [-].
@@ -122,28 +139,12 @@ class ScheduledOccupancy:
         zones : sequence of str
             Names.
         """
-        times = grid.middles
-        table = np.asarray(self.presence, dtype=float)
-        share = grid.mean(table[self.calendar.kinds_on(times), np.asarray(times.hour)])
-        return np.outer(share, self.people(zones))
-
-    def draw(self, grid: StepGrid, zones: Sequence[str], seed: int) -> FloatArray:
-        """Repeat what is `expected`: nothing is random.
-
-        Parameters
-        ----------
-        grid : StepGrid
-            Steps in the building's time zone.
-        zones : sequence of str
-            Names.
-        seed : int
-            Without effect.
-        """
-        return self.expected(grid, zones)
+        table = np.asarray(self.presence, dtype=float)[:, None, :]
+        return np.outer(grid.mean(by_clock(table, self.calendar, grid)), self.people(zones))
 
 
 @dataclass(frozen=True, eq=False)
-class RandomOccupancy:
+class RandomOccupancy(Occupancy):
     """People who each arrive once and depart once on a working day, at random times of two windows of the local clock.
 
     ``exponential`` is the law of the paper's simulator in continuous time: from the window's opening a person arrives,
@@ -171,35 +172,22 @@ class RandomOccupancy:
         When windows are not in order within a day, or a number of people is not whole.
     """
 
-    assigned: float | Mapping[str, float] = 1.0
     arrival: tuple[float, float] = (3.0, 12.0)
     departure: tuple[float, float] = (13.0, 23.0)
     law: Literal["exponential", "uniform"] = "exponential"
-    calendar: Calendar = field(default_factory=Calendar)
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         hours = np.array([0.0, *self.arrival, *self.departure, 24.0])
         off = np.abs(hours * 3600.0 / RESOLUTION - np.round(hours * 3600.0 / RESOLUTION)) > 1e-6
-        ordered = hours[1] < hours[2] <= hours[3] < hours[4] and hours[0] <= hours[1] and hours[4] <= hours[5]
+        ordered = (np.diff(hours) >= 0.0).all() and hours[1] < hours[2] and hours[3] < hours[4]
         if off.any() or not ordered:
             found = f"arrival {self.arrival}, departure {self.departure}"
             raise ScenarioError(describe("windows", "rising multiples of 5 minutes from 0 to 24 h", found))
         if self.law not in ("exponential", "uniform"):
             raise ScenarioError(describe("law", "'exponential' or 'uniform'", repr(self.law)))
-        _check_assigned(self.assigned)
-        counts = self.assigned.values() if isinstance(self.assigned, Mapping) else [self.assigned]
-        if any(not float(count).is_integer() for count in counts):
+        if not all(float(count).is_integer() for count in self._counts):
             raise ScenarioError(describe("assigned", "whole numbers of people", repr(self.assigned)))
-
-    def people(self, zones: Sequence[str]) -> FloatArray:
-        """People assigned to each zone, shape (n_zone,) [-].
-
-        Parameters
-        ----------
-        zones : sequence of str
-            Names.
-        """
-        return _assigned(self.assigned, zones)
 
     def chance(self, hours: ArrayLike) -> FloatArray:
         """Chance that a person is in at an hour of a working day [-].
@@ -255,8 +243,7 @@ class RandomOccupancy:
         ScenarioError
             When the seed is negative.
         """
-        if seed < 0:
-            raise ScenarioError(describe("seed", "0 or more", repr(seed)))
+        ScenarioError.unless(seed >= 0, "seed", "0 or more", repr(seed))
         days = [d for d, kind in zip(grid.days, self.calendar.kind(grid.days), strict=True) if kind == WEEKDAY]
         count = np.zeros((grid.n_steps, len(zones)))
         for k, (zone, people) in enumerate(zip(zones, self.people(zones), strict=True)):
@@ -302,13 +289,68 @@ def _presence(stays: FloatArray, grid: StepGrid) -> FloatArray:
     return np.where(np.abs(mean) < 1e-9, 0.0, mean)  # what rounding leaves of an empty room
 
 
-def _check_assigned(assigned: float | Mapping[str, float]) -> None:
-    counts = assigned.values() if isinstance(assigned, Mapping) else [assigned]
-    if any(not (np.isfinite(count) and count >= 0) for count in counts):
-        raise ScenarioError(describe("assigned", "people of 0 or more", repr(assigned)))
+@dataclass(frozen=True)
+class ComfortBand:
+    """A band in occupied hours and a wider one outside of them, by the local clock.
 
+    Parameters
+    ----------
+    occupied, unoccupied : tuple of float
+        Lower and upper temperature [K]. Defaults are those of BOPTEST's multi-zone office, 21 to 24 and 15 to 30 degC
+        (Blum et al. 2021, doi:10.1080/19401493.2021.1986574).
+    weekday, saturday, sunday : tuple of float or None
+        Start and end of the occupied hours, local [h], multiples of 5 minutes; None is a day without. A holiday is
+        like a Sunday. Defaults are weekdays from 6 to 19.
+    calendar : Calendar
+        Which days are holidays; default none.
 
-def _assigned(assigned: float | Mapping[str, float], zones: Sequence[str]) -> FloatArray:
-    if not isinstance(assigned, Mapping):
-        return np.full(len(zones), float(assigned))
-    return np.array([float(assigned.get(zone, 0.0)) for zone in zones])
+    Raises
+    ------
+    ScenarioError
+        When a band is empty or hours are out of order.
+    """
+
+    occupied: tuple[float, float] = (294.15, 297.15)
+    unoccupied: tuple[float, float] = (288.15, 303.15)
+    weekday: tuple[float, float] | None = (6.0, 19.0)
+    saturday: tuple[float, float] | None = None
+    sunday: tuple[float, float] | None = None
+    calendar: Calendar = field(default_factory=Calendar)
+
+    def __post_init__(self) -> None:
+        for name in ("occupied", "unoccupied"):
+            lower, upper = getattr(self, name)
+            if not 223.15 <= lower < upper <= 373.15:
+                found = f"{lower:g} to {upper:g}"
+                raise ScenarioError(describe(f"comfort: {name}", "a lower and an upper temperature in K", found))
+        for name in ("weekday", "saturday", "sunday"):
+            hours = getattr(self, name)
+            if hours is not None and not 0.0 <= hours[0] < hours[1] <= 24.0:
+                raise ScenarioError(describe(f"comfort: {name}", "rising hours from 0 to 24", repr(hours)))
+
+    def occupied_share(self, grid: StepGrid) -> FloatArray:
+        """Share of each step that lies in occupied hours, shape (n_steps,) [-].
+
+        Parameters
+        ----------
+        grid : StepGrid
+            Steps in the building's time zone.
+        """
+        of_kind = np.array([hours or (0.0, 0.0) for hours in (self.weekday, self.saturday, self.sunday)])
+        hour, (first, last) = local_hours(grid.middles), of_kind[self.calendar.kinds_on(grid.middles)].T
+        inside = ((hour >= first) & (hour < last)).astype(float)
+        return grid.mean(inside)
+
+    def on(self, grid: StepGrid) -> tuple[FloatArray, FloatArray]:
+        """Lower and upper edge over each step, shape (n_steps,) each [K].
+
+        A step that is partly occupied has the occupied band.
+
+        Parameters
+        ----------
+        grid : StepGrid
+            Steps in the building's time zone.
+        """
+        occupied = self.occupied_share(grid) > 0.0
+        lower, upper = (np.where(occupied, self.occupied[side], self.unoccupied[side]).astype(float) for side in (0, 1))
+        return lower, upper

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from mpc.scenario.carbon import CarbonIntensity
 from mpc.scenario.grid import Calendar
-from mpc.scenario.rates import ConstantRate, HourlyRate, MonthlyRate
-from mpc.scenario.tariff import Tariff
+from mpc.scenario.rates import ConstantRate, HourlyRate, monthly_rate
+from mpc.scenario.tariff import CarbonIntensity, Tariff
 
 # google/sbsim, smart_control/reward: PG&E's time of use for commerce [USD/kWh], EIA's gas price for California in 2020
 # [USD/kcf], carbon of the grid at the pilot [kg/MWh]; its 1000 cubic feet are 293.07107 kWh and emit 53.12 kg.
@@ -31,7 +30,7 @@ def paper_tariff(calendar: Calendar | None = None) -> Tariff:
         Holidays; default none.
     """
     days = calendar or Calendar()
-    gas = MonthlyRate(tuple(price / _GAS_ENERGY for price in _GAS_BY_MONTH))
+    gas = monthly_rate([price / _GAS_ENERGY for price in _GAS_BY_MONTH])
     return Tariff(HourlyRate(_WEEKDAY, _WEEKEND, days), gas, name="PG&E as in google/sbsim")
 
 

@@ -11,7 +11,7 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from mpc.errors import ScenarioError
-from mpc.scenario.grid import WEEKDAY, Calendar, StepGrid, index_seconds
+from mpc.scenario.grid import Calendar, StepGrid, by_clock, index_seconds, means_of_steps, regular_steps, require_cover
 from thermal._types import FloatArray
 from thermal.errors import describe
 
@@ -50,8 +50,7 @@ class ConstantRate:
     value: float
 
     def __post_init__(self) -> None:
-        if not np.isfinite(self.value):
-            raise ScenarioError(describe("rate", "a finite number per kWh", repr(self.value)))
+        ScenarioError.unless(np.isfinite(self.value), "rate", "a finite number per kWh", repr(self.value))
 
     def on(self, grid: StepGrid) -> FloatArray:
         """Average over each step of a grid, shape (n_steps,) [per kWh].
@@ -113,24 +112,8 @@ class HourlyRate:
         grid : StepGrid
             Steps in the building's time zone.
         """
-        return grid.mean(by_month_and_hour(np.asarray(self.weekday), np.asarray(self.weekend), self.calendar, grid))
-
-
-def by_month_and_hour(weekday: FloatArray, weekend: FloatArray, calendar: Calendar, grid: StepGrid) -> FloatArray:
-    """Look tables of months and hours up at the pieces of a grid, shape (n_steps * per_step,).
-
-    Parameters
-    ----------
-    weekday, weekend : ndarray, shape (12, 24)
-        What they hold [any].
-    calendar : Calendar
-        Which days are holidays.
-    grid : StepGrid
-        Steps in the building's time zone.
-    """
-    times = grid.middles
-    month, hour = np.asarray(times.month) - 1, np.asarray(times.hour)
-    return np.asarray(np.where(calendar.kinds_on(times) == WEEKDAY, weekday[month, hour], weekend[month, hour]))
+        tables = np.stack([np.asarray(self.weekday), *[np.asarray(self.weekend)] * 2])
+        return grid.mean(by_clock(tables, self.calendar, grid))
 
 
 def _month_hours(values: ArrayLike, name: str) -> FloatArray:
@@ -141,9 +124,8 @@ def _month_hours(values: ArrayLike, name: str) -> FloatArray:
     return np.array(np.broadcast_to(table, (12, 24)))
 
 
-@dataclass(frozen=True, eq=False)
-class MonthlyRate:
-    """A rate that changes with the local month.
+def monthly_rate(values: Sequence[float]) -> HourlyRate:
+    """Rate that changes with the local month.
 
     Parameters
     ----------
@@ -155,22 +137,9 @@ class MonthlyRate:
     ScenarioError
         When there are not 12 finite numbers.
     """
-
-    values: Sequence[float]
-
-    def __post_init__(self) -> None:
-        if np.shape(self.values) != (12,) or not np.isfinite(self.values).all():
-            raise ScenarioError(describe("monthly rate", "12 finite numbers", repr(self.values)))
-
-    def on(self, grid: StepGrid) -> FloatArray:
-        """Average over each step of a grid, shape (n_steps,) [per kWh].
-
-        Parameters
-        ----------
-        grid : StepGrid
-            Steps in the building's time zone.
-        """
-        return grid.mean(np.asarray(self.values, dtype=float)[np.asarray(grid.middles.month) - 1])
+    if np.shape(values) != (12,) or not np.isfinite(values).all():
+        raise ScenarioError(describe("monthly rate", "12 finite numbers", repr(values)))
+    return HourlyRate(np.repeat(np.asarray(values, dtype=float)[:, None], 24, axis=1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -196,17 +165,9 @@ class SeriesRate:
 
     def __post_init__(self) -> None:
         index = self.series.index
-        if self.stamped not in ("start", "end"):
-            raise ScenarioError(describe("series: stamped", "'start' or 'end'", repr(self.stamped)))
-        if not isinstance(index, pd.DatetimeIndex) or index.tz is None or len(index) < 2:
-            raise ScenarioError(
-                describe("series", "at least two stamps with a time zone", f"an index of {index.dtype}")
-            )
-        gaps = np.diff(index_seconds(index))
-        if (gaps != gaps[0]).any() or gaps[0] <= 0:
-            row = int(np.flatnonzero((gaps != gaps[0]) | (gaps <= 0))[0])
-            expected = f"a stamp {gaps[0]} s after {index[row]}"
-            raise ScenarioError(describe("series", expected, str(index[row + 1]), "fill gaps, and sort the stamps"))
+        possible = self.stamped in ("start", "end")
+        ScenarioError.unless(possible, "series: stamped", "'start' or 'end'", repr(self.stamped))
+        regular_steps(index, "series", ScenarioError)
         empty = self.series.isna().to_numpy()
         if empty.any():
             found = f"{empty.sum()} missing of {len(empty)}, first {index[int(np.argmax(empty))]}"
@@ -228,13 +189,8 @@ class SeriesRate:
         stamps = index_seconds(pd.DatetimeIndex(self.series.index))
         length = stamps[1] - stamps[0]
         edges = np.append(stamps, stamps[-1] + length) - (length if self.stamped == "end" else 0)
-        if grid.edges[0] < edges[0] or grid.edges[-1] > edges[-1]:
-            zone = grid.start.tz
-            first, last = (pd.Timestamp(int(e), unit="s", tz=zone) for e in (edges[0], edges[-1]))
-            found = f"{first} to {last}"
-            raise ScenarioError(describe("series", f"values from {grid.start} to {grid.stamps[-1]}", found))
-        total = np.concatenate([[0.0], np.cumsum(self.series.to_numpy(dtype=float))]) * length
-        return np.asarray(np.diff(np.interp(grid.edges, edges, total)) / grid.step)
+        require_cover(grid, edges[0], edges[-1], "series", ScenarioError)
+        return means_of_steps(edges.astype(float), self.series.to_numpy(dtype=float), grid.edges.astype(float))
 
 
 def gas_price(value: float, unit: str) -> ConstantRate:
@@ -257,6 +213,5 @@ def gas_price(value: float, unit: str) -> ConstantRate:
     >>> round(gas_price(1.2, "therm").value, 4)
     0.0409
     """
-    if unit not in GAS_UNITS:
-        raise ScenarioError(describe("gas price", f"a price per {', '.join(GAS_UNITS)}", repr(unit)))
+    ScenarioError.unless(unit in GAS_UNITS, "gas price", f"a price per {', '.join(GAS_UNITS)}", repr(unit))
     return ConstantRate(value / GAS_UNITS[unit])

@@ -10,12 +10,11 @@ import numpy as np
 import pandas as pd
 
 from mpc.errors import ScenarioError
-from mpc.scenario.carbon import CarbonIntensity
-from mpc.scenario.comfort import ComfortBand
 from mpc.scenario.gains import InternalGains
 from mpc.scenario.grid import StepGrid
-from mpc.scenario.occupancy import OFFICE_AREA_PER_PERSON, Occupancy, ScheduledOccupancy
-from mpc.scenario.tariff import DemandBuckets, Tariff
+from mpc.scenario.occupancy import OFFICE_AREA_PER_PERSON, ComfortBand, Occupancy, ScheduledOccupancy
+from mpc.scenario.rates import ConstantRate
+from mpc.scenario.tariff import CarbonIntensity, DemandBuckets, Tariff
 from mpc.scenario.weather import Weather
 from thermal._types import FloatArray
 from thermal.case.building import Building, ZoneTable
@@ -24,12 +23,12 @@ from thermal.case.plan import zone_floor_areas
 from thermal.case.points import OUTDOOR_TEMPERATURE, ZONE_TEMPERATURE
 from thermal.case.quality import QualityReport
 from thermal.case.telemetry import Telemetry
-from thermal.errors import describe, nearest
+from thermal.errors import nearest
 
 OCCUPANCY_POINT = "occupancy_count_sensor"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Scenario:
     """What drives a closed loop, one row a step; made by `build_scenario`.
 
@@ -39,16 +38,12 @@ class Scenario:
         Which building, and so its zones, in order.
     grid : StepGrid
         Steps.
-    areas : ndarray, shape (n_zone,)
-        Floor areas [m2].
+    areas, assigned : ndarray, shape (n_zone,)
+        Floor areas [m2], and people that belong to the zones [-].
     weather : Weather
         Means over the steps.
     occupancy, expected_occupancy : ndarray, shape (n_steps, n_zone)
         People as they come, and as a forecast may expect them [-].
-    gains, expected_gains : ndarray, shape (n_steps, n_zone)
-        Sensible heat of people, light and equipment, into the zone [W]; `radiant_gains` is the part that radiates.
-    latent : ndarray, shape (n_steps, n_zone)
-        Latent heat of people [W].
     lower, upper : ndarray, shape (n_steps, n_zone)
         Edges of the comfort band [K].
     electricity_price, gas_price : ndarray, shape (n_steps,)
@@ -70,12 +65,10 @@ class Scenario:
     building: Building
     grid: StepGrid
     areas: FloatArray
+    assigned: FloatArray
     weather: Weather
     occupancy: FloatArray
     expected_occupancy: FloatArray
-    gains: FloatArray
-    expected_gains: FloatArray
-    latent: FloatArray
     lower: FloatArray
     upper: FloatArray
     electricity_price: FloatArray
@@ -96,14 +89,27 @@ class Scenario:
         seed : int
             Same seed, same people at the same times; 0 or more.
         """
-        drawn = self.people.draw(self.grid, self.zones, seed)
-        gains = self.heat.heat(drawn, self.people.people(self.zones), self.areas)
-        return replace(self, occupancy=drawn, gains=gains, latent=self.heat.moisture_heat(drawn))
+        return replace(self, occupancy=self.people.draw(self.grid, self.zones, seed))
+
+    @cached_property
+    def gains(self) -> FloatArray:
+        """Sensible heat of people, light and equipment into the zones, shape (n_steps, n_zone) [W]."""
+        return self.heat.heat(self.occupancy, self.assigned, self.areas)
+
+    @cached_property
+    def expected_gains(self) -> FloatArray:
+        """Gains of the people that may be expected, shape (n_steps, n_zone) [W]."""
+        return self.heat.heat(self.expected_occupancy, self.assigned, self.areas)
 
     @cached_property
     def radiant_gains(self) -> FloatArray:
-        """The part of the gains that radiates to the surfaces, shape (n_steps, n_zone) [W]."""
-        return self.heat.radiant_heat(self.occupancy, self.people.people(self.zones), self.areas)
+        """Part of the gains that radiates to the surfaces, shape (n_steps, n_zone) [W]."""
+        return self.heat.radiant_heat(self.occupancy, self.assigned, self.areas)
+
+    @property
+    def latent(self) -> FloatArray:
+        """Latent heat of people, shape (n_steps, n_zone) [W]."""
+        return self.heat.moisture_heat(self.occupancy)
 
     @property
     def zones(self) -> tuple[str, ...]:
@@ -120,6 +126,34 @@ class Scenario:
         """Floor area of all zones [m2]."""
         return float(self.areas.sum())
 
+    def to_frame(self, expected: bool = False) -> pd.DataFrame:
+        """Table of all that drives the loop, one row a step, columns and units as those of a `Forecast`.
+
+        Parameters
+        ----------
+        expected : bool
+            Whether people and gains are those that a forecast may expect, rather than those that come.
+        """
+        columns = {str(point): self.weather.frame[point].to_numpy(dtype=float) for point in self.weather.frame}
+        columns |= {
+            "electricity_price": self.electricity_price,
+            "gas_price": self.gas_price,
+            "electricity_carbon_intensity": self.electricity_carbon,
+            "gas_carbon_intensity": self.gas_carbon,
+        }
+        of_zones = {
+            OCCUPANCY_POINT: self.expected_occupancy if expected else self.occupancy,
+            "internal_gain": self.expected_gains if expected else self.gains,
+            "comfort_lower_temperature": self.lower,
+            "comfort_upper_temperature": self.upper,
+        }
+        for name, values in of_zones.items():
+            columns |= {f"{zone}/{name}": values[:, i] for i, zone in enumerate(self.zones)}
+        return pd.DataFrame(columns, index=self.grid.stamps)
+
+    def __repr__(self) -> str:
+        return f"Scenario({len(self.zones)} zones, {self.floor_area:g} m2, {self.grid!r})"
+
     def driving_case(self) -> Case:
         """Make a case whose telemetry is this scenario, so that effects of the catalogue find what drives them.
 
@@ -129,13 +163,12 @@ class Scenario:
             Columns of the weather station, people in the zones, and as zone temperatures the middle of the comfort
             band, which effects take for the usual temperature of the hour.
         """
-        station = self.building.weather_station
+        station, stamps = self.building.weather_station, self.grid.stamps
         columns = {f"{station}/{point}": self.weather.frame[point].to_numpy() for point in self.weather.frame}
         for k, zone in enumerate(self.zones):
             columns[f"{zone}/{OCCUPANCY_POINT}"] = self.occupancy[:, k]
             columns[f"{zone}/{ZONE_TEMPERATURE}"] = 0.5 * (self.lower[:, k] + self.upper[:, k])
-        telemetry = Telemetry.from_frame(pd.DataFrame(columns, index=self.grid.stamps), where="scenario")
-        stamps = self.grid.stamps
+        telemetry = Telemetry.from_frame(pd.DataFrame(columns, index=stamps), where="scenario")
         # Nothing was measured, so that nothing is to be judged: a flat line at night is no flaw here.
         judged = QualityReport(stamps[0], stamps[-1], self.grid.step, self.grid.n_steps, (), ())
         return Case(self.building, telemetry, judged=judged)
@@ -151,7 +184,6 @@ def build_scenario(
     occupancy: Occupancy | None = None,
     gains: InternalGains | None = None,
     comfort: ComfortBand | Mapping[str, ComfortBand] | None = None,
-    seed: int = 0,
 ) -> Scenario:
     """Put all that drives a closed loop on one grid of steps.
 
@@ -173,13 +205,11 @@ def build_scenario(
         Heat of people, light and equipment; default an office's.
     comfort : ComfortBand or mapping of str to ComfortBand
         Band of all zones, or of each; default BOPTEST's office band.
-    seed : int
-        Of the people's coming and going; 0 or more.
 
     Returns
     -------
     Scenario
-        One row a step.
+        One row a step; people come and go by seed 0, other people with `Scenario.redrawn`.
 
     Raises
     ------
@@ -190,32 +220,17 @@ def build_scenario(
     here = weather.on(grid)
     here.require([OUTDOOR_TEMPERATURE])
     people = occupancy or ScheduledOccupancy(dict(zip(zones, areas / OFFICE_AREA_PER_PERSON, strict=True)))
-    heat, assigned = gains or InternalGains(), people.people(zones)
-    drawn, expected = people.draw(grid, zones, seed), people.expected(grid, zones)
     bands = [_band(comfort, zone).on(grid) for zone in zones]
-    none = np.zeros(grid.n_steps)
+    emitted = carbon or CarbonIntensity(ConstantRate(0.0), "average", ConstantRate(0.0))
     return Scenario(
-        building=building,
-        grid=grid,
-        areas=areas,
-        weather=here,
-        occupancy=drawn,
-        expected_occupancy=expected,
-        gains=heat.heat(drawn, assigned, areas),
-        expected_gains=heat.heat(expected, assigned, areas),
-        latent=heat.moisture_heat(drawn),
-        lower=np.column_stack([band[0] for band in bands]),
-        upper=np.column_stack([band[1] for band in bands]),
-        electricity_price=tariff.electricity.on(grid),
-        gas_price=tariff.gas.on(grid),
-        electricity_carbon=none if carbon is None else carbon.electricity.on(grid),
-        gas_carbon=none if carbon is None else carbon.gas.on(grid),
-        demand=tuple(charge.on(grid) for charge in tariff.demand),
-        currency=tariff.currency,
-        carbon_kind="" if carbon is None else carbon.kind,
-        people=people,
-        heat=heat,
-    )
+        building, grid, areas, people.people(zones), here,
+        occupancy=people.draw(grid, zones, 0), expected_occupancy=people.expected(grid, zones),
+        lower=np.column_stack([band[0] for band in bands]), upper=np.column_stack([band[1] for band in bands]),
+        electricity_price=tariff.electricity.on(grid), gas_price=tariff.gas.on(grid),
+        electricity_carbon=emitted.electricity.on(grid), gas_carbon=emitted.gas.on(grid),
+        demand=tuple(charge.on(grid) for charge in tariff.demand), currency=tariff.currency,
+        carbon_kind=carbon.kind if carbon else "", people=people, heat=gains or InternalGains(),
+    )  # fmt: skip
 
 
 def zone_areas(building: Building) -> FloatArray:
@@ -235,6 +250,5 @@ def zone_areas(building: Building) -> FloatArray:
 def _band(comfort: ComfortBand | Mapping[str, ComfortBand] | None, zone: str) -> ComfortBand:
     if not isinstance(comfort, Mapping):
         return comfort or ComfortBand()
-    if zone not in comfort:
-        raise ScenarioError(describe("comfort", f"a band of zone {zone!r}", "none", nearest(zone, comfort)))
+    ScenarioError.unless(zone in comfort, "comfort", f"a band of zone {zone!r}", "none", nearest(zone, comfort))
     return comfort[zone]

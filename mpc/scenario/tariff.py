@@ -1,17 +1,17 @@
-"""What energy costs: energy prices, and charges for the highest demand of a month."""
+"""What energy costs and emits: prices, charges for the highest demand of a month, carbon."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from mpc.errors import ScenarioError
-from mpc.scenario.grid import Calendar, StepGrid
-from mpc.scenario.rates import Rate, by_month_and_hour
+from mpc.scenario.grid import Calendar, StepGrid, by_clock, means_of_steps
+from mpc.scenario.rates import ConstantRate, Rate
 from thermal._types import FloatArray, IntArray
 from thermal.errors import describe
 
@@ -40,13 +40,11 @@ def window_means(power: ArrayLike, starts: ArrayLike, step: float, window: float
     begin : ndarray, shape (n_window,)
         When each window begins [s].
     """
-    values, first = np.asarray(power, dtype=float), np.asarray(starts, dtype=float)
+    first = np.asarray(starts, dtype=float)
     edges = np.append(first, first[-1] + step)
     inner = np.arange(np.floor(edges[0] / window) + 1, np.ceil(edges[-1] / window)) * window
     bounds = np.concatenate([edges[:1], inner, edges[-1:]])
-    energy = np.concatenate([[0.0], np.cumsum(values) * step])
-    mean = np.diff(np.interp(bounds, edges, energy)) / np.diff(bounds)
-    return np.asarray(mean), bounds[:-1]
+    return means_of_steps(edges, np.asarray(power, dtype=float), bounds), bounds[:-1]
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,8 +164,7 @@ class DemandCharge:
         rates = np.asarray(self.rates, dtype=float)
         if rates.ndim != 1 or not len(rates) or not (np.isfinite(rates) & (rates >= 0)).all():
             raise ScenarioError(describe("demand charge: rates", "numbers of 0 or more", repr(self.rates)))
-        if self.window <= 0:
-            raise ScenarioError(describe("demand charge: window", "seconds above 0", repr(self.window)))
+        ScenarioError.unless(self.window > 0, "demand charge: window", "seconds above 0", repr(self.window))
         weekday = np.zeros((12, 24)) if self.weekday is None else np.asarray(self.weekday)
         weekend = weekday if self.weekend is None else np.asarray(self.weekend)
         for key, table in (("weekday", weekday), ("weekend", weekend)):
@@ -184,9 +181,9 @@ class DemandCharge:
         grid : StepGrid
             Steps in the building's time zone.
         """
-        period = by_month_and_hour(np.asarray(self.weekday), np.asarray(self.weekend), self.calendar, grid)
+        tables = np.stack([np.asarray(self.weekday), *[np.asarray(self.weekend)] * 2])
         first = grid.middles[:: grid.per_step]
-        number = np.asarray(period[:: grid.per_step], dtype=np.int64)
+        number = by_clock(tables, self.calendar, grid)[:: grid.per_step].astype(np.int64)
         keys = (np.asarray(first.year) * 12 + np.asarray(first.month) - 1) * len(self.rates) + number
         keys[number < 0] = -1
         known = np.unique(keys[keys >= 0])
@@ -226,3 +223,39 @@ class Tariff:
         """Give what a report says of the tariff, as plain types."""
         charges = [{"name": d.name, "rates": [float(r) for r in d.rates], "window": d.window} for d in self.demand]
         return {"name": self.name, "currency": self.currency, "demand_charges": charges}
+
+
+#: Carbon dioxide of natural gas by its upper heating value [kg/kWh]: 53.06 kg/mmBtu (40 CFR 98, table C-1).
+GAS_CARBON = 53.06 / 293.0711
+
+
+@dataclass(frozen=True, eq=False)
+class CarbonIntensity:
+    """Emissions of a kilowatt-hour of electricity and of gas.
+
+    Average intensity (all emissions of the grid over all generation) is what inventories count; marginal intensity
+    (of the plants that follow a change of demand) is what a shift of load changes. They may differ in sign of their
+    slope over a day, so that there is no default.
+
+    Parameters
+    ----------
+    electricity : Rate
+        Constant, by the local hour or a published series [kg/kWh].
+    kind : str
+        ``average`` or ``marginal``: which of the two `electricity` is.
+    gas : Rate
+        By the upper heating value [kg/kWh]; default `GAS_CARBON`, burnt on site.
+
+    Raises
+    ------
+    ScenarioError
+        When the kind is none of the two.
+    """
+
+    electricity: Rate
+    kind: Literal["average", "marginal"]
+    gas: Rate = field(default_factory=lambda: ConstantRate(GAS_CARBON))
+
+    def __post_init__(self) -> None:
+        if self.kind not in ("average", "marginal"):
+            raise ScenarioError(describe("carbon: kind", "'average' or 'marginal'", repr(self.kind)))

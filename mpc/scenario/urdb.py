@@ -121,12 +121,10 @@ def _prices(
         if len(tiers) > 1 and tier is None:
             found = f"{len(tiers)}, the first up to {tiers[0].get('max')} {unit}"
             raise ScenarioError(describe(at, "one tier", found, "choose one by `tier`"))
-        if tier is not None and tier < 0:
-            raise ScenarioError(describe("tier", "0 or more", repr(tier)))
+        ScenarioError.unless((tier or 0) >= 0, "tier", "0 or more", repr(tier))
         chosen = tiers[min(tier or 0, len(tiers) - 1)]
         named = chosen.get("unit") or given or unit
-        if named != unit:
-            raise ScenarioError(describe(f"{at}: unit", repr(unit), repr(named)))
+        ScenarioError.unless(named == unit, f"{at}: unit", repr(unit), repr(named))
         try:
             prices.append(float(chosen.get("rate") or 0.0) + float(chosen.get("adj") or 0.0))
         except (TypeError, ValueError) as error:

@@ -13,12 +13,18 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from mpc.errors import WeatherError
-from mpc.scenario.averages import means_by_shape, means_of_means, means_of_readings
-from mpc.scenario.grid import StepGrid, index_seconds
+from mpc.scenario.grid import (
+    StepGrid,
+    index_seconds,
+    means_by_shape,
+    means_of_means,
+    means_of_readings,
+    regular_steps,
+    require_cover,
+)
 from thermal._types import FloatArray
 from thermal.case.building import Location
-from thermal.case.points import OUTDOOR_TEMPERATURE, POINT_TYPES
-from thermal.errors import describe, nearest
+from thermal.case.points import OUTDOOR_TEMPERATURE
 from thermal.inputs.sun import Sun, sun_of
 
 DIRECTION = "wind_direction_sensor"
@@ -37,7 +43,7 @@ _SHORTEST_PIECE = 60  # s: sub-steps of the sun's spread over an hour
 _DAY = 86400
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Weather:
     """Weather of a stretch of time at one place.
 
@@ -69,24 +75,13 @@ class Weather:
     step: float = 0.0
 
     def __post_init__(self) -> None:
-        index = self.frame.index
-        if not isinstance(index, pd.DatetimeIndex) or index.tz is None or len(index) < 1 + (not self.step):
-            found = f"{len(index)} of {index.dtype}"
-            raise WeatherError(describe("weather", "at least two stamps with a time zone", found))
-        gaps = np.diff(index_seconds(index)) if len(index) > 1 else np.array([int(self.step)])
-        uneven = (gaps != (self.step or gaps[0])) | (gaps <= 0) | (gaps > max(_LONGEST_STEP, self.step))
-        if uneven.any():
-            row = int(np.argmax(uneven))
-            found = f"{index[row + 1]} after {index[row]}"
-            raise WeatherError(describe("weather", f"one step of up to {_LONGEST_STEP:g} s", found, "fill the gap"))
+        step = regular_steps(self.frame.index, "weather", WeatherError, self.step, _LONGEST_STEP)
         for column in self.frame.columns:
-            if column not in WEATHER_POINTS:
-                advice = nearest(column, WEATHER_POINTS)
-                raise WeatherError(describe("weather: column", "a weather point", repr(column), advice))
-        if self.typical and (len(index) != 8760 or gaps[0] != 3600):
-            found = f"{len(index)} rows, a step of {gaps[0]} s"
-            raise WeatherError(describe("typical year", "8760 hours", found))
-        object.__setattr__(self, "step", float(gaps[0]))
+            WeatherError.unless_known(column, WEATHER_POINTS, "weather: column", "a weather point")
+        count = len(self.frame)
+        hours = not self.typical or (count == 8760 and step == 3600)
+        WeatherError.unless(hours, "typical year", "8760 hours", f"{count} rows, a step of {step:g} s")
+        object.__setattr__(self, "step", step)
 
     @property
     def stamps(self) -> pd.DatetimeIndex:
@@ -128,16 +123,21 @@ class Weather:
             Which point is missing, how often, and when first.
         """
         for point in points:
-            if point not in POINT_TYPES or point not in WEATHER_POINTS:
-                advice = nearest(point, WEATHER_POINTS)
-                raise WeatherError(describe("weather", "a weather point", repr(point), advice))
-            empty = self.frame[point].isna().to_numpy() if point in self.frame else np.ones(len(self.frame), dtype=bool)
+            WeatherError.unless_known(point, WEATHER_POINTS, "weather", "a weather point")
+            empty = self.frame.get(point, pd.Series(np.nan, self.frame.index)).isna().to_numpy()
             if empty.any():
                 first = self.stamps[int(np.argmax(empty))]
                 raise WeatherError(
                     f"weather lacks {point!r} for {empty.sum()} of {len(empty)} steps (first {first}); supply it, or "
                     "fill the gap"
                 )
+
+    def to_frame(self) -> pd.DataFrame:
+        """Give the table, to be written to, in the library's units."""
+        return self.frame.copy()
+
+    def __repr__(self) -> str:
+        return f"Weather({len(self.frame)} steps of {self.step:g} s to {self.stamps[-1]}, {[*self.frame]})"
 
     @cached_property
     def outdoor(self) -> FloatArray:
@@ -221,9 +221,8 @@ class Weather:
         stamps = index_seconds(self.stamps)
         first = int(stamps[0] - self.step)
         piece = math.gcd(int(self.step), int(grid.step), int(grid.edges[0]) - first)
-        if piece < _SHORTEST_PIECE:
-            expected = "clocks of weather and grid that differ by whole minutes"
-            raise WeatherError(describe("weather", expected, f"{piece} s"))
+        expected = "clocks of weather and grid that differ by whole minutes"
+        WeatherError.unless(piece >= _SHORTEST_PIECE, "weather", expected, f"{piece} s")
         edges = np.arange(first, stamps[-1] + piece, piece)
         middles = pd.to_datetime(edges[:-1] + piece / 2.0, unit="s", utc=True)
         place = self.location
@@ -234,10 +233,7 @@ class Weather:
         """Cut this weather to a day around a grid, after a typical year has been repeated as often as needed."""
         whole = self._repeated(grid) if self.typical else self
         seconds = index_seconds(whole.stamps)
-        if grid.edges[0] < seconds[0] - self.step or grid.edges[-1] > seconds[-1]:
-            first = self.stamps[0] - pd.Timedelta(seconds=self.step)
-            expected = f"weather from {grid.start} to {grid.stamps[-1]}"
-            raise WeatherError(describe("weather", expected, f"{first} to {self.stamps[-1]}"))
+        require_cover(grid, seconds[0] - self.step, seconds[-1], "weather", WeatherError)
         near = (seconds > grid.edges[0] - _DAY) & (seconds < grid.edges[-1] + _DAY)
         return Weather(whole.frame[near], self.location, self.readings)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -57,9 +57,7 @@ def read_epw(path: str | Path) -> Weather:
     """
     from pvlib.iotools import read_epw as read
 
-    data, meta = _read(read, path)
-    data.index = data.index + pd.Timedelta(hours=1)
-    return _typical(data, meta, path)
+    return _typical(read, path, lambda data: data.shift(freq="h"))
 
 
 def read_tmy3(path: str | Path) -> Weather:
@@ -85,10 +83,11 @@ def read_tmy3(path: str | Path) -> Weather:
     """
     from pvlib.iotools import read_tmy3 as read
 
-    data, meta = _read(read, path)
-    air, dew = (data[name].to_numpy(dtype=float) + 273.15 for name in ("temp_air", "temp_dew"))
-    data["ghi_infrared"] = sky_radiation(air, dew, data["OpqCld (tenths)"].to_numpy(dtype=float))
-    return _typical(data, meta, path)
+    def with_sky(data: pd.DataFrame) -> pd.DataFrame:
+        air, dew, cloud = (data[name].to_numpy(dtype=float) for name in ("temp_air", "temp_dew", "OpqCld (tenths)"))
+        return data.assign(ghi_infrared=sky_radiation(air + 273.15, dew + 273.15, cloud))
+
+    return _typical(read, path, with_sky)
 
 
 def sky_radiation(air: FloatArray, dew_point: FloatArray, cloud: FloatArray) -> FloatArray:
@@ -107,29 +106,23 @@ def sky_radiation(air: FloatArray, dew_point: FloatArray, cloud: FloatArray) -> 
     return np.asarray((0.787 + 0.764 * np.log(dew_point / 273.0)) * covered * _STEFAN_BOLTZMANN * air**4)
 
 
-def _read(read: Any, path: str | Path) -> tuple[pd.DataFrame, dict[str, Any]]:
-    if not Path(path).is_file():
-        raise WeatherError(describe(str(path), "a weather file", "none"))
+def _typical(read: Any, path: str | Path, complete: Callable[[pd.DataFrame], pd.DataFrame]) -> Weather:
+    WeatherError.unless(Path(path).is_file(), str(path), "a weather file", "none")
     try:
-        data, meta = read(str(path), coerce_year=_YEAR)
+        raw, meta = read(str(path), coerce_year=_YEAR)
+        data = complete(raw)
     except Exception as error:  # pvlib lets whatever its parser stumbles on through
         found = " ".join(str(error).split()) or type(error).__name__
         raise WeatherError(describe(str(path), f"a file that pvlib's {read.__name__} reads", found)) from error
-    return data, meta
-
-
-def _typical(data: pd.DataFrame, meta: dict[str, Any], path: str | Path) -> Weather:
     hours = float(meta["TZ"])
     place = {"latitude": meta["latitude"], "longitude": meta["longitude"], "elevation": meta["altitude"]}
     # Etc/GMT+8 is 8 hours behind UTC; zones off the full hour have no such name and keep UTC's.
     zone = f"Etc/GMT{-int(hours):+d}" if hours.is_integer() and hours else "UTC"
     location = Location(**{k: float(v) for k, v in place.items()}, timezone=zone)
-    frame = pd.DataFrame(index=data.index.rename("timestamp"))
-    for name, point, offset, missing in _COLUMNS:
-        values = data[name].astype(float)
-        frame[point] = values.where(values < missing) + offset
+    known = {point: data[name].astype(float) for name, point, _, _ in _COLUMNS}
+    columns = {point: known[point].where(known[point] < missing) + offset for _, point, offset, missing in _COLUMNS}
     try:
-        return Weather(frame, location, readings=True, typical=True)
+        return Weather(pd.DataFrame(columns).rename_axis("timestamp"), location, readings=True, typical=True)
     except WeatherError as error:
         raise WeatherError(f"{path}: {error}") from error
 
@@ -170,19 +163,14 @@ def read_weather_csv(
     WeatherError
         When the file, a column, a stamp or a unit is not as it should be.
     """
-    if not Path(path).is_file():
-        raise WeatherError(describe(str(path), "a CSV file", "none"))
+    WeatherError.unless(Path(path).is_file(), str(path), "a CSV file", "none")
     raw = pd.read_csv(path)
     named = dict(columns) if columns is not None else {point: point for point in WEATHER_POINTS if point in raw}
     for name in (stamp, *named):
-        if name not in raw:
-            raise WeatherError(describe(f"{path}: columns", repr(name), str(list(raw)), nearest(name, raw)))
+        WeatherError.unless(name in raw, f"{path}: columns", repr(name), str(list(raw)), nearest(name, raw))
     for point in (*named.values(), *(units or {})):
-        if point not in WEATHER_POINTS:
-            advice = nearest(point, WEATHER_POINTS)
-            raise WeatherError(describe(f"{path}: column", "a weather point", repr(point), advice))
-    if not named:
-        raise WeatherError(describe(f"{path}: columns", f"one of {', '.join(WEATHER_POINTS)}", str(list(raw))))
+        WeatherError.unless_known(point, WEATHER_POINTS, f"{path}: column", "a weather point")
+    WeatherError.unless(named, f"{path}: columns", f"one of {', '.join(WEATHER_POINTS)}", str(list(raw)))
     frame = pd.DataFrame(index=_stamps(raw[stamp], location, path))
     for name, point in named.items():
         quantity = POINT_TYPES[point].quantity

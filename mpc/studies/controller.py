@@ -16,11 +16,11 @@ from mpc.control.controller.observer import Observer
 from mpc.control.controller.reading import SitePoints
 from mpc.control.predictor.forecast_signals import ForecastSignals
 from mpc.control.predictor.predictor import Predictor
-from mpc.control.problem.back_off import Margin
 from mpc.control.problem.channels import Channel
 from mpc.control.problem.horizon import Horizon
 from mpc.control.problem.problem import ControlProblem
 from mpc.control.solvers.sequential import SequentialSolver
+from mpc.control.solvers.uncertainty import Margin
 from mpc.errors import ControlError
 from mpc.loop.actuators import Actuator
 from mpc.loop.plant import Plant

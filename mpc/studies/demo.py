@@ -27,7 +27,7 @@ from mpc.reports.demo import render_demo
 from mpc.reports.diagnosis import write_diagnosis
 from mpc.reports.diagnosis_words import diagnosis_verdict
 from mpc.reports.evaluation import evaluation_verdict, write_evaluation
-from mpc.scenario.forecaster import DAY_AHEAD_ERRORS
+from mpc.scenario.forecast import DAY_AHEAD_ERRORS
 from mpc.scenario.weather_files import weather_of_case
 from mpc.studies.compare import Comparison, compare_controllers
 from mpc.studies.run import Progress

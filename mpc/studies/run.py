@@ -11,8 +11,7 @@ import numpy as np
 import pandas as pd
 
 from mpc.baselines.guideline36 import Guideline36
-from mpc.baselines.reset import OutdoorReset
-from mpc.baselines.schedule import day_schedule
+from mpc.baselines.rules import OutdoorReset, day_schedule
 from mpc.control.controller.action import Action
 from mpc.control.controller.controller import MpcController
 from mpc.errors import ControlError

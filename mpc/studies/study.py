@@ -18,15 +18,13 @@ from mpc.loop.building import BuildingModel, GridBuilding
 from mpc.loop.noise import SensorNoise
 from mpc.loop.reduced import ReducedBuilding
 from mpc.loop.simulated import SimulatedPlant
-from mpc.scenario.carbon import CarbonIntensity
-from mpc.scenario.comfort import ComfortBand
-from mpc.scenario.forecaster import ErrorGrowth, Forecaster
+from mpc.scenario.forecast import ErrorGrowth, Forecaster
 from mpc.scenario.gains import InternalGains
 from mpc.scenario.grid import StepGrid
-from mpc.scenario.occupancy import Occupancy
+from mpc.scenario.occupancy import ComfortBand, Occupancy
 from mpc.scenario.paper import paper_carbon, paper_tariff
 from mpc.scenario.scenario import Scenario, build_scenario
-from mpc.scenario.tariff import Tariff
+from mpc.scenario.tariff import CarbonIntensity, Tariff
 from mpc.scenario.weather import Weather
 from mpc.studies.controller import MODEL_STEP
 from mpc.studies.devices import equip
@@ -273,8 +271,8 @@ def make_study(
     prices = tariff or paper_tariff()
     scenario = build_scenario(
         ready, longer, _prolonged(weather, grid, longer), prices, carbon=carbon or paper_carbon(),
-        occupancy=occupancy, gains=gains, comfort=comfort, seed=seed,
-    )  # fmt: skip
+        occupancy=occupancy, gains=gains, comfort=comfort,
+    ).redrawn(seed)  # fmt: skip
     truth = reduced(built, ready, parameters, order)
     model = truth
     if controller_parameters is not None:

@@ -8,12 +8,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from mpc.scenario.carbon import CarbonIntensity
 from mpc.scenario.grid import StepGrid
 from mpc.scenario.occupancy import ScheduledOccupancy
 from mpc.scenario.rates import ConstantRate
 from mpc.scenario.scenario import Scenario, build_scenario
-from mpc.scenario.tariff import Tariff
+from mpc.scenario.tariff import CarbonIntensity, Tariff
 from mpc.scenario.weather import Weather
 from thermal import Building, ZoneTable
 from thermal.case.building import Location, ZoneEntry

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from mpc.adapters.boptest.case import BoptestCase
 from mpc.adapters.boptest.prices import PRICE_POINTS
 from mpc.adapters.boptest.signals import Metadata
-from mpc.scenario.forecaster import ErrorGrowth
+from mpc.scenario.forecast import ErrorGrowth
 from mpc.scenario.rates import Rate
 from mpc.scenario.scenario import Scenario
 from thermal._types import FloatArray

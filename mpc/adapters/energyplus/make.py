@@ -13,14 +13,13 @@ from mpc.adapters.energyplus.holidays import holidays
 from mpc.adapters.energyplus.install import CHICAGO
 from mpc.adapters.energyplus.plant import EnergyPlusPlant
 from mpc.loop.noise import SensorNoise
-from mpc.scenario.carbon import CarbonIntensity
-from mpc.scenario.comfort import ComfortBand
-from mpc.scenario.forecaster import ErrorGrowth, Forecaster
+from mpc.scenario.forecast import ErrorGrowth, Forecaster
 from mpc.scenario.gains import InternalGains
 from mpc.scenario.grid import Calendar, StepGrid
+from mpc.scenario.occupancy import ComfortBand
 from mpc.scenario.paper import paper_tariff
 from mpc.scenario.scenario import Scenario, build_scenario
-from mpc.scenario.tariff import Tariff
+from mpc.scenario.tariff import CarbonIntensity, Tariff
 from mpc.scenario.weather_files import read_epw
 
 #: Thermostats of the reference offices, 21 and 24 degC while they run, half a kelvin wider; an hour to get there.

@@ -19,8 +19,7 @@ from mpc.loop.actuators import checked_actions
 from mpc.loop.history import RecentSteps
 from mpc.loop.noise import NoiseSource, SensorNoise
 from mpc.loop.plant import Measurements, PointLayout, need_running
-from mpc.scenario.forecast import Forecast
-from mpc.scenario.forecaster import Forecaster
+from mpc.scenario.forecast import Forecast, Forecaster
 from mpc.scenario.scenario import Scenario
 from thermal._types import FloatArray
 from thermal.case.case import Case

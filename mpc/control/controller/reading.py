@@ -1,4 +1,4 @@
-"""Names of a building's points, and what a controller reads off its measurements."""
+"""Names of a building's points, and what a controller reads off measurements and past telemetry."""
 
 from __future__ import annotations
 
@@ -7,9 +7,11 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+import pandas as pd
 
 from mpc.control.problem.channels import Channel
 from mpc.errors import ControlError
+from mpc.scenario.forecast import Forecast
 from thermal._types import FloatArray
 from thermal.case.points import OUTDOOR_TEMPERATURE, ZONE_TEMPERATURE
 from thermal.errors import describe
@@ -79,7 +81,7 @@ class SitePoints:
         return named
 
 
-class _Reading(NamedTuple):
+class Reading(NamedTuple):
     """What was measured over a control step.
 
     Parameters
@@ -123,12 +125,11 @@ class Readings:
     def __init__(self, points: SitePoints, system: HvacSystem) -> None:
         found = (len(points.zones), len(points.terminals), len(points.air_handlers))
         wanted = (system.zone_count, len(system.terminals), len(system.air_handlers))
-        if found != wanted:
-            expected = "names of {} zones, {} terminals, {} air handlers".format(*wanted)
-            raise ControlError(describe("site points", expected, "{}, {}, {}".format(*found)))
+        expected = "names of {} zones, {} terminals, {} air handlers".format(*wanted)
+        ControlError.unless(found == wanted, "site points", expected, "{}, {}, {}".format(*found))
         self.points, self.place = points, system.terminals.zone
 
-    def read(self, measurements: Mapping[str, float]) -> _Reading:
+    def read(self, measurements: Mapping[str, float]) -> Reading:
         """Read a control step.
 
         Parameters
@@ -137,20 +138,20 @@ class Readings:
             By ``ENTITY/POINT`` [library's units].
         """
         points, place, n_zone = self.points, self.place, len(self.points.zones)
-        seen = np.array([_value(measurements, f"{name}/{ZONE_TEMPERATURE}") for name in points.terminals])
+        seen, flow, warm = (
+            values_of(measurements, points.terminals, point)
+            for point in (ZONE_TEMPERATURE, "supply_air_flowrate_sensor", "discharge_air_temperature_sensor")
+        )
         known = np.isfinite(seen)
-        count = np.bincount(place[known], minlength=n_zone)
-        total = np.bincount(place[known], seen[known], n_zone)
+        count, total = (np.bincount(place[known], weights, n_zone) for weights in (None, seen[known]))
         zone = np.where(count > 0, total / np.maximum(count, 1), np.nan)
-        own = np.array([_value(measurements, f"{name}/{ZONE_TEMPERATURE}") for name in points.zones])
+        own = values_of(measurements, points.zones, ZONE_TEMPERATURE)
         zone = np.where(np.isfinite(own), own, zone)
-        flow = np.array([_value(measurements, f"{name}/supply_air_flowrate_sensor") for name in points.terminals])
-        warm = np.array([_value(measurements, f"{name}/discharge_air_temperature_sensor") for name in points.terminals])
         each = AIR_HEAT_CAPACITY * flow * (warm - zone[place])
         heat = np.asarray(np.bincount(place, each, n_zone), dtype=float)
-        outdoor = _value(measurements, f"{points.weather_station}/{OUTDOOR_TEMPERATURE}")
-        water = _value(measurements, f"{points.boiler}/supply_water_temperature_sensor")
-        power = sum((_value(measurements, column) for column in points.meters), 0.0)
+        outdoor = float(values_of(measurements, [points.weather_station], OUTDOOR_TEMPERATURE)[0])
+        water = float(values_of(measurements, [points.boiler], "supply_water_temperature_sensor")[0])
+        power = float(values_of(measurements, points.meters).sum())
         missing = [f"zone temperature of {z!r} is missing: its model goes on alone"
                    for z, t in zip(points.zones, zone, strict=True) if not np.isfinite(t)]  # fmt: skip
         # where the zone itself did not report, its heat is unknown too and has been said
@@ -159,13 +160,95 @@ class Readings:
         missing += [f"flow or discharge temperature of {name!r} is missing: the plan's heat is taken" for name in names]
         if not np.isfinite(water):
             missing.append(f"supply water temperature of {points.boiler!r} is missing: its last value is taken")
-        return _Reading(zone, heat, outdoor, water, power, tuple(missing))
+        return Reading(zone, heat, outdoor, water, power, tuple(missing))
 
 
-def _value(measurements: Mapping[str, float], column: str) -> float:
-    if column not in measurements:
-        return float("nan")
-    try:
-        return float(measurements[column])
-    except (TypeError, ValueError):
-        return float("nan")
+def values_of(measurements: Mapping[str, float], entities: Sequence[str], point: str = "") -> FloatArray:
+    """Look a point of several entities up, shape (n_entity,) [library's units]; NaN where it is missing or no number.
+
+    Parameters
+    ----------
+    measurements : mapping of str to float
+        By ``ENTITY/POINT`` [library's units].
+    entities : sequence of str
+        Zones or devices; whole columns where there is no point.
+    point : str
+        What is measured.
+    """
+    columns = [f"{entity}/{point}" if point else entity for entity in entities]
+    found = pd.Series([measurements[c] if c in measurements else np.nan for c in columns], dtype=object)
+    return pd.to_numeric(found, errors="coerce").to_numpy(dtype=float)
+
+
+class _PastStep(NamedTuple):
+    """A control step that has gone.
+
+    Parameters
+    ----------
+    stamp : pandas.Timestamp
+        Its end.
+    measured : dict of str to float
+        Means by ``ENTITY/POINT`` [library's units].
+    outdoor : float
+        Its temperature, the last that was measured [K].
+    gains : ndarray, shape (n_zone,)
+        Heat of people, lights and equipment as far as it was expected [W].
+    """
+
+    stamp: pd.Timestamp
+    measured: dict[str, float]
+    outdoor: float
+    gains: FloatArray
+
+
+def past_steps(telemetry: pd.DataFrame, points: SitePoints, control_step: float) -> list[_PastStep]:
+    """Cut telemetry into control steps, the last of which ends with it.
+
+    Parameters
+    ----------
+    telemetry : DataFrame, shape (n_time, n_column)
+        Means over the steps that end at its stamps.
+    points : SitePoints
+        Names of zones and weather station.
+    control_step : float
+        [s].
+
+    Raises
+    ------
+    ControlError
+        When stamps have no time zone or do not rise, there is less than a control step, or no outdoor temperature.
+    """
+    index = telemetry.index
+    if not isinstance(index, pd.DatetimeIndex) or index.tz is None or not index.is_monotonic_increasing:
+        raise ControlError(describe("start-up: telemetry", "stamps with a time zone that rise", f"{index.dtype}"))
+    length = pd.Timedelta(seconds=control_step)
+    step = index[1] - index[0] if len(index) > 1 else length
+    if not len(index) or step > length or index[-1] - index[0] + step < length:
+        raise ControlError(describe("start-up: telemetry", f"a control step, {length}, or more", f"{len(index)} rows"))
+    means = telemetry.resample(length, closed="right", label="right", origin=index[-1]).mean()
+    outdoor = (
+        means.reindex(columns=[f"{points.weather_station}/{OUTDOOR_TEMPERATURE}"]).ffill().bfill().to_numpy()[:, 0]
+    )
+    if np.isnan(outdoor).any():
+        raise ControlError(
+            describe("start-up: telemetry", "an outdoor temperature", "none", str(points.weather_station))
+        )
+    gains = means.reindex(columns=[f"{zone}/internal_gain" for zone in points.zones]).fillna(0.0).to_numpy()
+    rows = zip(means.index, means.to_dict("records"), outdoor, gains, strict=True)
+    return [_PastStep(stamp, {str(k): v for k, v in row.items()}, float(air), heat) for stamp, row, air, heat in rows]
+
+
+def past_forecast(telemetry: pd.DataFrame, points: SitePoints) -> Forecast:
+    """Take what signals of effects are made of from telemetry: the weather, and who was in which zone.
+
+    Parameters
+    ----------
+    telemetry : DataFrame
+        By ``ENTITY/POINT`` [library's units].
+    points : SitePoints
+        Names of the weather station and the zones.
+    """
+    station = f"{points.weather_station}/"
+    weather = {column: column.removeprefix(station) for column in map(str, telemetry) if column.startswith(station)}
+    people = [f"{zone}/occupancy_count_sensor" for zone in points.zones]
+    return Forecast(telemetry[[*weather, *(c for c in people if c in telemetry)]].rename(columns=weather))

@@ -10,11 +10,10 @@ import numpy as np
 
 from mpc.control.predictor.predictor import Predictor, Rollout, Sensitivity
 from mpc.control.problem.channels import Channel
-from mpc.control.problem.data import HorizonData
-from mpc.control.problem.horizon import Horizon
+from mpc.control.problem.horizon import Horizon, HorizonData
 from mpc.errors import ControlError
 from thermal._types import FloatArray
-from thermal.errors import describe, nearest
+from thermal.errors import describe
 from thermal.inputs.drivers import REFERENCE_TEMPERATURE
 from thermal.model.modal import ModalModel
 from thermal.model.scheme import IMPLICIT_EULER, Scheme
@@ -53,9 +52,7 @@ class HeatChannel:
     rate: float = np.inf
 
     def __post_init__(self) -> None:
-        if self.quantity not in get_args(HeatQuantity):
-            advice = nearest(self.quantity, get_args(HeatQuantity))
-            raise ControlError(describe("heat channel", "heating or cooling", repr(self.quantity), advice))
+        ControlError.unless_known(self.quantity, get_args(HeatQuantity), "heat channel", "heating or cooling")
         if not (0.0 <= self.lower < self.upper < np.inf and self.rate > 0.0 and self.zone >= 0):
             found = f"zone {self.zone}, {self.lower!r} to {self.upper!r} W, {self.rate!r} W/h"
             raise ControlError(describe("heat channel", "a zone, a range of watts and a positive rate", found))

@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mpc.control.problem.channels import Channel
-from mpc.control.problem.data import HorizonData
-from mpc.control.problem.horizon import Horizon
+from mpc.control.problem.horizon import Horizon, HorizonData
 from mpc.errors import ControlError
 from thermal._types import FloatArray
 from thermal.errors import describe

@@ -9,17 +9,16 @@ from typing import Literal, NamedTuple
 import numpy as np
 import pandas as pd
 
-from mpc.control.problem.data import PeakData
-from mpc.control.problem.horizon import Horizon
+from mpc.control.problem.horizon import Horizon, PeakData
 from mpc.errors import ScenarioError
 from mpc.scenario.forecast import Forecast
-from mpc.scenario.grid import StepGrid
+from mpc.scenario.grid import StepGrid, means_of_steps
 from mpc.scenario.tariff import DemandCharge
-from thermal._types import FloatArray
+from thermal._types import FloatArray, IntArray
 from thermal.case.points import OUTDOOR_TEMPERATURE
-from thermal.errors import describe
 
 _HOUR = 3600.0  # s
+_NARROWEST = (np.maximum, np.minimum)  # of lower and of upper edges
 
 
 class Expected(NamedTuple):
@@ -78,39 +77,27 @@ def expect(
     ScenarioError
         Which column is missing, for how many steps and when first, or where the forecast ends.
     """
-    per_zone = [f"{zone}/{name}" for name in ("internal_gain", "comfort_lower_temperature", "comfort_upper_temperature")
-                for zone in zones]  # fmt: skip
-    prices = ["electricity_price", "gas_price"]
     carbon = ["electricity_carbon_intensity", "gas_carbon_intensity"] if carbon_price else []
-    columns = [OUTDOOR_TEMPERATURE, *prices, *carbon, *per_zone]
+    flowing = [OUTDOOR_TEMPERATURE, "electricity_price", "gas_price", *carbon, *(f"{z}/internal_gain" for z in zones)]
+    sides = [[f"{zone}/comfort_{side}_temperature" for zone in zones] for side in ("lower", "upper")]
     index = pd.DatetimeIndex(forecast.table.index)
     ends = (index - now).total_seconds().to_numpy()
     step = float(np.median(np.diff(ends))) if len(ends) > 1 else float(horizon.control_step)
     edges = np.concatenate([[ends[0] - step], ends])
-    if fill is None and (edges[-1] < horizon.edges[-1] - 1e-6 or edges[0] > 1e-6):
-        last = now + pd.Timedelta(seconds=horizon.edges[-1])
-        found = f"{now + pd.Timedelta(seconds=edges[0])} to {index[-1]}"
-        raise ScenarioError(describe("forecast", f"steps from {now} to {last}", found, 'pass fill="hold"'))
-    values = forecast.values(columns, fill=fill)
+    first, last = now + pd.Timedelta(seconds=edges[0]), now + pd.Timedelta(seconds=horizon.edges[-1])
+    covered = fill is not None or (edges[-1] >= horizon.edges[-1] - 1e-6 and edges[0] <= 1e-6)
+    advice = 'pass fill="hold"'
+    ScenarioError.unless(covered, "forecast", f"steps from {now} to {last}", f"{first} to {index[-1]}", advice)
+    values = forecast.values([*flowing, *sides[0], *sides[1]], fill=fill)
     edges[0], edges[-1] = min(edges[0], 0.0), max(edges[-1], horizon.edges[-1])
-    n_single, n = 3 + len(carbon), len(zones)
-    flowing = _means(edges, values[:, : n_single + n], horizon.edges)
-    lower = _extremes(edges, values[:, n_single + n : n_single + 2 * n], horizon.edges, np.maximum)
-    upper = _extremes(edges, values[:, n_single + 2 * n :], horizon.edges, np.minimum)
-    emitted = flowing[:, 3:n_single] * carbon_price if carbon else np.zeros((len(horizon), 2))
+    flows, *bands = np.split(values, [len(flowing), len(flowing) + len(zones)], axis=1)
+    mean = means_of_steps(edges, flows, horizon.edges)
+    lower, upper = (_extremes(edges, b, horizon.edges, of) for b, of in zip(bands, _NARROWEST, strict=True))
+    emitted = mean[:, 3:5] * carbon_price if carbon else np.zeros((len(horizon), 2))
     return Expected(
-        flowing[:, 0], flowing[:, n_single:], np.maximum(lower, np.vstack([lower[1:], lower[-1:]])),
-        np.minimum(upper, np.vstack([upper[1:], upper[-1:]])), (lower, upper), flowing[:, 1] + emitted[:, 0],
-        flowing[:, 2] + emitted[:, 1],
+        mean[:, 0], mean[:, 3 + len(carbon) :], np.maximum(lower, np.vstack([lower[1:], lower[-1:]])),
+        np.minimum(upper, np.vstack([upper[1:], upper[-1:]])), (lower, upper), *(mean[:, 1:3] + emitted).T,
     )  # fmt: skip
-
-
-def _means(edges: FloatArray, values: FloatArray, steps: FloatArray) -> FloatArray:
-    """Means over steps of what is constant between edges."""
-    total = np.vstack([np.zeros(values.shape[1]), np.cumsum(values * np.diff(edges)[:, None], axis=0)])
-    k = np.clip(np.searchsorted(edges, steps, side="right") - 1, 0, len(values) - 1)
-    at = total[k] + values[k] * (steps - edges[k])[:, None]
-    return np.asarray(np.diff(at, axis=0) / np.diff(steps)[:, None])
 
 
 def _extremes(edges: FloatArray, values: FloatArray, steps: FloatArray, of: np.ufunc) -> FloatArray:
@@ -206,30 +193,76 @@ def peak_data(
     used : sequence of float
         Mean power since the window of now began, of each charge [W]; default none.
     """
-    parts: list[PeakData] = []
-    seconds = horizon.edges
+    parts: list[tuple[FloatArray | IntArray, ...]] = []
+    seconds, count, begin = horizon.edges, 0, now.timestamp()
     for charge, power in zip(charges, used or [0.0] * len(charges), strict=True):
-        begin = now.timestamp()
         first = np.floor(begin / charge.window) * charge.window - begin
         bounds = np.arange(first, seconds[-1], charge.window)
         overlap = np.minimum(seconds[1:], bounds[:, None] + charge.window) - np.maximum(seconds[:-1], bounds[:, None])
         weights = np.maximum(overlap, 0.0)
-        offset = np.zeros(len(bounds))
-        offset[0] = power * -first / charge.window
         # windows that the horizon's end cuts count with the mean of their part
-        whole = np.where(np.arange(len(bounds)) == 0, charge.window, np.maximum(weights.sum(axis=1), 1e-9))
-        grid = StepGrid(now + pd.Timedelta(seconds=float(first)), charge.window, len(bounds))
-        buckets = charge.on(grid)
+        whole = np.maximum(weights.sum(axis=1), 1e-9)
+        offset, whole[0] = np.zeros(len(bounds)), charge.window
+        offset[0] = power * -first / charge.window
+        buckets = charge.on(StepGrid(now + pd.Timedelta(seconds=float(first)), charge.window, len(bounds)))
         kept = buckets.bucket >= 0
         before = np.array([(so_far or {}).get(name, 0.0) for name in buckets.names])
         parts.append(
-            PeakData(weights[kept] / whole[kept, None], offset[kept], buckets.bucket[kept], buckets.rate, before)
+            (weights[kept] / whole[kept, None], offset[kept], buckets.bucket[kept] + count, buckets.rate, before)
         )
-    if not parts:
-        return PeakData.none(len(horizon))
-    shift = np.cumsum([0, *(len(p.rate) for p in parts[:-1])])
-    return PeakData(
-        np.vstack([p.weights for p in parts]), np.concatenate([p.offset for p in parts]),
-        np.concatenate([p.bucket + s for p, s in zip(parts, shift, strict=True)]).astype(np.int64),
-        np.concatenate([p.rate for p in parts]), np.concatenate([p.so_far for p in parts]),
-    )  # fmt: skip
+        count += len(buckets.rate)
+    return PeakData(*map(np.concatenate, zip(*parts, strict=True))) if parts else PeakData.none(len(horizon))
+
+
+class DemandCount:
+    """Counts the power of each step for the windows of demand charges.
+
+    Parameters
+    ----------
+    charges : sequence of DemandCharge
+        Of the tariff.
+    """
+
+    def __init__(self, charges: Sequence[DemandCharge]) -> None:
+        self.charges = tuple(charges)
+        #: Highest mean of each peak so far, by name [W].
+        self.peaks: dict[str, float] = {}
+        #: Of each charge: start of the window that runs [s since 1970], and energy used in it [J].
+        self.windows = [(0.0, 0.0)] * len(self.charges)
+
+    def add(self, electricity: float, now: pd.Timestamp, step: float) -> None:
+        """Add the power of the step that has ended to the window that it began in; a window that is over is a peak.
+
+        Parameters
+        ----------
+        electricity : float
+            Mean over the step [W]; NaN counts as nothing.
+        now : pandas.Timestamp
+            End of the step.
+        step : float
+            Its length [s].
+        """
+        for k, charge in enumerate(self.charges):
+            begin = float(np.floor((now.timestamp() - step) / charge.window) * charge.window)
+            start, used = self.windows[k] if self.windows[k][0] == begin else (begin, 0.0)
+            used += electricity * step if np.isfinite(electricity) else 0.0
+            if now.timestamp() >= begin + charge.window:
+                one = pd.Timestamp(begin, unit="s", tz="UTC").tz_convert(now.tz)
+                for name in charge.on(StepGrid(one, charge.window, 1)).names:
+                    self.peaks[name] = max(self.peaks.get(name, 0.0), used / max(charge.window, step))
+                start, used = begin + charge.window, 0.0
+            self.windows[k] = (start, used)
+
+    def used(self, now: pd.Timestamp) -> list[float]:
+        """Mean power since the window of now began, of each charge [W].
+
+        Parameters
+        ----------
+        now : pandas.Timestamp
+            Time.
+        """
+        means = []
+        for (start, energy), charge in zip(self.windows, self.charges, strict=True):
+            lasted = now.timestamp() - start
+            means.append(energy / lasted if 0.0 < lasted < charge.window else 0.0)
+        return means

@@ -7,13 +7,12 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mpc.control.predictor.predictor import Predictor, Rollout, Sensitivity
-from mpc.control.problem.data import HorizonData
+from mpc.control.problem.horizon import HorizonData
 from mpc.errors import ControlError
 from mpc.scenario.rates import KILOWATT_HOUR
-from thermal._types import FloatArray
+from thermal._types import FloatArray, IntArray
 from thermal.errors import describe
 
 _HOUR = 3600.0  # s
@@ -32,7 +31,7 @@ class CostTerms(NamedTuple):
     comfort : float
         Time outside of the bands, at the end of the horizon prolonged by the terminal time [currency].
     moves : float
-        Squared changes of the setpoints, which settle what costs nothing else [currency].
+        Squared changes of the setpoints, which decide what costs nothing else [currency].
     storage : float
         Minus the value of the heat that the building holds at the end [currency].
     """
@@ -81,6 +80,8 @@ class ControlProblem:
     move_weight : float
         Price of a change by the whole range of a channel between two blocks, squared [currency]. Small: it chooses
         among setpoints that cost the same.
+    paths : ndarray of int, shape (n_path, n_block of the horizon), optional
+        Blocks of a plan that follow each other, by scenario where there are several; by default those of the horizon.
 
     Raises
     ------
@@ -92,16 +93,21 @@ class ControlProblem:
     softness: float = 0.2
     terminal_time: float = 1800.0
     move_weight: float = 1e-3
+    paths: IntArray | None = None
 
     def __post_init__(self) -> None:
         if not (0.0 < self.softness <= 5.0 and self.terminal_time >= 0.0 and self.move_weight >= 0.0):
             found = f"{self.softness} K, {self.terminal_time} s, {self.move_weight}"
             raise ControlError(describe("control problem", "a softness of 0 to 5 K, no negative number", found))
 
-    @property
+    @cached_property
+    def _paths(self) -> IntArray:
+        return np.arange(self.predictor.horizon.n_block)[None] if self.paths is None else self.paths
+
+    @cached_property
     def shape(self) -> tuple[int, int]:
         """Shape of a plan, (n_block, n_channel)."""
-        return self.predictor.horizon.n_block, len(self.predictor.channels)
+        return int(self._paths.max()) + 1, len(self.predictor.channels)
 
     @cached_property
     def lower(self) -> FloatArray:
@@ -154,14 +160,19 @@ class ControlProblem:
     @cached_property
     def most_change(self) -> FloatArray:
         """Largest change between blocks, shape (D,) [-]; infinite where there is no limit."""
-        horizon = self.predictor.horizon
+        horizon, most = self.predictor.horizon, np.empty(self.shape)
         hours = np.concatenate([[horizon.control_step], np.diff(horizon.block_starts)]) / _HOUR
-        return np.outer(hours, [c.rate for c in self.predictor.channels]).ravel() / self.span
+        for path in self._paths:
+            most[path] = np.outer(hours, [c.rate for c in self.predictor.channels])
+        return most.ravel() / self.span
 
-    @property
-    def predecessors(self) -> NDArray[np.int64]:
+    @cached_property
+    def predecessors(self) -> IntArray:
         """Block that each block follows, shape (n_block,); -1 is what stands now."""
-        return np.arange(self.shape[0], dtype=np.int64) - 1
+        before = np.full(self.shape[0], -1, dtype=np.int64)
+        for path in self._paths:
+            before[path[1:]] = path[:-1]
+        return before
 
     def admitted(self, data: HorizonData, shares: FloatArray) -> FloatArray:
         """Move decisions to where limits on changes allow them, shape (D,) [-].
@@ -232,20 +243,20 @@ class ControlProblem:
             storage=-data.heat_value * self.predictor.heat_content(rollout.end_state) / KILOWATT_HOUR,
         )
 
-    def energy_gradient(self, data: HorizonData, slopes: Sensitivity) -> FloatArray:
+    def energy_gradient(self, data: HorizonData, sensitivity: Sensitivity) -> FloatArray:
         """Gradient of energy and storage by the decisions, shape (D,) [currency].
 
         Parameters
         ----------
         data : HorizonData
             Of the horizon.
-        slopes : Sensitivity
+        sensitivity : Sensitivity
             Of the roll-out.
         """
-        by_plan = (data.electricity_price * self.hours) @ slopes.electric / _KILOWATT
-        by_plan += (data.gas_price * self.hours) @ slopes.fuel / _KILOWATT
+        by_plan = (data.electricity_price * self.hours) @ sensitivity.electric / _KILOWATT
+        by_plan += (data.gas_price * self.hours) @ sensitivity.fuel / _KILOWATT
         if data.heat_value:
-            by_plan -= data.heat_value / KILOWATT_HOUR * (self.predictor.heat_row @ slopes.end_state)
+            by_plan -= data.heat_value / KILOWATT_HOUR * (self.predictor.heat_row @ sensitivity.end_state)
         return np.asarray(by_plan * self.span)
 
     def move_gradient(self, data: HorizonData, shares: FloatArray) -> FloatArray:
@@ -261,7 +272,7 @@ class ControlProblem:
         changes = self.differences @ shares - self.standing(data)
         return np.asarray(2.0 * self.move_weight * (self.differences.T @ changes))
 
-    def gradient(self, data: HorizonData, rollout: Rollout, slopes: Sensitivity) -> FloatArray:
+    def gradient(self, data: HorizonData, rollout: Rollout, sensitivity: Sensitivity) -> FloatArray:
         """Gradient of everything but demand charges, shape (D,) [currency].
 
         Parameters
@@ -270,12 +281,12 @@ class ControlProblem:
             Of the horizon.
         rollout : Rollout
             Where.
-        slopes : Sensitivity
+        sensitivity : Sensitivity
             Of it.
         """
-        comfort = self.penalty(data, rollout.zone[1:]).slope.ravel() @ slopes.zone[1:].reshape(-1, self.span.size)
+        comfort = self.penalty(data, rollout.zone[1:]).slope.ravel() @ sensitivity.zone[1:].reshape(-1, self.span.size)
         moves = self.move_gradient(data, self.shares(rollout.plan))
-        return np.asarray(self.energy_gradient(data, slopes) + comfort * self.span + moves)
+        return np.asarray(self.energy_gradient(data, sensitivity) + comfort * self.span + moves)
 
     def explain_limits(self, data: HorizonData) -> list[str]:
         """Say which ranges and rates contradict what stands now: such a plan begins at the edge of its range.

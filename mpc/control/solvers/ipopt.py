@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
 from mpc.control.predictor.predictor import Rollout
-from mpc.control.problem.data import HorizonData
+from mpc.control.problem.horizon import HorizonData
 from mpc.control.problem.problem import ControlProblem
-from mpc.control.solvers.solution import Solution, Status
+from mpc.control.solvers.solution import Solution, Solver, Status
 from mpc.errors import MpcError
 from thermal._types import FloatArray
 
@@ -34,56 +34,52 @@ class _OutOfTimeError(MpcError):
 
 
 class _Evaluation:
-    """Cost without demand charges, mean powers of the windows in kW, and their slopes, of the last few points."""
+    """Cost without demand charges, mean powers of the windows in kW, and their Jacobian, of the last few points."""
 
     def __init__(self, problem: ControlProblem) -> None:
         self.problem = problem
-        self.data: HorizonData | None = None
-        self.deadline = np.inf
-        self.best: tuple[float, FloatArray, Rollout] | None = None
-        self.error: BaseException | None = None
-        self._rollouts: dict[bytes, Rollout] = {}
 
     def begin(self, data: HorizonData, deadline: float) -> None:
         """Take up a horizon."""
-        self.data, self.deadline, self.best, self.error = data, deadline, None, None
-        self._rollouts.clear()
+        self.data, self.deadline = data, deadline
+        self.best: tuple[float, FloatArray, Rollout] | None = None
+        self.error: BaseException | None = None
+        self._rollouts: dict[bytes, Rollout] = {}
 
     def rollout(self, shares: FloatArray) -> Rollout:
         """Follow decisions, once."""
         key = shares.tobytes()
         if key not in self._rollouts:
             if time.perf_counter() > self.deadline:
-                self.error = _OutOfTimeError()
-                raise self.error
+                raise _OutOfTimeError
             if len(self._rollouts) > 3:
                 self._rollouts.pop(next(iter(self._rollouts)))
             near = next(reversed(self._rollouts.values()), None)
-            rollout = self.problem.predictor.rollout(self._given, self.problem.plan(shares), near)
-            self._rollouts[key] = rollout
+            self._rollouts[key] = self.problem.predictor.rollout(self.data, self.problem.plan(shares), near)
         return self._rollouts[key]
-
-    @property
-    def _given(self) -> HorizonData:
-        if self.data is None:
-            raise RuntimeError("no horizon was taken up")
-        return self.data
 
     def values(self, shares: FloatArray) -> FloatArray:
         """Cost, then means over the windows [kW], shape (1 + n_window,)."""
         rollout = self.rollout(shares)
-        terms = self.problem.terms(self._given, rollout)
+        terms = self.problem.terms(self.data, rollout)
         if np.isfinite(terms.total) and (self.best is None or terms.total < self.best[0]):
             self.best = (terms.total, shares.copy(), rollout)
-        means = self._given.peaks.means(rollout.electric) / _KILOWATT
-        return np.concatenate([[terms.total - terms.demand], means])
+        return np.concatenate([[terms.total - terms.demand], self.data.peaks.means(rollout.electric) / _KILOWATT])
 
-    def slopes(self, shares: FloatArray) -> FloatArray:
+    def jacobian(self, shares: FloatArray) -> FloatArray:
         """Their derivatives, shape (1 + n_window, D)."""
         rollout = self.rollout(shares)
-        slopes = self.problem.predictor.sensitivity(self._given, rollout)
-        means = self._given.peaks.weights @ slopes.electric * self.problem.span / _KILOWATT
-        return np.vstack([self.problem.gradient(self._given, rollout, slopes), means])
+        by_plan = self.problem.predictor.sensitivity(self.data, rollout)
+        means = self.data.peaks.weights @ by_plan.electric * self.problem.span / _KILOWATT
+        return np.vstack([self.problem.gradient(self.data, rollout, by_plan), means])
+
+    def guarded(self, of: Callable[[FloatArray], FloatArray], shares: FloatArray) -> FloatArray:
+        """Evaluate, and keep what breaks: CasADi reports only that a callback failed."""
+        try:
+            return of(shares)
+        except BaseException as error:
+            self.error = error
+            raise
 
 
 class _Callback(ca.Callback):
@@ -98,9 +94,6 @@ class _Callback(ca.Callback):
     def get_n_in(self) -> int:
         return 1 + self._order
 
-    def get_n_out(self) -> int:
-        return 1
-
     def get_sparsity_in(self, i: int) -> ca.Sparsity:
         return ca.Sparsity.dense(self._n, 1) if i == 0 else ca.Sparsity(self._m, 1)
 
@@ -108,25 +101,18 @@ class _Callback(ca.Callback):
         return ca.Sparsity.dense(self._m, self._n if self._order else 1)
 
     def eval(self, arg: Sequence[ca.DM]) -> list[ca.DM]:
-        shares = np.array(arg[0], dtype=float).ravel()
-        of = self._evaluation.slopes if self._order else self._evaluation.values
-        try:
-            return [ca.DM(of(shares))]
-        except BaseException as error:  # kept: CasADi reports only that a callback failed
-            self._evaluation.error = error
-            raise
+        of = self._evaluation.jacobian if self._order else self._evaluation.values
+        return [ca.DM(self._evaluation.guarded(of, np.array(arg[0], dtype=float).ravel()))]
 
     def has_jacobian(self) -> bool:
         return self._order == 0
 
-    def get_jacobian(
-        self, name: str, inames: Sequence[str], onames: Sequence[str], opts: Mapping[str, object]
-    ) -> ca.Function:
+    def get_jacobian(self, *_: object) -> ca.Function:
         self._kept.append(_Callback(self._evaluation, self._m - 1, 1))
         return self._kept[-1]
 
 
-class IpoptSolver:
+class IpoptSolver(Solver):
     """Ipopt on the single shooting: the reference for faster solvers.
 
     Parameters
@@ -148,12 +134,7 @@ class IpoptSolver:
     def __init__(self, problem: ControlProblem, tolerance: float = 1e-5, iterations: int = 200) -> None:
         self.problem, self.tolerance, self.iterations = problem, tolerance, iterations
         self._evaluation = _Evaluation(problem)
-        self.memory: FloatArray | None = None  # nothing is kept between solves
         self._built: dict[tuple[int, int, bool], tuple[Any, Any]] = {}
-
-    def forget(self) -> None:
-        """Nothing is kept between solves."""
-        self.memory = None
 
     def solve(self, data: HorizonData, plan: FloatArray, time_limit: float | None = None) -> Solution:
         """Solve for one horizon; see `Solver`.
@@ -179,10 +160,9 @@ class IpoptSolver:
         best = self._evaluation.best
         if best is None:
             best, status = (start.total, shares, first), Status.FAILED
-        terms = problem.terms(data, best[2])
         return Solution(
-            problem.plan(best[1]), best[2], terms, start.total, status, message, steps, time.perf_counter() - begin,
-            "ipopt",
+            problem.plan(best[1]), best[2], problem.terms(data, best[2]), start.total, status, message, steps,
+            time.perf_counter() - begin, "ipopt",
         )  # fmt: skip
 
     def _run(self, data: HorizonData, shares: FloatArray, tuned: bool) -> tuple[Status, str, int]:
@@ -190,19 +170,18 @@ class IpoptSolver:
         solver = self._solver(n_window, n_peak, tuned)
         limited = np.flatnonzero(np.isfinite(problem.most_change))
         most, before = problem.most_change[limited], problem.standing(data)[limited]
-        peaks = data.peaks.so_far / _KILOWATT
-        no_lower = np.full(n_window, -np.inf)
+        peaks, found = data.peaks.so_far / _KILOWATT, None
         try:
             found = solver(
                 x0=np.concatenate([shares, peaks]),
                 p=np.concatenate([data.peaks.rate, data.peaks.bucket.astype(float)]),
                 lbx=np.concatenate([np.zeros(shares.size), peaks]),
                 ubx=np.concatenate([np.ones(shares.size), np.full(n_peak, np.inf)]),
-                lbg=np.concatenate([no_lower, before - most]),
+                lbg=np.concatenate([np.full(n_window, -np.inf), before - most]),
                 ubg=np.concatenate([np.zeros(n_window), before + most]),
             )
-        except RuntimeError:
-            found = None
+        except RuntimeError:  # of CasADi, for what the evaluation has kept, if anything
+            pass
         error = self._evaluation.error
         if isinstance(error, _OutOfTimeError):
             return Status.TIME_LIMIT, "out of time", 0
@@ -210,14 +189,11 @@ class IpoptSolver:
             raise error
         stats = solver.stats()
         word, count = str(stats["return_status"]), int(stats.get("iter_count", 0))
-        if found is not None and stats["success"]:
-            shares_found = np.clip(np.array(found["x"]).ravel()[: shares.size], 0.0, 1.0)
+        status = Status.of(word, found is not None and bool(stats["success"]))
+        if found is not None and status is Status.CONVERGED:
             self._evaluation.best = None  # the point of convergence: a better one may break a limit
-            self._evaluation.values(shares_found)
-            return Status.CONVERGED, word, count
-        if word == "Maximum_Iterations_Exceeded":
-            return Status.ITERATION_LIMIT, word, count
-        return Status.FAILED, word, count
+            self._evaluation.values(np.clip(np.array(found["x"]).ravel()[: shares.size], 0.0, 1.0))
+        return Status.FAILED if status is Status.STALLED else status, word, count
 
     def _solver(self, n_window: int, n_peak: int, tuned: bool) -> Any:
         key = (n_window, n_peak, tuned)

@@ -1,4 +1,4 @@
-"""Sequential quadratic programming on the single shooting: exact slopes, comfort kept piecewise, cost by BFGS."""
+"""Sequential quadratic programming on the single shooting: exact gradients, piecewise comfort, cost by BFGS."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from typing import NamedTuple
 import numpy as np
 
 from mpc.control.predictor.predictor import Rollout, Sensitivity
-from mpc.control.problem.data import HorizonData
+from mpc.control.problem.horizon import HorizonData
 from mpc.control.problem.problem import ControlProblem, CostTerms
-from mpc.control.solvers.quadratic import QuadraticSolver, solve_quadratic
-from mpc.control.solvers.solution import Solution, Status
+from mpc.control.solvers.convex import QuadraticSolver, solve_quadratic
+from mpc.control.solvers.solution import Solution, Solver, Status
 from thermal._types import FloatArray
 
 _KILOWATT = 1000.0  # W
@@ -33,16 +33,23 @@ class _Point(NamedTuple):
 class _Model(NamedTuple):
     """Convex model of the cost around a point; comfort and peaks are kept as they are, with linearised arguments."""
 
+    shares: FloatArray
     zone: FloatArray
-    zone_slope: FloatArray  # (N n_zone, D)
+    zone_by_plan: FloatArray  # (N n_zone, D), by the plan itself
+    zone_slope: FloatArray  # (N n_zone, D), by shares of the ranges
     means: FloatArray
     mean_slope: FloatArray  # (n_window, D)
+    smooth: FloatArray
     gradient: FloatArray
     hessian: FloatArray
 
+    def zone_at(self, step: FloatArray) -> FloatArray:
+        """Temperatures after a step, shape (N, n_zone) [K]."""
+        return self.zone + (self.zone_slope @ step).reshape(self.zone.shape)
+
 
 @dataclass(eq=False)
-class SequentialSolver:
+class SequentialSolver(Solver):
     """Sequential quadratic programming for control in real time.
 
     Parameters
@@ -76,14 +83,9 @@ class SequentialSolver:
     quadratic: QuadraticSolver = "clarabel"
 
     def __post_init__(self) -> None:
-        self._curvature: FloatArray | None = None
-        self._reach = self.reach
         self._longest = 0.0  # s, that a step took: what is left of the time limit must hold another one
         self._deadline = np.inf
-
-    def forget(self) -> None:
-        """Drop the curvature and the length of steps of earlier solves."""
-        self._curvature, self._reach = None, self.reach
+        self.forget()
 
     @property
     def memory(self) -> FloatArray | None:
@@ -94,9 +96,8 @@ class SequentialSolver:
 
     @memory.setter
     def memory(self, kept: FloatArray | None) -> None:
-        self.forget()
-        if kept is not None:
-            self._curvature, self._reach = np.array(kept[:-1]), float(kept[-1, 0])
+        self._curvature: FloatArray | None = None if kept is None else np.array(kept[:-1])
+        self._reach = self.reach if kept is None else float(kept[-1, 0])
 
     def solve(self, data: HorizonData, plan: FloatArray, time_limit: float | None = None) -> Solution:
         """Solve for one horizon; see `Solver`.
@@ -117,51 +118,50 @@ class SequentialSolver:
         status, message, k = Status.ITERATION_LIMIT, f"after {self.iterations} steps", 0
         if not np.isfinite(point.cost):
             status, message = Status.FAILED, "the plan to start from has no finite cost"
-        last: tuple[FloatArray, FloatArray, Sensitivity] | None = None
+        last: _Model | None = None
         reach, fresh, slow = self._reach, self._curvature is None, 0
-        while status is not Status.FAILED and k < self.iterations:
+        while status is Status.ITERATION_LIMIT and k < self.iterations:
             lap = time.perf_counter()
             if lap + self._longest > self._deadline:
                 status, message = Status.TIME_LIMIT, f"after {k} steps, {time_limit:g} s allowed"
                 break
             k += 1
-            slopes = self.problem.predictor.sensitivity(data, point.rollout)
-            smooth = self.problem.energy_gradient(data, slopes)
-            self._learn(data, point, smooth, slopes, last)
-            model = self._model(data, point, slopes, smooth)
-            step, promised, solved = self._step(data, point, model, reach)
             scale = max(abs(point.cost), 1e-6)
+            sensitivity = self.problem.predictor.sensitivity(data, point.rollout)
+            model = self._model(data, point, sensitivity, last)
+            step, promised, solved = self._step(data, point, model, reach)
             if not solved:
                 status, message = Status.STALLED, f"quadratic programme of step {k} failed"
                 break
             if promised <= self.tolerance * scale and not fresh:
                 # curvature that was learned elsewhere may promise too little: ask again without it
-                self._curvature = None
-                self._learn(data, point, smooth, slopes, None)
-                model, fresh = self._model(data, point, slopes, smooth), True
-                step, promised, solved = self._step(data, point, model, reach)
-            if time.perf_counter() > self._deadline:  # what was promised so far need not be all
-                status, message = Status.TIME_LIMIT, f"within step {k}, {time_limit:g} s allowed"
-                break
-            if promised <= self.tolerance * scale:
+                self._curvature, fresh = None, True
+                model = self._model(data, point, sensitivity, None)
+                step, promised, _ = self._step(data, point, model, reach)
+            late = time.perf_counter() > self._deadline  # what was promised so far need not be all
+            if not late and promised <= self.tolerance * scale:
                 status, message = Status.CONVERGED, f"the next step promises {promised / scale:.1e} of the cost"
                 break
-            new, length = self._search(data, point, step, promised)
-            self._longest = max(0.9 * self._longest, time.perf_counter() - lap)
-            if new is None and time.perf_counter() > self._deadline:
-                status, message = Status.TIME_LIMIT, f"within step {k}, {time_limit:g} s allowed"
-                break
+            new, length = None, 0.0
+            if not late:
+                new, length = self._search(data, point, step, promised)
+                self._longest = max(0.9 * self._longest, time.perf_counter() - lap)
             if new is None:
                 status, message = Status.STALLED, f"no decrease along step {k}"
-                self._curvature = None
+                if time.perf_counter() > self._deadline:
+                    status, message = Status.TIME_LIMIT, f"within step {k}, {time_limit:g} s allowed"
+                else:
+                    self._curvature = None
                 break
-            good = point.cost - new.cost > 0.75 * promised
-            reach = min(2.0 * reach, self.reach) if good else reach if length == 1.0 else max(length * reach, 0.02)
-            slow = slow + 1 if point.cost - new.cost <= self.tolerance * scale else 0
-            last, point, fresh = (point.shares, smooth, slopes), new, False
+            gained = point.cost - new.cost
+            if gained > 0.75 * promised:
+                reach = min(2.0 * reach, self.reach)
+            elif length < 1.0:
+                reach = max(length * reach, 0.02)
+            slow = slow + 1 if gained <= self.tolerance * scale else 0
+            last, point, fresh = model, new, False
             if slow == 2:
                 status, message = Status.CONVERGED, f"two steps brought less than {self.tolerance:g} of the cost each"
-                break
         self._reach = float(np.clip(reach, 0.05, self.reach))
         point = given if given.cost < point.cost else point
         return Solution(
@@ -184,78 +184,67 @@ class SequentialSolver:
         near = self._at(data, self.problem.admitted(data, self.problem.shares(plan)), point.rollout)
         return near if near.cost <= point.cost + self.tolerance * max(abs(point.cost), 1e-6) else point
 
-    def _learn(
-        self,
-        data: HorizonData,
-        point: _Point,
-        smooth: FloatArray,
-        slopes: Sensitivity,
-        last: tuple[FloatArray, FloatArray, Sensitivity] | None,
-    ) -> None:
-        """Update the curvature by the change of the gradient that the piecewise model does not have."""
-        size = smooth.size
+    def _model(self, data: HorizonData, point: _Point, by_plan: Sensitivity, last: _Model | None) -> _Model:
+        """Linearise around a point, with the curvature that the way from the last one has shown."""
+        problem, span = self.problem, self.problem.span
+        smooth = problem.energy_gradient(data, by_plan)
+        zone_by_plan = by_plan.zone[1:].reshape(-1, span.size)
         if self._curvature is None:
             energy = abs(point.terms.electricity) + abs(point.terms.gas)
-            self._curvature = max(energy, 1e-3) / self.problem.shape[0] * np.eye(size)
-        if last is None:
-            return
-        s = point.shares - last[0]
-        felt = self.problem.penalty(data, point.rollout.zone[1:]).slope.ravel()
-        bent = felt @ (slopes.zone[1:] - last[2].zone[1:]).reshape(-1, size) * self.problem.span
-        y, bs = smooth - last[1] + bent, self._curvature @ s
+            self._curvature = max(energy, 1e-3) / problem.shape[0] * np.eye(span.size)
+        if last is not None:
+            felt = problem.penalty(data, point.rollout.zone[1:]).slope.ravel()
+            bent = felt @ (zone_by_plan - last.zone_by_plan) * span
+            self._learn(point.shares - last.shares, smooth - last.smooth + bent, self._curvature)
+        moves = 2.0 * problem.move_weight * (problem.differences.T @ problem.differences)
+        return _Model(
+            point.shares, point.rollout.zone[1:], zone_by_plan, zone_by_plan * span,
+            data.peaks.means(point.rollout.electric), data.peaks.weights @ by_plan.electric * span, smooth,
+            smooth + problem.move_gradient(data, point.shares), moves + self._curvature,
+        )  # fmt: skip
+
+    @staticmethod
+    def _learn(s: FloatArray, y: FloatArray, curvature: FloatArray) -> None:
+        """Update the curvature by the change of the gradient, of what the piecewise model does not have."""
         if s @ s < 1e-16:
             return
+        bs = curvature @ s
         sbs, sy = float(s @ bs), float(s @ y)
         share = 1.0 if sy >= 0.2 * sbs else 0.8 * sbs / (sbs - sy)  # Powell (1978)
         y = share * y + (1.0 - share) * bs
-        self._curvature += np.outer(y, y) / float(s @ y) - np.outer(bs, bs) / sbs
-
-    def _model(self, data: HorizonData, point: _Point, slopes: Sensitivity, smooth: FloatArray) -> _Model:
-        problem, span = self.problem, self.problem.span
-        moves = 2.0 * problem.move_weight * (problem.differences.T @ problem.differences)
-        curvature = np.zeros_like(moves) if self._curvature is None else self._curvature
-        return _Model(
-            point.rollout.zone[1:],
-            slopes.zone[1:].reshape(-1, span.size) * span,
-            data.peaks.means(point.rollout.electric),
-            data.peaks.weights @ slopes.electric * span,
-            smooth + problem.move_gradient(data, point.shares),
-            moves + curvature,
-        )
+        curvature += np.outer(y, y) / float(s @ y) - np.outer(bs, bs) / sbs
 
     def _value(self, data: HorizonData, model: _Model, step: FloatArray) -> float:
         """Cost of a step according to the model, but for what is constant."""
-        zone = model.zone + (model.zone_slope @ step).reshape(model.zone.shape)
         highest = data.peaks.so_far.copy()
         np.maximum.at(highest, data.peaks.bucket, model.means + model.mean_slope @ step)
-        comfort = float(self.problem.penalty(data, zone).value.sum())
+        comfort = float(self.problem.penalty(data, model.zone_at(step)).value.sum())
         peaks = float(data.peaks.rate @ highest) / _KILOWATT
         return float(model.gradient @ step + 0.5 * step @ model.hessian @ step) + comfort + peaks
 
     def _step(self, data: HorizonData, point: _Point, model: _Model, reach: float) -> tuple[FloatArray, float, bool]:
         """Minimise the model: step, decrease that it promises, and whether the programmes were solved."""
         rows, lower, upper = self._limits(data, point, model, reach)
-        step, value = np.zeros(point.shares.size), self._value(data, model, np.zeros(point.shares.size))
-        first, n_peak = value, data.peaks.rate.size
+        n, n_peak = point.shares.size, data.peaks.rate.size
+        step = np.zeros(n)
+        first = value = self._value(data, model, step)
         for _ in range(_INNER):
             if time.perf_counter() > self._deadline:
                 break
-            zone = model.zone + (model.zone_slope @ step).reshape(model.zone.shape)
-            penalty = self.problem.penalty(data, zone)
+            penalty = self.problem.penalty(data, model.zone_at(step))
             curved = np.flatnonzero(penalty.curvature)
             part = model.zone_slope[curved]
             bowl = (part * penalty.curvature.ravel()[curved, None]).T @ part
-            hessian = model.hessian + bowl
-            hessian[np.diag_indices_from(hessian)] += 1e-9 * (1.0 + np.trace(hessian) / step.size)
+            hessian = np.zeros((n + n_peak, n + n_peak))
+            hessian[:n, :n] = model.hessian + bowl
+            hessian[range(n), range(n)] += 1e-9 * (1.0 + np.trace(hessian) / n)
             gradient = model.gradient + penalty.slope.ravel() @ model.zone_slope - bowl @ step
-            whole = np.zeros((step.size + n_peak, step.size + n_peak))
-            whole[: step.size, : step.size] = hessian
             found = solve_quadratic(
-                whole, np.concatenate([gradient, data.peaks.rate]), rows, lower, upper, self.quadratic
+                hessian, np.concatenate([gradient, data.peaks.rate]), rows, lower, upper, self.quadratic
             )
-            if not (found.solved and np.isfinite(found.x).all()):
+            if not found.solved:
                 return step, first - value, bool(value < first)
-            towards = found.x[: step.size] - step
+            towards = found.x[:n] - step
             length, trial = 1.0, np.inf
             while length >= _SHORTEST and (trial := self._value(data, model, step + length * towards)) > value:
                 length *= 0.5
@@ -271,28 +260,22 @@ class SequentialSolver:
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Ranges, limits on changes, and peaks above the mean powers, as rows of a quadratic programme [- and kW]."""
         n, n_peak, problem = point.shares.size, data.peaks.rate.size, self.problem
-        change = problem.differences @ point.shares - problem.standing(data)
         limited = np.flatnonzero(np.isfinite(problem.most_change))
-        most = problem.most_change[limited]
-        belongs = np.eye(n_peak)[data.peaks.bucket]
-        rows = np.vstack([
-            np.eye(n, n + n_peak),
-            np.hstack([problem.differences[limited], np.zeros((limited.size, n_peak))]),
-            np.hstack([model.mean_slope / _KILOWATT, -belongs]),
-            np.eye(n_peak, n + n_peak, k=n),
+        change = (problem.differences @ point.shares - problem.standing(data))[limited]
+        most, means = problem.most_change[limited], model.means / _KILOWATT
+        rows = np.block([
+            [np.eye(n), np.zeros((n, n_peak))],
+            [problem.differences[limited], np.zeros((limited.size, n_peak))],
+            [model.mean_slope / _KILOWATT, -np.eye(n_peak)[data.peaks.bucket]],
+            [np.zeros((n_peak, n)), np.eye(n_peak)],
         ])  # fmt: skip
-        none = np.full(len(model.means), -np.inf)
-        lower = np.concatenate(
-            [np.maximum(-point.shares, -reach), -most - change[limited], none, data.peaks.so_far / _KILOWATT]
+        parts = (
+            (np.maximum(-point.shares, -reach), np.minimum(1.0 - point.shares, reach)),
+            (-most - change, most - change),
+            (np.full(means.size, -np.inf), -means),
+            (data.peaks.so_far / _KILOWATT, np.full(n_peak, np.inf)),
         )
-        upper = np.concatenate(
-            [
-                np.minimum(1.0 - point.shares, reach),
-                most - change[limited],
-                -model.means / _KILOWATT,
-                np.full(n_peak, np.inf),
-            ]
-        )
+        lower, upper = (np.concatenate(ends) for ends in zip(*parts, strict=True))
         return rows, np.minimum(lower, upper), upper
 
     def _search(

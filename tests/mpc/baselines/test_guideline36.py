@@ -6,9 +6,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from mpc.baselines.guideline36 import Guideline36, Guideline36Settings
-from mpc.baselines.requests import HysteresisRequests, SuppressedRequests
-from mpc.baselines.reset import OutdoorReset
+from mpc.baselines.guideline36 import Guideline36, Guideline36Settings, HysteresisRequests, SuppressedRequests
+from mpc.baselines.rules import BASELINES, OutdoorReset
 from mpc.control.controller.reading import SitePoints
 from mpc.errors import ControlError
 from mpc.loop.actuators import Actuator
@@ -114,3 +113,11 @@ def test_outdoor_reset_follows_its_lines() -> None:
     assert list(reset.step(cold, None).values()) == [291.15, 291.15, 353.15]
     assert list(reset.step(warm, None).values()) == [286.15, 286.15, 323.15]
     assert list(reset.step(lost, None).values()) == [288.65, 288.65, 338.15] == list(reset.step({}, None).values())
+
+
+@pytest.mark.parametrize("name", BASELINES)
+def test_every_baseline_is_made_of_points_and_actuators(name: str) -> None:
+    rule = BASELINES[name](POINTS, (0, 0, 0, 1), ACTUATORS)
+    chosen = rule.step(Seen(0.0, (295.15,) * 4), None)
+    assert set(chosen) == {a.name for a in ACTUATORS}
+    assert all(a.lowest <= chosen[a.name] <= a.highest for a in ACTUATORS)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from mpc.baselines.trim_respond import TrimRespond, TrimRespondLoop
+from mpc.baselines.guideline36 import TrimRespond, TrimRespondLoop
 from mpc.errors import ControlError
 
 AIR = TrimRespond(291.15, 285.15, 291.15, 0.1, -0.2, -0.6)

@@ -11,8 +11,7 @@ import pytest
 from mpc.control.controller.reading import SitePoints
 from mpc.control.predictor.predictor import Predictor
 from mpc.control.problem.channels import Channel, supply_channels
-from mpc.control.problem.data import HorizonData, PeakData
-from mpc.control.problem.horizon import Horizon
+from mpc.control.problem.horizon import Horizon, HorizonData, PeakData
 from mpc.control.problem.problem import ControlProblem
 from mpc.scenario.forecast import Forecast
 from mpc.scenario.scenario import zone_areas

@@ -11,12 +11,12 @@ from scipy.stats import binom, norm
 from calibration import DisturbanceModel, KalmanFilter
 from calibration.estimation.state_space import state_space
 from mpc.control.predictor.heat import HeatPredictor, heat_channels
-from mpc.control.problem.back_off import BackOff, Margin
 from mpc.control.problem.horizon import Horizon
 from mpc.control.problem.problem import ControlProblem
-from mpc.control.solvers.linear import LinearSolver
+from mpc.control.solvers.convex import LinearSolver
+from mpc.control.solvers.uncertainty import BackOff, Margin
 from mpc.errors import ControlError
-from mpc.scenario.forecaster import ErrorGrowth
+from mpc.scenario.forecast import ErrorGrowth
 from thermal.model.scheme import IMPLICIT_EULER
 
 HORIZON = Horizon.regular(2.0, 600.0, 12)

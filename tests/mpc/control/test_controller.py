@@ -12,7 +12,7 @@ from mpc.control.controller.action import ControllerSettings, Source
 from mpc.control.controller.controller import MpcController
 from mpc.control.controller.observer import Observer
 from mpc.control.controller.reading import SitePoints
-from mpc.control.problem.data import HorizonData
+from mpc.control.problem.horizon import HorizonData
 from mpc.control.solvers.sequential import SequentialSolver
 from mpc.errors import ControlError
 from mpc.scenario.forecast import Forecast

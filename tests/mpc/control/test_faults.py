@@ -17,11 +17,11 @@ from mpc.control.controller.controller import MpcController
 from mpc.control.controller.observer import Observer
 from mpc.control.controller.reading import SitePoints
 from mpc.control.predictor.predictor import Predictor
-from mpc.control.problem.back_off import BackOff
 from mpc.control.problem.channels import supply_channels
 from mpc.control.problem.horizon import Horizon
 from mpc.control.solvers.sequential import SequentialSolver
 from mpc.control.solvers.solution import Status
+from mpc.control.solvers.uncertainty import BackOff
 
 START = pd.Timestamp("2023-01-16 07:00", tz="Etc/GMT+8")
 STEPS, FAULT = 15, 3  # of 5 minutes, and the step from which on there is a fault
@@ -67,7 +67,7 @@ def run(make_problem, modes, hvac, points, make_data, make_forecast) -> Callable
     def go(fault: Callable | None = None, settings: ControllerSettings | None = None) -> tuple[Site, list[Action]]:
         kalman = KalmanFilter(state_space(modes, 300.0), DisturbanceModel(100.0, 6 * 3600.0, 0.05))
         problem = make_problem(Horizon.growing([(0.5, 300.0), (1.5, 900.0)], [0.5, 0.5, 1.0]))
-        controller = MpcController(SequentialSolver(problem), Observer(kalman, modes), points, settings)
+        controller = MpcController(SequentialSolver(problem), Observer(kalman, modes), points, settings or ControllerSettings())
         site, actions = Site(modes, hvac, make_data, points), []
         for k in range(STEPS):
             now = START + k * pd.Timedelta(minutes=5)

@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 
 from mpc.control.predictor.heat import HeatChannel, HeatPredictor, heat_channels
-from mpc.control.problem.data import PeakData
-from mpc.control.problem.horizon import Horizon
+from mpc.control.problem.horizon import Horizon, PeakData
 from mpc.control.problem.problem import ControlProblem
+from mpc.control.solvers.convex import LinearSolver
 from mpc.control.solvers.ipopt import IpoptSolver
-from mpc.control.solvers.linear import LinearSolver
 from mpc.control.solvers.sequential import SequentialSolver
 from mpc.control.solvers.solution import Status
 from mpc.errors import ControlError

@@ -10,8 +10,7 @@ import pytest
 from calibration import DisturbanceModel, KalmanFilter
 from calibration.estimation.state_space import state_space
 from mpc.control.controller.controller import MpcController
-from mpc.control.controller.moving_horizon import MovingHorizonObserver
-from mpc.control.controller.observer import Observer
+from mpc.control.controller.observer import MovingHorizonObserver, Observer
 from mpc.control.solvers.sequential import SequentialSolver
 from mpc.control.solvers.solution import Status
 from mpc.errors import ControlError

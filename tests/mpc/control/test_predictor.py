@@ -7,8 +7,7 @@ import pytest
 
 from mpc.control.predictor.predictor import Predictor
 from mpc.control.problem.channels import Channel
-from mpc.control.problem.data import HorizonData
-from mpc.control.problem.horizon import Horizon
+from mpc.control.problem.horizon import Horizon, HorizonData
 from mpc.errors import ControlError
 from thermal.hvac._symbolic import hvac_function
 from thermal.model.scheme import IMPLICIT_EULER

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mpc.control.problem.channels import Channel
-from mpc.control.problem.data import PeakData
+from mpc.control.problem.horizon import PeakData
 
 
 def test_terms_are_what_they_say(make_problem, make_data) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mpc.control.solvers.quadratic import solve_quadratic
+from mpc.control.solvers.convex import solve_quadratic
 
 
 @pytest.mark.parametrize("solver", ["clarabel", "osqp"])

@@ -14,10 +14,10 @@ from mpc.control.problem.channels import Channel
 from mpc.control.problem.horizon import Horizon
 from mpc.control.problem.problem import ControlProblem
 from mpc.control.solvers.ipopt import IpoptSolver
-from mpc.control.solvers.scenarios import ScenarioSolver, _Tree, outdoor_scenarios
 from mpc.control.solvers.sequential import SequentialSolver
+from mpc.control.solvers.uncertainty import ScenarioSolver, _Tree, outdoor_scenarios
 from mpc.errors import ControlError
-from mpc.scenario.forecaster import ErrorGrowth
+from mpc.scenario.forecast import ErrorGrowth
 
 GROWTH = ErrorGrowth(4.0, 3 * 3600.0)
 

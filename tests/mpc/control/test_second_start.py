@@ -10,12 +10,10 @@ import pytest
 
 from mpc.control.predictor.predictor import Predictor
 from mpc.control.problem.channels import Channel, supply_channels
-from mpc.control.problem.data import HorizonData
-from mpc.control.problem.horizon import Horizon
+from mpc.control.problem.horizon import Horizon, HorizonData
 from mpc.control.problem.problem import ControlProblem, CostTerms
 from mpc.control.solvers.sequential import SequentialSolver
-from mpc.control.solvers.solution import Solution
-from mpc.control.solvers.starts import CHEAPER, Starts
+from mpc.control.solvers.solution import CHEAPER, Solution, Starts
 from thermal.hvac._air_handler import Heater
 from thermal.hvac._smooth import SmoothHvac
 

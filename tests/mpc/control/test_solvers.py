@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mpc.control.problem.channels import Channel
-from mpc.control.problem.data import PeakData
+from mpc.control.problem.horizon import PeakData
 from mpc.control.solvers.ipopt import IpoptSolver
 from mpc.control.solvers.sequential import SequentialSolver
 from mpc.control.solvers.solution import Status

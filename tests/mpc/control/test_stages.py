@@ -8,9 +8,8 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from mpc.control.problem.stages import StageData, StageProblem
 from mpc.control.solvers.solution import Status
-from mpc.control.solvers.stage_solver import StageSolver
+from mpc.control.solvers.stages import StageData, StageProblem, StageSolver
 from mpc.errors import ControlError
 
 N = 15

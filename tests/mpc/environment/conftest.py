@@ -15,7 +15,7 @@ from mpc.loop.make import pilot_weather
 from mpc.loop.noise import SensorNoise
 from mpc.loop.reduced import ReducedBuilding, reduced_building
 from mpc.loop.simulated import SimulatedPlant
-from mpc.scenario.forecaster import DAY_AHEAD_ERRORS, Forecaster
+from mpc.scenario.forecast import DAY_AHEAD_ERRORS, Forecaster
 from mpc.scenario.grid import StepGrid
 from mpc.scenario.occupancy import RandomOccupancy
 from mpc.scenario.paper import paper_carbon, paper_tariff

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mpc.kpi.integrals import excess
+from mpc.kpi.record import excess
 
 ENDS = st.floats(-50.0, 50.0).map(lambda value: round(value, 6))
 

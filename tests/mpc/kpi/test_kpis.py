@@ -13,7 +13,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from mpc.errors import MpcError
-from mpc.kpi.kpis import Kpis, measure_kpis
+from mpc.kpi.kpis import KPIS, Kpis, MeasuredRun, measure_kpis, register_kpi
 from mpc.kpi.record import PlantRecord
 from mpc.scenario.scenario import Scenario
 from mpc.scenario.tariff import DemandCharge
@@ -171,3 +171,41 @@ def test_what_does_not_fit_is_refused(plain_scenario: Make) -> None:
     ):
         with pytest.raises(MpcError, match=message):
             build()
+
+
+def test_a_kpi_of_ones_own_is_measured_and_shown(plain_scenario: Make, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A function of a run and its tariff, registered outside of the library."""
+    monkeypatch.setattr("mpc.kpi.kpis.KPIS", dict(KPIS))
+
+    def dearest_hour(run: MeasuredRun) -> float:
+        price = run.scenario.electricity_price[run.rows]
+        return float((price * run.record.electricity / 1000.0).max())
+
+    register_kpi("dearest_hour", dearest_hour, "currency/h", "highest cost of electricity in an hour")
+    register_kpi("dearest_hour", dearest_hour, "currency/h", "highest cost of electricity in an hour")  # read again
+    register_kpi("never", lambda run: None, "-", "what no plant has")
+    scenario = plain_scenario(n_steps=4)
+    run = record(scenario, electricity=np.array([1000.0, 4000.0, 2000.0, 0.0]))
+    kpis = measure_kpis(run, scenario)
+    assert kpis.own == {"dearest_hour": pytest.approx(0.8), "never": None}
+    assert kpis.to_dict()["dearest_hour"] == pytest.approx(0.8) and "own" not in kpis.to_dict()
+    table = kpis.to_frame()
+    assert table.loc["dearest_hour", "unit"] == "USD/h" and table.loc["cost_tot", "value"] == kpis.cost_tot
+    assert [*table.index] == [*kpis.values] and "dearest_hour=0.8" in repr(kpis) and len(repr(kpis)) < 300
+    for name in ("cost_tot", "zones", "dearest_hour", "two words"):
+        with pytest.raises(MpcError, match="a name beside tdis_tot"):
+            register_kpi(name, lambda run: 0.0, "-", "another")
+
+
+def test_a_record_goes_to_pandas_and_back(plain_scenario: Make) -> None:
+    scenario = plain_scenario(n_steps=4)
+    run = record(scenario, co2=np.full((5, 2), 4e-4))
+    table = run.to_frame(scenario.grid.start, scenario.zones)
+    assert table.index[-1] == scenario.grid.stamps[-1] and table["electricity"].isna().tolist() == [True] + [False] * 4
+    for back in (PlantRecord.from_frame(table), PlantRecord.from_frame(run.to_frame())):
+        assert back.step == run.step and back.district_heating is None
+        for name in ("zone_temperature", "electricity", "gas", "co2"):
+            np.testing.assert_array_equal(getattr(back, name), getattr(run, name))
+    assert repr(run) == "PlantRecord(4 steps of 900 s, 2 zones)"
+    with pytest.raises(MpcError, match="regular edges"):
+        PlantRecord.from_frame(table.drop(columns="electricity"))

@@ -11,8 +11,7 @@ from mpc.errors import PlantError
 from mpc.loop.plant import Measurements, Plant, RestorablePlant
 from mpc.loop.run import FixedSetpoints, run_closed_loop
 from mpc.loop.simulated import SimulatedPlant
-from mpc.scenario.forecast import Forecast
-from mpc.scenario.forecaster import Forecaster
+from mpc.scenario.forecast import Forecast, Forecaster
 from mpc.scenario.scenario import Scenario
 
 Make = Callable[..., SimulatedPlant]

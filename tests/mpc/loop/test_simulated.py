@@ -15,7 +15,7 @@ from mpc.loop.building import GridBuilding
 from mpc.loop.noise import SensorNoise
 from mpc.loop.operation import scheduled_operation
 from mpc.loop.simulated import SimulatedPlant
-from mpc.scenario.forecaster import Forecaster
+from mpc.scenario.forecast import Forecaster
 from mpc.scenario.scenario import Scenario
 from thermal import Building, Simulator, load_case, save_case
 from thermal.hvac._system import HvacSystem

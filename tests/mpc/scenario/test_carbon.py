@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from mpc.errors import ScenarioError
-from mpc.scenario.carbon import GAS_CARBON, CarbonIntensity
 from mpc.scenario.rates import ConstantRate
+from mpc.scenario.tariff import GAS_CARBON, CarbonIntensity
 
 
 def test_gas_by_its_energy() -> None:

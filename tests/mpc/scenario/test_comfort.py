@@ -8,8 +8,8 @@ import pandas as pd
 import pytest
 
 from mpc.errors import ScenarioError
-from mpc.scenario.comfort import ComfortBand
 from mpc.scenario.grid import Calendar, StepGrid
+from mpc.scenario.occupancy import ComfortBand
 
 ZONE = "America/Los_Angeles"
 

@@ -54,16 +54,16 @@ def test_units_of_ones_own() -> None:
     own = table(2)[[AIR, "east/internal_gain", "electricity_price"]]
     own[AIR], own["east/internal_gain"] = [10.0, 20.0], [0.3, 0.4]
     units = {AIR: "degC", "east/internal_gain": "kW", "electricity_price": "1/kWh"}
-    values = Forecast.from_table(own, units).values(list(own))
+    values = Forecast.from_frame(own, units).values(list(own))
     assert values == pytest.approx(np.array([[283.15, 300.0, 0.2], [293.15, 400.0, 0.2]]))
     for change, message in (
         ({"electricity_price": "1/MWh"}, "the unit '1/kWh'"),
         ({AIR: "W"}, "a unit of a temperature"),
     ):
         with pytest.raises(ScenarioError, match=message):
-            Forecast.from_table(own, units | change)
+            Forecast.from_frame(own, units | change)
     with pytest.raises(ScenarioError, match="a unit, found none; add it"):
-        Forecast.from_table(own, {AIR: "degC"})
+        Forecast.from_frame(own, {AIR: "degC"})
 
 
 def test_what_is_no_forecast_is_refused() -> None:
@@ -75,3 +75,10 @@ def test_what_is_no_forecast_is_refused() -> None:
         column_unit("electricty_price")
     with pytest.raises(ScenarioError, match="'hold' or None"):
         Forecast(table()).values([AIR], fill="zero")  # type: ignore[arg-type]
+
+
+def test_a_forecast_goes_to_pandas_and_back() -> None:
+    forecast = Forecast(table())
+    again = Forecast.from_frame(forecast.to_frame(), forecast.units)
+    pd.testing.assert_frame_equal(again.table, forecast.table)
+    assert repr(forecast) == "Forecast(72 steps, 2023-07-06 07:05:00-07:00 to 2023-07-06 13:00:00-07:00, 3 columns)"

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from mpc.errors import ScenarioError
-from mpc.scenario.forecaster import DAY_AHEAD_ERRORS, ErrorGrowth, Forecaster
+from mpc.scenario.forecast import DAY_AHEAD_ERRORS, ErrorGrowth, Forecaster
 from mpc.scenario.occupancy import RandomOccupancy
 from mpc.scenario.paper import paper_tariff
 from mpc.scenario.scenario import Scenario, build_scenario
@@ -26,7 +26,7 @@ def scenario(plain_scenario: Callable[..., Scenario], building: Building) -> Sce
     grid = plain_scenario(n_steps=192).grid
     columns = {AIR: 288.0, WIND: 0.5, BEAM: 600.0, DIFFUSE: 100.0}
     weather = Weather(pd.DataFrame(columns, index=grid.stamps), building.location)
-    return build_scenario(building, grid, weather, paper_tariff(), occupancy=RandomOccupancy(9.0), seed=1)
+    return build_scenario(building, grid, weather, paper_tariff(), occupancy=RandomOccupancy(9.0)).redrawn(1)
 
 
 def test_a_perfect_forecast_is_the_truth(scenario: Scenario) -> None:

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from mpc.errors import ScenarioError
 from mpc.scenario.grid import Calendar, StepGrid
 from mpc.scenario.paper import paper_carbon, paper_tariff
-from mpc.scenario.rates import GAS_UNITS, ConstantRate, HourlyRate, MonthlyRate, SeriesRate, gas_price
+from mpc.scenario.rates import GAS_UNITS, ConstantRate, HourlyRate, SeriesRate, gas_price, monthly_rate
 
 ZONE = "America/Los_Angeles"
 BY_HOUR = [float(hour) for hour in range(24)]
@@ -50,7 +50,7 @@ def test_weekends_holidays_and_months() -> None:
     weekday = np.outer(np.arange(1.0, 13.0), np.ones(24))
     rate = HourlyRate(weekday, np.zeros(24), Calendar([date(2023, 7, 4)]))
     assert rate.on(grid("2023-06-30", 86400.0, 5)).tolist() == [6.0, 0.0, 0.0, 7.0, 0.0]  # Friday to a holiday
-    assert MonthlyRate(range(12)).on(grid("2023-06-30", 86400.0, 2)).tolist() == [5.0, 6.0]
+    assert monthly_rate(range(12)).on(grid("2023-06-30", 86400.0, 2)).tolist() == [5.0, 6.0]
 
 
 @given(step=st.sampled_from([300, 900, 1800, 3600, 7200]))
@@ -99,7 +99,7 @@ def test_what_is_no_rate_is_refused() -> None:
         (lambda: HourlyRate([1.0] * 23), "24 finite numbers"),
         (lambda: HourlyRate([np.nan] * 24), "24 finite numbers"),
         (lambda: ConstantRate(float("nan")), "finite number"),
-        (lambda: MonthlyRate([1.0]), "12 finite"),
+        (lambda: monthly_rate([1.0]), "12 finite"),
         (lambda: SeriesRate(series, "middle"), "'start' or 'end'"),  # type: ignore[arg-type]
         (lambda: SeriesRate(series.tz_localize(None), "end"), "time zone"),
         (lambda: SeriesRate(series.iloc[[0, 1, 3]], "end"), "03:00"),

@@ -9,10 +9,9 @@ import pandas as pd
 import pytest
 
 from mpc.errors import ScenarioError, WeatherError
-from mpc.scenario.comfort import ComfortBand
 from mpc.scenario.gains import InternalGains
 from mpc.scenario.grid import StepGrid
-from mpc.scenario.occupancy import RandomOccupancy
+from mpc.scenario.occupancy import ComfortBand, RandomOccupancy
 from mpc.scenario.paper import paper_carbon, paper_tariff
 from mpc.scenario.scenario import Scenario, build_scenario, zone_areas
 from mpc.scenario.weather import Weather
@@ -28,8 +27,8 @@ def bundled() -> Scenario:
     grid = StepGrid(case.stamps[287], 300.0, 2 * 288)
     people = RandomOccupancy(6.0, arrival=(7.0, 9.0), departure=(16.0, 18.0))
     return build_scenario(
-        case.building, grid, weather_of_case(case), paper_tariff(), carbon=paper_carbon(), occupancy=people, seed=3
-    )
+        case.building, grid, weather_of_case(case), paper_tariff(), carbon=paper_carbon(), occupancy=people
+    ).redrawn(3)
 
 
 def test_parts_are_those_asked_for(bundled: Scenario) -> None:

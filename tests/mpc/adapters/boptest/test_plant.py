@@ -15,8 +15,7 @@ from mpc.kpi.kpis import measure_kpis
 from mpc.loop.plant import Measurements
 from mpc.loop.run import run_closed_loop
 from mpc.loop.simulated import SimulatedPlant
-from mpc.scenario.forecast import Forecast
-from mpc.scenario.forecaster import Forecaster
+from mpc.scenario.forecast import Forecast, Forecaster
 from mpc.scenario.grid import StepGrid
 
 DAY = 86_400.0
