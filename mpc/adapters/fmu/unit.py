@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 from collections.abc import Iterable, Mapping, Sequence
-from contextlib import chdir
+from contextlib import chdir, suppress
 from pathlib import Path
 from typing import Any
 
@@ -157,12 +157,9 @@ class Unit:
         """Free the instance, if there is one."""
         slave, self._slave = self._slave, None
         if slave is not None:
-            try:
+            with suppress(Exception):  # it may have failed before; it is freed all the same
                 slave.terminate()
-            except Exception:  # it may have failed before; it is freed all the same
-                slave.freeInstance()
-            else:
-                slave.freeInstance()
+            slave.freeInstance()
 
     def close(self) -> None:
         """Free everything, the unpacked files too."""
