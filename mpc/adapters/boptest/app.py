@@ -6,7 +6,6 @@ import asyncio
 import ipaddress
 import json
 import logging
-import math
 import time
 import uuid
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterable, Sequence
@@ -24,7 +23,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from mpc.adapters.boptest.case import BoptestCase
 from mpc.adapters.boptest.requests import LONGEST_BODY, Answer, read_body
-from mpc.adapters.boptest.test import BoptestTest
+from mpc.adapters.boptest.test import REQUESTS, BoptestTest
 from mpc.errors import BoptestError, BoptestRequestError, MpcError
 from thermal.errors import describe
 
@@ -43,23 +42,6 @@ _WORKERS = 4  # threads that simulate; Python lets one of them compute at a time
 _SWEEP = 5.0  # s between looks for idle tests
 
 Handler = Callable[[Request], Awaitable[Response]]
-
-# what a test is asked; requests other than GET have arguments
-_ASKED: dict[tuple[str, str], Callable[..., Answer]] = {
-    ("GET", "name"): BoptestTest.get_name,
-    ("GET", "inputs"): BoptestTest.get_inputs,
-    ("GET", "measurements"): BoptestTest.get_measurements,
-    ("GET", "forecast_points"): BoptestTest.get_forecast_points,
-    ("GET", "step"): BoptestTest.get_step,
-    ("GET", "scenario"): BoptestTest.get_scenario,
-    ("GET", "kpi"): BoptestTest.kpis,
-    ("PUT", "initialize"): BoptestTest.initialize,
-    ("PUT", "step"): BoptestTest.set_step,
-    ("PUT", "scenario"): BoptestTest.set_scenario,
-    ("PUT", "forecast"): BoptestTest.forecast,
-    ("PUT", "results"): BoptestTest.results,
-    ("POST", "advance"): BoptestTest.advance,
-}
 
 
 @dataclass(eq=False)
@@ -263,7 +245,7 @@ def create_app(tests: HeldTests) -> FastAPI:
         app.add_route(f"/testcases/{{name}}/{path}", select, ["POST"])
     handlers: dict[tuple[str, str], Handler] = {("GET", "version"): version, ("PUT", "stop"): stop}
     handlers |= {("GET", "status"): of_test(status), ("POST", "submit"): of_test(submit)}
-    handlers |= {(verb, name): asking(verb, ask) for (verb, name), ask in _ASKED.items()}
+    handlers |= {(verb, name): asking(verb, ask) for (verb, name), ask in REQUESTS.items()}
     for (verb, name), handler in handlers.items():
         app.add_route(f"/{name}/{{testid}}", handler, [verb])
         app.add_route(f"/{name}", handler, [verb])
@@ -341,18 +323,16 @@ def _counted(receive: Receive) -> Receive:
 def _sweeping(tests: HeldTests) -> Callable[[FastAPI], Any]:
     """Free idle tests as long as the application lives."""
 
+    async def sweep() -> None:
+        while True:
+            await asyncio.sleep(min(_SWEEP, tests.idle_seconds / 4.0))
+            tests.free_idle()
+
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
-        async def sweep() -> None:
-            while True:
-                await asyncio.sleep(min(_SWEEP, tests.idle_seconds / 4.0))
-                tests.free_idle()
-
         task = asyncio.create_task(sweep())
-        try:
-            yield
-        finally:
-            task.cancel()
+        yield
+        task.cancel()
 
     return lifespan
 
@@ -386,13 +366,5 @@ def _respond(status: int, content: Any) -> Response:
     try:
         text = json.dumps(content, allow_nan=False)
     except ValueError:  # a sensor that reads nothing
-        text = json.dumps(_without_nan(content), allow_nan=False)
+        text = json.dumps(json.loads(json.dumps(content), parse_constant=lambda name: None))
     return Response(text, status, media_type="application/json")
-
-
-def _without_nan(content: Any) -> Any:
-    if isinstance(content, dict):
-        return {key: _without_nan(value) for key, value in content.items()}
-    if isinstance(content, list):
-        return [_without_nan(value) for value in content]
-    return None if isinstance(content, float) and not math.isfinite(content) else content

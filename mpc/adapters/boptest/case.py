@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 
 from mpc.adapters.boptest.scenario import DAY, Period, YearClock, find_periods, scenario_prices
-from mpc.adapters.boptest.signals import ObservedPlant, PlantSignals
+from mpc.adapters.boptest.signals import Metadata, ObservedPlant, PlantSignals, forecast_metadata
 from mpc.errors import BoptestRequestError, PlantError
 from mpc.loop.building import BuildingModel
 from mpc.loop.noise import SensorNoise
@@ -221,10 +221,11 @@ class BoptestCase:
         return PlantSignals(self._plant(first, first + DAY))
 
     @cached_property
-    def weather_points(self) -> frozenset[str]:
-        """Points of the weather station that are known at any time."""
+    def forecast_points(self) -> Metadata:
+        """Metadata of the boundary conditions, of the weather those that are known at any time."""
         frame = self.weather.frame
-        return frozenset(str(point) for point in frame if frame[point].notna().any())
+        known = {str(point) for point in frame if frame[point].notna().any()}
+        return forecast_metadata(known, self.building.zone_names, self.tariff.currency, self.carbon.kind)
 
     @property
     def _first_day(self) -> float:

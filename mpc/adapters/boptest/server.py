@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ipaddress
 import logging
+import os
 import socket
 import threading
 import time
@@ -112,18 +113,14 @@ def _listen(host: str, port: int) -> socket.socket:
     if not 0 <= port <= 65535:
         raise BoptestError(describe("port", "a number from 0 to 65535", repr(port)))
     try:
-        family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
-        listening = socket.socket(family, kind, protocol)
+        family, _, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
     except OSError as error:
         raise BoptestError(f"host {host!r}: {error.strerror or error}") from error
+    both = family == socket.AF_INET6 and socket.has_dualstack_ipv6()
     try:
-        listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        listening.bind(address)
-        listening.listen(1024)
+        return socket.create_server(address, family=family, backlog=1024, dualstack_ipv6=both)
     except OSError as error:
-        listening.close()
-        raise BoptestError(f"port {port} of {host}: {error.strerror or error}; choose another") from error
-    return listening
+        raise BoptestError(f"port {port} of {host}: {os.strerror(error.errno or 0)}; choose another") from error
 
 
 def check_host(host: str, allow_remote: bool) -> None:

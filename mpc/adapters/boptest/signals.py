@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Collection, Iterable, Mapping
+from itertools import chain, count
 from operator import attrgetter
 from typing import Any
 
@@ -117,13 +118,10 @@ def _signal_names(names: Iterable[str]) -> dict[str, str]:
     found: dict[str, str] = {}
     taken: set[str] = set()
     for name in names:
-        plain = signal = re.sub(r"\W+", "_", name)
-        count = 1
-        while signal in taken:
-            count += 1
-            signal = f"{plain}_{count}"
-        taken.add(signal)
-        found[name] = signal
+        plain = re.sub(r"\W+", "_", name)
+        numbered = (f"{plain}_{k}" for k in count(2))
+        found[name] = next(signal for signal in chain([plain], numbered) if signal not in taken)
+        taken.add(found[name])
     return found
 
 

@@ -13,15 +13,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
-from mpc.adapters.energyplus.input import (
-    CHICAGO,
-    InputFile,
-    building_path,
-    entity,
-    read_input,
-    weather_path,
-    with_period,
-)
+from mpc.adapters.energyplus.input import CHICAGO, InputFile, building_path, entity, read_input, weather_path
 from mpc.adapters.energyplus.layout import PlantLayout, find_layout
 from mpc.adapters.energyplus.process import Job, run_energyplus
 from mpc.errors import EnergyPlusError
@@ -146,7 +138,7 @@ def energyplus_building(name: str | Path, weather: str | Path = CHICAGO) -> Ener
 def _described(path: Path, weather: Path) -> EnergyPlusBuilding:
     source = read_input(path)
     layout = find_layout(source)
-    content: dict[str, Any] = with_period(source, _DAY, 1, 6)
+    content: dict[str, Any] = source.with_period(_DAY, 1, 6)
     content["Output:SQLite"] = {"Output:SQLite 1": {"option_type": "SimpleAndTabular"}}
     content["Output:VariableDictionary"] = {"Output:VariableDictionary 1": {"key_field": "IDF"}}
     job = Job(json.dumps(content), "in.epJSON", weather, stepped=False)

@@ -183,6 +183,46 @@ class InputFile:
                 return tuple(str(entry["node_name"]) for entry in fields["nodes"])
         return (name,)
 
+    def with_period(self, start: date, days: int, steps_per_hour: int) -> dict[str, Any]:
+        """Copy the content with its clock and reports replaced.
+
+        Reports of its own are left out, daylight saving time too: the building's clock is that of its weather file.
+        Holidays stay.
+
+        Parameters
+        ----------
+        start : date
+            First day; its day of the week counts.
+        days : int
+            Number of days.
+        steps_per_hour : int
+            Of zones and weather.
+
+        Returns
+        -------
+        dict
+            Content of an input file, to be written as JSON.
+        """
+        last = start + timedelta(days=days - 1)
+        content = {k: copy.deepcopy(dict(v)) for k, v in self.content.items() if k not in (*_REPORTS, *_CLOCK)}
+        content["Timestep"] = {"Timestep 1": {"number_of_timesteps_per_hour": steps_per_hour}}
+        control: dict[str, Any] = dict(next(iter(content.get("SimulationControl", {"": {}}).values())))
+        control |= {
+            "run_simulation_for_sizing_periods": "No",
+            "run_simulation_for_weather_file_run_periods": "Yes",
+        }
+        content["SimulationControl"] = {"SimulationControl 1": control}
+        content["RunPeriod"] = {
+            "run": {
+                "begin_month": start.month, "begin_day_of_month": start.day, "begin_year": start.year,
+                "end_month": last.month, "end_day_of_month": last.day, "end_year": last.year,
+                "day_of_week_for_start_day": start.strftime("%A"), "use_weather_file_holidays_and_special_days": "No",
+                "use_weather_file_daylight_saving_period": "No", "apply_weekend_holiday_rule": "No",
+                "use_weather_file_rain_indicators": "Yes", "use_weather_file_snow_indicators": "Yes",
+            }
+        }  # fmt: skip
+        return content
+
 
 @cache
 def read_input(path: Path) -> InputFile:
@@ -203,49 +243,6 @@ def read_input(path: Path) -> InputFile:
     )
     text = run_energyplus(job, ["in.epJSON"])["in.epJSON"]
     return InputFile(json.loads(text), path.stem)
-
-
-def with_period(source: InputFile, start: date, days: int, steps_per_hour: int) -> dict[str, Any]:
-    """Copy an input file with its clock and reports replaced.
-
-    Reports of its own are left out, daylight saving time too: the building's clock is that of its weather file.
-    Holidays stay.
-
-    Parameters
-    ----------
-    source : InputFile
-        The building.
-    start : date
-        First day; its day of the week counts.
-    days : int
-        Number of days.
-    steps_per_hour : int
-        Of zones and weather.
-
-    Returns
-    -------
-    dict
-        Content of an input file, to be written as JSON.
-    """
-    last = start + timedelta(days=days - 1)
-    content = {k: copy.deepcopy(dict(v)) for k, v in source.content.items() if k not in (*_REPORTS, *_CLOCK)}
-    content["Timestep"] = {"Timestep 1": {"number_of_timesteps_per_hour": steps_per_hour}}
-    control: dict[str, Any] = dict(next(iter(content.get("SimulationControl", {"": {}}).values())))
-    control |= {
-        "run_simulation_for_sizing_periods": "No",
-        "run_simulation_for_weather_file_run_periods": "Yes",
-    }
-    content["SimulationControl"] = {"SimulationControl 1": control}
-    content["RunPeriod"] = {
-        "run": {
-            "begin_month": start.month, "begin_day_of_month": start.day, "begin_year": start.year,
-            "end_month": last.month, "end_day_of_month": last.day, "end_year": last.year,
-            "day_of_week_for_start_day": start.strftime("%A"), "use_weather_file_holidays_and_special_days": "No",
-            "use_weather_file_daylight_saving_period": "No", "apply_weekend_holiday_rule": "No",
-            "use_weather_file_rain_indicators": "Yes", "use_weather_file_snow_indicators": "Yes",
-        }
-    }  # fmt: skip
-    return content
 
 
 def holidays(source: InputFile, years: Iterable[int]) -> frozenset[date]:

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from mpc.adapters.energyplus.building import EnergyPlusBuilding
-from mpc.adapters.energyplus.input import InputFile, entity, with_period
+from mpc.adapters.energyplus.input import InputFile, entity
 from mpc.adapters.energyplus.layout import AirLoop, PlantLayout, Terminal, WaterLoop
 from mpc.errors import EnergyPlusError, PlantError
 from mpc.loop.actuators import ACTION_LIMITS, COOLING_SETPOINT, HEATING_SETPOINT, SUPPLY_AIR, SUPPLY_WATER, Actuator
@@ -247,7 +247,7 @@ def prepared(source: EnergyPlusBuilding, start: date, days: int, steps_per_hour:
     dict
         Content of an input file.
     """
-    content = with_period(source.source, start, days, steps_per_hour)
+    content = source.source.with_period(start, days, steps_per_hour)
     for supply in _supplies(source):
         content[supply.kind][supply.own] = dict(content[supply.kind][supply.schedule])
         for manager in supply.managers:
