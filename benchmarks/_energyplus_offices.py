@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from calibration.diagnosis.diagnosis import diagnose
-from mpc.adapters.energyplus.make import energyplus_plant
-from mpc.adapters.energyplus.plant import EnergyPlusPlant
+from mpc.adapters.energyplus.make import EnergyPlusConditions, energyplus_plant
+from mpc.adapters.energyplus.plant import EnergyPlusPlant, EnergyPlusSettings
 from mpc.loop.noise import SensorNoise
 from mpc.loop.plant import Measurements
 from mpc.loop.run import run_closed_loop
@@ -73,11 +73,10 @@ class Office:
             Of the noise.
         """
         tariff = Tariff(ConstantRate(ELECTRICITY), ConstantRate(GAS))
-        plant = energyplus_plant(
-            self.file, start, days, step_seconds=STEP, control_steps=CONTROL_STEPS, horizon=horizon, tariff=tariff,
-            noise=SensorNoise(),
+        return energyplus_plant(
+            self.file, start, days, EnergyPlusSettings(CONTROL_STEPS, noise=SensorNoise()),
+            EnergyPlusConditions(tariff), step_seconds=STEP, horizon=horizon,
         )  # fmt: skip
-        return plant
 
 
 _MEDIUM, _LARGE = "RefBldgMediumOfficeNew2004_Chicago", "RefBldgLargeOfficeNew2004_Chicago"

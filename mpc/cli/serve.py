@@ -48,8 +48,7 @@ def serve(
     json: Json = False,
 ) -> int:
     """Serve plants until interrupted."""
-    from mpc.adapters.boptest.guard import check_host
-    from mpc.adapters.boptest.server import BoptestServer
+    from mpc.adapters.boptest.server import BoptestServer, check_host
     from mpc.errors import BoptestError
 
     if not boptest:

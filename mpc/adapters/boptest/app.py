@@ -1,25 +1,31 @@
-"""BOPTEST's REST API over the tests that a server holds."""
+"""BOPTEST's REST API over the tests that a server holds, and who may use it."""
 
 from __future__ import annotations
 
 import asyncio
+import ipaddress
 import json
 import logging
-import math
-from collections.abc import AsyncIterator, Awaitable, Callable
+import time
+import uuid
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterable, Sequence
 from contextlib import asynccontextmanager
+from dataclasses import dataclass, field
 from importlib import metadata
 from typing import Any
+from urllib.parse import urlsplit
 
 import anyio
 from fastapi import FastAPI, Request
 from starlette.requests import ClientDisconnect
 from starlette.responses import Response
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from mpc.adapters.boptest.body import read_body
-from mpc.adapters.boptest.registry import DEFAULT_TEST, HeldTest, HeldTests
-from mpc.adapters.boptest.test import Answer, BoptestTest
-from mpc.errors import BoptestRequestError, MpcError
+from mpc.adapters.boptest.case import BoptestCase
+from mpc.adapters.boptest.requests import LONGEST_BODY, Answer, read_body
+from mpc.adapters.boptest.test import REQUESTS, BoptestTest
+from mpc.errors import BoptestError, BoptestRequestError, MpcError
+from thermal.errors import describe
 
 #: Version of BOPTEST whose API this is.
 API_VERSION = "1.0.0"
@@ -27,32 +33,135 @@ API_VERSION = "1.0.0"
 #: Most requests that wait for one test.
 MOST_WAITING = 64
 
+#: The test that requests without a number go to, as before BOPTEST 0.7.
+DEFAULT_TEST = ""
+
 _log = logging.getLogger(__name__)
 
 _WORKERS = 4  # threads that simulate; Python lets one of them compute at a time
 _SWEEP = 5.0  # s between looks for idle tests
 
 Handler = Callable[[Request], Awaitable[Response]]
-Question = Callable[[BoptestTest], Answer]
-Command = Callable[[BoptestTest, dict[str, Any]], Answer]
 
-_QUESTIONS: dict[str, Question] = {
-    "name": BoptestTest.get_name,
-    "inputs": BoptestTest.get_inputs,
-    "measurements": BoptestTest.get_measurements,
-    "forecast_points": BoptestTest.get_forecast_points,
-    "step": BoptestTest.get_step,
-    "scenario": BoptestTest.get_scenario,
-    "kpi": BoptestTest.kpis,
-}
-_COMMANDS: dict[tuple[str, str], Command] = {
-    ("PUT", "initialize"): BoptestTest.initialize,
-    ("PUT", "step"): BoptestTest.set_step,
-    ("PUT", "scenario"): BoptestTest.set_scenario,
-    ("PUT", "forecast"): BoptestTest.forecast,
-    ("PUT", "results"): BoptestTest.results,
-    ("POST", "advance"): BoptestTest.advance,
-}
+
+@dataclass(eq=False)
+class HeldTest:
+    """A test with what a server needs to know about it.
+
+    Parameters
+    ----------
+    test : BoptestTest
+        Its state.
+    last_used : float
+        Time when it was last asked for [s].
+    waiting : int
+        Requests that wait for it.
+    turn : Lock
+        Held by the request that is being answered.
+    """
+
+    test: BoptestTest
+    last_used: float
+    waiting: int = 0
+    turn: asyncio.Lock = field(default_factory=asyncio.Lock)
+
+
+class HeldTests:
+    """Test cases that are served, and the tests of them that run.
+
+    Parameters
+    ----------
+    cases : sequence of BoptestCase
+        At least one, each with a name of its own.
+    most : int
+        How many tests run at once.
+    idle_seconds : float
+        A test that nobody asks for this long is freed [s].
+    clock : callable
+        Time that passes [s].
+
+    Raises
+    ------
+    BoptestError
+        When there is no case, two have one name, or a number is out of range.
+    """
+
+    def __init__(
+        self,
+        cases: Sequence[BoptestCase],
+        most: int = 64,
+        idle_seconds: float = 900.0,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self.cases = {case.name: case for case in cases}
+        if not cases or len(self.cases) < len(cases):
+            found = ", ".join(case.name for case in cases) or "none"
+            raise BoptestError(describe("cases", "one or more, each with a name of its own", found))
+        if not (most >= 1 and idle_seconds > 0):
+            found = f"{most} and {idle_seconds} s"
+            raise BoptestError(describe("server", "one test at least, and a positive idle time", found))
+        self.most, self.idle_seconds, self.clock = most, idle_seconds, clock
+        self._held: dict[str, HeldTest] = {}
+
+    def __len__(self) -> int:
+        return len(self._held)
+
+    def select(self, name: str, testid: str | None = None) -> str | None:
+        """Begin a test.
+
+        Parameters
+        ----------
+        name : str
+            Of a case that is served.
+        testid : str, optional
+            Its number; a new random one by default.
+
+        Returns
+        -------
+        str or None
+            Its number; None when as many run as may.
+        """
+        self.free_idle()
+        if len(self._held) >= self.most:
+            return None
+        chosen = str(uuid.uuid4()) if testid is None else testid
+        self._held[chosen] = HeldTest(BoptestTest(self.cases[name]), self.clock())
+        return chosen
+
+    def find(self, testid: str) -> HeldTest | None:
+        """Look a test up, which counts as use of it.
+
+        Parameters
+        ----------
+        testid : str
+            Its number.
+        """
+        if testid == DEFAULT_TEST and testid not in self._held:
+            self.select(next(iter(self.cases)), DEFAULT_TEST)
+        held = self._held.get(testid)
+        if held is not None:
+            held.last_used = self.clock()
+        return held
+
+    def stop(self, testid: str) -> bool:
+        """Free a test; whether there was one.
+
+        Parameters
+        ----------
+        testid : str
+            Its number.
+        """
+        return self._held.pop(testid, None) is not None
+
+    def free_idle(self) -> int:
+        """Free the tests that nobody has come back to, and tell how many."""
+        limit = self.clock() - self.idle_seconds
+        # who has no number would not learn that the common test begins anew: it stays
+        held = ((testid, held) for testid, held in self._held.items() if testid != DEFAULT_TEST)
+        lost = [testid for testid, test in held if test.last_used < limit and not test.waiting]
+        for testid in lost:
+            del self._held[testid]
+        return len(lost)
 
 
 def create_app(tests: HeldTests) -> FastAPI:
@@ -88,101 +197,150 @@ def create_app(tests: HeldTests) -> FastAPI:
         payload = {"version": API_VERSION, "service-version": API_VERSION, "server": served_by}
         return _status(200, "Queried the version number successfully.", payload)
 
-    async def status(request: Request) -> Response:
-        testid = request.path_params.get("testid", DEFAULT_TEST)
-        return _unknown(testid) if tests.find(testid) is None else _respond(200, "Running")
-
     async def stop(request: Request) -> Response:
         testid = request.path_params.get("testid", DEFAULT_TEST)
         return Response("OK", media_type="text/plain") if tests.stop(testid) else _unknown(testid)
 
-    async def submit(request: Request) -> Response:
-        testid = request.path_params.get("testid", DEFAULT_TEST)
-        if tests.find(testid) is None:
-            return _unknown(testid)
+    async def status(held: HeldTest, request: Request) -> Response:
+        return _respond(200, "Running")
+
+    async def submit(held: HeldTest, request: Request) -> Response:
         return _status(400, "This server is no official instance: it sends nothing to BOPTEST's dashboard.")
+
+    def of_test(answer: Callable[[HeldTest, Request], Awaitable[Response]]) -> Handler:
+        """Answer requests of a test that is there."""
+
+        async def handle(request: Request) -> Response:
+            testid = request.path_params.get("testid", DEFAULT_TEST)
+            held = tests.find(testid)
+            return _unknown(testid) if held is None else await answer(held, request)
+
+        return handle
+
+    def asking(verb: str, ask: Callable[..., Answer]) -> Handler:
+        """Ask a test once the requests before are done: they never overlap."""
+
+        async def answer(held: HeldTest, request: Request) -> Response:
+            kind = request.headers.get("content-type", "")
+            try:
+                body = [] if verb == "GET" else [read_body(await request.body(), kind)]
+            except ClientDisconnect:
+                return Response(status_code=400)  # nobody is there to read it
+            except BoptestRequestError as error:
+                return _status(400, str(error))
+            if held.waiting >= MOST_WAITING:
+                return _status(503, f"{MOST_WAITING} requests wait for this test already.")
+            held.waiting += 1
+            try:
+                async with held.turn:
+                    return await anyio.to_thread.run_sync(_answered, ask, held.test, *body, limiter=workers)
+            finally:
+                held.waiting -= 1
+                held.last_used = tests.clock()
+
+        return of_test(answer)
 
     app.add_route("/testcases", cases, ["GET"])
     for path in ("select", "select-async"):
         app.add_route(f"/testcases/{{name}}/{path}", select, ["POST"])
-    special: list[tuple[str, str, Handler]] = [("GET", "version", version), ("GET", "status", status)]
-    special += [("PUT", "stop", stop), ("POST", "submit", submit)]
-    answered: list[tuple[str, str, Handler]] = [
-        *(("GET", name, _asking(tests, workers, question)) for name, question in _QUESTIONS.items()),
-        *((verb, name, _telling(tests, workers, command)) for (verb, name), command in _COMMANDS.items()),
-    ]
-    for verb, name, handler in (*special, *answered):
+    handlers: dict[tuple[str, str], Handler] = {("GET", "version"): version, ("PUT", "stop"): stop}
+    handlers |= {("GET", "status"): of_test(status), ("POST", "submit"): of_test(submit)}
+    handlers |= {(verb, name): asking(verb, ask) for (verb, name), ask in REQUESTS.items()}
+    for (verb, name), handler in handlers.items():
         app.add_route(f"/{name}/{{testid}}", handler, [verb])
         app.add_route(f"/{name}", handler, [verb])
     return app
 
 
+class Guard:
+    """Refuses requests that came by a name the server does not have, from pages of other sites, or that are too long.
+
+    A page of a browser can be led to a server on the same machine by a name that first meant another address (DNS
+    rebinding); its requests then carry that name as their host. Addresses carry no name, so they are safe from it.
+
+    Parameters
+    ----------
+    app : ASGI application
+        What is guarded.
+    allow_remote : bool
+        Whether hosts may be addresses other than this machine's own.
+    names : iterable of str
+        Names that the server has beside ``localhost``.
+    """
+
+    def __init__(self, app: ASGIApp, allow_remote: bool = False, names: Iterable[str] = ()) -> None:
+        self._app, self._remote = app, allow_remote
+        self._names = {name.lower() for name in ("localhost", *names)}
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer a request, or hand it on.
+
+        Parameters
+        ----------
+        scope, receive, send
+            Of ASGI.
+        """
+        if scope["type"] != "http":
+            await self._app(scope, receive, send)
+            return
+        headers = {key.decode("latin-1").lower(): value.decode("latin-1") for key, value in scope["headers"]}
+        origin, length = headers.get("origin"), headers.get("content-length", "0")
+        if not self._knows(f"//{headers.get('host', '')}"):
+            refusal = _status(403, "The Host header names no address of this server; serve with --name to allow it.")
+        elif origin is not None and not self._knows(origin):
+            refusal = _status(403, "Pages of other sites may not use this server.")
+        elif not length.isdecimal() or int(length) > LONGEST_BODY:
+            refusal = _status(413, f"The body is longer than {LONGEST_BODY} bytes.")
+        else:
+            await self._app(scope, _counted(receive), send)
+            return
+        refusal.headers["connection"] = "close"
+        await refusal(scope, receive, send)
+
+    def _knows(self, url: str) -> bool:
+        """Whether the host of an address, with or without a port, is this server's."""
+        name = ""
+        try:
+            name = urlsplit(url).hostname or ""
+            return ipaddress.ip_address(name).is_loopback or self._remote
+        except ValueError:
+            return name in self._names
+
+
+def _counted(receive: Receive) -> Receive:
+    """Receive a body up to its largest size; a client that sends more in pieces is taken for gone."""
+    total = 0
+
+    async def receive_some() -> Message:
+        nonlocal total
+        message = await receive()
+        total += len(message.get("body", b""))
+        return message if total <= LONGEST_BODY else {"type": "http.disconnect"}
+
+    return receive_some
+
+
 def _sweeping(tests: HeldTests) -> Callable[[FastAPI], Any]:
     """Free idle tests as long as the application lives."""
 
+    async def sweep() -> None:
+        while True:
+            await asyncio.sleep(min(_SWEEP, tests.idle_seconds / 4.0))
+            tests.free_idle()
+
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
-        async def sweep() -> None:
-            while True:
-                await asyncio.sleep(min(_SWEEP, tests.idle_seconds / 4.0))
-                tests.free_idle()
-
         task = asyncio.create_task(sweep())
-        try:
-            yield
-        finally:
-            task.cancel()
+        yield
+        task.cancel()
 
     return lifespan
 
 
-def _asking(tests: HeldTests, workers: anyio.CapacityLimiter, question: Question) -> Handler:
-    """Answer requests that have no arguments."""
-
-    async def handle(request: Request) -> Response:
-        testid = request.path_params.get("testid", DEFAULT_TEST)
-        held = tests.find(testid)
-        return _unknown(testid) if held is None else await _in_turn(tests, held, workers, question)
-
-    return handle
-
-
-def _telling(tests: HeldTests, workers: anyio.CapacityLimiter, command: Command) -> Handler:
-    """Answer requests that have arguments."""
-
-    async def handle(request: Request) -> Response:
-        testid = request.path_params.get("testid", DEFAULT_TEST)
-        held = tests.find(testid)
-        if held is None:
-            return _unknown(testid)
-        try:
-            body = read_body(await request.body(), request.headers.get("content-type", ""))
-        except ClientDisconnect:
-            return Response(status_code=400)  # nobody is there to read it
-        except BoptestRequestError as error:
-            return _status(400, str(error))
-        return await _in_turn(tests, held, workers, lambda test: command(test, body))
-
-    return handle
-
-
-async def _in_turn(tests: HeldTests, held: HeldTest, workers: anyio.CapacityLimiter, ask: Question) -> Response:
-    """Do what is asked of a test once those before are done: its requests never overlap."""
-    if held.waiting >= MOST_WAITING:
-        return _status(503, f"{MOST_WAITING} requests wait for this test already.")
-    held.waiting += 1
-    try:
-        async with held.turn:
-            return await anyio.to_thread.run_sync(_answered, ask, held.test, limiter=workers)
-    finally:
-        held.waiting -= 1
-        tests.touch(held)
-
-
-def _answered(ask: Question, test: BoptestTest) -> Response:
+def _answered(ask: Callable[..., Answer], test: BoptestTest, *body: dict[str, Any]) -> Response:
     """Ask, and write the answer down: both may take a while, and so belong in a thread."""
     try:
-        answer = ask(test)
+        answer = ask(test, *body)
     except MpcError as error:
         return _status(400, str(error))
     except Exception as error:
@@ -208,13 +366,5 @@ def _respond(status: int, content: Any) -> Response:
     try:
         text = json.dumps(content, allow_nan=False)
     except ValueError:  # a sensor that reads nothing
-        text = json.dumps(_without_nan(content), allow_nan=False)
+        text = json.dumps(json.loads(json.dumps(content), parse_constant=lambda name: None))
     return Response(text, status, media_type="application/json")
-
-
-def _without_nan(content: Any) -> Any:
-    if isinstance(content, dict):
-        return {key: _without_nan(value) for key, value in content.items()}
-    if isinstance(content, list):
-        return [_without_nan(value) for value in content]
-    return None if isinstance(content, float) and not math.isfinite(content) else content

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from bisect import bisect_left, bisect_right
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
+from operator import itemgetter
 from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 
-from mpc.adapters.boptest.clock import DAY, YearClock
-from mpc.adapters.boptest.periods import Period, find_periods
-from mpc.adapters.boptest.prices import scenario_prices
-from mpc.adapters.boptest.recent import Recent
-from mpc.adapters.boptest.signals import ObservedPlant, PlantSignals
-from mpc.adapters.boptest.trajectory import Trajectory
+from mpc.adapters.boptest.scenario import DAY, Period, YearClock, find_periods, scenario_prices
+from mpc.adapters.boptest.signals import Metadata, ObservedPlant, PlantSignals, forecast_metadata
 from mpc.errors import BoptestRequestError, PlantError
 from mpc.loop.building import BuildingModel
 from mpc.loop.noise import SensorNoise
@@ -37,11 +35,59 @@ _MINUTE = 60.0
 _KEPT, _WARM = 8, 4  # scenarios and warm-ups that are kept, so that tests of one period share theirs
 
 
-class _Driven(NamedTuple):
-    """What drives a plant: its scenario, and the schedules that follow from it."""
+class Trajectory:
+    """Outputs and inputs of a run by time, a row a step of the plant.
 
-    scenario: Scenario
-    operation: Operation
+    Parameters
+    ----------
+    names : sequence of str
+        Of the values.
+    rows : iterable of ndarray, shape (1 + n_name,)
+        Time [s] and values.
+    """
+
+    def __init__(self, names: Sequence[str], rows: Iterable[FloatArray] = ()) -> None:
+        self.names, self._rows = tuple(names), list(rows)
+
+    def __len__(self) -> int:
+        return len(self._rows)
+
+    def append(self, time: float, values: Sequence[float]) -> None:
+        """Add a row.
+
+        Parameters
+        ----------
+        time : float
+            BOPTEST's [s], after that of the row before.
+        values : sequence of float
+            In the order of the names [their units].
+        """
+        self._rows.append(np.array((time, *values), dtype=float))
+
+    def copy(self) -> Trajectory:
+        """Give the same rows, to go on from."""
+        return Trajectory(self.names, self._rows)
+
+    def last(self) -> dict[str, float]:
+        """Give the last row, by name, with its time."""
+        return dict(zip(("time", *self.names), self._rows[-1].tolist(), strict=True))
+
+    def between(self, names: Sequence[str], start: float, end: float) -> dict[str, list[float]]:
+        """Rows of a time, column by column.
+
+        Parameters
+        ----------
+        names : sequence of str
+            Which values.
+        start, end : float
+            BOPTEST's times, both included [s].
+        """
+        first = bisect_left(self._rows, start, key=itemgetter(0))
+        last = bisect_right(self._rows, end, key=itemgetter(0))
+        position = {name: k for k, name in enumerate(("time", *self.names))}
+        columns = [position[name] for name in ("time", *names)]
+        table = np.array([row[columns] for row in self._rows[first:last]]).reshape(-1, len(columns))
+        return dict(zip(("time", *names), table.T.tolist(), strict=True))
 
 
 class BegunPlant(NamedTuple):
@@ -117,9 +163,6 @@ class BoptestCase:
     noise: SensorNoise | None = None
     boundaries: Mapping[str, pd.Series] = field(default_factory=dict)
     longest_days: float = 31.0
-    _driven: Recent[tuple[float, float], _Driven] = field(default_factory=lambda: Recent(_KEPT), init=False)
-    #: Plants after a warm-up, with what was noted down of it, by its end and its steps.
-    warmed: Recent[tuple[float, int], tuple[Any, Trajectory]] = field(default_factory=lambda: Recent(_WARM), init=False)
 
     def __post_init__(self) -> None:
         if not (self.step >= _MINUTE and (self.step / _MINUTE).is_integer()):
@@ -173,13 +216,14 @@ class BoptestCase:
     def signals(self) -> PlantSignals:
         """What of its plants is seen and set."""
         first, _ = self.covered
-        return PlantSignals(self._plant(self._driven_by(first, first + DAY)))
+        return PlantSignals(self._plant(first, first + DAY))
 
     @cached_property
-    def weather_points(self) -> frozenset[str]:
-        """Points of the weather station that are known at any time."""
+    def forecast_points(self) -> Metadata:
+        """Metadata of the boundary conditions, of the weather those that are known at any time."""
         frame = self.weather.frame
-        return frozenset(str(point) for point in frame if frame[point].notna().any())
+        known = {str(point) for point in frame if frame[point].notna().any()}
+        return forecast_metadata(known, self.building.zone_names, self.tariff.currency, self.carbon.kind)
 
     @property
     def _first_day(self) -> float:
@@ -217,30 +261,36 @@ class BoptestCase:
         steps = int(min(warm_up, begin - first) // self.step)
         latest = min(begin + self.longest_days * DAY if end is None else end, last)
         whole = int((latest - begin) // self.step)
-        driven = self._driven_by(begin - steps * self.step, begin + whole * self.step)
-        return BegunPlant(self._plant(driven), begin, begin + whole * self.step, steps)
+        stop = begin + whole * self.step
+        return BegunPlant(self._plant(begin - steps * self.step, stop), begin, stop, steps)
 
-    def _driven_by(self, begin: float, end: float) -> _Driven:
-        """Make what drives the plant over a time, and a day longer for forecasts where there is weather."""
-        found = self._driven.get((begin, end))
-        if found is None:
+    @cached_property
+    def warmed(self) -> Callable[[float, int], list[tuple[Any, Trajectory]]]:
+        """Where a plant after a warm-up is kept, with what was noted down of it, by its end and its steps."""
+        return lru_cache(_WARM)(lambda start, steps: [])
+
+    @cached_property
+    def _driven(self) -> Callable[[float, float], tuple[Scenario, Operation]]:
+        """Scenario of a time, a day longer for forecasts where there is weather, and its schedules."""
+
+        def make(begin: float, end: float) -> tuple[Scenario, Operation]:
             steps = int((min(end + DAY, self.covered[1]) - begin) // self.step)
             scenario = build_scenario(
                 self.building, StepGrid(self.clock.stamp(begin), self.step, steps), self.weather, self.tariff,
                 carbon=self.carbon, occupancy=self.occupancy, comfort=self.comfort,
             )  # fmt: skip
-            found = _Driven(scenario, scheduled_operation(scenario, len(self.system.air_handlers)))
-            self._driven.put((begin, end), found)
-        return found
+            return scenario, scheduled_operation(scenario, len(self.system.air_handlers))
 
-    def _plant(self, driven: _Driven) -> ObservedPlant:
-        middles = driven.scenario.grid.edges[:-1] + 0.5 * self.step
+        return lru_cache(_KEPT)(make)
+
+    def _plant(self, begin: float, end: float) -> ObservedPlant:
+        scenario, operation = self._driven(begin, end)
+        middles = scenario.grid.edges[:-1] + 0.5 * self.step
         beside: dict[str, float | FloatArray] = {}
         for name, series in self.boundaries.items():
             known = series.dropna()
             seconds = np.array([stamp.timestamp() for stamp in known.index])
             beside[name] = np.interp(middles, seconds, known.to_numpy(dtype=float))
         return ObservedPlant(
-            driven.scenario, self.system, self.make_model(), driven.operation, noise=self.noise, warm_up_days=0,
-            boundaries=beside,
-        )  # fmt: skip
+            scenario, self.system, self.make_model(), operation, noise=self.noise, warm_up_days=0, boundaries=beside
+        )

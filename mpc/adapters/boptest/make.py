@@ -25,7 +25,7 @@ from thermal.network.build import build_network
 from thermal.pilot.building import pilot_building
 from thermal.pilot.sizing import size_system
 
-_PILOT_STEP = 3600.0  # s, of a year of made weather
+_PILOT_START, _PILOT_STEP = "2023-01-01", 3600.0  # of a year of made weather; step in s
 
 
 def case_to_serve(
@@ -88,7 +88,6 @@ def pilot_to_serve(
     floors: int = 2,
     step_seconds: float = 300.0,
     dx: float = 0.5,
-    year: int = 2023,
     days: float = 367.0,
     name: str = "pilot",
 ) -> BoptestCase:
@@ -106,10 +105,8 @@ def pilot_to_serve(
         Step of the plant [s].
     dx : float
         Distance between control volumes [m].
-    year : int
-        Of the weather.
     days : float
-        How long the weather goes on from the begin of the year [d].
+        How long the weather goes on from the begin of 2023 [d].
     name : str
         Of the test case.
 
@@ -129,7 +126,7 @@ def pilot_to_serve(
     return BoptestCase(
         _plain_name(name),
         building,
-        pilot_weather(seed, f"{year}-01-01", days, _PILOT_STEP),
+        pilot_weather(seed, _PILOT_START, days, _PILOT_STEP),
         _maker(SymbolicModel(network), network.start(), step_seconds),
         size_system(building),
         step_seconds,

@@ -1,22 +1,40 @@
-"""Which signals of a BOPTEST server are which points of a plant of ours."""
+"""Which signals and forecast points of a BOPTEST server are which points of a plant of ours."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
-from mpc.adapters.boptest.signals import ELECTRICITY_OUTPUT, GAS_OUTPUT, Metadata
+import numpy as np
+import pandas as pd
+
+from mpc.adapters.boptest.scenario import PRICE_POINTS
+from mpc.adapters.boptest.signals import ELECTRICITY_OUTPUT, GAS_OUTPUT, WEATHER_NAMES, Metadata
+from mpc.adapters.foreign import ForeignSignals
 from mpc.errors import BoptestError
-from thermal.case.points import split_column
-from thermal.errors import CaseError, describe, nearest
+from mpc.scenario.forecast import Forecast
+from thermal._types import FloatArray
+from thermal.errors import describe, nearest
 
 _COLUMN = re.compile(r"([^/:]+/[a-z0-9_]+): ")
 _ZONE = re.compile(r"Air temperature of zone (.+) at this time, ")
+_ZONE_COLUMNS = {
+    "LowerSetp": "comfort_lower_temperature",
+    "UpperSetp": "comfort_upper_temperature",
+    "Occupancy": "occupancy_count_sensor",
+    "InternalGainsCon": "internal_gain",
+}
+_SINGLE = {
+    "PriceGasPower": "gas_price",
+    "EmissionsElectricPower": "electricity_carbon_intensity",
+    "EmissionsGasPower": "gas_carbon_intensity",
+}
 
 
 @dataclass(frozen=True)
-class BoptestSignals:
+class BoptestSignals(ForeignSignals):
     """Signals of a BOPTEST test case under the names of the case format.
 
     A test case of `BoptestServer` says them itself. For one of BOPTEST's own, name those that the controller needs.
@@ -51,29 +69,9 @@ class BoptestSignals:
     'reaTZon_y'
     """
 
-    measurements: Mapping[str, str]
-    actuators: Mapping[str, str]
-    zones: Mapping[str, str]
-    electricity: tuple[str, ...] = ()
-    gas: tuple[str, ...] = ()
-    district_heating: tuple[str, ...] = ()
     forecast_zones: Mapping[str, str] = field(default_factory=dict)
     means: bool = False
-
-    def __post_init__(self) -> None:
-        if not self.zones:
-            raise BoptestError(describe("signals", "an output for the temperature of a zone at least", "none"))
-        for column in self.measurements:
-            try:
-                split_column(column, "signals")
-            except CaseError as error:
-                raise BoptestError(str(error)) from error
-
-    @property
-    def powers(self) -> Mapping[str, tuple[str, ...]]:
-        """Outputs of each kind of energy."""
-        kinds = {"electricity": self.electricity, "gas": self.gas, "district_heating": self.district_heating}
-        return {kind: outputs for kind, outputs in kinds.items() if outputs}
+    _kind, _error = "an output", BoptestError
 
     def check(self, inputs: Metadata, outputs: Metadata) -> None:
         """Refuse signals that a server does not have.
@@ -88,12 +86,8 @@ class BoptestSignals:
         BoptestError
             Which signal is not there.
         """
-        known = (
-            *self.measurements.values(),
-            *self.zones.values(),
-            *(n for names in self.powers.values() for n in names),
-        )
-        for name, there in [*((n, outputs) for n in known), *((n, inputs) for n in self.actuators.values())]:
+        known = [(name, outputs) for name in (*self.measurements.values(), *self.recorded)]
+        for name, there in [*known, *((name, inputs) for name in self.actuators.values())]:
             if name not in there:
                 raise BoptestError(describe("signals", "one of the test case", repr(name), nearest(name, there)))
 
@@ -123,3 +117,72 @@ def own_signals(inputs: Metadata, outputs: Metadata) -> BoptestSignals:
 def _described(signals: Metadata, pattern: re.Pattern[str]) -> dict[str, str]:
     matches = ((pattern.match(str(entry.get("Description"))), name) for name, entry in signals.items())
     return {match[1]: name for match, name in matches if match is not None}
+
+
+class _Source(NamedTuple):
+    """Where a column of a forecast comes from.
+
+    Parameters
+    ----------
+    point : str
+        Forecast point of the server.
+    divisor : float
+        Of its values, from the server's unit to the library's [unit of the point per library's unit].
+    weather : bool
+        Whether it changes between its values rather than holding them.
+    """
+
+    point: str
+    divisor: float = 1.0
+    weather: bool = False
+
+
+def forecast_sources(known: Mapping[str, object], signals: BoptestSignals, price: str) -> dict[str, _Source]:
+    """Choose the forecast points of each column.
+
+    Parameters
+    ----------
+    known : mapping
+        Forecast points that the server has.
+    signals : BoptestSignals
+        Of the test case.
+    price : str
+        Which electricity price holds.
+    """
+    found = {point: _Source(name, factor, True) for name, (_, point, factor, _) in WEATHER_NAMES.items()}
+    found["electricity_price"] = _Source(PRICE_POINTS[price])
+    found |= {column: _Source(name) for name, column in _SINGLE.items()}
+    for zone in signals.zones:
+        index = signals.forecast_zones.get(zone, zone)
+        found |= {f"{zone}/{column}": _Source(f"{name}[{index}]") for name, column in _ZONE_COLUMNS.items()}
+    return {column: source for column, source in found.items() if source.point in known}
+
+
+def as_forecast(payload: object, sources: Mapping[str, _Source], stamps: pd.DatetimeIndex, *, means: bool) -> Forecast:
+    """Make a forecast of what a server answered.
+
+    Parameters
+    ----------
+    payload : object
+        Lists of numbers by point, one more than there are stamps.
+    sources : mapping of str to _Source
+        By column.
+    stamps : DatetimeIndex
+        Ends of the steps.
+    means : bool
+        Whether values are means from their time on, rather than readings at it.
+
+    Raises
+    ------
+    BoptestError
+        When a point is missing or of another length.
+    """
+    count, columns = len(stamps), {}
+    for column, source in sources.items():
+        listed = payload.get(source.point) if isinstance(payload, dict) else None
+        if not isinstance(listed, list) or len(listed) != count + 1:
+            found = f"{len(listed)}" if isinstance(listed, list) else "none"
+            raise BoptestError(describe(f"forecast point {source.point}", f"{count + 1} values", found))
+        values: FloatArray = np.array(listed, dtype=float) / source.divisor  # null becomes NaN
+        columns[column] = 0.5 * (values[:-1] + values[1:]) if source.weather and not means else values[:-1]
+    return Forecast(pd.DataFrame(columns, index=stamps))

@@ -4,28 +4,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
-from types import TracebackType
+from dataclasses import dataclass, field
 from typing import Any
 from urllib.parse import quote
 
 import numpy as np
 import pandas as pd
 
-from mpc.adapters.boptest.answers import actuator_of, check_step, regular, time_of
-from mpc.adapters.boptest.clock import DAY, YearClock
-from mpc.adapters.boptest.http import BoptestClient
-from mpc.adapters.boptest.mapping import BoptestSignals, own_signals
-from mpc.adapters.boptest.outlook import as_forecast, forecast_sources
-from mpc.adapters.boptest.periods import PERIOD_DAYS
-from mpc.adapters.boptest.prices import PRICE_POINTS
-from mpc.adapters.boptest.signals import activation
-from mpc.adapters.boptest.test import KPI_NAMES
+from mpc.adapters.boptest.client import BoptestClient, check_step, regular, time_of
+from mpc.adapters.boptest.mapping import BoptestSignals, as_forecast, forecast_sources, own_signals
+from mpc.adapters.boptest.scenario import DAY, PERIOD_DAYS, PRICE_POINTS, YearClock
+from mpc.adapters.boptest.signals import KPI_NAMES, activation
+from mpc.adapters.foreign import Declared, SignalPlant
 from mpc.errors import BoptestError, PlantError
 from mpc.kpi.record import PlantRecord
 from mpc.loop.actuators import checked_actions
-from mpc.loop.conversion import conversion
-from mpc.loop.plant import Measurements, PointLayout, need_running
+from mpc.loop.plant import Measurements, need_running
 from mpc.scenario.forecast import Forecast
 from thermal.errors import describe, nearest
 
@@ -49,7 +43,48 @@ class BoptestTime:
     warm_up: float = 7 * DAY
 
 
-class BoptestPlant:
+@dataclass(frozen=True)
+class BoptestSettings:
+    """Scenario of a test beside its time, and how the server is talked to.
+
+    Parameters
+    ----------
+    electricity_price : str
+        ``constant``, ``dynamic`` or ``highly_dynamic``.
+    horizon : int
+        Control steps of a forecast.
+    uncertainty : mapping of str to str
+        ``temperature_uncertainty`` and ``solar_uncertainty`` of forecasts, ``low``, ``medium`` or ``high``.
+    year, timezone : int, str, optional
+        Of the stamps; those that the server says, else 2023 and UTC.
+    timeout : float
+        How long to wait for an answer [s]; a warm-up takes minutes on some servers.
+    repeats : int
+        How often requests are sent again that do no harm.
+
+    Raises
+    ------
+    BoptestError
+        When there is no such price, or the horizon has no step.
+    """
+
+    electricity_price: str = "constant"
+    horizon: int = 24
+    uncertainty: Mapping[str, str] = field(default_factory=dict)
+    year: int | None = None
+    timezone: str | None = None
+    timeout: float = 600.0
+    repeats: int = 2
+
+    def __post_init__(self) -> None:
+        price = self.electricity_price
+        if price not in PRICE_POINTS:
+            raise BoptestError(describe("electricity_price", "a known one", repr(price), nearest(price, PRICE_POINTS)))
+        if self.horizon < 1:
+            raise BoptestError(describe("horizon", "a control step or more", repr(self.horizon)))
+
+
+class BoptestPlant(SignalPlant):
     """A test case of a BOPTEST server as a `Plant`: the server's traps are errors here.
 
     Setpoints out of range are refused by name before they are sent, since a server clips them and reports success. A
@@ -68,20 +103,10 @@ class BoptestPlant:
         Time period of BOPTEST's scenario, such as ``peak_heat_day``, or a time of one's own.
     control_step : float
         Time between two actions [s].
-    electricity_price : str
-        ``constant``, ``dynamic`` or ``highly_dynamic``.
+    settings : BoptestSettings
+        Price, forecasts, stamps and patience.
     signals : BoptestSignals, optional
         What the server's signals are; those of a `BoptestServer` say it themselves.
-    horizon : int
-        Control steps of a forecast.
-    uncertainty : mapping of str to str, optional
-        ``temperature_uncertainty`` and ``solar_uncertainty`` of forecasts, ``low``, ``medium`` or ``high``.
-    year, timezone : int, str, optional
-        Of the stamps; those that the server says, else 2023 and UTC.
-    timeout : float
-        How long to wait for an answer [s]; a warm-up takes minutes on some servers.
-    repeats : int
-        How often requests are sent again that do no harm.
 
     Raises
     ------
@@ -89,35 +114,27 @@ class BoptestPlant:
         When the server has no such test case or signals.
     """
 
+    signals: BoptestSignals
+
     def __init__(
         self,
         url: str,
         testcase: str,
         period: str | BoptestTime,
         control_step: float,
+        settings: BoptestSettings = BoptestSettings(),
         *,
-        electricity_price: str = "constant",
         signals: BoptestSignals | None = None,
-        horizon: int = 24,
-        uncertainty: Mapping[str, str] | None = None,
-        year: int | None = None,
-        timezone: str | None = None,
-        timeout: float = 600.0,
-        repeats: int = 2,
     ) -> None:
-        if electricity_price not in PRICE_POINTS:
-            advice = nearest(electricity_price, PRICE_POINTS)
-            raise BoptestError(describe("electricity_price", "a known one", repr(electricity_price), advice))
-        if not (control_step > 0 and horizon >= 1):
-            raise BoptestError(describe("plant", "a positive control step and a horizon", f"{control_step}, {horizon}"))
-        self._period, self._price, self._horizon = period, electricity_price, horizon
-        self._uncertainty, self._seed = dict(uncertainty or {}), 0
-        self._client = BoptestClient(url, timeout, repeats)
+        if not control_step > 0:
+            raise BoptestError(describe("plant", "a positive control step", repr(control_step)))
+        self._period, self._settings, self._seed = period, settings, 0
+        self._client = BoptestClient(url, settings.timeout, settings.repeats)
         self._testid = ""
         try:
             self.server_version = self._client.check_version()
             self._testid = self._select(testcase)
-            self._look_around(signals, year, timezone)
+            self._look_around(signals)
             self.control_step = self._set_step(control_step)
         except BaseException:
             self.close()
@@ -125,29 +142,11 @@ class BoptestPlant:
         self._time, self._end, self._start = math.nan, math.nan, math.nan
         self._broken = ""
 
-    def __enter__(self) -> BoptestPlant:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
-
     def close(self) -> None:
         """Stop the test, so that the server has room for another."""
         if self._testid:
             self._client.stop(self._testid)
         self._client.close()
-
-    @property
-    def zone_names(self) -> tuple[str, ...]:
-        """Names of the zones, in the order of records."""
-        return tuple(self.signals.zones)
-
-    @property
-    def columns(self) -> tuple[str, ...]:
-        """Names of the measurements."""
-        return self._layout.columns
 
     @property
     def finished(self) -> bool:
@@ -168,8 +167,9 @@ class BoptestPlant:
             At the start.
         """
         self._seed = self._seed if seed is None else seed
-        scenario: dict[str, Any] = {"electricity_price": self._price, **self._uncertainty}
-        if self._uncertainty:
+        chosen = self._settings
+        scenario: dict[str, Any] = {"electricity_price": chosen.electricity_price, **chosen.uncertainty}
+        if chosen.uncertainty:
             scenario["seed"] = self._seed
         if isinstance(self._period, BoptestTime):
             self._ask("PUT", "scenario", scenario)
@@ -181,7 +181,7 @@ class BoptestPlant:
         self._broken = ""
         self._start = self._time = time_of(values, "the start")
         self._end = self._find_end()
-        return self._seen(values)
+        return self._measured(values)
 
     def step(self, actions: Mapping[str, float]) -> Measurements:
         """Hold setpoints for a control step.
@@ -214,10 +214,8 @@ class BoptestPlant:
         if self.finished:
             left = self._end - self._time
             raise PlantError(describe("test", f"{self.control_step:g} s more", f"{left:g} s", "reset the plant"))
-        sent: dict[str, float] = {}
-        for name, value in given.items():
-            signal = self.signals.actuators[name]
-            sent |= {signal: value, activation(signal): 1.0}
+        sent = self._sent(given)
+        sent |= {activation(signal): 1.0 for signal in sent}
         try:
             message, values = self._ask("POST", "advance", sent, repeat=False)
             if isinstance(values, dict) and not values:
@@ -228,7 +226,7 @@ class BoptestPlant:
             self._broken = str(error)
             raise
         self._time = time_of(values, "a step")
-        return self._seen(values)
+        return self._measured(values)
 
     def forecast(self) -> Forecast:
         """Forecast the control steps from now on: weather, prices, emissions, people and comfort bands.
@@ -239,11 +237,11 @@ class BoptestPlant:
             When the answer is not whole.
         """
         need_running(not math.isnan(self._time))
-        span = self._horizon * self.control_step
+        step, count = self.control_step, self._settings.horizon
         points = sorted({source.point for source in self._sources.values()})
-        body = {"point_names": points, "horizon": span, "interval": self.control_step}
+        body = {"point_names": points, "horizon": count * step, "interval": step}
         payload = self._ask("PUT", "forecast", body).payload
-        ends = self._clock.zero + np.rint(self._time + self.control_step * np.arange(1, self._horizon + 1)).astype(int)
+        ends = self._clock.zero + np.rint(self._time + step * np.arange(1, count + 1)).astype(int)
         stamps = pd.to_datetime(ends, unit="s", utc=True).tz_convert(self._clock.timezone)
         return as_forecast(payload, self._sources, stamps, means=self.signals.means)
 
@@ -257,15 +255,13 @@ class BoptestPlant:
         """
         if math.isnan(self._time) or self._time <= self._start:
             raise PlantError(describe("run", "a step at least", "none since the reset"))
-        powers = self.signals.powers
-        points = list(dict.fromkeys([*self.signals.zones.values(), *(n for names in powers.values() for n in names)]))
+        points = self.signals.recorded
         body = {"point_names": points, "start_time": self._start, "final_time": self._time}
         times, columns = regular(self._ask("PUT", "results", body).payload, points)
-        sums = {kind: np.sum([columns[name] for name in names], axis=0) for kind, names in powers.items()}
+        sums = {kind: np.sum([columns[name] for name in names], axis=0) for kind, names in self.signals.powers.items()}
         means = {kind: p[1:] if self.signals.means else 0.5 * (p[1:] + p[:-1]) for kind, p in sums.items()}
         zones = np.column_stack([columns[name] for name in self.signals.zones.values()])
-        means.setdefault("electricity", np.zeros(len(times) - 1))
-        return PlantRecord(float(times[1] - times[0]), zones, **means)
+        return self._record(float(times[1] - times[0]), zones, means)
 
     def kpis(self) -> dict[str, float | None]:
         """Ask the server for its indicators; what it has none of is None.
@@ -295,7 +291,7 @@ class BoptestPlant:
             raise BoptestError(describe(f"POST /{path}", "a testid", repr(answer)[:200]))
         return quote(testid, safe="")
 
-    def _look_around(self, signals: BoptestSignals | None, year: int | None, timezone: str | None) -> None:
+    def _look_around(self, signals: BoptestSignals | None) -> None:
         """Learn what the test case has."""
         inputs, outputs, points = (
             self._ask("GET", what).payload for what in ("inputs", "measurements", "forecast_points")
@@ -304,14 +300,11 @@ class BoptestPlant:
             raise BoptestError(describe("test case", "signals by name", "something else"))
         self.signals = own_signals(inputs, outputs) if signals is None else signals
         self.signals.check(inputs, outputs)
-        about = self._ask("GET", "name").payload or {}
-        self._clock = YearClock(year or int(about.get("year", 2023)), timezone or str(about.get("timezone", "UTC")))
-        self._layout = PointLayout(tuple(self.signals.measurements), self._clock.timezone)
-        named = self.signals.measurements.items()
-        self._read = [(n, conversion(column.rpartition("/")[2], n, outputs[n].get("Unit"))) for column, n in named]
-        self.actuators = tuple(actuator_of(name, inputs[u]) for name, u in self.signals.actuators.items())
-        self._by_name = {a.name: a for a in self.actuators}
-        self._sources = forecast_sources(points, self.signals, self._price)
+        about, chosen = self._ask("GET", "name").payload or {}, self._settings
+        year, timezone = about.get("year", 2023), about.get("timezone", "UTC")
+        self._clock = YearClock(chosen.year or int(year), chosen.timezone or str(timezone))
+        self._map(self._clock.timezone, lambda name: _declared(outputs[name]), lambda name: _declared(inputs[name]))
+        self._sources = forecast_sources(points, self.signals, chosen.electricity_price)
 
     def _set_step(self, control_step: float) -> float:
         self._ask("PUT", "step", {"step": control_step})
@@ -327,10 +320,10 @@ class BoptestPlant:
         told = scenario.get("end_time") if isinstance(scenario, dict) else None
         return min(self._start + own, math.inf if told is None else float(told))
 
-    def _seen(self, values: Mapping[str, Any]) -> Measurements:
-        numbers = np.full(len(self._read), np.nan)
-        for k, (name, line) in enumerate(self._read):
-            value = values.get(name)
-            if isinstance(value, int | float) and not isinstance(value, bool):
-                numbers[k] = line.into(value)
-        return Measurements(self._layout, self._clock.zero + round(self._time), numbers)
+    def _measured(self, values: Mapping[str, Any]) -> Measurements:
+        return self._seen(values, self._clock.zero + round(self._time))
+
+
+def _declared(entry: Mapping[str, Any]) -> Declared:
+    low, high = (None if v is None else float(v) for v in (entry.get("Minimum"), entry.get("Maximum")))
+    return Declared(entry.get("Unit"), low, high)

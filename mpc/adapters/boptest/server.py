@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import ipaddress
 import logging
+import os
 import socket
 import threading
+import time
 from collections.abc import Iterable, Sequence
-from types import TracebackType
+from typing import Self
 
 from mpc.adapters.boptest.case import BoptestCase
-from mpc.adapters.boptest.guard import Guard, check_host
-from mpc.adapters.boptest.registry import HeldTests
 from mpc.errors import BoptestError
 from thermal.errors import describe
 
@@ -65,7 +66,7 @@ class BoptestServer:
         try:
             import uvicorn
 
-            from mpc.adapters.boptest.app import create_app
+            from mpc.adapters.boptest.app import Guard, HeldTests, create_app
         except ModuleNotFoundError as error:
             raise BoptestError(f'a server needs {error.name}: pip install "buildingmpc[pages]"') from error
         self.tests = HeldTests(cases, most, idle_seconds)
@@ -91,21 +92,17 @@ class BoptestServer:
         finally:
             self._socket.close()
 
-    def __enter__(self) -> BoptestServer:
+    def __enter__(self) -> Self:
         self._thread = threading.Thread(target=self.run, name="boptest", daemon=True)
         self._thread.start()
-        waited = threading.Event()
-        for _ in range(round(_START / 0.01)):
+        deadline = time.monotonic() + _START
+        while self._thread.is_alive() and time.monotonic() < deadline:
             if self._server.started:
                 return self
-            if not self._thread.is_alive():
-                break
-            waited.wait(0.01)
+            time.sleep(0.01)
         raise BoptestError(describe("server", f"a start within {_START:g} s", "none"))
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         self._server.should_exit = True
         if self._thread is not None:
             self._thread.join(_STOP)
@@ -116,15 +113,35 @@ def _listen(host: str, port: int) -> socket.socket:
     if not 0 <= port <= 65535:
         raise BoptestError(describe("port", "a number from 0 to 65535", repr(port)))
     try:
-        family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
-        listening = socket.socket(family, kind, protocol)
+        family, _, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
     except OSError as error:
         raise BoptestError(f"host {host!r}: {error.strerror or error}") from error
+    both = family == socket.AF_INET6 and socket.has_dualstack_ipv6()
     try:
-        listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        listening.bind(address)
-        listening.listen(1024)
+        return socket.create_server(address, family=family, backlog=1024, dualstack_ipv6=both)
     except OSError as error:
-        listening.close()
-        raise BoptestError(f"port {port} of {host}: {error.strerror or error}; choose another") from error
-    return listening
+        raise BoptestError(f"port {port} of {host}: {os.strerror(error.errno or 0)}; choose another") from error
+
+
+def check_host(host: str, allow_remote: bool) -> None:
+    """Refuse to listen for other machines unless told to.
+
+    Parameters
+    ----------
+    host : str
+        Name or address to listen on.
+    allow_remote : bool
+        Whether other machines may come.
+
+    Raises
+    ------
+    BoptestError
+        When they could, and may not.
+    """
+    try:
+        own = ipaddress.ip_address(host.strip("[]")).is_loopback
+    except ValueError:
+        own = host.lower() == "localhost"
+    if not (allow_remote or own):
+        advice = "whoever reaches the server may use it: to let other machines in, say --allow-remote"
+        raise BoptestError(describe("host", "an address of this machine's own, such as 127.0.0.1", repr(host), advice))

@@ -1,12 +1,19 @@
-"""Signals of a plant by BOPTEST's conventions: names, units, ranges and descriptions, and their values after a step."""
+"""Signals of a plant by BOPTEST's conventions: names, units, ranges, values after a step, and forecast points."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping
+from itertools import chain, count
+from operator import attrgetter
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
+from mpc.adapters.boptest.scenario import PRICE_POINTS
 from mpc.loop.actuators import (
+    COOLING_SETPOINT,
     DIFFERENTIAL_PRESSURE,
     HEATING_SETPOINT,
     STATIC_PRESSURE,
@@ -16,9 +23,11 @@ from mpc.loop.actuators import (
 from mpc.loop.conversion import SIGNAL_UNITS
 from mpc.loop.history import PlantStep
 from mpc.loop.simulated import SimulatedPlant
+from mpc.scenario.forecast import ErrorGrowth
+from mpc.scenario.rates import Rate
+from mpc.scenario.scenario import Scenario
 from thermal._types import FloatArray
 from thermal.case.points import POINT_TYPES, split_column
-from thermal.hvac._system import HvacSystem
 
 Metadata = dict[str, dict[str, Any]]
 
@@ -29,7 +38,50 @@ _MEANINGS = {
     STATIC_PRESSURE: "setpoint of the supply air's static pressure",
     DIFFERENTIAL_PRESSURE: "setpoint of the heating water's differential pressure",
 }
+# where a step has the setpoints that are one a device or a zone
+_HELD = {
+    SUPPLY_AIR: "actions.supply_air_temperature",
+    STATIC_PRESSURE: "actions.static_pressure",
+    HEATING_SETPOINT: "conditions.heating_setpoint",
+    COOLING_SETPOINT: "conditions.cooling_setpoint",
+}
 
+#: Names of the indicators that `GET /kpi` gives.
+KPI_NAMES = ("cost_tot", "emis_tot", "ener_tot", "idis_tot", "pdih_tot", "pele_tot", "pgas_tot", "tdis_tot", "time_rat")
+
+#: BOPTEST's names of weather, with unit, point of the case format, factor from the library's unit, and meaning.
+WEATHER_NAMES: Mapping[str, tuple[str, str, float, str]] = {
+    "TDryBul": ("K", "outside_air_temperature_sensor", 1.0, "Outdoor air temperature"),
+    "HGloHor": ("W/m2", "global_horizontal_irradiance_sensor", 1.0, "Global irradiance on the horizontal"),
+    "HDirNor": ("W/m2", "direct_normal_irradiance_sensor", 1.0, "Direct normal irradiance"),
+    "HDifHor": ("W/m2", "diffuse_horizontal_irradiance_sensor", 1.0, "Diffuse irradiance on the horizontal"),
+    "HHorIR": ("W/m2", "horizontal_infrared_irradiance_sensor", 1.0, "Infrared irradiance from the sky"),
+    "winSpe": ("m/s", "wind_speed_sensor", 1.0, "Wind speed"),
+    "winDir": ("rad", "wind_direction_sensor", float(np.pi / 180.0), "Direction that the wind comes from"),
+}
+
+#: BOPTEST's names of what each zone has, with unit and meaning; a point is ``name[zone]``.
+ZONE_NAMES: Mapping[str, tuple[str, str]] = {
+    "LowerSetp": ("K", "Lower edge of the comfort band"),
+    "UpperSetp": ("K", "Upper edge of the comfort band"),
+    "Occupancy": ("number of people", "People expected"),
+    "InternalGainsCon": ("W", "Expected sensible heat of people, light and equipment into the air"),
+    "InternalGainsLat": ("W", "Expected latent heat of people"),
+}
+
+# Irradiances, and what `thermal.inputs.Sun` calls them.
+_SUN = {
+    "global_horizontal_irradiance_sensor": "horizontal",
+    "direct_normal_irradiance_sensor": "normal",
+    "diffuse_horizontal_irradiance_sensor": "diffuse",
+}
+
+#: Levels of ``temperature_uncertainty`` and ``solar_uncertainty``: the deviation at long leads as a share of that of
+#: day-ahead weather prediction, assumed [-].
+UNCERTAINTY: Mapping[str, float] = {"low": 0.5, "medium": 1.0, "high": 1.5}
+_STREAM = 22  # of random numbers of a seed
+# forecast points that may be uncertain: number of their random stream, and how their errors grow
+_ERRORS = {"TDryBul": (11, ErrorGrowth(2.0, 24 * 3600.0)), "HGloHor": (3, ErrorGrowth(0.3, 6 * 3600.0))}
 
 class ObservedPlant(SimulatedPlant):
     """A simulated plant that hands out the step it has just taken."""
@@ -66,13 +118,10 @@ def _signal_names(names: Iterable[str]) -> dict[str, str]:
     found: dict[str, str] = {}
     taken: set[str] = set()
     for name in names:
-        plain = signal = re.sub(r"\W+", "_", name)
-        count = 1
-        while signal in taken:
-            count += 1
-            signal = f"{plain}_{count}"
-        taken.add(signal)
-        found[name] = signal
+        plain = re.sub(r"\W+", "_", name)
+        numbered = (f"{plain}_{k}" for k in count(2))
+        found[name] = next(signal for signal in chain([plain], numbered) if signal not in taken)
+        taken.add(found[name])
     return found
 
 
@@ -104,8 +153,7 @@ class PlantSignals:
         setters = _signal_names(actuator.name for actuator in plant.actuators)
         self.inputs = {f"{setters[actuator.name]}_u": actuator for actuator in plant.actuators}
         self.input_names = tuple(name for u in self.inputs for name in (u, activation(u)))
-        self._reads = [_reader(a.name, plant.system, plant.devices.air_handlers, plant.zone_names)
-                       for a in plant.actuators]  # fmt: skip
+        self._reads = [_reader(actuator.name, plant) for actuator in plant.actuators]
 
     def measurement_metadata(self) -> Metadata:
         """Describe each output with its unit, as `GET /measurements` does."""
@@ -170,21 +218,138 @@ def _entry(text: str, unit: str | None, lowest: float | None = None, highest: fl
     return {"Unit": unit, "Description": text, "Minimum": lowest, "Maximum": highest}
 
 
-def _reader(name: str, system: HvacSystem, handlers: Sequence[str], zones: Sequence[str]) -> Any:
+def _reader(name: str, plant: SimulatedPlant) -> Callable[[PlantStep], float]:
     """Find where a step holds the value of an actuator."""
     entity, _, kind = name.rpartition("/")
-    if kind == SUPPLY_AIR:
-        at = handlers.index(entity)
-        return lambda step: step.actions.supply_air_temperature[at]
-    if kind == STATIC_PRESSURE:
-        at = handlers.index(entity)
-        return lambda step: step.actions.static_pressure[at]
     if kind == SUPPLY_WATER:
         return lambda step: step.actions.supply_water_temperature
     if kind == DIFFERENTIAL_PRESSURE:
-        design = system.loop.pump.differential_pressure
+        design = plant.system.loop.pump.differential_pressure
         return lambda step: design if step.actions.differential_pressure is None else step.actions.differential_pressure
-    zone = zones.index(entity)
-    if kind == HEATING_SETPOINT:
-        return lambda step: step.conditions.heating_setpoint[zone]
-    return lambda step: step.conditions.cooling_setpoint[zone]
+    values, of_zone = attrgetter(_HELD[kind]), kind in (HEATING_SETPOINT, COOLING_SETPOINT)
+    at = (plant.zone_names if of_zone else plant.devices.air_handlers).index(entity)
+    return lambda step: values(step)[at]
+
+
+def forecast_metadata(points: Collection[str], zones: Iterable[str], currency: str, carbon: str) -> Metadata:
+    """Describe each forecast point with its unit, as `GET /forecast_points` does.
+
+    Parameters
+    ----------
+    points : collection of str
+        Points of the weather station that are known.
+    zones : iterable of str
+        Names of the zones.
+    currency : str
+        Of prices.
+    carbon : str
+        Kind of electricity's emissions.
+    """
+    known = set(points)
+    if "global_horizontal_irradiance_sensor" in known or known >= {*_SUN} - {"global_horizontal_irradiance_sensor"}:
+        known |= {*_SUN}  # any two give the third, and the global one alone is split
+    per_kwh = f"{currency}/kWh"
+    rows: dict[str, tuple[str, str]] = {
+        name: (unit, f"{text}, mean from the time on")
+        for name, (unit, point, _, text) in WEATHER_NAMES.items()
+        if point in known
+    }
+    for kind, name in PRICE_POINTS.items():
+        rows[name] = (per_kwh, f"Price of electricity, {kind.replace('_', ' ')}")
+    rows["PriceGasPower"] = (per_kwh, "Price of gas by its upper heating value")
+    rows["EmissionsElectricPower"] = ("kgCO2/kWh", f"Emissions of electricity, {carbon}")
+    rows["EmissionsGasPower"] = ("kgCO2/kWh", "Emissions of gas")
+    zones = tuple(zones)
+    for name, (unit, text) in ZONE_NAMES.items():
+        rows |= {f"{name}[{zone}]": (unit, f"{text}, zone {zone}") for zone in zones}
+    return {name: {"Unit": unit, "Description": text} for name, (unit, text) in rows.items()}
+
+
+class BoundaryConditions:
+    """Boundary conditions of a test's scenario, step by step.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        That drives the plant.
+    prices : mapping of str to Rate
+        Of the scenarios.
+    """
+
+    def __init__(self, scenario: Scenario, prices: Mapping[str, Rate]) -> None:
+        self._scenario, grid = scenario, scenario.grid
+        self.prices = {kind: np.asarray(rate.on(grid), dtype=float) for kind, rate in prices.items()}
+        self._single = {PRICE_POINTS[kind]: values for kind, values in self.prices.items()} | {
+            "PriceGasPower": scenario.gas_price,
+            "EmissionsElectricPower": scenario.electricity_carbon,
+            "EmissionsGasPower": scenario.gas_carbon,
+        }
+        self._of_zones = {
+            "LowerSetp": scenario.lower,
+            "UpperSetp": scenario.upper,
+            "Occupancy": scenario.expected_occupancy,
+            "InternalGainsCon": scenario.expected_gains,
+            "InternalGainsLat": scenario.heat.moisture_heat(scenario.expected_occupancy),
+        }
+
+    def series(self, name: str) -> FloatArray:
+        """Values over the steps of the scenario, shape (n_steps,) [unit of the point].
+
+        Parameters
+        ----------
+        name : str
+            A forecast point of the case.
+        """
+        if name in self._single:
+            return self._single[name]
+        if name in WEATHER_NAMES:
+            _, point, factor, _ = WEATHER_NAMES[name]
+            weather = self._scenario.weather
+            if point in _SUN and point not in weather.frame:
+                return np.asarray(getattr(weather.sun, _SUN[point]), dtype=float)
+            return factor * weather.values(point)
+        kind, _, zone = name.removesuffix("]").partition("[")
+        return np.asarray(self._of_zones[kind][:, self._scenario.zones.index(zone)], dtype=float)
+
+    def rows(self, seconds: FloatArray) -> tuple[NDArray[np.int64], bool]:
+        """Find the steps that hold at some times; beyond the scenario those of the same hour of its last day.
+
+        Parameters
+        ----------
+        seconds : ndarray, shape (n,)
+            Since 1970 in UTC [s].
+
+        Returns
+        -------
+        tuple
+            Numbers of the steps, shape (n,), and whether any lies beyond the scenario.
+        """
+        grid = self._scenario.grid
+        numbers = np.floor((seconds - grid.edges[0]) / grid.step + 1e-9).astype(np.int64)
+        day = min(round(86_400.0 / grid.step), grid.n_steps)
+        late = numbers >= grid.n_steps
+        beyond = numbers[late] - grid.n_steps
+        numbers[late] = grid.n_steps - day + beyond % day
+        return numbers, bool(late.any())
+
+
+def uncertain(name: str, values: FloatArray, level: str, seed: tuple[int, ...], interval: float) -> FloatArray:
+    """Add the errors of an uncertain forecast of temperature or sun.
+
+    Parameters
+    ----------
+    name : str
+        ``TDryBul`` or ``HGloHor``.
+    values : ndarray, shape (n,)
+        The truth, from now on [unit of the point].
+    level : str
+        A key of `UNCERTAINTY`.
+    seed : tuple of int
+        Of the errors.
+    interval : float
+        Time between values [s].
+    """
+    stream, growth = _ERRORS[name]
+    later = growth.path(np.random.default_rng([_STREAM, stream, *seed]), max(values.size - 1, 0), interval)
+    errors = UNCERTAINTY[level] * np.concatenate([[0.0], later])[: values.size]
+    return values + errors if name == "TDryBul" else values * np.maximum(1.0 + errors, 0.0)

@@ -1,32 +1,48 @@
-"""A reference building: its plant, its geometry and its sizes, from the input file and a day that EnergyPlus ran."""
+"""A reference building: its plant, its zone table and its sizes, from the input file and a day that EnergyPlus ran."""
 
 from __future__ import annotations
 
 import json
 import re
 import sqlite3
-import tempfile
 from collections.abc import Mapping
 from contextlib import closing
 from dataclasses import dataclass
 from datetime import date
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, NamedTuple
 
-from mpc.adapters.energyplus.geometry import building_of
-from mpc.adapters.energyplus.input import InputFile, read_input, with_period
-from mpc.adapters.energyplus.install import CHICAGO, building_path, weather_path
+from mpc.adapters.energyplus.input import CHICAGO, InputFile, building_path, entity, read_input, weather_path
 from mpc.adapters.energyplus.layout import PlantLayout, find_layout
 from mpc.adapters.energyplus.process import Job, run_energyplus
 from mpc.errors import EnergyPlusError
 from mpc.loop.sensors import PlantDevices
-from thermal.case.building import Building
+from mpc.scenario.weather_files import read_epw
+from thermal.case.building import Building, Device, Layer, Surface, ZoneEntry, ZoneTable
 from thermal.errors import describe
 
 _METER = re.compile(r"^Output:Meter,([^,]+),", re.M)
 _DAY = date(2023, 1, 2)  # any: sizes come from design days
 _WATER_DENSITY = 983.0  # kg/m3, as `thermal.hvac` has it
+
+Kind = Literal["wall", "floor", "ceiling"]
+
+_KINDS: Mapping[str, Kind] = {
+    "Wall": "wall",
+    "Door": "wall",
+    "Internal Mass": "wall",
+    "Floor": "floor",
+    "Roof": "ceiling",
+}
+_GLASS = ("Window", "Glass Door")
+_OUTDOOR, _GROUND = "outdoor", "ground"
+_THIN = 0.01  # m, of a layer that has a resistance only
+_LIGHT = 10.0  # kg/m3, of such a layer
+_QUERY = """
+    SELECT s.SurfaceIndex, s.SurfaceName, s.ClassName, s.Area, s.Azimuth, s.ExtBoundCond, s.ZoneIndex, c.Name
+    FROM Surfaces s JOIN Constructions c USING (ConstructionIndex) ORDER BY s.SurfaceIndex
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,12 +98,9 @@ class EnergyPlusBuilding:
     @property
     def devices(self) -> PlantDevices:
         """Names of the devices; a building without boilers has an empty one, several chillers count as the first."""
-        names = {
-            kind: [d.name for d in self.building.devices if d.type == kind]
-            for kind in ("vav", "ahu", "boiler", "chiller")
-        }
-        chiller = names["chiller"][0] if names["chiller"] else None
-        return PlantDevices(tuple(names["vav"]), tuple(names["ahu"]), (names["boiler"] or [""])[0], chiller)
+        kinds = ("vav", "ahu", "boiler", "chiller")
+        vav, ahu, boiler, chiller = (tuple(d.name for d in self.building.devices if d.type == kind) for kind in kinds)
+        return PlantDevices(vav, ahu, next(iter(boiler), ""), next(iter(chiller), None))
 
     @property
     def full_water_flow(self) -> dict[str, float]:
@@ -124,18 +137,15 @@ def energyplus_building(name: str | Path, weather: str | Path = CHICAGO) -> Ener
 def _described(path: Path, weather: Path) -> EnergyPlusBuilding:
     source = read_input(path)
     layout = find_layout(source)
-    content: dict[str, Any] = with_period(source, _DAY, 1, 6)
+    content: dict[str, Any] = source.with_period(_DAY, 1, 6)
     content["Output:SQLite"] = {"Output:SQLite 1": {"option_type": "SimpleAndTabular"}}
     content["Output:VariableDictionary"] = {"Output:VariableDictionary 1": {"key_field": "IDF"}}
-    files = run_energyplus(
-        Job(json.dumps(content), "in.epJSON", weather, stepped=False), ["eplusout.sql", "eplusout.mdd"]
-    )
-    with tempfile.TemporaryDirectory(prefix="buildingmpc-energyplus-") as folder:
-        copy = Path(folder) / "eplusout.sql"
-        copy.write_bytes(files["eplusout.sql"])
-        with closing(sqlite3.connect(copy)) as database:
-            rows = database.execute("SELECT CompName, Description, Value FROM ComponentSizes").fetchall()
-            building = building_of(database, source, layout, weather)
+    job = Job(json.dumps(content), "in.epJSON", weather, stepped=False)
+    files = run_energyplus(job, ["eplusout.sql", "eplusout.mdd"])
+    with closing(sqlite3.connect(":memory:")) as database:
+        database.deserialize(files["eplusout.sql"])
+        rows = database.execute("SELECT CompName, Description, Value FROM ComponentSizes").fetchall()
+        building = _building_of(database, source, layout, weather)
     sizes = {(str(name).upper(), str(what)): float(value) for name, what, value in rows}
     meters = tuple(_METER.findall(files["eplusout.mdd"].decode("latin-1")))
     return EnergyPlusBuilding(source, weather, layout, building, sizes, meters)
@@ -144,3 +154,111 @@ def _described(path: Path, weather: Path) -> EnergyPlusBuilding:
 def _plain(description: str) -> str:
     """Write a description without capitals and underscores, which some runs have and others have not."""
     return description.lower().replace("_", " ")
+
+
+class _Face(NamedTuple):
+    """A surface as EnergyPlus has it; `behind` is a surface, 0 outdoors, negative the ground."""
+
+    number: int
+    name: str
+    kind: str
+    area: float
+    azimuth: float
+    behind: int
+    zone: int
+    construction: str
+
+
+class _Zone(NamedTuple):
+    """A zone as large as all those that it stands for together."""
+
+    name: str
+    volume: float
+    floor_area: float
+    multiplier: float
+
+
+def _building_of(database: sqlite3.Connection, source: InputFile, layout: PlantLayout, weather: Path) -> Building:
+    """Zone table from EnergyPlus' output of a run; zones that no terminal serves are measured boundaries."""
+    names = {zone.upper(): zone for zone in (*layout.zones, *layout.others)}
+    rows = database.execute("SELECT ZoneIndex, ZoneName, Volume, FloorArea, Multiplier * ListMultiplier FROM Zones")
+    zones = {int(i): _Zone(names[name.upper()], v * m, a * m, float(m)) for i, name, v, a, m in rows}
+    by_name = {zone.name: zone for zone in zones.values()}
+    entries = tuple(
+        ZoneEntry(name=entity(name), volume=by_name[name].volume, floor_area=by_name[name].floor_area)
+        for name in layout.zones
+    )
+    faces = {int(row[0]): _Face(*row) for row in database.execute(_QUERY)}
+    surfaces = [s for face in faces.values() if (s := _surface(face, faces, zones, source, set(layout.zones)))]
+    used = {s.construction for s in surfaces if s.construction}
+    layers = {name: stack for name, stack in _constructions(database).items() if name in used}
+    table = ZoneTable(entries, tuple(surfaces), layers)
+    return Building(entity(source.name), read_epw(weather).location, 0.0, table, _devices(layout))
+
+
+def _devices(layout: PlantLayout) -> tuple[Device, ...]:
+    central = {
+        "ahu": [loop.name for loop in layout.air_loops],
+        "boiler": [loop.name for loop in layout.water_loops],
+        "chiller": layout.chillers,
+    }
+    terminals = [Device(name=entity(t.name), type="vav", zone=entity(t.zone)) for t in layout.terminals]
+    return (*terminals, *(Device(name=entity(name), type=kind) for kind, names in central.items() for name in names))
+
+
+def _surface(
+    face: _Face,
+    faces: Mapping[int, _Face],
+    zones: Mapping[int, _Zone],
+    source: InputFile,
+    served: set[str],
+) -> Surface | None:
+    """Make a surface of the zone table; None for what is not a zone's, or has been counted from the other side."""
+    zone = zones[face.zone]
+    if zone.name not in served or face.kind not in (*_KINDS, *_GLASS):
+        return None
+    name, own, area = entity(face.name), entity(zone.name), face.area * zone.multiplier
+    if face.kind in _GLASS:
+        u_value, sun = _glazing(source, face)
+        return Surface(name=name, kind="window", zone=own, other=_OUTDOOR, area=area, azimuth=face.azimuth,
+                       u_value=u_value, solar_transmittance=sun)  # fmt: skip
+    kind, other = _KINDS[face.kind], _OUTDOOR if face.behind == 0 else _GROUND
+    if face.behind > 0:
+        behind = zones[faces[face.behind].zone].name
+        other = entity(behind)
+        if other == own:  # its own back, or the same storey again: nothing leaves there
+            kind = "wall"
+        elif behind in served and face.behind < face.number:
+            return None
+    azimuth = face.azimuth if other == _OUTDOOR and kind == "wall" else None
+    return Surface(name=name, kind=kind, zone=own, other=other, area=area, azimuth=azimuth,
+                   construction=entity(face.construction))  # fmt: skip
+
+
+def _glazing(source: InputFile, face: _Face) -> tuple[float, float]:
+    """U-value [W/m2/K] and solar heat gain coefficient [-]."""
+    fields = source.find("Construction", face.construction)
+    layer = str(fields["outside_layer"])
+    for name, glass in source.of_type("WindowMaterial:SimpleGlazingSystem").items():
+        if name.lower() == layer.lower():
+            return float(glass["u_factor"]), float(glass["solar_heat_gain_coefficient"])
+    return 2.7, 0.4  # layered glass: an ordinary double pane, whose values a calibration moves
+
+
+def _constructions(database: sqlite3.Connection) -> dict[str, tuple[Layer, ...]]:
+    """Layers by construction, from the zone outwards."""
+    query = """
+        SELECT c.Name, m.Thickness, m.Conductivity, m.Density, m.SpecHeat, m.Resistance
+        FROM ConstructionLayers l JOIN Constructions c USING (ConstructionIndex) JOIN Materials m USING (MaterialIndex)
+        ORDER BY c.ConstructionIndex, l.LayerIndex DESC
+    """
+    stacks: dict[str, list[Layer]] = {}
+    for name, *values in database.execute(query):
+        stacks.setdefault(entity(name), []).append(_layer(*values))
+    return {name: tuple(stack) for name, stack in stacks.items()}
+
+
+def _layer(thickness: Any, conductivity: Any, density: Any, heat: Any, resistance: Any) -> Layer:
+    if thickness and conductivity and density and heat:
+        return Layer(thickness=thickness, conductivity=conductivity, density=density, heat_capacity=heat)
+    return Layer(thickness=_THIN, conductivity=_THIN / (resistance or 0.1), density=_LIGHT, heat_capacity=1000.0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -166,57 +167,51 @@ def find_layout(source: InputFile) -> PlantLayout:
 
 def _air_loop(source: InputFile, name: str) -> AirLoop | None:
     fields = source.find("AirLoopHVAC", name)
-    outlets = source.nodes(str(fields["supply_side_outlet_node_names"]))
-    demand = {n.lower() for n in source.nodes(str(fields["demand_side_inlet_node_names"]))}
+    outlets = source.nodes(fields["supply_side_outlet_node_names"])
+    demand = {n.lower() for n in source.nodes(fields["demand_side_inlet_node_names"])}
     managers = _managers(source, outlets)
     terminals = _terminals(source, _branches_of_duct(source, demand))
     if not (len(outlets) == 1 and managers and terminals):
         return None
-    components = _components(source, str(fields["branch_list_name"]))
-    mixed, controller = "", ""
-    for kind, title in components:
-        if kind == "OutdoorAir:Mixer":
-            mixed = str(source.find(kind, title)["mixed_air_node_name"])
-    for title, controls in source.of_type("Controller:OutdoorAir").items():
-        if mixed and str(controls["mixed_air_node_name"]).lower() == mixed.lower():
-            controller = title
-    inlet = str(fields["supply_side_inlet_node_name"])
-    return AirLoop(name, outlets[0], inlet, mixed, managers, components, terminals, controller)
+    components = tuple(
+        c for part in _parts(source, fields["branch_list_name"]) for c in _inside(source, *_type_and_name(part))
+    )
+    mixers = (source.find(*component) for component in components if component[0] == "OutdoorAir:Mixer")
+    mixed = next((mixer["mixed_air_node_name"] for mixer in mixers), "")
+    outdoor = source.of_type("Controller:OutdoorAir").items() if mixed else ()
+    controllers = (title for title, control in outdoor if control["mixed_air_node_name"].lower() == mixed.lower())
+    inlet = fields["supply_side_inlet_node_name"]
+    return AirLoop(name, outlets[0], inlet, mixed, managers, components, terminals, next(controllers, ""))
 
 
 def _branches_of_duct(source: InputFile, demand: set[str]) -> set[str]:
     """Nodes where the supply path of an air loop ends, in lower case."""
     nodes = set(demand)
     for path in source.of_type("AirLoopHVAC:SupplyPath").values():
-        if str(path["supply_air_path_inlet_node_name"]).lower() not in demand:
-            continue
-        for part in path["components"]:
-            fields = source.find(str(part["component_object_type"]), str(part["component_name"]))
-            nodes |= {str(entry["outlet_node_name"]).lower() for entry in fields.get("nodes", ())}
+        if path["supply_air_path_inlet_node_name"].lower() in demand:
+            for part in path["components"]:
+                fields = source.find(*_type_and_name(part))
+                nodes |= {entry["outlet_node_name"].lower() for entry in fields.get("nodes", ())}
     return nodes
 
 
 def _terminals(source: InputFile, nodes: set[str]) -> tuple[Terminal, ...]:
-    zone_of = {
-        node.lower(): str(fields["zone_name"])
-        for fields in source.of_type("ZoneHVAC:EquipmentConnections").values()
-        for node in source.nodes(str(fields.get("zone_air_inlet_node_or_nodelist_name", "")))
-    }
     names = {zone.lower(): zone for zone in source.of_type("Zone")}
+    zone_of = {
+        node.lower(): names[fields["zone_name"].lower()]
+        for fields in source.of_type("ZoneHVAC:EquipmentConnections").values()
+        for node in source.nodes(fields.get("zone_air_inlet_node_or_nodelist_name", ""))
+    }
     found = []
-    for kind in _TERMINALS:
-        for name, fields in source.of_type(kind).items():
-            inlet, outlet = (str(fields[f"air_{side}_node_name"]) for side in ("inlet", "outlet"))
-            if inlet.lower() not in nodes or outlet.lower() not in zone_of:
-                continue
-            coil, coil_type = (str(fields.get(f"reheat_coil_{what}", "")) for what in ("name", "object_type"))
-            water = (
-                str(source.find(coil_type, coil)["water_inlet_node_name"]) if coil_type == "Coil:Heating:Water" else ""
-            )
-            zone = names[zone_of[outlet.lower()].lower()]
+    for name, fields in (item for kind in _TERMINALS for item in source.of_type(kind).items()):
+        inlet, outlet = fields["air_inlet_node_name"], fields["air_outlet_node_name"]
+        if inlet.lower() in nodes and outlet.lower() in zone_of:
+            coil, coil_type = (fields.get(f"reheat_coil_{what}", "") for what in ("name", "object_type"))
+            wet = coil_type == "Coil:Heating:Water"
+            water = source.find(coil_type, coil)["water_inlet_node_name"] if wet else ""
             least = fields.get("constant_minimum_air_flow_fraction", 0.0)
             share = float(least) if isinstance(least, int | float) else 0.3
-            found.append(Terminal(name, zone, inlet, outlet, coil, coil_type, water, share))
+            found.append(Terminal(name, zone_of[outlet.lower()], inlet, outlet, coil, coil_type, water, share))
     return tuple(found)
 
 
@@ -226,48 +221,38 @@ def _managers(source: InputFile, nodes: tuple[str, ...]) -> tuple[str, ...]:
         name
         for name, fields in source.of_type(_SCHEDULED).items()
         if fields.get("control_variable", "Temperature") == "Temperature"
-        and wanted & {n.lower() for n in source.nodes(str(fields["setpoint_node_or_nodelist_name"]))}
+        and wanted & {n.lower() for n in source.nodes(fields["setpoint_node_or_nodelist_name"])}
     )
 
 
-def _components(source: InputFile, branch_list: str) -> tuple[tuple[str, str], ...]:
-    """Types and names on the branches of a loop, those inside of outdoor air systems and coil systems with them."""
-    found: list[tuple[str, str]] = []
-    for entry in source.find("BranchList", branch_list)["branches"]:
-        for part in source.find("Branch", str(entry["branch_name"]))["components"]:
-            found += _inside(source, str(part["component_object_type"]), str(part["component_name"]))
-    return tuple(found)
+def _parts(source: InputFile, branch_list: str) -> list[Mapping[str, Any]]:
+    """Components on the branches of a loop."""
+    branches = source.find("BranchList", branch_list)["branches"]
+    return [part for entry in branches for part in source.find("Branch", entry["branch_name"])["components"]]
+
+
+def _type_and_name(part: Mapping[str, Any]) -> tuple[str, str]:
+    return part["component_object_type"], part["component_name"]
 
 
 def _inside(source: InputFile, kind: str, name: str) -> list[tuple[str, str]]:
+    """Types and names of a component, or of what an outdoor air system or a coil system holds."""
     if kind == "AirLoopHVAC:OutdoorAirSystem":
-        listed: Any = source.find(kind, name)["outdoor_air_equipment_list_name"]
-        parts = source.find("AirLoopHVAC:OutdoorAirSystem:EquipmentList", str(listed))
+        listed = source.find(kind, name)["outdoor_air_equipment_list_name"]
+        parts = source.find("AirLoopHVAC:OutdoorAirSystem:EquipmentList", listed)
         count = sum(key.endswith("_object_type") for key in parts)
-        return [
-            (str(parts[f"component_{k}_object_type"]), str(parts[f"component_{k}_name"])) for k in range(1, count + 1)
-        ]
+        return [(parts[f"component_{k}_object_type"], parts[f"component_{k}_name"]) for k in range(1, count + 1)]
     if kind.startswith("CoilSystem:"):
         fields = source.find(kind, name)
-        return [(str(fields["cooling_coil_object_type"]), str(fields["cooling_coil_name"]))]
+        return [(fields["cooling_coil_object_type"], fields["cooling_coil_name"])]
     return [(kind, name)]
 
 
 def _water_loop(source: InputFile, name: str) -> WaterLoop | None:
     fields = source.find("PlantLoop", name)
-    branches = source.find("BranchList", str(fields["plant_side_branch_list_name"]))["branches"]
-    parts = [p for b in branches for p in source.find("Branch", str(b["branch_name"]))["components"]]
-    of_kind = {
-        prefix: tuple(
-            (str(p["component_object_type"]), str(p["component_name"]))
-            for p in parts
-            if str(p["component_object_type"]).startswith(prefix)
-        )
-        for prefix in ("Boiler:HotWater", "Pump:")
-    }
-    nodes = tuple(str(p["component_outlet_node_name"]) for p in parts)
-    outlet, inlet = (str(fields[f"plant_side_{side}_node_name"]) for side in ("outlet", "inlet"))
-    managers = _managers(source, (outlet, *nodes))
-    if not (of_kind["Boiler:HotWater"] and managers):
-        return None
-    return WaterLoop(name, outlet, inlet, managers, of_kind["Boiler:HotWater"], of_kind["Pump:"])
+    parts = _parts(source, fields["plant_side_branch_list_name"])
+    components = [_type_and_name(part) for part in parts]
+    boilers, pumps = (tuple(c for c in components if c[0].startswith(kind)) for kind in ("Boiler:HotWater", "Pump:"))
+    outlet, inlet = (fields[f"plant_side_{side}_node_name"] for side in ("outlet", "inlet"))
+    managers = _managers(source, (outlet, *(part["component_outlet_node_name"] for part in parts)))
+    return WaterLoop(name, outlet, inlet, managers, boilers, pumps) if boilers and managers else None

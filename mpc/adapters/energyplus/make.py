@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import pandas as pd
 
 from mpc.adapters.energyplus.building import EnergyPlusBuilding, energyplus_building
-from mpc.adapters.energyplus.holidays import holidays
-from mpc.adapters.energyplus.install import CHICAGO
-from mpc.adapters.energyplus.plant import EnergyPlusPlant
-from mpc.loop.noise import SensorNoise
-from mpc.scenario.forecast import ErrorGrowth, Forecaster
+from mpc.adapters.energyplus.input import CHICAGO, holidays
+from mpc.adapters.energyplus.plant import EnergyPlusPlant, EnergyPlusSettings
+from mpc.scenario.forecast import Forecaster
 from mpc.scenario.gains import InternalGains
 from mpc.scenario.grid import Calendar, StepGrid
 from mpc.scenario.occupancy import ComfortBand
@@ -24,21 +21,40 @@ from mpc.scenario.weather_files import read_epw
 
 #: Thermostats of the reference offices, 21 and 24 degC while they run, half a kelvin wider; an hour to get there.
 OFFICE_COMFORT = ComfortBand((293.65, 297.65), (288.25, 300.35), weekday=(7.0, 22.0), saturday=(7.0, 18.0))
-#: No heat of people and equipment: who predicts is not told what the building's schedules hold.
 _UNKNOWN_GAINS = InternalGains(0.0, 0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class EnergyPlusConditions:
+    """What a scenario has beside its weather.
+
+    Parameters
+    ----------
+    tariff : Tariff
+        Prices; those of the paper's simulator by default.
+    carbon : CarbonIntensity, optional
+        Emissions; not counted by default.
+    comfort : ComfortBand, optional
+        Of all zones; `OFFICE_COMFORT` with the holidays of the building by default.
+    gains : InternalGains
+        What forecasts say of people and equipment; nothing by default: who predicts is not told what the building's
+        schedules hold.
+    """
+
+    tariff: Tariff = field(default_factory=paper_tariff)
+    carbon: CarbonIntensity | None = None
+    comfort: ComfortBand | None = None
+    gains: InternalGains = _UNKNOWN_GAINS
 
 
 def energyplus_scenario(
     source: EnergyPlusBuilding,
     start: str,
     days: int,
+    conditions: EnergyPlusConditions = EnergyPlusConditions(),
     *,
     step_seconds: float = 300.0,
     horizon: int = 0,
-    tariff: Tariff | None = None,
-    carbon: CarbonIntensity | None = None,
-    comfort: ComfortBand | None = None,
-    gains: InternalGains | None = None,
 ) -> Scenario:
     """Make the scenario of a run: its weather file's weather, comfort bands and prices.
 
@@ -50,18 +66,12 @@ def energyplus_scenario(
         First day, ISO 8601; its day of the week counts.
     days : int
         Length of the run [d].
+    conditions : EnergyPlusConditions
+        Prices, emissions, comfort and gains.
     step_seconds : float
         Step of the plant [s].
     horizon : int
         Steps that forecasts reach beyond the end.
-    tariff : Tariff, optional
-        Prices; those of the paper's simulator by default.
-    carbon : CarbonIntensity, optional
-        Emissions; not counted by default.
-    comfort : ComfortBand, optional
-        Of all zones; `OFFICE_COMFORT` with the holidays of the building by default.
-    gains : InternalGains, optional
-        What forecasts say of people and equipment; nothing by default.
 
     Returns
     -------
@@ -72,8 +82,8 @@ def energyplus_scenario(
     grid = StepGrid(pd.Timestamp(start, tz=zone), step_seconds, round(days * 86_400 / step_seconds) + horizon)
     free = holidays(source.source, range(grid.start.year, grid.start.year + 2))
     return build_scenario(
-        source.building, grid, read_epw(source.weather), tariff or paper_tariff(), carbon=carbon,
-        comfort=comfort or replace(OFFICE_COMFORT, calendar=Calendar(free)), gains=gains or _UNKNOWN_GAINS,
+        source.building, grid, read_epw(source.weather), conditions.tariff, carbon=conditions.carbon,
+        comfort=conditions.comfort or replace(OFFICE_COMFORT, calendar=Calendar(free)), gains=conditions.gains,
     )  # fmt: skip
 
 
@@ -81,19 +91,16 @@ def energyplus_plant(
     name: str | Path,
     start: str,
     days: int,
+    settings: EnergyPlusSettings | None = None,
+    conditions: EnergyPlusConditions = EnergyPlusConditions(),
     *,
     weather: str | Path = CHICAGO,
     step_seconds: float = 300.0,
-    control_steps: int = 1,
     horizon: int | None = None,
-    errors: Mapping[str, ErrorGrowth] | None = None,
-    tariff: Tariff | None = None,
-    carbon: CarbonIntensity | None = None,
-    comfort: ComfortBand | None = None,
-    noise: SensorNoise | None = None,
-    lead_days: int = 1,
 ) -> EnergyPlusPlant:
-    """Make a plant of one of EnergyPlus' buildings; `EnergyPlusPlant` has every choice.
+    """Make a plant of one of EnergyPlus' buildings; forecasts are the weather file's, without errors.
+
+    For forecasts with errors make an `EnergyPlusPlant` with a `Forecaster` of `energyplus_scenario`.
 
     Parameters
     ----------
@@ -103,26 +110,16 @@ def energyplus_plant(
         First day, ISO 8601; its day of the week counts.
     days : int
         Length of the run [d].
+    settings : EnergyPlusSettings, optional
+        How it is run and measured.
+    conditions : EnergyPlusConditions
+        Prices, emissions, comfort and gains.
     weather : str or Path
         An ``.epw`` file, or one of `weather_files`.
     step_seconds : float
         Step of the plant [s], an hour divided by a whole number.
-    control_steps : int
-        Steps of the plant in a control step.
     horizon : int, optional
         Steps of the forecasts; none by default.
-    errors : mapping of str to ErrorGrowth, optional
-        Of the forecasts' weather; perfect by default.
-    tariff : Tariff, optional
-        Prices; those of the paper's simulator by default.
-    carbon : CarbonIntensity, optional
-        Emissions; not counted by default.
-    comfort : ComfortBand, optional
-        Of all zones; `OFFICE_COMFORT` with the holidays of the building by default.
-    noise : SensorNoise, optional
-        Errors of what is measured; none by default.
-    lead_days : int
-        Days under the building's own control before the run [d].
 
     Returns
     -------
@@ -141,11 +138,6 @@ def energyplus_plant(
     >>> plant = energyplus_plant("RefBldgMediumOfficeNew2004_Chicago", "2023-01-09", 7)  # doctest: +SKIP
     """
     source = energyplus_building(name, weather)
-    scenario = energyplus_scenario(
-        source, start, days, step_seconds=step_seconds, horizon=horizon or 0, tariff=tariff, carbon=carbon,
-        comfort=comfort,
-    )  # fmt: skip
-    forecaster = None if horizon is None else Forecaster(scenario, horizon, errors)
-    return EnergyPlusPlant(
-        source, scenario, days, control_steps=control_steps, forecaster=forecaster, lead_days=lead_days, noise=noise
-    )
+    scenario = energyplus_scenario(source, start, days, conditions, step_seconds=step_seconds, horizon=horizon or 0)
+    forecaster = None if horizon is None else Forecaster(scenario, horizon)
+    return EnergyPlusPlant(source, scenario, days, settings or EnergyPlusSettings(), forecaster)

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 from datetime import timedelta
 
 import numpy as np
 import pandas as pd
 
 from mpc.adapters.energyplus.building import EnergyPlusBuilding
-from mpc.adapters.energyplus.points import Reader, columns_of, meters
+from mpc.adapters.energyplus.points import CELSIUS, Reader, actuators_of, columns_of, meters, prepared
 from mpc.adapters.energyplus.process import EnergyPlusProcess, Job
-from mpc.adapters.energyplus.setpoints import actuators_of, prepared
+from mpc.adapters.foreign import ForeignPlant
 from mpc.errors import PlantError
 from mpc.kpi.record import PlantRecord
 from mpc.loop.actuators import checked_actions
@@ -26,11 +27,38 @@ from thermal.case.case import Case
 from thermal.case.telemetry import Telemetry
 from thermal.errors import describe
 
-_FREEZING = 273.15  # K
 _DAY, _HOUR = 86_400, 3_600  # s
 
 
-class EnergyPlusPlant:
+@dataclass(frozen=True)
+class EnergyPlusSettings:
+    """How a building is run and measured.
+
+    Parameters
+    ----------
+    control_steps : int
+        Steps of the plant in a control step.
+    lead_days : int
+        Days under the building's own control before the run [d], at least 1, after EnergyPlus' warm-up.
+    limits : mapping of str to tuple of float
+        Ranges by kind of action in the place of the default ones [K].
+    noise : SensorNoise, optional
+        Errors of what is measured; none by default.
+    seed : int
+        Of the noise.
+    patience : float
+        Longest time for an answer of EnergyPlus [s]; then its process is ended.
+    """
+
+    control_steps: int = 1
+    lead_days: int = 1
+    limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    noise: SensorNoise | None = None
+    seed: int = 0
+    patience: float = 600.0
+
+
+class EnergyPlusPlant(ForeignPlant):
     """A building of EnergyPlus in closed loop.
 
     Every run has a process of its own, which waits at each control step. What an action leaves out stays as the
@@ -46,20 +74,10 @@ class EnergyPlusPlant:
         building has its own schedules, people and weather.
     days : int
         Length of the run [d].
-    control_steps : int
-        Steps of the plant in a control step.
+    settings : EnergyPlusSettings
+        How it is run and measured.
     forecaster : Forecaster, optional
         Forecasts of the scenario; none by default.
-    lead_days : int
-        Days under the building's own control before the run [d], at least 1, after EnergyPlus' warm-up.
-    limits : mapping of str to tuple of float, optional
-        Ranges by kind of action in the place of the default ones [K].
-    noise : SensorNoise, optional
-        Errors of what is measured; none by default.
-    seed : int
-        Of the noise.
-    patience : float
-        Longest time for an answer of EnergyPlus [s]; then its process is ended.
 
     Raises
     ------
@@ -74,44 +92,27 @@ class EnergyPlusPlant:
         source: EnergyPlusBuilding,
         scenario: Scenario,
         days: int,
-        *,
-        control_steps: int = 1,
+        settings: EnergyPlusSettings = EnergyPlusSettings(),
         forecaster: Forecaster | None = None,
-        lead_days: int = 1,
-        limits: Mapping[str, tuple[float, float]] | None = None,
-        noise: SensorNoise | None = None,
-        seed: int = 0,
-        patience: float = 600.0,
     ) -> None:
-        self.source, self.scenario, self.forecaster, self.control_steps = source, scenario, forecaster, control_steps
-        self._days, self._lead, self._patience = days, lead_days, patience
+        self.source, self.scenario, self.forecaster = source, scenario, forecaster
+        self.settings, self.control_steps, self._days = settings, settings.control_steps, days
+        self._seed, self._patience = settings.seed, settings.patience
         self._check()
+        self.zone_names, self.control_step = scenario.zones, self.control_steps * float(scenario.grid.step)
         self._per_day = round(_DAY / scenario.grid.step)
-        self.actuators, self._handles = actuators_of(source, limits or {})
+        self._handles = actuators_of(source, settings.limits)
+        self.actuators = tuple(self._handles.values())
         self._by_name = {a.name: a for a in self.actuators}
         columns = columns_of(source.layout, source.building.weather_station, source.full_water_flow)
         self._reader = Reader(columns, source.layout)
         self._layout = PointLayout(self._reader.names, source.building.location.timezone)
-        self._noise, self._seed = None if noise is None else NoiseSource(self._layout, noise), seed
-        self._meters = tuple(meters(source.meters, kind) for kind in ("Electricity", "NaturalGas"))
+        self._noise = None if settings.noise is None else NoiseSource(self._layout, settings.noise)
+        electric, gas = (meters(source.meters, kind) for kind in ("Electricity", "NaturalGas"))
+        self._meters, self._electric = (*electric, *gas), len(electric)
         self._process: EnergyPlusProcess | None = None
         self._number = -1
         self._clear()
-
-    @property
-    def control_step(self) -> float:
-        """Time between two actions [s]."""
-        return self.control_steps * float(self.scenario.grid.step)
-
-    @property
-    def zone_names(self) -> tuple[str, ...]:
-        """Names of the zones, in the order of records."""
-        return self.scenario.zones
-
-    @property
-    def columns(self) -> tuple[str, ...]:
-        """Names of the measurements."""
-        return self._layout.columns
 
     @property
     def steps(self) -> int:
@@ -130,11 +131,12 @@ class EnergyPlusPlant:
 
     def job(self) -> Job:
         """Give what EnergyPlus is run with."""
-        start = self.scenario.grid.start.date() - timedelta(days=self._lead)
-        content = prepared(self.source, start, self._days + self._lead, round(_HOUR / self.scenario.grid.step))
+        start = self.scenario.grid.start.date() - timedelta(days=self.settings.lead_days)
+        days = self._days + self.settings.lead_days
+        content = prepared(self.source, start, days, round(_HOUR / self.scenario.grid.step))
         return Job(
             json.dumps(content), "in.epJSON", self.source.weather, self._reader.outputs, self._reader.products,
-            (*self._meters[0], *self._meters[1]), self._handles,
+            self._meters, tuple(self._handles),
         )  # fmt: skip
 
     def reset(self, seed: int | None = None) -> Measurements:
@@ -154,8 +156,7 @@ class EnergyPlusPlant:
         self._seed = self._seed if seed is None else seed
         self._process, self._number = EnergyPlusProcess(self.job(), self._patience), 0
         self._clear()
-        steps = self._lead * self._per_day
-        rows, ends, _ = self._ask(steps, {})
+        rows, ends, _ = self._ask(self.settings.lead_days * self._per_day, {})
         self._first = self._reader.rooms(ends[-1])
         return self._seen(self._read(rows[-self.control_steps :], 0))
 
@@ -179,9 +180,7 @@ class EnergyPlusPlant:
         PlantError
             When the run is over, or `reset` was not called.
         EnergyPlusError
-            When EnergyPlus breaks off or ends with severe errors.
-        EnergyPlusError
-            When it does not answer.
+            When EnergyPlus breaks off, ends with severe errors or does not answer.
         """
         need_running(self._number >= 0)
         given = checked_actions(actions, self._by_name)
@@ -235,7 +234,7 @@ class EnergyPlusPlant:
         PlantError
             When there was no step yet.
         """
-        last, count = self._kept(self._energy)[-steps // self.control_steps :], len(self._meters[0])
+        last, count = self._kept(self._energy)[-steps // self.control_steps :], self._electric
         power = np.concatenate(last)[-steps:] / self.scenario.grid.step
         before = len(self._rooms) - steps
         zones = [self._rooms[before - 1] if before > 0 else self._first, *self._rooms[-steps:]]
@@ -251,7 +250,7 @@ class EnergyPlusPlant:
             When there was no step yet.
         """
         total = np.concatenate(self._kept(self._energy)).sum(axis=0)
-        return dict(zip((*self._meters[0], *self._meters[1]), map(float, total), strict=True))
+        return dict(zip(self._meters, map(float, total), strict=True))
 
     def telemetry(self) -> pd.DataFrame:
         """Give what was measured in the run since the reset, shape (n_steps, n_column) [library's units].
@@ -289,7 +288,7 @@ class EnergyPlusPlant:
     def _ask(self, steps: int, given: Mapping[str, float]) -> tuple[FloatArray, FloatArray, FloatArray]:
         if self._process is None:
             raise PlantError("plant: it was closed; call reset() before the next step")
-        values = [given[a.name] - _FREEZING if a.name in given else None for a in self.actuators]
+        values = [CELSIUS.out(given[a.name]) if a.name in given else None for a in self.actuators]
         try:
             answer = self._process.ask(steps, values)
         except PlantError:
@@ -316,8 +315,9 @@ class EnergyPlusPlant:
             raise PlantError(describe("scenario", "a start at midnight", str(grid.start)))
         if _HOUR % step or not 60.0 <= step <= 3600.0:
             raise PlantError(describe("scenario", "a step of an hour divided by 1 to 60", f"{step:g} s"))
-        if self._days < 1 or self._lead < 1 or self._days * _DAY > grid.n_steps * step:
-            found = f"{self._days} and {self._lead} days on a grid of {grid.n_steps * step / _DAY:g}"
+        lead = self.settings.lead_days
+        if self._days < 1 or lead < 1 or self._days * _DAY > grid.n_steps * step:
+            found = f"{self._days} and {lead} days on a grid of {grid.n_steps * step / _DAY:g}"
             raise PlantError(describe("plant", "days that the scenario covers", found))
         if self.control_steps < 1 or round(self._days * _DAY / step) % self.control_steps:
             expected = "control steps of which the run has a whole number"

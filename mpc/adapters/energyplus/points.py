@@ -1,19 +1,30 @@
-"""What is measured: columns of the case format as sums of EnergyPlus' output variables."""
+"""What is measured and set: columns of the case format as sums of EnergyPlus' output variables, and its setpoints."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections.abc import Mapping, Sequence
+from datetime import date
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from mpc.adapters.energyplus.layout import AirLoop, PlantLayout, WaterLoop
-from mpc.loop.actuators import COOLING_SETPOINT, HEATING_SETPOINT, SUPPLY_AIR, SUPPLY_WATER
+from mpc.adapters.energyplus.building import EnergyPlusBuilding
+from mpc.adapters.energyplus.input import InputFile, entity
+from mpc.adapters.energyplus.layout import AirLoop, PlantLayout, Terminal, WaterLoop
+from mpc.errors import EnergyPlusError, PlantError
+from mpc.loop.actuators import ACTION_LIMITS, COOLING_SETPOINT, HEATING_SETPOINT, SUPPLY_AIR, SUPPLY_WATER, Actuator
+from mpc.loop.conversion import conversion
 from thermal._types import FloatArray
+from thermal.errors import describe, nearest
 
+#: Name and key of an output variable.
 Output = tuple[str, str]
+#: Output variables whose sum a point is, with the factor of each; a point of none is not measured.
+Points = Mapping[str, Mapping[Output, float]]
 
-_FREEZING = 273.15  # K
+#: To and from the only unit of EnergyPlus that is not the library's.
+CELSIUS = conversion("zone_air_temperature_sensor", "EnergyPlus", "degC")
+
 _LEAST_FLOW = 1e-6  # kg/s: less is none
 _TEMPERATURE, _FLOW = "System Node Temperature", "System Node Mass Flow Rate"
 _SETPOINT = "System Node Setpoint Temperature"
@@ -26,41 +37,14 @@ _SITE = {
     "diffuse_horizontal_irradiance_sensor": "Site Diffuse Solar Radiation Rate per Area",
     "horizontal_infrared_irradiance_sensor": "Site Horizontal Infrared Radiation Rate per Area",
 }
+_MEASURED = ("zone_air_temperature_sensor", "supply_air_flowrate_sensor", "discharge_air_temperature_sensor")
+_SCHEDULED = "SetpointManager:Scheduled"
 
 #: End uses that belong to heating, ventilation and air conditioning.
 _END_USES = ("Fans", "Cooling", "Heating", "Pumps", "HeatRejection", "HeatRecovery", "Humidifier")
 
-
-class _Column(NamedTuple):
-    """A column of telemetry.
-
-    Parameters
-    ----------
-    name : str
-        ``ENTITY/POINT``.
-    outputs : tuple
-        Name and key of the output variables whose sum it is.
-    offset : float
-        Added to the sum: 273.15 K for temperatures [unit of the column].
-    scale : float
-        Of the sum [-].
-    """
-
-    name: str
-    outputs: tuple[Output, ...]
-    offset: float = 0.0
-    scale: float = 1.0
-
-
-def entity(name: str) -> str:
-    """Make a name of EnergyPlus one that columns can have.
-
-    Parameters
-    ----------
-    name : str
-        Of an object.
-    """
-    return name.replace("/", "-").strip()
+#: Ranges of the supply setpoints [K]; water as hot as the reference buildings' own, 82.2 degC, must be in.
+_LIMITS = {SUPPLY_AIR: (283.15, 303.15), SUPPLY_WATER: (310.0, 361.15)}
 
 
 def meters(names: Sequence[str], resource: str) -> tuple[str, ...]:
@@ -76,7 +60,50 @@ def meters(names: Sequence[str], resource: str) -> tuple[str, ...]:
     return tuple(f"{use}:{resource}" for use in _END_USES if f"{use}:{resource}" in set(names))
 
 
-def columns_of(layout: PlantLayout, station: str, full_flow: dict[str, float]) -> tuple[_Column, ...]:
+def _all(output: str, *keys: str) -> dict[Output, float]:
+    return {(output, key): 1.0 for key in keys}
+
+
+def _of_terminal(t: Terminal, full_flow: Mapping[str, float]) -> Points:
+    full = full_flow.get(t.coil, 0.0) if t.water_node else 0.0
+    return {
+        "zone_air_temperature_sensor": _all(_ZONE, t.zone),
+        HEATING_SETPOINT: _all("Zone Thermostat Heating Setpoint Temperature", t.zone),
+        COOLING_SETPOINT: _all("Zone Thermostat Cooling Setpoint Temperature", t.zone),
+        "supply_air_flowrate_sensor": _all(_FLOW, t.outlet),
+        "discharge_air_temperature_sensor": _all(_TEMPERATURE, t.outlet),
+        "supply_air_damper_percentage_command": _all("Zone Air Terminal VAV Damper Position", t.name),
+        "heating_water_valve_percentage_command": {(_FLOW, t.water_node): 1.0 / full} if full > 0.0 else {},
+    }
+
+
+def _of_air_loop(loop: AirLoop) -> Points:
+    fans = _all("Fan Electricity Rate", *(fan for _, fan in loop.of_kind("Fan:")))
+    compressors = _all("Cooling Coil Electricity Rate", *(coil for _, coil in loop.of_kind("Coil:Cooling:DX")))
+    electric = _all("Heating Coil Electricity Rate", *(coil for _, coil in loop.of_kind("Coil:Heating:Electric")))
+    return {
+        SUPPLY_AIR: _all(_SETPOINT, loop.outlet),
+        "supply_air_temperature_sensor": _all(_TEMPERATURE, loop.outlet),
+        "return_air_temperature_sensor": _all(_TEMPERATURE, loop.inlet),
+        "supply_air_flowrate_sensor": _all(_FLOW, loop.outlet),
+        "mixed_air_temperature_sensor": _all(_TEMPERATURE, loop.mixed) if loop.mixed else {},
+        "supply_fan_power_sensor": fans,
+        "electrical_power_sensor": fans | compressors | electric,
+        "gas_power_sensor": _all("Heating Coil NaturalGas Rate", *(c for _, c in loop.of_kind("Coil:Heating:Fuel"))),
+    }
+
+
+def _of_water_loop(loop: WaterLoop) -> Points:
+    return {
+        SUPPLY_WATER: _all(_SETPOINT, loop.outlet),
+        "supply_water_temperature_sensor": _all(_TEMPERATURE, loop.outlet),
+        "return_water_temperature_sensor": _all(_TEMPERATURE, loop.inlet),
+        "gas_power_sensor": _all("Boiler NaturalGas Rate", *(boiler for _, boiler in loop.boilers)),
+        "pump_power_sensor": _all("Pump Electricity Rate", *(pump for _, pump in loop.pumps)),
+    }
+
+
+def columns_of(layout: PlantLayout, station: str, full_flow: Mapping[str, float]) -> Points:
     """List the columns of a building.
 
     Parameters
@@ -85,82 +112,21 @@ def columns_of(layout: PlantLayout, station: str, full_flow: dict[str, float]) -
         Its plant.
     station : str
         Name of the weather station.
-    full_flow : dict of str to float
+    full_flow : mapping of str to float
         Water flow of reheat coils whose valve is open, by coil [kg/s].
+
+    Returns
+    -------
+    mapping
+        By ``ENTITY/POINT``.
     """
-    columns = [*_terminal_columns(layout, full_flow)]
-    columns += [_at(f"{entity(zone)}/zone_air_temperature_sensor", _ZONE, zone) for zone in layout.others]
-    for loop in layout.air_loops:
-        columns += _air_columns(loop)
-    for water in layout.water_loops:
-        columns += _water_columns(water)
-    columns += [_Column(f"{entity(name)}/electrical_power_sensor", (("Chiller Electricity Rate", name),))
-                for name in layout.chillers]  # fmt: skip
-    columns += [
-        _Column(f"{station}/{point}", ((output, "Environment"),), _FREEZING if "temperature" in point else 0.0)
-        for point, output in _SITE.items()
-    ]
-    return tuple(columns)
-
-
-def _at(name: str, output: str, key: str) -> _Column:
-    return _Column(name, ((output, key),), _FREEZING)
-
-
-def _terminal_columns(layout: PlantLayout, full_flow: dict[str, float]) -> list[_Column]:
-    columns: list[_Column] = []
-    for t in layout.terminals:
-        name = entity(t.name)
-        columns += [
-            _at(f"{name}/zone_air_temperature_sensor", _ZONE, t.zone),
-            _at(f"{name}/{HEATING_SETPOINT}", "Zone Thermostat Heating Setpoint Temperature", t.zone),
-            _at(f"{name}/{COOLING_SETPOINT}", "Zone Thermostat Cooling Setpoint Temperature", t.zone),
-            _Column(f"{name}/supply_air_flowrate_sensor", ((_FLOW, t.outlet),)),
-            _at(f"{name}/discharge_air_temperature_sensor", _TEMPERATURE, t.outlet),
-            _Column(
-                f"{name}/supply_air_damper_percentage_command", (("Zone Air Terminal VAV Damper Position", t.name),)
-            ),
-        ]
-        if t.water_node and full_flow.get(t.coil, 0.0) > 0.0:
-            share = _Column(f"{name}/heating_water_valve_percentage_command", ((_FLOW, t.water_node),))
-            columns.append(share._replace(scale=1.0 / full_flow[t.coil]))
-    return columns
-
-
-def _air_columns(loop: AirLoop) -> list[_Column]:
-    name = entity(loop.name)
-    fans = tuple(("Fan Electricity Rate", fan) for _, fan in loop.of_kind("Fan:"))
-    compressors = tuple(("Cooling Coil Electricity Rate", coil) for _, coil in loop.of_kind("Coil:Cooling:DX"))
-    electric = tuple(("Heating Coil Electricity Rate", coil) for _, coil in loop.of_kind("Coil:Heating:Electric"))
-    gas = tuple(("Heating Coil NaturalGas Rate", coil) for _, coil in loop.of_kind("Coil:Heating:Fuel"))
-    columns = [
-        _at(f"{name}/{SUPPLY_AIR}", _SETPOINT, loop.outlet),
-        _at(f"{name}/supply_air_temperature_sensor", _TEMPERATURE, loop.outlet),
-        _at(f"{name}/return_air_temperature_sensor", _TEMPERATURE, loop.inlet),
-        _Column(f"{name}/supply_air_flowrate_sensor", ((_FLOW, loop.outlet),)),
-    ]
-    if loop.mixed:
-        columns.append(_at(f"{name}/mixed_air_temperature_sensor", _TEMPERATURE, loop.mixed))
-    if fans:
-        columns.append(_Column(f"{name}/supply_fan_power_sensor", fans))
-    if fans or compressors or electric:
-        columns.append(_Column(f"{name}/electrical_power_sensor", (*fans, *compressors, *electric)))
-    if gas:
-        columns.append(_Column(f"{name}/gas_power_sensor", gas))
-    return columns
-
-
-def _water_columns(loop: WaterLoop) -> list[_Column]:
-    name = entity(loop.name)
-    gas = tuple(("Boiler NaturalGas Rate", boiler) for _, boiler in loop.boilers)
-    pumps = tuple(("Pump Electricity Rate", pump) for _, pump in loop.pumps)
-    return [
-        _at(f"{name}/{SUPPLY_WATER}", _SETPOINT, loop.outlet),
-        _at(f"{name}/supply_water_temperature_sensor", _TEMPERATURE, loop.outlet),
-        _at(f"{name}/return_water_temperature_sensor", _TEMPERATURE, loop.inlet),
-        _Column(f"{name}/gas_power_sensor", gas),
-        _Column(f"{name}/pump_power_sensor", pumps),
-    ]
+    devices: list[tuple[str, Points]] = [(t.name, _of_terminal(t, full_flow)) for t in layout.terminals]
+    devices += [(zone, {"zone_air_temperature_sensor": _all(_ZONE, zone)}) for zone in layout.others]
+    devices += [(loop.name, _of_air_loop(loop)) for loop in layout.air_loops]
+    devices += [(loop.name, _of_water_loop(loop)) for loop in layout.water_loops]
+    devices += [(name, {"electrical_power_sensor": _all("Chiller Electricity Rate", name)}) for name in layout.chillers]
+    devices.append((station, {point: _all(output, "Environment") for point, output in _SITE.items()}))
+    return {f"{entity(name)}/{point}": sums for name, points in devices for point, sums in points.items() if sums}
 
 
 class Reader:
@@ -168,8 +134,8 @@ class Reader:
 
     Parameters
     ----------
-    columns : tuple of _Column
-        Which.
+    columns : mapping
+        Of `columns_of`.
     layout : PlantLayout
         Plant of the building.
 
@@ -177,31 +143,28 @@ class Reader:
     ----------
     outputs : tuple of tuple of str
         Name and key of every variable that is read, once each.
+    products : list of tuple of int
+        Pairs of outputs whose product is averaged too: air flow and its temperature, for the heat that it brings.
     names : tuple of str
         Of the columns.
     """
 
-    def __init__(self, columns: tuple[_Column, ...], layout: PlantLayout) -> None:
-        self.outputs: tuple[Output, ...] = tuple(dict.fromkeys(o for c in columns for o in c.outputs))
-        self.names = tuple(c.name for c in columns)
+    def __init__(self, columns: Points, layout: PlantLayout) -> None:
+        self.outputs: tuple[Output, ...] = tuple(dict.fromkeys(o for sums in columns.values() for o in sums))
+        self.names = tuple(columns)
         place = {output: k for k, output in enumerate(self.outputs)}
         self._sum = np.zeros((len(columns), len(self.outputs)))
-        for row, column in enumerate(columns):
-            for output in column.outputs:
-                self._sum[row, place[output]] += column.scale
-        self._offset = np.array([c.offset for c in columns])
+        for row, sums in enumerate(columns.values()):
+            for output, factor in sums.items():
+                self._sum[row, place[output]] = factor
+        self._offset = np.array([CELSIUS.offset if "temperature" in c.rpartition("/")[2] else 0.0 for c in columns])
         at = {name: k for k, name in enumerate(self.names)}
-        kinds = ("zone_air_temperature_sensor", "supply_air_flowrate_sensor", "discharge_air_temperature_sensor")
-        terminals = [entity(t.name) for t in layout.terminals]
-        self._zone, self._flow, self._warm = (np.array([at[f"{t}/{kind}"] for t in terminals]) for kind in kinds)
-        zones = {zone: terminals[[t.zone for t in layout.terminals].index(zone)] for zone in layout.zones}
-        self._rooms = np.array([at[f"{zones[zone]}/{kinds[0]}"] for zone in layout.zones])
-        self._products = [(place[_FLOW, t.outlet], place[_TEMPERATURE, t.outlet]) for t in layout.terminals]
-
-    @property
-    def products(self) -> list[tuple[int, int]]:
-        """Pairs of outputs whose product is averaged too: air flow and its temperature, for the heat that it brings."""
-        return list(self._products)
+        terminals = {t.zone: entity(t.name) for t in reversed(layout.terminals)}
+        self._zone, self._flow, self._warm = (
+            np.array([at[f"{entity(t.name)}/{kind}"] for t in layout.terminals]) for kind in _MEASURED
+        )
+        self._rooms = np.array([at[f"{terminals[zone]}/{_MEASURED[0]}"] for zone in layout.zones])
+        self.products = [(place[_FLOW, t.outlet], place[_TEMPERATURE, t.outlet]) for t in layout.terminals]
 
     def read(self, rows: FloatArray) -> FloatArray:
         """Turn rows of outputs, products after them, into columns, shape (n_row, n_column) [library's units].
@@ -216,7 +179,7 @@ class Reader:
         flow = values[:, self._flow]
         flowing = flow > _LEAST_FLOW
         # the temperature of the heat: a flow that changes within the step weighs its own temperature
-        warm = np.divide(products, flow, out=np.zeros_like(flow), where=flowing) + _FREEZING
+        warm = np.divide(products, flow, out=np.zeros_like(flow), where=flowing) + self._offset[self._warm]
         values[:, self._warm] = np.where(flowing, warm, values[:, self._zone])
         values[:, self._flow] = np.where(flowing, flow, 0.0)
         return np.asarray(values)
@@ -230,3 +193,95 @@ class Reader:
             Values at an instant, in EnergyPlus' units.
         """
         return np.asarray((row @ self._sum.T + self._offset)[self._rooms])
+
+
+class _Supply(NamedTuple):
+    """A supply setpoint: the schedule that its managers follow, and the device's own copy of it."""
+
+    actuator: str
+    managers: tuple[str, ...]
+    kind: str
+    schedule: str
+    own: str
+
+
+def _supplies(source: EnergyPlusBuilding) -> list[_Supply]:
+    file, layout = source.source, source.layout
+    found = []
+    for point, loops in ((SUPPLY_AIR, layout.air_loops), (SUPPLY_WATER, layout.water_loops)):
+        for loop in loops:
+            named = {file.find(_SCHEDULED, m)["schedule_name"].lower() for m in loop.managers}
+            if len(named) > 1:
+                expected = f"one schedule for the setpoint managers of {loop.name!r}"
+                raise EnergyPlusError(describe(file.name, expected, ", ".join(sorted(named))))
+            kind, schedule = _schedule(file, named.pop())
+            own = f"{schedule} of {loop.name}"
+            found.append(_Supply(f"{entity(loop.name)}/{point}", loop.managers, kind, schedule, own))
+    return found
+
+
+def _schedule(source: InputFile, name: str) -> tuple[str, str]:
+    """Type and name of a schedule as the file writes it."""
+    for kind, title, _ in source.begins("Schedule:"):
+        if title.lower() == name:
+            return kind, title
+    raise EnergyPlusError(describe(source.name, f"a schedule {name!r}", "none"))
+
+
+def prepared(source: EnergyPlusBuilding, start: date, days: int, steps_per_hour: int) -> dict[str, Any]:
+    """Write a building's input for a run: clock, and schedules of supply setpoints that are each device's own.
+
+    Parameters
+    ----------
+    source : EnergyPlusBuilding
+        The building.
+    start : date
+        First day.
+    days : int
+        Number of days.
+    steps_per_hour : int
+        Of zones and weather.
+
+    Returns
+    -------
+    dict
+        Content of an input file.
+    """
+    content = source.source.with_period(start, days, steps_per_hour)
+    for supply in _supplies(source):
+        content[supply.kind][supply.own] = dict(content[supply.kind][supply.schedule])
+        for manager in supply.managers:
+            content[_SCHEDULED][manager]["schedule_name"] = supply.own
+    return content
+
+
+def actuators_of(
+    source: EnergyPlusBuilding, limits: Mapping[str, tuple[float, float]]
+) -> dict[tuple[str, str, str], Actuator]:
+    """List the actuators by what each is called in EnergyPlus: schedules of supply setpoints, thermostats of zones.
+
+    Parameters
+    ----------
+    source : EnergyPlusBuilding
+        The building.
+    limits : mapping of str to tuple of float
+        Ranges by kind of action in the place of the default ones [K].
+
+    Raises
+    ------
+    PlantError
+        When a limit is for no kind of action.
+    EnergyPlusError
+        When a device's setpoint managers follow several schedules.
+    """
+    for kind in limits:
+        if kind not in ACTION_LIMITS:
+            raise PlantError(describe("limits", "a kind of action", repr(kind), nearest(kind, ACTION_LIMITS)))
+    bounds = {**ACTION_LIMITS, **_LIMITS, **limits}
+    names = {(s.kind, "Schedule Value", s.own): s.actuator for s in _supplies(source)}
+    for point, control in ((HEATING_SETPOINT, "Heating Setpoint"), (COOLING_SETPOINT, "Cooling Setpoint")):
+        for zone in source.layout.zones:
+            names["Zone Temperature Control", control, zone] = f"{entity(zone)}/{point}"
+    return {
+        key: Actuator(name, "K", *bounds[name.rpartition("/")[2]], required=False) for key, name in names.items()
+    }

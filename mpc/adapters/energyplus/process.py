@@ -14,17 +14,34 @@ import tempfile
 import threading
 import weakref
 from collections.abc import Mapping, Sequence
+from functools import cache
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from mpc.adapters.energyplus.install import data_folder
 from mpc.errors import EnergyPlusError
 from thermal.errors import describe
 
-_WORKER = Path(__file__).with_name("_worker.py")
+_WORKER = Path(__file__).with_name("worker.py")
 _SEVERE = re.compile(r"(\d+) Severe Errors")
 _UNSETTLED = "CheckWarmupConvergence"
 _GOODBYE = 30.0  # s, for a process that was told to end
+
+
+@cache
+def data_folder() -> Path:
+    """Find the data that EnergyPlus' package brings.
+
+    Raises
+    ------
+    EnergyPlusError
+        When it is not installed.
+    """
+    spec = find_spec("pyenergyplus")
+    if spec is None or spec.origin is None:
+        advice = "pip install 'buildingmpc[energyplus]'"
+        raise EnergyPlusError(describe("EnergyPlus", "the package pyenergyplus-lbnl", "none", advice))
+    return Path(spec.origin).parent / "data"
 
 
 class Job(NamedTuple):
@@ -84,14 +101,8 @@ class EnergyPlusProcess:
         self._patience = patience
         self.folder = Path(tempfile.mkdtemp(prefix="buildingmpc-energyplus-"))
         (self.folder / job.name).write_text(job.model, encoding="latin-1")
-        content = {
-            "input": str(self.folder / job.name),
-            "weather": str(job.weather),
-            "out": str(self.output),
-            **{kind: list(getattr(job, kind)) for kind in ("variables", "products", "meters", "actuators", "options")},
-            "stepped": job.stepped,
-        }
-        path = self.folder / "job.json"
+        paths = {"model": str(self.folder / job.name), "weather": str(job.weather), "out": str(self.output)}
+        content, path = {**job._asdict(), **paths}, self.folder / "job.json"
         path.write_text(json.dumps(content), encoding="utf-8")
         environment = os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
         with (self.folder / "log.txt").open("w", encoding="utf-8") as log:

@@ -1,4 +1,4 @@
-"""One EnergyPlus run in a process of its own: ``python _worker.py JOB.json``.
+"""One EnergyPlus run in a process of its own: ``python worker.py JOB.json``.
 
 EnergyPlus' state is global to a process and leaks between runs, so nothing else runs here, and nothing of the library
 is imported. A thread holds EnergyPlus, whose callbacks wait at a queue; the main thread reads commands, one line of
@@ -28,7 +28,7 @@ class _Run:
     Parameters
     ----------
     job : dict
-        ``input``, ``weather``, ``out``: paths; ``options`` of the command line; ``stepped``: whether it waits at
+        ``model``, ``weather``, ``out``: paths; ``options`` of the command line; ``stepped``: whether it waits at
         each step; ``variables``: name and key each; ``products``: pairs of
         variables whose product is averaged too; ``meters``: names; ``actuators``: component type, control type and
         key each.
@@ -44,13 +44,9 @@ class _Run:
         self.api = EnergyPlusAPI()
         self.state = self.api.state_manager.new_state()
         self.exchange = self.api.exchange
-        self.variables: list[int] = []
-        self.meters: list[int] = []
-        self.actuators: list[int] = []
+        self.handles: dict[str, list[int]] = {}
         self.left, self.stopped, self.pending = 0, False, False
-        self.rows: list[list[float]] = []
-        self.ends: list[list[float]] = []
-        self.energy: list[list[float]] = []
+        self.taken: dict[str, list[list[float]]] = {"rows": [], "ends": [], "energy": []}
         self.sums: list[float] = []
         self.last: list[float] = []
         self.hours = 0.0
@@ -70,7 +66,7 @@ class _Run:
             runtime.callback_begin_zone_timestep_before_set_current_weather(self.state, self.guarded(self.begin))
             runtime.callback_end_system_timestep_after_hvac_reporting(self.state, self.guarded(self.add))
             runtime.callback_end_zone_timestep_after_zone_reporting(self.state, self.guarded(self.end))
-        arguments = ["-w", job["weather"], "-d", job["out"], *job["options"], job["input"]]
+        arguments = ["-w", job["weather"], "-d", job["out"], *job["options"], job["model"]]
         code = int(runtime.run_energyplus(self.state, arguments))
         self.send({"done": code})
 
@@ -92,24 +88,22 @@ class _Run:
         x, s = self.exchange, self.state
         if self.stopped or not x.api_data_fully_ready(s) or x.warmup_flag(s) or x.kind_of_sim(s) != _RUN_PERIOD:
             return False
-        if not self.variables:
+        if not self.handles:
             self.find()
         return True
 
     def find(self) -> None:
         """Get all handles; -1 is no handle, and what is read through it is 0."""
-        x, s, job = self.exchange, self.state, self.job
-        self.variables = [x.get_variable_handle(s, name, key) for name, key in job["variables"]]
-        self.meters = [x.get_meter_handle(s, name) for name in job["meters"]]
-        self.actuators = [x.get_actuator_handle(s, *what) for what in job["actuators"]]
-        kinds = ("variables", "meters", "actuators")
-        handles = (self.variables, self.meters, self.actuators)
-        missing = {
-            kind: [what for what, handle in zip(job[kind], found, strict=True) if handle < 0]
-            for kind, found in zip(kinds, handles, strict=True)
-        }
-        if any(missing.values()):
-            self.send({"missing": {kind: names for kind, names in missing.items() if names}})
+        x, job = self.exchange, self.job
+        gets = {"variables": x.get_variable_handle, "meters": x.get_meter_handle, "actuators": x.get_actuator_handle}
+        missing: dict[str, list[Any]] = {}
+        for kind, get in gets.items():
+            named = [[what] if isinstance(what, str) else what for what in job[kind]]
+            self.handles[kind] = [get(self.state, *what) for what in named]
+            lost = [what for what, handle in zip(job[kind], self.handles[kind], strict=True) if handle < 0]
+            missing |= {kind: lost} if lost else {}
+        if missing:
+            self.send({"missing": missing})
             os._exit(_NO_HANDLES)
         self.clear()
 
@@ -124,7 +118,7 @@ class _Run:
                 self.api.runtime.stop_simulation(self.state)
                 return
             self.left = int(command["steps"])
-            for handle, value in zip(self.actuators, command["values"], strict=True):
+            for handle, value in zip(self.handles["actuators"], command["values"], strict=True):
                 if value is None:
                     self.exchange.reset_actuator(self.state, handle)
                 else:
@@ -136,7 +130,7 @@ class _Run:
         if not self.pending or not self.counts:
             return
         hours = float(self.exchange.system_time_step(self.state))
-        self.last = [self.exchange.get_variable_value(self.state, handle) for handle in self.variables]
+        self.last = [self.exchange.get_variable_value(self.state, handle) for handle in self.handles["variables"]]
         values = self.last + [self.last[i] * self.last[j] for i, j in self.job["products"]]
         self.sums = [total + hours * value for total, value in zip(self.sums, values, strict=True)]
         self.hours += hours
@@ -146,18 +140,19 @@ class _Run:
         if not self.pending or not self.counts:
             return
         self.pending = False
-        self.rows.append([total / self.hours for total in self.sums])
-        self.ends.append(self.last)
-        self.energy.append([self.exchange.get_meter_value(self.state, handle) for handle in self.meters])
+        energy = [self.exchange.get_meter_value(self.state, handle) for handle in self.handles["meters"]]
+        step = ([total / self.hours for total in self.sums], self.last, energy)
+        for kept, values in zip(self.taken.values(), step, strict=True):
+            kept.append(values)
         self.clear()
         self.left -= 1
         if self.left == 0:
-            self.send({"rows": self.rows, "ends": self.ends, "energy": self.energy})
-            self.rows, self.ends, self.energy = [], [], []
+            self.send(self.taken)
+            self.taken = {kind: [] for kind in self.taken}
 
     def clear(self) -> None:
         """Start the sums of a step."""
-        self.sums, self.hours = [0.0] * (len(self.variables) + len(self.job["products"])), 0.0
+        self.sums, self.hours = [0.0] * (len(self.job["variables"]) + len(self.job["products"])), 0.0
 
 
 def _main() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 from collections.abc import Iterable, Mapping, Sequence
-from contextlib import chdir
+from contextlib import chdir, suppress
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +17,6 @@ def _fmpy() -> Any:
     """Import FMPy, or say which extra brings it."""
     try:
         import fmpy
-        import fmpy.fmi2
     except ModuleNotFoundError as error:
         raise PlantError(f'an FMU needs {error.name}: pip install "buildingmpc[fmu]"') from error
     return fmpy
@@ -100,14 +99,9 @@ class Unit:
             Of parameters and inputs before it begins [their declared units].
         """
         self.end()
-        c = self._description.coSimulation
         try:
             with chdir(os.curdir):  # FMPy loads a library from its own folder, and stays there if that fails
-                slave = self._fmpy.fmi2.FMU2Slave(
-                    guid=self._description.guid, unzipDirectory=str(self._folder), modelIdentifier=c.modelIdentifier,
-                    instanceName=self.name,
-                )  # fmt: skip
-            slave.instantiate()
+                slave = self._fmpy.instantiate_fmu(str(self._folder), self._description, "CoSimulation")
         except Exception as error:
             raise PlantError(f"FMU {self.name}: cannot be started: {error}") from error
         self._slave = slave
@@ -157,12 +151,9 @@ class Unit:
         """Free the instance, if there is one."""
         slave, self._slave = self._slave, None
         if slave is not None:
-            try:
+            with suppress(Exception):  # it may have failed before; it is freed all the same
                 slave.terminate()
-            except Exception:  # it may have failed before; it is freed all the same
-                slave.freeInstance()
-            else:
-                slave.freeInstance()
+            slave.freeInstance()
 
     def close(self) -> None:
         """Free everything, the unpacked files too."""

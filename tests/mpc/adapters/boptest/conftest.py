@@ -10,7 +10,7 @@ import pytest
 
 from mpc.adapters.boptest.case import BoptestCase
 from mpc.adapters.boptest.make import pilot_to_serve
-from mpc.adapters.boptest.plant import BoptestPlant, BoptestTime
+from mpc.adapters.boptest.plant import BoptestPlant, BoptestSettings, BoptestTime
 from mpc.adapters.boptest.server import BoptestServer
 
 DAY = 86_400.0
@@ -51,7 +51,7 @@ def connect(server: BoptestServer) -> Iterator[Callable[..., BoptestPlant]]:
 
     def make(period: Any = None, control_step: float = 300.0, **options: Any) -> BoptestPlant:
         when = BoptestTime(9 * DAY, DAY, DAY) if period is None else period
-        made.append(BoptestPlant(server.url, "small", when, control_step, **options))
+        made.append(BoptestPlant(server.url, "small", when, control_step, BoptestSettings(**options)))
         return made[-1]
 
     yield make

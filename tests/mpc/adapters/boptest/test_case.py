@@ -11,13 +11,10 @@ import pandas as pd
 import pytest
 
 from calibration import ModelSettings
-from mpc.adapters.boptest.case import BoptestCase
-from mpc.adapters.boptest.clock import YearClock
+from mpc.adapters.boptest.case import BoptestCase, Trajectory
 from mpc.adapters.boptest.make import _plain_name, case_to_serve, with_plant
-from mpc.adapters.boptest.periods import find_periods
-from mpc.adapters.boptest.prices import MarketRate, scenario_prices
+from mpc.adapters.boptest.scenario import MarketRate, YearClock, find_periods, scenario_prices
 from mpc.adapters.boptest.signals import _signal_names
-from mpc.adapters.boptest.trajectory import Trajectory
 from mpc.errors import BoptestError, BoptestRequestError, PlantError
 from mpc.scenario.grid import StepGrid
 from mpc.scenario.rates import HourlyRate

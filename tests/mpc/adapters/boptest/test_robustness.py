@@ -16,8 +16,8 @@ from typing import Any
 import httpx
 import pytest
 
+from mpc.adapters.boptest.app import HeldTests
 from mpc.adapters.boptest.case import BoptestCase
-from mpc.adapters.boptest.registry import HeldTests
 from mpc.adapters.boptest.server import BoptestServer
 from mpc.errors import BoptestError
 

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from mpc.adapters.boptest.mapping import BoptestSignals
-from mpc.adapters.boptest.plant import BoptestPlant, BoptestTime
+from mpc.adapters.boptest.plant import BoptestPlant, BoptestSettings, BoptestTime
 from mpc.errors import BoptestError, BoptestTimeoutError, PlantActionError, PlantError
 
 HOUSE = BoptestSignals(
@@ -144,9 +144,10 @@ def connect(house: House) -> Iterator[Callable[..., BoptestPlant]]:
     thread.start()
     made: list[BoptestPlant] = []
 
-    def make(period: Any = "peak_heat_day", **options: Any) -> BoptestPlant:
-        settings = {"signals": HOUSE, "electricity_price": "dynamic", "timeout": 20.0} | options
-        made.append(BoptestPlant(f"http://127.0.0.1:{server.server_port}", "house", period, 900.0, **settings))
+    def make(period: Any = "peak_heat_day", signals: BoptestSignals | None = HOUSE, **options: Any) -> BoptestPlant:
+        url = f"http://127.0.0.1:{server.server_port}"
+        settings = BoptestSettings(**{"electricity_price": "dynamic", "timeout": 20.0} | options)
+        made.append(BoptestPlant(url, "house", period, 900.0, settings, signals=signals))
         return made[-1]
 
     yield make
@@ -374,4 +375,4 @@ def test_signals_are_checked(house: House, connect: Connect) -> None:
 
 def test_no_server_at_all() -> None:
     with pytest.raises(BoptestTimeoutError, match="no server answers"):
-        BoptestPlant("http://127.0.0.1:9", "house", "peak_heat_day", 900.0, repeats=0)
+        BoptestPlant("http://127.0.0.1:9", "house", "peak_heat_day", 900.0, BoptestSettings(repeats=0))

@@ -29,11 +29,12 @@ def office():
 @pytest.fixture
 def make_plant():
     from mpc.adapters.energyplus.make import energyplus_plant
+    from mpc.adapters.energyplus.plant import EnergyPlusSettings
 
     made = []
 
     def make(**options):
-        made.append(energyplus_plant(MEDIUM, DAY, 1, **{"step_seconds": 600.0, **options}))
+        made.append(energyplus_plant(MEDIUM, DAY, 1, EnergyPlusSettings(**options), step_seconds=600.0))
         return made[-1]
 
     yield make
@@ -45,8 +46,9 @@ def make_plant():
 def own():
     """The plant after a day under its own control."""
     from mpc.adapters.energyplus.make import energyplus_plant
+    from mpc.adapters.energyplus.plant import EnergyPlusSettings
 
-    plant = energyplus_plant(MEDIUM, DAY, 1, step_seconds=600.0, control_steps=3)
+    plant = energyplus_plant(MEDIUM, DAY, 1, EnergyPlusSettings(control_steps=3), step_seconds=600.0)
     plant.reset()
     while not plant.finished:
         plant.step({})

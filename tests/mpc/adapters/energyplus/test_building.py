@@ -21,8 +21,7 @@ def test_the_plant_of_the_medium_office_is_found(office):
 
 
 def test_the_hot_water_of_the_large_office_is_found():
-    from mpc.adapters.energyplus.input import read_input
-    from mpc.adapters.energyplus.install import building_path
+    from mpc.adapters.energyplus.input import building_path, read_input
     from mpc.adapters.energyplus.layout import find_layout
 
     layout = find_layout(read_input(building_path("RefBldgLargeOfficeNew2004_Chicago")))

@@ -7,8 +7,7 @@ from datetime import date
 import pytest
 from pandas.tseries.holiday import USColumbusDay, USLaborDay, USMartinLutherKingJr, USMemorialDay, USThanksgivingDay
 
-from mpc.adapters.energyplus.holidays import holidays
-from mpc.adapters.energyplus.input import InputFile
+from mpc.adapters.energyplus.input import InputFile, holidays
 from mpc.errors import EnergyPlusError
 
 YEARS = range(2020, 2030)

@@ -6,8 +6,8 @@ import importlib.util
 
 import pytest
 
-from mpc.adapters.energyplus import install as _install
-from mpc.adapters.energyplus.install import reference_buildings, weather_files
+from mpc.adapters.energyplus import process as _install
+from mpc.adapters.energyplus.input import reference_buildings, weather_files
 from mpc.errors import EnergyPlusError
 
 

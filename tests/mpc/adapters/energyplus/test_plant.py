@@ -28,7 +28,7 @@ Output:Meter,Heating:NaturalGas,Timestep;
 @pytest.fixture(scope="module")
 def alone(office, tmp_path_factory):
     """Meters of the second day, from the unchanged input file run without the library's callbacks [J]."""
-    from mpc.adapters.energyplus.install import building_path
+    from mpc.adapters.energyplus.input import building_path
     from mpc.adapters.energyplus.process import Job, run_energyplus
 
     text = building_path("RefBldgMediumOfficeNew2004_Chicago").read_text(encoding="latin-1")
@@ -136,8 +136,9 @@ def test_a_dead_process_is_a_named_error_and_nothing_is_left(make_plant, left_ov
 def test_a_warm_up_that_swings_without_end_is_no_error_of_the_run(office):
     """A plenum of that day has two states that follow each other for 25 days, which EnergyPlus calls severe."""
     from mpc.adapters.energyplus.make import energyplus_plant
+    from mpc.adapters.energyplus.plant import EnergyPlusSettings
 
-    plant = energyplus_plant("RefBldgMediumOfficeNew2004_Chicago", "2023-08-28", 1, control_steps=288)
+    plant = energyplus_plant("RefBldgMediumOfficeNew2004_Chicago", "2023-08-28", 1, EnergyPlusSettings(control_steps=288))
     plant.reset()
     process = plant._process
     assert "CheckWarmupConvergence" in (process.output / "eplusout.err").read_text(encoding="latin-1")
@@ -175,10 +176,10 @@ def test_the_end_of_the_run_ends_the_process(own, left_over):
 
 def test_a_scenario_of_another_building_is_refused(office):
     from mpc.adapters.energyplus.make import energyplus_scenario
-    from mpc.adapters.energyplus.plant import EnergyPlusPlant
+    from mpc.adapters.energyplus.plant import EnergyPlusPlant, EnergyPlusSettings
 
     scenario = energyplus_scenario(office, "2023-01-10", 1, step_seconds=600.0)
     with pytest.raises(PlantError, match="days that the scenario covers"):
         EnergyPlusPlant(office, scenario, 2)
     with pytest.raises(PlantError, match="whole number"):
-        EnergyPlusPlant(office, scenario, 1, control_steps=7)
+        EnergyPlusPlant(office, scenario, 1, EnergyPlusSettings(control_steps=7))

@@ -15,7 +15,7 @@ from mpc.errors import EnergyPlusError
 pytestmark = pytest.mark.energyplus
 ABANDON = """
 import os
-from mpc.adapters.energyplus.install import CHICAGO, weather_path
+from mpc.adapters.energyplus.input import CHICAGO, weather_path
 from mpc.adapters.energyplus.process import EnergyPlusProcess, Job
 process = EnergyPlusProcess(Job("Version,25.2;", "in.idf", weather_path(CHICAGO)))
 print(process.folder, flush=True)
@@ -34,7 +34,7 @@ def test_a_parent_that_dies_leaves_neither_process_nor_folder():
 
 
 def test_a_broken_input_is_a_named_error_with_energyplus_own_words():
-    from mpc.adapters.energyplus.install import CHICAGO, weather_path
+    from mpc.adapters.energyplus.input import CHICAGO, weather_path
     from mpc.adapters.energyplus.process import Job, run_energyplus
 
     job = Job("Version,25.2;\nZone,;\nNothing,1;\n", "in.idf", weather_path(CHICAGO), stepped=False)

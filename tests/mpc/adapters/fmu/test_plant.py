@@ -14,8 +14,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from mpc.adapters.fmu.plant import FmuPlant
-from mpc.adapters.fmu.signals import FmuSignals
+from mpc.adapters.fmu.plant import FmuPlant, FmuSignals, FmuTime
 from mpc.errors import PlantActionError, PlantError
 from mpc.loop.run import FixedSetpoints, run_closed_loop
 
@@ -59,7 +58,7 @@ def packed(path: Path, description: str, library: Path | None, platform: str = "
 @pytest.fixture
 def plant(room: Path) -> Iterator[FmuPlant]:
     """Six hours of the room, outdoors at 0 degC."""
-    with FmuPlant(room, SIGNALS, 900.0, START, 6 * 3600.0, communication_steps=3) as made:
+    with FmuPlant(room, SIGNALS, 900.0, FmuTime(START, 6 * 3600.0, 3)) as made:
         yield made
 
 
@@ -104,7 +103,7 @@ def test_what_is_left_out_stays_and_a_reset_repeats(plant: FmuPlant) -> None:
 def test_parameters_drivers_and_warm_up(room: Path) -> None:
     outdoor = np.linspace(-5.0, 5.0, 3 + 8)
     with FmuPlant(
-        room, SIGNALS, 600.0, START, 4800.0, warm_up=1800.0, parameters={"UA": 200.0, "QHea": 500.0},
+        room, SIGNALS, 600.0, FmuTime(START, 4800.0, warm_up=1800.0), parameters={"UA": 200.0, "QHea": 500.0},
         drivers={"TOut": outdoor},
     ) as plant:  # fmt: skip
         seen = plant.reset()
@@ -169,7 +168,7 @@ def replaced(signals: FmuSignals, **changes: Any) -> FmuSignals:
 )
 def test_signals_that_do_not_fit(room: Path, changes: Mapping[str, Any], options: Mapping[str, Any], says: str) -> None:
     with pytest.raises(PlantError, match=says):
-        FmuPlant(room, replaced(SIGNALS, **changes), 900.0, START, 6 * 3600.0, **options)
+        FmuPlant(room, replaced(SIGNALS, **changes), 900.0, FmuTime(START, 6 * 3600.0), **options)
 
 
 def test_signals_that_make_no_sense() -> None:
@@ -197,21 +196,21 @@ def test_files_that_are_no_such_unit(room: Path, tmp_path: Path) -> None:
         (packed(tmp_path / "other.fmu", text, library, "other99"), f"expected a library for {fmpy.platform}"),
     ):
         with pytest.raises(PlantError, match=says):
-            FmuPlant(path, SIGNALS, 900.0, START, 3600.0)
-    broken = FmuPlant(packed(tmp_path / "broken.fmu", text, library), SIGNALS, 900.0, START, 3600.0)
+            FmuPlant(path, SIGNALS, 900.0, FmuTime(START, 3600.0))
+    broken = FmuPlant(packed(tmp_path / "broken.fmu", text, library), SIGNALS, 900.0, FmuTime(START, 3600.0))
     here = Path.cwd()
     with pytest.raises(PlantError, match="cannot be started"):
         broken.reset()
     assert Path.cwd() == here
     broken.close()
     with pytest.raises(PlantError, match="a time with a time zone"):
-        FmuPlant(room, SIGNALS, 900.0, pd.Timestamp("2023-01-09"), 3600.0)
+        FmuPlant(room, SIGNALS, 900.0, FmuTime(pd.Timestamp("2023-01-09"), 3600.0))
     with pytest.raises(PlantError, match="a positive control step"):
-        FmuPlant(room, SIGNALS, 900.0, START, 600.0)
+        FmuPlant(room, SIGNALS, 900.0, FmuTime(START, 600.0))
 
 
 def test_a_closed_plant_leaves_no_files(room: Path) -> None:
-    plant = FmuPlant(room, SIGNALS, 900.0, START, 3600.0)
+    plant = FmuPlant(room, SIGNALS, 900.0, FmuTime(START, 3600.0))
     folder = plant._unit._folder
     assert folder.is_dir()
     plant.close()

@@ -1,16 +1,86 @@
-"""Arguments of requests: numbers and names from whatever a client has sent."""
+"""Requests of clients, as they come over the wire: bodies, numbers, names and overwritten inputs, each checked."""
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Iterable, Mapping
-from typing import Any
+from typing import Any, NamedTuple
+from urllib.parse import parse_qs
 
+from mpc.adapters.boptest.signals import activation
 from mpc.errors import BoptestRequestError
+from mpc.loop.actuators import Actuator
 from thermal.errors import nearest
+
+#: Longest body that is read [bytes].
+LONGEST_BODY = 1_000_000
 
 #: Most values that one answer holds.
 MOST_VALUES = 5_000_000
+
+_FORM = "application/x-www-form-urlencoded"
+_MOST_FIELDS = 20_000
+
+
+class Answer(NamedTuple):
+    """What a request is answered with, beside the status 200.
+
+    Parameters
+    ----------
+    message : str
+        For people.
+    payload : object
+        What was asked for, of plain types.
+    """
+
+    message: str
+    payload: Any
+
+
+def read_body(body: bytes, content_type: str) -> dict[str, Any]:
+    """Read the arguments of a request; an empty body has none, and a field that comes several times is a list.
+
+    Parameters
+    ----------
+    body : bytes
+        As it was sent.
+    content_type : str
+        What it says to be: a form, or else JSON.
+
+    Raises
+    ------
+    BoptestRequestError
+        When it cannot be read, or is no object.
+
+    Examples
+    --------
+    >>> read_body(b"step=900", "application/x-www-form-urlencoded")
+    {'step': '900'}
+    >>> read_body(b'{"step": 900}', "application/json")
+    {'step': 900}
+    """
+    if not body.strip():
+        return {}
+    try:
+        text = body.decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise BoptestRequestError(f"The body is no UTF-8: {error.reason} at byte {error.start}.") from error
+    if content_type.partition(";")[0].strip().lower() == _FORM:
+        try:
+            fields = parse_qs(text, keep_blank_values=True, max_num_fields=_MOST_FIELDS)
+        except ValueError as error:
+            raise BoptestRequestError(f"The body is no form: {error}.") from error
+        return {name: values[0] if len(values) == 1 else values for name, values in fields.items()}
+    try:
+        found = json.loads(text)
+    except RecursionError as error:
+        raise BoptestRequestError("The body is no JSON: too many brackets within each other.") from error
+    except ValueError as error:
+        raise BoptestRequestError(f"The body is no JSON: {str(error)[:200]}.") from error
+    if not isinstance(found, dict):
+        raise BoptestRequestError(f"The body must be a JSON object, but is {type(found).__name__}.")
+    return found
 
 
 def number(name: str, value: Any, lowest: float = -math.inf, highest: float = math.inf) -> float:
@@ -186,6 +256,67 @@ def allowed(body: Mapping[str, Any], arguments: Iterable[str]) -> None:
     for name in body:
         if name not in known:
             raise BoptestRequestError(f"Unexpected argument {_short(name)}. The request takes {', '.join(known)}.")
+
+
+class _Overwrites(NamedTuple):
+    """Inputs that a step overwrites.
+
+    Parameters
+    ----------
+    given : dict of str to float
+        Setpoints by actuator, within their ranges [unit of the actuator].
+    active : tuple of str
+        Names of the inputs.
+    warnings : str
+        What was clipped, in BOPTEST's words; empty when nothing was.
+    """
+
+    given: dict[str, float]
+    active: tuple[str, ...]
+    warnings: str
+
+
+def read_overwrites(body: Mapping[str, Any], inputs: Mapping[str, Actuator]) -> _Overwrites:
+    """Read the arguments of an advance; values out of range are clipped, as BOPTEST does.
+
+    Parameters
+    ----------
+    body : mapping
+        Values and activations by name.
+    inputs : mapping of str to Actuator
+        By the name of the signal.
+
+    Raises
+    ------
+    BoptestRequestError
+        When a name is unknown, a value is no number, or an active input has none.
+    """
+    values = {name: value for name, value in body.items() if name in inputs}
+    switches = {activation(name): name for name in inputs}
+    for name in body:
+        if name not in values and name not in switches:
+            raise BoptestRequestError(f"Unexpected input variable: {name[:200]}.")
+    warnings: list[str] = []
+    used = {n: _clipped(n, value, inputs[n], warnings) for n, value in values.items() if value is not None}
+    given: dict[str, float] = {}
+    active: list[str] = []
+    for switch, name in switches.items():
+        if body.get(switch) is not None and flag(switch, body[switch]):
+            if name not in used:
+                raise BoptestRequestError(f"Input {switch} is 1, but {name} has no value.")
+            given[inputs[name].name] = used[name]
+            active.append(name)
+    return _Overwrites(given, tuple(active), ";".join(warnings))
+
+
+def _clipped(name: str, value: Any, actuator: Actuator, warnings: list[str]) -> float:
+    """Move a value into the range of its input, with a warning where it was not there."""
+    found = number(f"input {name}", value)
+    used = min(max(found, actuator.lowest), actuator.highest)
+    if used != found:
+        side = "above maximum" if found > used else "below minimum"
+        warnings.append(f"WARNING: value of {found} for {name} is {side} of {used}.  Using {used}. ")
+    return used
 
 
 def _short(value: Any) -> str:
