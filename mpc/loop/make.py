@@ -10,10 +10,10 @@ import pandas as pd
 
 from mpc.errors import PlantError
 from mpc.loop.building import BuildingModel, GridBuilding
-from mpc.loop.extras import RadiantGains, check_extras
 from mpc.loop.noise import SensorNoise
 from mpc.loop.reduced import reduced_building
 from mpc.loop.run import FixedSetpoints
+from mpc.loop.signals import RadiantGains, check_extras
 from mpc.loop.simulated import SimulatedPlant
 from mpc.scenario.carbon import CarbonIntensity
 from mpc.scenario.forecaster import Forecaster

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-import pandas as pd
 
 from mpc.errors import ScenarioError
 from mpc.scenario.carbon import CarbonIntensity
@@ -20,10 +19,7 @@ from mpc.scenario.weather import Weather
 from thermal._types import FloatArray
 from thermal.case.areas import zone_floor_areas
 from thermal.case.building import Building, ZoneTable
-from thermal.case.case import Case
-from thermal.case.points import OUTDOOR_TEMPERATURE, ZONE_TEMPERATURE
-from thermal.case.quality import QualityReport
-from thermal.case.telemetry import Telemetry
+from thermal.case.points import OUTDOOR_TEMPERATURE
 from thermal.errors import describe, nearest
 
 OCCUPANCY_POINT = "occupancy_count_sensor"
@@ -119,26 +115,6 @@ class Scenario:
     def floor_area(self) -> float:
         """Floor area of all zones [m2]."""
         return float(self.areas.sum())
-
-    def driving_case(self) -> Case:
-        """Make a case whose telemetry is this scenario, so that effects of the catalogue find what drives them.
-
-        Returns
-        -------
-        Case
-            Columns of the weather station, people in the zones, and as zone temperatures the middle of the comfort
-            band, which effects take for the usual temperature of the hour.
-        """
-        station = self.building.weather_station
-        columns = {f"{station}/{point}": self.weather.frame[point].to_numpy() for point in self.weather.frame}
-        for k, zone in enumerate(self.zones):
-            columns[f"{zone}/{OCCUPANCY_POINT}"] = self.occupancy[:, k]
-            columns[f"{zone}/{ZONE_TEMPERATURE}"] = 0.5 * (self.lower[:, k] + self.upper[:, k])
-        telemetry = Telemetry.from_frame(pd.DataFrame(columns, index=self.grid.stamps), where="scenario")
-        stamps = self.grid.stamps
-        # Nothing was measured, so that nothing is to be judged: a flat line at night is no flaw here.
-        judged = QualityReport(stamps[0], stamps[-1], self.grid.step, self.grid.n_steps, (), ())
-        return Case(self.building, telemetry, judged=judged)
 
 
 def build_scenario(

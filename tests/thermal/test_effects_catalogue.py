@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import doctest
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,11 +12,11 @@ import pytest
 
 from thermal import Case, FloorPlans, Telemetry, ZoneTable, build_network
 from thermal.effects.catalogue import CATALOGUE, chosen
-from thermal.effects.effect import Chosen
-from thermal.effects.words import catalogue_table
+from thermal.effects.effect import Chosen, Effect
 from thermal.errors import EffectError
-from thermal.inputs.drivers import INFRARED, IRRADIANCE, WIND, Drivers
-from thermal.parameters import PARAMETERS
+from thermal.inputs.normalisation import WIND
+from thermal.inputs.provider import INFRARED, IRRADIANCE, telemetry_inputs
+from thermal.parameters import PARAMETERS, Parameter
 
 CaseOf = Callable[[str], Case]
 UNITS = pint.UnitRegistry()
@@ -85,7 +85,7 @@ def test_an_effect_of_some_zones_has_their_parameters(lively_case: CaseOf) -> No
 
 
 def reasons(case: Case) -> dict[str, str]:
-    drivers, anatomy = Drivers(case), build_network(case.building).anatomy
+    drivers, anatomy = telemetry_inputs(case), build_network(case.building).anatomy
     return {name: reason for name, e in CATALOGUE.items() if (reason := e.untestable(drivers, anatomy)) is not None}
 
 
@@ -137,12 +137,43 @@ def test_a_side_with_windows_is_no_party_wall(lively_case: CaseOf) -> None:
     def party(glazing: dict[str, dict[str, float]]) -> tuple[str | None, list[str]]:
         building = replace(case.building, geometry=replace(plans, glazing=glazing))
         network = build_network(building, effects=chosen({"neighbour": ()}))
-        told = CATALOGUE["neighbour"].untestable(Drivers(case), network.anatomy)
+        told = CATALOGUE["neighbour"].untestable(telemetry_inputs(case), network.anatomy)
         return told, sorted(p.member or "" for p in network.parameters if p.base == "neighbour_u_value")
 
     assert [len(party(g)[1]) for g in ({}, {"A": {"south": 2.0}}, {"A": {"south": 2.0, "west": 1.0}})] == [4, 3, 2]
     everywhere = {"A": {"south": 2.0, "west": 1.5}, "D": {"east": 3.0, "north": 1.0}}
     assert party(everywhere) == ("every side has windows, so that none is a party wall", [])
+
+
+_HEAD = ("id", "what, and its heat", "acts on", "parameters", "needs", "looks like", "told apart by", "source")
+
+
+def catalogue_table(effects: Iterable[Effect]) -> str:
+    """Effects as the Markdown table of the page, one row each."""
+    rows = [_HEAD, tuple("-" * 3 for _ in _HEAD), *(_cells(e) for e in effects)]
+    return "".join(f"| {' | '.join(row)} |\n" for row in rows)
+
+
+def _cells(effect: Effect) -> tuple[str, ...]:
+    needs = ", ".join(f"`{n}`" for n in (*effect.needs, *effect.requires)) or "no signal of its own"
+    alike = ", ".join(name if " " in name else f"`{name}`" for name in effect.confounders)
+    cells = (
+        f"`{effect.id}`",
+        f"{effect.title}: {effect.equation}",
+        effect.acts_on + ("; a strength a zone" if effect.zonal else ""),
+        "<br>".join(_range(p) for p in effect.parameters),
+        needs,
+        alike,
+        effect.separated_by,
+        effect.source,
+    )
+    return tuple(cell.replace("|", "\\|") for cell in cells)
+
+
+def _range(parameter: Parameter) -> str:
+    start = "" if parameter.start == 0.0 else f", from {parameter.start:g}"
+    unit = "" if parameter.unit == "1" else f" {parameter.unit}"
+    return f"`{parameter.name}` {parameter.lower:g} to {parameter.upper:g}{unit}{start}"
 
 
 def test_the_page_has_the_catalogue() -> None:

@@ -12,12 +12,13 @@ from numpy.typing import NDArray
 from thermal._types import FloatArray, IntArray
 from thermal.case.case import Case
 from thermal.errors import ModelError
-from thermal.inputs.drivers import REFERENCE_TEMPERATURE, Drivers, signal_values
+from thermal.inputs.provider import InputProvider, signal_values, telemetry_inputs
 from thermal.model.modal_series import run_along
 from thermal.model.scheme import IMPLICIT_EULER, Scheme
 from thermal.model.stepper import Stepper
 from thermal.model.symbolic import Matrices
 from thermal.network.network import ThermalNetwork
+from thermal.units import REFERENCE_TEMPERATURE
 
 #: Longest gap of an input that is bridged by a straight line [s] (results contract: 30 minutes).
 LONGEST_BRIDGE = 1800.0
@@ -77,7 +78,7 @@ class Inputs:
         return len(self.stamps)
 
 
-def replay_inputs(case: Case, network: ThermalNetwork, drivers: Drivers | None = None) -> Inputs:
+def replay_inputs(case: Case, network: ThermalNetwork, provider: InputProvider | None = None) -> Inputs:
     """Collect the inputs of a replay from a case's telemetry.
 
     Parameters
@@ -86,8 +87,8 @@ def replay_inputs(case: Case, network: ThermalNetwork, drivers: Drivers | None =
         With telemetry.
     network : ThermalNetwork
         Says which boundaries, airflows and signals the model has.
-    drivers : Drivers, optional
-        Of the same case, where they are at hand.
+    provider : InputProvider, optional
+        Of the same case, where it is at hand; else made of the telemetry with the network's normalisation.
 
     Returns
     -------
@@ -119,7 +120,10 @@ def replay_inputs(case: Case, network: ThermalNetwork, drivers: Drivers | None =
         raise ModelError(f"telemetry: no step has all its inputs; {_most_missing(bridged)}")
     filled = [f.interpolate(limit_direction="both").fillna(0.0).to_numpy(dtype=float) for f in bridged]
     index = pd.DatetimeIndex(zone.index)
-    signals = _REFERENCE + signal_values(network.signals, drivers or Drivers(case))
+    signals = np.empty((len(index), 0))
+    if network.signals:
+        source = provider or telemetry_inputs(case, network.normalisation)
+        signals = REFERENCE_TEMPERATURE + signal_values(network.signals, source)
     return Inputs(
         stamps=index,
         step=step,

@@ -12,7 +12,6 @@ from thermal._types import FloatArray
 from thermal.case.building import Building
 from thermal.case.case import Case
 from thermal.errors import ModelError
-from thermal.inputs.drivers import REFERENCE_TEMPERATURE
 from thermal.model.replay import LEAST_SPIN_UP, SPIN_UP, replay_inputs, spin_up
 from thermal.model.scheme import SCHEMES
 from thermal.model.stepper import Stepper
@@ -22,6 +21,7 @@ from thermal.network.extension import Extension
 from thermal.network.materials import SHUFFLE_STEP
 from thermal.parameters import Scope
 from thermal.shuffle.random import RandomShuffle
+from thermal.units import REFERENCE_TEMPERATURE
 
 #: One long implicit step to the steady state of a reset [s], three years.
 _STEADY_STEP = 1e8

@@ -14,8 +14,8 @@ from mpc.control.solvers.solution import Status
 from mpc.errors import ControlError
 from thermal._types import FloatArray
 from thermal.errors import describe
-from thermal.inputs.drivers import REFERENCE_TEMPERATURE
 from thermal.model.modal import ModalModel
+from thermal.units import REFERENCE_TEMPERATURE
 
 _ROUND_OFF = 1e-6  # W: bounds that are missed by less are met
 

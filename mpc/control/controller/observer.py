@@ -9,8 +9,8 @@ from calibration.estimation.kalman import KalmanFilter
 from mpc.errors import ControlError
 from thermal._types import FloatArray
 from thermal.errors import describe
-from thermal.inputs.drivers import REFERENCE_TEMPERATURE
 from thermal.model.modal import ModalModel
+from thermal.units import REFERENCE_TEMPERATURE
 
 
 class Observer:

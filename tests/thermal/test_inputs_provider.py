@@ -1,4 +1,4 @@
-"""Drivers: what a case's telemetry says, in the building's time, and what it does not say."""
+"""InputProvider: what a case's telemetry says, in the building's time, and what it does not say."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ import pytest
 
 from thermal import Case, Telemetry
 from thermal.errors import EffectError
-from thermal.inputs.drivers import INFRARED, IRRADIANCE, WIND, Drivers, Signal, signal_values
+from thermal.inputs.normalisation import WIND
+from thermal.inputs.provider import INFRARED, IRRADIANCE, InputProvider, Signal, signal_values, telemetry_inputs
 
 CaseOf = Callable[[str], Case]
 
@@ -29,7 +30,7 @@ def changed(case: Case, **columns: object) -> Case:
 
 def test_sky_is_colder_than_air(lively_case: CaseOf) -> None:
     case = lively_case("plan")
-    drivers = Drivers(case)
+    drivers = telemetry_inputs(case)
     frame = case.telemetry.frame
     expected = (
         frame[f"weather_station/{INFRARED}"]
@@ -43,13 +44,13 @@ def test_gaps_are_bridged(lively_case: CaseOf) -> None:
     case = lively_case("plan")
     values = case.telemetry.frame[f"weather_station/{WIND}"].copy()
     values.iloc[10:13] = np.nan
-    gap = Drivers(changed(case, **{f"weather_station/{WIND}": values})).wind
+    gap = telemetry_inputs(changed(case, **{f"weather_station/{WIND}": values})).wind
     assert gap[9:14] == pytest.approx(np.linspace(values.iloc[9], values.iloc[13], 5))
 
 
 def test_presence_follows_the_clock_of_the_building(lively_case: CaseOf) -> None:
     # Friday 24 March to Monday 27 March 2023; clocks go forward on the Sunday
-    drivers = Drivers(lively_case("plan"))
+    drivers = telemetry_inputs(lively_case("plan"))
     middle = drivers.stamps - pd.Timedelta(minutes=5)
     weekend = middle.day_of_week >= 5
     assert (drivers.occupancy[weekend] == 0.0).all()
@@ -65,27 +66,28 @@ def test_counted_people_go_before_office_hours(lively_case: CaseOf) -> None:
     case = lively_case("plan")
     n = len(case.stamps)
     people = {"A/occupancy_count_sensor": np.arange(n) % 4.0, "B/occupancy_count_sensor": np.full(n, 1.0)}
-    drivers = Drivers(changed(case, **people))
+    drivers = telemetry_inputs(changed(case, **people))
     assert drivers.occupancy == pytest.approx((np.arange(n) % 4.0 + 1.0) / 4.0)
 
 
 def test_usual_temperature_knows_the_hour_and_not_the_stamp(lively_case: CaseOf) -> None:
     case = lively_case("plan")
-    drivers, zone = Drivers(case), case.zone_temperatures()
+    drivers, zone = telemetry_inputs(case), case.zone_temperatures()
     slots = zone.groupby([zone.index.day_of_week < 5, zone.index.hour])
     assert drivers.usual == pytest.approx(slots.transform("mean").to_numpy())
     blank = changed(case, **{"A/zone_air_temperature_sensor": np.nan})
-    assert np.isfinite(Drivers(blank).usual).all()
+    assert np.isfinite(telemetry_inputs(blank).usual).all()
 
 
 def test_supply_air_is_flow_and_heat_above_the_zone(lively_case: CaseOf) -> None:
     case = lively_case("table")
-    flow, heat = Drivers(case).supply
+    inputs = telemetry_inputs(case)
+    flow, heat = inputs.supply_flow, inputs.supply_heat
     metered = case.zone_heat().to_numpy()
     assert heat[:, 0] == pytest.approx(metered[:, 0])
     assert (flow[:, 1] == 0.0).all() and (heat[:, 1] == 0.0).all()  # an electric heater has no air
-    assert Drivers(case).heat == pytest.approx(metered)
-    assert Drivers(case).airflow == pytest.approx(0.5 * flow[:, [0]])
+    assert telemetry_inputs(case).heat == pytest.approx(metered)
+    assert telemetry_inputs(case).airflow == pytest.approx(0.5 * flow[:, [0]])
 
 
 @pytest.mark.parametrize(
@@ -93,9 +95,9 @@ def test_supply_air_is_flow_and_heat_above_the_zone(lively_case: CaseOf) -> None
     [(WIND, lambda d: d.wind), (INFRARED, lambda d: d.sky), (IRRADIANCE, lambda d: d.sun)],
 )
 def test_what_is_not_measured_is_said_by_name(
-    lively_case: CaseOf, point: str, use: Callable[[Drivers], object]
+    lively_case: CaseOf, point: str, use: Callable[[InputProvider], object]
 ) -> None:
-    drivers = Drivers(changed(lively_case("plan"), **{f"weather_station/{point}": None}))
+    drivers = telemetry_inputs(changed(lively_case("plan"), **{f"weather_station/{point}": None}))
     assert not drivers.measured(point)
     with pytest.raises(EffectError, match=f"expected {point}"):
         use(drivers)
@@ -107,12 +109,12 @@ def test_beam_follows_from_global_and_diffuse(lively_case: CaseOf) -> None:
         case,
         **{f"weather_station/{IRRADIANCE}": None, "weather_station/global_horizontal_irradiance_sensor": 300.0},
     )
-    assert Drivers(swapped).measured(IRRADIANCE)
-    assert Drivers(swapped).sun.normal.max() > 0.0
+    assert telemetry_inputs(swapped).measured(IRRADIANCE)
+    assert telemetry_inputs(swapped).sun.normal.max() > 0.0
 
 
 def test_signals_are_columns(lively_case: CaseOf) -> None:
-    drivers = Drivers(lively_case("plan"))
+    drivers = telemetry_inputs(lively_case("plan"))
     signals = [Signal("one", "1", lambda d: np.ones(len(d.stamps))), Signal("wind", "m/s", lambda d: d.wind)]
     assert signal_values(signals, drivers) == pytest.approx(
         np.column_stack([np.ones(len(drivers.stamps)), drivers.wind])
