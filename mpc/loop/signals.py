@@ -95,7 +95,8 @@ class EffectSignals:
         most = (system.rooms.T @ value for value in (system.terminals.design_flow, _most_heat(system)))
         flow, heat = (dict(zip(network.zones, value.tolist(), strict=True)) for value in most)
         counted = self._ahead.normalisation
-        counted = replace(counted, flow=counted.flow or flow, heat=counted.heat or heat)
+        if not counted.flow:
+            counted = replace(counted, flow=flow, heat=heat, peak_flow=flow)
         self._now = LiveInputs(scenario.building, scenario.grid.step, counted)
         nothing = np.zeros(len(network.zones))
         self._put(0, nothing, nothing)

@@ -46,7 +46,7 @@ def _over(inputs: InputProvider, zone: str, lost: float) -> FloatArray:
 
 
 def _running(inputs: InputProvider, zone: str) -> FloatArray:
-    most = inputs.normalisation.flow.get(zone, 0.0)
+    most = inputs.normalisation.peak_flow.get(zone, 0.0)
     return (_of_zone(inputs, "supply_flow", zone) > 0.02 * max(most, 1e-9)).astype(float)
 
 

@@ -34,10 +34,10 @@ class Normalisation:
         Largest number of people in the building [1]; None where nobody counts them.
     wind : float, optional
         Mean wind speed [m/s]; None where it is not measured.
-    flow : mapping of str to float
+    flow, heat : mapping of str to float
+        Supply air flow [kg/s] and metered heat, heating or cooling [W], of each zone that it exceeds 1 % of the time.
+    peak_flow : mapping of str to float
         Largest supply air flow of each zone [kg/s].
-    heat : mapping of str to float
-        Largest metered heat of each zone, heating or cooling [W].
 
     Examples
     --------
@@ -50,6 +50,7 @@ class Normalisation:
     wind: float | None = None
     flow: Mapping[str, float] = field(default_factory=dict)
     heat: Mapping[str, float] = field(default_factory=dict)
+    peak_flow: Mapping[str, float] = field(default_factory=dict)
 
     def to_dict(self) -> dict[str, Any]:
         """Entry of ``calibration.json``."""
@@ -96,8 +97,9 @@ def fit_normalisation(
         usual=usual_temperatures(case.zone_temperatures()[rows]),
         people=None if people is None else float(np.nan_to_num(people[rows].max())),
         wind=float(filled(weather[WIND]).clip(0.0).mean()) if WIND in weather else None,
-        flow=_largest(flow[rows]),
-        heat=_largest(heat.abs()),
+        flow=_quantiles(flow[rows], _LARGEST),
+        heat=_quantiles(heat.abs(), _LARGEST),
+        peak_flow=_quantiles(flow[rows], 1.0),
     )
 
 
@@ -167,7 +169,7 @@ def filled(values: pd.Series | pd.DataFrame) -> FloatArray:
     return values.interpolate(limit_direction="both").fillna(0.0).to_numpy(dtype=float)
 
 
-def _largest(values: pd.DataFrame) -> dict[str, float]:
-    """Largest values of each column, but for what is rare."""
-    quantiles = np.quantile(filled(values), _LARGEST, axis=0)
+def _quantiles(values: pd.DataFrame, share: float) -> dict[str, float]:
+    """Values of each column that a share of the time is below."""
+    quantiles = np.quantile(filled(values), share, axis=0)
     return dict(zip(map(str, values.columns), quantiles.tolist(), strict=True))
