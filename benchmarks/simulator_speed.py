@@ -36,10 +36,9 @@ from _table import markdown, write
 from scipy.sparse.linalg import splu
 
 from thermal import Building, SymbolicModel, build_network
-from thermal.model.factor import SparseSolver
-from thermal.model.scheme import IMPLICIT_EULER, TR_BDF2, Scheme
-from thermal.model.stepper import Stepper, factorise
-from thermal.model.symbolic import Matrices
+from thermal.model.factor import SparseSolver, factorise
+from thermal.model.matrices import Matrices
+from thermal.model.step import IMPLICIT_EULER, TR_BDF2, Scheme, Stepper
 from thermal.network.network import ThermalNetwork
 from thermal.pilot.layout import devices, generate_office
 from thermal.pilot.weather import MOUNTAIN_VIEW

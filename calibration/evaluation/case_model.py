@@ -16,10 +16,10 @@ from calibration.evaluation.settings import ModelSettings, read_settings
 from calibration.fit.result import GridCheck, load_parameters
 from thermal._types import FloatArray
 from thermal.case.case import Case
+from thermal.model.matrices import SymbolicModel
 from thermal.model.reduce import ReducedModel, reduced_model
 from thermal.model.replay import SPIN_UP, Inputs, free_runs, replay_inputs, spin_up
-from thermal.model.scheme import Scheme
-from thermal.model.symbolic import SymbolicModel
+from thermal.model.step import Scheme
 
 #: Runs of the check of a reduced model on the grid, and the stretch of telemetry they are spread over [days].
 CHECK_RUNS, CHECK_DAYS = 6, 2.0

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from calibration.errors import HorizonError, NotEnoughDataError
 from calibration.evaluation.intervals import Interval, Runs, horizon_steps, select_runs
 from thermal._types import FloatArray
+from thermal.model.matrices import Matrices, SymbolicModel
 from thermal.model.replay import SPIN_UP, Inputs, free_runs, spin_up
-from thermal.model.scheme import IMPLICIT_EULER, Scheme
-from thermal.model.symbolic import Matrices, SymbolicModel
+from thermal.model.step import IMPLICIT_EULER, Scheme
 from thermal.network.network import ThermalNetwork
 
 #: Called with what is being done, how much is done and how much there is.

@@ -14,7 +14,7 @@ from thermal.effects.catalogue import CATALOGUE, chosen
 from thermal.errors import ModelError
 from thermal.inputs.normalisation import Normalisation
 from thermal.model.replay import LEAST_SPIN_UP, SPIN_UP
-from thermal.model.scheme import SCHEMES, Scheme
+from thermal.model.step import SCHEMES, Scheme
 from thermal.network.build import build_network
 from thermal.network.network import ThermalNetwork
 from thermal.network.structure import BASELINE, Structure

@@ -21,9 +21,9 @@ from calibration.fit.starts import solve_starts, tuning_runs
 from calibration.identifiability.information import information_of
 from thermal.case.case import Case
 from thermal.inputs.normalisation import fit_normalisation
+from thermal.model.matrices import SymbolicModel
 from thermal.model.reduce import ReducedModel, reduced_model
 from thermal.model.replay import SPIN_UP, replay_inputs
-from thermal.model.symbolic import SymbolicModel
 from thermal.network.structure import BASELINE, Structure
 from thermal.parameters import Scope
 

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from calibration.estimation.disturbance import DisturbanceModel
 from calibration.evaluation.intervals import Interval, Runs
 from thermal._types import FloatArray
+from thermal.model.matrices import SymbolicModel
 from thermal.model.replay import Inputs, free_runs, spin_up
-from thermal.model.scheme import IMPLICIT_EULER, Scheme
-from thermal.model.symbolic import SymbolicModel
+from thermal.model.step import IMPLICIT_EULER, Scheme
 from thermal.parameters import Parameter
 
 #: ``linear`` is plain least squares; ``pseudo_huber`` takes errors far beyond the others for outliers.

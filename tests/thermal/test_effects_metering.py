@@ -16,7 +16,7 @@ from thermal.effects.catalogue import chosen
 from thermal.inputs.provider import InputProvider, signal_values, telemetry_inputs
 from thermal.model.modal_runs import ModalRuns
 from thermal.model.reduce import reduced_model
-from thermal.model.scheme import EXACT
+from thermal.model.step import EXACT
 from thermal.units import AIR_HEAT_CAPACITY, air_density
 
 FloatArray = NDArray[np.float64]

@@ -25,7 +25,7 @@ from thermal.errors import ModelError
 from thermal.inputs.provider import signal_values, telemetry_inputs
 from thermal.model.replay import Inputs
 from thermal.model.rollouts import RolloutData, rollout
-from thermal.model.scheme import IMPLICIT_EULER, TR_BDF2, Scheme
+from thermal.model.step import IMPLICIT_EULER, TR_BDF2, Scheme
 from thermal.units import REFERENCE_TEMPERATURE
 
 FloatArray = NDArray[np.float64]

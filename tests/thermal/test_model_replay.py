@@ -29,8 +29,7 @@ from thermal import (
 )
 from thermal.case.schema import Airflow, Layer, Location, Surface, ZoneEntry
 from thermal.errors import ModelError
-from thermal.model.scheme import IMPLICIT_EULER, SCHEMES
-from thermal.model.stepper import Stepper
+from thermal.model.step import IMPLICIT_EULER, SCHEMES, Stepper
 
 FloatArray = NDArray[np.float64]
 

@@ -20,7 +20,7 @@ from thermal import (
     spin_up,
 )
 from thermal.errors import ModelError
-from thermal.model.scheme import TR_BDF2
+from thermal.model.step import TR_BDF2
 
 
 @cache

@@ -28,7 +28,7 @@ from thermal.case.areas import zone_floor_areas
 from thermal.case.building import Building, ZoneTable
 from thermal.case.schema import Location
 from thermal.errors import ThermalError
-from thermal.model.stepper import Stepper
+from thermal.model.step import Stepper
 from thermal.pilot.building import pilot_building
 from thermal.pilot.truth import TwinRanges, TwinTruth
 from thermal.pilot.twin import _draw_conditions, _draw_values

@@ -13,7 +13,7 @@ from thermal import Building, FloorPlan, FloorPlans, Simulator, SymbolicModel, Z
 from thermal.case.schema import Airflow, Layer, Location, Surface, ZoneEntry
 from thermal.errors import ModelError, ThermalError
 from thermal.model.replay import free_runs, replay_inputs, spin_up
-from thermal.model.scheme import TR_BDF2
+from thermal.model.step import TR_BDF2
 from thermal.units import AIR_HEAT_CAPACITY
 
 FloatArray = NDArray[np.float64]

@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 from thermal._types import FloatArray
 from thermal.errors import ModelError
 from thermal.model.certificate import Certificate, Replay, closed_loop, differences
-from thermal.model.factor import Elimination
+from thermal.model.factor import Elimination, Matrix, factorise
+from thermal.model.matrices import Matrices, SymbolicModel, congruent
 from thermal.model.modal import modal_model
-from thermal.model.stepper import factorise
-from thermal.model.symbolic import Matrices, Matrix, SymbolicModel, congruent
 
 #: Expansion points of the transfer function [1/s]: a month, a day, eight hours, an hour, ten minutes and two minutes.
 SHIFTS = (1.0 / 2.6e6, 1.0 / 86400.0, 1.0 / 28800.0, 1.0 / 3600.0, 1.0 / 600.0, 1.0 / 120.0)

@@ -13,10 +13,9 @@ from thermal._types import FloatArray, IntArray
 from thermal.case.case import Case
 from thermal.errors import ModelError
 from thermal.inputs.provider import InputProvider, signal_values, telemetry_inputs
-from thermal.model.modal_series import run_along
-from thermal.model.scheme import IMPLICIT_EULER, Scheme
-from thermal.model.stepper import Stepper
-from thermal.model.symbolic import Matrices
+from thermal.model.matrices import Matrices, SymbolicModel
+from thermal.model.modal import run_along
+from thermal.model.step import IMPLICIT_EULER, Scheme, Stepper
 from thermal.network.network import ThermalNetwork
 from thermal.units import REFERENCE_TEMPERATURE
 
@@ -284,3 +283,91 @@ def free_runs(
         if progress is not None:
             progress(k)
     return means, mean_slopes
+
+
+@dataclass(frozen=True)
+class Simulation:
+    """A replayed interval.
+
+    Parameters
+    ----------
+    simulated : DataFrame, shape (n_time, n_zone)
+        Zone temperatures, means over the steps that end at the stamps [K].
+    measured : DataFrame, shape (n_time, n_zone)
+        What the sensors reported [K].
+    heat : DataFrame, shape (n_time, n_zone)
+        Metered heat that drove the replay [W].
+    start : Timestamp
+        Where measured and simulated zones were matched.
+    """
+
+    simulated: pd.DataFrame
+    measured: pd.DataFrame
+    heat: pd.DataFrame
+    start: pd.Timestamp
+
+
+def simulate(
+    case: Case,
+    model: SymbolicModel,
+    theta: FloatArray,
+    start: pd.Timestamp,
+    end: pd.Timestamp,
+    scheme: Scheme = IMPLICIT_EULER,
+    spin_up_seconds: float = SPIN_UP,
+    progress: Callable[[int], None] | None = None,
+) -> Simulation:
+    """Replay the building's inputs from ``start`` to ``end`` through the model.
+
+    Parameters
+    ----------
+    case : Case
+        Building and telemetry.
+    model : SymbolicModel
+        On the grid or reduced.
+    theta : ndarray, shape (n_parameter,)
+        Parameter values [parameter units].
+    start, end : Timestamp
+        Stamps; zones are matched at the first stamp at or after ``start``.
+    scheme : Scheme
+        Time stepping.
+    spin_up_seconds : float
+        Telemetry before the start that the spin-up uses [s]; what there is, but at least 12 hours.
+    progress : callable, optional
+        Called with the number of free steps done.
+
+    Raises
+    ------
+    ModelError
+        When the interval is outside of the telemetry, leaves no spin-up, or lacks inputs for over 30 minutes.
+    """
+    inputs = replay_inputs(case, model.network)
+    stamps = inputs.stamps
+    first, last = int(stamps.searchsorted(start)), int(stamps.searchsorted(end, side="right")) - 1
+    if not (start < end and first < last and stamps[0] <= start and end <= stamps[-1]):
+        raise ModelError(
+            f"interval {start} to {end}: expected two times in order within the telemetry, "
+            f"which goes from {stamps[0]} to {stamps[-1]}"
+        )
+    begin = max(0, first - round(spin_up_seconds / inputs.step))
+    if (first - begin) * inputs.step < LEAST_SPIN_UP:
+        earliest = stamps[0] + pd.Timedelta(seconds=LEAST_SPIN_UP)
+        raise ModelError(
+            f"start {start}: expected at least 12 h of telemetry before it for the spin-up; earliest is {earliest}"
+        )
+    lacking = np.flatnonzero(~inputs.complete[first + 1 : last + 1])
+    if lacking.size:
+        raise ModelError(
+            f"inputs are missing for over 30 minutes from {stamps[first + 1 + lacking[0]]}; choose another interval"
+        )
+    matrices = model.matrices(theta)
+    at = np.array([first])
+    states, _ = spin_up(matrices, inputs, begin, at)
+    means, _ = free_runs(matrices, model.network, inputs, at, last - first, states, scheme=scheme, progress=progress)
+    rows = slice(first + 1, last + 1)
+    zones = list(model.network.zones)
+
+    def table(values: FloatArray) -> pd.DataFrame:
+        return pd.DataFrame(values, index=stamps[rows], columns=zones)
+
+    return Simulation(table(means[0]), table(inputs.zone[rows]), table(inputs.heat[rows]), stamps[first])

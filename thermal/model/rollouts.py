@@ -12,9 +12,9 @@ import scipy.sparse as sp
 
 from thermal._types import FloatArray
 from thermal.errors import ModelError
-from thermal.model.scheme import IMPLICIT_EULER, Scheme, Stage
-from thermal.model.stepper import Stepper
-from thermal.model.symbolic import Matrix, SymbolicModel
+from thermal.model.factor import Matrix
+from thermal.model.matrices import SymbolicModel
+from thermal.model.step import IMPLICIT_EULER, Scheme, Stage, Stepper
 from thermal.units import AIR_HEAT_CAPACITY
 
 #: Beyond this many volumes the symbolic executor's LDL factors and tapes outgrow it (measured: 6,000 volumes).

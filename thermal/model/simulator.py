@@ -12,10 +12,9 @@ from thermal._types import FloatArray
 from thermal.case.building import Building
 from thermal.case.case import Case
 from thermal.errors import ModelError
+from thermal.model.matrices import Matrices, SymbolicModel
 from thermal.model.replay import LEAST_SPIN_UP, SPIN_UP, replay_inputs, spin_up
-from thermal.model.scheme import SCHEMES
-from thermal.model.stepper import Stepper
-from thermal.model.symbolic import Matrices, SymbolicModel
+from thermal.model.step import SCHEMES, Stepper
 from thermal.network.build import build_network
 from thermal.network.extension import Extension
 from thermal.network.materials import SHUFFLE_STEP

@@ -18,8 +18,8 @@ from thermal.hvac._fan import Fan
 from thermal.hvac._system import HvacSystem
 from thermal.hvac._terminals import Terminals
 from thermal.hvac._thermostat import Thermostat
-from thermal.model.stepper import Stepper
-from thermal.model.symbolic import SymbolicModel
+from thermal.model.matrices import SymbolicModel
+from thermal.model.step import Stepper
 from thermal.network.build import build_network
 from thermal.units import AIR_HEAT_CAPACITY, air_density
 

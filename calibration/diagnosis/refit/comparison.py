@@ -27,9 +27,9 @@ from thermal.case.case import Case
 from thermal.effects.catalogue import CATALOGUE, chosen
 from thermal.inputs.normalisation import fit_normalisation
 from thermal.inputs.provider import InputProvider, telemetry_inputs
+from thermal.model.matrices import SymbolicModel
 from thermal.model.reduce import ReducedModel
 from thermal.model.replay import Inputs, replay_inputs
-from thermal.model.symbolic import SymbolicModel
 from thermal.network.assembly import Blueprint
 from thermal.network.build import blueprint
 from thermal.network.extension import Extension

@@ -20,8 +20,8 @@ from thermal.case.building import Building
 from thermal.case.case import Case
 from thermal.case.schema import Device
 from thermal.errors import describe
+from thermal.model.matrices import SymbolicModel
 from thermal.model.reduce import reduced_model
-from thermal.model.symbolic import SymbolicModel
 from thermal.network.build import build_network
 from thermal.pilot.building import pilot_building
 from thermal.pilot.sizing import size_system

@@ -16,7 +16,7 @@ from mpc.errors import ControlError
 from thermal._types import FloatArray
 from thermal.errors import describe, nearest
 from thermal.model.modal import ModalModel
-from thermal.model.scheme import IMPLICIT_EULER, Scheme
+from thermal.model.step import IMPLICIT_EULER, Scheme
 from thermal.units import REFERENCE_TEMPERATURE
 
 #: What a plant can do to a zone.

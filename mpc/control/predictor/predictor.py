@@ -16,7 +16,7 @@ from thermal._types import FloatArray
 from thermal.errors import describe
 from thermal.hvac._smooth import SmoothHvac
 from thermal.model.modal import ModalModel
-from thermal.model.scheme import IMPLICIT_EULER, Scheme
+from thermal.model.step import IMPLICIT_EULER, Scheme
 from thermal.units import REFERENCE_TEMPERATURE
 
 _SETTLED = 1e-5  # K: what thermostats go by is found to within this

@@ -16,7 +16,7 @@ from mpc.scenario.forecaster import ErrorGrowth
 from thermal._types import BoolArray, FloatArray
 from thermal.errors import describe
 from thermal.model.modal import ModalModel
-from thermal.model.scheme import IMPLICIT_EULER, Scheme
+from thermal.model.step import IMPLICIT_EULER, Scheme
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,10 +8,9 @@ import numpy as np
 import pandas as pd
 
 from thermal._types import FloatArray
+from thermal.model.matrices import SymbolicModel
 from thermal.model.replay import SPIN_UP, Inputs, spin_up
-from thermal.model.scheme import IMPLICIT_EULER, Scheme
-from thermal.model.stepper import Stepper
-from thermal.model.symbolic import SymbolicModel
+from thermal.model.step import IMPLICIT_EULER, Scheme, Stepper
 from thermal.network.network import ThermalNetwork
 
 #: The steppers take temperatures as differences from this one [K], which costs no accuracy.

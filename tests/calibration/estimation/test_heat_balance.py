@@ -11,9 +11,9 @@ import pytest
 from calibration import Interval
 from calibration.estimation.heat_balance import HeatBalance, _heat_fit, _needed_heat, heat_balance
 from thermal import Case, Inputs, SymbolicModel, build_network, load_bundled_case, reduced_model, replay_inputs
+from thermal.model.matrices import Matrices
 from thermal.model.modal_runs import ModalRuns
-from thermal.model.stepper import Stepper
-from thermal.model.symbolic import Matrices
+from thermal.model.step import Stepper
 from thermal.units import AIR_HEAT_CAPACITY
 
 QUIET = 300  # steps at one temperature everywhere, so that the steady start of a spin-up is exact

@@ -11,10 +11,9 @@ from calibration import StateSpace
 from calibration.errors import CalibrationError, FilterError
 from calibration.estimation.state_space import state_space
 from thermal import ModelError
+from thermal.model.matrices import Matrices
 from thermal.model.modal import modal_model
-from thermal.model.scheme import EXACT, IMPLICIT_EULER, TR_BDF2, Scheme
-from thermal.model.stepper import Stepper
-from thermal.model.symbolic import Matrices
+from thermal.model.step import EXACT, IMPLICIT_EULER, TR_BDF2, Scheme, Stepper
 from thermal.units import AIR_HEAT_CAPACITY
 
 FloatArray = NDArray[np.float64]

@@ -25,7 +25,7 @@ from thermal import (
 )
 from thermal.model.reduce import ReducedModel
 from thermal.model.replay import SPIN_UP
-from thermal.model.scheme import IMPLICIT_EULER
+from thermal.model.step import IMPLICIT_EULER
 
 FloatArray = NDArray[np.float64]
 

@@ -13,7 +13,7 @@ from calibration import Interval, evaluate_model
 from calibration.errors import NotEnoughDataError
 from calibration.evaluation.n_step import HORIZONS, spatial_metrics
 from thermal import Case, Inputs, SymbolicModel, build_network, free_runs, load_bundled_case, replay_inputs, spin_up
-from thermal.model.scheme import TR_BDF2
+from thermal.model.step import TR_BDF2
 
 FloatArray = NDArray[np.float64]
 

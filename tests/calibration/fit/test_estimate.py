@@ -15,7 +15,7 @@ from calibration.fit.estimate import compensated_start, draw_starts, estimate
 from calibration.fit.problem import Problem, thin
 from thermal import SymbolicModel, build_network, free_runs, load_bundled_case, reduced_model, replay_inputs, spin_up
 from thermal.effects.catalogue import chosen
-from thermal.model.scheme import TR_BDF2
+from thermal.model.step import TR_BDF2
 
 FloatArray = NDArray[np.float64]
 

@@ -17,7 +17,7 @@ from mpc.control.problem.problem import ControlProblem
 from mpc.control.solvers.linear import LinearSolver
 from mpc.errors import ControlError
 from mpc.scenario.forecaster import ErrorGrowth
-from thermal.model.scheme import IMPLICIT_EULER
+from thermal.model.step import IMPLICIT_EULER
 
 HORIZON = Horizon.regular(2.0, 600.0, 12)
 DRAWS = 500

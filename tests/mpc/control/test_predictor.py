@@ -11,7 +11,7 @@ from mpc.control.problem.data import HorizonData
 from mpc.control.problem.horizon import Horizon
 from mpc.errors import ControlError
 from thermal.hvac._symbolic import hvac_function
-from thermal.model.scheme import IMPLICIT_EULER
+from thermal.model.step import IMPLICIT_EULER
 
 
 def test_a_rollout_solves_plant_and_building_together(make_problem, make_data, hvac, modes) -> None:

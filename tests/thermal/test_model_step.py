@@ -24,9 +24,9 @@ from thermal import (
 )
 from thermal.case.schema import Airflow, Layer, Location, Surface, ZoneEntry
 from thermal.errors import ModelError
-from thermal.model.scheme import IMPLICIT_EULER, SCHEMES, TR_BDF2, Scheme
-from thermal.model.stepper import Stepper, factorise
-from thermal.model.symbolic import Matrices
+from thermal.model.factor import factorise
+from thermal.model.matrices import Matrices
+from thermal.model.step import IMPLICIT_EULER, SCHEMES, TR_BDF2, Scheme, Stepper
 
 FloatArray = NDArray[np.float64]
 
