@@ -224,7 +224,7 @@ def run_error(grid: SymbolicModel, matrices: Matrices, inputs: Inputs, start: in
     """Errors of the zones at the end of one run, shape (1, n_zone) [K]; NaN where not measured."""
     steps, at = horizon_steps(HORIZON, inputs.step), np.array([start])
     states, _ = spin_up(matrices, inputs, start - round(SPIN_UP / inputs.step), at)
-    means, _ = free_runs(matrices, grid.network, inputs, at, steps, states, scheme=SCHEME, keep=np.array([steps]))
+    means, _ = free_runs(matrices, inputs, at, np.array([steps]), states, scheme=SCHEME)
     return np.where(np.isfinite(inputs.bridged[at]), means[:, 0] - inputs.zone[at + steps], np.nan)
 
 

@@ -124,7 +124,7 @@ class Replay:
     """
 
     def __init__(self, matrices: Matrices, network: ThermalNetwork, scheme: Scheme = IMPLICIT_EULER) -> None:
-        self.stepper = Stepper(matrices, STEP, scheme, network.airflows)
+        self.stepper = Stepper(matrices, STEP, scheme)
         rng = np.random.default_rng(SEED)
         self.heat = rng.uniform(-1000.0, 1000.0, (N_STEP, len(network.zones), 1))
         self.boundary = 283.15 + 5.0 * rng.standard_normal((N_STEP, network.n_boundary, 1))

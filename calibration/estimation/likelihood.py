@@ -121,7 +121,7 @@ class InnovationsProblem(Problem):
         starts = np.array([white.at])
         states, moved = spin_up(matrices, inputs, white.begin, starts)
         means, mean_slopes = free_runs(
-            matrices, model.network, inputs, starts, white.stop - white.at, states, moved, self.scheme
+            matrices, inputs, starts, white.stop - white.at, states, moved, self.scheme
         )
         columns = [(means[0] - inputs.zone[white.at + 1 : white.stop + 1])[..., None]]
         if mean_slopes is not None:

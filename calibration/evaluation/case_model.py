@@ -202,7 +202,7 @@ def check_on_grid(
     for model in (grid, reduced):
         matrices = model.matrices(theta)
         states, _ = spin_up(matrices, inputs, runs.begin, starts)
-        means.append(free_runs(matrices, model.network, inputs, starts, steps, states, scheme=scheme)[0])
+        means.append(free_runs(matrices, inputs, starts, steps, states, scheme=scheme)[0])
     difference = np.abs(means[0] - means[1])
     order = reduced.projection.shape[1] if reduced.projection is not None else reduced.network.n_node
     return GridCheck(grid.network.n_node, order, starts.size, float(difference.max()), float(difference.mean()))

@@ -347,7 +347,7 @@ def _simulate(
         means = np.full((starts.size, steps.size, len(network.zones)), np.nan)
         for last in np.unique(reach):
             part, keep = np.flatnonzero(reach == last), steps[steps <= last]
-            found = free_runs(matrices, network, inputs, starts[part], last, states[:, part], scheme=scheme, keep=keep)
+            found = free_runs(matrices, inputs, starts[part], keep, states[:, part], scheme=scheme)
             means[part, : keep.size] = found[0]
         for i, w, row in zip(numbers, alike, rows, strict=True):
             simulated[i] = means[row][:, np.searchsorted(steps, w.keep)]

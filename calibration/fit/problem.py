@@ -217,9 +217,7 @@ class Problem:
         matrices = model.matrices(theta, slopes)
         inputs, keep = self.inputs, self.keep
         states, moved = spin_up(matrices, inputs, runs.begin, runs.starts)
-        means, mean_slopes = free_runs(
-            matrices, model.network, inputs, runs.starts, self.steps, states, moved, self.scheme, keep
-        )
+        means, mean_slopes = free_runs(matrices, inputs, runs.starts, keep, states, moved, self.scheme)
         error = means - inputs.zone[runs.starts[:, None] + keep[None, :]]
         error[~np.isfinite(inputs.bridged[runs.starts])[:, None, :] & np.ones_like(error, dtype=bool)] = np.nan
         return error, None if mean_slopes is None else mean_slopes[..., list(self.free)]

@@ -31,7 +31,7 @@ from thermal.case.save import save_case
 from thermal.effects.effect import Chosen
 from thermal.errors import describe
 from thermal.hvac._system import HvacSystem
-from thermal.model.simulator import Simulator
+from thermal.model.simulator import Shuffle, Simulator
 from thermal.network.extension import Extension
 from thermal.pilot.building import pilot_building
 from thermal.pilot.sizing import size_system
@@ -131,7 +131,7 @@ def simulated_plant(
     elif model in ("grid", "random"):
         shuffle: Literal["mean", "random"] = "random" if model == "random" else "mean"
         built = GridBuilding(
-            Simulator(building, parameters, step_seconds, dx, shuffle=shuffle, seed=seed, effects=extras)
+            Simulator(building, parameters, step_seconds, dx, shuffle=Shuffle(shuffle, seed=seed), effects=extras)
         )
     else:
         raise PlantError(describe("model", "'reduced', 'grid' or 'random'", repr(model)))

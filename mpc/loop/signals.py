@@ -19,7 +19,8 @@ from thermal.errors import describe
 from thermal.hvac._replay import replay_reheat
 from thermal.hvac._system import HvacSystem
 from thermal.inputs.normalisation import WIND, Normalisation, usual_temperatures
-from thermal.inputs.provider import HVAC_INPUTS, InputProvider, LiveInputs, Signal
+from thermal.inputs.provider import HVAC_INPUTS, InputProvider, LiveInputs
+from thermal.inputs.signals import Signal
 from thermal.network.extension import Extension
 from thermal.network.graph import GraphBuilder
 from thermal.network.network import ThermalNetwork

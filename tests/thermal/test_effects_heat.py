@@ -13,7 +13,8 @@ from pvlib import irradiance, solarposition
 from thermal import Case, SymbolicModel, ThermalNetwork, build_network
 from thermal.effects.catalogue import CATALOGUE, chosen
 from thermal.effects.effect import PAIR
-from thermal.inputs.provider import signal_values, telemetry_inputs
+from thermal.inputs.provider import telemetry_inputs
+from thermal.inputs.signals import signal_values
 from thermal.inputs.sun import incidence_modifier
 from thermal.units import air_density
 

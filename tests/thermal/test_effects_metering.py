@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from thermal import Case, Simulator, SymbolicModel, Telemetry, build_network, free_runs, replay_inputs, spin_up
 from thermal.effects.catalogue import chosen
-from thermal.inputs.provider import InputProvider, signal_values, telemetry_inputs
+from thermal.inputs.provider import InputProvider, telemetry_inputs
+from thermal.inputs.signals import signal_values
 from thermal.model.modal_runs import ModalRuns
 from thermal.model.reduce import reduced_model
 from thermal.model.step import EXACT
@@ -70,7 +71,7 @@ def test_a_replay_with_biased_sensors_is_that_of_right_ones(lively_case: CaseOf,
         values = {f"sensor_bias@{z}": b for z, b in off.items()} if ids else {}
         inputs, matrices = replay_inputs(told, network), SymbolicModel(network).matrices(network.values(values))
         states, _ = spin_up(matrices, inputs, 0, at)
-        means, _ = free_runs(matrices, network, inputs, at, steps, states)
+        means, _ = free_runs(matrices, inputs, at, steps, states)
         runs.append(means - np.array([off.get(z, 0.0) for z in network.zones]))
     assert np.abs(runs[1] - runs[0]).max() < 8e-3  # all that differs is the uniform state before a spin-up
     assert np.abs(runs[2] - runs[0]).max() > 0.05

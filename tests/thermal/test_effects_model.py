@@ -22,7 +22,8 @@ from thermal import (
 )
 from thermal.effects.catalogue import CATALOGUE, chosen
 from thermal.errors import ModelError
-from thermal.inputs.provider import signal_values, telemetry_inputs
+from thermal.inputs.provider import telemetry_inputs
+from thermal.inputs.signals import signal_values
 from thermal.model.replay import Inputs
 from thermal.model.rollouts import RolloutData, rollout
 from thermal.model.step import IMPLICIT_EULER, TR_BDF2, Scheme
@@ -51,7 +52,7 @@ def trajectories(model: SymbolicModel, inputs: Inputs, theta: FloatArray, slopes
     """Spun up and run freely: zone means, and their derivatives."""
     matrices = model.matrices(theta, slopes)
     states, moved = spin_up(matrices, inputs, 0, STARTS)
-    return free_runs(matrices, model.network, inputs, STARTS, STEPS, states, moved)
+    return free_runs(matrices, inputs, STARTS, STEPS, states, moved)
 
 
 @cache

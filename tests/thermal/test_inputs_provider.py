@@ -12,7 +12,8 @@ import pytest
 from thermal import Case, Telemetry
 from thermal.errors import EffectError
 from thermal.inputs.normalisation import WIND
-from thermal.inputs.provider import INFRARED, IRRADIANCE, InputProvider, Signal, signal_values, telemetry_inputs
+from thermal.inputs.provider import INFRARED, IRRADIANCE, InputProvider, telemetry_inputs
+from thermal.inputs.signals import Signal, signal_values
 
 CaseOf = Callable[[str], Case]
 

@@ -36,7 +36,7 @@ def test_replay_is_the_free_run_from_the_same_spin_up() -> None:
     inputs = replay_inputs(case, model.network)
     matrices = model.matrices(theta)
     states, _ = spin_up(matrices, inputs, 900 - 864, np.array([900]))
-    wanted, _ = free_runs(matrices, model.network, inputs, np.array([900]), 60, states, scheme=TR_BDF2)
+    wanted, _ = free_runs(matrices, inputs, np.array([900]), 60, states, scheme=TR_BDF2)
     np.testing.assert_allclose(found.simulated.to_numpy(), wanted[0], rtol=0, atol=1e-9)
     assert found.start == stamps[900]
     for table in (found.simulated, found.measured, found.heat):

@@ -9,7 +9,8 @@ import numpy as np
 
 from thermal._types import FloatArray
 from thermal.effects.effect import PAIR, EffectBuilder, described, lacking, paired, without_facades
-from thermal.inputs.provider import InputProvider, Signal
+from thermal.inputs.provider import InputProvider
+from thermal.inputs.signals import Signal
 from thermal.network.topology import Room
 
 #: Wind speed [m/s], root of temperature difference [K^0.5] and presence [-] at which a varying exchange is part of K;

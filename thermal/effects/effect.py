@@ -13,7 +13,8 @@ import numpy as np
 
 from thermal._types import FloatArray, IntArray
 from thermal.errors import EffectError, nearest
-from thermal.inputs.provider import InputProvider, Signal
+from thermal.inputs.provider import InputProvider
+from thermal.inputs.signals import Signal
 from thermal.network.graph import GraphBuilder
 from thermal.network.topology import Anatomy, Room
 from thermal.parameters import Parameter

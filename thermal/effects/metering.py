@@ -9,7 +9,8 @@ import numpy as np
 
 from thermal._types import FloatArray
 from thermal.effects.effect import CONSTANT, EffectBuilder, described, hat
-from thermal.inputs.provider import InputProvider, Signal
+from thermal.inputs.provider import InputProvider
+from thermal.inputs.signals import Signal
 from thermal.units import AIR_HEAT_CAPACITY
 
 #: Heat that a sensor takes up in a minute over that of the zone's air [-]: too little to cool the zone, and enough for

@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 
 from thermal._types import FloatArray
 from thermal.effects.effect import CONSTANT, EffectBuilder, described, lacking, paired, without_facades
-from thermal.inputs.provider import InputProvider, Signal
+from thermal.inputs.provider import InputProvider
+from thermal.inputs.signals import Signal
 from thermal.network.materials import RATED_OUTSIDE_FILM
 from thermal.network.topology import UPWARD, Anatomy, OuterFaces, Outlook, Room
 from thermal.units import REFERENCE_TEMPERATURE

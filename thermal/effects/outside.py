@@ -10,7 +10,8 @@ import pandas as pd
 
 from thermal._types import FloatArray
 from thermal.effects.effect import CONSTANT, EffectBuilder, described, lacking
-from thermal.inputs.provider import InputProvider, Signal
+from thermal.inputs.provider import InputProvider
+from thermal.inputs.signals import Signal
 
 
 def _wind(inputs: InputProvider, zone: str | None) -> FloatArray:

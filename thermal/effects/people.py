@@ -9,7 +9,8 @@ import numpy as np
 
 from thermal._types import FloatArray
 from thermal.effects.effect import CONSTANT, EffectBuilder, described
-from thermal.inputs.provider import InputProvider, Signal
+from thermal.inputs.provider import InputProvider
+from thermal.inputs.signals import Signal
 
 
 def _heat_rate(inputs: InputProvider, zone: str) -> FloatArray:

@@ -9,7 +9,8 @@ import numpy as np
 
 from thermal._types import FloatArray
 from thermal.effects.effect import EffectBuilder, described, hat, lacking
-from thermal.inputs.provider import InputProvider, Signal
+from thermal.inputs.provider import InputProvider
+from thermal.inputs.signals import Signal
 from thermal.network.topology import Anatomy
 
 #: Solar transmittance that a window is taken for where another's is known [-]: double glazing (EN 410).

@@ -6,8 +6,7 @@ of a model what it is made of (`Signal.inputs`), so that nobody has to try.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
 from functools import cached_property
 
 import numpy as np
@@ -386,50 +385,3 @@ def telemetry_inputs(case: Case, normalisation: Normalisation | None = None) -> 
     if people is not None:
         series["people"] = filled(people)
     return InputProvider(case.building, case.stamps, case.step, series, normalisation or fit_normalisation(case))
-
-
-@dataclass(frozen=True)
-class Signal:
-    """A time series that drives sources of a network.
-
-    Parameters
-    ----------
-    name : str
-        Unique within a network.
-    unit : str
-        Its unit.
-    of : callable
-        Makes it from the inputs, shape (n_time,) [unit].
-    inputs : tuple of str
-        What it is made of and cannot do without, names of `INPUTS`; by default what every source has, the time.
-    """
-
-    name: str
-    unit: str
-    of: Callable[[InputProvider], FloatArray]
-    inputs: tuple[str, ...] = ()
-
-
-def signal_values(signals: Sequence[Signal], inputs: InputProvider) -> FloatArray:
-    """Make signals from inputs.
-
-    Parameters
-    ----------
-    signals : sequence of Signal
-        Such as `ThermalNetwork.signals`.
-    inputs : InputProvider
-        Of a case, a scenario, a forecast or a feed.
-
-    Returns
-    -------
-    ndarray, shape (n_time, n_signal)
-        One column a signal [signal unit].
-
-    Raises
-    ------
-    EffectError
-        When the source lacks what a signal is made of.
-    """
-    for signal in signals:
-        inputs.need(*signal.inputs)
-    return np.column_stack([np.empty((len(inputs.stamps), 0)), *(s.of(inputs) for s in signals)])

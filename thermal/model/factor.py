@@ -58,6 +58,8 @@ class Pencil:
         What the zones' sensors read where these lag behind; see `output`.
     n_signal : int
         How many of the boundary columns, the last ones, are signals of effects.
+    airflows : tuple of (int, int)
+        Source and target zone of each directed airflow, which is no part of K.
     """
 
     capacity: Matrix
@@ -69,6 +71,7 @@ class Pencil:
     flow_slopes: list[Matrix]
     reading: Matrix = None
     n_signal: int = 0
+    airflows: tuple[tuple[int, int], ...] = ()
 
     @property
     def n(self) -> int:

@@ -142,6 +142,7 @@ class SymbolicModel:
             flow_slopes=flow_slopes,
             reading=self._reading,
             n_signal=len(self.network.signals),
+            airflows=self.network.airflows,
         )
 
     def source_slopes(self, theta: FloatArray) -> Matrix:

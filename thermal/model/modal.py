@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy.linalg as sl
@@ -129,6 +130,29 @@ class ModalModel:
             np.asarray(f(self.capacity), dtype=float) for f in propagator_functions(step, scheme)
         )
         return Propagator(end, end_gain, mean, mean_gain)
+
+    def to_control(self, inputs: list[str], outputs: list[str], step: float | None = None) -> Any:
+        """Make a `control.StateSpace`, ``dξ/dt = -(k/c) ξ + [B H]/c [u; q]``, ``y = O ξ``.
+
+        Parameters
+        ----------
+        inputs : list of str
+            Names of the columns of B, then of H.
+        outputs : list of str
+            Names of the zones.
+        step : float, optional
+            Time step of an exact zero-order hold [s]; continuous time by default.
+        """
+        import control  # here: it takes a second to import
+
+        drive = np.hstack([self.boundary, self.heating])
+        if step is None:
+            a, b, time = -1.0 / self.time_constants, drive / self.capacity[:, None], 0.0
+        else:
+            one = self.propagator(step)
+            a, b, time = one.end, one.end_gain[:, None] * drive, step
+        none = np.zeros((self.output.shape[0], drive.shape[1]))
+        return control.StateSpace(np.diag(a), b, self.output, none, time, inputs=inputs, outputs=outputs)
 
 
 #: Functions of the capacity c of a mode (with k = 1 - s c): end, end_gain, mean, mean_gain.

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from thermal._types import FloatArray, IntArray
 from thermal.case.case import Case
 from thermal.errors import ModelError
-from thermal.inputs.provider import InputProvider, signal_values, telemetry_inputs
+from thermal.inputs.provider import InputProvider, telemetry_inputs
+from thermal.inputs.signals import signal_values
 from thermal.model.matrices import Matrices, SymbolicModel
 from thermal.model.modal import run_along
 from thermal.model.step import IMPLICIT_EULER, Scheme, Stepper
@@ -212,14 +213,12 @@ def spin_up(
 
 def free_runs(
     matrices: Matrices,
-    network: ThermalNetwork,
     inputs: Inputs,
     starts: IntArray,
-    steps: int,
+    steps: int | IntArray,
     states: FloatArray,
     slopes: FloatArray | None = None,
     scheme: Scheme = IMPLICIT_EULER,
-    keep: IntArray | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> tuple[FloatArray, FloatArray | None]:
     """Run the model freely from several stamps, driven by the telemetry's inputs.
@@ -228,48 +227,42 @@ def free_runs(
     ----------
     matrices : Matrices
         The model at one θ.
-    network : ThermalNetwork
-        For zones and airflows.
     inputs : Inputs
         The telemetry.
     starts : ndarray of int, shape (m,)
         Stamps at which the runs start.
-    steps : int
-        Number of steps N.
+    steps : int or ndarray of int
+        Number of steps N, or which steps to return, from 1 on and increasing.
     states : ndarray, shape (n, m)
         States at the starts [K].
     slopes : ndarray, shape (n, n_parameter m), optional
-        Their derivatives [K per unit of θ].
+        Their sensitivities [K per unit of θ].
     scheme : Scheme
         Implicit Euler by default.
-    keep : ndarray of int, optional
-        Steps to return, 1 to ``steps``; all by default.
     progress : callable, optional
         Called with the number of steps done.
 
     Returns
     -------
     tuple
-        Zone means over the kept steps (m, n_keep, n_zone) [K] and derivatives (m, n_keep, n_zone, n_parameter), or
+        Zone means over the kept steps (m, n_keep, n_zone) [K] and sensitivities (m, n_keep, n_zone, n_parameter), or
         None.
     """
-    keep = np.arange(1, steps + 1) if keep is None else keep
-    if matrices.reduced and not network.airflows:
-        start, boundary = states - _REFERENCE * matrices.uniform[:, None], inputs.boundary - _REFERENCE
+    keep = np.arange(1, steps + 1) if isinstance(steps, int | np.integer) else steps
+    states, boundary = states - _REFERENCE * matrices.uniform[:, None], inputs.boundary - _REFERENCE
+    if matrices.reduced and not matrices.airflows:
         if slopes is None:
             modes = matrices.modal.modes
-            along = run_along(modes, start, boundary, inputs.heat, starts, keep, inputs.step, scheme)
+            along = run_along(modes, states, boundary, inputs.heat, starts, keep, inputs.step, scheme)
             return along + _REFERENCE, None
         row = starts + np.arange(1, int(keep[-1]) + 1)[:, None]
         boundary, heat = ((v[row]).transpose(0, 2, 1) for v in (boundary, inputs.heat))
-        means, moved = matrices.modal.run(start, boundary, heat, keep, inputs.step, scheme, slopes)
+        means, moved = matrices.modal.run(states, boundary, heat, keep, inputs.step, scheme, slopes)
         return means + _REFERENCE, moved
-    stepper = Stepper(matrices, inputs.step, scheme, network.airflows)
-    m, n_zone, p = starts.size, len(network.zones), len(matrices.flow_slopes)
+    stepper = Stepper(matrices, inputs.step, scheme)
+    m, n_zone, p = starts.size, inputs.zone.shape[1], len(matrices.flow_slopes)
     means = np.empty((m, keep.size, n_zone))
     mean_slopes = np.empty((m, keep.size, n_zone, p)) if slopes is not None else None
-    boundary = inputs.boundary - _REFERENCE
-    states = states - _REFERENCE * matrices.uniform[:, None]
     position = {int(s): i for i, s in enumerate(keep)}
     for k in range(1, int(keep[-1]) + 1):
         row = starts + k
@@ -363,7 +356,7 @@ def simulate(
     matrices = model.matrices(theta)
     at = np.array([first])
     states, _ = spin_up(matrices, inputs, begin, at)
-    means, _ = free_runs(matrices, model.network, inputs, at, last - first, states, scheme=scheme, progress=progress)
+    means, _ = free_runs(matrices, inputs, at, last - first, states, scheme=scheme, progress=progress)
     rows = slice(first + 1, last + 1)
     zones = list(model.network.zones)
 

@@ -179,7 +179,7 @@ class SparseRollout(ca.Callback):
     def _run(self, theta: FloatArray, slopes: bool) -> tuple[FloatArray, FloatArray]:
         """Zone means (n_zone, N), and their derivatives (n_zone N, n_parameter) in CasADi's column-major order."""
         data, p = self._data, theta.size
-        stepper = Stepper(self._model.matrices(theta, slopes), self._step, self._scheme, self._model.network.airflows)
+        stepper = Stepper(self._model.matrices(theta, slopes), self._step, self._scheme)
         states = data.initial[:, None]
         moved = np.zeros((states.size, p)) if slopes else None
         means, mean_slopes = [], []

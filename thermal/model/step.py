@@ -101,8 +101,6 @@ class Stepper:
         Time step [s].
     scheme : Scheme
         Implicit Euler by default.
-    airflows : tuple of (int, int)
-        Source and target zone of each directed airflow.
 
     Raises
     ------
@@ -110,14 +108,8 @@ class Stepper:
         When the matrix of the step cannot be factorised.
     """
 
-    def __init__(
-        self,
-        matrices: Pencil,
-        step: float,
-        scheme: Scheme = IMPLICIT_EULER,
-        airflows: tuple[tuple[int, int], ...] = (),
-    ) -> None:
-        self.matrices, self.step, self.scheme, self.airflows = matrices, step, scheme, airflows
+    def __init__(self, matrices: Pencil, step: float, scheme: Scheme = IMPLICIT_EULER) -> None:
+        self.matrices, self.step, self.scheme = matrices, step, scheme
         n = matrices.n
         self._stiffness = matrices.flow[:, :n]
         self._exchange = matrices.flow[:, n:]
@@ -302,11 +294,11 @@ class Stepper:
 
     def _mixing(self, airflow: FloatArray | None) -> FloatArray | None:
         """M for each run, shape (m, n_zone, n_zone) [W/K]: air that enters a zone at another zone's temperature."""
-        if airflow is None or not self.airflows:
+        if airflow is None or not self.matrices.airflows:
             return None
         n_zone = self.matrices.observation.shape[0]
         mixing = np.zeros((airflow.shape[1], n_zone, n_zone))
-        for flow, (source, target) in zip(airflow, self.airflows, strict=True):
+        for flow, (source, target) in zip(airflow, self.matrices.airflows, strict=True):
             mixing[:, target, source] += AIR_HEAT_CAPACITY * flow
             mixing[:, target, target] -= AIR_HEAT_CAPACITY * flow
         return mixing

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from thermal._types import FloatArray, IntArray
 from thermal.errors import ModelError
 from thermal.inputs.normalisation import Normalisation
-from thermal.inputs.provider import Signal
+from thermal.inputs.signals import Signal
 from thermal.network.topology import Anatomy
 from thermal.parameters import Parameter
 

@@ -152,7 +152,7 @@ def _heat_loss(building: Building, at: DesignConditions) -> Series:
     matrices = SymbolicModel(network).matrices(network.start())
     outside = np.full((matrices.n_boundary, 1), at.winter_outdoor)
     zones = np.full((len(network.zones), 1), at.heating)
-    stepper = Stepper(matrices, _LONG_RUN, airflows=network.airflows)
+    stepper = Stepper(matrices, _LONG_RUN)
     return stepper.hold(at.heating * matrices.uniform[:, None], outside, zones)[2]
 
 

@@ -8,7 +8,8 @@ import numpy as np
 
 from thermal._types import FloatArray
 from thermal.effects.effect import CONSTANT, Effect, EffectBuilder, strength
-from thermal.inputs.provider import InputProvider, Signal
+from thermal.inputs.provider import InputProvider
+from thermal.inputs.signals import Signal
 
 #: Hours of a bin of the day.
 _BIN = 3

@@ -72,7 +72,7 @@ def spatial_field(
     begin = max(0, first - round(SPIN_UP / inputs.step))
     states, _ = spin_up(matrices, inputs, begin, np.array([first]))
     states = states - _REFERENCE
-    stepper = Stepper(matrices, inputs.step, scheme, model.network.airflows)
+    stepper = Stepper(matrices, inputs.step, scheme)
     for row in range(first + 1, first + steps + 1):
         boundary = inputs.boundary[row][:, None] - _REFERENCE
         states, *_ = stepper.advance(states, boundary, inputs.heat[row][:, None], inputs.airflow[row][:, None])

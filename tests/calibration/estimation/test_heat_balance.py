@@ -39,7 +39,7 @@ def replayed(matrices: Matrices, real: Inputs, airflows: tuple[tuple[int, int], 
     boundary = np.full((LENGTH, n_boundary), LEVEL)
     boundary[QUIET:] += np.cumsum(rng.normal(size=(LENGTH - QUIET, n_boundary)), axis=0)
     airflow = rng.uniform(0.01, 0.05, (LENGTH, len(airflows)))
-    stepper = Stepper(matrices, real.step, airflows=airflows)
+    stepper = Stepper(replace(matrices, airflows=airflows), real.step)
     states = LEVEL * matrices.uniform[:, None]
     zone = np.empty((LENGTH, n_zone))
     for k in range(LENGTH):

@@ -81,7 +81,7 @@ def predictor(ids: tuple[str, ...]) -> Callable[[Case], FloatArray]:
         model = reduced_model(SymbolicModel(network), [theta])
         inputs, matrices = replay_inputs(case, network), model.matrices(theta)
         states, _ = spin_up(matrices, inputs, int(starts[0]) - 400, starts)
-        return free_runs(matrices, network, inputs, starts, STEPS, states)[0]
+        return free_runs(matrices, inputs, starts, STEPS, states)[0]
 
     return predict
 

@@ -73,7 +73,7 @@ def test_errors_are_those_of_runs_one_by_one() -> None:
     wanted = []
     for start in starts:
         state, _ = spin_up(matrices, inputs, 1200 - 864, np.array([start]))
-        means, _ = free_runs(matrices, model.network, inputs, np.array([start]), 72, state)
+        means, _ = free_runs(matrices, inputs, np.array([start]), 72, state)
         wanted.append(means[0, 71] - inputs.zone[start + 72])
     np.testing.assert_allclose(predictions.error, wanted, rtol=0, atol=1e-9)
     np.testing.assert_allclose(predictions.initial, inputs.zone[starts])

@@ -19,7 +19,8 @@ from thermal import Building, build_network
 from thermal.effects.catalogue import CATALOGUE, chosen
 from thermal.errors import EffectError
 from thermal.hvac._system import HvacSystem
-from thermal.inputs.provider import signal_values, telemetry_inputs
+from thermal.inputs.provider import telemetry_inputs
+from thermal.inputs.signals import signal_values
 from thermal.pilot.building import pilot_building
 from thermal.pilot.sizing import size_system
 

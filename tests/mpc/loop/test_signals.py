@@ -15,7 +15,7 @@ from mpc.scenario.scenario import Scenario
 from thermal import Building, build_network
 from thermal.effects.catalogue import chosen
 from thermal.hvac._system import HvacSystem
-from thermal.inputs.provider import signal_values
+from thermal.inputs.signals import signal_values
 from thermal.units import AIR_HEAT_CAPACITY
 
 
