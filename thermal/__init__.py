@@ -10,7 +10,8 @@ from thermal.data import load_bundled_case
 from thermal.errors import CaseError, ModelError, PlanError, ThermalError
 from thermal.model.matrices import SymbolicModel
 from thermal.model.reduce import reduced_model
-from thermal.model.replay import Inputs, free_runs, replay_inputs, simulate, spin_up
+from thermal.model.replay import Inputs, free_runs, replay_inputs, spin_up
+from thermal.model.simulation import simulate
 from thermal.model.simulator import Simulator
 from thermal.network.build import build_network
 from thermal.network.network import ThermalNetwork

@@ -30,7 +30,7 @@ def simulate(
     from mpc.reports.case import simulation_summary, simulation_verdict, write_simulation
     from thermal.case.load import load_case
     from thermal.case.times import local_timestamp
-    from thermal.model.replay import simulate as replay
+    from thermal.model.simulation import simulate as replay
 
     if out is not None:
         check_results_folder(out, force)

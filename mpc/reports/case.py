@@ -16,7 +16,7 @@ from mpc.reports.page import clock, counted, duration, kelvin, render, signed, s
 from thermal.case.building import FloorPlans
 from thermal.case.case import Case
 from thermal.case.check import CaseCheck
-from thermal.model.replay import Simulation
+from thermal.model.simulation import Simulation
 
 
 def write_check(check: CaseCheck, out: str | Path, *, force: bool = False) -> Path:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -11,8 +12,8 @@ import pytest
 
 from thermal import Case, Telemetry
 from thermal.errors import EffectError
-from thermal.inputs.normalisation import WIND
-from thermal.inputs.provider import INFRARED, IRRADIANCE, InputProvider, telemetry_inputs
+from thermal.inputs.normalisation import WIND, Normalisation, fit_normalisation, usual_temperatures
+from thermal.inputs.provider import INFRARED, INPUTS, IRRADIANCE, InputProvider, LiveInputs, telemetry_inputs
 from thermal.inputs.signals import Signal, signal_values
 
 CaseOf = Callable[[str], Case]
@@ -121,3 +122,58 @@ def test_signals_are_columns(lively_case: CaseOf) -> None:
         np.column_stack([np.ones(len(drivers.stamps)), drivers.wind])
     )
     assert signal_values([], drivers).shape == (len(drivers.stamps), 0)
+
+
+def test_values_by_name_unit_and_time(lively_case: CaseOf) -> None:
+    inputs = telemetry_inputs(lively_case("plan"))
+    some = inputs.stamps[[3, 7]]
+    assert inputs.values("wind", "m/s", some).tolist() == inputs.wind[[3, 7]].tolist()
+    assert inputs.values("heat").shape == (len(inputs.stamps), len(inputs.zones))
+    assert np.array_equal(inputs.values("sun", "W/m^2"), inputs.sun.horizontal)
+    assert inputs.lacks(("outdoor", "radiant_gains", "usual")) == ("radiant_gains",)
+    assert "wind" in repr(inputs) and "radiant_gains" not in repr(inputs)
+    for ask, message in (
+        (lambda: inputs.values("wind", "km/h"), "input wind: expected unit m/s, found 'km/h'"),
+        (lambda: inputs.values("winds"), "nearest valid one is 'wind'"),
+        (lambda: inputs.values("wind", at=some + pd.Timedelta(days=99)), "stamps of the telemetry"),
+    ):
+        with pytest.raises(EffectError, match=message):
+            ask()
+
+
+def test_constants_are_of_the_intervals_they_are_fitted_on(lively_case: CaseOf) -> None:
+    case = lively_case("table")
+    n = len(case.stamps)
+    people = np.where(np.arange(n) < n // 2, 3.0, 12.0)
+    case = changed(case, **{"A/occupancy_count_sensor": people})
+    early = fit_normalisation(case, [(case.stamps[0], case.stamps[n // 2 - 1])])
+    assert (early.people, fit_normalisation(case).people) == (3.0, 12.0)
+    assert telemetry_inputs(case, early).occupancy.max() == 4.0
+    frame = case.telemetry.frame
+    assert early.wind == pytest.approx(frame[f"weather_station/{WIND}"].iloc[: n // 2].mean())
+    assert early.peak_flow["A"] >= early.flow["A"] > 0.0 and set(early.usual) == set(case.building.zone_names)
+    assert Normalisation.from_dict(json.loads(json.dumps(early.to_dict()))) == early
+    assert f"{len(early.usual)} zones" in repr(early)
+
+
+def test_hours_that_were_not_fitted_are_those_of_other_days() -> None:
+    # Friday the 24th from 6 to 12: a Saturday's eight o'clock is that of the Friday, eight in the evening the mean
+    index = pd.date_range("2023-03-24 06:00", "2023-03-24 11:50", freq="10min", tz="Etc/GMT+6")
+    zone = pd.DataFrame({"A": np.asarray(index.hour, dtype=float), "B": np.nan}, index=index)
+    usual = usual_temperatures(zone)
+    assert (usual["A"][24 + 8], usual["A"][8], usual["A"][20]) == (8.0, 8.0, 8.5)
+    assert usual["B"][24 + 8] == 8.5
+
+
+def test_a_live_feed_gives_what_the_telemetry_gives_row_by_row(lively_case: CaseOf) -> None:
+    case = lively_case("plan")
+    whole = telemetry_inputs(case)
+    now = LiveInputs(case.building, case.step, whole.normalisation)
+    for k in (5, 60):
+        now.put(whole.stamps[k : k + 1], {name: values[k : k + 1] for name, values in whole.series.items()})
+        for name in INPUTS:
+            if name.endswith("_rate"):
+                assert not now.gives(name)  # takes several stamps
+            elif now.gives(name):
+                np.testing.assert_allclose(now.values(name), whole.values(name)[[k]], rtol=1e-12)
+        assert now.gives("heat") and now.gives("sky") and now.gives("through_windows")

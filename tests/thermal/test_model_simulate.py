@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from functools import cache
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 import pytest
@@ -93,3 +94,20 @@ def test_missing_inputs_are_refused_with_their_first_stamp() -> None:
     with pytest.raises(ModelError, match="30 minutes"):
         simulate(spoilt, model, model.network.start(), stamps[900], stamps[950])
     assert len(simulate(spoilt, model, model.network.start(), stamps[900], stamps[919]).simulated) == 19
+
+
+def test_results_become_tables_and_pictures() -> None:
+    case = load_bundled_case()
+    model = SymbolicModel(build_network(case.building, dx=1.5))
+    inputs = replay_inputs(case, model.network)
+    assert "5 zones" in repr(inputs) and "100% complete" in repr(inputs)
+    table = inputs.to_frame()
+    assert list(dict.fromkeys(table.columns.get_level_values(0))) == ["boundary", "heat", "zone"]
+    assert np.array_equal(table["heat"].to_numpy(), inputs.heat)
+    found = simulate(case, model, model.network.start(), case.stamps[500], case.stamps[600])
+    assert repr(found).startswith("Simulation(") and "mean absolute error" in repr(found)
+    assert found.to_frame()["simulated"].equals(found.simulated)
+    assert found.error.equals(found.simulated - found.measured)
+    for figure in (inputs.plot(), found.plot()):
+        assert figure.axes
+        plt.close(figure)

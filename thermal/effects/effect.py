@@ -171,8 +171,16 @@ class EffectBuilder:
             Its name.
         zone, facade : str, optional
             Whose value it is.
+
+        Raises
+        ------
+        EffectError
+            When the effect has none of this name.
         """
-        found = next(p for p in self.effect.parameters if p.name == name)
+        own = {p.name: p for p in self.effect.parameters}
+        if name not in own:
+            raise EffectError(f"effect {self.effect.id}: has no parameter {name!r}; {nearest(name, own)}")
+        found = own[name]
         if zone is not None:
             found = found.of("zone", zone)
         elif facade is not None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -14,7 +15,7 @@ from thermal.case.case import Case
 from thermal.errors import ModelError
 from thermal.inputs.provider import InputProvider, telemetry_inputs
 from thermal.inputs.signals import signal_values
-from thermal.model.matrices import Matrices, SymbolicModel
+from thermal.model.matrices import Matrices
 from thermal.model.modal import run_along
 from thermal.model.step import IMPLICIT_EULER, Scheme, Stepper
 from thermal.network.network import ThermalNetwork
@@ -37,7 +38,7 @@ _REFERENCE = REFERENCE_TEMPERATURE
 _STEADY_STEP = 10 * 86400.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Inputs:
     """What drives a replay, one row a stamp; a row stands for the step that ends at its stamp.
 
@@ -76,6 +77,30 @@ class Inputs:
 
     def __len__(self) -> int:
         return len(self.stamps)
+
+    def __repr__(self) -> str:
+        n, share = self.zone.shape[1], self.complete.mean()
+        span = f"{self.stamps[0]} to {self.stamps[-1]} by {self.step:g} s" if len(self) else "no steps"
+        return f"Inputs({span}, {n} zones, {self.boundary.shape[1]} boundaries and signals, {share:.0%} complete)"
+
+    def to_frame(self) -> pd.DataFrame:
+        """All inputs as a table, shape (n_time, n) [K], [W], [kg/s]; columns of two levels, kind and number."""
+        kinds = ("boundary", "heat", "airflow", "zone")
+        tables = {kind: pd.DataFrame(getattr(self, kind), index=self.stamps) for kind in kinds}
+        return pd.concat({kind: table for kind, table in tables.items() if table.size}, axis=1)
+
+    def plot(self) -> Any:
+        """Draw zones with outdoors [degC] above their heat [kW]; returns a matplotlib figure."""
+        import matplotlib.pyplot as plt
+
+        figure, (above, below) = plt.subplots(2, 1, sharex=True, layout="constrained")
+        above.plot(self.stamps, self.zone - 273.15)
+        above.plot(self.stamps, self.boundary[:, 0] - 273.15, "k", linewidth=0.8, label="outdoor")
+        above.legend(frameon=False)
+        below.plot(self.stamps, self.heat / 1000.0)
+        above.set_ylabel("temperature (degC)")
+        below.set_ylabel("heat (kW)")
+        return figure
 
 
 def replay_inputs(case: Case, network: ThermalNetwork, provider: InputProvider | None = None) -> Inputs:
@@ -276,91 +301,3 @@ def free_runs(
         if progress is not None:
             progress(k)
     return means, mean_slopes
-
-
-@dataclass(frozen=True)
-class Simulation:
-    """A replayed interval.
-
-    Parameters
-    ----------
-    simulated : DataFrame, shape (n_time, n_zone)
-        Zone temperatures, means over the steps that end at the stamps [K].
-    measured : DataFrame, shape (n_time, n_zone)
-        What the sensors reported [K].
-    heat : DataFrame, shape (n_time, n_zone)
-        Metered heat that drove the replay [W].
-    start : Timestamp
-        Where measured and simulated zones were matched.
-    """
-
-    simulated: pd.DataFrame
-    measured: pd.DataFrame
-    heat: pd.DataFrame
-    start: pd.Timestamp
-
-
-def simulate(
-    case: Case,
-    model: SymbolicModel,
-    theta: FloatArray,
-    start: pd.Timestamp,
-    end: pd.Timestamp,
-    scheme: Scheme = IMPLICIT_EULER,
-    spin_up_seconds: float = SPIN_UP,
-    progress: Callable[[int], None] | None = None,
-) -> Simulation:
-    """Replay the building's inputs from ``start`` to ``end`` through the model.
-
-    Parameters
-    ----------
-    case : Case
-        Building and telemetry.
-    model : SymbolicModel
-        On the grid or reduced.
-    theta : ndarray, shape (n_parameter,)
-        Parameter values [parameter units].
-    start, end : Timestamp
-        Stamps; zones are matched at the first stamp at or after ``start``.
-    scheme : Scheme
-        Time stepping.
-    spin_up_seconds : float
-        Telemetry before the start that the spin-up uses [s]; what there is, but at least 12 hours.
-    progress : callable, optional
-        Called with the number of free steps done.
-
-    Raises
-    ------
-    ModelError
-        When the interval is outside of the telemetry, leaves no spin-up, or lacks inputs for over 30 minutes.
-    """
-    inputs = replay_inputs(case, model.network)
-    stamps = inputs.stamps
-    first, last = int(stamps.searchsorted(start)), int(stamps.searchsorted(end, side="right")) - 1
-    if not (start < end and first < last and stamps[0] <= start and end <= stamps[-1]):
-        raise ModelError(
-            f"interval {start} to {end}: expected two times in order within the telemetry, "
-            f"which goes from {stamps[0]} to {stamps[-1]}"
-        )
-    begin = max(0, first - round(spin_up_seconds / inputs.step))
-    if (first - begin) * inputs.step < LEAST_SPIN_UP:
-        earliest = stamps[0] + pd.Timedelta(seconds=LEAST_SPIN_UP)
-        raise ModelError(
-            f"start {start}: expected at least 12 h of telemetry before it for the spin-up; earliest is {earliest}"
-        )
-    lacking = np.flatnonzero(~inputs.complete[first + 1 : last + 1])
-    if lacking.size:
-        raise ModelError(
-            f"inputs are missing for over 30 minutes from {stamps[first + 1 + lacking[0]]}; choose another interval"
-        )
-    matrices = model.matrices(theta)
-    at = np.array([first])
-    states, _ = spin_up(matrices, inputs, begin, at)
-    means, _ = free_runs(matrices, inputs, at, last - first, states, scheme=scheme, progress=progress)
-    rows = slice(first + 1, last + 1)
-    zones = list(model.network.zones)
-
-    def table(values: FloatArray) -> pd.DataFrame:
-        return pd.DataFrame(values, index=stamps[rows], columns=zones)
-
-    return Simulation(table(means[0]), table(inputs.zone[rows]), table(inputs.heat[rows]), stamps[first])

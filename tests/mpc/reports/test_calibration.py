@@ -34,7 +34,7 @@ from thermal import (
 )
 from thermal.case.check import describe_case
 from thermal.case.schema import Location, ZoneEntry
-from thermal.model.replay import simulate
+from thermal.model.simulation import simulate
 
 LARGEST_PAGE = 5e6  # bytes
 
