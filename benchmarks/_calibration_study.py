@@ -33,8 +33,8 @@ from calibration import CalibrationResult, Interval, ModelSettings, calibrate, e
 from calibration.evaluation.intervals import default_intervals, horizon_steps
 from calibration.evaluation.n_step import spatial_metrics
 from thermal import Case, Inputs, Structure, SymbolicModel, free_runs, load_case, replay_inputs, spin_up
+from thermal.model.matrices import Matrices
 from thermal.model.replay import SPIN_UP
-from thermal.model.symbolic import Matrices
 from thermal.network.structure import BASELINE
 
 FloatArray = NDArray[np.float64]
@@ -224,7 +224,7 @@ def run_error(grid: SymbolicModel, matrices: Matrices, inputs: Inputs, start: in
     """Errors of the zones at the end of one run, shape (1, n_zone) [K]; NaN where not measured."""
     steps, at = horizon_steps(HORIZON, inputs.step), np.array([start])
     states, _ = spin_up(matrices, inputs, start - round(SPIN_UP / inputs.step), at)
-    means, _ = free_runs(matrices, grid.network, inputs, at, steps, states, scheme=SCHEME, keep=np.array([steps]))
+    means, _ = free_runs(matrices, inputs, at, np.array([steps]), states, scheme=SCHEME)
     return np.where(np.isfinite(inputs.bridged[at]), means[:, 0] - inputs.zone[at + steps], np.nan)
 
 

@@ -29,8 +29,8 @@ from mpc.control.problem.horizon import HorizonData
 from mpc.control.problem.problem import ControlProblem
 from mpc.control.solvers.solution import Solution, Status
 from thermal.hvac._symbolic import hvac_function
-from thermal.inputs.drivers import REFERENCE_TEMPERATURE
-from thermal.model.scheme import IMPLICIT_EULER
+from thermal.model.step import IMPLICIT_EULER
+from thermal.units import REFERENCE_TEMPERATURE
 
 #: Ipopt's settings: quiet, a good first guess, tolerance, and when to give up. Of the barriers that were tried (1e-3 to
 #: 1e-5) this one solves most often and soonest.

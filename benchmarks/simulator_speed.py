@@ -36,10 +36,9 @@ from _table import markdown, write
 from scipy.sparse.linalg import splu
 
 from thermal import Building, SymbolicModel, build_network
-from thermal.model.factor import SparseSolver
-from thermal.model.scheme import IMPLICIT_EULER, TR_BDF2, Scheme
-from thermal.model.stepper import Stepper, factorise
-from thermal.model.symbolic import Matrices
+from thermal.model.factor import SparseSolver, factorise
+from thermal.model.matrices import Matrices
+from thermal.model.step import IMPLICIT_EULER, TR_BDF2, Scheme, Stepper
 from thermal.network.network import ThermalNetwork
 from thermal.pilot.building import devices, generate_office
 from thermal.pilot.weather import MOUNTAIN_VIEW
@@ -125,7 +124,7 @@ class Replay:
     """
 
     def __init__(self, matrices: Matrices, network: ThermalNetwork, scheme: Scheme = IMPLICIT_EULER) -> None:
-        self.stepper = Stepper(matrices, STEP, scheme, network.airflows)
+        self.stepper = Stepper(matrices, STEP, scheme)
         rng = np.random.default_rng(SEED)
         self.heat = rng.uniform(-1000.0, 1000.0, (N_STEP, len(network.zones), 1))
         self.boundary = 283.15 + 5.0 * rng.standard_normal((N_STEP, network.n_boundary, 1))

@@ -54,6 +54,9 @@ QUANTITIES: dict[str, _Quantity] = {
 
 STANDARD_PRESSURE = 101_325.0  # Pa, at sea level (ISO 2533)
 DRY_AIR_GAS_CONSTANT = 287.042  # J/kg/K (ASHRAE Fundamentals 2017, ch. 1)
+#: Temperature from which states, boundaries and signals that stand for a temperature are counted [K].
+REFERENCE_TEMPERATURE = 293.15
+
 AIR_HEAT_CAPACITY = 1006.0  # J/kg/K, dry air at room temperature; the value of the metered heat (case format)
 METERING_TEMPERATURE = 293.15  # K: volumetric meters and balancing reports state flows of air at 20 degC
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from importlib.metadata import version
 from typing import Any
 
@@ -219,7 +219,7 @@ def diagnose(
         judged=tuple(bench.judged),
         seconds=time.perf_counter() - began,
         version=version("buildingmpc"),
-        settings=bench.settings,
+        settings=replace(bench.settings, normalisation=bench.drivers.normalisation),
         horizon=horizon,
         last_third=first.mae if turns else None,
     )

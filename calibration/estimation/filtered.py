@@ -16,9 +16,9 @@ from calibration.estimation.state_space import StateSpace, mean_flow, state_spac
 from calibration.evaluation.intervals import Interval
 from calibration.evaluation.n_step import Evaluation, Progress, Wanted, evaluate_runs
 from thermal._types import FloatArray
+from thermal.model.matrices import Matrices, SymbolicModel
 from thermal.model.replay import LEAST_SPIN_UP, SPIN_UP, Inputs, spin_up
-from thermal.model.scheme import IMPLICIT_EULER, Scheme
-from thermal.model.symbolic import Matrices, SymbolicModel
+from thermal.model.step import IMPLICIT_EULER, Scheme
 
 
 def filter_interval(

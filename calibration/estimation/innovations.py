@@ -19,9 +19,9 @@ from calibration.estimation.state_space import StateSpace
 from calibration.evaluation.intervals import Interval
 from calibration.evaluation.n_step import Progress
 from thermal._types import FloatArray
+from thermal.model.matrices import SymbolicModel
 from thermal.model.replay import SPIN_UP, Inputs
-from thermal.model.scheme import IMPLICIT_EULER, Scheme
-from thermal.model.symbolic import SymbolicModel
+from thermal.model.step import IMPLICIT_EULER, Scheme
 
 
 @dataclass(frozen=True)

@@ -111,7 +111,7 @@ class KalmanFilter:
     >>> from thermal.data import load_bundled_case
     >>> from thermal.model.reduce import reduced_model
     >>> from thermal.model.replay import replay_inputs, spin_up
-    >>> from thermal.model.symbolic import SymbolicModel
+    >>> from thermal.model.matrices import SymbolicModel
     >>> from thermal.network.build import build_network
     >>> case = load_bundled_case()
     >>> grid = SymbolicModel(build_network(case.building, dx=1.0))

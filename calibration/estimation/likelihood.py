@@ -23,8 +23,8 @@ from calibration.evaluation.intervals import Interval
 from calibration.fit.precision import Precision, precision, unexplained
 from calibration.fit.problem import Problem
 from thermal._types import FloatArray
+from thermal.model.matrices import SymbolicModel
 from thermal.model.replay import SPIN_UP, free_runs, spin_up
-from thermal.model.symbolic import SymbolicModel
 
 #: Zones beyond which the gains are those of the steady covariance, as in the tuning of the disturbance.
 _MANY_ZONES = 40
@@ -121,7 +121,7 @@ class InnovationsProblem(Problem):
         starts = np.array([white.at])
         states, moved = spin_up(matrices, inputs, white.begin, starts)
         means, mean_slopes = free_runs(
-            matrices, model.network, inputs, starts, white.stop - white.at, states, moved, self.scheme
+            matrices, inputs, starts, white.stop - white.at, states, moved, self.scheme
         )
         columns = [(means[0] - inputs.zone[white.at + 1 : white.stop + 1])[..., None]]
         if mean_slopes is not None:

@@ -107,7 +107,7 @@ def smooth(filtered: Filtered) -> Smoothed:
     >>> from thermal.data import load_bundled_case
     >>> from thermal.model.reduce import reduced_model
     >>> from thermal.model.replay import replay_inputs
-    >>> from thermal.model.symbolic import SymbolicModel
+    >>> from thermal.model.matrices import SymbolicModel
     >>> from thermal.network.build import build_network
     >>> grid = SymbolicModel(build_network(load_bundled_case().building, dx=1.0))
     >>> inputs, theta = replay_inputs(load_bundled_case(), grid.network), grid.network.start()
@@ -222,7 +222,7 @@ def averaged_deviation(filtered: Filtered, steps: int) -> FloatArray:
     >>> from thermal.data import load_bundled_case
     >>> from thermal.model.reduce import reduced_model
     >>> from thermal.model.replay import replay_inputs
-    >>> from thermal.model.symbolic import SymbolicModel
+    >>> from thermal.model.matrices import SymbolicModel
     >>> from thermal.network.build import build_network
     >>> grid = SymbolicModel(build_network(load_bundled_case().building, dx=1.0))
     >>> inputs, theta = replay_inputs(load_bundled_case(), grid.network), grid.network.start()

@@ -11,7 +11,7 @@ from calibration.errors import FilterError
 from thermal._types import FloatArray
 from thermal.model.modal import ModalModel
 from thermal.model.replay import Inputs
-from thermal.model.scheme import IMPLICIT_EULER, Scheme
+from thermal.model.step import IMPLICIT_EULER, Scheme
 from thermal.units import AIR_HEAT_CAPACITY
 
 #: Temperatures are stepped as differences from this one [K], as in a replay: nothing changes but round-off.
@@ -183,7 +183,7 @@ def state_space(
     --------
     >>> from thermal.data import load_bundled_case
     >>> from thermal.model.reduce import reduced_model
-    >>> from thermal.model.symbolic import SymbolicModel
+    >>> from thermal.model.matrices import SymbolicModel
     >>> from thermal.network.build import build_network
     >>> grid = SymbolicModel(build_network(load_bundled_case().building, dx=1.0))
     >>> small = reduced_model(grid, [grid.network.start()])

@@ -12,9 +12,9 @@ from calibration.estimation.filtered import filter_interval, rows_of
 from calibration.estimation.gains import Covariance, Gain
 from calibration.evaluation.intervals import Interval
 from thermal._types import FloatArray
+from thermal.model.matrices import SymbolicModel
 from thermal.model.replay import Inputs
-from thermal.model.scheme import Scheme
-from thermal.model.symbolic import SymbolicModel
+from thermal.model.step import Scheme
 
 #: Relative change of a variance in a step below which it counts as steady [-]: log-likelihoods are then right to a
 #: tenth.

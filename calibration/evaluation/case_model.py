@@ -16,10 +16,10 @@ from calibration.evaluation.settings import ModelSettings, read_settings
 from calibration.fit.result import GridCheck, load_parameters
 from thermal._types import FloatArray
 from thermal.case.case import Case
+from thermal.model.matrices import SymbolicModel
 from thermal.model.reduce import ReducedModel, reduced_model
 from thermal.model.replay import SPIN_UP, Inputs, free_runs, replay_inputs, spin_up
-from thermal.model.scheme import Scheme
-from thermal.model.symbolic import SymbolicModel
+from thermal.model.step import Scheme
 
 #: Runs of the check of a reduced model on the grid, and the stretch of telemetry they are spread over [days].
 CHECK_RUNS, CHECK_DAYS = 6, 2.0
@@ -202,7 +202,7 @@ def check_on_grid(
     for model in (grid, reduced):
         matrices = model.matrices(theta)
         states, _ = spin_up(matrices, inputs, runs.begin, starts)
-        means.append(free_runs(matrices, model.network, inputs, starts, steps, states, scheme=scheme)[0])
+        means.append(free_runs(matrices, inputs, starts, steps, states, scheme=scheme)[0])
     difference = np.abs(means[0] - means[1])
     order = reduced.projection.shape[1] if reduced.projection is not None else reduced.network.n_node
     return GridCheck(grid.network.n_node, order, starts.size, float(difference.max()), float(difference.mean()))

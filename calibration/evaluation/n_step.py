@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from calibration.errors import HorizonError, NotEnoughDataError
 from calibration.evaluation.intervals import Interval, Runs, horizon_steps, select_runs
 from thermal._types import FloatArray
+from thermal.model.matrices import Matrices, SymbolicModel
 from thermal.model.replay import SPIN_UP, Inputs, free_runs, spin_up
-from thermal.model.scheme import IMPLICIT_EULER, Scheme
-from thermal.model.symbolic import Matrices, SymbolicModel
+from thermal.model.step import IMPLICIT_EULER, Scheme
 from thermal.network.network import ThermalNetwork
 
 #: Called with what is being done, how much is done and how much there is.
@@ -347,7 +347,7 @@ def _simulate(
         means = np.full((starts.size, steps.size, len(network.zones)), np.nan)
         for last in np.unique(reach):
             part, keep = np.flatnonzero(reach == last), steps[steps <= last]
-            found = free_runs(matrices, network, inputs, starts[part], last, states[:, part], scheme=scheme, keep=keep)
+            found = free_runs(matrices, inputs, starts[part], keep, states[:, part], scheme=scheme)
             means[part, : keep.size] = found[0]
         for i, w, row in zip(numbers, alike, rows, strict=True):
             simulated[i] = means[row][:, np.searchsorted(steps, w.keep)]

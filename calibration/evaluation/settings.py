@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any, get_args
 
@@ -12,8 +12,9 @@ from calibration.errors import CalibrationError
 from thermal.case.building import Building
 from thermal.effects.catalogue import CATALOGUE, chosen
 from thermal.errors import ModelError
+from thermal.inputs.normalisation import Normalisation
 from thermal.model.replay import LEAST_SPIN_UP, SPIN_UP
-from thermal.model.scheme import SCHEMES, Scheme
+from thermal.model.step import SCHEMES, Scheme
 from thermal.network.build import build_network
 from thermal.network.network import ThermalNetwork
 from thermal.network.structure import BASELINE, Structure
@@ -40,6 +41,9 @@ class ModelSettings:
         What the model is made of: furniture, slabs, nodes of a wall, radiant node.
     effects : mapping of str to sequence of str
         Effects of the catalogue in the model, each with its zones; none is the whole building.
+    normalisation : Normalisation, optional
+        Constants that the inputs of the effects are counted by, of the tuning intervals; by default, as in files that
+        have none, those of whatever telemetry the model is run on.
 
     Raises
     ------
@@ -54,6 +58,7 @@ class ModelSettings:
     spin_up_seconds: float = SPIN_UP
     structure: Structure = BASELINE
     effects: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    normalisation: Normalisation | None = None
 
     def __post_init__(self) -> None:
         if self.scheme not in SCHEMES:
@@ -78,7 +83,7 @@ class ModelSettings:
         building : Building
             What the case folder describes.
         """
-        return build_network(
+        network = build_network(
             building,
             dx=self.dx,
             reach=self.reach,
@@ -86,11 +91,14 @@ class ModelSettings:
             structure=self.structure,
             effects=chosen(self.effects),
         )
+        return replace(network, normalisation=self.normalisation)
 
     def to_dict(self) -> dict[str, Any]:
         """Entry of ``calibration.json``."""
-        plain = {"scopes": dict(self.scopes), "structure": asdict(self.structure)}
+        plain: dict[str, Any] = {"scopes": dict(self.scopes), "structure": asdict(self.structure)}
         plain["effects"] = {name: list(zones) for name, zones in self.effects.items()}
+        kept = self.normalisation if self.effects else None
+        plain["normalisation"] = None if kept is None else kept.to_dict()
         return {**{k: getattr(self, k) for k in self.__dataclass_fields__}, **plain}
 
 
@@ -131,6 +139,11 @@ def read_settings(path: str | Path) -> dict[str, Any]:
         _check_effects(path, settings["effects"])
     if "structure" in settings:
         settings["structure"] = _structure(path, settings["structure"])
+    if settings.get("normalisation") is not None:
+        try:
+            settings["normalisation"] = Normalisation.from_dict(settings["normalisation"])
+        except ValueError as error:
+            raise CalibrationError(f"{path}: settings.normalisation: {error}") from error
     return settings
 
 

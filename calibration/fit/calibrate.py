@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from importlib.metadata import version
 from typing import get_args
 
@@ -19,9 +20,10 @@ from calibration.fit.result import CalibrationResult, GridCheck, SolverReport
 from calibration.fit.starts import solve_starts, tuning_runs
 from calibration.identifiability.information import information_of
 from thermal.case.case import Case
+from thermal.inputs.normalisation import fit_normalisation
+from thermal.model.matrices import SymbolicModel
 from thermal.model.reduce import ReducedModel, reduced_model
 from thermal.model.replay import SPIN_UP, replay_inputs
-from thermal.model.symbolic import SymbolicModel
 from thermal.network.structure import BASELINE, Structure
 from thermal.parameters import Scope
 
@@ -122,6 +124,8 @@ def calibrate(
         if value < least:
             raise CalibrationError(f"{name}: expected at least {least}, came {value}")
     tuned, judged = default_intervals(case, tune, hold_out)
+    if chosen:
+        settings = replace(settings, normalisation=fit_normalisation(case, ((i.start, i.end) for i in tuned)))
     intervals = {"tuning": tuned, "held_out": judged}
     _refuse_overlap(tuned, judged)
     network = settings.network(case.building)

@@ -13,8 +13,8 @@ from calibration.fit.least_squares import LeastSquaresResult, solve_least_square
 from calibration.fit.precision import Precision, precision, unexplained
 from calibration.fit.problem import Problem
 from thermal._types import FloatArray
+from thermal.model.matrices import SymbolicModel
 from thermal.model.reduce import ReducedModel, reduced_model
-from thermal.model.symbolic import SymbolicModel
 
 #: Most rounds, and the change of the estimate in standard errors that ends them [-].
 ROUNDS = 8

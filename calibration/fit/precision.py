@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from calibration.estimation.disturbance import DisturbanceModel
 from calibration.fit.problem import Problem
 from thermal._types import FloatArray
+from thermal.model.matrices import SymbolicModel
 from thermal.model.replay import Inputs
-from thermal.model.symbolic import SymbolicModel
 
 #: Least standard deviation of daily means before the telemetry [K].
 _LEAST_SWING = 0.2

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from calibration.estimation.disturbance import DisturbanceModel
 from calibration.evaluation.intervals import Interval, Runs
 from thermal._types import FloatArray
+from thermal.model.matrices import SymbolicModel
 from thermal.model.replay import Inputs, free_runs, spin_up
-from thermal.model.scheme import IMPLICIT_EULER, Scheme
-from thermal.model.symbolic import SymbolicModel
+from thermal.model.step import IMPLICIT_EULER, Scheme
 from thermal.parameters import Parameter
 
 #: ``linear`` is plain least squares; ``pseudo_huber`` takes errors far beyond the others for outliers.
@@ -217,9 +217,7 @@ class Problem:
         matrices = model.matrices(theta, slopes)
         inputs, keep = self.inputs, self.keep
         states, moved = spin_up(matrices, inputs, runs.begin, runs.starts)
-        means, mean_slopes = free_runs(
-            matrices, model.network, inputs, runs.starts, self.steps, states, moved, self.scheme, keep
-        )
+        means, mean_slopes = free_runs(matrices, inputs, runs.starts, keep, states, moved, self.scheme)
         error = means - inputs.zone[runs.starts[:, None] + keep[None, :]]
         error[~np.isfinite(inputs.bridged[runs.starts])[:, None, :] & np.ones_like(error, dtype=bool)] = np.nan
         return error, None if mean_slopes is None else mean_slopes[..., list(self.free)]

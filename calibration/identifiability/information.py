@@ -14,7 +14,7 @@ from calibration.fit.problem import Problem
 from calibration.identifiability.information_search import DETERMINED, InformationSearch
 from mpc.reports.identifiability import combination_words, describe
 from thermal._types import FloatArray
-from thermal.model.symbolic import SymbolicModel
+from thermal.model.matrices import SymbolicModel
 from thermal.parameters import Parameter
 
 #: Above this ratio of posterior to prior deviation the data tell nothing of a parameter [-].

@@ -21,9 +21,9 @@ from mpc.reports.identifiability import spoken
 from thermal._types import FloatArray
 from thermal.case.case import Case
 from thermal.errors import nearest
+from thermal.model.matrices import SymbolicModel
 from thermal.model.reduce import reduced_model
 from thermal.model.replay import replay_inputs
-from thermal.model.symbolic import SymbolicModel
 from thermal.parameters import Parameter
 
 #: Draws of the parameters beside their start, from the prior at half its spread as the starts of a calibration are.

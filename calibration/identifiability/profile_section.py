@@ -12,8 +12,8 @@ from scipy.optimize import lsq_linear
 from calibration.fit.estimate import Estimate
 from calibration.fit.least_squares import solve_least_squares
 from thermal._types import FloatArray
+from thermal.model.matrices import SymbolicModel
 from thermal.model.reduce import ReducedModel, reduced_model
-from thermal.model.symbolic import SymbolicModel
 from thermal.parameters import Parameter
 
 #: A crossing counts as found when a point lies this near to it in the root of the deviance [-]; the rest is a straight

@@ -7,9 +7,9 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from thermal._types import FloatArray
-from thermal.inputs.drivers import REFERENCE_TEMPERATURE
 from thermal.model.simulator import Simulator
 from thermal.network.network import ThermalNetwork
+from thermal.units import REFERENCE_TEMPERATURE
 
 
 class BuildingStep(NamedTuple):

@@ -9,12 +9,11 @@ import numpy as np
 
 from mpc.loop.building import BuildingModel, zone_response
 from mpc.loop.history import PlantStep
-from mpc.loop.inputs import sensor_offset
 from mpc.loop.local import LocalControl
 from mpc.loop.operation import Operation
 from mpc.loop.schedule import Schedule
 from mpc.loop.sensors import PlantDevices
-from mpc.loop.signals import EffectSignals
+from mpc.loop.signals import EffectSignals, sensor_offset
 from mpc.loop.supply import SupplySetpoints
 from mpc.scenario.scenario import Scenario
 from thermal._types import FloatArray

@@ -10,10 +10,10 @@ import pandas as pd
 
 from mpc.errors import PlantError
 from mpc.loop.building import BuildingModel, GridBuilding
-from mpc.loop.extras import RadiantGains, check_extras
 from mpc.loop.noise import SensorNoise
 from mpc.loop.reduced import reduced_building
 from mpc.loop.run import FixedSetpoints
+from mpc.loop.signals import RadiantGains, check_extras
 from mpc.loop.simulated import SimulatedPlant
 from mpc.scenario.forecast import Forecaster
 from mpc.scenario.gains import InternalGains
@@ -30,7 +30,7 @@ from thermal.case.save import save_case
 from thermal.effects.effect import Chosen
 from thermal.errors import describe
 from thermal.hvac._system import HvacSystem
-from thermal.model.simulator import Simulator
+from thermal.model.simulator import Shuffle, Simulator
 from thermal.network.assembly import Extension
 from thermal.pilot.building import pilot_building
 from thermal.pilot.sizing import size_system
@@ -130,7 +130,7 @@ def simulated_plant(
     elif model in ("grid", "random"):
         shuffle: Literal["mean", "random"] = "random" if model == "random" else "mean"
         built = GridBuilding(
-            Simulator(building, parameters, step_seconds, dx, shuffle=shuffle, seed=seed, effects=extras)
+            Simulator(building, parameters, step_seconds, dx, shuffle=Shuffle(shuffle, seed=seed), effects=extras)
         )
     else:
         raise PlantError(describe("model", "'reduced', 'grid' or 'random'", repr(model)))

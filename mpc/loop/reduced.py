@@ -12,13 +12,13 @@ from mpc.loop.building import BuildingFlows, BuildingStep
 from thermal._types import FloatArray
 from thermal.case.building import Building
 from thermal.errors import describe
-from thermal.inputs.drivers import REFERENCE_TEMPERATURE
+from thermal.model.matrices import SymbolicModel
 from thermal.model.modal import ModalModel, modal_model
 from thermal.model.reduce import ReducedModel, reduced_model
-from thermal.model.scheme import IMPLICIT_EULER
-from thermal.model.symbolic import SymbolicModel
+from thermal.model.step import IMPLICIT_EULER
 from thermal.network.assembly import Extension
 from thermal.network.build import build_network
+from thermal.units import REFERENCE_TEMPERATURE
 
 
 class ReducedBuilding:

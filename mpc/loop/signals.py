@@ -1,56 +1,62 @@
-"""Signals that drive the effects in a plant: of the scenario in advance, of air and heat while the loop runs."""
+"""What drives a plant's building: boundaries, and signals of its effects, in advance or as the loop runs."""
 
 from __future__ import annotations
 
-from functools import cached_property
-from typing import Any
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import partial
 
 import numpy as np
+import pandas as pd
 
 from mpc.errors import PlantError
-from mpc.loop.extras import ScenarioDrivers
+from mpc.loop.building import BuildingModel
 from mpc.scenario.scenario import Scenario
 from thermal._types import FloatArray
+from thermal.case.points import OUTDOOR_TEMPERATURE
+from thermal.effects.effect import Chosen
 from thermal.errors import describe
 from thermal.hvac._replay import replay_reheat
 from thermal.hvac._system import HvacSystem
-from thermal.inputs.drivers import Signal
+from thermal.inputs.normalisation import WIND, Normalisation, usual_temperatures
+from thermal.inputs.provider import HVAC_INPUTS, InputProvider, LiveInputs
+from thermal.inputs.signals import Signal
+from thermal.network.assembly import Extension
+from thermal.network.graph import GraphBuilder
 from thermal.network.network import ThermalNetwork
 from thermal.units import AIR_HEAT_CAPACITY
 
 #: Zone, supply air and supply water that design capacities of terminals are counted at [K], those of `Terminals.sized`.
 _ROOM, _SUPPLY, _WATER = 294.15, 285.95, 355.35
 
-
-class _NeedsLoop(PlantError):  # noqa: N818 - control flow within this module, never seen outside
-    """A signal asks for what only the running loop knows."""
+_RADIANT = "radiant gains of "
 
 
-class _InAdvance(ScenarioDrivers):
-    """Drivers of a scenario, which does not know what the plant will do."""
+def scenario_inputs(scenario: Scenario, normalisation: Normalisation | None = None) -> InputProvider:
+    """Make inputs as a scenario knows them before the plant runs: all but what its HVAC system does.
 
-    def _unknown(self) -> Any:
-        raise _NeedsLoop
-
-    heat = cached_property(_unknown)
-    supply = cached_property(_unknown)
-    airflow = cached_property(_unknown)
-
-
-class _Now:
-    """Drivers of a step of the loop, behind two rows of what is the most: quantiles over telemetry mean that."""
-
-    def __init__(self, zones: tuple[str, ...], flow: FloatArray, heat: FloatArray) -> None:
-        self.zones = zones
-        self.heat, self._flow = np.stack([heat, heat, heat]), np.stack([flow, flow, flow])
-        self.supply = (self._flow, self.heat)
-
-    def put(self, flow: FloatArray, heat: FloatArray) -> None:
-        """Set the row of now."""
-        self._flow[2], self.heat[2] = flow, heat
-
-    def __getattr__(self, name: str) -> Any:
-        raise _NeedsLoop(name)
+    Parameters
+    ----------
+    scenario : Scenario
+        Weather, people and comfort bands.
+    normalisation : Normalisation, optional
+        Of the calibration that the building's model belongs to; what it does not know is the scenario's: the middle of
+        the comfort band as usual temperature of the hour, the mean wind, and the most people at a time.
+    """
+    stamps, weather = pd.DatetimeIndex(scenario.grid.stamps), scenario.weather.frame.interpolate(limit_direction="both")
+    series = {str(name): weather[name].to_numpy(dtype=float) for name in weather if weather[name].notna().any()}
+    people = scenario.occupancy.sum(axis=1)
+    series |= {"outdoor": series[OUTDOOR_TEMPERATURE], "people": people, "radiant_gains": scenario.radiant_gains}
+    known = normalisation or Normalisation()
+    middle = pd.DataFrame(0.5 * (scenario.lower + scenario.upper), index=stamps, columns=list(scenario.zones))
+    wind = float(np.maximum(series[WIND], 0.0).mean()) if WIND in series else None
+    counted = replace(
+        known,
+        usual=known.usual or usual_temperatures(middle),
+        people=float(people.max()) if known.people is None else known.people,
+        wind=wind if known.wind is None else known.wind,
+    )
+    return InputProvider(scenario.building, stamps, scenario.grid.step, series, counted, "scenario")
 
 
 def _most_heat(system: HvacSystem) -> FloatArray:
@@ -67,7 +73,7 @@ class EffectSignals:
     Parameters
     ----------
     network : ThermalNetwork
-        With effects, or without.
+        With effects, or without; its normalisation goes before that of the scenario.
     scenario : Scenario
         Weather and people.
     system : HvacSystem
@@ -83,28 +89,35 @@ class EffectSignals:
 
     def __init__(self, network: ThermalNetwork, scenario: Scenario, system: HvacSystem) -> None:
         self._values = np.zeros((scenario.grid.n_steps, len(network.signals)))
-        self._system, terminals = system, system.terminals
-        flow, heat = (system.rooms.T @ value for value in (terminals.design_flow, _most_heat(system)))
-        self._now = _Now(network.zones, flow, heat)
         self._live: list[tuple[int, Signal]] = []
-        drivers = _InAdvance(scenario.driving_case(), scenario) if network.signals else None
+        if not network.signals:
+            return
+        self._system, self._ahead = system, scenario_inputs(scenario, network.normalisation)
+        most = (system.rooms.T @ value for value in (system.terminals.design_flow, _most_heat(system)))
+        flow, heat = (dict(zip(network.zones, value.tolist(), strict=True)) for value in most)
+        counted = self._ahead.normalisation
+        if not counted.flow:
+            counted = replace(counted, flow=flow, heat=heat, peak_flow=flow)
+        self._now = LiveInputs(scenario.building, scenario.grid.step, counted)
+        nothing = np.zeros(len(network.zones))
+        self._put(0, nothing, nothing)
         for k, signal in enumerate(network.signals):
-            try:
-                self._values[:, k] = signal.of(drivers)  # type: ignore[arg-type]
-            except _NeedsLoop:
-                self._try(signal)
+            if HVAC_INPUTS.isdisjoint(signal.inputs):
+                self._ahead.need(*signal.inputs)
+                self._values[:, k] = signal.of(self._ahead)
+            elif lacking := self._now.lacks(signal.inputs):
+                found = f"{signal.name!r}, which is made of {', '.join(lacking)}"
+                expected = "signals of a step, its air and its heat"
+                raise PlantError(describe("effects of the plant", expected, found, "leave that effect out"))
+            else:
                 self._live.append((k, signal))
 
-    def _try(self, signal: Signal) -> None:
-        try:
-            self._of(signal)
-        except _NeedsLoop as error:
-            found = f"{signal.name!r}, which is made of {error}"
-            expected = "signals of a step, its air and its heat"
-            raise PlantError(describe("effects of the plant", expected, found, "leave that effect out")) from error
-
-    def _of(self, signal: Signal) -> float:
-        return float(signal.of(self._now)[-1])  # type: ignore[arg-type]
+    def _put(self, k: int, flow: FloatArray, heat: FloatArray) -> None:
+        """Set what is known of a step while the loop runs."""
+        row = {name: values[k : k + 1] for name, values in self._ahead.series.items()}
+        brought = heat[None]
+        row |= {"supply_flow": flow[None], "supply_heat": brought, "heat": brought}
+        self._now.put(self._ahead.stamps[k : k + 1], row)
 
     def known(self, k: int) -> FloatArray:
         """Give the signals of a step as far as they are known before it, shape (n_signal,) [signal unit].
@@ -132,7 +145,158 @@ class EffectSignals:
         row: FloatArray = self._values[k]
         if self._live:
             row = row.copy()
-            self._now.put(self._system.rooms.T @ airflow, heat)
+            self._put(k, self._system.rooms.T @ airflow, heat)
             for position, signal in self._live:
-                row[position] = self._of(signal)
+                row[position] = signal.of(self._now)[0]
         return row
+
+
+def _radiant(inputs: InputProvider, zone: str) -> FloatArray:
+    return np.asarray(inputs.radiant_gains[:, inputs.zones.index(zone)])
+
+
+class RadiantGains:
+    """Lets the radiant part of a scenario's gains fall on the surfaces of the zones, and not into their air.
+
+    An extension of a network, `thermal.build_network`; a zone without radiant node keeps it in its air. For each zone
+    there is a signal, the heat that radiates: it goes to the radiant node and is taken from the air, so that the gains
+    as a whole are those of the scenario.
+
+    Examples
+    --------
+    >>> from thermal.data import load_bundled_case
+    >>> from thermal.network.build import build_network
+    >>> building = load_bundled_case().building
+    >>> [s.name for s in build_network(building, dx=1.0, effects=(RadiantGains(),)).signals][:1]
+    ['radiant gains of F1_N']
+    """
+
+    def extend(self, graph: GraphBuilder) -> None:
+        """Add the signals and what they move.
+
+        Parameters
+        ----------
+        graph : GraphBuilder
+            With its anatomy.
+        """
+        for room in graph.anatomy.rooms.values():
+            if room.radiant < 0:
+                continue
+            signal = Signal(_RADIANT + room.name, "W", partial(_radiant, zone=room.name), ("radiant_gains",))
+            node, share = np.append(room.air, room.radiant), np.append(-room.share, 1.0)
+            graph.source("radiant gains", 1.0, node, signal, share)
+
+
+def check_extras(effects: Sequence[Extension], network: ThermalNetwork) -> None:
+    """Refuse effects that a building cannot have: they would change nothing, unseen.
+
+    Parameters
+    ----------
+    effects : sequence of Extension
+        Of the plant's building.
+    network : ThermalNetwork
+        The building.
+
+    Raises
+    ------
+    PlantError
+        Which effect, and why.
+    """
+    for chosen in effects:
+        if isinstance(chosen, Chosen) and chosen.effect.applies is not None:
+            why = chosen.effect.applies(network.anatomy)
+            if why is not None:
+                expected = "one that the building can have"
+                raise PlantError(describe(f"effect {chosen.effect.id}", expected, why, "leave that effect out"))
+
+
+def check_radiant(network: ThermalNetwork, scenario: Scenario) -> None:
+    """Refuse a scenario whose gains radiate for a building that takes them into its air.
+
+    Parameters
+    ----------
+    network : ThermalNetwork
+        The building.
+    scenario : Scenario
+        With its gains.
+
+    Raises
+    ------
+    PlantError
+        When there are no signals for the part that radiates.
+    """
+    takes = any(signal.name.startswith(_RADIANT) for signal in network.signals)
+    if scenario.heat.radiates and not takes and (network.kind == "radiant").any():
+        advice = "build it with effects=(RadiantGains(),)"
+        raise PlantError(describe("building model", "one that takes gains that radiate", "gains to air only", advice))
+
+
+def check_parts(scenario: Scenario, model: BuildingModel, control_steps: int, warm_up_days: int, seed: int) -> None:
+    """Refuse parts of a plant that do not fit each other.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Whose zones and step count.
+    model : BuildingModel
+        Of the building.
+    control_steps, warm_up_days, seed : int
+        Of the plant.
+
+    Raises
+    ------
+    PlantError
+        Which part does not fit.
+    """
+    if model.network.zones != scenario.zones:
+        found = f"{len(model.network.zones)} others"
+        raise PlantError(describe("building model", f"the scenario's {len(scenario.zones)} zones", found))
+    if model.step_seconds != scenario.grid.step:
+        found = f"{model.step_seconds:g} s"
+        raise PlantError(describe("building model", f"the scenario's step of {scenario.grid.step:g} s", found))
+    if model.network.airflows:
+        raise PlantError(describe("building", "one without airflows from zone to zone", "some"))
+    check_radiant(model.network, scenario)
+    if not (isinstance(control_steps, int) and control_steps >= 1 and warm_up_days >= 0 and seed >= 0):
+        found = f"{control_steps}, {warm_up_days} and {seed}"
+        raise PlantError(describe("plant", "control_steps from 1, warm_up_days and seed from 0 on", found))
+
+
+def boundary_series(scenario: Scenario, model: BuildingModel, given: Mapping[str, float | FloatArray]) -> FloatArray:
+    """Lay out boundary temperatures, shape (n_steps, n_boundary) [K].
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Knows the outdoor temperature.
+    model : BuildingModel
+        Knows which boundaries there are.
+    given : mapping of str to float or ndarray
+        Temperatures of the others [K].
+    """
+    names, n_steps = model.network.boundaries, scenario.grid.n_steps
+    columns = [scenario.outdoor]
+    for name in names[1:]:
+        if name not in given:
+            raise PlantError(describe(f"boundary {name!r}", "its temperature", "none", "pass it in `boundaries`"))
+        columns.append(np.broadcast_to(np.asarray(given[name], dtype=float), (n_steps,)))
+    strange = sorted(set(given) - set(names[1:]))
+    if strange:
+        raise PlantError(describe("boundaries", f"those of the building, {list(names[1:])}", repr(strange[0])))
+    return np.ascontiguousarray(np.column_stack(columns))
+
+
+def sensor_offset(model: BuildingModel) -> FloatArray:
+    """Tell what the zones' sensors say too much, where the effect `sensor_bias` is in the model [K].
+
+    Parameters
+    ----------
+    model : BuildingModel
+        At its parameter values.
+    """
+    zones = model.network.zones
+    offset = np.zeros(len(zones))
+    for parameter, value in zip(model.network.parameters, model.theta, strict=True):
+        if parameter.base == "sensor_bias" and parameter.member in zones:
+            offset[zones.index(parameter.member)] = value
+    return offset

@@ -14,13 +14,12 @@ from mpc.kpi.record import PlantRecord
 from mpc.loop.actuators import SUPPLY_AIR, SUPPLY_WATER, Actuator, actuators_of, checked_actions
 from mpc.loop.building import BuildingModel
 from mpc.loop.history import PlantStep, RecentSteps, SystemBalance
-from mpc.loop.inputs import boundary_series, check_parts
 from mpc.loop.loop import LoopState, PlantLoop
 from mpc.loop.noise import SensorNoise
 from mpc.loop.operation import Operation, scheduled_operation, shared_rows
 from mpc.loop.plant import Measurements, need_running
 from mpc.loop.sensors import Sensors, plant_devices
-from mpc.loop.signals import EffectSignals
+from mpc.loop.signals import EffectSignals, boundary_series, check_parts
 from mpc.scenario.forecast import Forecast, Forecaster
 from mpc.scenario.scenario import Scenario
 from thermal._types import FloatArray

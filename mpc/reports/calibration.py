@@ -25,8 +25,8 @@ from mpc.reports.identifiability import in_words
 from mpc.reports.page import clock, counted, duration, kelvin, plain, render, signed, significant, unit
 from mpc.reports.residuals import diagnostics_content
 from thermal.case.case import Case
+from thermal.model.matrices import SymbolicModel
 from thermal.model.replay import Inputs, replay_inputs
-from thermal.model.symbolic import SymbolicModel
 
 #: The heat map shows every cell of the grid up to this many control volumes; beyond, one colour a zone.
 MOST_VOLUMES = 40_000

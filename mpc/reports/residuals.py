@@ -19,9 +19,9 @@ from calibration.fit.result import CalibrationResult
 from mpc.reports import figures
 from mpc.reports.page import clock, counted, duration, significant
 from thermal._types import FloatArray
+from thermal.model.matrices import SymbolicModel
 from thermal.model.reduce import reduced_model
 from thermal.model.replay import Inputs
-from thermal.model.symbolic import SymbolicModel
 
 #: Zones up to which innovations are tested: the filter of a larger building takes minutes.
 MOST_FILTERED = 40

@@ -18,11 +18,8 @@ from mpc.scenario.tariff import CarbonIntensity, DemandBuckets, Tariff
 from mpc.scenario.weather import Weather
 from thermal._types import FloatArray
 from thermal.case.building import Building, ZoneTable
-from thermal.case.case import Case
 from thermal.case.plan import zone_floor_areas
-from thermal.case.points import OUTDOOR_TEMPERATURE, ZONE_TEMPERATURE
-from thermal.case.quality import QualityReport
-from thermal.case.telemetry import Telemetry
+from thermal.case.points import OUTDOOR_TEMPERATURE
 from thermal.errors import nearest
 
 OCCUPANCY_POINT = "occupancy_count_sensor"
@@ -153,25 +150,6 @@ class Scenario:
 
     def __repr__(self) -> str:
         return f"Scenario({len(self.zones)} zones, {self.floor_area:g} m2, {self.grid!r})"
-
-    def driving_case(self) -> Case:
-        """Make a case whose telemetry is this scenario, so that effects of the catalogue find what drives them.
-
-        Returns
-        -------
-        Case
-            Columns of the weather station, people in the zones, and as zone temperatures the middle of the comfort
-            band, which effects take for the usual temperature of the hour.
-        """
-        station, stamps = self.building.weather_station, self.grid.stamps
-        columns = {f"{station}/{point}": self.weather.frame[point].to_numpy() for point in self.weather.frame}
-        for k, zone in enumerate(self.zones):
-            columns[f"{zone}/{OCCUPANCY_POINT}"] = self.occupancy[:, k]
-            columns[f"{zone}/{ZONE_TEMPERATURE}"] = 0.5 * (self.lower[:, k] + self.upper[:, k])
-        telemetry = Telemetry.from_frame(pd.DataFrame(columns, index=stamps), where="scenario")
-        # Nothing was measured, so that nothing is to be judged: a flat line at night is no flaw here.
-        judged = QualityReport(stamps[0], stamps[-1], self.grid.step, self.grid.n_steps, (), ())
-        return Case(self.building, telemetry, judged=judged)
 
 
 def build_scenario(

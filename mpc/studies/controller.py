@@ -33,7 +33,7 @@ from thermal.hvac._smooth import SmoothHvac
 from thermal.hvac._system import HvacSystem
 from thermal.model.modal import ModalModel, modal_model
 from thermal.model.reduce import ReducedModel
-from thermal.model.scheme import IMPLICIT_EULER
+from thermal.model.step import IMPLICIT_EULER
 
 #: Step of a controller's model [s]: that of telemetry in most cases.
 MODEL_STEP = 300.0

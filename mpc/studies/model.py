@@ -11,8 +11,8 @@ from mpc.errors import ControlError
 from thermal.case.building import Building
 from thermal.effects.effect import Chosen
 from thermal.errors import describe
+from thermal.model.matrices import SymbolicModel
 from thermal.model.reduce import ReducedModel, reduced_model
-from thermal.model.symbolic import SymbolicModel
 
 #: Largest number of states of a controller's model: 76 mK from the grid on 123 zones at 0.5 m, at a third of the time.
 ORDER = 201

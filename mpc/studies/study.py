@@ -34,7 +34,7 @@ from thermal.effects.catalogue import chosen
 from thermal.errors import describe, nearest
 from thermal.hvac._system import HvacSystem
 from thermal.model.reduce import ReducedModel, reduced_model
-from thermal.model.simulator import Simulator
+from thermal.model.simulator import Shuffle, Simulator
 from thermal.pilot.sizing import size_system
 
 #: What steps the plant: the reduced model, its grid with the mean of the shuffle, or with the random shuffle.
@@ -149,16 +149,13 @@ class Study:
             expected = "the usual structure of the model"
             raise PlantError(describe("plant on the grid", expected, "another", "take kind='reduced'"))
         values = zip(self.truth.network.parameters, self.truth.theta, strict=True)
-        shuffle: Literal["mean", "random"] = "random" if self.kind == "random" else "mean"
         return GridBuilding(
             Simulator(
                 self.building,
                 {p.name: float(v) for p, v in values},
                 MODEL_STEP,
                 self.built.dx,
-                shuffle=shuffle,
-                reach=self.built.reach,
-                seed=self.seed,
+                shuffle=Shuffle("random" if self.kind == "random" else "mean", reach=self.built.reach, seed=self.seed),
                 scopes=self.built.scopes,
                 effects=chosen(self.built.effects),
             )

@@ -24,6 +24,7 @@ def test_every_example_is_tested_here() -> None:
         "calibrate_a_case",
         "close_the_loop",
         "make_the_pilot",
+        "linear_response",
     }
 
 
@@ -37,6 +38,14 @@ def test_step_a_building() -> None:
     assert path[107, core] > last_set_back.max() + 1.0  # no facade of its own
     assert (end > path[107]).all()
     assert np.abs(end - example.COMFORT).max() < 1.5
+
+
+def test_linear_response(tmp_path: Path) -> None:
+    example = load("linear_response")
+    office = example.linear_office()
+    assert 1.0 / np.abs(office.poles().real).min() / 86400.0 == pytest.approx(8.2, abs=0.1)
+    example.draw(office, tmp_path / "linear.png")
+    assert (tmp_path / "linear.png").stat().st_size > 10_000
 
 
 def test_calibrate_a_case() -> None:

@@ -3,23 +3,25 @@
 from __future__ import annotations
 
 import doctest
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pint
 import pytest
 
 from thermal import Case, FloorPlans, Telemetry, ZoneTable, build_network
-from thermal.effects.catalogue import CATALOGUE, chosen
-from thermal.effects.effect import Chosen
-from thermal.effects.words import catalogue_table
+from thermal.effects.catalogue import CATALOGUE, chosen, register_effect
+from thermal.effects.effect import Chosen, Effect, EffectBuilder
 from thermal.errors import EffectError
-from thermal.inputs.drivers import INFRARED, IRRADIANCE, WIND, Drivers
-from thermal.parameters import PARAMETERS
+from thermal.inputs.normalisation import WIND
+from thermal.inputs.provider import INFRARED, IRRADIANCE, InputProvider, telemetry_inputs
+from thermal.parameters import PARAMETERS, Parameter
 
 CaseOf = Callable[[str], Case]
 UNITS = pint.UnitRegistry()
+DIFFUSE, GLOBAL = "diffuse_horizontal_irradiance_sensor", "global_horizontal_irradiance_sensor"
 DOCS = Path(__file__).parents[2] / "docs"
 
 # Fixed for all who read or write a diagnosis.
@@ -85,7 +87,7 @@ def test_an_effect_of_some_zones_has_their_parameters(lively_case: CaseOf) -> No
 
 
 def reasons(case: Case) -> dict[str, str]:
-    drivers, anatomy = Drivers(case), build_network(case.building).anatomy
+    drivers, anatomy = telemetry_inputs(case), build_network(case.building).anatomy
     return {name: reason for name, e in CATALOGUE.items() if (reason := e.untestable(drivers, anatomy)) is not None}
 
 
@@ -137,12 +139,101 @@ def test_a_side_with_windows_is_no_party_wall(lively_case: CaseOf) -> None:
     def party(glazing: dict[str, dict[str, float]]) -> tuple[str | None, list[str]]:
         building = replace(case.building, geometry=replace(plans, glazing=glazing))
         network = build_network(building, effects=chosen({"neighbour": ()}))
-        told = CATALOGUE["neighbour"].untestable(Drivers(case), network.anatomy)
+        told = CATALOGUE["neighbour"].untestable(telemetry_inputs(case), network.anatomy)
         return told, sorted(p.member or "" for p in network.parameters if p.base == "neighbour_u_value")
 
     assert [len(party(g)[1]) for g in ({}, {"A": {"south": 2.0}}, {"A": {"south": 2.0, "west": 1.0}})] == [4, 3, 2]
     everywhere = {"A": {"south": 2.0, "west": 1.5}, "D": {"east": 3.0, "north": 1.0}}
     assert party(everywhere) == ("every side has windows, so that none is a party wall", [])
+
+
+_HEAD = ("id", "what, and its heat", "acts on", "parameters", "needs", "looks like", "told apart by", "source")
+
+
+def catalogue_table(effects: Iterable[Effect]) -> str:
+    """Effects as the Markdown table of the page, one row each."""
+    rows = [_HEAD, tuple("-" * 3 for _ in _HEAD), *(_cells(e) for e in effects)]
+    return "".join(f"| {' | '.join(row)} |\n" for row in rows)
+
+
+def _cells(effect: Effect) -> tuple[str, ...]:
+    needs = ", ".join(f"`{n}`" for n in (*effect.needs, *effect.requires)) or "no signal of its own"
+    alike = ", ".join(name if " " in name else f"`{name}`" for name in effect.confounders)
+    cells = (
+        f"`{effect.id}`",
+        f"{effect.title}: {effect.equation}",
+        effect.acts_on + ("; a strength a zone" if effect.zonal else ""),
+        "<br>".join(_range(p) for p in effect.parameters),
+        needs,
+        alike,
+        effect.separated_by,
+        effect.source,
+    )
+    return tuple(cell.replace("|", "\\|") for cell in cells)
+
+
+def _range(parameter: Parameter) -> str:
+    start = "" if parameter.start == 0.0 else f", from {parameter.start:g}"
+    unit = "" if parameter.unit == "1" else f" {parameter.unit}"
+    return f"`{parameter.name}` {parameter.lower:g} to {parameter.upper:g}{unit}{start}"
+
+
+def test_signals_need_what_they_say_they_need(lively_case: CaseOf) -> None:
+    """Every signal of the catalogue is made by a source that has its inputs, and nothing else."""
+    case = lively_case("plan")
+    whole, seen = telemetry_inputs(case), set()
+    for name, effect in CATALOGUE.items():
+        network = build_network(case.building, effects=chosen([*effect.requires, name]))
+        for signal in network.signals:
+            made_of = {s.removesuffix("_rate") for s in signal.inputs}
+            wanted = {s for i in made_of for s in {"sun": (IRRADIANCE, DIFFUSE, GLOBAL), "sky": (INFRARED, "outdoor"),
+                                                   "wind": (WIND,), "through_windows": ("outdoor",)}.get(i, (i,))}  # fmt: skip
+            series = {s: v for s, v in whole.series.items() if s in wanted}
+            few = InputProvider(case.building, whole.stamps, case.step, series, whole.normalisation)
+            assert not few.lacks(signal.inputs) and np.isfinite(signal.of(few)).all()
+            seen |= set(signal.inputs)
+    assert len(seen) > 10
+
+
+def windy(**changes: object) -> Effect:
+    strength = Parameter("chimney_area", "m^2", 0.0, 0.0, 1.0, "any size of chimney", "linear", "chimney")
+    whole = {"id": "chimney", "parameters": (strength,)} | changes
+    return replace(CATALOGUE["thermal_bridge"], **whole)  # type: ignore[arg-type]
+
+
+def test_an_effect_of_ones_own_enters_the_catalogue(lively_case: CaseOf) -> None:
+    def build(builder: EffectBuilder) -> None:
+        for room in builder.rooms:
+            builder.air_to(room, builder.parameter("chimney_area"), builder.graph.boundary("outdoor"), 1.0)
+
+    register_effect(windy(build=build))
+    try:
+        network = build_network(lively_case("plan").building, effects=chosen(["chimney", "flow_gain"]))
+        assert list(CATALOGUE)[-1] == "chimney"
+        assert {p.name.partition("@")[0] for p in network.parameters if p.effect} == {"chimney_area", "flow_gain"}
+        with pytest.raises(EffectError, match="effect thermal_bridge: has no parameter 'chimney_area'"):
+            build_network(
+                lively_case("plan").building,
+                effects=(Chosen(replace(CATALOGUE["thermal_bridge"], build=build)),),
+            )
+    finally:
+        del CATALOGUE["chimney"]
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"id": "blinds"}, "effect blinds: expected a name of its own, found 'blinds'"),
+        ({"parameters": CATALOGUE["blinds"].parameters}, "found 'blind_shading'"),
+        ({"requires": ("chimneys",)}, "requires: expected effects of the catalogue, found 'chimneys'"),
+        ({"parameters": ()}, "a strength that starts at 0 first"),
+    ],
+)
+def test_what_cannot_be_registered(changes: dict[str, object], message: str) -> None:
+    before = list(CATALOGUE)
+    with pytest.raises(EffectError, match=message):
+        register_effect(windy(**changes))
+    assert list(CATALOGUE) == before
 
 
 def test_the_page_has_the_catalogue() -> None:

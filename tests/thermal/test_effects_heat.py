@@ -13,7 +13,8 @@ from pvlib import irradiance, solarposition
 from thermal import Case, SymbolicModel, ThermalNetwork, build_network
 from thermal.effects.catalogue import CATALOGUE, chosen
 from thermal.effects.effect import PAIR
-from thermal.inputs.drivers import Drivers, signal_values
+from thermal.inputs.provider import telemetry_inputs
+from thermal.inputs.signals import signal_values
 from thermal.inputs.sun import incidence_modifier
 from thermal.units import air_density
 
@@ -36,7 +37,7 @@ class Bench:
 
     def __post_init__(self) -> None:
         rng = np.random.default_rng(4)
-        self.drivers = Drivers(self.case)
+        self.drivers = telemetry_inputs(self.case)
         self.stamp = 80  # early afternoon of the first day
         self.states = rng.normal(0.0, 3.0, self.network.n_node)
         self.outside = rng.normal(-10.0, 3.0, len(self.network.boundaries))

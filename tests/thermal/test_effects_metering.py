@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 
 from thermal import Case, Simulator, SymbolicModel, Telemetry, build_network, free_runs, replay_inputs, spin_up
 from thermal.effects.catalogue import chosen
-from thermal.inputs.drivers import Drivers, signal_values
+from thermal.inputs.provider import InputProvider, telemetry_inputs
+from thermal.inputs.signals import signal_values
 from thermal.model.modal_runs import ModalRuns
 from thermal.model.reduce import reduced_model
-from thermal.model.scheme import EXACT
+from thermal.model.step import EXACT
 from thermal.units import AIR_HEAT_CAPACITY, air_density
 
 FloatArray = NDArray[np.float64]
@@ -31,11 +32,11 @@ def true_building(case: Case, bias: dict[str, float]) -> Case:
 
     Supply air and its heat are true; the zone sensors read too much, and so does whatever is reckoned from them.
     """
-    drivers, inputs = Drivers(case), replay_inputs(case, build_network(case.building))
+    drivers, inputs = telemetry_inputs(case), replay_inputs(case, build_network(case.building))
     plant = Simulator(case.building, step_seconds=case.step)
-    flow, discharge = drivers.supply[0], _discharge(case)
+    flow, discharge = drivers.supply_flow, _discharge(case)
     zones = [plant.reset(inputs.zone[0], inputs.boundary[0])]
-    power = drivers.heat - drivers.supply[1]
+    power = drivers.heat - drivers.supply_heat
     for k in range(1, len(inputs)):
         # the metered heat is reckoned with the mean over the step, which it itself moves: a few rounds settle it
         saved, zone = plant.save_state(), zones[-1]
@@ -70,7 +71,7 @@ def test_a_replay_with_biased_sensors_is_that_of_right_ones(lively_case: CaseOf,
         values = {f"sensor_bias@{z}": b for z, b in off.items()} if ids else {}
         inputs, matrices = replay_inputs(told, network), SymbolicModel(network).matrices(network.values(values))
         states, _ = spin_up(matrices, inputs, 0, at)
-        means, _ = free_runs(matrices, network, inputs, at, steps, states)
+        means, _ = free_runs(matrices, inputs, at, steps, states)
         runs.append(means - np.array([off.get(z, 0.0) for z in network.zones]))
     assert np.abs(runs[1] - runs[0]).max() < 8e-3  # all that differs is the uniform state before a spin-up
     assert np.abs(runs[2] - runs[0]).max() > 0.05
@@ -83,7 +84,7 @@ def test_a_step_with_a_biased_sensor_is_the_shifted_true_step(lively_case: CaseO
     told = true_building(case, bias)
     network = build_network(told.building, effects=chosen(["sensor_bias"]))
     inputs = replay_inputs(told, network)
-    signals = signal_values(network.signals, Drivers(told))
+    signals = signal_values(network.signals, telemetry_inputs(told))
     values = {f"sensor_bias@{z}": b for z, b in bias.items()}
     model = Simulator(told.building, values, step_seconds=told.step, effects=chosen(["sensor_bias"]))
     truth = Simulator(told.building, step_seconds=told.step)
@@ -152,20 +153,23 @@ def test_hidden_mass_is_a_second_node(lively_case: CaseOf) -> None:
     assert capacity[node] == pytest.approx(stored)
 
 
-def signal_heat(case: Case, effect: str, zone: str, drivers: Drivers | None = None, **values: float) -> FloatArray:
+def signal_heat(
+    case: Case, effect: str, zone: str, drivers: InputProvider | None = None, **values: float
+) -> FloatArray:
     """Heat that an effect of signals alone brings to a zone at every stamp [W]."""
     network = build_network(case.building, effects=chosen([effect]))
     flow = SymbolicModel(network).matrices(network.values(values)).flow
     zero = SymbolicModel(network).matrices(network.start()).flow
     brought = -np.asarray((flow - zero)[:, network.n_node + len(network.boundaries) :].todense())
     mine = network.zone == network.zones.index(zone)
-    return np.asarray(brought[mine].sum(axis=0)).ravel() @ signal_values(network.signals, drivers or Drivers(case)).T
+    signals = signal_values(network.signals, drivers or telemetry_inputs(case))
+    return np.asarray(brought[mine].sum(axis=0)).ravel() @ signals.T
 
 
 def test_a_window_that_is_seen_open(lively_case: CaseOf) -> None:
     # ρ c A ½ (0.001 v² + 0.0035 h |ΔT| + 0.01)^½ (T_out - T), h = 1 m, while it stands open
     case = lively_case("plan")
-    drivers = Drivers(case)
+    drivers = telemetry_inputs(case)
     drivers.openings = np.zeros((len(case.stamps), len(drivers.zones)))
     drivers.openings[70:90, drivers.zones.index("A")] = 1.0
     difference = drivers.outdoor - drivers.usual[:, drivers.zones.index("A")]
@@ -183,7 +187,7 @@ def test_windows_that_people_open_on_mild_days(lively_case: CaseOf) -> None:
     network, rate = build_network(case.building, effects=chosen(["window_opening"])), {"window_opening_rate": 3.0}
     opened, shut = (SymbolicModel(network).matrices(v).flow for v in (network.values(rate), network.start()))
     assert not np.any((opened - shut)[:, : network.n_node + len(network.boundaries)].todense())
-    drivers = Drivers(case)
+    drivers = telemetry_inputs(case)
     drivers.outdoor = np.linspace(280.0, 300.0, len(case.stamps))
     drivers.occupancy = np.arange(len(case.stamps)) % 7 / 6.0
     mild = np.clip((drivers.outdoor - 285.15) / 10.0, 0.0, 1.0)
@@ -290,7 +294,7 @@ def test_a_station_elsewhere_reads_too_high_for_all_that_outdoor_air_touches(liv
         column = first + names.index(name)
         assert np.abs((flow[:, column] + factor * flow[:, network.n_node]).toarray()).max() < 1e-9
     daily = next(s for s in network.signals if s.name == "outdoor temperature about its day's mean")
-    drivers = Drivers(case)
+    drivers = telemetry_inputs(case)
     drivers.outdoor = 280.0 + 4.0 * np.sin(2.0 * np.pi * np.arange(len(case.stamps)) * case.step / 86400.0)
     day = round(86400.0 / case.step)
     inner = slice(day, len(case.stamps) - day)

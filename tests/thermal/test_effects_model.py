@@ -22,10 +22,12 @@ from thermal import (
 )
 from thermal.effects.catalogue import CATALOGUE, chosen
 from thermal.errors import ModelError
-from thermal.inputs.drivers import REFERENCE_TEMPERATURE, Drivers, signal_values
+from thermal.inputs.provider import telemetry_inputs
+from thermal.inputs.signals import signal_values
 from thermal.model.replay import Inputs
 from thermal.model.rollouts import RolloutData, rollout
-from thermal.model.scheme import IMPLICIT_EULER, TR_BDF2, Scheme
+from thermal.model.step import IMPLICIT_EULER, TR_BDF2, Scheme
+from thermal.units import REFERENCE_TEMPERATURE
 
 FloatArray = NDArray[np.float64]
 CaseOf = Callable[[str], Case]
@@ -50,7 +52,7 @@ def trajectories(model: SymbolicModel, inputs: Inputs, theta: FloatArray, slopes
     """Spun up and run freely: zone means, and their derivatives."""
     matrices = model.matrices(theta, slopes)
     states, moved = spin_up(matrices, inputs, 0, STARTS)
-    return free_runs(matrices, model.network, inputs, STARTS, STEPS, states, moved)
+    return free_runs(matrices, inputs, STARTS, STEPS, states, moved)
 
 
 @cache
@@ -145,7 +147,7 @@ def test_the_simulator_has_the_effects(lively_case: CaseOf, kind: str) -> None:
     theta = typical(network)
     values = dict(zip([p.name for p in network.parameters], theta, strict=True))
     plant = Simulator(case.building, values, step_seconds=case.step, effects=chosen(EFFECTS))
-    inputs, signals = replay_inputs(case, network), signal_values(network.signals, Drivers(case))
+    inputs, signals = replay_inputs(case, network), signal_values(network.signals, telemetry_inputs(case))
     plant.reset_from(case, 100)
     zones = [
         plant.step(inputs.heat[k], inputs.boundary[k, : len(network.boundaries)], inputs.airflow[k], signals[k])

@@ -11,8 +11,7 @@ from thermal import SymbolicModel, build_network
 from thermal.data import load_bundled_case
 from thermal.errors import ModelError
 from thermal.model import factor as _factor
-from thermal.model.factor import Elimination, SparseSolver
-from thermal.model.stepper import factorise
+from thermal.model.factor import Elimination, SparseSolver, factorise
 
 
 @pytest.fixture(scope="module")

@@ -10,9 +10,9 @@ import scipy.linalg as sl
 from numpy.typing import NDArray
 
 from thermal import ModelError, SymbolicModel, build_network, load_bundled_case, reduced_model
+from thermal.model.matrices import Matrices
 from thermal.model.modal import divided_differences, modal_model, propagator_functions
-from thermal.model.scheme import EXACT, IMPLICIT_EULER, TR_BDF2, Scheme
-from thermal.model.symbolic import Matrices
+from thermal.model.step import EXACT, IMPLICIT_EULER, TR_BDF2, Scheme
 
 FloatArray = NDArray[np.float64]
 

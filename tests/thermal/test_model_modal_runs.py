@@ -9,10 +9,9 @@ import pytest
 from numpy.typing import NDArray
 
 from thermal import SymbolicModel, build_network, load_bundled_case, reduced_model
+from thermal.model.matrices import Matrices
 from thermal.model.reduce import ReducedModel
-from thermal.model.scheme import EXACT, IMPLICIT_EULER, TR_BDF2, Scheme
-from thermal.model.stepper import Stepper
-from thermal.model.symbolic import Matrices
+from thermal.model.step import EXACT, IMPLICIT_EULER, TR_BDF2, Scheme, Stepper
 
 FloatArray = NDArray[np.float64]
 STEPS, RUNS = 30, 3

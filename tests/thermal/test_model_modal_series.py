@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from thermal import SymbolicModel, build_network, load_bundled_case, reduced_model
-from thermal.model.modal_series import run_along
+from thermal.model.modal import run_along
 from thermal.model.reduce import ReducedModel
-from thermal.model.scheme import EXACT, IMPLICIT_EULER, TR_BDF2, Scheme
+from thermal.model.step import EXACT, IMPLICIT_EULER, TR_BDF2, Scheme
 
 STEPS, STARTS = 120, np.array([3, 0, 4, 80, 90, 3])  # in any order, twice, and with a gap that no run passes
 KEEP = np.array([1, 5, 24])

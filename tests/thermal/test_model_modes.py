@@ -12,9 +12,8 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from thermal.model.scheme import IMPLICIT_EULER, SCHEMES, TR_BDF2, Scheme
-from thermal.model.stepper import Stepper
-from thermal.model.symbolic import Matrices, SymbolicModel
+from thermal.model.matrices import Matrices, SymbolicModel
+from thermal.model.step import IMPLICIT_EULER, SCHEMES, TR_BDF2, Scheme, Stepper
 from thermal.network.graph import GraphBuilder
 from thermal.network.network import ThermalNetwork
 

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from thermal import ModelError, SymbolicModel, build_network, load_bundled_case, reduced_model
 from thermal.model.certificate import closed_loop
 from thermal.model.reduce import krylov_basis
-from thermal.model.scheme import IMPLICIT_EULER, TR_BDF2, Scheme
-from thermal.model.stepper import Stepper
+from thermal.model.step import IMPLICIT_EULER, TR_BDF2, Scheme, Stepper
 
 FloatArray = NDArray[np.float64]
 

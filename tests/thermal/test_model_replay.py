@@ -29,8 +29,7 @@ from thermal import (
 )
 from thermal.case.building import Airflow, Layer, Location, Surface, ZoneEntry
 from thermal.errors import ModelError
-from thermal.model.scheme import IMPLICIT_EULER, SCHEMES
-from thermal.model.stepper import Stepper
+from thermal.model.step import IMPLICIT_EULER, SCHEMES, Stepper
 
 FloatArray = NDArray[np.float64]
 
@@ -202,15 +201,15 @@ def test_unmeasured_zone_is_free_in_the_spin_up() -> None:
 @pytest.mark.parametrize("name", ["plan", "table"])
 def test_free_runs_are_steps_driven_by_the_rows_after_their_start(name: str, scheme: str) -> None:
     model, inputs = model_of(name), inputs_of(name)
-    network, matrices = model.network, model.matrices(theta_of(name))
+    matrices = model.matrices(theta_of(name))
     starts, steps, keep = np.array([150, 163, 300]), 30, np.array([1, 12, 30])
     states, _ = spin_up(matrices, inputs, 0, starts)
-    found, slopes = free_runs(matrices, network, inputs, starts, steps, states, scheme=SCHEMES[scheme], keep=keep)
+    found, slopes = free_runs(matrices, inputs, starts, keep, states, scheme=SCHEMES[scheme])
     assert slopes is None
     assert found.shape == (3, 3, 2)
-    whole, _ = free_runs(matrices, network, inputs, starts, steps, states, scheme=SCHEMES[scheme])
+    whole, _ = free_runs(matrices, inputs, starts, steps, states, scheme=SCHEMES[scheme])
     np.testing.assert_array_equal(whole[:, keep - 1], found)
-    stepper = Stepper(matrices, inputs.step, SCHEMES[scheme], network.airflows)
+    stepper = Stepper(matrices, inputs.step, SCHEMES[scheme])
     for run, start in enumerate(starts):
         now = states[:, [run]]
         for k in range(1, steps + 1):
@@ -231,12 +230,12 @@ def test_slopes_of_spin_up_and_free_run_are_those_of_finite_differences(name: st
     def means(t: FloatArray) -> FloatArray:
         matrices = model.matrices(t)
         states, _ = spin_up(matrices, inputs, 0, starts)
-        return free_runs(matrices, model.network, inputs, starts, 24, states, scheme=SCHEMES[scheme], keep=keep)[0]
+        return free_runs(matrices, inputs, starts, keep, states, scheme=SCHEMES[scheme])[0]
 
     matrices = model.matrices(theta, slopes=True)
     states, moved = spin_up(matrices, inputs, 0, starts)
     found, slopes = free_runs(
-        matrices, model.network, inputs, starts, 24, states, moved, scheme=SCHEMES[scheme], keep=keep
+        matrices, inputs, starts, keep, states, moved, scheme=SCHEMES[scheme]
     )
     np.testing.assert_allclose(found, means(theta), rtol=0, atol=1e-10)
     assert slopes is not None
@@ -253,7 +252,7 @@ def test_progress_is_told_every_step() -> None:
     states, _ = spin_up(matrices, inputs, 0, np.array([150]), told.append)
     assert told == list(range(1, 152))
     told.clear()
-    free_runs(matrices, model.network, inputs, np.array([150]), 12, states, scheme=IMPLICIT_EULER, progress=told.append)
+    free_runs(matrices, inputs, np.array([150]), 12, states, scheme=IMPLICIT_EULER, progress=told.append)
     assert told == list(range(1, 13))
 
 

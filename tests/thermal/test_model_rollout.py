@@ -13,8 +13,7 @@ from thermal import Building, FloorPlan, FloorPlans, SymbolicModel, ZoneTable, b
 from thermal.case.building import Airflow, Layer, Location, Surface, ZoneEntry
 from thermal.errors import ModelError
 from thermal.model.rollouts import RolloutData, rollout, symbolic_step
-from thermal.model.scheme import IMPLICIT_EULER, SCHEMES
-from thermal.model.stepper import Stepper
+from thermal.model.step import IMPLICIT_EULER, SCHEMES, Stepper
 
 FloatArray = NDArray[np.float64]
 
@@ -109,7 +108,7 @@ def test_jacobian_is_that_of_finite_differences(name: str, scheme: str, executor
 def test_roll_out_is_step_after_step() -> None:
     model, data = model_of("table"), data_of("table")
     theta = theta_of("table")
-    stepper = Stepper(model.matrices(theta), 300.0, IMPLICIT_EULER, model.network.airflows)
+    stepper = Stepper(model.matrices(theta), 300.0, IMPLICIT_EULER)
     states, means = data.initial[:, None], []
     for k in range(STEPS):
         states, mean, _, _ = stepper.advance(states, data.boundary[[k]].T, data.heat[[k]].T, data.airflow[[k]].T)
@@ -123,7 +122,7 @@ def test_symbolic_step_is_the_step() -> None:
         end, mean = symbolic_step(model, 300.0, scheme)(
             data.initial, data.boundary[0], data.heat[0], data.airflow[0], theta
         )
-        wanted = Stepper(model.matrices(theta), 300.0, scheme, model.network.airflows).advance(
+        wanted = Stepper(model.matrices(theta), 300.0, scheme).advance(
             data.initial[:, None], data.boundary[[0]].T, data.heat[[0]].T, data.airflow[[0]].T
         )
         np.testing.assert_allclose(end.full(), wanted[0], rtol=0, atol=1e-10)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from functools import cache
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 import pytest
@@ -20,7 +21,7 @@ from thermal import (
     spin_up,
 )
 from thermal.errors import ModelError
-from thermal.model.scheme import TR_BDF2
+from thermal.model.step import TR_BDF2
 
 
 @cache
@@ -36,7 +37,7 @@ def test_replay_is_the_free_run_from_the_same_spin_up() -> None:
     inputs = replay_inputs(case, model.network)
     matrices = model.matrices(theta)
     states, _ = spin_up(matrices, inputs, 900 - 864, np.array([900]))
-    wanted, _ = free_runs(matrices, model.network, inputs, np.array([900]), 60, states, scheme=TR_BDF2)
+    wanted, _ = free_runs(matrices, inputs, np.array([900]), 60, states, scheme=TR_BDF2)
     np.testing.assert_allclose(found.simulated.to_numpy(), wanted[0], rtol=0, atol=1e-9)
     assert found.start == stamps[900]
     for table in (found.simulated, found.measured, found.heat):
@@ -93,3 +94,20 @@ def test_missing_inputs_are_refused_with_their_first_stamp() -> None:
     with pytest.raises(ModelError, match="30 minutes"):
         simulate(spoilt, model, model.network.start(), stamps[900], stamps[950])
     assert len(simulate(spoilt, model, model.network.start(), stamps[900], stamps[919]).simulated) == 19
+
+
+def test_results_become_tables_and_pictures() -> None:
+    case = load_bundled_case()
+    model = SymbolicModel(build_network(case.building, dx=1.5))
+    inputs = replay_inputs(case, model.network)
+    assert "5 zones" in repr(inputs) and "100% complete" in repr(inputs)
+    table = inputs.to_frame()
+    assert list(dict.fromkeys(table.columns.get_level_values(0))) == ["boundary", "heat", "zone"]
+    assert np.array_equal(table["heat"].to_numpy(), inputs.heat)
+    found = simulate(case, model, model.network.start(), case.stamps[500], case.stamps[600])
+    assert repr(found).startswith("Simulation(") and "mean absolute error" in repr(found)
+    assert found.to_frame()["simulated"].equals(found.simulated)
+    assert found.error.equals(found.simulated - found.measured)
+    for figure in (inputs.plot(), found.plot()):
+        assert figure.axes
+        plt.close(figure)

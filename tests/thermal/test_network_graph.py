@@ -9,7 +9,7 @@ import scipy.sparse as sp
 
 from thermal import SymbolicModel
 from thermal.errors import ModelError
-from thermal.inputs.drivers import Signal
+from thermal.inputs.signals import Signal
 from thermal.network.graph import GraphBuilder
 from thermal.network.network import ThermalNetwork
 from thermal.parameters import PARAMETERS, Parameter

@@ -27,7 +27,7 @@ from thermal import (
 from thermal.case.building import Building, Location, ZoneTable
 from thermal.case.plan import zone_floor_areas
 from thermal.errors import ThermalError
-from thermal.model.stepper import Stepper
+from thermal.model.step import Stepper
 from thermal.pilot.building import pilot_building
 from thermal.pilot.twin import TwinRanges, TwinSettings, TwinTruth, _draw_conditions, _draw_values
 from thermal.pilot.twin import generate_twin as generate
@@ -80,7 +80,7 @@ def test_without_disturbance_and_noise_the_true_model_replays_it(quiet: Twin) ->
     case, truth = quiet
     network = build_network(case.building, dx=1.0)
     matrices, inputs = SymbolicModel(network).matrices(truth.theta), replay_inputs(case, network)
-    means, _ = free_runs(matrices, network, inputs, np.array([0]), len(inputs) - 1, truth.states[:, None])
+    means, _ = free_runs(matrices, inputs, np.array([0]), len(inputs) - 1, truth.states[:, None])
     assert np.abs(means[0][:72] - inputs.zone[1:73]).max() < 1e-9
     assert np.abs(means[0] - inputs.zone[1:]).max() < 1e-8
 
@@ -95,7 +95,7 @@ def test_after_a_long_hold_it_replays_without_the_true_states(building: Building
 
     def error(held: np.ndarray) -> float:
         states, _ = spin_up(matrices, replace(inputs, held=held), 0, starts)
-        means, _ = free_runs(matrices, network, inputs, starts, 72, states)
+        means, _ = free_runs(matrices, inputs, starts, 72, states)
         return float(np.abs(means[:, -1] - inputs.zone[starts + 72]).max())
 
     stepper, states = Stepper(matrices, 300.0), [truth.states[:, None]]

@@ -13,8 +13,8 @@ import pytest
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from thermal.model.stepper import Stepper
-from thermal.model.symbolic import Matrices, SymbolicModel
+from thermal.model.matrices import Matrices, SymbolicModel
+from thermal.model.step import Stepper
 from thermal.network.graph import GraphBuilder
 from thermal.network.network import ThermalNetwork
 

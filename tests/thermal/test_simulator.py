@@ -13,7 +13,8 @@ from thermal import Building, FloorPlan, FloorPlans, Simulator, SymbolicModel, Z
 from thermal.case.building import Airflow, Layer, Location, Surface, ZoneEntry
 from thermal.errors import ModelError, ThermalError
 from thermal.model.replay import free_runs, replay_inputs, spin_up
-from thermal.model.scheme import TR_BDF2
+from thermal.model.simulator import Shuffle
+from thermal.model.step import TR_BDF2
 from thermal.units import AIR_HEAT_CAPACITY
 
 FloatArray = NDArray[np.float64]
@@ -119,7 +120,7 @@ def test_states_are_a_copy() -> None:
 @pytest.mark.parametrize("dx", [1.0, 2.0, 0.5])
 def test_energy_of_a_step_is_balanced_with_and_without_the_random_shuffle(shuffle: Any, dx: float) -> None:
     """Stored heat = heat of the zones + exchange with outdoor at the end of the step, before air changes places."""
-    plant = Simulator(plan_building(), dx=dx, shuffle=shuffle, probability=0.7)
+    plant = Simulator(plan_building(), dx=dx, shuffle=Shuffle(shuffle, 0.7))
     plant.reset(np.array([294.0, 291.0]), np.array([275.0]))
     m, capacity = plant.matrices, plant.matrices.capacity.diagonal()
     exchange = -m.flow[:, m.n :].toarray()[:, 0]
@@ -153,7 +154,7 @@ def test_energy_of_a_step_is_balanced_with_and_without_the_random_shuffle(shuffl
 
 def test_equal_seeds_are_equal_bit_for_bit_and_others_are_not() -> None:
     def run(seed: int) -> FloatArray:
-        plant = Simulator(plan_building(), shuffle="random", seed=seed)
+        plant = Simulator(plan_building(), shuffle=Shuffle("random", seed=seed))
         plant.reset(np.array([294.0, 291.5]), np.array([275.0]))
         return drive(plant, 12)
 
@@ -172,7 +173,7 @@ def test_restored_state_continues_bit_for_bit(shuffle: Any, step: float) -> None
     plant.restore_state(saved)
     np.testing.assert_array_equal(drive(plant, 9), first)
     np.testing.assert_array_equal(plant.states, states)
-    other = Simulator(plan_building(), shuffle=shuffle, step_seconds=step, seed=99)
+    other = Simulator(plan_building(), shuffle=Shuffle(shuffle, seed=99), step_seconds=step)
     other.restore_state(saved)
     np.testing.assert_array_equal(drive(other, 9), first)
 
@@ -217,8 +218,8 @@ def test_mean_of_random_runs_is_the_run_with_the_mean_shuffle() -> None:
     room = ("##########", *(["#AAAA+BBB#"] * 4), "##########")
     heat, outdoor, start = np.array([1500.0, 0.0]), np.array([270.0]), np.array([290.0, 290.0])
 
-    def ended(**options: Any) -> FloatArray:
-        plant = Simulator(plan_building(room), probability=0.4, **options)
+    def ended(seed: int) -> FloatArray:
+        plant = Simulator(plan_building(room), shuffle=Shuffle("random", 0.4, seed=seed))
         plant.reset(start, outdoor)
         return np.array([plant.step(heat, outdoor) for _ in range(72)])[-1]
 
@@ -226,7 +227,7 @@ def test_mean_of_random_runs_is_the_run_with_the_mean_shuffle() -> None:
     plant = Simulator(plan_building(room), {"shuffle_probability": 0.4})
     plant.reset(start, outdoor)
     mean = np.array([plant.step(heat, outdoor) for _ in range(72)])[-1]
-    runs = np.array([ended(shuffle="random", seed=s) for s in range(24)])
+    runs = np.array([ended(s) for s in range(24)])
     error = runs.std(axis=0, ddof=1) / np.sqrt(len(runs))
     rise = np.abs(mean - start).max()
     assert rise > 3.0
@@ -245,7 +246,7 @@ def test_random_shuffle_takes_the_calibrated_probability() -> None:
 @pytest.mark.parametrize("probability", [-0.1, 1.1, np.nan])
 def test_probabilities_outside_of_0_to_1_are_refused(probability: float) -> None:
     with pytest.raises(ThermalError, match="probability"):
-        Simulator(plan_building(), shuffle="random", probability=probability)
+        Simulator(plan_building(), shuffle=Shuffle("random", probability))
 
 
 def test_zone_table_has_nothing_to_shuffle() -> None:
@@ -280,7 +281,7 @@ def test_steps_after_reset_from_are_the_free_run(scheme: str) -> None:
     matrices = model.matrices(plant.network.values({"slab_coupling": 20.0}))
     states, _ = spin_up(matrices, inputs, start - 288, np.array([start]))
     options = {"scheme": TR_BDF2} if scheme == "tr_bdf2" else {}
-    wanted = free_runs(matrices, plant.network, inputs, np.array([start]), 36, states, **options)[0][0]
+    wanted = free_runs(matrices, inputs, np.array([start]), 36, states, **options)[0][0]
     found = [plant.step(inputs.heat[start + k], inputs.boundary[start + k]) for k in range(1, 37)]
     np.testing.assert_allclose(np.array(found), wanted, rtol=0, atol=1e-9)
 

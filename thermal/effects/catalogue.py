@@ -11,7 +11,8 @@ from thermal.effects.next_door import GROUND_EXCHANGE, HIDDEN_MASS, INTERFLOOR_E
 from thermal.effects.outside import LONGWAVE_SKY, WIND_FILM, WRONG_STATION
 from thermal.effects.people import CLOCK_SHIFT, INTERNAL_GAINS, LATENT_LOAD
 from thermal.effects.sun import BLINDS, SOLAR_GAIN, SOLAR_OPAQUE
-from thermal.errors import EffectError, nearest
+from thermal.errors import EffectError, describe, nearest
+from thermal.parameters import PARAMETERS
 
 #: Effects by id, in the order in which they join a network: what others look at comes first, sensors come last.
 CATALOGUE: dict[str, Effect] = {
@@ -23,6 +24,32 @@ CATALOGUE: dict[str, Effect] = {
         SENSOR_LAG,
     )
 }  # fmt: skip
+
+
+def register_effect(effect: Effect) -> None:
+    """Add an effect of one's own to the catalogue: commands, calibration, diagnosis and reports know it from then on.
+
+    Parameters
+    ----------
+    effect : Effect
+        After those of the catalogue in the order in which they join a network.
+
+    Raises
+    ------
+    EffectError
+        When its id or the name of a parameter is taken, or it modifies an effect that is not there.
+    """
+    taken = {p.name for e in CATALOGUE.values() for p in e.parameters} | set(PARAMETERS)
+    names = [p.name for p in effect.parameters]
+    clashes = [effect.id] if effect.id in CATALOGUE else [name for name in names if name in taken]
+    if clashes:
+        raise EffectError(describe(f"effect {effect.id}", "a name of its own", repr(clashes[0]), "call it otherwise"))
+    if absent := [r for r in effect.requires if r not in CATALOGUE]:
+        raise EffectError(describe(f"effect {effect.id}: requires", "effects of the catalogue", repr(absent[0])))
+    if not names or effect.parameters[0].start != 0.0 or any(p.effect != effect.id for p in effect.parameters):
+        expected = "a strength that starts at 0 first, all with this effect's id"
+        raise EffectError(describe(f"effect {effect.id}: parameters", expected, f"{names}"))
+    CATALOGUE[effect.id] = effect
 
 
 def chosen(effects: Iterable[str] | Mapping[str, Sequence[str]]) -> tuple[Chosen, ...]:

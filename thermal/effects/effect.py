@@ -2,24 +2,31 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from importlib.resources import files
+from typing import Any
 
 import casadi as ca
 import numpy as np
 
 from thermal._types import FloatArray, IntArray
 from thermal.errors import EffectError, nearest
-from thermal.inputs.drivers import Drivers, Signal
+from thermal.inputs.provider import InputProvider
+from thermal.inputs.signals import Signal
 from thermal.network.graph import GraphBuilder
 from thermal.network.topology import Anatomy, Room
-from thermal.parameters import Parameter, Scale
+from thermal.parameters import Parameter
 
 _Part = tuple[IntArray, FloatArray]
 
 #: Adds an effect to a graph, in some of its zones (all of them when there are none).
-Builder = Callable[["Joining"], None]
+Builder = Callable[["EffectBuilder"], None]
 
+
+#: Words and numbers of the catalogue, by id.
+_TABLE = tomllib.loads(files(__package__).joinpath("catalogue.toml").read_text(encoding="utf-8"))
 
 #: Between the names of two zones, where a strength belongs to both.
 PAIR = " + "
@@ -81,17 +88,17 @@ class Effect:
     shifts: tuple[str, ...] = ()
     level: str = ""
 
-    def untestable(self, drivers: Drivers, anatomy: Anatomy) -> str | None:
+    def untestable(self, inputs: InputProvider, anatomy: Anatomy) -> str | None:
         """Say why a case cannot tell whether the effect is there; None when it can.
 
         Parameters
         ----------
-        drivers : Drivers
-            The case's telemetry.
+        inputs : InputProvider
+            Of the case's telemetry.
         anatomy : Anatomy
             Of its building.
         """
-        missing = [point for point in self.needs if not drivers.measured(point)]
+        missing = [point for point in self.needs if not inputs.measured(point)]
         if missing:
             return f"not measured: {', '.join(missing)}"
         return None if self.applies is None else self.applies(anatomy)
@@ -133,18 +140,18 @@ class Chosen:
             raise EffectError(
                 f"effect {self.effect.id}: acts on the whole building, came zones {list(self.zones)}; leave them out"
             )
-        self.effect.build(Joining(graph, self.effect, self.zones or graph.zones))
+        self.effect.build(EffectBuilder(graph, self.effect, self.zones or graph.zones))
 
 
-class Joining:
-    """A graph while one effect joins it.
+class EffectBuilder:
+    """What an effect adds its terms to a graph with.
 
     Parameters
     ----------
     graph : GraphBuilder
         The building.
     effect : Effect
-        What joins.
+        What is added.
     zones : tuple of str
         Where it may act.
     """
@@ -164,8 +171,16 @@ class Joining:
             Its name.
         zone, facade : str, optional
             Whose value it is.
+
+        Raises
+        ------
+        EffectError
+            When the effect has none of this name.
         """
-        found = next(p for p in self.effect.parameters if p.name == name)
+        own = {p.name: p for p in self.effect.parameters}
+        if name not in own:
+            raise EffectError(f"effect {self.effect.id}: has no parameter {name!r}; {nearest(name, own)}")
+        found = own[name]
         if zone is not None:
             found = found.of("zone", zone)
         elif facade is not None:
@@ -278,21 +293,22 @@ def strength(name: str, unit: str, upper: float, source: str, effect: str, lower
     return Parameter(name, unit, 0.0, lower, upper, source, "linear", effect)
 
 
-def shape(
-    name: str, unit: str, start: float, lower: float, upper: float, source: str, effect: str, scale: Scale = "log"
-) -> Parameter:
-    """Parameter of an effect that has no value of absence.
+def described(name: str, build: Builder, applies: Callable[[Anatomy], str | None] | None = None) -> Effect:
+    """Make an effect of the catalogue from its entry in ``catalogue.toml``.
 
     Parameters
     ----------
-    name, unit, source, effect : str
-        As in `Parameter`.
-    start, lower, upper : float
-        Centre of the prior and plausible range [unit].
-    scale : str
-        What it is estimated on.
+    name : str
+        Its id.
+    build, applies : callable
+        As in `Effect`.
     """
-    return Parameter(name, unit, start, lower, upper, source, scale, effect)
+    entry: dict[str, Any] = _TABLE[name]
+    parameters = tuple(
+        Parameter(**{"start": 0.0, "scale": "linear", "effect": name} | row) for row in entry["parameters"]
+    )
+    rest: Any = {key: tuple(value) if isinstance(value, list) else value for key, value in entry.items()}
+    return Effect(**rest | {"id": name, "parameters": parameters, "build": build, "applies": applies})
 
 
 def hat(value: ca.SX, knots: Sequence[float], number: int, signed: bool = False) -> ca.SX:
@@ -318,20 +334,26 @@ def hat(value: ca.SX, knots: Sequence[float], number: int, signed: bool = False)
     return ca.fmax(0.0, ca.fmin(rise, fall))
 
 
-def _one(drivers: Drivers) -> FloatArray:
-    return np.ones(len(drivers.stamps))
+def _one(inputs: InputProvider) -> FloatArray:
+    return np.ones(len(inputs.stamps))
 
 
 #: A signal that is 1 throughout.
 CONSTANT = Signal("constant", "1", _one)
 
 
-def without_facades(anatomy: Anatomy) -> str | None:
-    """Say that a building has no exterior walls; None where it has.
+def lacking(part: str, reason: str) -> Callable[[Anatomy], str | None]:
+    """Make what says that a building has nothing of which an effect is made, for `Effect.applies`.
 
     Parameters
     ----------
-    anatomy : Anatomy
-        Of the building.
+    part : str
+        Attribute of `Anatomy`.
+    reason : str
+        What is said where it is empty.
     """
-    return None if anatomy.facades else "the building has no exterior walls"
+    return lambda anatomy: None if getattr(anatomy, part) else reason
+
+
+#: Says that a building has no exterior walls.
+without_facades = lacking("facades", "the building has no exterior walls")

@@ -1,1 +1,1 @@
-"""What drives the effects of the catalogue: sun, sky, wind and schedules, from a case's telemetry."""
+"""What drives a model, by name, unit and time: from telemetry, a scenario, a forecast or a live feed."""

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from thermal._types import FloatArray
-from thermal.model.scheme import IMPLICIT_EULER
-from thermal.model.stepper import Stepper
-from thermal.model.symbolic import Matrices
+from thermal.model.matrices import Matrices
+from thermal.model.step import IMPLICIT_EULER, Stepper
 
 #: Length [h] and step [s] of the replay.
 _HOURS, _STEP = 48.0, 300.0

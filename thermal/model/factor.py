@@ -1,16 +1,23 @@
-"""Sparse factors of the symmetric matrix of a step: lean ones for many solves, ordered once for few."""
+"""Matrices of a model at one θ, and factors of that of a step: lean for many solves, ordered once for few."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import numpy as np
+import scipy.linalg as sl
 import scipy.sparse as sp
 import scipy.sparse.linalg as spl
 from numpy.typing import NDArray
 
 from thermal._types import FloatArray
+from thermal.errors import ModelError
+
+#: A csr_matrix on the grid, an ndarray when reduced; the stubs of scipy cannot type products with such a union.
+Matrix = Any
 
 #: Entries of the factors below this share of their column are left out [-]. What one volume passes on decays with every
 #: volume between, so up to two fifths of the complete factors lie below it; double precision ends at 1e-16.
@@ -24,6 +31,67 @@ _COLUMNS = 8
 
 #: First guess of the factors' size over that of the matrix [-]; SuperLU enlarges it when it has to.
 _FILL = 10
+
+
+@dataclass(frozen=True)
+class Pencil:
+    """The model at one θ: ``C dT/dt = -K T + B u + H q`` and its derivatives with respect to θ.
+
+    The boundary nodes are the last columns of ``flow = [K, -B]``, so that ``flow @ [T; u]`` is the heat that leaves
+    each volume.
+
+    Parameters
+    ----------
+    capacity : sparse matrix or ndarray, shape (n, n)
+        C [J/K]; diagonal on the grid.
+    flow : sparse matrix or ndarray, shape (n, n + n_boundary)
+        ``[K, -B]`` [W/K].
+    heating : matrix, shape (n, n_zone)
+        H, distribution of a zone's heat; columns sum to 1 on the grid.
+    observation : matrix, shape (n_zone, n)
+        Zone means.
+    uniform : ndarray, shape (n,)
+        The state in which every volume is at 1 K [K].
+    capacity_slopes, flow_slopes : list of matrices
+        dC/dθ_j and d[K, -B]/dθ_j, one a parameter.
+    reading : matrix, shape (n_zone, n), optional
+        What the zones' sensors read where these lag behind; see `output`.
+    n_signal : int
+        How many of the boundary columns, the last ones, are signals of effects.
+    airflows : tuple of (int, int)
+        Source and target zone of each directed airflow, which is no part of K.
+    """
+
+    capacity: Matrix
+    flow: Matrix
+    heating: Matrix
+    observation: Matrix
+    uniform: FloatArray
+    capacity_slopes: list[Matrix]
+    flow_slopes: list[Matrix]
+    reading: Matrix = None
+    n_signal: int = 0
+    airflows: tuple[tuple[int, int], ...] = ()
+
+    @property
+    def n(self) -> int:
+        """Number of states."""
+        return int(self.flow.shape[0])
+
+    @property
+    def n_boundary(self) -> int:
+        """Number of boundary temperatures and signals."""
+        return int(self.flow.shape[1] - self.flow.shape[0])
+
+    @property
+    def output(self) -> Matrix:
+        """What is compared with telemetry, shape (n_zone, n): the sensors' readings, or the zone means."""
+        return self.observation if self.reading is None else self.reading
+
+    @property
+    def reduced(self) -> bool:
+        """Whether the matrices are dense, those of a reduced model."""
+        return isinstance(self.capacity, np.ndarray)
 
 
 class SparseSolver:
@@ -161,3 +229,36 @@ def _without_negligible(matrix: sp.csc_matrix) -> spl.SuperLU | None:
         scale = abs(matrix) @ np.abs(solution) + np.abs(rhs)
         exact = np.abs(matrix @ solution - rhs) <= BACKWARD_ERROR * scale
     return factors if exact.all() else None
+
+
+def factorise(system: Matrix, elimination: Elimination | None = None) -> Callable[[FloatArray], FloatArray]:
+    """Factorise a symmetric positive definite matrix, sparse (SuperLU) or dense (inverse by Cholesky).
+
+    Parameters
+    ----------
+    system : sparse matrix or ndarray, shape (n, n)
+        Matrix of the step [J/K].
+    elimination : Elimination, optional
+        What factorises sparse matrices of its structure, for a few solves each; a step is solved many times.
+
+    Returns
+    -------
+    callable
+        Solves for right-hand sides of shape (n,) or (n, m).
+
+    Raises
+    ------
+    ModelError
+        When it is not positive definite.
+    """
+    try:
+        if sp.issparse(system):
+            return SparseSolver(system) if elimination is None else elimination(system)
+        factor = sl.cho_factor(np.asarray(system))
+        inverse = sl.cho_solve(factor, np.eye(system.shape[0]))
+        return lambda rhs: np.asarray(inverse @ rhs)
+    except (RuntimeError, np.linalg.LinAlgError) as error:
+        raise ModelError(
+            f"the matrix of the step (n = {system.shape[0]}) cannot be factorised: {error}; "
+            "a volume without heat capacity and without any face, or a parameter out of range, does this"
+        ) from error

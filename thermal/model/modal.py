@@ -4,19 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 import scipy.linalg as sl
 from numpy.typing import NDArray
 
-from thermal._types import FloatArray
+from thermal._types import FloatArray, IntArray
 from thermal.errors import ModelError
-from thermal.model.scheme import EXACT, Scheme
-
-if TYPE_CHECKING:
-    from thermal.model.symbolic import Matrices
-
+from thermal.model.factor import Pencil
+from thermal.model.step import EXACT, Scheme
 
 #: Shift that keeps a building without any path to the outside regular [1/s]: three years.
 SHIFT = 1e-8
@@ -79,7 +76,7 @@ class ModalModel:
     --------
     >>> from thermal.data import load_bundled_case
     >>> from thermal.model.reduce import reduced_model
-    >>> from thermal.model.symbolic import SymbolicModel
+    >>> from thermal.model.matrices import SymbolicModel
     >>> from thermal.network.build import build_network
     >>> grid = SymbolicModel(build_network(load_bundled_case().building, dx=1.0))
     >>> modes = modal_model(reduced_model(grid, [grid.network.start()]).matrices(grid.network.start()))
@@ -134,17 +131,40 @@ class ModalModel:
         )
         return Propagator(end, end_gain, mean, mean_gain)
 
+    def to_control(self, inputs: list[str], outputs: list[str], step: float | None = None) -> Any:
+        """Make a `control.StateSpace`, ``dξ/dt = -(k/c) ξ + [B H]/c [u; q]``, ``y = O ξ``.
+
+        Parameters
+        ----------
+        inputs : list of str
+            Names of the columns of B, then of H.
+        outputs : list of str
+            Names of the zones.
+        step : float, optional
+            Time step of an exact zero-order hold [s]; continuous time by default.
+        """
+        import control  # here: it takes a second to import
+
+        drive = np.hstack([self.boundary, self.heating])
+        if step is None:
+            a, b, time = -1.0 / self.time_constants, drive / self.capacity[:, None], 0.0
+        else:
+            one = self.propagator(step)
+            a, b, time = one.end, one.end_gain[:, None] * drive, step
+        none = np.zeros((self.output.shape[0], drive.shape[1]))
+        return control.StateSpace(np.diag(a), b, self.output, none, time, inputs=inputs, outputs=outputs)
+
 
 #: Functions of the capacity c of a mode (with k = 1 - s c): end, end_gain, mean, mean_gain.
 ModalFunction = Callable[[NDArray[np.inexact]], NDArray[np.inexact]]
 
 
-def modal_model(matrices: Matrices) -> ModalModel:
+def modal_model(matrices: Pencil) -> ModalModel:
     """Modes of a reduced model.
 
     Parameters
     ----------
-    matrices : Matrices
+    matrices : Pencil
         Of a reduced model, dense.
 
     Raises
@@ -260,3 +280,63 @@ def divided_differences(function: ModalFunction, c: FloatArray) -> FloatArray:
     tiny = 1e-30 * points
     quotient[row, column] = function(points + 1j * tiny).imag / tiny
     return np.asarray(quotient)
+
+
+def run_along(
+    modes: ModalModel,
+    states: FloatArray,
+    boundary: FloatArray,
+    heat: FloatArray,
+    starts: IntArray,
+    keep: IntArray,
+    step: float,
+    scheme: Scheme,
+) -> FloatArray:
+    """Zone means of free runs that start at several rows of one series of inputs, by superposition.
+
+    From its start on, a run is the path of one long run plus the difference of their states, which decays by itself:
+    ``ξ(s + k) = X(s + k) + end^k (ξ(s) - X(s))``. Hourly runs of a day share 23 of 24 steps.
+
+    Parameters
+    ----------
+    modes : ModalModel
+        Modes of the model.
+    states : ndarray, shape (n, m)
+        States of the reduced model at the starts [K].
+    boundary : ndarray, shape (n_time, n_boundary)
+        Boundary temperatures of each step [K].
+    heat : ndarray, shape (n_time, n_zone)
+        Heat given to the zones in each step [W].
+    starts : ndarray of int, shape (m,)
+        Rows at whose stamps the runs start; the first step is driven by the row that follows.
+    keep : ndarray of int
+        Steps whose means are returned, from 1 on.
+    step : float
+        Time step [s].
+    scheme : Scheme
+        Time stepping; ``EXACT`` too.
+
+    Returns
+    -------
+    ndarray, shape (m, n_keep, n_zone)
+        Zone means over the kept steps [K].
+    """
+    propagator, own = modes.propagator(step, scheme), (modes.coordinates @ states).T
+    means = np.empty((starts.size, keep.size, modes.output.shape[0]))
+    order, longest = np.argsort(starts, kind="stable"), int(keep.max())
+    # what lies between runs is not stepped
+    for together in np.split(order, np.flatnonzero(np.diff(starts[order]) > longest) + 1):
+        first, last = int(starts[together[0]]), int(starts[together[-1]]) + longest
+        rows = slice(first + 1, last + 1)
+        pushed = boundary[rows] @ modes.boundary.T + heat[rows] @ modes.heating.T
+        path = np.zeros((len(pushed) + 1, pushed.shape[1]))
+        path[1:] = propagator.end_gain * pushed
+        for k in range(len(pushed)):
+            path[k + 1] += propagator.end * path[k]
+        shared = (propagator.mean * path[:-1] + propagator.mean_gain * pushed) @ modes.output.T
+        at = starts[together] - first
+        behind = own[together] - path[at]
+        for position, k in enumerate(keep):
+            fading = modes.output * (propagator.mean * propagator.end ** (k - 1))
+            means[together, position] = shared[at + k - 1] + behind @ fading.T
+    return means

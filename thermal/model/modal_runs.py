@@ -9,20 +9,41 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
+import scipy.linalg as sl
 from numpy.typing import NDArray
 
 from thermal._types import FloatArray
-from thermal.model.convolution import all_fading_sums, fading_sums, rows_of
-from thermal.model.modal import SHIFT, divided_differences, modal_model, propagator_functions
-from thermal.model.modal_sensitivities import ModalSlopes
-from thermal.model.prescribed import HeldFrame, scan
-from thermal.model.scheme import IMPLICIT_EULER, Scheme
+from thermal.model.factor import Pencil
+from thermal.model.modal import SHIFT, ModalModel, divided_differences, modal_model, propagator_functions
+from thermal.model.sensitivities import ModalSensitivities, all_convolution_sums, convolution_sums, rows_of
+from thermal.model.step import IMPLICIT_EULER, Scheme
 
-if TYPE_CHECKING:
-    from thermal.model.symbolic import Matrices
+
+class PrescribedBasis:
+    """States with given means of the held zones, ``ξ = lift y + basis ζ``, where C is diagonal in ζ."""
+
+    def __init__(self, modes: ModalModel, held: NDArray[np.bool_]) -> None:
+        observe = modes.observation[held]
+        count = observe.shape[0]
+        q, upper = sl.qr(observe.T)
+        self.lift = sl.solve_triangular(upper[:count], q[:, :count].T).T if count else observe.T
+        null = q[:, count:]
+        self.capacity, turn = np.linalg.eigh(null.T @ (modes.capacity[:, None] * null))
+        self.basis = null @ turn
+        self.coupling = self.basis.T @ (modes.capacity[:, None] * self.lift)
+
+
+def scan(capacity: FloatArray, step: float, start: FloatArray, push: FloatArray) -> FloatArray:
+    """``c (ζ' - ζ) + Δt k ζ' = push`` over all steps, (r, n_time + 1)."""
+    system = capacity + step * (1.0 - SHIFT * capacity)
+    stay, gain = capacity / system, push.T / system
+    path = np.empty((push.shape[1] + 1, start.size))
+    path[0] = start
+    for k in range(push.shape[1]):
+        path[k + 1] = stay * path[k] + gain[k]
+    return path.T
 
 
 class ModalRuns:
@@ -30,26 +51,26 @@ class ModalRuns:
 
     Parameters
     ----------
-    matrices : Matrices
+    matrices : Pencil
         Of the reduced model at one θ; with slopes when sensitivities are wanted.
     """
 
-    def __init__(self, matrices: Matrices) -> None:
+    def __init__(self, matrices: Pencil) -> None:
         # a copy, as matrices keep their runs: what refers to each other stays in memory until it is looked for
         self.matrices = replace(matrices)
         self.modes = modal_model(matrices)
-        self._frames: dict[bytes, HeldFrame] = {}
+        self._frames: dict[bytes, PrescribedBasis] = {}
 
     @cached_property
-    def slopes(self) -> ModalSlopes:
+    def slopes(self) -> ModalSensitivities:
         """Derivatives of the matrices in the modes."""
-        return ModalSlopes(self.matrices, self.modes)
+        return ModalSensitivities(self.matrices, self.modes)
 
-    def _frame(self, held: NDArray[np.bool_]) -> HeldFrame:
+    def _frame(self, held: NDArray[np.bool_]) -> PrescribedBasis:
         """Frame of held zones; a spin-up needs it for its steady state, its steps and its derivatives."""
         key = held.tobytes()
         if key not in self._frames:
-            self._frames[key] = HeldFrame(self.modes, held)
+            self._frames[key] = PrescribedBasis(self.modes, held)
         return self._frames[key]
 
     @property
@@ -146,7 +167,7 @@ class ModalRuns:
                 turned = np.concatenate([slope.turned(rows, end), by_drive], axis=2)
             by_path += np.tensordot(observe[:, rows], slope.turned(rows, mean), axes=1)
             by_input += np.tensordot(observe[:, rows], slope.turned(rows, mean_gain, propagator.mean_gain), axes=1)
-            for position, sums in enumerate(fading_sums(stay, driven, last)):
+            for position, sums in enumerate(convolution_sums(stay, driven, last)):
                 moved = stay[:, None, None] ** last[position] * starts[rows]
                 moved[:, slope.turning] += turned @ sums[:, : turned.shape[2]]
                 moved += (pushed @ sums.reshape(-1, m)).reshape(moved.shape)
@@ -245,7 +266,7 @@ class ModalRuns:
 
     def _held_slopes(
         self,
-        frame: HeldFrame,
+        frame: PrescribedBasis,
         path: FloatArray,
         boundary: FloatArray,
         ends: NDArray[np.int64],
@@ -266,8 +287,8 @@ class ModalRuns:
                 continue
             turned = stack.times(factor * gain)
             for rows in rows_of(stay.size, len(path) * ends.size):
-                out[rows, stack.parameters] += turned[rows] @ all_fading_sums(stay[rows], drive, ends)
-        sums = all_fading_sums(stay, boundary, ends).reshape(-1, ends.size)
+                out[rows, stack.parameters] += turned[rows] @ all_convolution_sums(stay[rows], drive, ends)
+        sums = all_convolution_sums(stay, boundary, ends).reshape(-1, ends.size)
         push = step * (gain @ slopes.boundary.values)
         out += (slopes.boundary.spread(push, np.arange(0, len(sums), boundary.shape[1]), len(sums)) @ sums).reshape(
             out.shape

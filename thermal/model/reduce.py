@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -12,10 +13,9 @@ from numpy.typing import NDArray
 from thermal._types import FloatArray
 from thermal.errors import ModelError
 from thermal.model.certificate import Certificate, Replay, closed_loop, differences
-from thermal.model.factor import Elimination
+from thermal.model.factor import Elimination, Matrix, factorise
+from thermal.model.matrices import Matrices, SymbolicModel, congruent
 from thermal.model.modal import modal_model
-from thermal.model.stepper import factorise
-from thermal.model.symbolic import Matrices, Matrix, SymbolicModel, congruent
 
 #: Expansion points of the transfer function [1/s]: a month, a day, eight hours, an hour, ten minutes and two minutes.
 SHIFTS = (1.0 / 2.6e6, 1.0 / 86400.0, 1.0 / 28800.0, 1.0 / 3600.0, 1.0 / 600.0, 1.0 / 120.0)
@@ -62,6 +62,49 @@ class ReducedModel(SymbolicModel):
     def order(self) -> int:
         """Number of states."""
         return int(self.class_flows[0].shape[0])
+
+    def to_control(self, theta: FloatArray | None = None, step: float | None = None) -> Any:
+        """Make a `control.StateSpace` of the model: poles, responses and whatever else python-control does with it.
+
+        Inputs are the boundary temperatures (``temperature of outdoor``, [K]), the signals of effects by name, and the
+        heat of every zone (``heat of north``, [W]); outputs what the zones' sensors read (``temperature of north``,
+        [K]). Temperatures are counted from `thermal.units.REFERENCE_TEMPERATURE`, or any other where there are no
+        signals.
+
+        Parameters
+        ----------
+        theta : ndarray, shape (n_parameter,), optional
+            Parameter values [parameter units]; where the basis was made by default.
+        step : float, optional
+            Time step of an exact zero-order hold [s]; continuous time by default.
+
+        Returns
+        -------
+        control.StateSpace
+            Of the model's order.
+
+        Raises
+        ------
+        ModelError
+            When air passes from zone to zone: such a model is not linear in its inputs.
+
+        Examples
+        --------
+        >>> from thermal.data import load_bundled_case
+        >>> from thermal.network.build import build_network
+        >>> grid = SymbolicModel(build_network(load_bundled_case().building, dx=1.0))
+        >>> system = reduced_model(grid, [grid.network.start()], order=20).to_control()
+        >>> system.nstates, system.input_labels[:2]
+        (20, ['temperature of outdoor', 'heat of F1_N'])
+        """
+        network = self.network
+        if network.airflows:
+            raise ModelError("to_control: expected a building without airflows from zone to zone, got some")
+        modes = modal_model(self.matrices(self.theta if theta is None else theta))
+        temperatures, heats = ([f"{kind} of {zone}" for zone in network.zones] for kind in ("temperature", "heat"))
+        outside = [f"temperature of {name}" for name in network.boundaries]
+        names = [name.replace(".", "_") for name in (*outside, *(s.name for s in network.signals), *heats)]
+        return modes.to_control(names, [name.replace(".", "_") for name in temperatures], step)
 
     def drift(self, theta: FloatArray) -> float:
         """How far the basis is from serving another θ: largest error of the responses between its shifts [K].

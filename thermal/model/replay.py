@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -12,12 +13,13 @@ from numpy.typing import NDArray
 from thermal._types import FloatArray, IntArray
 from thermal.case.case import Case
 from thermal.errors import ModelError
-from thermal.inputs.drivers import REFERENCE_TEMPERATURE, Drivers, signal_values
-from thermal.model.modal_series import run_along
-from thermal.model.scheme import IMPLICIT_EULER, Scheme
-from thermal.model.stepper import Stepper
-from thermal.model.symbolic import Matrices
+from thermal.inputs.provider import InputProvider, telemetry_inputs
+from thermal.inputs.signals import signal_values
+from thermal.model.matrices import Matrices
+from thermal.model.modal import run_along
+from thermal.model.step import IMPLICIT_EULER, Scheme, Stepper
 from thermal.network.network import ThermalNetwork
+from thermal.units import REFERENCE_TEMPERATURE
 
 #: Longest gap of an input that is bridged by a straight line [s] (results contract: 30 minutes).
 LONGEST_BRIDGE = 1800.0
@@ -36,7 +38,7 @@ _REFERENCE = REFERENCE_TEMPERATURE
 _STEADY_STEP = 10 * 86400.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Inputs:
     """What drives a replay, one row a stamp; a row stands for the step that ends at its stamp.
 
@@ -76,8 +78,32 @@ class Inputs:
     def __len__(self) -> int:
         return len(self.stamps)
 
+    def __repr__(self) -> str:
+        n, share = self.zone.shape[1], self.complete.mean()
+        span = f"{self.stamps[0]} to {self.stamps[-1]} by {self.step:g} s" if len(self) else "no steps"
+        return f"Inputs({span}, {n} zones, {self.boundary.shape[1]} boundaries and signals, {share:.0%} complete)"
 
-def replay_inputs(case: Case, network: ThermalNetwork, drivers: Drivers | None = None) -> Inputs:
+    def to_frame(self) -> pd.DataFrame:
+        """All inputs as a table, shape (n_time, n) [K], [W], [kg/s]; columns of two levels, kind and number."""
+        kinds = ("boundary", "heat", "airflow", "zone")
+        tables = {kind: pd.DataFrame(getattr(self, kind), index=self.stamps) for kind in kinds}
+        return pd.concat({kind: table for kind, table in tables.items() if table.size}, axis=1)
+
+    def plot(self) -> Any:
+        """Draw zones with outdoors [degC] above their heat [kW]; returns a matplotlib figure."""
+        import matplotlib.pyplot as plt
+
+        figure, (above, below) = plt.subplots(2, 1, sharex=True, layout="constrained")
+        above.plot(self.stamps, self.zone - 273.15)
+        above.plot(self.stamps, self.boundary[:, 0] - 273.15, "k", linewidth=0.8, label="outdoor")
+        above.legend(frameon=False)
+        below.plot(self.stamps, self.heat / 1000.0)
+        above.set_ylabel("temperature (degC)")
+        below.set_ylabel("heat (kW)")
+        return figure
+
+
+def replay_inputs(case: Case, network: ThermalNetwork, provider: InputProvider | None = None) -> Inputs:
     """Collect the inputs of a replay from a case's telemetry.
 
     Parameters
@@ -86,8 +112,8 @@ def replay_inputs(case: Case, network: ThermalNetwork, drivers: Drivers | None =
         With telemetry.
     network : ThermalNetwork
         Says which boundaries, airflows and signals the model has.
-    drivers : Drivers, optional
-        Of the same case, where they are at hand.
+    provider : InputProvider, optional
+        Of the same case, where it is at hand; else made of the telemetry with the network's normalisation.
 
     Returns
     -------
@@ -119,7 +145,10 @@ def replay_inputs(case: Case, network: ThermalNetwork, drivers: Drivers | None =
         raise ModelError(f"telemetry: no step has all its inputs; {_most_missing(bridged)}")
     filled = [f.interpolate(limit_direction="both").fillna(0.0).to_numpy(dtype=float) for f in bridged]
     index = pd.DatetimeIndex(zone.index)
-    signals = _REFERENCE + signal_values(network.signals, drivers or Drivers(case))
+    signals = np.empty((len(index), 0))
+    if network.signals:
+        source = provider or telemetry_inputs(case, network.normalisation)
+        signals = REFERENCE_TEMPERATURE + signal_values(network.signals, source)
     return Inputs(
         stamps=index,
         step=step,
@@ -209,14 +238,12 @@ def spin_up(
 
 def free_runs(
     matrices: Matrices,
-    network: ThermalNetwork,
     inputs: Inputs,
     starts: IntArray,
-    steps: int,
+    steps: int | IntArray,
     states: FloatArray,
     slopes: FloatArray | None = None,
     scheme: Scheme = IMPLICIT_EULER,
-    keep: IntArray | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> tuple[FloatArray, FloatArray | None]:
     """Run the model freely from several stamps, driven by the telemetry's inputs.
@@ -225,48 +252,42 @@ def free_runs(
     ----------
     matrices : Matrices
         The model at one θ.
-    network : ThermalNetwork
-        For zones and airflows.
     inputs : Inputs
         The telemetry.
     starts : ndarray of int, shape (m,)
         Stamps at which the runs start.
-    steps : int
-        Number of steps N.
+    steps : int or ndarray of int
+        Number of steps N, or which steps to return, from 1 on and increasing.
     states : ndarray, shape (n, m)
         States at the starts [K].
     slopes : ndarray, shape (n, n_parameter m), optional
-        Their derivatives [K per unit of θ].
+        Their sensitivities [K per unit of θ].
     scheme : Scheme
         Implicit Euler by default.
-    keep : ndarray of int, optional
-        Steps to return, 1 to ``steps``; all by default.
     progress : callable, optional
         Called with the number of steps done.
 
     Returns
     -------
     tuple
-        Zone means over the kept steps (m, n_keep, n_zone) [K] and derivatives (m, n_keep, n_zone, n_parameter), or
+        Zone means over the kept steps (m, n_keep, n_zone) [K] and sensitivities (m, n_keep, n_zone, n_parameter), or
         None.
     """
-    keep = np.arange(1, steps + 1) if keep is None else keep
-    if matrices.reduced and not network.airflows:
-        start, boundary = states - _REFERENCE * matrices.uniform[:, None], inputs.boundary - _REFERENCE
+    keep = np.arange(1, steps + 1) if isinstance(steps, int | np.integer) else steps
+    states, boundary = states - _REFERENCE * matrices.uniform[:, None], inputs.boundary - _REFERENCE
+    if matrices.reduced and not matrices.airflows:
         if slopes is None:
             modes = matrices.modal.modes
-            along = run_along(modes, start, boundary, inputs.heat, starts, keep, inputs.step, scheme)
+            along = run_along(modes, states, boundary, inputs.heat, starts, keep, inputs.step, scheme)
             return along + _REFERENCE, None
         row = starts + np.arange(1, int(keep[-1]) + 1)[:, None]
         boundary, heat = ((v[row]).transpose(0, 2, 1) for v in (boundary, inputs.heat))
-        means, moved = matrices.modal.run(start, boundary, heat, keep, inputs.step, scheme, slopes)
+        means, moved = matrices.modal.run(states, boundary, heat, keep, inputs.step, scheme, slopes)
         return means + _REFERENCE, moved
-    stepper = Stepper(matrices, inputs.step, scheme, network.airflows)
-    m, n_zone, p = starts.size, len(network.zones), len(matrices.flow_slopes)
+    stepper = Stepper(matrices, inputs.step, scheme)
+    m, n_zone, p = starts.size, inputs.zone.shape[1], len(matrices.flow_slopes)
     means = np.empty((m, keep.size, n_zone))
     mean_slopes = np.empty((m, keep.size, n_zone, p)) if slopes is not None else None
-    boundary = inputs.boundary - _REFERENCE
-    states = states - _REFERENCE * matrices.uniform[:, None]
     position = {int(s): i for i, s in enumerate(keep)}
     for k in range(1, int(keep[-1]) + 1):
         row = starts + k

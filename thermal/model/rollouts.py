@@ -12,9 +12,9 @@ import scipy.sparse as sp
 
 from thermal._types import FloatArray
 from thermal.errors import ModelError
-from thermal.model.scheme import IMPLICIT_EULER, Scheme, Stage
-from thermal.model.stepper import Stepper
-from thermal.model.symbolic import Matrix, SymbolicModel
+from thermal.model.factor import Matrix
+from thermal.model.matrices import SymbolicModel
+from thermal.model.step import IMPLICIT_EULER, Scheme, Stage, Stepper
 from thermal.units import AIR_HEAT_CAPACITY
 
 #: Beyond this many volumes the symbolic executor's LDL factors and tapes outgrow it (measured: 6,000 volumes).
@@ -179,7 +179,7 @@ class SparseRollout(ca.Callback):
     def _run(self, theta: FloatArray, slopes: bool) -> tuple[FloatArray, FloatArray]:
         """Zone means (n_zone, N), and their derivatives (n_zone N, n_parameter) in CasADi's column-major order."""
         data, p = self._data, theta.size
-        stepper = Stepper(self._model.matrices(theta, slopes), self._step, self._scheme, self._model.network.airflows)
+        stepper = Stepper(self._model.matrices(theta, slopes), self._step, self._scheme)
         states = data.initial[:, None]
         moved = np.zeros((states.size, p)) if slopes else None
         means, mean_slopes = [], []

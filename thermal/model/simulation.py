@@ -1,9 +1,10 @@
-"""Replay of one interval of a case: what the building would have done according to the model."""
+"""Replay of an interval of telemetry through the model: the simulated zones beside the measured ones."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -11,12 +12,12 @@ import pandas as pd
 from thermal._types import FloatArray
 from thermal.case.case import Case
 from thermal.errors import ModelError
+from thermal.model.matrices import SymbolicModel
 from thermal.model.replay import LEAST_SPIN_UP, SPIN_UP, free_runs, replay_inputs, spin_up
-from thermal.model.scheme import IMPLICIT_EULER, Scheme
-from thermal.model.symbolic import SymbolicModel
+from thermal.model.step import IMPLICIT_EULER, Scheme
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Simulation:
     """A replayed interval.
 
@@ -36,6 +37,31 @@ class Simulation:
     measured: pd.DataFrame
     heat: pd.DataFrame
     start: pd.Timestamp
+
+    @property
+    def error(self) -> pd.DataFrame:
+        """Simulated less measured temperatures, shape (n_time, n_zone) [K]."""
+        return self.simulated - self.measured
+
+    def __repr__(self) -> str:
+        mean, span = self.error.abs().mean().mean(), f"{self.start} to {self.simulated.index[-1]}"
+        return f"Simulation({span}, {self.simulated.shape[1]} zones, mean absolute error {mean:.2f} K)"
+
+    def to_frame(self) -> pd.DataFrame:
+        """Everything as a table, shape (n_time, 3 n_zone) [K], [K], [W]; columns of two levels, kind and zone."""
+        return pd.concat({"simulated": self.simulated, "measured": self.measured, "heat": self.heat}, axis=1)
+
+    def plot(self) -> Any:
+        """Draw simulated and measured temperatures of every zone [degC]; returns a matplotlib figure."""
+        import matplotlib.pyplot as plt
+
+        figure, axes = plt.subplots(layout="constrained")
+        for k, zone in enumerate(self.simulated):
+            axes.plot(self.simulated.index, self.simulated[zone] - 273.15, color=f"C{k}", label=zone)
+            axes.plot(self.measured.index, self.measured[zone] - 273.15, color=f"C{k}", linestyle=":")
+        axes.set(ylabel="temperature (degC)", title="simulated, and measured (dotted)")
+        axes.legend(frameon=False, ncols=4)
+        return figure
 
 
 def simulate(
@@ -94,7 +120,7 @@ def simulate(
     matrices = model.matrices(theta)
     at = np.array([first])
     states, _ = spin_up(matrices, inputs, begin, at)
-    means, _ = free_runs(matrices, model.network, inputs, at, last - first, states, scheme=scheme, progress=progress)
+    means, _ = free_runs(matrices, inputs, at, last - first, states, scheme=scheme, progress=progress)
     rows = slice(first + 1, last + 1)
     zones = list(model.network.zones)
 

@@ -3,25 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from thermal._types import FloatArray
 from thermal.case.building import Building
 from thermal.case.case import Case
 from thermal.errors import ModelError
-from thermal.inputs.drivers import REFERENCE_TEMPERATURE
+from thermal.model.matrices import Matrices, SymbolicModel
 from thermal.model.replay import LEAST_SPIN_UP, SPIN_UP, replay_inputs, spin_up
-from thermal.model.scheme import SCHEMES
-from thermal.model.stepper import Stepper
-from thermal.model.symbolic import Matrices, SymbolicModel
+from thermal.model.step import SCHEMES, Stepper
 from thermal.network.assembly import Extension
 from thermal.network.build import build_network
 from thermal.network.structure import SHUFFLE_STEP
 from thermal.parameters import Scope
 from thermal.shuffle.random import RandomShuffle
+from thermal.units import REFERENCE_TEMPERATURE
 
 #: One long implicit step to the steady state of a reset [s], three years.
 _STEADY_STEP = 1e8
@@ -31,6 +31,39 @@ _LEAST_PROBABILITY = 1e-3
 
 #: Temperatures outside of this range are refused as inputs [K].
 PLAUSIBLE = (173.15, 373.15)
+
+
+@dataclass(frozen=True)
+class Shuffle:
+    """How the air of a zone is mixed.
+
+    Parameters
+    ----------
+    kind : {"mean", "random"}
+        The mean of the shuffle as a term of the model, or the paper's random one after each step.
+    probability : float, optional
+        Probability of the shuffle per 300 s [-], in [0, 1]; ``shuffle_probability`` of the parameters by default.
+    reach : float, optional
+        Reach of the shuffle [m]; None is the whole zone.
+    seed : int
+        Seed of the random shuffle.
+
+    Raises
+    ------
+    ModelError
+        When the kind is unknown, or the probability none.
+    """
+
+    kind: Literal["mean", "random"] = "mean"
+    probability: float | None = None
+    reach: float | None = None
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        if self.probability is not None and not 0.0 <= self.probability <= 1.0:
+            raise ModelError(f"probability: expected a number from 0 to 1, came {self.probability}")
+        if self.kind not in ("mean", "random"):
+            raise ModelError(f"shuffle: expected 'mean' or 'random', came {self.kind!r}")
 
 
 class Simulator:
@@ -48,14 +81,8 @@ class Simulator:
         Distance between control volumes of a plan [m].
     scheme : str
         ``implicit_euler`` or ``tr_bdf2``.
-    shuffle : {"mean", "random"}
-        The mean of the shuffle as a term of the model, or the paper's random one after each step.
-    probability : float, optional
-        Probability of the shuffle per 300 s [-], in [0, 1]; ``shuffle_probability`` of the parameters by default.
-    reach : float, optional
-        Reach of the shuffle [m]; None is the whole zone.
-    seed : int
-        Seed of the random shuffle.
+    shuffle : Shuffle or {"mean", "random"}
+        How the air of a zone is mixed.
     scopes : mapping of str to {"global", "zone"}, optional
         Parameters with one value a zone, as they were calibrated.
     effects : sequence of Extension
@@ -83,34 +110,25 @@ class Simulator:
         step_seconds: float = 300.0,
         dx: float | None = None,
         scheme: str = "implicit_euler",
-        shuffle: Literal["mean", "random"] = "mean",
-        probability: float | None = None,
-        reach: float | None = None,
-        seed: int = 0,
+        shuffle: Shuffle | Literal["mean", "random"] = "mean",
         scopes: Mapping[str, Scope] | None = None,
         effects: Sequence[Extension] = (),
     ) -> None:
         if scheme not in SCHEMES:
             raise ModelError(f"scheme: expected one of {sorted(SCHEMES)}, came {scheme!r}")
-        if probability is not None and not 0.0 <= probability <= 1.0:
-            raise ModelError(f"probability: expected a number from 0 to 1, came {probability}")
-        if shuffle not in ("mean", "random"):
-            raise ModelError(f"shuffle: expected 'mean' or 'random', came {shuffle!r}")
         if not (np.isfinite(step_seconds) and step_seconds > 0):
             raise ModelError(f"step_seconds: expected a positive number of seconds, came {step_seconds}")
-        network = build_network(
-            building, dx=dx, reach=reach, scopes=scopes, mean_shuffle=shuffle == "mean", effects=effects
-        )
-        self.network = network
+        mixing = shuffle if isinstance(shuffle, Shuffle) else Shuffle(shuffle)
+        probability, random = mixing.probability, mixing.kind == "random"
+        build = partial(build_network, building, dx=dx, reach=mixing.reach, scopes=scopes, effects=effects)
+        self.network = network = build(mean_shuffle=not random)
         # a steady state or a spin-up needs the mean of the shuffle, also where the steps shuffle at random
-        self.model = self._start_model = SymbolicModel(network)
-        if shuffle == "random":
-            mean = build_network(building, dx=dx, reach=reach, scopes=scopes, effects=effects)
-            self._start_model = SymbolicModel(mean)
+        self.model = SymbolicModel(network)
+        self._start_model = SymbolicModel(build()) if random else self.model
         given = dict(parameters or {})
         names = [p.name for p in self._start_model.network.parameters]
         if probability is not None and "shuffle_probability" in names:
-            given["shuffle_probability"] = probability if shuffle == "random" else max(probability, _LEAST_PROBABILITY)
+            given["shuffle_probability"] = probability if random else max(probability, _LEAST_PROBABILITY)
         start = dict(zip(names, self._start_model.network.values(given), strict=True))
         self.probability = float(start.get("shuffle_probability", 0.0))
         self._start_theta = np.array(
@@ -119,13 +137,9 @@ class Simulator:
         self.step_seconds = float(step_seconds)
         self.theta = np.array([start[p.name] for p in network.parameters])
         self.matrices = self.model.matrices(self.theta)
-        self._stepper = Stepper(self.matrices, self.step_seconds, SCHEMES[scheme], network.airflows)
+        self._stepper = Stepper(self.matrices, self.step_seconds, SCHEMES[scheme])
         self._air = np.flatnonzero(network.kind == "air")
-        self._shuffle = (
-            _random_shuffle(network, self.matrices, self._air, self.probability, reach, seed)
-            if shuffle == "random"
-            else None
-        )
+        self._shuffle = self._random_shuffle(mixing) if random else None
         self._states: FloatArray | None = None
         self._stepped: FloatArray | None = None
         self._elapsed = 0.0
@@ -262,8 +276,8 @@ class Simulator:
         airflow : ndarray, shape (n_airflow,), optional
             Directed airflows during the step [kg/s]; zero by default.
         signals : ndarray, shape (n_signal,), optional
-            Signals of the effects during the step [signal unit], as `thermal.inputs.signal_values` makes them from
-            telemetry; none are needed in the baseline.
+            Signals of the effects during the step [signal unit], as `thermal.inputs.signals.signal_values` makes
+            them of telemetry; none are needed in the baseline.
 
         Returns
         -------
@@ -350,6 +364,14 @@ class Simulator:
             raise ModelError("simulator: call reset() or reset_from() before the first step")
         return self._states
 
+    def _random_shuffle(self, mixing: Shuffle) -> RandomShuffle:
+        """Make the shuffle over the air volumes, each zone within one floor."""
+        network, air = self.network, self._air
+        zones = [np.flatnonzero(network.zone[air] == z) for z in range(len(network.zones))]
+        positions = network.place[air][:, 1:] * network.spacing if network.spacing else np.zeros((air.size, 2))
+        capacities = np.asarray(self.matrices.capacity.diagonal())[air]
+        return RandomShuffle(zones, positions, self.probability, mixing.reach, mixing.seed, capacities=capacities)
+
     @staticmethod
     def _checked(name: str, value: FloatArray, n: int, limits: tuple[float, float] | None = None) -> FloatArray:
         array = np.asarray(value, dtype=float)
@@ -365,19 +387,3 @@ class Simulator:
                 wanted = f"kelvin from {limits[0]} to {limits[1]}" if limits == PLAUSIBLE else "a flow of zero or more"
             raise ModelError(f"{name}[{where}]: expected {wanted}, came {array[where]}")
         return array
-
-
-def _random_shuffle(
-    network: Any, matrices: Any, air: NDArray[np.int64], probability: float, reach: float | None, seed: int
-) -> RandomShuffle:
-    """Make the shuffle over the air volumes of a network, each zone within one floor."""
-    position = {int(node): i for i, node in enumerate(air)}
-    zones = [
-        np.array([position[int(node)] for node in np.flatnonzero((network.kind == "air") & (network.zone == z))])
-        for z in range(len(network.zones))
-    ]
-    place = network.place[air]
-    spacing = network.spacing
-    positions = place[:, 1:] * spacing if spacing else np.zeros((air.size, 2))
-    capacities = np.asarray(matrices.capacity.diagonal())[air]
-    return RandomShuffle(zones, positions, probability, reach, seed, capacities=capacities)

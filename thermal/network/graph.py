@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from thermal._types import FloatArray, IntArray
 from thermal.errors import ModelError
-from thermal.inputs.drivers import Signal
+from thermal.inputs.signals import Signal
 from thermal.network.network import CapacityClass, ConductanceClass, ThermalNetwork
 from thermal.network.structure import BASELINE, Structure
 from thermal.network.topology import Anatomy

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from thermal._types import FloatArray, IntArray
 from thermal.errors import ModelError
-from thermal.inputs.drivers import Signal
+from thermal.inputs.normalisation import Normalisation
+from thermal.inputs.signals import Signal
 from thermal.network.topology import Anatomy
 from thermal.parameters import Parameter
 
@@ -106,6 +107,9 @@ class ThermalNetwork:
         Sensor nodes by zone number, where a sensor does not read the mean of the air.
     anatomy : Anatomy
         What its volumes and faces are part of.
+    normalisation : Normalisation, optional
+        Constants that the signals are counted by, of the calibration that the model belongs to; None where there is
+        none: a source of inputs then has its own.
     """
 
     zones: tuple[str, ...]
@@ -126,6 +130,7 @@ class ThermalNetwork:
     signals: tuple[Signal, ...] = ()
     readings: Mapping[int, int] = field(default_factory=dict)
     anatomy: Anatomy = field(default_factory=Anatomy)
+    normalisation: Normalisation | None = None
 
     @property
     def n_node(self) -> int:

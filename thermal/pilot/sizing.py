@@ -19,8 +19,8 @@ from thermal.hvac._fan import Fan
 from thermal.hvac._system import HvacSystem
 from thermal.hvac._terminals import Terminals
 from thermal.hvac._thermostat import Thermostat
-from thermal.model.stepper import Stepper
-from thermal.model.symbolic import SymbolicModel
+from thermal.model.matrices import SymbolicModel
+from thermal.model.step import Stepper
 from thermal.network.build import build_network
 from thermal.units import AIR_HEAT_CAPACITY, air_density
 
@@ -151,7 +151,7 @@ def _heat_loss(building: Building, at: DesignConditions) -> FloatArray:
     matrices = SymbolicModel(network).matrices(network.start())
     outside = np.full((matrices.n_boundary, 1), at.winter_outdoor)
     zones = np.full((len(network.zones), 1), at.heating)
-    stepper = Stepper(matrices, _LONG_RUN, airflows=network.airflows)
+    stepper = Stepper(matrices, _LONG_RUN)
     return stepper.hold(at.heating * matrices.uniform[:, None], outside, zones)[2]
 
 

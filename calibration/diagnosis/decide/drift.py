@@ -16,7 +16,7 @@ from calibration.evaluation.n_step import Wanted, predict_runs
 from mpc.reports.page import duration, kelvin
 from thermal._types import FloatArray
 from thermal.model.replay import SPIN_UP, Inputs
-from thermal.model.scheme import IMPLICIT_EULER, Scheme
+from thermal.model.step import IMPLICIT_EULER, Scheme
 
 Kind = Literal["sensors", "random", "persistent", "hump"]
 

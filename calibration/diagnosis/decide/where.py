@@ -14,7 +14,7 @@ from calibration.diagnosis.screen.missing import Missing, at_start, missing_heat
 from calibration.evaluation.n_step import Predictions
 from thermal._types import BoolArray, FloatArray
 from thermal.case.building import FloorPlans
-from thermal.inputs.drivers import Drivers
+from thermal.inputs.provider import InputProvider
 from thermal.network.network import ThermalNetwork
 
 #: Resamples of the days for intervals, and the share of them that an interval holds [-].
@@ -211,7 +211,7 @@ def _spoken(place: str, moment: str) -> str:
     return " ".join(part for part in (f"in {place}" if place else "", when) if part)
 
 
-def _weather(drivers: Drivers) -> dict[str, BoolArray]:
+def _weather(drivers: InputProvider) -> dict[str, BoolArray]:
     """Sun, wind, cold, people: masks over the stamps, shape (n_time,)."""
     found: dict[str, BoolArray] = {}
     if drivers.measured("direct_normal_irradiance_sensor") or drivers.measured("global_horizontal_irradiance_sensor"):

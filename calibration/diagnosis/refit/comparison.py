@@ -25,10 +25,11 @@ from calibration.fit.starts import tuning_runs
 from thermal._types import FloatArray
 from thermal.case.case import Case
 from thermal.effects.catalogue import CATALOGUE, chosen
-from thermal.inputs.drivers import Drivers
+from thermal.inputs.normalisation import fit_normalisation
+from thermal.inputs.provider import InputProvider, telemetry_inputs
+from thermal.model.matrices import SymbolicModel
 from thermal.model.reduce import ReducedModel
 from thermal.model.replay import Inputs, replay_inputs
-from thermal.model.symbolic import SymbolicModel
 from thermal.network.assembly import Blueprint, Extension
 from thermal.network.build import blueprint
 from thermal.network.network import ThermalNetwork
@@ -203,13 +204,16 @@ class Bench:
         if len(judged) < _LEAST_DAYS:
             return False
         self.tuned, self.judged = tuned, judged
+        self.__dict__.pop("drivers", None)  # counted by the days that tune
         return True
 
     @cached_property
-    def drivers(self) -> Drivers:
+    def drivers(self) -> InputProvider:
         """Sun, sky, wind and schedules of the case, and when windows are seen to stand open."""
-        drivers = Drivers(self.case)
-        drivers.openings = seen_openings(drivers, self.settings)
+        drivers = telemetry_inputs(
+            self.case, fit_normalisation(self.case, ((i.start, i.end) for i in self.tuned))
+        )
+        drivers.openings = seen_openings(self.case, drivers, self.settings)
         return drivers
 
     @cached_property

@@ -16,8 +16,8 @@ from scipy.special import log_ndtr
 from calibration.fit.estimate import DRIFT_TOLERANCE
 from calibration.fit.problem import Problem
 from thermal._types import FloatArray
+from thermal.model.matrices import SymbolicModel
 from thermal.model.reduce import FEW_SHIFTS, ReducedModel, reduced_model
-from thermal.model.symbolic import SymbolicModel
 
 #: Longest change of a parameter in a step, in deviations of its prior [-].
 _LONGEST = 1.5

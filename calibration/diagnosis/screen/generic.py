@@ -7,8 +7,9 @@ from functools import partial
 import numpy as np
 
 from thermal._types import FloatArray
-from thermal.effects.effect import CONSTANT, Effect, Joining, strength
-from thermal.inputs.drivers import Drivers, Signal
+from thermal.effects.effect import CONSTANT, Effect, EffectBuilder, strength
+from thermal.inputs.provider import InputProvider
+from thermal.inputs.signals import Signal
 
 #: Hours of a bin of the day.
 _BIN = 3
@@ -19,23 +20,23 @@ _HEAT, _PER_KELVIN = 20.0, 1.0
 _SOURCE = "any cause: loads and losses of offices stay within"
 
 
-def _hours(drivers: Drivers, first: int) -> FloatArray:
+def _hours(drivers: InputProvider, first: int) -> FloatArray:
     hour = np.asarray(drivers.stamps.hour)
     return ((hour >= first) & (hour < first + _BIN)).astype(float)
 
 
-def _outdoor(drivers: Drivers) -> FloatArray:
+def _outdoor(drivers: InputProvider) -> FloatArray:
     return np.asarray(drivers.outdoor - drivers.outdoor.mean())
 
 
-def _build(join: Joining) -> None:
-    outdoor = Signal("outdoor temperature about its mean", "K", _outdoor)
-    for room in join.rooms:
+def _build(builder: EffectBuilder) -> None:
+    outdoor = Signal("outdoor temperature about its mean", "K", _outdoor, ("outdoor",))
+    for room in builder.rooms:
         for first in range(0, 24, _BIN):
             signal = Signal(f"{first} to {first + _BIN} h", "1", partial(_hours, first=first))
-            join.heat_air(room, join.parameter(f"heat_from_{first:02d}"), signal, room.floor_area)
-        join.heat_air(room, join.parameter(ZONE_HEAT, zone=room.name), CONSTANT, room.floor_area)
-        join.heat_air(room, join.parameter("heat_by_outdoor", zone=room.name), outdoor, room.floor_area)
+            builder.heat_air(room, builder.parameter(f"heat_from_{first:02d}"), signal, room.floor_area)
+        builder.heat_air(room, builder.parameter(ZONE_HEAT, zone=room.name), CONSTANT, room.floor_area)
+        builder.heat_air(room, builder.parameter("heat_by_outdoor", zone=room.name), outdoor, room.floor_area)
 
 
 #: Constant heat of a zone [W/m2], by which the smallest detectable watts are told.

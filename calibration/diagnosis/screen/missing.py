@@ -22,7 +22,7 @@ from calibration.evaluation.intervals import Interval
 from thermal._types import FloatArray
 from thermal.model.reduce import ReducedModel, reduced_model
 from thermal.model.replay import SPIN_UP, Inputs
-from thermal.model.scheme import IMPLICIT_EULER, Scheme
+from thermal.model.step import IMPLICIT_EULER, Scheme
 
 #: Telemetry that the size and the course of the missing heat are tuned on [s]: the last four days that were fitted,
 #: of which at most two are a weekend.

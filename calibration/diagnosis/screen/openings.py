@@ -14,10 +14,11 @@ import pandas as pd
 from calibration.estimation.heat_balance import step_balance
 from calibration.evaluation.settings import ModelSettings
 from thermal._types import FloatArray
-from thermal.inputs.drivers import Drivers
+from thermal.case.case import Case
+from thermal.inputs.provider import InputProvider
+from thermal.model.matrices import SymbolicModel
 from thermal.model.reduce import reduced_model
 from thermal.model.replay import Inputs, replay_inputs
-from thermal.model.symbolic import SymbolicModel
 
 #: Deviations within which 90 % of a normal distribution are [-].
 _NINETY = 1.645
@@ -45,24 +46,26 @@ _FREEDOM = 3.0
 _SEEN, _LONGEST, _PRESENT = 100.0, 0.25, 0.75
 
 
-def seen_openings(drivers: Drivers, settings: ModelSettings) -> FloatArray:
+def seen_openings(case: Case, drivers: InputProvider, settings: ModelSettings) -> FloatArray:
     """When a window is seen to stand open before anything is fitted, shape (n_time, n_zone): 1 where one is.
 
     Parameters
     ----------
-    drivers : Drivers
-        Of the case.
+    case : Case
+        With telemetry.
+    drivers : InputProvider
+        Its inputs.
     settings : ModelSettings
         How its model is built.
     """
     if len(drivers.zones) > _MOST_ZONES:
         return np.zeros((len(drivers.stamps), len(drivers.zones)))
-    network = settings.network(drivers.case.building)
+    network = settings.network(case.building)
     theta = np.array([p.start for p in network.parameters])
-    return openings_beyond(SymbolicModel(network), theta, drivers, replay_inputs(drivers.case, network, drivers))
+    return openings_beyond(SymbolicModel(network), theta, drivers, replay_inputs(case, network, drivers))
 
 
-def openings_beyond(grid: SymbolicModel, theta: FloatArray, drivers: Drivers, inputs: Inputs) -> FloatArray:
+def openings_beyond(grid: SymbolicModel, theta: FloatArray, drivers: InputProvider, inputs: Inputs) -> FloatArray:
     """When a window is seen to stand open in heat that is lost beyond a model, shape (n_time, n_zone): 1 where one is.
 
     Parameters
@@ -71,7 +74,7 @@ def openings_beyond(grid: SymbolicModel, theta: FloatArray, drivers: Drivers, in
         The model, whose windows are shut.
     theta : ndarray, shape (n_parameter,)
         Its parameters [parameter units].
-    drivers : Drivers
+    drivers : InputProvider
         Of the case.
     inputs : Inputs
         Its telemetry, as the model takes it.

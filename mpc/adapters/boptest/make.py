@@ -19,8 +19,8 @@ from thermal._types import FloatArray
 from thermal.case.building import Building, Device
 from thermal.case.case import Case
 from thermal.errors import describe
+from thermal.model.matrices import SymbolicModel
 from thermal.model.reduce import reduced_model
-from thermal.model.symbolic import SymbolicModel
 from thermal.network.build import build_network
 from thermal.pilot.building import pilot_building
 from thermal.pilot.sizing import size_system

@@ -12,8 +12,8 @@ from mpc.control.solvers.solution import Status
 from mpc.errors import ControlError
 from thermal._types import BoolArray, FloatArray
 from thermal.errors import describe
-from thermal.inputs.drivers import REFERENCE_TEMPERATURE
 from thermal.model.modal import ModalModel
+from thermal.units import REFERENCE_TEMPERATURE
 
 
 class Observer:

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import cached_property
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -13,37 +12,19 @@ from mpc.errors import ControlError
 from mpc.scenario.forecast import Forecast
 from thermal._types import FloatArray
 from thermal.case.building import Building
-from thermal.case.case import Case
-from thermal.case.points import ZONE_TEMPERATURE
-from thermal.case.quality import QualityReport
-from thermal.case.telemetry import Telemetry
-from thermal.errors import EffectError, describe
-from thermal.inputs.drivers import Drivers
+from thermal.case.points import OUTDOOR_TEMPERATURE
+from thermal.errors import describe
+from thermal.inputs.normalisation import OCCUPANCY, WIND, Normalisation, filled, usual_temperatures
+from thermal.inputs.provider import HVAC_INPUTS, InputProvider
 from thermal.network.network import ThermalNetwork
-
-_OCCUPANCY = "occupancy_count_sensor"
-
-
-class _OnlyMeasured(ControlError):  # noqa: N818 - control flow within this module, never seen outside
-    """A signal is made of heat or air that only the running plant knows."""
-
-
-class _Ahead(Drivers):
-    """Drivers of a forecast, which does not know what the plant will do."""
-
-    def _unknown(self) -> Any:
-        raise _OnlyMeasured
-
-    heat = cached_property(_unknown)
-    supply = cached_property(_unknown)
-    airflow = cached_property(_unknown)
 
 
 class ForecastSignals:
     """Boundaries beside the outdoor air and signals of effects over a horizon, as `MpcController` asks for them.
 
     Signals of heat and air (`flow_gain`, `duct_loss`, `capacity_limit`, `valve_leak`) are not foreseen: they are taken
-    as none, and what they do is found by the observer as unmeasured heat. `left_out` names them.
+    as none, and what they do is found by the observer as unmeasured heat. `left_out` names them. Usual temperatures are
+    those of the network's normalisation, or else the middles of the forecast's comfort bands.
 
     Parameters
     ----------
@@ -52,8 +33,8 @@ class ForecastSignals:
     building : Building
         Where it stands, its zones and its weather station.
     people : float
-        Most people in the building at a time [-]: presence is counted as a share of them. What forecasts say counts
-        from there on, should it be more.
+        Most people in the building at a time [-], where the network's normalisation does not say: presence is counted
+        as a share of them. What forecasts say counts from there on, should it be more.
     boundaries : mapping of str to float, optional
         Temperatures of boundaries beside outdoor, which are taken to stay [K].
 
@@ -94,48 +75,43 @@ class ForecastSignals:
         ControlError
             When the forecast lacks what a signal is made of.
         """
-        n = len(forecast.table)
-        drivers = _Ahead(self._case(forecast))
+        n, inputs = len(forecast.table), self._inputs(forecast)
         values = np.zeros((n, len(self.network.signals)))
         unknown = []
         for k, signal in enumerate(self.network.signals):
-            try:
-                values[:, k] = np.asarray(signal.of(drivers))[-n - 1 : -1]
-            except _OnlyMeasured:
+            if not HVAC_INPUTS.isdisjoint(signal.inputs):
                 unknown.append(signal.name)
-            except EffectError as error:
-                raise ControlError(f"forecast: {error}") from error
+                continue
+            if lacking := inputs.lacks(signal.inputs):
+                raise ControlError(f"forecast: {inputs.why_not(lacking[0])}")
+            values[:, k] = signal.of(inputs)[-n:]
         self.left_out = tuple(unknown)
         others = np.tile(self._others, (len(stamps), 1))
         return np.hstack([others, self._on(pd.DatetimeIndex(forecast.table.index), values, stamps)])
 
-    def _case(self, forecast: Forecast) -> Case:
-        """Make a case of a forecast, after the step before it, and before one in which everybody is in.
-
-        Signals of change need the former; presence is a share of the latter.
-        """
-        table, station, zones = forecast.table, self.building.weather_station, self.building.zone_names
-        points = [str(c) for c in table if str(c).endswith("_sensor") and "/" not in str(c)]
-        columns = {f"{station}/{point}": table[point] for point in points}
-        count = [f"{zone}/{_OCCUPANCY}" for zone in zones if f"{zone}/{_OCCUPANCY}" in table]
-        columns |= {name: table[name] for name in count}
-        for zone in zones:
-            band = [f"{zone}/comfort_{side}_temperature" for side in ("lower", "upper")]
-            if set(band) <= set(table):
-                columns[f"{zone}/{ZONE_TEMPERATURE}"] = table[band].mean(axis=1)
-        frame = pd.DataFrame(columns)
-        step = frame.index[1] - frame.index[0] if len(frame) > 1 else pd.Timedelta(minutes=5)
-        last = frame.iloc[[-1]].set_axis(pd.DatetimeIndex([frame.index[-1] + step]))
-        if count:
-            self.people = max(self.people, float(frame[count].sum(axis=1).max()))
-            last[count] = self.people / len(count)
-        before = self._past.loc[self._past.index == frame.index[0] - step]
-        self._past = pd.concat([self._past, frame])
-        self._past = self._past.loc[~self._past.index.duplicated(keep="last")].tail(2 * len(frame))
-        whole = pd.concat([before, frame, last])
-        whole.index = pd.DatetimeIndex(whole.index, name="timestamp")
-        nothing = QualityReport(whole.index[0], whole.index[-1], step.total_seconds(), len(whole), (), ())
-        return Case(self.building, Telemetry.from_frame(whole, where="forecast"), judged=nothing)
+    def _inputs(self, forecast: Forecast) -> InputProvider:
+        """Make inputs of a forecast and the step before it, which changes need and an earlier forecast had."""
+        table = forecast.table
+        step = table.index[1] - table.index[0] if len(table) > 1 else pd.Timedelta(minutes=5)
+        before = self._past.loc[self._past.index == table.index[0] - step]
+        self._past = pd.concat([self._past, table])
+        self._past = self._past.loc[~self._past.index.duplicated(keep="last")].tail(2 * len(table))
+        table = pd.concat([before, table]) if len(before) else table
+        zones, stamps = self.building.zone_names, pd.DatetimeIndex(table.index)
+        points = {name: filled(table[name]) for name in map(str, table) if "/" not in name and name.endswith("_sensor")}
+        series = points | ({"outdoor": points[OUTDOOR_TEMPERATURE]} if OUTDOOR_TEMPERATURE in points else {})
+        known = self.network.normalisation or Normalisation()
+        if count := [c for zone in zones if (c := f"{zone}/{OCCUPANCY}") in table]:
+            series["people"] = filled(table[count].sum(axis=1, min_count=1))
+            self.people = max(self.people, float(series["people"].max()))
+            known = replace(known, people=self.people if known.people is None else known.people)
+        if not known.usual:
+            bands = {zone: [f"{zone}/comfort_{side}_temperature" for side in ("lower", "upper")] for zone in zones}
+            middles = {zone: table[band].mean(axis=1) for zone, band in bands.items() if set(band) <= set(table)}
+            known = replace(known, usual=usual_temperatures(pd.DataFrame(middles).reindex(columns=list(zones))))
+        if known.wind is None and WIND in points:
+            known = replace(known, wind=float(np.maximum(points[WIND], 0.0).mean()))
+        return InputProvider(self.building, stamps, step.total_seconds(), series, known, "forecast")
 
     @staticmethod
     def _on(index: pd.DatetimeIndex, values: FloatArray, stamps: pd.DatetimeIndex) -> FloatArray:

@@ -14,9 +14,9 @@ from mpc.control.problem.horizon import Horizon, HorizonData
 from mpc.errors import ControlError
 from thermal._types import FloatArray
 from thermal.errors import describe
-from thermal.inputs.drivers import REFERENCE_TEMPERATURE
 from thermal.model.modal import ModalModel
-from thermal.model.scheme import IMPLICIT_EULER, Scheme
+from thermal.model.step import IMPLICIT_EULER, Scheme
+from thermal.units import REFERENCE_TEMPERATURE
 
 #: What a plant can do to a zone.
 HeatQuantity = Literal["heating", "cooling"]

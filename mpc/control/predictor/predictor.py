@@ -14,9 +14,9 @@ from mpc.errors import ControlError
 from thermal._types import FloatArray
 from thermal.errors import describe
 from thermal.hvac._smooth import SmoothHvac
-from thermal.inputs.drivers import REFERENCE_TEMPERATURE
 from thermal.model.modal import ModalModel
-from thermal.model.scheme import IMPLICIT_EULER, Scheme
+from thermal.model.step import IMPLICIT_EULER, Scheme
+from thermal.units import REFERENCE_TEMPERATURE
 
 _SETTLED = 1e-5  # K: what thermostats go by is found to within this
 _NARROW = 0.02  # K: width of a bracket from which on Newton's method is left alone
@@ -347,7 +347,7 @@ class Predictor:
         return Sensitivity(zone, totals[:, 0], totals[:, 1], states)
 
     def heat_content(self, state: FloatArray) -> float:
-        """Heat that the building holds above `thermal.inputs.REFERENCE_TEMPERATURE` [J].
+        """Heat that the building holds above `thermal.units.REFERENCE_TEMPERATURE` [J].
 
         Parameters
         ----------

@@ -238,7 +238,7 @@ class HorizonData:
     previous : ndarray, shape (n_channel,)
         Setpoints that stand now [unit of the channel].
     boundary : ndarray, shape (N, n_boundary)
-        Boundary temperatures, then signals of effects, counted from `thermal.inputs.REFERENCE_TEMPERATURE`
+        Boundary temperatures, then signals of effects, counted from `thermal.units.REFERENCE_TEMPERATURE`
         [signal unit].
     outdoor_temperature, outdoor_humidity : ndarray, shape (N,)
         Of the air that is drawn in [K], [kg/kg].

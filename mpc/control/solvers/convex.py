@@ -18,7 +18,7 @@ from mpc.errors import ControlError
 from mpc.scenario.rates import KILOWATT_HOUR
 from thermal._types import FloatArray
 from thermal.errors import describe
-from thermal.inputs.drivers import REFERENCE_TEMPERATURE
+from thermal.units import REFERENCE_TEMPERATURE
 
 #: Clarabel (interior point) or OSQP (operator splitting, polished).
 QuadraticSolver = Literal["clarabel", "osqp"]

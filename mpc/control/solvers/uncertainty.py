@@ -20,7 +20,7 @@ from mpc.errors import ControlError
 from mpc.scenario.forecast import ErrorGrowth
 from thermal._types import BoolArray, FloatArray
 from thermal.model.modal import ModalModel
-from thermal.model.scheme import IMPLICIT_EULER, Scheme
+from thermal.model.step import IMPLICIT_EULER, Scheme
 
 
 @dataclass(frozen=True, eq=False)

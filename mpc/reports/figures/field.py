@@ -8,10 +8,9 @@ import numpy as np
 import pandas as pd
 
 from thermal._types import FloatArray
+from thermal.model.matrices import SymbolicModel
 from thermal.model.replay import SPIN_UP, Inputs, spin_up
-from thermal.model.scheme import IMPLICIT_EULER, Scheme
-from thermal.model.stepper import Stepper
-from thermal.model.symbolic import SymbolicModel
+from thermal.model.step import IMPLICIT_EULER, Scheme, Stepper
 from thermal.network.network import ThermalNetwork
 
 #: The steppers take temperatures as differences from this one [K], which costs no accuracy.
@@ -73,7 +72,7 @@ def spatial_field(
     begin = max(0, first - round(SPIN_UP / inputs.step))
     states, _ = spin_up(matrices, inputs, begin, np.array([first]))
     states = states - _REFERENCE
-    stepper = Stepper(matrices, inputs.step, scheme, model.network.airflows)
+    stepper = Stepper(matrices, inputs.step, scheme)
     for row in range(first + 1, first + steps + 1):
         boundary = inputs.boundary[row][:, None] - _REFERENCE
         states, *_ = stepper.advance(states, boundary, inputs.heat[row][:, None], inputs.airflow[row][:, None])

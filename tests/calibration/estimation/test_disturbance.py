@@ -16,8 +16,8 @@ from calibration.errors import FilterError
 from calibration.estimation.disturbance import DisturbedSpace
 from calibration.estimation.state_space import state_space
 from thermal import SymbolicModel, build_network, load_bundled_case, reduced_model
-from thermal.model.scheme import EXACT
-from thermal.model.symbolic import Matrices
+from thermal.model.matrices import Matrices
+from thermal.model.step import EXACT
 
 FloatArray = NDArray[np.float64]
 

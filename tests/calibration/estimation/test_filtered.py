@@ -79,7 +79,7 @@ def test_without_a_disturbance_it_is_the_model_alone_from_its_first_spin_up() ->
     matrices = model.matrices(theta)
     states, _ = spin_up(matrices, inputs, begin, np.array([at]))
     last = int(inputs.stamps.get_indexer(predictions.start)[-1])
-    means, _ = free_runs(matrices, model.network, inputs, np.array([at]), last + 72 - at, states)
+    means, _ = free_runs(matrices, inputs, np.array([at]), last + 72 - at, states)
     np.testing.assert_allclose(predictions.simulated[-1, 0], means[0, -1], rtol=0, atol=1e-5)
 
 
@@ -182,6 +182,6 @@ def test_directed_airflows_are_in_the_prediction() -> None:
     matrices = model.matrices(theta)
     states, _ = spin_up(matrices, inputs, 1000 - 3 * 144, np.array([at]))
     steps = int(starts[0]) + 12 - at
-    means, _ = free_runs(matrices, model.network, inputs, np.array([at]), steps, states)
+    means, _ = free_runs(matrices, inputs, np.array([at]), steps, states)
     assert np.abs(found.predictions[0].simulated[0, 0] - means[0, -1]).max() < 2e-3
     assert spatial_metrics(found.predictions[0].error).mae > 0

@@ -11,9 +11,9 @@ import pytest
 from calibration import Interval
 from calibration.estimation.heat_balance import HeatBalance, _heat_fit, _needed_heat, heat_balance
 from thermal import Case, Inputs, SymbolicModel, build_network, load_bundled_case, reduced_model, replay_inputs
+from thermal.model.matrices import Matrices
 from thermal.model.modal_runs import ModalRuns
-from thermal.model.stepper import Stepper
-from thermal.model.symbolic import Matrices
+from thermal.model.step import Stepper
 from thermal.units import AIR_HEAT_CAPACITY
 
 QUIET = 300  # steps at one temperature everywhere, so that the steady start of a spin-up is exact
@@ -39,7 +39,7 @@ def replayed(matrices: Matrices, real: Inputs, airflows: tuple[tuple[int, int], 
     boundary = np.full((LENGTH, n_boundary), LEVEL)
     boundary[QUIET:] += np.cumsum(rng.normal(size=(LENGTH - QUIET, n_boundary)), axis=0)
     airflow = rng.uniform(0.01, 0.05, (LENGTH, len(airflows)))
-    stepper = Stepper(matrices, real.step, airflows=airflows)
+    stepper = Stepper(replace(matrices, airflows=airflows), real.step)
     states = LEVEL * matrices.uniform[:, None]
     zone = np.empty((LENGTH, n_zone))
     for k in range(LENGTH):

@@ -16,8 +16,8 @@ from calibration import DisturbanceModel, KalmanFilter, StateSpace
 from calibration.errors import FilterError
 from calibration.estimation.state_space import state_space
 from thermal import Inputs
-from thermal.model.scheme import EXACT
-from thermal.model.symbolic import Matrices
+from thermal.model.matrices import Matrices
+from thermal.model.step import EXACT
 
 FloatArray = NDArray[np.float64]
 

@@ -62,7 +62,7 @@ def mean(p: InnovationsProblem, theta: FloatArray, number: int) -> FloatArray:
     white, matrices = p.whitenings[number], reduced().matrices(theta)
     starts = np.array([white.at])
     states, _ = spin_up(matrices, p.inputs, white.begin, starts)
-    return np.asarray(free_runs(matrices, reduced().network, p.inputs, starts, white.stop - white.at, states)[0][0])
+    return np.asarray(free_runs(matrices, p.inputs, starts, white.stop - white.at, states)[0][0])
 
 
 def log_likelihood(p: InnovationsProblem, theta: FloatArray, at: FloatArray, inputs: Inputs, number: int = 0) -> float:

@@ -14,7 +14,7 @@ from calibration.estimation.kalman import Filtered
 from calibration.estimation.score import log_likelihood_slopes
 from calibration.estimation.state_space import state_space
 from thermal import Inputs
-from thermal.model.symbolic import Matrices
+from thermal.model.matrices import Matrices
 
 FloatArray = NDArray[np.float64]
 

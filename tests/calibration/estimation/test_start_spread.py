@@ -9,7 +9,7 @@ import pytest
 
 from calibration.estimation.start_spread import BOUNDARY_SPREAD, ZONE_SPREAD, start_spread
 from thermal import SymbolicModel, build_network, load_bundled_case, reduced_model
-from thermal.model.symbolic import Matrices
+from thermal.model.matrices import Matrices
 
 ALL = np.ones(5, dtype=bool)
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import scipy.linalg as sl
@@ -11,10 +13,9 @@ from calibration import StateSpace
 from calibration.errors import CalibrationError, FilterError
 from calibration.estimation.state_space import state_space
 from thermal import ModelError
+from thermal.model.matrices import Matrices
 from thermal.model.modal import modal_model
-from thermal.model.scheme import EXACT, IMPLICIT_EULER, TR_BDF2, Scheme
-from thermal.model.stepper import Stepper
-from thermal.model.symbolic import Matrices
+from thermal.model.step import EXACT, IMPLICIT_EULER, TR_BDF2, Scheme, Stepper
 from thermal.units import AIR_HEAT_CAPACITY
 
 FloatArray = NDArray[np.float64]
@@ -82,7 +83,7 @@ def test_constant_directed_airflows_are_those_of_the_grid_s_stepper(scheme: Sche
     states = 290.0 + np.arange(9.0)[:, None]
     space = state_space(m.modal.modes, 300.0, scheme, airflows=AIRFLOWS, flow=FLOW)
     found = run(space, states, boundary, heat)
-    stepper = Stepper(m, 300.0, scheme, AIRFLOWS)
+    stepper = Stepper(replace(m, airflows=AIRFLOWS), 300.0, scheme)
     for k in range(len(heat)):
         states, mean, _, _ = stepper.advance(states, boundary[k][:, None], heat[k][:, None], FLOW[:, None])
         np.testing.assert_allclose(found[k], mean[:, 0], rtol=0, atol=1e-8)

@@ -17,7 +17,7 @@ from calibration.estimation.kalman import Filtered
 from calibration.estimation.state_space import state_space
 from calibration.estimation.whiteness import Whiteness, whiteness
 from thermal import Inputs
-from thermal.model.symbolic import Matrices
+from thermal.model.matrices import Matrices
 
 FloatArray = NDArray[np.float64]
 

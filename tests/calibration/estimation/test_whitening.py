@@ -25,7 +25,7 @@ from thermal import (
 )
 from thermal.model.reduce import ReducedModel
 from thermal.model.replay import SPIN_UP
-from thermal.model.scheme import IMPLICIT_EULER
+from thermal.model.step import IMPLICIT_EULER
 
 FloatArray = NDArray[np.float64]
 
@@ -64,7 +64,7 @@ def errors_of_a_free_run(white: Whitening, inputs: Inputs) -> FloatArray:
     theta = model().network.start()
     matrices, starts = model().matrices(theta), np.array([white.at])
     states, _ = spin_up(matrices, inputs, white.begin, starts)
-    means, _ = free_runs(matrices, model().network, inputs, starts, white.stop - white.at, states)
+    means, _ = free_runs(matrices, inputs, starts, white.stop - white.at, states)
     return np.asarray(inputs.zone[white.at + 1 : white.stop + 1] - means[0])[..., None]
 
 

@@ -13,7 +13,7 @@ from calibration import Interval, evaluate_model
 from calibration.errors import NotEnoughDataError
 from calibration.evaluation.n_step import HORIZONS, spatial_metrics
 from thermal import Case, Inputs, SymbolicModel, build_network, free_runs, load_bundled_case, replay_inputs, spin_up
-from thermal.model.scheme import TR_BDF2
+from thermal.model.step import TR_BDF2
 
 FloatArray = NDArray[np.float64]
 
@@ -73,7 +73,7 @@ def test_errors_are_those_of_runs_one_by_one() -> None:
     wanted = []
     for start in starts:
         state, _ = spin_up(matrices, inputs, 1200 - 864, np.array([start]))
-        means, _ = free_runs(matrices, model.network, inputs, np.array([start]), 72, state)
+        means, _ = free_runs(matrices, inputs, np.array([start]), 72, state)
         wanted.append(means[0, 71] - inputs.zone[start + 72])
     np.testing.assert_allclose(predictions.error, wanted, rtol=0, atol=1e-9)
     np.testing.assert_allclose(predictions.initial, inputs.zone[starts])

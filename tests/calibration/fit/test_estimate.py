@@ -15,7 +15,7 @@ from calibration.fit.estimate import compensated_start, draw_starts, estimate
 from calibration.fit.problem import Problem, thin
 from thermal import SymbolicModel, build_network, free_runs, load_bundled_case, reduced_model, replay_inputs, spin_up
 from thermal.effects.catalogue import chosen
-from thermal.model.scheme import TR_BDF2
+from thermal.model.step import TR_BDF2
 
 FloatArray = NDArray[np.float64]
 
@@ -61,7 +61,7 @@ def test_residuals_are_half_hourly_errors_of_the_runs() -> None:
     wanted = []
     for runs in p.runs:
         states, _ = spin_up(matrices, p.inputs, runs.begin, runs.starts)
-        means, _ = free_runs(matrices, model.network, p.inputs, runs.starts, 72, states)
+        means, _ = free_runs(matrices, p.inputs, runs.starts, 72, states)
         for run, start in enumerate(runs.starts):
             wanted.append(means[run, p.keep - 1] - p.inputs.zone[start + p.keep])
     np.testing.assert_allclose(np.sort(found), np.sort(np.concatenate(wanted).ravel()), rtol=0, atol=1e-9)

@@ -16,7 +16,7 @@ from calibration.fit.precision import Precision, precision, unexplained
 from calibration.fit.problem import Problem, thin
 from thermal import SymbolicModel, build_network, load_bundled_case, reduced_model, replay_inputs
 from thermal.model.reduce import ReducedModel
-from thermal.model.scheme import IMPLICIT_EULER
+from thermal.model.step import IMPLICIT_EULER
 
 FloatArray = NDArray[np.float64]
 

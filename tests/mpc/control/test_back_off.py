@@ -17,7 +17,7 @@ from mpc.control.solvers.convex import LinearSolver
 from mpc.control.solvers.uncertainty import BackOff, Margin
 from mpc.errors import ControlError
 from mpc.scenario.forecast import ErrorGrowth
-from thermal.model.scheme import IMPLICIT_EULER
+from thermal.model.step import IMPLICIT_EULER
 
 HORIZON = Horizon.regular(2.0, 600.0, 12)
 DRAWS = 500

@@ -17,7 +17,7 @@ from mpc.control.solvers.sequential import SequentialSolver
 from mpc.errors import ControlError
 from mpc.scenario.forecast import Forecast
 from mpc.scenario.tariff import DemandCharge
-from thermal.model.scheme import IMPLICIT_EULER
+from thermal.model.step import IMPLICIT_EULER
 
 START = pd.Timestamp("2023-01-16 06:00", tz="Etc/GMT+8")
 STEP = pd.Timedelta(minutes=5)

@@ -10,7 +10,7 @@ from mpc.control.problem.channels import Channel
 from mpc.control.problem.horizon import Horizon, HorizonData
 from mpc.errors import ControlError
 from thermal.hvac._symbolic import hvac_function
-from thermal.model.scheme import IMPLICIT_EULER
+from thermal.model.step import IMPLICIT_EULER
 
 
 def test_a_rollout_solves_plant_and_building_together(make_problem, make_data, hvac, modes) -> None:

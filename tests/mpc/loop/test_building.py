@@ -10,6 +10,7 @@ from mpc.loop.building import BuildingModel, GridBuilding, zone_response
 from mpc.loop.reduced import ReducedBuilding, reduced_building
 from thermal import Building, Simulator
 from thermal.effects.catalogue import chosen
+from thermal.model.simulator import Shuffle
 
 NONE = np.zeros(0)
 START, COLD = np.full(12, 294.15), np.array([278.15])
@@ -62,7 +63,7 @@ def test_heat_in_is_heat_out_and_kept(building: Building, kind: str) -> None:
     model: BuildingModel = (
         reduced_building(building, dx=1.0)
         if kind == "reduced"
-        else GridBuilding(Simulator(building, dx=1.0, shuffle="random" if kind == "random" else "mean", seed=1))
+        else GridBuilding(Simulator(building, dx=1.0, shuffle=Shuffle("random" if kind == "random" else "mean", seed=1)))
     )
     run(model)
     flows = model.flows()

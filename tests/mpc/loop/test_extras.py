@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from mpc.errors import PlantError
-from mpc.loop.extras import RadiantGains
 from mpc.loop.make import ModelKind, pilot_weather, simulated_plant
 from mpc.loop.reduced import reduced_building
+from mpc.loop.signals import RadiantGains
 from mpc.loop.simulated import SimulatedPlant
 from mpc.scenario.gains import RADIANT_SHARES, InternalGains
 from mpc.scenario.occupancy import RandomOccupancy
@@ -19,7 +19,8 @@ from thermal import Building, build_network
 from thermal.effects.catalogue import CATALOGUE, chosen
 from thermal.errors import EffectError
 from thermal.hvac._system import HvacSystem
-from thermal.inputs.drivers import Drivers, signal_values
+from thermal.inputs.provider import telemetry_inputs
+from thermal.inputs.signals import signal_values
 from thermal.pilot.building import pilot_building
 from thermal.pilot.sizing import size_system
 
@@ -167,4 +168,4 @@ def test_a_building_without_them_is_refused() -> None:
 def test_telemetry_does_not_know_what_radiates() -> None:
     network = build_network(house(), dx=1.0, effects=(RadiantGains(),))
     with pytest.raises(EffectError, match="those of a plant's scenario, found telemetry.*internal_gains"):
-        signal_values(network.signals, Drivers(run().case()))
+        signal_values(network.signals, telemetry_inputs(run().case()))

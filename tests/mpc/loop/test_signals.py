@@ -9,13 +9,13 @@ import pytest
 
 from mpc.errors import PlantError
 from mpc.loop.reduced import reduced_building
-from mpc.loop.signals import EffectSignals
+from mpc.loop.signals import EffectSignals, scenario_inputs
 from mpc.loop.simulated import SimulatedPlant
 from mpc.scenario.scenario import Scenario
 from thermal import Building, build_network
 from thermal.effects.catalogue import chosen
 from thermal.hvac._system import HvacSystem
-from thermal.inputs.drivers import Drivers, signal_values
+from thermal.inputs.signals import signal_values
 from thermal.units import AIR_HEAT_CAPACITY
 
 
@@ -25,7 +25,7 @@ def test_what_the_weather_drives_is_known_in_advance(
     effects, sc = chosen(["solar_gain", "infiltration"]), scenario()
     network = build_network(building, dx=1.0, effects=effects)
     signals = EffectSignals(network, sc, system)
-    expected = signal_values(network.signals, Drivers(sc.driving_case()))
+    expected = signal_values(network.signals, scenario_inputs(sc))
     found = [signals.at(k, np.ones(12), np.ones(12)) for k in (0, 100, 150)]
     np.testing.assert_array_equal(found, expected[[0, 100, 150]])
 

@@ -19,6 +19,7 @@ from mpc.scenario.forecast import Forecaster
 from mpc.scenario.scenario import Scenario
 from thermal import Building, Simulator, load_case, save_case
 from thermal.hvac._system import HvacSystem
+from thermal.model.simulator import Shuffle
 
 Make = Callable[..., SimulatedPlant]
 
@@ -35,7 +36,7 @@ def test_energy_closes_at_every_step_of_a_day(make_plant: Make) -> None:
 
 
 def test_energy_closes_on_the_grid_with_the_random_shuffle(building: Building, make_plant: Make) -> None:
-    plant = make_plant(model=GridBuilding(Simulator(building, dx=1.0, shuffle="random", seed=1)), warm_up_days=0)
+    plant = make_plant(model=GridBuilding(Simulator(building, dx=1.0, shuffle=Shuffle("random", seed=1))), warm_up_days=0)
     plant.reset()
     for _ in range(90):
         plant.step(plant.default_actions)
@@ -69,7 +70,7 @@ def test_a_seed_repeats_bit_for_bit(building: Building, make_plant: Make, kind: 
 
 @pytest.mark.parametrize("kind", ["reduced", "random"])
 def test_a_saved_state_returns_bit_for_bit(building: Building, make_plant: Make, kind: str) -> None:
-    model = None if kind == "reduced" else GridBuilding(Simulator(building, dx=1.0, shuffle="random", seed=2))
+    model = None if kind == "reduced" else GridBuilding(Simulator(building, dx=1.0, shuffle=Shuffle("random", seed=2)))
     plant = make_plant(model=model, noise=SensorNoise(), warm_up_days=0)
     plant.reset(5)
     warm = {name: value + 3.0 for name, value in plant.default_actions.items()}

@@ -9,6 +9,7 @@ import pandas as pd
 import pytest
 
 from mpc.errors import ScenarioError, WeatherError
+from mpc.loop.signals import scenario_inputs
 from mpc.scenario.gains import InternalGains
 from mpc.scenario.grid import StepGrid
 from mpc.scenario.occupancy import ComfortBand, RandomOccupancy
@@ -17,7 +18,6 @@ from mpc.scenario.scenario import Scenario, build_scenario, zone_areas
 from mpc.scenario.weather import Weather
 from mpc.scenario.weather_files import weather_of_case
 from thermal import Building, load_bundled_case
-from thermal.inputs.drivers import Drivers
 
 
 @pytest.fixture(scope="module")
@@ -67,7 +67,7 @@ def test_another_seed_brings_other_people_and_nothing_else(bundled: Scenario) ->
 
 
 def test_effects_find_what_drives_them(bundled: Scenario) -> None:
-    drivers = Drivers(bundled.driving_case())
+    drivers = scenario_inputs(bundled)
     assert np.array_equal(drivers.outdoor, bundled.outdoor)
     assert drivers.sun.normal == pytest.approx(bundled.weather.sun.normal)
     assert drivers.wind == pytest.approx(bundled.weather.values("wind_speed_sensor"))

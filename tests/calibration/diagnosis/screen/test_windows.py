@@ -16,7 +16,7 @@ from calibration.diagnosis.screen.screen import screen
 from calibration.diagnosis.screen.windows import WINDOWS, look_again
 from calibration.evaluation.settings import ModelSettings
 from thermal import Case, Telemetry
-from thermal.inputs.drivers import Drivers
+from thermal.inputs.provider import telemetry_inputs
 from thermal.pilot.building import pilot_building
 from thermal.pilot.twin import TwinRanges, TwinSettings, generate_twin
 from thermal.units import AIR_HEAT_CAPACITY
@@ -38,7 +38,7 @@ def twin() -> Case:
 @cache
 def planted() -> tuple[Case, str, FloatArray]:
     """The twin with a window of its first zone opened once a working day; the zone, and when."""
-    case, drivers, rng = twin(), Drivers(twin()), np.random.default_rng(2)
+    case, drivers, rng = twin(), telemetry_inputs(twin()), np.random.default_rng(2)
     zone = case.building.zone_names[0]
     there = np.flatnonzero(np.diff((drivers.occupancy > 0.5).astype(int)) == 1) + 1
     opened = np.zeros(len(drivers.stamps))

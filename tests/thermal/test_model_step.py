@@ -24,9 +24,9 @@ from thermal import (
 )
 from thermal.case.building import Airflow, Layer, Location, Surface, ZoneEntry
 from thermal.errors import ModelError
-from thermal.model.scheme import IMPLICIT_EULER, SCHEMES, TR_BDF2, Scheme
-from thermal.model.stepper import Stepper, factorise
-from thermal.model.symbolic import Matrices
+from thermal.model.factor import factorise
+from thermal.model.matrices import Matrices
+from thermal.model.step import IMPLICIT_EULER, SCHEMES, TR_BDF2, Scheme, Stepper
 
 FloatArray = NDArray[np.float64]
 
@@ -140,7 +140,7 @@ def test_energy_is_balanced_to_1e_9_of_the_heat_through_the_building(name: str, 
     model = model_of(name)
     network, theta, step = model.network, model.network.start(), 300.0
     matrices = model.matrices(theta)
-    stepper = Stepper(matrices, step, SCHEMES[scheme], network.airflows)
+    stepper = Stepper(matrices, step, SCHEMES[scheme])
     capacity = matrices.capacity.diagonal()
     states = 291.0 + 4.0 * np.random.default_rng(1).random(network.n_node)
     if scheme == "tr_bdf2":  # massless nodes enter its explicit part: begin where they are in balance
@@ -170,7 +170,7 @@ def test_energy_is_balanced_to_1e_9_of_the_heat_through_the_building(name: str, 
 def test_a_building_at_one_temperature_stays_there(name: str, scheme: str) -> None:
     """Boundaries at it, no heat; directed air is at it too."""
     network = model_of(name).network
-    stepper = Stepper(model_of(name).matrices(network.start()), 600.0, SCHEMES[scheme], network.airflows)
+    stepper = Stepper(model_of(name).matrices(network.start()), 600.0, SCHEMES[scheme])
     states = np.full((network.n_node, 1), 291.7)
     airflow = np.full((len(network.airflows), 1), 0.2)
     for _ in range(20):
@@ -195,7 +195,7 @@ def test_directed_airflows_are_those_of_a_dense_solve(name: str, scheme: str) ->
     states = 20.0 + 3.0 * rng.standard_normal((n, runs))
     u, q, f = (x[:runs].T for x in inputs_of(network, runs))
     u = u - 273.15
-    new, mean, _, _ = Stepper(matrices, step, SCHEMES[scheme], network.airflows).advance(states, u, q, f)
+    new, mean, _, _ = Stepper(matrices, step, SCHEMES[scheme]).advance(states, u, q, f)
     for k in range(runs):
         operator = stiffness - directed_matrix(network, f[:, k])
         system, source = capacity + a * step * operator, heating @ q[:, k] - exchange @ u[:, k]
@@ -216,7 +216,7 @@ def test_source_of_a_directed_airflow_loses_nothing_by_it() -> None:
     """Its metered heat already counts the air as leaving; the target alone is warmed, by c_p flow (T_source - T_target)."""
     network = model_of("table").network
     model = model_of("table")
-    stepper = Stepper(model.matrices(network.start()), 1e-3, IMPLICIT_EULER, network.airflows)
+    stepper = Stepper(model.matrices(network.start()), 1e-3, IMPLICIT_EULER)
     states = np.full(network.n_node, 290.0)
     room = np.isin(network.kind, ("air", "radiant", "furniture")) & (network.zone == 0)
     states[room] = 300.0  # zone a
@@ -234,7 +234,7 @@ def test_source_of_a_directed_airflow_loses_nothing_by_it() -> None:
 def test_runs_side_by_side_are_the_runs_alone(scheme: str) -> None:
     model = model_of("table")
     network = model.network
-    stepper = Stepper(model.matrices(network.start(), slopes=True), 300.0, SCHEMES[scheme], network.airflows)
+    stepper = Stepper(model.matrices(network.start(), slopes=True), 300.0, SCHEMES[scheme])
     p = len(network.parameters)
     rng = np.random.default_rng(6)
     states, slopes = 290.0 + rng.random((network.n_node, 2)), rng.random((network.n_node, p * 2))

@@ -1,21 +1,89 @@
-"""One factorisation, many steps: states and their forward sensitivities for many runs at once."""
+"""Time stepping: schemes as stages of one form, and a stepper with one factorisation for many runs at once.
+
+Every stage solves ``(C + a Δt K) T = C (Σ_i w_i T_i) + a Δt (flow-in of the inputs) - b Δt K T_0 ...``; see `Stage`.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
-import scipy.linalg as sl
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from thermal._types import FloatArray
 from thermal.errors import ModelError
-from thermal.model.factor import Elimination, SparseSolver
-from thermal.model.scheme import IMPLICIT_EULER, Scheme, Stage
-from thermal.model.symbolic import Matrices, Matrix
+from thermal.model.factor import Matrix, Pencil, factorise
 from thermal.units import AIR_HEAT_CAPACITY
+
+SchemeName = Literal["implicit_euler", "tr_bdf2", "exact"]
+
+_GAMMA = 2.0 - np.sqrt(2.0)
+
+
+@dataclass(frozen=True)
+class Stage:
+    """``C (T - Σ w_i T_i) = Δt (implicit F(T) + explicit F(T_0))`` with ``F(T) = B u + H q - K T``.
+
+    Parameters
+    ----------
+    weights : tuple of float
+        ``w_i`` of the earlier states (the step's start, then earlier stages); they sum to 1 [-].
+    implicit, explicit : float
+        Coefficients [-].
+    """
+
+    weights: tuple[float, ...]
+    implicit: float
+    explicit: float
+
+
+@dataclass(frozen=True)
+class Scheme:
+    """A one-step method whose stages share one matrix.
+
+    Parameters
+    ----------
+    name : str
+        ``implicit_euler`` (first order), ``tr_bdf2`` (second order, L-stable; Bank et al. 1985,
+        doi:10.1109/T-ED.1985.22232) or ``exact`` (zero-order hold of a reduced model's modes).
+    stages : tuple of Stage
+        In order; the last gives the state at the end of the step. None for ``exact``.
+    mean : tuple of float
+        Quadrature weights of the step's mean over start and stages [-]; they sum to 1. None for ``exact``.
+    """
+
+    name: SchemeName
+    stages: tuple[Stage, ...]
+    mean: tuple[float, ...]
+
+    @property
+    def implicit(self) -> float:
+        """Coefficient of the matrix ``C + implicit Δt K`` [-]."""
+        return self.stages[0].implicit
+
+
+#: First order, as in the paper; with piecewise constant inputs its mean over a step is the trapezoid's.
+IMPLICIT_EULER = Scheme("implicit_euler", (Stage((1.0,), 1.0, 0.0),), (0.5, 0.5))
+
+#: Second order and L-stable.
+TR_BDF2 = Scheme(
+    "tr_bdf2",
+    (
+        Stage((1.0,), _GAMMA / 2.0, _GAMMA / 2.0),
+        Stage((-((1.0 - _GAMMA) ** 2) / (_GAMMA * (2.0 - _GAMMA)), 1.0 / (_GAMMA * (2.0 - _GAMMA))), _GAMMA / 2.0, 0.0),
+    ),
+    (_GAMMA / 2.0, 0.5, (1.0 - _GAMMA) / 2.0),
+)
+
+#: Zero-order hold without any error of time stepping: for the modes of a reduced model, not on the grid.
+EXACT = Scheme("exact", (), ())
+
+#: Schemes of the grid by name.
+SCHEMES: dict[str, Scheme] = {s.name: s for s in (IMPLICIT_EULER, TR_BDF2)}
 
 
 class Stepper:
@@ -27,14 +95,12 @@ class Stepper:
 
     Parameters
     ----------
-    matrices : Matrices
+    matrices : Pencil
         The model at one θ; with slopes when sensitivities are wanted.
     step : float
         Time step [s].
     scheme : Scheme
         Implicit Euler by default.
-    airflows : tuple of (int, int)
-        Source and target zone of each directed airflow.
 
     Raises
     ------
@@ -42,19 +108,12 @@ class Stepper:
         When the matrix of the step cannot be factorised.
     """
 
-    def __init__(
-        self,
-        matrices: Matrices,
-        step: float,
-        scheme: Scheme = IMPLICIT_EULER,
-        airflows: tuple[tuple[int, int], ...] = (),
-    ) -> None:
-        self.matrices, self.step, self.scheme, self.airflows = matrices, step, scheme, airflows
+    def __init__(self, matrices: Pencil, step: float, scheme: Scheme = IMPLICIT_EULER) -> None:
+        self.matrices, self.step, self.scheme = matrices, step, scheme
         n = matrices.n
         self._stiffness = matrices.flow[:, :n]
         self._exchange = matrices.flow[:, n:]
-        system = matrices.capacity + scheme.implicit * step * self._stiffness
-        self._solve = factorise(system)
+        self._solve = factorise(matrices.capacity + scheme.implicit * step * self._stiffness)
         self.n_parameter = len(matrices.flow_slopes)
 
     @cached_property
@@ -235,11 +294,11 @@ class Stepper:
 
     def _mixing(self, airflow: FloatArray | None) -> FloatArray | None:
         """M for each run, shape (m, n_zone, n_zone) [W/K]: air that enters a zone at another zone's temperature."""
-        if airflow is None or not self.airflows:
+        if airflow is None or not self.matrices.airflows:
             return None
         n_zone = self.matrices.observation.shape[0]
         mixing = np.zeros((airflow.shape[1], n_zone, n_zone))
-        for flow, (source, target) in zip(airflow, self.airflows, strict=True):
+        for flow, (source, target) in zip(airflow, self.matrices.airflows, strict=True):
             mixing[:, target, source] += AIR_HEAT_CAPACITY * flow
             mixing[:, target, target] -= AIR_HEAT_CAPACITY * flow
         return mixing
@@ -305,34 +364,3 @@ def _combine(weights: tuple[float, ...], trail: list[FloatArray]) -> FloatArray:
     return np.asarray(total)
 
 
-def factorise(system: Matrix, elimination: Elimination | None = None) -> Callable[[FloatArray], FloatArray]:
-    """Factorise a symmetric positive definite matrix, sparse (SuperLU) or dense (inverse by Cholesky).
-
-    Parameters
-    ----------
-    system : sparse matrix or ndarray, shape (n, n)
-        Matrix of the step [J/K].
-    elimination : Elimination, optional
-        What factorises sparse matrices of its structure, for a few solves each; a step is solved many times.
-
-    Returns
-    -------
-    callable
-        Solves for right-hand sides of shape (n,) or (n, m).
-
-    Raises
-    ------
-    ModelError
-        When it is not positive definite.
-    """
-    try:
-        if sp.issparse(system):
-            return SparseSolver(system) if elimination is None else elimination(system)
-        factor = sl.cho_factor(np.asarray(system))
-        inverse = sl.cho_solve(factor, np.eye(system.shape[0]))
-        return lambda rhs: np.asarray(inverse @ rhs)
-    except (RuntimeError, np.linalg.LinAlgError) as error:
-        raise ModelError(
-            f"the matrix of the step (n = {system.shape[0]}) cannot be factorised: {error}; "
-            "a volume without heat capacity and without any face, or a parameter out of range, does this"
-        ) from error

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from thermal.model.convolution import all_fading_sums, fading_sums, rows_of
+from thermal.model.sensitivities import all_convolution_sums, convolution_sums, rows_of
 
 
 def test_they_are_the_recursion_that_forgets() -> None:
@@ -15,9 +15,9 @@ def test_they_are_the_recursion_that_forgets() -> None:
     for k, pushed in enumerate(drive, 1):
         state = stay[:, None, None] * state + pushed
         wanted[k] = state
-    for end, sums in zip(ends, fading_sums(stay, drive, ends), strict=True):
+    for end, sums in zip(ends, convolution_sums(stay, drive, ends), strict=True):
         np.testing.assert_allclose(sums, wanted[int(end)], rtol=1e-12, atol=1e-13)
-    together = all_fading_sums(stay, drive[:, :, 1], ends)
+    together = all_convolution_sums(stay, drive[:, :, 1], ends)
     np.testing.assert_allclose(together, np.stack([wanted[int(e)][:, :, 1] for e in ends], axis=2), atol=1e-13)
 
 

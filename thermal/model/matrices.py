@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -12,70 +11,14 @@ import scipy.sparse as sp
 
 from thermal._types import FloatArray, IntArray
 from thermal.errors import ModelError
-from thermal.model.factor import Elimination
+from thermal.model.factor import Elimination, Matrix, Pencil
 from thermal.model.modal_runs import ModalRuns
 from thermal.network.network import ConductanceClass, ThermalNetwork
 
-#: A csr_matrix on the grid, an ndarray when reduced; the stubs of scipy cannot type products with such a union.
-Matrix = Any
-
 
 @dataclass(frozen=True)
-class Matrices:
-    """The model at one θ: ``C dT/dt = -K T + B u + H q`` and its derivatives with respect to θ.
-
-    The boundary nodes are the last columns of ``flow = [K, -B]``, so that ``flow @ [T; u]`` is the heat that leaves
-    each volume.
-
-    Parameters
-    ----------
-    capacity : sparse matrix or ndarray, shape (n, n)
-        C [J/K]; diagonal on the grid.
-    flow : sparse matrix or ndarray, shape (n, n + n_boundary)
-        ``[K, -B]`` [W/K].
-    heating : matrix, shape (n, n_zone)
-        H, distribution of a zone's heat; columns sum to 1 on the grid.
-    observation : matrix, shape (n_zone, n)
-        Zone means.
-    uniform : ndarray, shape (n,)
-        The state in which every volume is at 1 K [K].
-    capacity_slopes, flow_slopes : list of matrices
-        dC/dθ_j and d[K, -B]/dθ_j, one a parameter.
-    reading : matrix, shape (n_zone, n), optional
-        What the zones' sensors read where these lag behind; see `output`.
-    n_signal : int
-        How many of the boundary columns, the last ones, are signals of effects.
-    """
-
-    capacity: Matrix
-    flow: Matrix
-    heating: Matrix
-    observation: Matrix
-    uniform: FloatArray
-    capacity_slopes: list[Matrix]
-    flow_slopes: list[Matrix]
-    reading: Matrix = None
-    n_signal: int = 0
-
-    @property
-    def n(self) -> int:
-        """Number of states."""
-        return int(self.flow.shape[0])
-
-    @property
-    def n_boundary(self) -> int:
-        """Number of boundary temperatures and signals."""
-        return int(self.flow.shape[1] - self.flow.shape[0])
-
-    @property
-    def output(self) -> Matrix:
-        """What is compared with telemetry, shape (n_zone, n): the sensors' readings, or the zone means."""
-        return self.observation if self.reading is None else self.reading
-
-    @property
-    def reduced(self) -> bool:
-        """Whether the matrices are dense, those of a reduced model."""
-        return isinstance(self.capacity, np.ndarray)
+class Matrices(Pencil):
+    """The model at one θ, as `Pencil` describes it, with what steps it in its modes."""
 
     @cached_property
     def modal(self) -> ModalRuns:
@@ -108,7 +51,7 @@ class SymbolicModel:
     Examples
     --------
     >>> from thermal.data import load_bundled_case
-    >>> from thermal.model.symbolic import SymbolicModel
+    >>> from thermal.model.matrices import SymbolicModel
     >>> from thermal.network.build import build_network
     >>> model = SymbolicModel(build_network(load_bundled_case().building, dx=1.0))
     >>> model.matrices(model.network.start()).n > 100
@@ -199,6 +142,7 @@ class SymbolicModel:
             flow_slopes=flow_slopes,
             reading=self._reading,
             n_signal=len(self.network.signals),
+            airflows=self.network.airflows,
         )
 
     def source_slopes(self, theta: FloatArray) -> Matrix:

@@ -1,0 +1,387 @@
+"""Inputs of a model by name, unit and time: from telemetry, a scenario, a forecast, or a live feed of rows.
+
+Values stand for the step that ends at their stamp. A source says what it can give (`InputProvider.gives`), and a signal
+of a model what it is made of (`Signal.inputs`), so that nobody has to try.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from functools import cached_property
+
+import numpy as np
+import pandas as pd
+
+from thermal._types import FloatArray
+from thermal.case.building import Building
+from thermal.case.case import Case
+from thermal.errors import EffectError, describe, nearest
+from thermal.inputs.normalisation import (
+    WIND,
+    Normalisation,
+    counted_people,
+    filled,
+    fit_normalisation,
+    supply_air,
+)
+from thermal.inputs.sun import Sun, suffices, sun_of
+
+#: Stefan-Boltzmann constant [W/m2/K4].
+STEFAN_BOLTZMANN = 5.670374419e-8
+
+#: Wind where none is measured [m/s].
+_USUAL_WIND = 3.0
+
+#: Hours of a working day unless occupancy is measured, and how long people take to come and go [h].
+_WORK, _RAMP = (8.0, 18.0), 1.0
+
+#: Points of the weather station that inputs are made of.
+IRRADIANCE, INFRARED = "direct_normal_irradiance_sensor", "horizontal_infrared_irradiance_sensor"
+
+#: Inputs with their units; a ``_rate`` is a change by the hour, of several stamps.
+INPUTS: dict[str, str] = {
+    "outdoor": "K", "wind": "m/s", "sky": "W/m^2", "sun": "W/m^2", "occupancy": "1", "usual": "K", "openings": "1",
+    "through_windows": "K*m/s", "heat": "W", "airflow": "kg/s", "supply_flow": "kg/s", "supply_heat": "W",
+    "radiant_gains": "W", "outdoor_rate": "K/h", "occupancy_rate": "1/h", "heat_rate": "W/h",
+}  # fmt: skip
+
+#: Inputs that depend on what the HVAC system does: telemetry and a running plant know them, nobody else.
+HVAC_INPUTS = frozenset({"heat", "airflow", "supply_flow", "supply_heat", "heat_rate"})
+
+#: Series that inputs are made of where these are not of the same name.
+_SERIES: dict[str, tuple[str, ...]] = {
+    "wind": (WIND,), "sky": (INFRARED, "outdoor"), "sun": (IRRADIANCE,), "through_windows": ("outdoor",),
+    "occupancy": (), "usual": (), "openings": (),
+}  # fmt: skip
+
+
+class InputProvider:
+    """Inputs of a building's models over some steps.
+
+    Parameters
+    ----------
+    building : Building
+        Zones and location.
+    stamps : DatetimeIndex, length n_time
+        Ends of the steps, in the building's time zone.
+    step : float
+        Their length [s].
+    series : mapping of str to ndarray
+        What the source knows, of shape (n_time,) or (n_time, n_zone): points of the weather station; ``outdoor``,
+        ``people`` in the building, ``heat``, ``airflow``, ``supply_flow``, ``supply_heat``, ``radiant_gains`` [units
+        of `INPUTS`].
+    normalisation : Normalisation
+        Constants that some inputs are counted by.
+    source : str
+        What the series are, for messages.
+
+    Attributes
+    ----------
+    openings : ndarray, shape (n_time, n_zone)
+        Whether a window of each zone is seen to stand open: 1 where one is. Telemetry has no window contacts: windows
+        are shut unless a diagnosis sees what they let out, and sets this.
+    """
+
+    def __init__(
+        self,
+        building: Building,
+        stamps: pd.DatetimeIndex,
+        step: float,
+        series: Mapping[str, FloatArray],
+        normalisation: Normalisation,
+        source: str = "telemetry",
+    ) -> None:
+        self.building, self.zones, self.step, self.source = building, building.zone_names, float(step), source
+        self.stamps, self.series, self.normalisation = stamps, series, normalisation
+        self.openings = np.zeros((len(stamps), len(self.zones)))
+
+    def __repr__(self) -> str:
+        known = [name for name in INPUTS if self.gives(name)]
+        return f"{type(self).__name__}({self.source}, {len(self.stamps)} steps of {self.step:g} s, {', '.join(known)})"
+
+    def measured(self, point: str) -> bool:
+        """Whether the weather station has a point, or those that it follows from.
+
+        Parameters
+        ----------
+        point : str
+            Point type. Beam and diffuse irradiance follow from the global one, and from each other with it.
+        """
+        return suffices(self.weather) if point == IRRADIANCE else point in self.series
+
+    def gives(self, name: str) -> bool:
+        """Whether the source has what an input is made of.
+
+        Parameters
+        ----------
+        name : str
+            Of `INPUTS`.
+
+        Raises
+        ------
+        EffectError
+            When there is no such input.
+        """
+        if name not in INPUTS:
+            raise EffectError(describe("input", "a name of `INPUTS`", repr(name), nearest(name, INPUTS)))
+        if name.endswith("_rate"):
+            return len(self.stamps) > 1 and self.gives(name.removesuffix("_rate"))
+        if name in ("usual", "through_windows") and not self.normalisation.usual:
+            return False
+        return all(self.measured(series) for series in _SERIES.get(name, (name,)))
+
+    def lacks(self, names: Iterable[str]) -> tuple[str, ...]:
+        """Name inputs that the source cannot give.
+
+        Parameters
+        ----------
+        names : iterable of str
+            Of `INPUTS`.
+        """
+        return tuple(name for name in names if not self.gives(name))
+
+    def values(self, name: str, unit: str = "", at: pd.DatetimeIndex | None = None) -> FloatArray:
+        """Give an input; of the sun that on the horizontal.
+
+        Parameters
+        ----------
+        name : str
+            Of `INPUTS`.
+        unit : str
+            Which unit it is expected in; any by default.
+        at : DatetimeIndex, optional
+            Stamps; all by default.
+
+        Returns
+        -------
+        ndarray, shape (n_time,) or (n_time, n)
+            Values [unit of `INPUTS`].
+
+        Raises
+        ------
+        EffectError
+            When the source does not have it, in this unit, or at these stamps.
+        """
+        self.need(name)
+        if unit not in ("", INPUTS[name]):
+            raise EffectError(describe(f"input {name}", f"unit {INPUTS[name]}", repr(unit)))
+        found = self.sun.horizontal if name == "sun" else np.asarray(getattr(self, name))
+        if at is None:
+            return found
+        rows = self.stamps.get_indexer(at)
+        if (rows < 0).any():
+            raise EffectError(describe(f"input {name}", f"stamps of the {self.source}", f"{at[rows < 0][0]}"))
+        return np.asarray(found[rows])
+
+    def why_not(self, name: str) -> str:
+        """Say what the source lacks for an input; nothing where it gives it.
+
+        Parameters
+        ----------
+        name : str
+            Of `INPUTS`.
+        """
+        if self.gives(name):
+            return ""
+        lacking = next((s for s in _SERIES.get(name, (name,)) if not self.measured(s)), name)
+        if lacking.endswith("_sensor"):
+            return f"weather station: expected {lacking}, which an effect of the model needs, got none"
+        if name == "radiant_gains":
+            found = f"{self.source}, which knows presence only"
+            return describe("radiant gains", "those of a plant's scenario", found, "use `internal_gains`")
+        return describe(f"input {name}", f"a source that knows {lacking}", f"{self.source}, which does not")
+
+    def need(self, *names: str) -> None:
+        """Refuse to go on without some inputs.
+
+        Parameters
+        ----------
+        *names : str
+            Of `INPUTS`.
+
+        Raises
+        ------
+        EffectError
+            What is lacking, and in what.
+        """
+        for name in self.lacks(names):
+            raise EffectError(self.why_not(name))
+
+    def _given(self, name: str) -> FloatArray:
+        self.need(name)
+        return self.series[name]
+
+    @cached_property
+    def weather(self) -> pd.DataFrame:
+        """Points of the weather station, shape (n_time, n_point) [library's units]."""
+        points = {name: values for name, values in self.series.items() if name.endswith("_sensor")}
+        return pd.DataFrame(points, index=self.stamps)
+
+    @cached_property
+    def outdoor(self) -> FloatArray:
+        """Outdoor temperature, shape (n_time,) [K]."""
+        return self._given("outdoor")
+
+    @cached_property
+    def heat(self) -> FloatArray:
+        """Metered heat of the zones, shape (n_time, n_zone) [W]."""
+        return self._given("heat")
+
+    @cached_property
+    def airflow(self) -> FloatArray:
+        """Directed airflows from zone to zone, shape (n_time, n_airflow) [kg/s]."""
+        return self._given("airflow")
+
+    @cached_property
+    def supply_flow(self) -> FloatArray:
+        """Supply air of the zones, shape (n_time, n_zone) [kg/s]."""
+        return self._given("supply_flow")
+
+    @cached_property
+    def supply_heat(self) -> FloatArray:
+        """Heat of the supply air above the zone's own temperature, shape (n_time, n_zone) [W]."""
+        return self._given("supply_heat")
+
+    @cached_property
+    def radiant_gains(self) -> FloatArray:
+        """Part of the gains of the zones that radiates, shape (n_time, n_zone) [W]."""
+        return self._given("radiant_gains")
+
+    @cached_property
+    def wind(self) -> FloatArray:
+        """Wind speed at the station, shape (n_time,) [m/s]."""
+        self.need("wind")
+        return np.maximum(np.nan_to_num(self.series[WIND]), 0.0)
+
+    @cached_property
+    def sky(self) -> FloatArray:
+        """Longwave from the sky less that of a black body at outdoor temperature, shape (n_time,) [W/m2]; negative."""
+        self.need("sky")
+        return np.asarray(np.nan_to_num(self.series[INFRARED]) - STEFAN_BOLTZMANN * self.outdoor**4)
+
+    @cached_property
+    def sun(self) -> Sun:
+        """Sun's place and irradiances."""
+        self.need("sun")
+        return sun_of(self.building.location, self.stamps, self.step, self.weather)
+
+    @cached_property
+    def usual(self) -> FloatArray:
+        """Zone temperatures as they usually are at that hour of a working day or a day off, (n_time, n_zone) [K]."""
+        self.need("usual")
+        slot = 24 * (self.stamps.day_of_week < 5) + np.asarray(self.stamps.hour)
+        profile = self.normalisation.usual
+        if lacking := [zone for zone in self.zones if zone not in profile]:
+            raise EffectError(describe("usual temperatures", f"zone {lacking[0]!r}", nearest(lacking[0], profile)))
+        return np.asarray(np.array([profile[zone] for zone in self.zones]).T[slot])
+
+    @cached_property
+    def occupancy(self) -> FloatArray:
+        """Presence of people, shape (n_time,): counted over their largest number, or working days from 8 to 18."""
+        most = self.normalisation.people
+        if most is not None and "people" in self.series:
+            people = self.series["people"]
+            return np.asarray(people / most) if most > 0.0 else np.zeros(len(people))
+        middle = self.stamps - pd.Timedelta(seconds=self.step / 2.0)
+        hour = np.asarray(middle.hour + middle.minute / 60.0 + middle.second / 3600.0, dtype=float)
+        rise = np.clip((hour - _WORK[0]) / _RAMP + 0.5, 0.0, 1.0)
+        fall = np.clip((_WORK[1] - hour) / _RAMP + 0.5, 0.0, 1.0)
+        return np.where(middle.day_of_week < 5, rise * fall, 0.0)
+
+    @cached_property
+    def through_windows(self) -> FloatArray:
+        """Air that passes an open window, times how much colder it is outdoor: shape (n_time, n_zone) [K*m/s].
+
+        Flow per area of a window of 1 m height on one side of a room, ``½ (0.001 v² + 0.0035 h |ΔT| + 0.01)^½``
+        (de Gids and Phaff 1982, Air Infiltration Review 4(1), 1-5).
+        """
+        difference = self.outdoor[:, None] - self.usual
+        wind = self.wind if self.gives("wind") else np.full(len(self.stamps), _USUAL_WIND)
+        speed = 0.5 * np.sqrt(0.001 * wind[:, None] ** 2 + 0.0035 * np.abs(difference) + 0.01)
+        return np.asarray(speed * difference)
+
+    @cached_property
+    def outdoor_rate(self) -> FloatArray:
+        """Change of the outdoor temperature, shape (n_time,) [K/h]."""
+        return self._rate("outdoor")
+
+    @cached_property
+    def occupancy_rate(self) -> FloatArray:
+        """Change of the presence of people, shape (n_time,) [1/h]."""
+        return self._rate("occupancy")
+
+    @cached_property
+    def heat_rate(self) -> FloatArray:
+        """Change of the metered heat of the zones, shape (n_time, n_zone) [W/h]."""
+        return self._rate("heat")
+
+    def _rate(self, name: str) -> FloatArray:
+        """Rate of change by central differences [1/h]."""
+        self.need(f"{name}_rate")
+        return np.asarray(np.gradient(getattr(self, name), self.step / 3600.0, axis=0))
+
+
+class LiveInputs(InputProvider):
+    """Inputs of one step at a time, as they are measured; what takes several stamps it cannot give.
+
+    Parameters
+    ----------
+    building : Building
+        Zones and location.
+    step : float
+        Length of a step [s].
+    normalisation : Normalisation
+        Constants that some inputs are counted by.
+
+    Examples
+    --------
+    >>> from thermal.data import load_bundled_case
+    >>> case = load_bundled_case()
+    >>> now = LiveInputs(case.building, case.step, Normalisation())
+    >>> now.put(case.stamps[:1], {"outdoor": np.array([273.15])})
+    >>> now.values("outdoor", "K").tolist(), now.gives("outdoor_rate")
+    ([273.15], False)
+    """
+
+    def __init__(self, building: Building, step: float, normalisation: Normalisation) -> None:
+        super().__init__(building, pd.DatetimeIndex([]), step, {}, normalisation, "live feed")
+
+    def put(self, stamp: pd.DatetimeIndex, row: Mapping[str, FloatArray]) -> None:
+        """Take in a row of the feed in the place of the last one.
+
+        Parameters
+        ----------
+        stamp : DatetimeIndex, length 1
+            End of the step.
+        row : mapping of str to ndarray
+            Series as in `InputProvider`, shape (1,) or (1, n_zone) [units of `INPUTS`].
+        """
+        for name in (*INPUTS, "weather"):
+            self.__dict__.pop(name, None)  # what was made of the last row
+        self.stamps, self.series = stamp, row
+        self.openings = np.zeros((1, len(self.zones)))
+
+
+def telemetry_inputs(case: Case, normalisation: Normalisation | None = None) -> InputProvider:
+    """Make inputs of a case's telemetry, gaps filled by straight lines.
+
+    Parameters
+    ----------
+    case : Case
+        With telemetry.
+    normalisation : Normalisation, optional
+        Of the calibration that its models belong to; fitted on all the telemetry by default, as for files of
+        calibrations that have none.
+    """
+    weather, people, (flow, supplied) = case.weather(), counted_people(case), supply_air(case)
+    series: dict[str, FloatArray] = {
+        str(name): weather[name].interpolate(limit_direction="both").to_numpy(dtype=float)
+        for name in weather
+        if weather[name].notna().any()
+    }
+    series["outdoor"] = filled(case.boundary_temperatures()["outdoor"])
+    series |= {"heat": filled(case.zone_heat()), "airflow": filled(case.airflow_rates())}
+    series |= {"supply_flow": flow.to_numpy(), "supply_heat": supplied.to_numpy()}
+    if people is not None:
+        series["people"] = filled(people)
+    return InputProvider(case.building, case.stamps, case.step, series, normalisation or fit_normalisation(case))
