@@ -15,23 +15,138 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from calibration.estimation.disturbance import DisturbanceModel
-from calibration.estimation.gains import Covariance
-from calibration.estimation.innovations import DISTURBANCE_PRIORS
-from calibration.estimation.whitening import Whitening, whitening
+from calibration.estimation.disturbance import DisturbanceModel, DisturbedSpace
+from calibration.estimation.filtered import FilterSettings, filter_interval, rows_of
+from calibration.estimation.gains import Gain
+from calibration.estimation.innovations import DISTURBANCE_PRIORS, ROUGH_TOLERANCE
 from calibration.evaluation.intervals import Interval
 from calibration.fit.precision import Precision, precision, unexplained
 from calibration.fit.problem import Problem
 from thermal._types import FloatArray
-from thermal.model.replay import SPIN_UP, free_runs, spin_up
+from thermal.model.replay import SPIN_UP, Inputs, free_runs, spin_up
 from thermal.model.symbolic import SymbolicModel
 
 #: Zones beyond which the gains are those of the steady covariance, as in the tuning of the disturbance.
 _MANY_ZONES = 40
 
-#: Stretch of telemetry whose gradients count as independent of those of the next [s]: innovations that are not white,
+#: Length of telemetry whose gradients count as independent of those of the next [s]: innovations that are not white,
 #: as physics that is missing makes them, are correlated over the course of a day.
 _INDEPENDENT = 86400.0
+
+
+@dataclass(frozen=True)
+class Whitening:
+    """The filter of one interval, with its gains, as a linear map on errors of an uncorrected run.
+
+    A Kalman filter is linear: its innovations are those that it makes of the errors of a free run from the same start,
+    as if these were the measurements of a building without any input. Divided by the Cholesky factors of their
+    covariances they are ``Σ^-1/2 e``, where Σ is the covariance of the run's errors under the disturbance, without Σ
+    ever being formed (Durbin and Koopman 2012, Time Series Analysis by State Space Methods, ch. 4.13).
+
+    Parameters
+    ----------
+    begin, at, stop : int
+        Row at which the spin-up begins, row at whose stamp the free run starts, and last row.
+    whole : DisturbedSpace
+        Building and disturbances.
+    corrections : ndarray, shape (n_gain, n, n_zone)
+        What an innovation adds to the states, by every gain that is used [states per K].
+    gain_of : ndarray of int, shape (n_time,)
+        Which of them a step uses.
+    roots : ndarray, shape (n_gain, n_zone, n_zone)
+        Inverse Cholesky factors of the innovations' covariances, zero where nothing is measured [1/K].
+    measured : ndarray of bool, shape (n_time, n_zone)
+        What is measured.
+    log_likelihood : float
+        Of the measurements at the θ that the filter was made at [-].
+    """
+
+    begin: int
+    at: int
+    stop: int
+    whole: DisturbedSpace
+    corrections: FloatArray
+    gain_of: NDArray[np.int64]
+    roots: FloatArray
+    measured: NDArray[np.bool_]
+    log_likelihood: float
+
+    def __call__(self, errors: FloatArray) -> FloatArray:
+        """Whiten columns of errors, (n_count, m) [-], where n_count are the measurements.
+
+        Parameters
+        ----------
+        errors : ndarray, shape (n_time, n_zone, m)
+            Errors of a free run, or their derivatives [K]; what is not measured is passed over.
+        """
+        whole, observe = self.whole, self.whole.observation
+        seen = np.where(self.measured[..., None], errors, 0.0)
+        gaps: NDArray[np.bool_] = np.asarray(~self.measured.all(axis=1))
+        z = np.zeros((whole.n, errors.shape[2]))
+        for k, number in enumerate(self.gain_of):
+            innovation = seen[k] - observe @ z
+            if gaps[k]:
+                innovation[~self.measured[k]] = 0.0
+            seen[k] = innovation
+            z = whole.advance(z + self.corrections[number] @ innovation)
+        order = np.argsort(self.gain_of, kind="stable")
+        for rows in np.split(order, np.flatnonzero(np.diff(self.gain_of[order])) + 1):
+            seen[rows] = self.roots[self.gain_of[rows[0]]] @ seen[rows]
+        return np.asarray(seen[self.measured])
+
+
+def whitening(
+    model: SymbolicModel,
+    theta: FloatArray,
+    inputs: Inputs,
+    interval: Interval,
+    disturbance: DisturbanceModel,
+    settings: FilterSettings,
+) -> Whitening:
+    """Make the filter of one interval at θ.
+
+    Parameters
+    ----------
+    model : SymbolicModel
+        Reduced.
+    theta : ndarray, shape (n_parameter,)
+        Parameter values [parameter units].
+    inputs : Inputs
+        The telemetry.
+    interval : Interval
+        What is filtered, see `filter_interval`.
+    disturbance : DisturbanceModel
+        Unmeasured heat and sensors.
+    settings : FilterSettings
+        Time stepping, covariance and spin-up.
+
+    Raises
+    ------
+    FilterError
+        When the model is not reduced, or the interval too short.
+    """
+    filtered = filter_interval(model, theta, inputs, interval, disturbance, settings)
+    whole, (begin, at, stop) = filtered.kalman.whole, rows_of(inputs, interval, settings)
+    return Whitening(
+        begin,
+        at,
+        stop,
+        whole,
+        np.array([gain.reach @ gain.weight for gain in filtered.gains]),
+        filtered.gain_of,
+        np.array([_root(gain, whole.noise_variance) for gain in filtered.gains]),
+        np.isfinite(inputs.zone[at + 1 : stop + 1]),
+        filtered.log_likelihood,
+    )
+
+
+def _root(gain: Gain, noise: FloatArray) -> FloatArray:
+    """Inverse Cholesky factor of the covariance of what a gain's step measures, zero elsewhere."""
+    chosen = np.flatnonzero(np.diag(gain.weight) > 0.0)
+    block = np.ix_(chosen, chosen)
+    root = np.zeros_like(gain.weight)
+    root[block] = np.linalg.inv(np.linalg.cholesky((gain.seen + np.diag(noise))[block]))
+    return root
 
 
 @dataclass(frozen=True)
@@ -59,7 +174,7 @@ class InnovationsProblem(Problem):
         return True
 
     @property
-    def stretches(self) -> tuple[Interval, ...]:
+    def fitted(self) -> tuple[Interval, ...]:
         """Telemetry that is fitted: the tuning intervals."""
         return self.intervals
 
@@ -83,11 +198,9 @@ class InnovationsProblem(Problem):
             Unmeasured heat and sensors; the medians of their priors by default.
         """
         known = disturbance or DisturbanceModel(**{name: p.median for name, p in DISTURBANCE_PRIORS.items()})
-        covariance: Covariance = "steady" if self.inputs.zone.shape[1] > _MANY_ZONES else "exact"
-        made = (
-            whitening(model, theta, self.inputs, i, known, self.scheme, covariance, self.spin_up_seconds)
-            for i in self.intervals
-        )
+        large = self.inputs.zone.shape[1] > _MANY_ZONES
+        settings = FilterSettings(self.scheme, "steady" if large else "exact", self.spin_up_seconds, ROUGH_TOLERANCE)
+        made = (whitening(model, theta, self.inputs, i, known, settings) for i in self.intervals)
         return replace(self, whitenings=tuple(made))
 
     def residuals(self, model: SymbolicModel, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -143,7 +256,7 @@ class InnovationsProblem(Problem):
         return float(sum(w.measured.sum() for w in self.whitenings)) if self.effective is None else self.effective
 
     def independent(self) -> NDArray[np.int64]:
-        """Tell which independent stretch of telemetry every residual belongs to, shape (n,)."""
+        """Tell which independent interval of telemetry every residual belongs to, shape (n,)."""
         steps = max(1, round(_INDEPENDENT / self.inputs.step))
         rows = [np.broadcast_to(w.at + np.arange(len(w.measured))[:, None], w.measured.shape) for w in self.whitenings]
         return np.concatenate([r[w.measured] // steps for r, w in zip(rows, self.whitenings, strict=True)])
@@ -168,13 +281,13 @@ def _(
     repeat within the day what they pull at. Directions count as far as the data determine them.
     """
     residual, jacobian = problem.turned(model, theta)
-    stretches, index = np.unique(problem.independent(), return_inverse=True)
-    if len(stretches) < 2:
+    parts, index = np.unique(problem.independent(), return_inverse=True)
+    if len(parts) < 2:
         return float(np.mean(residual**2))
-    pulls = np.zeros((len(stretches), jacobian.shape[1]))
+    pulls = np.zeros((len(parts), jacobian.shape[1]))
     np.add.at(pulls, index, residual[:, None] * jacobian)
     curvature = jacobian.T @ jacobian
-    # each stretch has pulled the estimate towards itself
-    score = pulls.T @ pulls * len(stretches) / (len(stretches) - 1)
+    # each interval has pulled the estimate towards itself
+    score = pulls.T @ pulls * len(parts) / (len(parts) - 1)
     prior = np.asarray(np.linalg.inv(problem.prior_covariance()), dtype=float)
     return 1.0 / Precision(curvature, score, prior, residual.size).weight()
