@@ -1,5 +1,6 @@
 """Fidelity: N-step prediction error, calibration by least squares, and what the data determine."""
 
+from calibration.diagnosis.diagnosis import Diagnosis, diagnose
 from calibration.errors import CalibrationError
 from calibration.estimation.disturbance import DisturbanceModel
 from calibration.estimation.heat_balance import heat_balance
@@ -25,6 +26,7 @@ __all__ = [
     "CalibrationResult",
     "CalibrationSettings",
     "CrossValidation",
+    "Diagnosis",
     "DisturbanceModel",
     "Evaluation",
     "Information",
@@ -39,6 +41,7 @@ __all__ = [
     "calibrate",
     "calibrate_many",
     "cross_validate",
+    "diagnose",
     "evaluate_case",
     "evaluate_model",
     "fisher_information",

@@ -96,8 +96,12 @@ class TuningSettings(FilterSettings):
 
     Parameters
     ----------
-    scheme, covariance, spin_up_seconds, tolerance
+    scheme, covariance
         Of the filter, see `FilterSettings`; with ``steady`` the derivatives hold but for the ends of the intervals.
+    spin_up_seconds : float
+        Telemetry before an interval that the spin-up may use [s].
+    tolerance : float
+        See `KalmanFilter` [-].
     per_zone : sequence of str
         What each zone has a number of its own of: ``deviation``, ``sensor_deviation``; both are common by default.
     weights : ndarray, shape (n_zone,), optional

@@ -111,7 +111,11 @@ class CalibrationSettings(ModelSettings):
 
     Parameters
     ----------
-    dx, reach, scheme, scopes, spin_up_seconds, structure, effects
+    dx, reach : float, optional
+        Of the model, see `ModelSettings` [m].
+    spin_up_seconds : float
+        Length of the spin-up before an interval [s].
+    scheme, scopes, structure, effects
         Of the model, see `ModelSettings`.
     fixed : mapping of str to float
         Parameters that keep a given value [parameter units].
@@ -157,13 +161,13 @@ class CalibrationSettings(ModelSettings):
 
 
 def calibration_settings(
-    given: CalibrationSettings | Mapping[str, Any] | None, further: Mapping[str, Any] | None = None
+    given: ModelSettings | Mapping[str, Any] | None, further: Mapping[str, Any] | None = None
 ) -> CalibrationSettings:
     """Make settings of a calibration from values by name, such as a file or a command has.
 
     Parameters
     ----------
-    given : CalibrationSettings, mapping of str to Any, or None
+    given : CalibrationSettings, ModelSettings, mapping of str to Any, or None
         Settings, or values by name; ``effects`` may be their names only, ``structure`` a mapping. None is the defaults.
     further : mapping of str to Any, optional
         Values that replace those.
@@ -174,7 +178,7 @@ def calibration_settings(
         When a name is unknown.
     """
     base = given if isinstance(given, CalibrationSettings) else CalibrationSettings()
-    changes = {**(given if isinstance(given, Mapping) else {}), **(further or {})}
+    changes = {**(vars(given) if isinstance(given, ModelSettings) else given or {}), **(further or {})}
     known = [f.name for f in fields(CalibrationSettings)]
     for name in changes:
         if name not in known:

@@ -12,7 +12,7 @@ from calibration.errors import CalibrationError
 from calibration.evaluation.case_model import CaseModel, GridCheck
 from calibration.evaluation.intervals import Interval, default_intervals, horizon_steps, select_runs
 from calibration.evaluation.n_step import HORIZONS, Evaluation, EvaluationSettings, Progress
-from calibration.evaluation.settings import CalibrationSettings, calibration_settings
+from calibration.evaluation.settings import ModelSettings, calibration_settings
 from calibration.fit.estimate import solve_starts
 from calibration.fit.likelihood import InnovationsProblem
 from calibration.fit.problem import tuning_problem
@@ -27,7 +27,7 @@ def calibrate(
     tune: Sequence[Interval] = (),
     hold_out: Sequence[Interval] = (),
     *,
-    settings: CalibrationSettings | Mapping[str, Any] | None = None,
+    settings: ModelSettings | Mapping[str, Any] | None = None,
     progress: Progress | None = None,
 ) -> CalibrationResult:
     """Fit the physical parameters of a building to its telemetry by least squares.
@@ -62,7 +62,7 @@ def calibrate(
     Examples
     --------
     >>> from thermal.data import load_bundled_case
-    >>> result = calibrate(load_bundled_case(), settings=CalibrationSettings(dx=1.0))
+    >>> result = calibrate(load_bundled_case(), settings={"dx": 1.0})
     >>> result.solver.success
     True
     """

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from calibration.errors import CalibrationError, NotEnoughDataError
 from calibration.evaluation.intervals import Interval, horizon_steps, merge
 from calibration.evaluation.n_step import Evaluation, Progress
-from calibration.evaluation.settings import INTERVALS, CalibrationSettings, calibration_settings
+from calibration.evaluation.settings import INTERVALS, CalibrationSettings, ModelSettings, calibration_settings
 from calibration.fit.calibrate import calibrate
 from calibration.fit.least_squares import INTERRUPTED
 from calibration.fit.result import ParameterEstimate
@@ -128,7 +128,7 @@ class CrossValidation(Result):
 def cross_validate(
     case: Case,
     folds: int = 5,
-    settings: CalibrationSettings | Mapping[str, Any] | None = None,
+    settings: ModelSettings | Mapping[str, Any] | None = None,
     *,
     intervals: Sequence[Interval] = (),
     executor: Executor | None = None,

@@ -20,7 +20,6 @@ from calibration.estimation.filtered import FilterSettings, filter_interval, row
 from calibration.estimation.gains import Gain
 from calibration.estimation.innovations import DISTURBANCE_PRIORS, ROUGH_TOLERANCE
 from calibration.evaluation.intervals import Interval
-from calibration.fit.precision import Precision, precision, unexplained
 from calibration.fit.problem import Problem
 from thermal._types import FloatArray
 from thermal.model.replay import SPIN_UP, Inputs, free_runs, spin_up
@@ -155,6 +154,16 @@ class InnovationsProblem(Problem):
 
     Parameters
     ----------
+    grid, inputs, runs, steps, free, scheme, loss
+        As in `Problem`.
+    start : ndarray, shape (n_parameter,)
+        θ at the start, each in the unit of its parameter [parameter units].
+    deviation : float
+        Standard deviation of a whitened innovation [-].
+    effective : float, optional
+        Effective sample size [-]; the number of innovations by default.
+    shrinkage : mapping of str to float
+        As in `Problem` [-].
     intervals : tuple of Interval
         The tuning intervals.
     whitenings : tuple of Whitening
@@ -260,34 +269,3 @@ class InnovationsProblem(Problem):
         steps = max(1, round(_INDEPENDENT / self.inputs.step))
         rows = [np.broadcast_to(w.at + np.arange(len(w.measured))[:, None], w.measured.shape) for w in self.whitenings]
         return np.concatenate([r[w.measured] // steps for r, w in zip(rows, self.whitenings, strict=True)])
-
-
-@precision.register
-def _(problem: InnovationsProblem, model: SymbolicModel, theta: FloatArray, disturbance: DisturbanceModel) -> Precision:
-    """Curvature of whitened innovations, which is their information too."""
-    jacobian = problem.turned(model, theta)[1]
-    curvature = jacobian.T @ jacobian
-    prior = np.asarray(np.linalg.inv(problem.prior_covariance()), dtype=float)
-    return Precision(curvature, curvature, prior, len(jacobian))
-
-
-@unexplained.register
-def _(
-    problem: InnovationsProblem, model: SymbolicModel, theta: FloatArray, disturbance: DisturbanceModel, seed: int = 0
-) -> float:
-    """Covariance of the gradient, day by day, over that of white innovations [-].
-
-    1 where the disturbance is right; above, innovations are larger than the filter says, or not white, so that they
-    repeat within the day what they pull at. Directions count as far as the data determine them.
-    """
-    residual, jacobian = problem.turned(model, theta)
-    parts, index = np.unique(problem.independent(), return_inverse=True)
-    if len(parts) < 2:
-        return float(np.mean(residual**2))
-    pulls = np.zeros((len(parts), jacobian.shape[1]))
-    np.add.at(pulls, index, residual[:, None] * jacobian)
-    curvature = jacobian.T @ jacobian
-    # each interval has pulled the estimate towards itself
-    score = pulls.T @ pulls * len(parts) / (len(parts) - 1)
-    prior = np.asarray(np.linalg.inv(problem.prior_covariance()), dtype=float)
-    return 1.0 / Precision(curvature, score, prior, residual.size).weight()

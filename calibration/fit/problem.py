@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from calibration.errors import CalibrationError, NotEnoughDataError
 from calibration.estimation.disturbance import DisturbanceModel
 from calibration.evaluation.intervals import Interval, Runs, default_intervals, horizon_steps, merge, select_runs
-from calibration.evaluation.settings import CalibrationSettings, Loss
+from calibration.evaluation.settings import Loss, ModelSettings, calibration_settings
 from thermal._types import FloatArray
 from thermal.case.case import Case
 from thermal.model.replay import LEAST_SPIN_UP, Inputs, free_runs, replay_inputs, spin_up
@@ -311,7 +311,7 @@ class Problem:
         return scale * cost, np.sqrt(0.5 * (1.0 + root)) / root
 
 
-def tuning_problem(case: Case, tune: Sequence[Interval] = (), settings: CalibrationSettings | None = None) -> Problem:
+def tuning_problem(case: Case, tune: Sequence[Interval] = (), settings: ModelSettings | None = None) -> Problem:
     """Make the least-squares problem of a case's tuning intervals.
 
     Parameters
@@ -320,7 +320,7 @@ def tuning_problem(case: Case, tune: Sequence[Interval] = (), settings: Calibrat
         Building and telemetry.
     tune : sequence of Interval
         First two thirds of the telemetry by default.
-    settings : CalibrationSettings, optional
+    settings : CalibrationSettings or ModelSettings, optional
         Model, what is fixed, horizon and loss.
 
     Returns
@@ -333,7 +333,7 @@ def tuning_problem(case: Case, tune: Sequence[Interval] = (), settings: Calibrat
     CalibrationError
         When everything is fixed, or an interval has no usable run.
     """
-    chosen = settings or CalibrationSettings()
+    chosen = calibration_settings(settings)
     network = chosen.network(case.building)
     inputs, given = replay_inputs(case, network), network.values(chosen.fixed)
     free = tuple(i for i, p in enumerate(network.parameters) if p.name not in chosen.fixed)

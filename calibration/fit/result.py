@@ -235,7 +235,7 @@ def describe(
     information : Information
         Of this estimate: a parameter that is known only because priors hold the others is not determined by the data.
     nominal : mapping of str to (float, str)
-        Values that were never estimated, with their units.
+        Values that were never estimated, with their units [that unit].
     """
     deviations = dict(zip(found.problem.free, np.sqrt(np.diag(found.covariance)), strict=True))
     described = describe_parameters(found.problem.grid.network.parameters, found.theta, deviations, nominal)
@@ -260,7 +260,7 @@ def describe_parameters(
     deviations : mapping of int to float
         Standard errors on the estimation scale [-], by position; the others were fixed.
     nominal : mapping of str to (float, str)
-        Values that were never estimated, with their units.
+        Values that were never estimated, with their units [that unit].
     """
     described = [_estimated(p, float(theta[i]), deviations.get(i)) for i, p in enumerate(parameters)]
     for name, (value, unit) in nominal.items():

@@ -150,8 +150,7 @@ class LikelihoodRatio:
     degrees : int
         Difference of the numbers of parameters.
     p_value : float
-        Probability of so much where the small one is true; too large rather than too small, as what the large one
-        adds is at the bound of its range there [-].
+        Probability of so much where the small one is true; rather too large, as what is added is at a bound there [-].
     """
 
     small: str
@@ -178,8 +177,7 @@ class Selection(Result):
     ratios : tuple of LikelihoodRatio
         Of all nested pairs.
     effective_size : float
-        Independent observations n that the tuning residuals of all candidates are taken for: the least that any finds
-        [-].
+        Independent observations n in the tuning residuals, the least that any candidate finds [-].
     preferred : str or None
         None where the data cannot tell.
     against : mapping of str to HeldOutDifference, LikelihoodRatio or str
@@ -195,11 +193,10 @@ class Selection(Result):
 
     def to_dict(self) -> dict[str, Any]:
         """Plain numbers and texts, ready for JSON."""
+        evidence = {c.name: {"log_evidence": c.log_evidence(self.effective_size)} for c in self.candidates}
         return {
             "effective_size": self.effective_size,
-            "candidates": {
-                c.name: c.to_dict() | {"log_evidence": c.log_evidence(self.effective_size)} for c in self.candidates
-            },
+            "candidates": {c.name: c.to_dict() | evidence[c.name] for c in self.candidates},
             "held_out_differences": plain(self.differences),
             "likelihood_ratios": plain(self.ratios),
             "preferred": self.preferred,
@@ -224,7 +221,7 @@ def select_structure(
     structures: Mapping[str, Structure | Mapping[str, Any]],
     tune: Sequence[Interval] = (),
     hold_out: Sequence[Interval] = (),
-    settings: CalibrationSettings | Mapping[str, Any] | None = None,
+    settings: ModelSettings | Mapping[str, Any] | None = None,
     *,
     seed: int = 0,
     executor: Executor | None = None,
@@ -270,7 +267,7 @@ def select_structure(
     if len(structures) < 2:
         raise CalibrationError(f"structures: expected at least two to choose from, came {list(structures)}")
     parts = tuple(tune), tuple(hold_out)
-    tasks = [(case, name, *parts, _settings(settings, structure)) for name, structure in structures.items()]
+    tasks = [(case, name, *parts, _settings(settings, own)) for name, own in structures.items()]
     candidates: list[Candidate] = []
     for candidate in in_order(_candidate, tasks, executor):
         candidates.append(candidate)
@@ -287,10 +284,10 @@ def select_structure(
 
 
 def _settings(
-    common: CalibrationSettings | Mapping[str, Any] | None, structure: Structure | Mapping[str, Any]
+    common: ModelSettings | Mapping[str, Any] | None, own: Structure | Mapping[str, Any]
 ) -> CalibrationSettings:
     """Check and join the settings of one structure."""
-    own = {"structure": structure} if isinstance(structure, Structure) else structure
+    own = {"structure": own} if isinstance(own, Structure) else own
     for name in (*(common if isinstance(common, Mapping) else ()), *own):
         if name in INTERVALS:
             raise CalibrationError(f"structures: {name!r} is the same for all; give it beside the structures")
@@ -339,7 +336,7 @@ def compare_candidates(candidates: Sequence[Candidate], seed: int = 0) -> Select
     tied = [c for c in candidates if c.name not in against]
     for one in tied:
         for other in sorted((c for c in tied if c is not one), key=lambda c: -c.log_evidence(size)):
-            reason = _speaks_against(one, other, ratios, size)
+            reason = _against(one, other, ratios, size)
             if reason is not None:
                 against.setdefault(one.name, reason)
     left = [c.name for c in candidates if c.name not in against]
@@ -369,8 +366,7 @@ def _day_bootstrap(sums: FloatArray, counts: FloatArray, seed: int = 0) -> tuple
     blocks = days / length
     # few blocks spread too little: quantiles further out, as Student's are (Hesterberg 2015)
     tail = float(norm.cdf(-np.sqrt(blocks / (blocks - 1.0)) * t.ppf(0.5 * (1.0 + LEVEL), blocks - 1.0)))
-    rng = np.random.default_rng(seed)
-    begins = rng.integers(0, days, size=(RESAMPLES, -(-days // length)))
+    begins = np.random.default_rng(seed).integers(0, days, size=(RESAMPLES, -(-days // length)))
     rows = ((begins[:, :, None] + np.arange(length)) % days).reshape(RESAMPLES, -1)[:, :days]
     means = sums[rows].sum(axis=1) / counts[rows].sum(axis=1)
     lower, upper = np.quantile(means, [tail, 1.0 - tail])
@@ -396,9 +392,7 @@ def _likelihood_ratio(small: Candidate, large: Candidate, size: float) -> Likeli
     return LikelihoodRatio(small.name, large.name, statistic, degrees, float(chi2.sf(max(0.0, statistic), degrees)))
 
 
-def _speaks_against(
-    one: Candidate, other: Candidate, ratios: Sequence[LikelihoodRatio], size: float
-) -> LikelihoodRatio | str | None:
+def _against(one: Candidate, other: Candidate, ratios: Sequence[LikelihoodRatio], size: float) -> Reason | None:
     """Find what the tuning data hold against one: nested ones by their likelihood ratio, others by the evidence."""
     for r in ratios:
         if {r.small, r.large} == {one.name, other.name}:

@@ -15,7 +15,7 @@ from typing import Any, ClassVar, Literal
 
 from calibration.errors import CalibrationError, ResultsExistError, WorkerLostError
 from calibration.evaluation.intervals import Interval, parse_interval
-from calibration.evaluation.settings import INTERVALS, CalibrationSettings, calibration_settings
+from calibration.evaluation.settings import INTERVALS, CalibrationSettings, ModelSettings, calibration_settings
 from calibration.fit.calibrate import calibrate
 from calibration.fit.least_squares import INTERRUPTED
 from calibration.fit.result import CalibrationResult
@@ -111,7 +111,7 @@ class CaseTask:
     case: Path
     out: Path
     running: Path
-    settings: CalibrationSettings | Mapping[str, Any]
+    settings: ModelSettings | Mapping[str, Any]
     run: str
     attempt: int
     retries: int
@@ -163,7 +163,15 @@ class CaseTask:
         return outcome_of(there, self.out) if there is not None and there["run"] == self.run else None
 
     def unfinished(self, status: Status, error: Exception | None = None) -> CaseOutcome:
-        """Describe an end without results."""
+        """Describe an end without results.
+
+        Parameters
+        ----------
+        status : str
+            One of `Status`.
+        error : Exception, optional
+            What went wrong.
+        """
         bad = status == "failed" and isinstance(error, ThermalError | CalibrationError)
         kind, text = (type(error).__name__, str(error)) if error is not None else (None, None)
         return CaseOutcome(self.name, status, attempts=len(self.starts()), error=kind, message=text, bad_input=bad)
@@ -219,7 +227,7 @@ def _calibrate_one(task: CaseTask) -> CaseOutcome:
 
 
 def split_settings(
-    settings: CalibrationSettings | Mapping[str, Any] | None,
+    settings: ModelSettings | Mapping[str, Any] | None,
 ) -> tuple[dict[str, Sequence[Interval | str]], CalibrationSettings]:
     """Intervals and settings of many calibrations; refuse what `calibrate` does not take.
 
@@ -242,7 +250,7 @@ def split_settings(
     return intervals, calibration_settings({k: v for k, v in settings.items() if k not in intervals})
 
 
-def check_settings(settings: CalibrationSettings | Mapping[str, Any] | None) -> dict[str, Any]:
+def check_settings(settings: ModelSettings | Mapping[str, Any] | None) -> dict[str, Any]:
     """Spell settings as a record does, with their defaults; refuse what `calibrate` does not take.
 
     Parameters

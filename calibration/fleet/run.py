@@ -16,7 +16,7 @@ from typing import Any
 
 from calibration.errors import CalibrationError, ResultsExistError, WorkerLostError
 from calibration.evaluation.n_step import Progress
-from calibration.evaluation.settings import CalibrationSettings
+from calibration.evaluation.settings import ModelSettings
 from calibration.fleet.case import (
     RECORD,
     CaseOutcome,
@@ -60,7 +60,7 @@ def case_folders(folder: str | Path) -> tuple[Path, ...]:
 def calibrate_many(
     cases: Sequence[str | Path],
     out: str | Path,
-    settings: CalibrationSettings | Mapping[str, Any] | None = None,
+    settings: ModelSettings | Mapping[str, Any] | None = None,
     *,
     files: Files = data_files,
     workers: Executor | int | None = None,

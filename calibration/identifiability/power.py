@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from calibration.errors import CalibrationError
 from calibration.evaluation.intervals import Interval
 from calibration.evaluation.n_step import Progress
-from calibration.evaluation.settings import CalibrationSettings
+from calibration.evaluation.settings import ModelSettings, calibration_settings
 from calibration.fit.estimate import draw_starts
 from calibration.fit.problem import FIRST_DEVIATION, Problem, tuning_problem
 from calibration.identifiability.information import DETERMINED, Information, fisher_information, split_jacobian
@@ -99,7 +99,7 @@ class Power(Result):
 def power_of_data(
     case: Case,
     tune: Sequence[Interval] = (),
-    settings: CalibrationSettings | None = None,
+    settings: ModelSettings | None = None,
     *,
     deviation: float | Mapping[str, float] = FIRST_DEVIATION,
     draws: int = DRAWS,
@@ -118,7 +118,7 @@ def power_of_data(
         Building and telemetry.
     tune : sequence of Interval
         First two thirds of the telemetry by default.
-    settings : CalibrationSettings, optional
+    settings : CalibrationSettings or ModelSettings, optional
         Model, what is fixed, horizon, and seed of the draws.
     deviation : float or mapping of str to float
         Standard deviation of the prediction error, for all zones or by zone, others at the default of 0.3 K; of a
@@ -136,13 +136,13 @@ def power_of_data(
     Examples
     --------
     >>> from thermal.data import load_bundled_case
-    >>> power = power_of_data(load_bundled_case(), settings=CalibrationSettings(dx=1.5), draws=0)
+    >>> power = power_of_data(load_bundled_case(), settings=ModelSettings(dx=1.5), draws=0)
     >>> {p.name: p.told for p in power.parameters}["shuffle_probability"]
     'no'
     """
     if draws < 0:
         raise CalibrationError(f"draws: expected at least 0, came {draws}")
-    chosen = settings or CalibrationSettings()
+    chosen = calibration_settings(settings)
     problem = tuning_problem(case, tune, chosen)
     spread = _deviations(problem.grid.network.zones, deviation)
     seen = np.flatnonzero(np.isfinite(problem.inputs.zone).any(axis=0))
