@@ -20,7 +20,9 @@ import pandas as pd
 from calibration.errors import CalibrationError, ResultsExistError
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
+    from matplotlib.axes import Axes as Axes
+else:  # loaded by whoever draws
+    Axes = Any
 
 #: What a file of results is made of: bytes or text as they are, a mapping as JSON, a table as Parquet.
 Content = bytes | str | dict[str, Any] | pd.DataFrame

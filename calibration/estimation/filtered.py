@@ -14,7 +14,7 @@ from calibration.errors import FilterError
 from calibration.estimation.disturbance import DisturbanceModel
 from calibration.estimation.gains import TOLERANCE, Covariance
 from calibration.estimation.kalman import Filtered, KalmanFilter
-from calibration.estimation.state_space import StateSpace, mean_flow, state_space
+from calibration.estimation.state_space import StateSpace, state_space
 from calibration.evaluation.intervals import Interval
 from calibration.evaluation.n_step import Evaluation, EvaluationSettings, Progress, Wanted, evaluate_runs
 from thermal._types import BoolArray, FloatArray
@@ -141,7 +141,7 @@ def prepare(model: SymbolicModel, theta: FloatArray, inputs: Inputs, scheme: Sch
     matrices, airflows = model.matrices(theta), model.network.airflows
     if not matrices.reduced:
         raise FilterError("filter: expected a reduced model, came the grid; see `thermal.reduced_model`")
-    flow = mean_flow(inputs) if airflows else None
+    flow = inputs.airflow[inputs.complete].mean(axis=0) if airflows else None
     return _Prepared(
         matrices, state_space(matrices.modal.modes, inputs.step, scheme, airflows=airflows, flow=flow), inputs
     )

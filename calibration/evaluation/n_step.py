@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -12,15 +12,12 @@ from numpy.typing import NDArray
 
 from calibration.errors import HorizonError, NotEnoughDataError
 from calibration.evaluation.intervals import Interval, Runs, horizon_steps, select_runs
-from calibration.results import Plain, Result
+from calibration.results import Axes, Plain, Result
 from thermal._types import FloatArray
 from thermal.model.replay import SPIN_UP, Inputs, free_runs, spin_up
 from thermal.model.scheme import IMPLICIT_EULER, Scheme
 from thermal.model.symbolic import Matrices, SymbolicModel
 from thermal.network.network import ThermalNetwork
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 #: Called with what is being done, how much is done and how much there is.
 Progress = Callable[[str, int, int], None]

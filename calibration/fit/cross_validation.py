@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor, Future
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 import pandas as pd
@@ -18,14 +18,11 @@ from calibration.evaluation.settings import INTERVALS, CalibrationSettings, Mode
 from calibration.fit.calibrate import calibrate
 from calibration.fit.least_squares import INTERRUPTED
 from calibration.fit.result import ParameterEstimate
-from calibration.results import Plain, Result
+from calibration.results import Axes, Plain, Result
 from thermal.case.case import Case
 from thermal.errors import ThermalError
 from thermal.model.replay import LEAST_SPIN_UP
 from thermal.parameters import PARAMETERS
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 T = TypeVar("T")
 

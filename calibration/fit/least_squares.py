@@ -6,7 +6,7 @@ that is close.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -134,46 +134,22 @@ class _Hessian:
         return np.asarray(jacobian.T @ jacobian + self.curvature)
 
 
-class _Objective(ca.Callback):
-    """``½ r'r`` for Ipopt; its gradient and Hessian come from the same cached residuals."""
+class _Callback(ca.Callback):
+    """A function of x (p,) for Ipopt, whose value has a shape of its own."""
 
-    def __init__(self, cache: _Cache, p: int, order: int) -> None:
+    def __init__(self, name: str, function: Callable[[FloatArray], Any], p: int, *shape: int) -> None:
         ca.Callback.__init__(self)
-        self._residuals, self._p, self._order = cache, p, order
-        self._hessian = _Hessian(p)
-        self._kept: list[ca.Callback] = []  # CasADi holds no reference to the derivatives it is handed
-        self.construct(f"least_squares_{order}", {})
-
-    def get_n_in(self) -> int:
-        return 1 if self._order != 1 else 2
-
-    def get_n_out(self) -> int:
-        return 1
+        self._function, self._p, self._shape = function, p, shape
+        self.construct(name, {})
 
     def get_sparsity_in(self, i: int) -> ca.Sparsity:
-        return ca.Sparsity.dense(self._p, 1) if i == 0 else ca.Sparsity(1, 1)
+        return ca.Sparsity.dense(self._p, 1)
 
     def get_sparsity_out(self, i: int) -> ca.Sparsity:
-        return [ca.Sparsity.dense(1, 1), ca.Sparsity.dense(1, self._p), ca.Sparsity.dense(self._p, self._p)][
-            self._order
-        ]
+        return ca.Sparsity.dense(*self._shape)
 
     def eval(self, arg: Sequence[ca.DM]) -> list[ca.DM]:
-        residual, jacobian = self._residuals(np.array(arg[0], dtype=float).ravel())
-        if self._order == 0:
-            return [ca.DM(0.5 * float(residual @ residual))]
-        if self._order == 1:
-            return [ca.DM((jacobian.T @ residual)[None, :])]
-        return [ca.DM(self._hessian(np.array(arg[0], dtype=float).ravel(), residual, jacobian))]
-
-    def has_jacobian(self) -> bool:
-        return self._order == 0
-
-    def get_jacobian(
-        self, name: str, inames: Sequence[str], onames: Sequence[str], opts: Mapping[str, object]
-    ) -> ca.Function:
-        self._kept.append(_Objective(self._residuals, self._p, 1))
-        return self._kept[-1]
+        return [ca.DM(self._function(np.array(arg[0], dtype=float).ravel()))]
 
 
 def solve_least_squares(
@@ -211,7 +187,10 @@ def solve_least_squares(
     cache = _Cache(function)
     inside = np.clip(start, lower, upper)
     cache(inside)
-    objective, hessian = _Objective(cache, p, 0), _Objective(cache, p, 2)
+    curved = _Hessian(p)
+    value = _Callback("value", lambda x: 0.5 * float(cache(x)[0] @ cache(x)[0]), p, 1, 1)
+    gradient = _Callback("gradient", lambda x: cache(x)[1].T @ cache(x)[0], p, p, 1)
+    hessian = _Callback("hessian", lambda x: curved(x, *cache(x)), p, p, p)
     x, scale, empty = ca.MX.sym("x", p), ca.MX.sym("lam_f"), ca.MX.sym("p", 0)
     lagrangian = ca.Function(
         "nlp_hess_l",
@@ -220,10 +199,12 @@ def solve_least_squares(
         ["x", "p", "lam_f", "lam_g"],
         ["triu_hess_gamma_x_x"],
     )
-    problem: dict[str, Any] = {"x": x, "f": objective(x)}
+    slope = ca.Function("nlp_grad_f", [x, empty], [value(x), gradient(x)], ["x", "p"], ["f", "grad_f_x"])
+    problem: dict[str, Any] = {"x": x, "f": value(x)}
     ipopt = {**_IPOPT, "tol": tolerance, "compl_inf_tol": tolerance, "acceptable_tol": 10 * tolerance}
     options: dict[str, Any] = {
-        "print_time": False, "hess_lag": lagrangian, "ipopt": {**ipopt, "max_iter": iterations}
+        "print_time": False, "no_nlp_grad": True, "grad_f": slope, "hess_lag": lagrangian,
+        "ipopt": {**ipopt, "max_iter": iterations},
     }  # fmt: skip
     solver = ca.nlpsol("least_squares", "ipopt", problem, options)
     try:

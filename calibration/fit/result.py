@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 import pandas as pd
@@ -17,13 +17,10 @@ from calibration.evaluation.n_step import Evaluation
 from calibration.evaluation.settings import ModelSettings, Objective
 from calibration.fit.estimate import Estimate
 from calibration.identifiability.information import DETERMINED, Information
-from calibration.results import Plain, Result, draw_rows, plain
+from calibration.results import Axes, Plain, Result, draw_rows, plain
 from thermal._types import FloatArray
 from thermal.effects.catalogue import CATALOGUE
 from thermal.parameters import Parameter
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 #: A bound counts as hit within this share of the range, on the estimation scale [-].
 BOUND_SHARE = 0.01

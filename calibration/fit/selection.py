@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import asdict, dataclass, field, replace
 from itertools import combinations
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 import pandas as pd
@@ -23,14 +23,11 @@ from calibration.fit.least_squares import INTERRUPTED
 from calibration.fit.precision import precision
 from calibration.fit.problem import tuning_problem
 from calibration.identifiability.information import InformationSearch, split_jacobian
-from calibration.results import Plain, Result, draw_rows, plain
+from calibration.results import Axes, Plain, Result, draw_rows, plain
 from thermal._types import FloatArray
 from thermal.case.case import Case
 from thermal.model.reduce import reduced_model
 from thermal.network.structure import Structure
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 #: Confidence of the interval of a difference of held-out errors [-].
 LEVEL = 0.90

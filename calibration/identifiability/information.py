@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from itertools import combinations
 from math import comb
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 import pandas as pd
@@ -15,13 +15,10 @@ from scipy.linalg import solve_triangular
 
 from calibration.fit.estimate import Estimate
 from calibration.fit.problem import Problem
-from calibration.results import Plain, Result, draw_rows, plain
+from calibration.results import Axes, Plain, Result, draw_rows, plain
 from thermal._types import FloatArray
 from thermal.model.symbolic import SymbolicModel
 from thermal.parameters import Parameter
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 #: A parameter, or a combination, is determined when the data at least halve the deviation of its prior [-]; above the
 #: second ratio of posterior to prior deviation the data tell nothing of a parameter [-].

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 import pandas as pd
@@ -17,15 +17,12 @@ from calibration.evaluation.settings import ModelSettings, calibration_settings
 from calibration.fit.estimate import draw_starts
 from calibration.fit.problem import FIRST_DEVIATION, Problem, tuning_problem
 from calibration.identifiability.information import DETERMINED, Information, fisher_information, split_jacobian
-from calibration.results import Plain, Result, draw_rows
+from calibration.results import Axes, Plain, Result, draw_rows
 from thermal._types import FloatArray
 from thermal.case.case import Case
 from thermal.errors import nearest
 from thermal.model.reduce import reduced_model
 from thermal.model.symbolic import SymbolicModel
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 #: Draws of the parameters beside their start, from the prior at half its spread as the starts of a calibration are.
 DRAWS = 4

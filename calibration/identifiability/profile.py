@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -14,15 +14,12 @@ from calibration.errors import CalibrationError
 from calibration.evaluation.n_step import Progress
 from calibration.fit.estimate import Estimate
 from calibration.fit.least_squares import solve_damped
-from calibration.results import Result, plain
+from calibration.results import Axes, Result, plain
 from thermal._types import FloatArray
 from thermal.errors import nearest
 from thermal.model.reduce import ReducedModel, reduced_model
 from thermal.model.symbolic import SymbolicModel
 from thermal.parameters import Parameter
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 #: Confidence levels of the intervals [-].
 LEVELS = (0.90, 0.95)
