@@ -29,9 +29,9 @@ from _code import code
 from _paper_search import EVALUATIONS, RANGES, Search, bayesian_search, sobol_search, theta, values
 from numpy.typing import NDArray
 
-from calibration import CalibrationResult, Interval, ModelSettings, calibrate, evaluate_model
+from calibration import CalibrationResult, CalibrationSettings, Interval, ModelSettings, calibrate, evaluate_model
 from calibration.evaluation.intervals import default_intervals, horizon_steps
-from calibration.evaluation.n_step import spatial_metrics
+from calibration.evaluation.n_step import EvaluationSettings, spatial_metrics
 from thermal import Case, Inputs, Structure, SymbolicModel, free_runs, load_case, replay_inputs, spin_up
 from thermal.model.matrices import Matrices
 from thermal.model.replay import SPIN_UP
@@ -141,7 +141,8 @@ class Bench:
         own = {} if tuning == self.intervals.tuning else {"horizon": whole_hours(tuning[0])}
         with counted() as seen:
             began = Clock()
-            result = calibrate(self.case, tuning, self.intervals.held_out, seed=self.study.seed, **own)
+            settings = CalibrationSettings(seed=self.study.seed, **own)
+            result = calibrate(self.case, tuning, self.intervals.held_out, settings=settings)
             cost = {"evaluations": len(seen), **began.seconds()}
         estimated = [p for p in result.parameters if p.standard_error is not None]
         return self.row(
@@ -163,7 +164,8 @@ class Bench:
             key: spatial_metrics(run_error(grid, matrices, self.inputs, start)).to_dict()
             for key, start in self.intervals.starts.items()
         }
-        judged = evaluate_model(grid, at, self.inputs, self.intervals.held_out, HORIZON, scheme=SCHEME)
+        runs = EvaluationSettings(HORIZON, scheme=SCHEME)
+        judged = evaluate_model(grid, at, self.inputs, self.intervals.held_out, runs)
         names = [p.name for p in grid.network.parameters]
         return {
             "method": name,

@@ -23,7 +23,7 @@ from typing import ClassVar
 import pandas as pd
 from _site import POLICIES, Site, Week, World
 
-from calibration import calibrate
+from calibration import CalibrationSettings, calibrate
 from calibration.diagnosis.diagnosis import diagnose
 from mpc.baselines.guideline36 import Guideline36
 from mpc.baselines.rules import OutdoorReset, day_schedule
@@ -220,7 +220,7 @@ class OfficeSite(Site):
         """Record telemetry, calibrate and diagnose; keeps both models in `policies`."""
         case = commissioning()
         self.policies.mkdir(parents=True, exist_ok=True)
-        baseline = calibrate(case, dx=DX)
+        baseline = calibrate(case, settings=CalibrationSettings(dx=DX))
         model_file("before").write_text(json.dumps(baseline.to_dict(), indent=1) + "\n", encoding="utf-8")
         write_diagnosis(diagnose(case, dx=DX), case, work / self.key, force=True)
         shutil.copyfile(work / self.key / "calibration.json", model_file("after"))

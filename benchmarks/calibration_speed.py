@@ -19,7 +19,7 @@ from typing import Any
 from _table import ROOT, markdown, write
 from simulator_speed import PARAMETERS
 
-from calibration import CalibrationResult, calibrate
+from calibration import CalibrationResult, CalibrationSettings, calibrate
 from thermal import build_network, load_case
 from thermal.data import bundled_case_path
 
@@ -38,7 +38,7 @@ def measure(path: Path) -> list[dict[str, Any]]:
     rows = []
     for fixed in (rest, {}):
         wall, cpu = time.perf_counter(), time.process_time()
-        result = calibrate(case, fixed=fixed)
+        result = calibrate(case, settings=CalibrationSettings(fixed=fixed))
         times = {"wall": time.perf_counter() - wall, "cpu": time.process_time() - cpu}
         rows.append({"parameters": len(parameters) - len(fixed), "fixed": sorted(fixed), **times, **summary(result)})
     return rows

@@ -33,8 +33,9 @@ from typing import Any
 from _table import markdown, write
 
 from calibration import calibrate_many
-from calibration.fleet.record import CaseOutcome
+from calibration.fleet.case import CaseOutcome
 from calibration.fleet.run import case_folders
+from mpc.reports.calibration import calibration_files
 from thermal.pilot.pilot import PilotSettings, generate_pilot
 
 BUILDINGS = 40
@@ -102,8 +103,9 @@ def measure(
         wall, cpu, busy = time.perf_counter(), own_seconds(), machine_seconds()
         with pool as executor:
             outcomes = calibrate_many(
-                case_folders(cases), out, executor=executor, workers=workers, progress=Kill(out) if kill else None
-            )
+                case_folders(cases), out, files=calibration_files, workers=executor or workers,
+                progress=Kill(out) if kill else None,
+            )  # fmt: skip
         wall = time.perf_counter() - wall
         cpu, busy = own_seconds() - cpu, machine_seconds() - busy
         kept = {o.case for o in outcomes if (out / o.case / "calibration.json").is_file()}

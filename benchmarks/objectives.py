@@ -12,7 +12,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 from _table import ROOT, markdown, write
 
-from calibration import CalibrationResult, calibrate
+from calibration import CalibrationResult, CalibrationSettings, calibrate
 from thermal import Case, load_case
 from thermal.pilot.twin import TwinSettings, TwinTruth, generate_twin
 
@@ -42,7 +42,7 @@ def recovered(result: CalibrationResult, truth: TwinTruth) -> dict[str, float | 
 def measure(case: Case, name: str, truth: TwinTruth | None, objective: Objective, **settings: Any) -> dict[str, Any]:
     """Calibrate one case by one objective."""
     began = time.process_time()
-    result = calibrate(case, objective=objective, **settings)
+    result = calibrate(case, settings=CalibrationSettings(objective=objective, **settings))
     seconds = time.process_time() - began
     estimated = [p for p in result.parameters if p.standard_error is not None]
     return {

@@ -40,7 +40,7 @@ from _code import code
 from _recovery_tables import report
 from _table import publish, write
 
-from calibration import CalibrationResult, calibrate, evaluate_case
+from calibration import CalibrationResult, CalibrationSettings, calibrate, evaluate_case
 from calibration.fit.result import ParameterEstimate
 from thermal import Building, Case, Parameter, load_case
 from thermal.pilot.building import devices, generate_office
@@ -88,7 +88,7 @@ def measure(study: Study, seed: int) -> dict[str, Any]:
         began = time.perf_counter()
         case, truth = study.twin(seed)
         made = time.perf_counter()
-        result = calibrate(case, dx=study.dx, seed=seed)
+        result = calibrate(case, settings=CalibrationSettings(dx=study.dx, seed=seed))
         done = time.perf_counter()
         line |= summary(result, truth)
         line["conditions"]["excitation"] = study.excitation_of(seed)

@@ -1,4 +1,4 @@
-"""Folders of results: refused when they hold something, and written whole or not at all."""
+"""Results as plain values, tables and figures, and folders of them, written whole or not at all."""
 
 from __future__ import annotations
 
@@ -6,16 +6,94 @@ import json
 import math
 import os
 import tempfile
+from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
+from dataclasses import fields, is_dataclass
 from datetime import date
 from pathlib import Path, PurePath
-from typing import Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 import pandas as pd
 
 from calibration.errors import CalibrationError, ResultsExistError
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes as Axes
+else:  # loaded by whoever draws
+    Axes = Any
+
+#: What a file of results is made of: bytes or text as they are, a mapping as JSON, a table as Parquet.
+Content = bytes | str | dict[str, Any] | pd.DataFrame
+
+
+class Plain:
+    """A dataclass whose fields go into a file by their names."""
+
+    #: Field by which one of several stands in a mapping; None where they are a list.
+    key: ClassVar[str | None] = None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Values by name, ready for JSON."""
+        return {k: v for k, v in _fields(self).items() if k != self.key}
+
+
+class Result(Plain, ABC):
+    """A dataclass that shows itself: in a line, as a table, and as a figure."""
+
+    @abstractmethod
+    def to_frame(self) -> pd.DataFrame:
+        """Tabulate the main numbers."""
+
+    @abstractmethod
+    def _summary(self) -> str:
+        """Say the main numbers in a line."""
+
+    @abstractmethod
+    def _draw(self, axes: Axes) -> None:
+        """Draw the main numbers."""
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__}: {self._summary()}>"
+
+    def _repr_html_(self) -> str:
+        table = self.to_frame().to_html(float_format="{:.4g}".format, max_rows=30, na_rep="")
+        return f"<p>{type(self).__name__}: {self._summary()}</p>{table}"
+
+    def plot(self, axes: Axes | None = None) -> Axes:
+        """Draw the main numbers.
+
+        Parameters
+        ----------
+        axes : Axes, optional
+            Where to draw; axes of a new figure by default.
+        """
+        if axes is None:
+            from matplotlib import pyplot
+
+            axes = pyplot.figure(layout="constrained").subplots()
+        self._draw(axes)
+        return axes
+
+
+def draw_rows(axes: Axes, table: pd.DataFrame, label: str) -> None:
+    """Draw a value a row with its interval.
+
+    Parameters
+    ----------
+    axes : Axes
+        Where to draw.
+    table : DataFrame
+        Names of the rows as index; columns value, lower and upper end, NaN where there is no interval.
+    label : str
+        Of the values, with their unit.
+    """
+    value, lower, upper = table.to_numpy(dtype=float).T
+    rows = np.arange(len(table))[::-1]
+    axes.errorbar(value, rows, xerr=np.nan_to_num([value - lower, upper - value]).clip(0.0), fmt="o", capsize=2.0)
+    axes.set_yticks(rows, labels=[str(name) for name in table.index])
+    axes.set_xlabel(label)
 
 
 def check_results_folder(out: str | Path, force: bool = False) -> Path:
@@ -58,9 +136,7 @@ def check_results_folder(out: str | Path, force: bool = False) -> Path:
     return folder
 
 
-def write_results(
-    out: str | Path, files: Mapping[str, bytes | str | dict[str, Any] | pd.DataFrame], force: bool = False
-) -> Path:
+def write_results(out: str | Path, files: Mapping[str, Content], force: bool = False) -> Path:
     """Write the files of one result, whole or not at all.
 
     Everything is written beside the folder first and moved there at the end, so a failure leaves what was there before.
@@ -116,16 +192,27 @@ def to_json(content: Mapping[str, Any]) -> str:
     >>> to_json({"mae": float("nan")})
     '{\n  "mae": null\n}'
     """
-    return json.dumps(_plain(content), indent=2, ensure_ascii=False, allow_nan=False)
+    return json.dumps(plain(content), indent=2, ensure_ascii=False, allow_nan=False)
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
+    """Make plain values of data: dataclasses and mappings become dicts, NaN and infinities None.
+
+    Parameters
+    ----------
+    value : Any
+        Plain types, numpy numbers and arrays, times, paths, dataclasses, and mappings and sequences of them; entries of
+        a sequence that have a `Plain.key` stand in a mapping by it.
+    """
+    if is_dataclass(value) and not isinstance(value, type):
+        to_dict = getattr(value, "to_dict", None)
+        return _fields(value) if to_dict is None else to_dict()
     if isinstance(value, Mapping):
-        return {str(key): _plain(entry) for key, entry in value.items()}
+        return {str(key): plain(entry) for key, entry in value.items()}
     if isinstance(value, np.ndarray):
-        return _plain(value.tolist())
+        return plain(value.tolist())
     if isinstance(value, np.generic):
-        return _plain(value.item())
+        return plain(value.item())
     if value is pd.NaT:
         return None
     if isinstance(value, date):
@@ -135,11 +222,18 @@ def _plain(value: Any) -> Any:
     if isinstance(value, PurePath):
         return str(value)
     if isinstance(value, Iterable) and not isinstance(value, str | bytes):
-        return [_plain(entry) for entry in value]
+        entries = list(value)
+        if entries and all(isinstance(entry, Plain) and entry.key for entry in entries):
+            return {getattr(entry, entry.key): plain(entry) for entry in entries}
+        return [plain(entry) for entry in entries]
     return value
 
 
-def _write(path: Path, content: bytes | str | dict[str, Any] | pd.DataFrame) -> None:
+def _fields(value: Any) -> dict[str, Any]:
+    return {f.name: plain(getattr(value, f.name)) for f in fields(value)}
+
+
+def _write(path: Path, content: Content) -> None:
     if isinstance(content, pd.DataFrame):
         if isinstance(content.index, pd.DatetimeIndex) and content.index.tz is None:
             raise TypeError(f"{path.name}: expected stamps with a time zone, came an index without one")

@@ -2,14 +2,14 @@
 
 import sys
 
-from calibration import CalibrationResult, calibrate
+from calibration import CalibrationResult, CalibrationSettings, calibrate
 from thermal import load_bundled_case, load_case
 
 
 def run(path: str | None = None, dx: float | None = None) -> CalibrationResult:
     """Calibrate a case folder, or the bundled case when no path is given."""
     case = load_case(path) if path else load_bundled_case()
-    return calibrate(case, dx=dx)
+    return calibrate(case, settings=CalibrationSettings(dx=dx))
 
 
 if __name__ == "__main__":

@@ -10,7 +10,7 @@ import pandas as pd
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from calibration.estimation.filtered import rows_of
+from calibration.estimation.filtered import FilterSettings, rows_of
 from calibration.estimation.state_space import REFERENCE
 from calibration.evaluation.intervals import Interval
 from thermal._types import FloatArray
@@ -161,7 +161,7 @@ def heat_balance(
     """
     matrices, parts = model.matrices(theta), []
     for interval in intervals:
-        begin, at, stop = rows_of(inputs, interval, spin_up_seconds, "exact")
+        begin, at, stop = rows_of(inputs, interval, FilterSettings(spin_up_seconds=spin_up_seconds))
         rows = np.arange(at + 1, stop + 1)
         steps = _step_balance(matrices, inputs, begin, rows, model.network.airflows)
         parts.append(hourly_means(inputs.stamps[rows], inputs.step, *steps))

@@ -3,25 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, field
 
 import numpy as np
 import scipy.optimize as so
 
 from calibration.errors import FilterError
 from calibration.estimation.disturbance import DisturbanceModel
-from calibration.estimation.filtered import prepare, rows_of
-from calibration.estimation.gains import Covariance
+from calibration.estimation.filtered import FilterSettings, prepare, rows_of
 from calibration.estimation.kalman import Filtered, KalmanFilter
-from calibration.estimation.score import log_likelihood_slopes
+from calibration.estimation.smoother import log_likelihood_slopes
 from calibration.estimation.state_space import StateSpace
 from calibration.evaluation.intervals import Interval
 from calibration.evaluation.n_step import Progress
+from calibration.results import Plain
 from thermal._types import FloatArray
 from thermal.model.matrices import SymbolicModel
-from thermal.model.replay import SPIN_UP, Inputs
-from thermal.model.step import IMPLICIT_EULER, Scheme
+from thermal.model.replay import Inputs
+from thermal.network.network import ThermalNetwork
 
 
 @dataclass(frozen=True)
@@ -77,9 +76,9 @@ EVALUATIONS = 200
 #: Gain of log-likelihood in an iteration below which the optimiser stops [-].
 _GAIN = 0.01
 
-#: Relative change of a variance in a step below which it counts as steady while tuning [-]: log-likelihoods are then
-#: right to a tenth.
-_TOLERANCE = 1e-5
+#: Relative change of a variance in a step below which it counts as steady in a fit [-]: log-likelihoods are then right
+#: to a tenth.
+ROUGH_TOLERANCE = 1e-5
 
 #: Distance of a logarithm from a limit at which it counts as on it [-].
 _AT_BOUND = 1e-3
@@ -92,7 +91,42 @@ _WIDEST = 10.0
 
 
 @dataclass(frozen=True)
-class TunedDisturbance:
+class TuningSettings(FilterSettings):
+    """How the disturbance is tuned.
+
+    Parameters
+    ----------
+    scheme, covariance
+        Of the filter, see `FilterSettings`; with ``steady`` the derivatives hold but for the ends of the intervals.
+    spin_up_seconds : float
+        Telemetry before an interval that the spin-up may use [s].
+    tolerance : float
+        See `KalmanFilter` [-].
+    per_zone : sequence of str
+        What each zone has a number of its own of: ``deviation``, ``sensor_deviation``; both are common by default.
+    weights : ndarray, shape (n_zone,), optional
+        Deviations of the zones in proportion to each other, such as floor areas [any unit]; equal by default.
+    time_constant : float, optional
+        Keep the time constant at this value [s]; infinite for a random walk.
+    priors : mapping of str to DisturbancePrior
+        Of ``deviation`` (that of a zone of mean weight), ``time_constant`` and ``sensor_deviation``.
+    start : DisturbanceModel, optional
+        Where to start, such as what was found at a θ close by; the medians of the priors by default.
+    curvature : bool
+        Whether the spread of the numbers is wanted: it takes one evaluation more for each.
+    """
+
+    tolerance: float = ROUGH_TOLERANCE
+    per_zone: Sequence[str] = ()
+    weights: FloatArray | None = None
+    time_constant: float | None = None
+    priors: Mapping[str, DisturbancePrior] = field(default_factory=lambda: DISTURBANCE_PRIORS)
+    start: DisturbanceModel | None = None
+    curvature: bool = True
+
+
+@dataclass(frozen=True)
+class TunedDisturbance(Plain):
     """Outcome of `tune_disturbance`.
 
     Parameters
@@ -125,27 +159,13 @@ class TunedDisturbance:
     evaluations: int
     at_bound: tuple[str, ...]
 
-    def to_dict(self) -> dict[str, Any]:
-        """Values for a file."""
-        plain = {"disturbance": self.disturbance.to_dict(), "spread": dict(self.spread)}
-        return {**{k: getattr(self, k) for k in self.__dataclass_fields__}, **plain, "at_bound": list(self.at_bound)}
-
 
 def tune_disturbance(
     model: SymbolicModel,
     theta: FloatArray,
     inputs: Inputs,
     intervals: Sequence[Interval],
-    *,
-    per_zone: Sequence[str] = (),
-    weights: FloatArray | None = None,
-    time_constant: float | None = None,
-    priors: Mapping[str, DisturbancePrior] = DISTURBANCE_PRIORS,
-    start: DisturbanceModel | None = None,
-    scheme: Scheme = IMPLICIT_EULER,
-    covariance: Covariance = "exact",
-    spin_up_seconds: float = SPIN_UP,
-    curvature: bool = True,
+    settings: TuningSettings | None = None,
     progress: Progress | None = None,
 ) -> TunedDisturbance:
     """Find the unmeasured heat and the sensors' noise that make the innovations likeliest.
@@ -163,24 +183,8 @@ def tune_disturbance(
         The telemetry.
     intervals : sequence of Interval
         Tuning intervals.
-    per_zone : sequence of str
-        What each zone has a number of its own of: ``deviation``, ``sensor_deviation``; both are common by default.
-    weights : ndarray, shape (n_zone,), optional
-        Deviations of the zones in proportion to each other, such as floor areas [any unit]; equal by default.
-    time_constant : float, optional
-        Keep the time constant at this value [s]; infinite for a random walk.
-    priors : mapping of str to DisturbancePrior
-        Of ``deviation`` (that of a zone of mean weight), ``time_constant`` and ``sensor_deviation``.
-    start : DisturbanceModel, optional
-        Where to start, such as what was found at a θ close by; the medians of the priors by default.
-    scheme : Scheme
-        Time stepping.
-    covariance : {"exact", "steady"}
-        See `KalmanFilter`; with ``steady`` the derivatives hold but for the ends of the intervals.
-    spin_up_seconds : float
-        Telemetry before an interval that the spin-up may use [s].
-    curvature : bool
-        Whether the spread of the numbers is wanted: it takes one evaluation more for each.
+    settings : TuningSettings, optional
+        What is tuned, from where, and the filter.
     progress : callable, optional
         Called with stage, done, total after every evaluation; the total is the largest number of them.
 
@@ -191,18 +195,19 @@ def tune_disturbance(
     """
     if not intervals:
         raise FilterError("tune: expected at least one interval, came none")
-    ready = prepare(model, theta, inputs, scheme)
-    stretches = []
+    chosen = settings or TuningSettings()
+    ready = prepare(model, theta, inputs, chosen.scheme)
+    parts = []
     for interval in intervals:
-        begin, at, stop = rows_of(inputs, interval, spin_up_seconds, covariance)
-        stretches.append(_Stretch(at, stop, *ready.start(begin, at)))
-    numbers = _numbers(model.network.zones, per_zone, time_constant, priors)
-    shares = _shares(weights, ready.space.n_zone)
-    tuning = _Tuning(ready.space, inputs, stretches, numbers, shares, time_constant, covariance)
-    bounds = [(np.log(p.lower), np.log(p.upper)) for p in tuning.numbers.values()]
+        begin, at, stop = rows_of(inputs, interval, chosen)
+        parts.append(_Part(at, stop, *ready.start(begin, at)))
+    numbers = _numbers(model.network.zones, chosen)
+    tuning = _Tuning(ready.space, inputs, parts, numbers, chosen)
+    bounds = [(np.log(p.lower), np.log(p.upper)) for p in numbers.values()]
+    start = [np.log(p.median) for p in numbers.values()]
     solved = so.minimize(
         tuning.cost,
-        [np.log(p.median) for p in tuning.numbers.values()] if start is None else tuning.point(start, bounds),
+        start if chosen.start is None else tuning.point(chosen.start, bounds),
         jac=True,
         method="L-BFGS-B",
         bounds=bounds,
@@ -213,18 +218,31 @@ def tune_disturbance(
     close = np.minimum(solved.x - low, high - solved.x) < _AT_BOUND
     return TunedDisturbance(
         disturbance=tuning.disturbance(solved.x),
-        spread=_spread(tuning, solved.x, np.asarray(solved.jac)) if curvature else {},
+        spread=_spread(tuning, solved.x, np.asarray(solved.jac)) if chosen.curvature else {},
         log_likelihood=float(tuning.prior(solved.x)[0] - tuning.count * solved.fun),
         count=tuning.count,
         success=bool(solved.success),
         status=str(solved.message),
         evaluations=int(solved.nfev),
-        at_bound=tuple(name for name, c in zip(tuning.numbers, close, strict=True) if c),
+        at_bound=tuple(name for name, c in zip(numbers, close, strict=True) if c),
     )
 
 
+def air_volumes(network: ThermalNetwork) -> FloatArray:
+    """Volume of each zone's air, shape (n_zone,) [m3]: unmeasured heat may be in proportion to it.
+
+    Parameters
+    ----------
+    network : ThermalNetwork
+        Control volumes and faces.
+    """
+    air = next(c for c in network.capacities if c.name == "air")
+    volumes = np.bincount(network.zone[air.node], air.weight, minlength=len(network.zones))
+    return np.asarray(volumes, dtype=float)
+
+
 @dataclass(frozen=True)
-class _Stretch:
+class _Part:
     """Rows of an interval, and what its filter starts from."""
 
     at: int
@@ -240,17 +258,15 @@ class _Tuning:
         self,
         space: StateSpace,
         inputs: Inputs,
-        stretches: Sequence[_Stretch],
+        parts: Sequence[_Part],
         numbers: Mapping[str, DisturbancePrior],
-        weights: FloatArray,
-        time_constant: float | None,
-        covariance: Covariance,
+        settings: TuningSettings,
     ) -> None:
-        self.space, self.inputs, self.stretches, self.numbers = space, inputs, stretches, numbers
-        self.time_constant, self.covariance = time_constant, covariance
-        seen = np.concatenate([np.isfinite(inputs.zone[s.at + 1 : s.stop + 1]) for s in stretches])
+        self.space, self.inputs, self.parts, self.numbers, self.settings = space, inputs, parts, numbers, settings
+        self.time_constant, weights = settings.time_constant, _shares(settings.weights, space.n_zone)
+        seen = np.concatenate([np.isfinite(inputs.zone[s.at + 1 : s.stop + 1]) for s in parts])
         self.count = int(seen.sum())
-        walks = time_constant is not None and np.isinf(time_constant)
+        walks = self.time_constant is not None and np.isinf(self.time_constant)
         self.weights = np.where(seen.any(axis=0), weights, 0.0) if walks else weights  # nothing holds a walk unseen
         self.heats, self.sensors = (sum(n.startswith(name) for n in numbers) for name in _ZONAL)
         self.evaluations = 0
@@ -273,9 +289,10 @@ class _Tuning:
         return np.asarray(np.clip(np.log(np.maximum(np.concatenate(values), 1e-12)), low, high))
 
     def filtered(self, disturbance: DisturbanceModel) -> list[Filtered]:
-        """Filter every stretch."""
-        kalman = KalmanFilter(self.space, disturbance, covariance=self.covariance, tolerance=_TOLERANCE)
-        return [kalman.filter(self.inputs, s.at, s.stop, s.states, s.spread) for s in self.stretches]
+        """Filter every interval."""
+        chosen = self.settings
+        kalman = KalmanFilter(self.space, disturbance, covariance=chosen.covariance, tolerance=chosen.tolerance)
+        return [kalman.filter(self.inputs, s.at, s.stop, s.states, s.spread) for s in self.parts]
 
     def cost(self, x: FloatArray) -> tuple[float, FloatArray]:
         """Cost and its derivatives [-]."""
@@ -295,7 +312,7 @@ class _Tuning:
         return 0.5 * float(off @ off), off / spreads
 
     def _slopes(self, filtered: Filtered, disturbance: DisturbanceModel) -> FloatArray:
-        """Differentiate one stretch's log-likelihood with respect to the logarithms."""
+        """Differentiate one interval's log-likelihood with respect to the logarithms."""
         by_drive, by_keep, by_noise = log_likelihood_slopes(filtered)
         whole, step = filtered.kalman.whole, self.space.step
         heat, noise = 2.0 * whole.heat_variance * by_drive, 2.0 * whole.noise_variance * by_noise
@@ -308,10 +325,9 @@ class _Tuning:
         return np.concatenate(slopes)
 
 
-def _numbers(
-    zones: Sequence[str], per_zone: Sequence[str], time_constant: float | None, priors: Mapping[str, DisturbancePrior]
-) -> dict[str, DisturbancePrior]:
+def _numbers(zones: Sequence[str], settings: TuningSettings) -> dict[str, DisturbancePrior]:
     """Numbers that are tuned, with their priors: deviations first, the sensors last."""
+    priors, per_zone = settings.priors, settings.per_zone
     missing = sorted(set(DISTURBANCE_PRIORS) - set(priors))
     if missing:
         raise FilterError(f"priors: expected {sorted(DISTURBANCE_PRIORS)}, came none for {missing}")
@@ -319,7 +335,7 @@ def _numbers(
     if not own <= set(_ZONAL):
         raise FilterError(f"per_zone: expected some of {', '.join(_ZONAL)}, came {sorted(own)}")
     names = {name: [f"{name}@{zone}" for zone in zones] if name in own else [name] for name in _ZONAL}
-    names["time_constant"] = ["time_constant"] if time_constant is None else []
+    names["time_constant"] = ["time_constant"] if settings.time_constant is None else []
     return {full: priors[name] for name in ("deviation", "time_constant", "sensor_deviation") for full in names[name]}
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple, get_args
+from typing import get_args
 
 import numpy as np
 import pandas as pd
@@ -195,10 +195,11 @@ class KalmanFilter:
             gains, gain_of = exact_gains(
                 self.whole, self.steady(ever)[0], start, measured, known, unknown, self.tolerance
             )
-        run = self._run(inputs, rows, self.space.start(states)[:, 0], gains, gain_of)
-        return _collect(self, inputs, rows, run, gains, gain_of)
+        return self._corrected(inputs, rows, self.space.start(states)[:, 0], gains, np.array(gain_of))
 
-    def _run(self, inputs: Inputs, rows: slice, start: FloatArray, gains: list[Gain], gain_of: list[int]) -> _Run:
+    def _corrected(
+        self, inputs: Inputs, rows: slice, start: FloatArray, gains: list[Gain], index: NDArray[np.int64]
+    ) -> Filtered:
         """Predict and correct step by step."""
         space, whole, r = self.space, self.whole, self.space.order
         u = space.drives(inputs.boundary[rows], inputs.heat[rows])
@@ -213,7 +214,7 @@ class KalmanFilter:
                 extra = space.directed_heat(airflow[k][:, None], z[:r, None])[:, 0]
                 pushed[k] += space.heat_drive @ extra
                 through[k] += space.heat_feedthrough @ extra
-            gain = gains[gain_of[k]]
+            gain = gains[index[k]]
             states[k] = z
             predicted[k] = whole.observation @ z + through[k]
             error = np.where(measured[k], zone[k] - predicted[k], 0.0)
@@ -223,7 +224,28 @@ class KalmanFilter:
             z = whole.advance(filtered[k])
             z[:r] += pushed[k]
         states[count] = z
-        return _Run(states, filtered, predicted, filtered @ whole.observation.T + through, errors, misfit)
+        spread = np.array([np.diag(g.seen) + whole.noise_variance for g in gains])
+        left = np.array([np.diag(g.seen) - ((g.seen @ g.weight) * g.seen).sum(axis=1) for g in gains])
+        heat = np.array([np.diag(g.heat[:, r:]) - ((g.reach[r:] @ g.weight) * g.reach[r:]).sum(axis=1) for g in gains])
+        determinant = np.array([g.log_determinant for g in gains])[index]
+        likelihood = -0.5 * (misfit.sum() + determinant.sum() + measured.sum() * np.log(2.0 * np.pi))
+        return Filtered(
+            kalman=self,
+            stamps=inputs.stamps[rows],
+            begin=rows.start - 1,
+            states=states,
+            predicted=predicted + REFERENCE,
+            zone=filtered @ whole.observation.T + through + REFERENCE,
+            zone_deviation=np.sqrt(np.maximum(left, 0.0))[index],
+            disturbance=filtered[:, r:],
+            disturbance_deviation=np.sqrt(np.maximum(heat, 0.0))[index],
+            innovations=np.where(measured & inputs.complete[rows, None], errors, np.nan),
+            innovation_deviation=np.sqrt(spread)[index],
+            log_likelihood=float(likelihood),
+            errors=errors,
+            gains=tuple(gains),
+            gain_of=index,
+        )
 
     def predict(
         self,
@@ -286,45 +308,3 @@ class KalmanFilter:
             added = added + whole.heat_variance @ rows[r:] ** 2
             rows = whole.retreat(rows)
         return np.sqrt(variance)
-
-
-class _Run(NamedTuple):
-    """States and outputs of a pass over the telemetry."""
-
-    states: FloatArray
-    filtered: FloatArray
-    predicted: FloatArray
-    zone: FloatArray
-    errors: FloatArray
-    misfit: FloatArray
-
-
-def _collect(
-    kalman: KalmanFilter, inputs: Inputs, rows: slice, run: _Run, gains: list[Gain], gain_of: list[int]
-) -> Filtered:
-    """Put the result together: deviations by gain, likelihood of what counts."""
-    whole, r, index = kalman.whole, kalman.space.order, np.array(gain_of)
-    spread = np.array([np.diag(g.seen) + whole.noise_variance for g in gains])
-    left = np.array([np.diag(g.seen) - ((g.seen @ g.weight) * g.seen).sum(axis=1) for g in gains])
-    heat = np.array([np.diag(g.heat[:, r:]) - ((g.reach[r:] @ g.weight) * g.reach[r:]).sum(axis=1) for g in gains])
-    measured, known = np.isfinite(inputs.zone[rows]), inputs.complete[rows]
-    counted = measured & known[:, None]
-    determinant = np.array([g.log_determinant for g in gains])[index]
-    likelihood = -0.5 * (run.misfit.sum() + determinant.sum() + measured.sum() * np.log(2.0 * np.pi))
-    return Filtered(
-        kalman=kalman,
-        stamps=inputs.stamps[rows],
-        begin=rows.start - 1,
-        states=run.states,
-        predicted=run.predicted + REFERENCE,
-        zone=run.zone + REFERENCE,
-        zone_deviation=np.sqrt(np.maximum(left, 0.0))[index],
-        disturbance=run.filtered[:, r:],
-        disturbance_deviation=np.sqrt(np.maximum(heat, 0.0))[index],
-        innovations=np.where(counted, run.errors, np.nan),
-        innovation_deviation=np.sqrt(spread)[index],
-        log_likelihood=float(likelihood),
-        errors=run.errors,
-        gains=tuple(gains),
-        gain_of=index,
-    )

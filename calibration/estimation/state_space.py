@@ -10,7 +10,6 @@ import scipy.linalg as sl
 from calibration.errors import FilterError
 from thermal._types import FloatArray
 from thermal.model.modal import ModalModel
-from thermal.model.replay import Inputs
 from thermal.model.step import IMPLICIT_EULER, Scheme
 from thermal.units import AIR_HEAT_CAPACITY
 
@@ -215,17 +214,6 @@ def state_space(
         airflows=tuple(airflows),
         flow=flow if airflows else None,
     )
-
-
-def mean_flow(inputs: Inputs) -> FloatArray:
-    """Mean directed airflows over the steps whose inputs are complete, shape (n_airflow,) [kg/s].
-
-    Parameters
-    ----------
-    inputs : Inputs
-        The telemetry.
-    """
-    return np.asarray(inputs.airflow[inputs.complete].mean(axis=0), dtype=float)
 
 
 def _times(transition: FloatArray, x: FloatArray) -> FloatArray:

@@ -14,6 +14,7 @@ from statsmodels.tsa.stattools import acovf
 
 from calibration.errors import FilterError
 from calibration.estimation.kalman import Filtered
+from calibration.results import Plain, plain
 from thermal._types import FloatArray
 from thermal.model.replay import Inputs
 
@@ -28,7 +29,7 @@ _FEWEST = 30
 
 
 @dataclass(frozen=True)
-class ZoneWhiteness:
+class ZoneWhiteness(Plain):
     """Tests of one zone's innovations; NaN where a zone has too few values or a constant series.
 
     Parameters
@@ -57,16 +58,6 @@ class ZoneWhiteness:
     periodogram_distance: float
     periodogram_p: float
     inputs_p: Mapping[str, float] = field(default_factory=dict)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Values for a file; None where a test was not possible."""
-        plain = {name: getattr(self, name) for name in ("count", "lag_one", "periodogram_distance", "periodogram_p")}
-        listed = {name: [_none(v) for v in getattr(self, name)] for name in ("ljung_box", "ljung_box_p")}
-        return {
-            **{k: _none(v) for k, v in plain.items()},
-            **listed,
-            "inputs_p": {k: _none(v) for k, v in self.inputs_p.items()},
-        }
 
 
 @dataclass(frozen=True)
@@ -107,14 +98,9 @@ class Whiteness:
         return tuple(named)
 
     def to_dict(self) -> dict[str, Any]:
-        """Values for a file."""
-        return {
-            "lags": list(self.lags),
-            "degrees": list(self.degrees),
-            "step_seconds": self.step,
-            "zones": {name: zone.to_dict() for name, zone in self.zones.items()},
-            "rejected": list(self.rejected()),
-        }
+        """Values for a file; None where a test was not possible."""
+        named = {"step_seconds": self.step, "rejected": self.rejected()}
+        return {k: plain(v) for k, v in {**vars(self), **named}.items() if k != "step"}
 
 
 def whiteness(
@@ -166,15 +152,15 @@ def whiteness(
     if fitted < 0 or not lags or min(lags) <= 0:
         raise FilterError(f"whiteness: expected positive lags and 0 or more fitted numbers, came {lags} and {fitted}")
     steps = tuple(sorted({max(fitted + 1, round(lag / step)) for lag in lags}))
-    drivers = _drivers(filtered, inputs, boundaries) if inputs is not None else {}
+    exogenous = _exogenous(filtered, inputs, boundaries) if inputs is not None else {}
     found = {}
     for z, name in enumerate(zones):
-        own = {driver: (v if v.ndim == 1 else v[:, z], first) for driver, (v, first) in drivers.items()}
+        own = {key: (v if v.ndim == 1 else v[:, z], first) for key, (v, first) in exogenous.items()}
         found[name] = _zone(series[:, z], steps, fitted, own, max(1, round(_INPUT_LAG / step)))
     return Whiteness(found, steps, tuple(s - fitted for s in steps), step)
 
 
-def _drivers(filtered: Filtered, inputs: Inputs, boundaries: Sequence[str]) -> dict[str, tuple[FloatArray, int]]:
+def _exogenous(filtered: Filtered, inputs: Inputs, boundaries: Sequence[str]) -> dict[str, tuple[FloatArray, int]]:
     """Name the inputs, each with the first lag at which innovations owe it nothing."""
     rows = slice(filtered.begin + 1, filtered.begin + 1 + len(filtered.stamps))
     if len(boundaries) != inputs.boundary.shape[1] or not inputs.stamps[rows].equals(filtered.stamps):
@@ -187,14 +173,14 @@ def _drivers(filtered: Filtered, inputs: Inputs, boundaries: Sequence[str]) -> d
 
 
 def _zone(
-    series: FloatArray, lags: tuple[int, ...], fitted: int, drivers: Mapping[str, tuple[FloatArray, int]], reach: int
+    series: FloatArray, lags: tuple[int, ...], fitted: int, inputs: Mapping[str, tuple[FloatArray, int]], reach: int
 ) -> ZoneWhiteness:
     """Test one zone's innovations."""
     there = np.isfinite(series)
     count = int(there.sum())
     unknown = tuple(np.nan for _ in lags)
     if count < max(_FEWEST, 2 * lags[0]) or np.ptp(series[there]) == 0.0:
-        return ZoneWhiteness(count, np.nan, unknown, unknown, np.nan, np.nan, dict.fromkeys(drivers, np.nan))
+        return ZoneWhiteness(count, np.nan, unknown, unknown, np.nan, np.nan, dict.fromkeys(inputs, np.nan))
     longest = min(lags[-1], count // 2)
     correlation = acovf(series, adjusted=True, fft=False, missing="conservative", nlag=longest)
     correlation = correlation / correlation[0]
@@ -210,7 +196,7 @@ def _zone(
         ljung_box_p=tuple(float(chi2.sf(q, lag - fitted)) for q, lag in zip(statistic, lags, strict=True)),
         periodogram_distance=distance,
         periodogram_p=p,
-        inputs_p={name: _cross(series, driver, first, reach) for name, (driver, first) in drivers.items()},
+        inputs_p={name: _cross(series, values, first, reach) for name, (values, first) in inputs.items()},
     )
 
 
@@ -224,11 +210,11 @@ def _cumulated_periodogram(series: FloatArray) -> tuple[float, float]:
     return distance, float(kstwo.sf(distance, share.size))
 
 
-def _cross(series: FloatArray, driver: FloatArray, first: int, reach: int) -> float:
+def _cross(series: FloatArray, values: FloatArray, first: int, reach: int) -> float:
     """Probability of the correlations with a whitened input at lags ``first`` to ``reach``."""
-    moved = driver - driver.mean()
+    moved = values - values.mean()
     order = min(_INPUT_ORDER, len(moved) // 10)
-    if np.ptp(driver) <= 1e-9 * max(1.0, float(np.abs(driver).max())) or order < 1:
+    if np.ptp(values) <= 1e-9 * max(1.0, float(np.abs(values).max())) or order < 1:
         return float("nan")
     correlation = acovf(moved, fft=False, nlag=order)
     correlation[0] *= 1.0 + 1e-8  # a sine alone would leave it singular
@@ -242,7 +228,3 @@ def _cross(series: FloatArray, driver: FloatArray, first: int, reach: int) -> fl
         past = white[: len(white) - lag]
         total += float(filled[lag:] @ past) ** 2 / (scale * float(there[lag:] @ past**2))
     return float(chi2.sf(total, reach + 1 - first))
-
-
-def _none(value: float) -> float | None:
-    return value if np.isfinite(value) else None

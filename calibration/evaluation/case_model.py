@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -11,21 +11,41 @@ import pandas as pd
 
 from calibration.errors import NotEnoughDataError
 from calibration.evaluation.intervals import Interval, Runs, horizon_steps, merge, select_runs
-from calibration.evaluation.n_step import HORIZONS, Evaluation, Progress, evaluate_model
-from calibration.evaluation.settings import ModelSettings, read_settings
-from calibration.fit.result import GridCheck, load_parameters
+from calibration.evaluation.n_step import HORIZONS, Evaluation, EvaluationSettings, Progress, evaluate_model
+from calibration.evaluation.settings import ModelSettings, load_parameters, read_settings
+from calibration.results import Plain
 from thermal._types import FloatArray
 from thermal.case.case import Case
 from thermal.model.matrices import SymbolicModel
 from thermal.model.reduce import ReducedModel, reduced_model
-from thermal.model.replay import SPIN_UP, Inputs, free_runs, replay_inputs, spin_up
-from thermal.model.step import Scheme
+from thermal.model.replay import Inputs, free_runs, replay_inputs, spin_up
 
-#: Runs of the check of a reduced model on the grid, and the stretch of telemetry they are spread over [days].
+#: Runs of the check of a reduced model on the grid, and the interval of telemetry they are spread over [days].
 CHECK_RUNS, CHECK_DAYS = 6, 2.0
 
 #: Largest difference between reduced model and grid that reported errors may carry [K]; else they come from the grid.
 CHECK_TOLERANCE = 0.01
+
+
+@dataclass(frozen=True)
+class GridCheck(Plain):
+    """The calibrated reduced model replayed beside the grid.
+
+    Parameters
+    ----------
+    volumes, order : int
+        Control volumes of the grid and states of the reduced model.
+    runs : int
+        Runs compared.
+    max_difference, mean_difference : float
+        Of zone means over all steps of these runs [K].
+    """
+
+    volumes: int
+    order: int
+    runs: int
+    max_difference: float
+    mean_difference: float
 
 
 @dataclass(frozen=True)
@@ -60,21 +80,58 @@ class CaseModel:
     ) -> tuple[SymbolicModel, GridCheck]:
         """Reduce the model where that is accurate enough, and return the grid where it is not.
 
+        A few runs are replayed on both and their zone means compared.
+
         Parameters
         ----------
         interval : Interval
-            Reduced model and grid are compared at its beginning.
+            The runs are spread over its first two days, or all of it where these have none.
         steps : int
             N of the runs that are compared.
         reduced : ReducedModel, optional
-            That serves θ; made here by default.
+            That is accurate at θ; made here by default.
+
+        Raises
+        ------
+        NotEnoughDataError
+            When the interval has no usable run.
         """
-        reduced = reduced or reduced_model(self.grid, [self.theta])
-        s = self.settings
-        check = check_on_grid(
-            self.grid, reduced, self.theta, self.inputs, interval, steps, s.stepping, s.spin_up_seconds
-        )
+        reduced, inputs = reduced or reduced_model(self.grid, [self.theta]), self.inputs
+        runs = _check_runs(inputs, interval, steps, self.settings.spin_up_seconds)
+        starts = np.unique(runs.starts[np.linspace(0, runs.starts.size - 1, CHECK_RUNS).astype(int)])
+        means = []
+        for model in (self.grid, reduced):
+            matrices = model.matrices(self.theta)
+            states, _ = spin_up(matrices, inputs, runs.begin, starts)
+            scheme = self.settings.stepping
+            means.append(free_runs(matrices, inputs, starts, steps, states, scheme=scheme)[0])
+        off = np.abs(means[0] - means[1])
+        order = reduced.projection.shape[1] if reduced.projection is not None else reduced.network.n_node
+        check = GridCheck(self.grid.network.n_node, order, starts.size, float(off.max()), float(off.mean()))
         return (reduced if check.max_difference <= CHECK_TOLERANCE else self.grid), check
+
+    def evaluate(
+        self,
+        model: SymbolicModel,
+        intervals: Sequence[Interval],
+        settings: EvaluationSettings,
+        progress: Progress | None = None,
+    ) -> Evaluation:
+        """N-step prediction error of one of its models, stepped and spun up as its settings say.
+
+        Parameters
+        ----------
+        model : SymbolicModel
+            On the grid or reduced.
+        intervals : sequence of Interval
+            Where the targets lie.
+        settings : EvaluationSettings
+            Horizons and what is kept.
+        progress : callable, optional
+            Called with stage, done, total.
+        """
+        own = replace(settings, scheme=self.settings.stepping, spin_up_seconds=self.settings.spin_up_seconds)
+        return evaluate_model(model, self.theta, self.inputs, intervals, own, progress)
 
 
 def case_model(
@@ -148,64 +205,7 @@ def evaluate_case(
     ready = case_model(case, parameters, dx=dx, scheme=scheme)
     parts = merge(intervals) or [Interval(ready.inputs.stamps[0], ready.inputs.stamps[-1])]
     model, _ = ready.certified(parts[0], horizon_steps(horizon, ready.inputs.step))
-    return evaluate_model(
-        model,
-        ready.theta,
-        ready.inputs,
-        parts,
-        horizon,
-        trajectories=trajectories,
-        horizons=HORIZONS,
-        scheme=ready.settings.stepping,
-        spin_up_seconds=ready.settings.spin_up_seconds,
-        progress=progress,
-    )
-
-
-def check_on_grid(
-    grid: SymbolicModel,
-    reduced: SymbolicModel,
-    theta: FloatArray,
-    inputs: Inputs,
-    interval: Interval,
-    steps: int,
-    scheme: Scheme,
-    spin_up_seconds: float = SPIN_UP,
-) -> GridCheck:
-    """Replay a few runs on the reduced model and on the grid and compare zone means.
-
-    Parameters
-    ----------
-    grid, reduced : SymbolicModel
-        The two models.
-    theta : ndarray, shape (n_parameter,)
-        Where they are compared [parameter units].
-    inputs : Inputs
-        The telemetry.
-    interval : Interval
-        The runs are spread over its first two days, or all of it where these have none.
-    steps : int
-        N.
-    scheme : Scheme
-        Time stepping of the runs.
-    spin_up_seconds : float
-        Length of the spin-up [s].
-
-    Raises
-    ------
-    NotEnoughDataError
-        When the interval has no usable run.
-    """
-    runs = _check_runs(inputs, interval, steps, spin_up_seconds)
-    starts = np.unique(runs.starts[np.linspace(0, runs.starts.size - 1, CHECK_RUNS).astype(int)])
-    means = []
-    for model in (grid, reduced):
-        matrices = model.matrices(theta)
-        states, _ = spin_up(matrices, inputs, runs.begin, starts)
-        means.append(free_runs(matrices, inputs, starts, steps, states, scheme=scheme)[0])
-    difference = np.abs(means[0] - means[1])
-    order = reduced.projection.shape[1] if reduced.projection is not None else reduced.network.n_node
-    return GridCheck(grid.network.n_node, order, starts.size, float(difference.max()), float(difference.mean()))
+    return ready.evaluate(model, parts, EvaluationSettings(horizon, trajectories, HORIZONS), progress)
 
 
 def _check_runs(inputs: Inputs, interval: Interval, steps: int, spin_up_seconds: float) -> Runs:

@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 
 from calibration.errors import CalibrationError, HorizonError, NotEnoughDataError
+from calibration.results import Plain
 from thermal._types import IntArray
 from thermal.case.case import Case, local_timestamp
 from thermal.errors import CaseError
@@ -21,8 +22,8 @@ _TUNING_DAYS, _TURNS = 2, 3
 
 
 @dataclass(frozen=True)
-class Interval:
-    """A stretch of telemetry; a run belongs to the interval that holds its target.
+class Interval(Plain):
+    """An interval of telemetry; a run belongs to the interval that holds its target.
 
     Parameters
     ----------
@@ -36,10 +37,6 @@ class Interval:
     def __post_init__(self) -> None:
         if not self.start < self.end:
             raise CalibrationError(f"interval {self.start}/{self.end}: expected the start before the end")
-
-    def to_dict(self) -> dict[str, str]:
-        """ISO 8601 texts of both ends."""
-        return {"start": self.start.isoformat(), "end": self.end.isoformat()}
 
 
 def parse_interval(text: str, case: Case) -> Interval:

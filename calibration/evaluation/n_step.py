@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from calibration.errors import HorizonError, NotEnoughDataError
 from calibration.evaluation.intervals import Interval, Runs, horizon_steps, select_runs
+from calibration.results import Axes, Plain, Result
 from thermal._types import FloatArray
 from thermal.model.matrices import Matrices, SymbolicModel
 from thermal.model.replay import SPIN_UP, Inputs, free_runs, spin_up
@@ -23,6 +24,31 @@ Progress = Callable[[str, int, int], None]
 
 #: Horizons reported beside the main one.
 HORIZONS = ("5min", "1h", "3h", "6h", "24h")
+
+
+@dataclass(frozen=True)
+class EvaluationSettings:
+    """Which runs are made and what is kept of them.
+
+    Parameters
+    ----------
+    horizon : str
+        The prediction horizon; six hours in the paper.
+    trajectories : bool
+        Keep every step of the runs instead of the last only.
+    horizons : sequence of str
+        Further horizons; those that are no multiple of the step, or leave no run, are left out.
+    scheme : Scheme
+        Time stepping of the free runs.
+    spin_up_seconds : float
+        Telemetry before an interval that the spin-up may use [s].
+    """
+
+    horizon: str = "6h"
+    trajectories: bool = False
+    horizons: Sequence[str] = ()
+    scheme: Scheme = IMPLICIT_EULER
+    spin_up_seconds: float = SPIN_UP
 
 
 @dataclass(frozen=True)
@@ -60,7 +86,7 @@ class Predictions:
 
 
 @dataclass(frozen=True)
-class Metrics:
+class Metrics(Plain):
     """Spatial errors at the N-th step.
 
     Parameters
@@ -77,13 +103,9 @@ class Metrics:
     median: float
     bias: float
 
-    def to_dict(self) -> dict[str, float]:
-        """Values by name."""
-        return {"mae": self.mae, "median": self.median, "bias": self.bias}
 
-
-@dataclass(frozen=True)
-class Evaluation:
+@dataclass(frozen=True, repr=False)
+class Evaluation(Result):
     """N-step prediction error of a model on intervals of telemetry.
 
     Parameters
@@ -123,22 +145,35 @@ class Evaluation:
 
     def to_dict(self) -> dict[str, Any]:
         """Contents of ``evaluation.json``."""
-        return {
-            "steps": self.steps,
-            "step_seconds": self.step_seconds,
-            "intervals": [
-                {
-                    **p.interval.to_dict(),
-                    **spatial_metrics(p.error).to_dict(),
-                    "runs": len(p.start),
-                    "skipped": p.skipped,
-                }
-                for p in self.predictions
-            ],
-            **self.metrics.to_dict(),
-            "by_zone": self.by_zone(),
-            "by_horizon": self.by_horizon,
-        }
+        intervals = [
+            p.interval.to_dict() | spatial_metrics(p.error).to_dict() | {"runs": len(p.start), "skipped": p.skipped}
+            for p in self.predictions
+        ]
+        plain = {"steps": self.steps, "step_seconds": self.step_seconds, "intervals": intervals}
+        return {**plain, **self.metrics.to_dict(), "by_zone": self.by_zone(), "by_horizon": self.by_horizon}
+
+    def to_frame(self) -> pd.DataFrame:
+        """Errors of every measured zone [K]."""
+        return pd.DataFrame.from_dict(self.by_zone(), orient="index", columns=["mae", "bias"]).rename_axis("zone")
+
+    def growth(self) -> pd.Series[float]:
+        """MAE by the time since the start of a run [h]: of the steps that were kept, in kelvin."""
+        error = np.concatenate([np.abs(p.simulated - p.measured) for p in self.predictions])
+        hours = self.predictions[0].steps * self.step_seconds / 3600.0
+        mae = np.nanmean(np.nanmean(error, axis=2), axis=0)
+        return pd.Series(mae, index=pd.Index(hours, name="hours"), name="mae", dtype=float)
+
+    def _summary(self) -> str:
+        runs, m = sum(len(p.start) for p in self.predictions), self.metrics
+        ahead = self.steps * self.step_seconds / 3600.0
+        return f"MAE {m.mae:.3f} K, bias {m.bias:+.3f} K at {ahead:g} h, {runs} runs, {len(self.zones)} zones"
+
+    def _draw(self, axes: Axes) -> None:
+        growth = self.growth()
+        axes.plot(growth.index, growth, marker="o" if len(growth) == 1 else "")
+        axes.set_xlabel("time since the start [h]")
+        axes.set_ylabel("MAE [K]")
+        axes.set_ylim(0.0)
 
 
 def spatial_metrics(error: FloatArray) -> Metrics:
@@ -181,11 +216,7 @@ def evaluate_runs(
     inputs: Inputs,
     zones: tuple[str, ...],
     intervals: Sequence[Interval],
-    horizon: str,
-    *,
-    trajectories: bool,
-    horizons: Sequence[str],
-    spin_up_seconds: float,
+    settings: EvaluationSettings,
     progress: Progress | None,
 ) -> Evaluation:
     """Choose the runs of every interval and horizon, simulate them, and compare them with what was measured.
@@ -198,7 +229,7 @@ def evaluate_runs(
         The telemetry.
     zones : tuple of str
         Zone names.
-    intervals, horizon, trajectories, horizons, spin_up_seconds, progress
+    intervals, settings, progress
         As in `evaluate_model`.
 
     Raises
@@ -206,17 +237,17 @@ def evaluate_runs(
     NotEnoughDataError
         When an interval has no run.
     """
-    steps = horizon_steps(horizon, inputs.step)
-    keep = np.arange(1, steps + 1) if trajectories else np.array([steps])
+    steps, spin_up_seconds = horizon_steps(settings.horizon, inputs.step), settings.spin_up_seconds
+    keep = np.arange(1, steps + 1) if settings.trajectories else np.array([steps])
     main: list[Predictions] = []
-    errors: dict[str, list[FloatArray]] = {name: [] for name in horizons}
+    errors: dict[str, list[FloatArray]] = {name: [] for name in settings.horizons}
     for done, interval in enumerate(intervals):
         runs = select_runs(inputs, interval, steps, spin_up=spin_up_seconds)
         if runs.starts.size == 0:
             raise NotEnoughDataError(
                 f"interval {interval.start} to {interval.end}: all {runs.skipped} runs miss telemetry"
             )
-        found = {name: _further(inputs, interval, name, spin_up_seconds) for name in horizons}
+        found = {name: _further(inputs, interval, name, spin_up_seconds) for name in settings.horizons}
         further = {name: wanted for name, wanted in found.items() if wanted is not None}
         wanted = [Wanted(runs, keep), *further.values()]
         predicted = [_predictions(inputs, interval, w, s) for w, s in zip(wanted, simulate(wanted), strict=True)]
@@ -252,12 +283,7 @@ def evaluate_model(
     theta: FloatArray,
     inputs: Inputs,
     intervals: Sequence[Interval],
-    horizon: str = "6h",
-    *,
-    trajectories: bool = False,
-    horizons: Sequence[str] = (),
-    scheme: Scheme = IMPLICIT_EULER,
-    spin_up_seconds: float = SPIN_UP,
+    settings: EvaluationSettings | None = None,
     progress: Progress | None = None,
 ) -> Evaluation:
     """N-step prediction error of a model at θ.
@@ -272,16 +298,8 @@ def evaluate_model(
         The telemetry.
     intervals : sequence of Interval
         Runs start every hour such that their targets lie inside.
-    horizon : str
-        The prediction horizon; six hours in the paper.
-    trajectories : bool
-        Keep every step of the runs instead of the last only.
-    horizons : sequence of str
-        Further horizons; those that are no multiple of the step, or leave no run, are left out.
-    scheme : Scheme
-        Time stepping of the free runs.
-    spin_up_seconds : float
-        Telemetry before an interval that the spin-up may use [s].
+    settings : EvaluationSettings, optional
+        Horizons, time stepping, and what is kept.
     progress : callable, optional
         Called with stage, done, total.
 
@@ -290,18 +308,12 @@ def evaluate_model(
     NotEnoughDataError
         When an interval has no run.
     """
-    matrices = model.matrices(theta)
-    return evaluate_runs(
-        lambda wanted: _simulate(model.network, matrices, inputs, wanted, scheme),
-        inputs,
-        model.network.zones,
-        intervals,
-        horizon,
-        trajectories=trajectories,
-        horizons=horizons,
-        spin_up_seconds=spin_up_seconds,
-        progress=progress,
-    )
+    chosen, matrices = settings or EvaluationSettings(), model.matrices(theta)
+
+    def simulate(wanted: Sequence[Wanted]) -> list[FloatArray]:
+        return _simulate(model.network, matrices, inputs, wanted, chosen.scheme)
+
+    return evaluate_runs(simulate, inputs, model.network.zones, intervals, chosen, progress)
 
 
 def predict_runs(

@@ -1,17 +1,20 @@
-"""How a case's model is built and run: what belongs to a set of parameters beside their values."""
+"""How a case's model is built, run and calibrated, and what a file of parameters says of it."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any, Literal, get_args
+
+import numpy as np
 
 from calibration.errors import CalibrationError
+from thermal._types import FloatArray
 from thermal.case.building import Building
 from thermal.effects.catalogue import CATALOGUE, chosen
-from thermal.errors import ModelError
+from thermal.errors import ModelError, nearest
 from thermal.inputs.normalisation import Normalisation
 from thermal.model.replay import LEAST_SPIN_UP, SPIN_UP
 from thermal.model.step import SCHEMES, Scheme
@@ -19,6 +22,15 @@ from thermal.network.build import build_network
 from thermal.network.network import ThermalNetwork
 from thermal.network.structure import BASELINE, Structure
 from thermal.parameters import Scope
+
+#: ``linear`` is plain least squares; ``pseudo_huber`` takes errors far beyond the others for outliers.
+Loss = Literal["linear", "pseudo_huber"]
+
+#: Errors of N-step runs, or whitened innovations of a Kalman filter.
+Objective = Literal["multi_step", "innovations"]
+
+#: Intervals of telemetry that `calibrate` takes beside its settings.
+INTERVALS = ("tune", "hold_out")
 
 
 @dataclass(frozen=True)
@@ -34,7 +46,7 @@ class ModelSettings:
     scheme : str
         ``implicit_euler`` or ``tr_bdf2``.
     scopes : mapping of str to {"global", "facade", "zone"}
-        Parameters with one value a facade or a zone.
+        Parameters with one value a facade or a zone, shrunk towards a common one as far as the data let them.
     spin_up_seconds : float
         Length of the spin-up before an interval [s].
     structure : Structure
@@ -95,11 +107,95 @@ class ModelSettings:
 
     def to_dict(self) -> dict[str, Any]:
         """Entry of ``calibration.json``."""
-        plain: dict[str, Any] = {"scopes": dict(self.scopes), "structure": asdict(self.structure)}
-        plain["effects"] = {name: list(zones) for name, zones in self.effects.items()}
-        kept = self.normalisation if self.effects else None
-        plain["normalisation"] = None if kept is None else kept.to_dict()
-        return {**{k: getattr(self, k) for k in self.__dataclass_fields__}, **plain}
+        effects = {name: list(zones) for name, zones in self.effects.items()}
+        kept = self.normalisation.to_dict() if self.effects and self.normalisation is not None else None
+        return {**asdict(replace(self, normalisation=None)), "effects": effects, "normalisation": kept}
+
+
+@dataclass(frozen=True)
+class CalibrationSettings(ModelSettings):
+    """How a case is calibrated: its model, what is estimated, and how.
+
+    Parameters
+    ----------
+    dx, reach : float, optional
+        Of the model, see `ModelSettings` [m].
+    spin_up_seconds : float
+        Length of the spin-up before an interval [s].
+    scheme, scopes, structure, effects
+        Of the model, see `ModelSettings`.
+    fixed : mapping of str to float
+        Parameters that keep a given value [parameter units].
+    horizon : str
+        Prediction horizon, such as ``6h``.
+    objective : {"multi_step", "innovations"}
+        Errors of N-step runs, or the likelihood of a Kalman filter's innovations, whose disturbance is tuned with the
+        parameters in turn.
+    loss : {"linear", "pseudo_huber"}
+        Least squares, or a loss that outlying errors do not pull.
+    starts : int
+        Number of starts: the given one, where a fit would go that may compensate freely, then draws from the prior.
+        The best is kept, and a start that fails costs that start only.
+    seed : int
+        Seed of the draws.
+
+    Raises
+    ------
+    CalibrationError
+        When a choice is unknown, or a number out of range.
+    """
+
+    fixed: Mapping[str, float] = field(default_factory=dict)
+    horizon: str = "6h"
+    objective: Objective = "multi_step"
+    loss: Loss = "linear"
+    starts: int = 3
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name, known in (("loss", get_args(Loss)), ("objective", get_args(Objective))):
+            if getattr(self, name) not in known:
+                raise CalibrationError(f"{name}: expected one of {', '.join(known)}, came {getattr(self, name)!r}")
+        for name, least in (("starts", 1), ("seed", 0)):
+            if getattr(self, name) < least:
+                raise CalibrationError(f"{name}: expected at least {least}, came {getattr(self, name)}")
+
+    @property
+    def model(self) -> ModelSettings:
+        """Settings of the model alone."""
+        return ModelSettings(**{f.name: getattr(self, f.name) for f in fields(ModelSettings)})
+
+
+def calibration_settings(
+    given: ModelSettings | Mapping[str, Any] | None, further: Mapping[str, Any] | None = None
+) -> CalibrationSettings:
+    """Make settings of a calibration from values by name, such as a file or a command has.
+
+    Parameters
+    ----------
+    given : CalibrationSettings, ModelSettings, mapping of str to Any, or None
+        Settings, or values by name; ``effects`` may be their names only, ``structure`` a mapping. None is the defaults.
+    further : mapping of str to Any, optional
+        Values that replace those.
+
+    Raises
+    ------
+    CalibrationError
+        When a name is unknown.
+    """
+    base = given if isinstance(given, CalibrationSettings) else CalibrationSettings()
+    changes = {**(vars(given) if isinstance(given, ModelSettings) else given or {}), **(further or {})}
+    known = [f.name for f in fields(CalibrationSettings)]
+    for name in changes:
+        if name not in known:
+            raise CalibrationError(f"settings: calibrate takes no {name!r}; {nearest(name, [*known, *INTERVALS])}")
+    effects, structure = changes.get("effects"), changes.get("structure")
+    if effects is not None and not isinstance(effects, Mapping):
+        changes["effects"] = {name: () for name in effects}
+    if isinstance(structure, Mapping):
+        changes["structure"] = Structure(**structure)
+    return replace(base, **changes)
 
 
 def read_settings(path: str | Path) -> dict[str, Any]:
@@ -126,19 +222,31 @@ def read_settings(path: str | Path) -> dict[str, Any]:
     except (OSError, ValueError):
         return {}
     settings = content.get("settings", {}) if isinstance(content, dict) else {}
-    known = set(ModelSettings.__dataclass_fields__)
-    if not isinstance(settings, dict) or set(settings) - known:
-        raise CalibrationError(f"{path}: settings: expected a mapping with keys {sorted(known)}, found {settings!r}")
+
+    def refuse(what: str, expected: str, found: Any) -> CalibrationError:
+        return CalibrationError(f"{path}: {what}: expected {expected}, found {found!r}")
+
+    known = sorted(f.name for f in fields(ModelSettings))
+    if not isinstance(settings, dict) or set(settings) - set(known):
+        raise refuse("settings", f"a mapping with keys {known}", settings)
     for name in ("dx", "reach", "spin_up_seconds"):
         value = settings.get(name)
         if value is not None and (isinstance(value, bool) or not isinstance(value, int | float) or value <= 0):
-            raise CalibrationError(f"{path}: settings.{name}: expected a positive number or null, found {value!r}")
-    if "scopes" in settings:
-        _check_scopes(path, settings["scopes"])
-    if "effects" in settings:
-        _check_effects(path, settings["effects"])
+            raise refuse(f"settings.{name}", "a positive number or null", value)
+    scopes, effects = settings.get("scopes", {}), settings.get("effects", {})
+    if not isinstance(scopes, dict) or not set(scopes.values()) <= set(get_args(Scope)):
+        raise refuse("settings.scopes", f"a mapping to {', '.join(get_args(Scope))}", scopes)
+    lists = isinstance(effects, dict) and all(isinstance(zones, list) for zones in effects.values())
+    if not lists or not set(effects) <= set(CATALOGUE):
+        raise refuse("settings.effects", "a mapping from effects of the catalogue to lists of zones", effects)
     if "structure" in settings:
-        settings["structure"] = _structure(path, settings["structure"])
+        entry, names = settings["structure"], sorted(f.name for f in fields(Structure))
+        if not isinstance(entry, dict) or set(entry) - set(names):
+            raise refuse("settings.structure", f"a mapping with keys among {names}", entry)
+        try:
+            settings["structure"] = Structure(**entry)
+        except ModelError as error:
+            raise CalibrationError(f"{path}: settings.{error}") from error
     if settings.get("normalisation") is not None:
         try:
             settings["normalisation"] = Normalisation.from_dict(settings["normalisation"])
@@ -147,32 +255,53 @@ def read_settings(path: str | Path) -> dict[str, Any]:
     return settings
 
 
-def _check_scopes(path: Path, scopes: Any) -> None:
-    """Refuse scopes that are not as `ModelSettings` writes them; the network says whether they fit the building."""
-    if not isinstance(scopes, dict) or not all(scope in get_args(Scope) for scope in scopes.values()):
-        raise CalibrationError(
-            f"{path}: settings.scopes: expected a mapping to {', '.join(get_args(Scope))}, found {scopes!r}"
-        )
+def load_parameters(path: str | Path, network: ThermalNetwork) -> FloatArray:
+    """Read θ from a ``calibration.json`` (or any JSON with its ``parameters`` key).
 
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+    network : ThermalNetwork
+        Whose parameters they are.
 
-def _check_effects(path: Path, effects: Any) -> None:
-    """Refuse effects that are not as `ModelSettings` writes them; the network says whether they fit the building."""
-    lists = isinstance(effects, dict) and all(isinstance(zones, list) for zones in effects.values())
-    if not lists or not set(effects) <= set(CATALOGUE):
-        raise CalibrationError(
-            f"{path}: settings.effects: expected a mapping from effects of the catalogue to lists of zones, "
-            f"found {effects!r}"
-        )
+    Returns
+    -------
+    ndarray, shape (n_parameter,)
+        θ [parameter units].
 
-
-def _structure(path: Path, entry: Any) -> Structure:
-    """Make the structure that a file names."""
-    known = sorted(Structure.__dataclass_fields__)
-    if not isinstance(entry, dict) or set(entry) - set(known):
-        raise CalibrationError(
-            f"{path}: settings.structure: expected a mapping with keys among {known}, found {entry!r}"
-        )
+    Raises
+    ------
+    CalibrationError
+        When the file cannot be read, or does not hold the parameters of this building.
+    """
+    path = Path(path)
     try:
-        return Structure(**entry)
-    except ModelError as error:
-        raise CalibrationError(f"{path}: settings.{error}") from error
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise CalibrationError(f"parameters: cannot read {path}: {error.strerror or error}") from error
+    except (json.JSONDecodeError, UnicodeDecodeError) as error:
+        raise CalibrationError(f"{path}: expected JSON as `calibrate` writes it, found {error}") from error
+    entries = content.get("parameters") if isinstance(content, dict) else None
+    if not isinstance(entries, dict) or not entries:
+        raise CalibrationError(
+            f"{path}: expected a key 'parameters' with an entry a parameter, as in calibration.json"
+        )
+    scales = {p.name: p.scale for p in network.parameters}
+    values: dict[str, float] = {}
+    for name, entry in entries.items():
+        value: Any = entry.get("value") if isinstance(entry, dict) else entry
+        scale = scales.get(name, "log")
+        usable = isinstance(value, int | float) and not isinstance(value, bool) and bool(np.isfinite(value))
+        if not usable or (value <= 0 and scale != "linear") or (value > 1 and scale == "logit"):
+            kind = {"linear": "a number", "logit": "a positive number of at most 1"}.get(scale, "a positive number")
+            raise CalibrationError(f"{path}: parameters.{name}: expected {kind} under 'value', found {value!r}")
+        values[name] = float(value)
+    unknown = sorted(set(values) - set(scales) - set(network.nominal))
+    missing = sorted(set(scales) - set(values))
+    if unknown or missing:
+        raise CalibrationError(
+            f"{path}: parameters of another building: unknown {unknown or 'none'}, missing {missing or 'none'}; "
+            "calibrate this case, or give the file that belongs to it"
+        )
+    return network.values({name: value for name, value in values.items() if name in scales})

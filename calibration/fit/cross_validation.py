@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor, Future
-from dataclasses import asdict, dataclass
-from typing import Any, TypeVar
+from dataclasses import dataclass
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 import pandas as pd
@@ -14,10 +14,11 @@ from numpy.typing import NDArray
 from calibration.errors import CalibrationError, NotEnoughDataError
 from calibration.evaluation.intervals import Interval, horizon_steps, merge
 from calibration.evaluation.n_step import Evaluation, Progress
+from calibration.evaluation.settings import INTERVALS, CalibrationSettings, ModelSettings, calibration_settings
 from calibration.fit.calibrate import calibrate
 from calibration.fit.least_squares import INTERRUPTED
 from calibration.fit.result import ParameterEstimate
-from calibration.fleet.record import INTERVALS, check_settings
+from calibration.results import Axes, Plain, Result
 from thermal.case.case import Case
 from thermal.errors import ThermalError
 from thermal.model.replay import LEAST_SPIN_UP
@@ -30,7 +31,7 @@ MOVES = 2.0
 
 
 @dataclass(frozen=True)
-class Fold:
+class Fold(Plain):
     """A calibration without some days, judged on them.
 
     Parameters
@@ -58,7 +59,7 @@ class Fold:
 
 
 @dataclass(frozen=True)
-class ParameterSpread:
+class ParameterSpread(Plain):
     """How far a parameter moves when days are left out.
 
     Parameters
@@ -81,10 +82,11 @@ class ParameterSpread:
     jackknife_error: float
     standard_error: float
     moves: bool
+    key: ClassVar[str] = "name"
 
 
-@dataclass(frozen=True)
-class CrossValidation:
+@dataclass(frozen=True, repr=False)
+class CrossValidation(Result):
     """Errors on days that were left out.
 
     Parameters
@@ -97,36 +99,33 @@ class CrossValidation:
         Of that mean, by the spread of the folds; they share most of their tuning data, so it is a rough one [K].
     parameters : tuple of ParameterSpread
         One an estimated parameter.
-    sentences : tuple of str
-        That in words.
     """
 
     folds: tuple[Fold, ...]
     mae: float
     standard_error: float
     parameters: tuple[ParameterSpread, ...]
-    sentences: tuple[str, ...]
 
-    def to_dict(self) -> dict[str, Any]:
-        """Plain numbers and texts, ready for JSON."""
-        intervals = ("held_out", "tuning")
-        return {
-            "mae": self.mae,
-            "standard_error": self.standard_error,
-            "folds": [
-                {**{k: v for k, v in vars(f).items() if k not in intervals}}
-                | {k: [i.to_dict() for i in getattr(f, k)] for k in intervals}
-                for f in self.folds
-            ],
-            "parameters": {p.name: {k: v for k, v in asdict(p).items() if k != "name"} for p in self.parameters},
-            "sentences": list(self.sentences),
-        }
+    def to_frame(self) -> pd.DataFrame:
+        """Errors of each fold [K]."""
+        rows = [{"start": f.held_out[0].start, "mae": f.mae, "bias": f.bias, "failure": f.failure} for f in self.folds]
+        return pd.DataFrame(rows).rename_axis("fold")
+
+    def _summary(self) -> str:
+        return f"MAE {self.mae:.3f} ± {self.standard_error:.3f} K over {len(self.folds)} folds"
+
+    def _draw(self, axes: Axes) -> None:
+        table = self.to_frame()
+        axes.bar([f"{start:%Y-%m-%d}" for start in table["start"]], table["mae"])
+        axes.axhline(self.mae, linestyle="--", color="grey")
+        axes.set_xlabel("days left out, from")
+        axes.set_ylabel("MAE [K]")
 
 
 def cross_validate(
     case: Case,
     folds: int = 5,
-    settings: Mapping[str, Any] | None = None,
+    settings: ModelSettings | Mapping[str, Any] | None = None,
     *,
     intervals: Sequence[Interval] = (),
     executor: Executor | None = None,
@@ -144,8 +143,8 @@ def cross_validate(
         Building and telemetry.
     folds : int
         Number of blocks K, at least two and at most one a day.
-    settings : mapping of str to Any, optional
-        Keywords of `calibrate`, other than its intervals.
+    settings : CalibrationSettings, or mapping of str to Any, optional
+        Of each calibration, or these by name.
     intervals : sequence of Interval
         What to use; all the telemetry by default. Leave out what is to judge the final model.
     executor : Executor, optional
@@ -170,12 +169,11 @@ def cross_validate(
     >>> found.mae < 1.0  # doctest: +SKIP
     True
     """
-    chosen = dict(settings or {})
-    for name in INTERVALS:
-        if name in chosen:
+    for name in settings if isinstance(settings, Mapping) else ():
+        if name in INTERVALS:
             raise CalibrationError(f"settings: cross-validation chooses {name!r} itself; give `intervals` instead")
-    spelled = check_settings(chosen)
-    parts = _folds(case, folds, intervals, horizon_steps(spelled["horizon"], case.telemetry.step))
+    chosen = calibration_settings(settings)
+    parts = _folds(case, folds, intervals, horizon_steps(chosen.horizon, case.telemetry.step))
     tasks = [(case, held, tuning, chosen) for held, tuning in parts]
     done: list[Fold] = []
     for fold in in_order(_fold, tasks, executor):
@@ -187,10 +185,7 @@ def cross_validate(
         raise CalibrationError(f"cross-validation: fewer than two folds succeeded; the last said {done[-1].failure}")
     mae = np.array([fold.mae for fold in good])
     error = float(np.std(mae, ddof=1) / np.sqrt(mae.size))
-    spreads = _spreads(good)
-    return CrossValidation(
-        tuple(done), float(mae.mean()), error, spreads, _sentences(done, float(mae.mean()), error, spreads)
-    )
+    return CrossValidation(tuple(done), float(mae.mean()), error, _spreads(good))
 
 
 def in_order(function: Callable[..., T], tasks: Sequence[tuple[Any, ...]], executor: Executor | None) -> Iterator[T]:
@@ -264,7 +259,7 @@ def _folds(
         tuning = _pieces(stamps, np.where(near, 0, used), room)
         if not tuning:
             raise NotEnoughDataError(
-                f"folds: without {block[0]} to {block[-1]} no stretch of {room * step / 3600:g} h is left to tune on; "
+                f"folds: without {block[0]} to {block[-1]} no interval of {room * step / 3600:g} h is left to tune on; "
                 "give more folds or more telemetry"
             )
         found.append((_pieces(stamps, np.where(held, used, 0), 2), tuning))
@@ -272,18 +267,18 @@ def _folds(
 
 
 def _pieces(stamps: pd.DatetimeIndex, label: NDArray[np.int64], least: int) -> tuple[Interval, ...]:
-    """Stretches of equal label other than zero, of at least so many stamps."""
+    """Intervals of equal label other than zero, of at least so many stamps."""
     edges = np.flatnonzero(np.diff(label)) + 1
     parts = np.split(np.arange(label.size), edges)
     return tuple(Interval(stamps[p[0]], stamps[p[-1]]) for p in parts if label[p[0]] and p.size >= least)
 
 
 def _fold(
-    case: Case, held_out: tuple[Interval, ...], tuning: tuple[Interval, ...], settings: Mapping[str, Any]
+    case: Case, held_out: tuple[Interval, ...], tuning: tuple[Interval, ...], settings: CalibrationSettings
 ) -> Fold:
     """Calibrate one fold, in whatever process."""
     try:
-        result = calibrate(case, tuning, held_out, **settings)
+        result = calibrate(case, tuning, held_out, settings=settings)
     except (CalibrationError, ThermalError, ArithmeticError, np.linalg.LinAlgError) as error:
         return Fold(held_out, tuning, failure=f"{type(error).__name__}: {error}")
     if result.solver.status == INTERRUPTED:  # the best so far is no fold
@@ -317,20 +312,3 @@ def _spreads(folds: Sequence[Fold]) -> tuple[ParameterSpread, ...]:
         jackknife = float(np.sqrt((z.size - 1) / z.size * np.sum((z - z.mean()) ** 2)))
         found.append(ParameterSpread(name, float(np.std(z, ddof=1)), jackknife, reported, jackknife > MOVES * reported))
     return tuple(found)
-
-
-def _sentences(folds: Sequence[Fold], mae: float, error: float, spreads: Sequence[ParameterSpread]) -> tuple[str, ...]:
-    failed = sum(fold.failure is not None for fold in folds)
-    sentences = [
-        f"On days that it was not calibrated on the model misses by {mae:.3f} K, give or take {error:.3f} K "
-        f"({len(folds) - failed} folds)."
-    ]
-    if failed:
-        sentences.append(f"{failed} of {len(folds)} folds failed and are not in these numbers.")
-    moving = [p.name.replace("_", " ") for p in spreads if p.moves]
-    if moving:
-        sentences.append(
-            f"Leaving out days moves {', '.join(moving)} by more than the standard errors say: either these are too "
-            "small, or the building was not the same on all days."
-        )
-    return tuple(sentences)

@@ -1,4 +1,4 @@
-"""Estimation from one start: rounds of solving on a reduced model, re-weighing the data, and reducing anew."""
+"""Estimation: rounds of solving on a reduced model, re-weighing the data, and reducing anew, from several starts."""
 
 from __future__ import annotations
 
@@ -7,12 +7,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from calibration.errors import CalibrationError
 from calibration.estimation.disturbance import DisturbanceModel
+from calibration.estimation.innovations import TuningSettings, air_volumes, tune_disturbance
 from calibration.evaluation.n_step import Progress
 from calibration.fit.least_squares import LeastSquaresResult, solve_least_squares
 from calibration.fit.precision import Precision, precision, unexplained
 from calibration.fit.problem import Problem
 from thermal._types import FloatArray
+from thermal.errors import ModelError
 from thermal.model.matrices import SymbolicModel
 from thermal.model.reduce import ReducedModel, reduced_model
 
@@ -36,8 +39,9 @@ _WHITENED_SLACK = 10.0
 #: Least standard deviation of an error [K]: sensors do not resolve less.
 _LEAST_DEVIATION = 0.02
 
-#: Zones beyond which a basis is made at one θ: a building of more is large, and a basis of two twice as slow.
-_MOST_ZONES = 40
+#: Zones beyond which a building is large: a basis is made at one θ, as one of two is twice as slow, and the disturbance
+#: tuned on a model of the order that follows; 123 zones take minutes with the five hundred states of a calibration.
+_MOST_ZONES, _TUNING_ORDER = 40, 300
 
 #: Finds the unmeasured heat and the sensors' noise at θ.
 Tuner = Callable[[Problem, ReducedModel, FloatArray], DisturbanceModel]
@@ -250,20 +254,18 @@ def _shrinkage(problem: Problem, z: FloatArray, solve: LeastSquaresResult | None
 
 
 def draw_starts(problem: Problem, count: int, seed: int) -> list[FloatArray]:
-    """Draw starts on the estimation scale: the given θ, then draws from the prior at half its spread.
+    """Draw points on the estimation scale: the given θ, then draws from the prior at half its spread.
 
     Parameters
     ----------
     problem : Problem
         With priors.
     count : int
-        Number of starts.
+        Number of points.
     seed : int
         Seed of the draws.
     """
-    rng = np.random.default_rng(seed)
-    spread = np.array([p.prior_deviation for p in problem.parameters])
-    centre = np.array([p.transform(p.start) for p in problem.parameters])
+    rng, centre, spread = np.random.default_rng(seed), problem.centre, problem.prior_deviations
     further = [centre + 0.5 * spread * rng.standard_normal(spread.size) for _ in range(count - 1)]
     return [problem.point(problem.start), *further]
 
@@ -285,3 +287,89 @@ def compensated_start(problem: Problem, z: FloatArray, model: SymbolicModel) -> 
     """
     bold = replace(problem, effective=10.0 * problem.effective_size())
     return solve_least_squares(lambda x: bold.weighted(model, x), z, *problem.bounds, tolerance=1e-1, iterations=15).x
+
+
+def tune(problem: Problem, model: ReducedModel, theta: FloatArray) -> DisturbanceModel:
+    """Unmeasured heat in proportion to the zones' air and sensor noise, by the likelihood of a filter's innovations.
+
+    Parameters
+    ----------
+    problem : Problem
+        What is fitted.
+    model : ReducedModel
+        That is accurate at θ.
+    theta : ndarray, shape (n_parameter,)
+        Parameter values [parameter units].
+    """
+    large = len(model.network.zones) > _MOST_ZONES
+    settings = TuningSettings(
+        problem.scheme,
+        covariance="steady",  # where sensors come and go exact gains take ten times as long
+        weights=air_volumes(model.network),
+        start=problem.disturbance,
+        curvature=False,
+    )
+    small = reduced_model(problem.grid, [theta], order=_TUNING_ORDER) if large else model
+    return tune_disturbance(small, theta, problem.inputs, problem.fitted, settings).disturbance
+
+
+def solve_starts(
+    problem: Problem, first: ReducedModel, starts: int, seed: int, progress: Progress | None
+) -> tuple[Estimate, list[str]]:
+    """Best estimate over the starts; a start that fails costs that start only, Ctrl-C those that are left.
+
+    Parameters
+    ----------
+    problem : Problem
+        What to fit.
+    first : ReducedModel
+        At the problem's start.
+    starts : int
+        Number of starts.
+    seed : int
+        Seed of the draws.
+    progress : callable, optional
+        Called with stage, done, total.
+
+    Returns
+    -------
+    tuple
+        The best, and what was wrong with the starts that failed.
+
+    Raises
+    ------
+    CalibrationError
+        When every start failed.
+    """
+    best: Estimate | None = None
+    failures = []
+    draws = draw_starts(problem, max(1, starts - 1), seed)
+    for number in range(starts):
+        try:
+            if number == 1:
+                begun = best.problem if best is not None else problem
+                z = compensated_start(begun, problem.point(problem.start), first)
+            else:
+                z = draws[max(0, number - 1)]
+            tuner: Tuner | None = tune
+            if best is not None:  # starts are weighed alike, with the disturbance of the best so far
+                known = best.disturbance
+                tuner = None if known is None else lambda *_, known=known: known
+            found = estimate(problem, z, progress, first if number == 0 else None, tuner)
+        except (ArithmeticError, np.linalg.LinAlgError, CalibrationError, ModelError) as error:
+            failures.append(f"start {number + 1}: {error}")
+            continue
+        except KeyboardInterrupt:
+            if best is None:
+                raise
+            failures.append(f"start {number + 1}: stopped by Ctrl-C")
+            break
+        if best is None or found.better_than(best):
+            best = found
+        if found.solve.interrupted:
+            failures.append(f"start {number + 1}: stopped by Ctrl-C")
+            break
+    if best is None:
+        raise CalibrationError(f"every start failed: {'; '.join(failures)}")
+    return best, failures
+

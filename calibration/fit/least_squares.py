@@ -1,13 +1,18 @@
-"""Nonlinear least squares with bounds by Ipopt: Gauss-Newton with a secant term for the residuals' curvature."""
+"""Nonlinear least squares within bounds.
+
+By Ipopt, Gauss-Newton with a secant term for the residuals' curvature; and by damped Gauss-Newton steps from a start
+that is close.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import casadi as ca
 import numpy as np
+from scipy.optimize import lsq_linear
 
 from thermal._types import FloatArray
 
@@ -60,6 +65,14 @@ _IPOPT = {
     "bound_frac": 1e-4,
     "nlp_scaling_method": "none",
 }
+
+
+#: Damping of the first step [per square of a prior deviation], and the factors by which it is eased and tightened when
+#: a step gains as much as expected or less than half: it stands for the residuals' curvature.
+DAMPING, EASED, TIGHTENED = 0.1, 0.25, 6.0
+
+#: Steps after which a solve is left to Ipopt.
+MOST_STEPS = 15
 
 
 class _Cache:
@@ -121,46 +134,22 @@ class _Hessian:
         return np.asarray(jacobian.T @ jacobian + self.curvature)
 
 
-class _Objective(ca.Callback):
-    """``½ r'r`` for Ipopt; its gradient and Hessian come from the same cached residuals."""
+class _Callback(ca.Callback):
+    """A function of x (p,) for Ipopt, whose value has a shape of its own."""
 
-    def __init__(self, cache: _Cache, p: int, order: int) -> None:
+    def __init__(self, name: str, function: Callable[[FloatArray], Any], p: int, *shape: int) -> None:
         ca.Callback.__init__(self)
-        self._residuals, self._p, self._order = cache, p, order
-        self._hessian = _Hessian(p)
-        self._kept: list[ca.Callback] = []  # CasADi holds no reference to the derivatives it is handed
-        self.construct(f"least_squares_{order}", {})
-
-    def get_n_in(self) -> int:
-        return 1 if self._order != 1 else 2
-
-    def get_n_out(self) -> int:
-        return 1
+        self._function, self._p, self._shape = function, p, shape
+        self.construct(name, {})
 
     def get_sparsity_in(self, i: int) -> ca.Sparsity:
-        return ca.Sparsity.dense(self._p, 1) if i == 0 else ca.Sparsity(1, 1)
+        return ca.Sparsity.dense(self._p, 1)
 
     def get_sparsity_out(self, i: int) -> ca.Sparsity:
-        return [ca.Sparsity.dense(1, 1), ca.Sparsity.dense(1, self._p), ca.Sparsity.dense(self._p, self._p)][
-            self._order
-        ]
+        return ca.Sparsity.dense(*self._shape)
 
     def eval(self, arg: Sequence[ca.DM]) -> list[ca.DM]:
-        residual, jacobian = self._residuals(np.array(arg[0], dtype=float).ravel())
-        if self._order == 0:
-            return [ca.DM(0.5 * float(residual @ residual))]
-        if self._order == 1:
-            return [ca.DM((jacobian.T @ residual)[None, :])]
-        return [ca.DM(self._hessian(np.array(arg[0], dtype=float).ravel(), residual, jacobian))]
-
-    def has_jacobian(self) -> bool:
-        return self._order == 0
-
-    def get_jacobian(
-        self, name: str, inames: Sequence[str], onames: Sequence[str], opts: Mapping[str, object]
-    ) -> ca.Function:
-        self._kept.append(_Objective(self._residuals, self._p, 1))
-        return self._kept[-1]
+        return [ca.DM(self._function(np.array(arg[0], dtype=float).ravel()))]
 
 
 def solve_least_squares(
@@ -198,7 +187,10 @@ def solve_least_squares(
     cache = _Cache(function)
     inside = np.clip(start, lower, upper)
     cache(inside)
-    objective, hessian = _Objective(cache, p, 0), _Objective(cache, p, 2)
+    curved = _Hessian(p)
+    value = _Callback("value", lambda x: 0.5 * float(cache(x)[0] @ cache(x)[0]), p, 1, 1)
+    gradient = _Callback("gradient", lambda x: cache(x)[1].T @ cache(x)[0], p, p, 1)
+    hessian = _Callback("hessian", lambda x: curved(x, *cache(x)), p, p, p)
     x, scale, empty = ca.MX.sym("x", p), ca.MX.sym("lam_f"), ca.MX.sym("p", 0)
     lagrangian = ca.Function(
         "nlp_hess_l",
@@ -207,10 +199,12 @@ def solve_least_squares(
         ["x", "p", "lam_f", "lam_g"],
         ["triu_hess_gamma_x_x"],
     )
-    problem: dict[str, Any] = {"x": x, "f": objective(x)}
+    slope = ca.Function("nlp_grad_f", [x, empty], [value(x), gradient(x)], ["x", "p"], ["f", "grad_f_x"])
+    problem: dict[str, Any] = {"x": x, "f": value(x)}
     ipopt = {**_IPOPT, "tol": tolerance, "compl_inf_tol": tolerance, "acceptable_tol": 10 * tolerance}
     options: dict[str, Any] = {
-        "print_time": False, "hess_lag": lagrangian, "ipopt": {**ipopt, "max_iter": iterations}
+        "print_time": False, "no_nlp_grad": True, "grad_f": slope, "hess_lag": lagrangian,
+        "ipopt": {**ipopt, "max_iter": iterations},
     }  # fmt: skip
     solver = ca.nlpsol("least_squares", "ipopt", problem, options)
     try:
@@ -234,3 +228,94 @@ def solve_least_squares(
         iterations=int(stats["iter_count"]),
         interrupted=interrupted,
     )
+
+
+def bounded_step(
+    residual: FloatArray,
+    jacobian: FloatArray,
+    lower: FloatArray,
+    upper: FloatArray,
+    damping: FloatArray | None = None,
+) -> FloatArray:
+    """Minimise the linearised residuals ``|r + J s|²`` within bounds of the step s.
+
+    Parameters
+    ----------
+    residual : ndarray, shape (m,)
+        r [-].
+    jacobian : ndarray, shape (m, p)
+        J [per unit of x].
+    lower, upper : ndarray, shape (p,)
+        Bounds of the step, about zero [as the caller's x].
+    damping : ndarray, shape (p,), optional
+        D of ``|D s|²``, which is added [per unit of x].
+
+    Returns
+    -------
+    ndarray, shape (p,)
+        The step [as the caller's x].
+    """
+    if damping is None:
+        bounds = np.minimum(lower, -1e-12), np.maximum(upper, 1e-12)
+        return np.asarray(lsq_linear(jacobian, -residual, bounds).x)
+    q, r = np.linalg.qr(jacobian)
+    target = np.concatenate([-q.T @ residual, np.zeros(damping.size)])
+    found = lsq_linear(np.vstack([r, np.diag(damping)]), target, (lower, upper), method="bvls").x
+    return np.asarray(np.clip(found, lower, upper))
+
+
+def solve_damped(
+    function: ResidualFunction,
+    start: FloatArray,
+    bounds: tuple[FloatArray, FloatArray],
+    spread: FloatArray,
+    tolerance: float,
+) -> LeastSquaresResult:
+    """Minimise ``½ Σ r(x)²`` by damped Gauss-Newton steps within bounds, and by Ipopt where these go on for long.
+
+    Started close to the minimum two steps are enough; Ipopt takes at least six for its barrier.
+
+    Parameters
+    ----------
+    function : callable
+        Residuals (m,) and their Jacobian (m, p) at x.
+    start : ndarray, shape (p,)
+        Within the bounds [as the caller's x].
+    bounds : tuple of ndarray, shape (p,)
+        Lower and upper bounds; x is held where they are equal [as the caller's x].
+    spread : ndarray, shape (p,)
+        Deviations in which steps are damped [as the caller's x].
+    tolerance : float
+        It is solved when a step lowers ``Σ r²``, or could, by no more than this [-]. A gradient does not say that where
+        the data leave a direction open.
+    """
+    (lower, upper), x, damping = bounds, start, DAMPING
+    free = lower < upper
+    residual, jacobian = function(x)
+    for number in range(MOST_STEPS):
+        step = np.zeros_like(x)
+        if free.any():
+            ends = (lower - x)[free], (upper - x)[free]
+            step[free] = bounded_step(residual, jacobian[:, free], *ends, np.sqrt(damping) / spread[free])
+        expected = float(residual @ residual - np.sum((residual + jacobian @ step) ** 2))
+        gained = 0.0
+        if expected >= tolerance:
+            there = function(x + step)
+            gained = float(residual @ residual - there[0] @ there[0])
+            damping *= EASED if gained > 0.8 * expected else TIGHTENED if gained < 0.5 * expected else 1.0
+        if gained > 0.0:
+            x, (residual, jacobian) = x + step, there
+        if expected < tolerance or 0.0 < gained < tolerance:
+            return LeastSquaresResult(x, 0.5 * float(residual @ residual), jacobian, "Solved", True, number + 1)
+
+    def filled(y: FloatArray) -> FloatArray:
+        whole = x.copy()
+        whole[free] = y
+        return whole
+
+    def reduced(y: FloatArray) -> tuple[FloatArray, FloatArray]:
+        residual, jacobian = function(filled(y))
+        return residual, jacobian[:, free]
+
+    found = solve_least_squares(reduced, x[free], lower[free], upper[free])
+    return replace(found, x=filled(found.x), jacobian=function(filled(found.x))[1])

@@ -11,12 +11,12 @@ covariance with prior precision Λ is ``H^-1 (w⁴M + Λ) H^-1``, H = w²B + Λ 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import singledispatch
 
 import numpy as np
 from numpy.typing import NDArray
 
 from calibration.estimation.disturbance import DisturbanceModel
+from calibration.fit.likelihood import InnovationsProblem
 from calibration.fit.problem import Problem
 from thermal._types import FloatArray
 from thermal.model.matrices import SymbolicModel
@@ -80,7 +80,6 @@ class Precision:
         return np.asarray(inverse @ (weight**2 * self.score + self.prior) @ inverse)
 
 
-@singledispatch
 def precision(problem: Problem, model: SymbolicModel, theta: FloatArray, disturbance: DisturbanceModel) -> Precision:
     """Curvature of the squared errors and covariance of their gradient under a disturbance model.
 
@@ -99,6 +98,10 @@ def precision(problem: Problem, model: SymbolicModel, theta: FloatArray, disturb
     disturbance : DisturbanceModel
         Heat and noise.
     """
+    prior = np.asarray(np.linalg.inv(problem.prior_covariance()), dtype=float)
+    if isinstance(problem, InnovationsProblem):  # whitened: their curvature is their information too
+        white = problem.turned(model, theta)[1]
+        return Precision(white.T @ white, white.T @ white, prior, len(white))
     inputs, keep, p = problem.inputs, problem.keep, len(problem.free)
     n_zone = inputs.zone.shape[1]
     heat = np.broadcast_to(np.asarray(disturbance.deviation), (n_zone,))
@@ -111,9 +114,7 @@ def precision(problem: Problem, model: SymbolicModel, theta: FloatArray, disturb
     unknown = np.concatenate([[_swing(inputs.boundary[:, :1], inputs)[0]], _swing(inputs.held[:, held], inputs)])
     for runs in problem.runs:
         error, slopes = problem.errors(model, theta, runs, slopes=True)
-        if slopes is None:  # pragma: no cover - asked for
-            raise RuntimeError
-        jacobian = np.where(np.isfinite(error)[..., None], slopes * scale, 0.0)
+        jacobian = np.where(np.isfinite(error)[..., None], np.asarray(slopes) * scale, 0.0)
         curvature += np.einsum("rkzi,rkzj->ij", jacobian, jacobian, optimize=True)
         score += np.einsum("rkzi,rkzj,z->ij", jacobian, jacobian, noise**2, optimize=True)
         errors += int(np.isfinite(error).sum())
@@ -131,7 +132,6 @@ def precision(problem: Problem, model: SymbolicModel, theta: FloatArray, disturb
     reach *= heat[:, None]
     stay, _ = disturbance.discrete(inputs.step)
     score += _autocorrelated(reach, stay)
-    prior = np.asarray(np.linalg.inv(problem.prior_covariance()), dtype=float)
     return Precision(curvature, score, prior, errors)
 
 
@@ -153,7 +153,6 @@ def _autocorrelated(reach: FloatArray, stay: float) -> FloatArray:
     return np.asarray(total + cross + cross.T)
 
 
-@singledispatch
 def unexplained(
     problem: Problem, model: SymbolicModel, theta: FloatArray, disturbance: DisturbanceModel, seed: int = 0
 ) -> float:
@@ -172,6 +171,8 @@ def unexplained(
     seed : int
         Seed of the heat that is drawn.
     """
+    if isinstance(problem, InnovationsProblem):
+        return _repeated(problem, model, theta)
     inputs, keep = problem.inputs, problem.keep
     n_zone = inputs.zone.shape[1]
     rng = np.random.default_rng(seed)
@@ -196,3 +197,22 @@ def unexplained(
         observed.append(error[seen])
         made.append(drawn[seen])
     return float(np.mean(np.concatenate(observed) ** 2) / np.mean(np.concatenate(made) ** 2))
+
+
+def _repeated(problem: InnovationsProblem, model: SymbolicModel, theta: FloatArray) -> float:
+    """Covariance of the gradient, day by day, over that of white innovations [-].
+
+    1 where the disturbance is right; above, innovations are larger than the filter says, or not white, so that they
+    repeat within the day what they pull at. Directions count as far as the data determine them.
+    """
+    residual, jacobian = problem.turned(model, theta)
+    parts, index = np.unique(problem.independent(), return_inverse=True)
+    if len(parts) < 2:
+        return float(np.mean(residual**2))
+    pulls = np.zeros((len(parts), jacobian.shape[1]))
+    np.add.at(pulls, index, residual[:, None] * jacobian)
+    curvature = jacobian.T @ jacobian
+    # each interval has pulled the estimate towards itself
+    score = pulls.T @ pulls * len(parts) / (len(parts) - 1)
+    prior = np.asarray(np.linalg.inv(problem.prior_covariance()), dtype=float)
+    return 1.0 / Precision(curvature, score, prior, residual.size).weight()

@@ -3,25 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Literal
+from dataclasses import dataclass, field, replace
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
+from calibration.errors import CalibrationError, NotEnoughDataError
 from calibration.estimation.disturbance import DisturbanceModel
-from calibration.evaluation.intervals import Interval, Runs
+from calibration.evaluation.intervals import Interval, Runs, default_intervals, horizon_steps, merge, select_runs
+from calibration.evaluation.settings import Loss, ModelSettings, calibration_settings
 from thermal._types import FloatArray
+from thermal.case.case import Case
 from thermal.model.matrices import SymbolicModel
-from thermal.model.replay import Inputs, free_runs, spin_up
+from thermal.model.replay import LEAST_SPIN_UP, Inputs, free_runs, replay_inputs, spin_up
 from thermal.model.step import IMPLICIT_EULER, Scheme
 from thermal.parameters import Parameter
-
-#: ``linear`` is plain least squares; ``pseudo_huber`` takes errors far beyond the others for outliers.
-Loss = Literal["linear", "pseudo_huber"]
-
-#: Errors of N-step runs, or whitened innovations of a Kalman filter.
-Objective = Literal["multi_step", "innovations"]
 
 #: Residuals of a run are taken every half hour: what lies between is almost the same number again.
 RESIDUAL_SPACING = 1800.0
@@ -99,6 +96,16 @@ class Problem:
         """Whether residuals are whitened, which takes a disturbance from the beginning: these are not."""
         return False
 
+    @property
+    def centre(self) -> FloatArray:
+        """Centre of the prior on the estimation scale, (n_free,) [-]."""
+        return np.array([p.transform(p.start) for p in self.parameters])
+
+    @property
+    def prior_deviations(self) -> FloatArray:
+        """Standard deviations of the prior on the estimation scale, (n_free,) [-]."""
+        return np.array([p.prior_deviation for p in self.parameters])
+
     def at(self, model: SymbolicModel, theta: FloatArray, disturbance: DisturbanceModel | None = None) -> Problem:
         """Return the problem whose residuals are weighed by a disturbance at θ: itself, as they are not whitened.
 
@@ -114,7 +121,7 @@ class Problem:
         return self
 
     @property
-    def stretches(self) -> tuple[Interval, ...]:
+    def fitted(self) -> tuple[Interval, ...]:
         """Telemetry that is fitted: from the first to the last run of each interval."""
         stamps = self.inputs.stamps
         return tuple(Interval(stamps[r.starts[0]], stamps[r.starts[-1] + self.steps]) for r in self.runs)
@@ -252,7 +259,7 @@ class Problem:
         parameters = self.parameters
         base = np.array([p.base for p in parameters])
         grouped = np.array([p.grouped for p in parameters])
-        spread = np.array([p.prior_deviation for p in parameters])
+        spread = self.prior_deviations
         together = (base[:, None] == base[None, :]) & (
             grouped[:, None] & grouped[None, :] | np.eye(base.size, dtype=bool)
         )
@@ -272,9 +279,8 @@ class Problem:
         theta = self.theta(z)
         cost, slopes = self.turned(model, theta)
         weight = np.sqrt(self.effective_size() / cost.size) / self.deviation
-        centre = np.array([p.transform(p.start) for p in self.parameters])
         whiten = np.linalg.inv(np.linalg.cholesky(self.prior_covariance()))
-        residual = np.concatenate([weight * cost, whiten @ (z - centre)])
+        residual = np.concatenate([weight * cost, whiten @ (z - self.centre)])
         return residual, np.vstack([weight * slopes, whiten])
 
     def turned(self, model: SymbolicModel, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -303,21 +309,88 @@ class Problem:
         return scale * cost, np.sqrt(0.5 * (1.0 + root)) / root
 
 
-def thin(runs: Sequence[Runs], steps: int) -> tuple[Runs, ...]:
-    """Keep runs that tile the data: each stamp lies in one run.
+def tuning_problem(case: Case, tune: Sequence[Interval] = (), settings: ModelSettings | None = None) -> Problem:
+    """Make the least-squares problem of a case's tuning intervals.
 
     Parameters
     ----------
-    runs : sequence of Runs
-        Hourly runs, one entry an interval.
+    case : Case
+        Building and telemetry.
+    tune : sequence of Interval
+        First two thirds of the telemetry by default.
+    settings : CalibrationSettings or ModelSettings, optional
+        Model, what is fixed, horizon and loss.
+
+    Returns
+    -------
+    Problem
+        On the grid, at the start.
+
+    Raises
+    ------
+    CalibrationError
+        When everything is fixed, or an interval has no usable run.
+    """
+    chosen = calibration_settings(settings)
+    network = chosen.network(case.building)
+    inputs, given = replay_inputs(case, network), network.values(chosen.fixed)
+    free = tuple(i for i, p in enumerate(network.parameters) if p.name not in chosen.fixed)
+    if not free:
+        raise CalibrationError(
+            f"fixed: expected a parameter that is left to estimate, came all {len(given)}; evaluate instead"
+        )
+    steps = horizon_steps(chosen.horizon, inputs.step)
+    runs = tuning_runs(inputs, merge(tune) or default_intervals(case)[0], steps, chosen.spin_up_seconds)
+    return Problem(SymbolicModel(network), inputs, runs, steps, free, given, chosen.stepping, loss=chosen.loss)
+
+
+def tuning_runs(inputs: Inputs, intervals: Sequence[Interval], steps: int, spin_up: float) -> tuple[Runs, ...]:
+    """Choose runs that tile the tuning intervals, with a full spin-up where that leaves half of the telemetry.
+
+    A run after 12 hours starts from walls and slabs that are still wrong, and the fit would take that for physics: on a
+    twin of known parameters it cost 0.013 K of held-out error.
+
+    Parameters
+    ----------
+    inputs : Inputs
+        The telemetry.
+    intervals : sequence of Interval
+        Tuning intervals.
     steps : int
         N.
+    spin_up : float
+        Length of the spin-up [s].
+
+    Raises
+    ------
+    NotEnoughDataError
+        When every run misses telemetry.
     """
+    chosen = []
+    for interval in intervals:
+        begin = max(inputs.stamps[0], interval.start - pd.Timedelta(seconds=spin_up))
+        half = 0.5 * (interval.end - begin).total_seconds()
+        try:
+            found = select_runs(inputs, interval, steps, spin_up=spin_up, least=max(LEAST_SPIN_UP, min(spin_up, half)))
+        except NotEnoughDataError:
+            found = select_runs(inputs, interval, steps, spin_up=spin_up)
+        inside = found.starts >= inputs.stamps.searchsorted(interval.start)  # every residual lies in the interval
+        chosen.append(Runs(found.begin, found.starts[inside], found.skipped))
+    runs = tuple(r for r in thin(chosen, steps) if r.starts.size)
+    if not runs:
+        raise NotEnoughDataError(
+            "tuning: every run misses inputs or zone temperatures; `buildingmpc check` shows the gaps"
+        )
+    return runs
+
+
+def thin(runs: Sequence[Runs], steps: int) -> tuple[Runs, ...]:
+    """Keep runs (of each interval) that tile the data: each stamp lies in one run of so many steps."""
     thinned = []
     for r in runs:
         kept: list[int] = []
         for start in r.starts:
             if not kept or start >= kept[-1] + steps:
                 kept.append(int(start))
-        thinned.append(Runs(r.begin, np.array(kept, dtype=np.int64), r.skipped))
+        thinned.append(replace(r, starts=np.array(kept, dtype=np.int64)))
     return tuple(thinned)

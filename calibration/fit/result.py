@@ -2,28 +2,35 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from pathlib import Path
-from typing import Any
+from dataclasses import dataclass, field, replace
+from typing import Any, ClassVar
 
 import numpy as np
+import pandas as pd
+from scipy import stats
 
-from calibration.errors import CalibrationError
 from calibration.estimation.disturbance import DisturbanceModel
+from calibration.evaluation.case_model import GridCheck
 from calibration.evaluation.intervals import Interval
 from calibration.evaluation.n_step import Evaluation
-from calibration.evaluation.settings import ModelSettings
-from calibration.fit.problem import Objective
-from calibration.identifiability.information import Information
+from calibration.evaluation.settings import ModelSettings, Objective
+from calibration.fit.estimate import Estimate
+from calibration.identifiability.information import DETERMINED, Information
+from calibration.results import Axes, Plain, Result, draw_rows, plain
 from thermal._types import FloatArray
 from thermal.effects.catalogue import CATALOGUE
-from thermal.network.network import ThermalNetwork
+from thermal.parameters import Parameter
+
+#: A bound counts as hit within this share of the range, on the estimation scale [-].
+BOUND_SHARE = 0.01
+
+#: Tails of a 90 % interval [-].
+_TAILS = (0.05, 0.95)
 
 
 @dataclass(frozen=True)
-class ParameterEstimate:
+class ParameterEstimate(Plain):
     """One parameter after calibration.
 
     Parameters
@@ -57,14 +64,11 @@ class ParameterEstimate:
     identifiable: bool
     source: str
     interval90: tuple[float, float] | None = None
-
-    def to_dict(self) -> dict[str, Any]:
-        """Entry of ``calibration.json``."""
-        return {k: getattr(self, k) for k in self.__dataclass_fields__ if k != "name"}
+    key: ClassVar[str] = "name"
 
 
 @dataclass(frozen=True)
-class SolverReport:
+class SolverReport(Plain):
     """How the solve went.
 
     Parameters
@@ -97,38 +101,9 @@ class SolverReport:
     evaluations: int = 0
     settled: bool = True
 
-    def to_dict(self) -> dict[str, Any]:
-        """Entry of ``calibration.json``."""
-        return {**{k: getattr(self, k) for k in self.__dataclass_fields__}, "failures": list(self.failures)}
 
-
-@dataclass(frozen=True)
-class GridCheck:
-    """The calibrated reduced model replayed beside the grid.
-
-    Parameters
-    ----------
-    volumes, order : int
-        Control volumes of the grid and states of the reduced model.
-    runs : int
-        Runs compared.
-    max_difference, mean_difference : float
-        Of zone means over all steps of these runs [K].
-    """
-
-    volumes: int
-    order: int
-    runs: int
-    max_difference: float
-    mean_difference: float
-
-    def to_dict(self) -> dict[str, Any]:
-        """Entry of ``calibration.json``."""
-        return {k: getattr(self, k) for k in self.__dataclass_fields__}
-
-
-@dataclass(frozen=True)
-class CalibrationResult:
+@dataclass(frozen=True, repr=False)
+class CalibrationResult(Result):
     """Outcome of `calibration.calibrate`.
 
     Parameters
@@ -155,7 +130,7 @@ class CalibrationResult:
         Mean square of the tuning errors, or of what a day's innovations pull at, over that which the disturbance makes
         [-]; far above 1, physics is missing.
     information : Information
-        What the data determine, in numbers and in words.
+        What the data determine.
     horizon : str
         Prediction horizon.
     settings : ModelSettings
@@ -193,31 +168,36 @@ class CalibrationResult:
 
     def to_dict(self) -> dict[str, Any]:
         """Contents of ``calibration.json``."""
-
-        def errors(evaluations: Mapping[str, Evaluation]) -> dict[str, dict[str, float]]:
-            return {name: e.metrics.to_dict() for name, e in evaluations.items()}
-
-        return {
-            "parameters": {p.name: p.to_dict() for p in self.parameters},
-            "uncalibrated": errors(self.uncalibrated),
-            "calibrated": errors(self.calibrated),
+        content: dict[str, Any] = {
+            "parameters": self.parameters,
+            "uncalibrated": {name: e.metrics for name, e in self.uncalibrated.items()},
+            "calibrated": {name: e.metrics for name, e in self.calibrated.items()},
             "effects": self.effects(),
-            "solver": self.solver.to_dict(),
-            "grid_check": self.grid_check.to_dict(),
-            "disturbance": None if self.disturbance is None else self.disturbance.to_dict(),
-            "excess": self.excess,
-            "information": self.information.to_dict(),
-            "intervals": {
-                "tuning": [i.to_dict() for i in self.tuning],
-                "held_out": [i.to_dict() for i in self.held_out],
-            },
-            "objective": self.objective,
-            "horizon": self.horizon,
-            "settings": self.settings.to_dict(),
-            "case": self.case,
-            "version": self.version,
-            "seed": self.seed,
         }
+        names = ("solver", "grid_check", "disturbance", "excess", "information")
+        intervals = {"tuning": self.tuning, "held_out": self.held_out}
+        about = ("objective", "horizon", "settings", "case", "version", "seed")
+        content |= {k: getattr(self, k) for k in names} | {"intervals": intervals}
+        found: dict[str, Any] = plain(content | {k: getattr(self, k) for k in about})
+        return found
+
+    def to_frame(self) -> pd.DataFrame:
+        """Parameters with their ranges, standard errors and 90 % intervals [parameter units]."""
+        rows = {p.name: p.to_dict() for p in self.parameters}
+        table = pd.DataFrame.from_dict(rows, orient="index").rename_axis("parameter")
+        ends = [p.interval90 or (np.nan, np.nan) for p in self.parameters]
+        return table.drop(columns="interval90").assign(low90=[e[0] for e in ends], high90=[e[1] for e in ends])
+
+    def _summary(self) -> str:
+        before, after = (e["held_out"].metrics.mae for e in (self.uncalibrated, self.calibrated))
+        return f"{self.case}, held-out MAE {after:.3f} K ({before:.3f} K before), {self.solver.status}"
+
+    def _draw(self, axes: Axes) -> None:
+        table = self.to_frame().dropna(subset="standard_error")
+        width = table["upper"] - table["lower"]
+        shares = table[["value", "low90", "high90"]].astype(float).sub(table["lower"], axis=0).div(width, axis=0)
+        draw_rows(axes, shares, "share of the physical range [-], with 90 % intervals")
+        axes.set_xlim(-0.02, 1.02)
 
 
 def effect_entries(
@@ -240,61 +220,64 @@ def effect_entries(
     return entries
 
 
-def load_parameters(path: str | Path, network: ThermalNetwork) -> FloatArray:
-    """Read θ from a ``calibration.json`` (or any JSON with its ``parameters`` key).
+def describe(
+    found: Estimate, information: Information, nominal: Mapping[str, tuple[float, str]]
+) -> tuple[ParameterEstimate, ...]:
+    """Parameters with standard errors, intervals, bounds and what the data determine.
 
     Parameters
     ----------
-    path : str or Path
-        The file.
-    network : ThermalNetwork
-        Whose parameters they are.
-
-    Returns
-    -------
-    ndarray, shape (n_parameter,)
-        θ [parameter units].
-
-    Raises
-    ------
-    CalibrationError
-        When the file cannot be read, or does not hold the parameters of this building.
+    found : Estimate
+        From `estimate`.
+    information : Information
+        Of this estimate: a parameter that is known only because priors hold the others is not determined by the data.
+    nominal : mapping of str to (float, str)
+        Values that were never estimated, with their units [that unit].
     """
-    path = Path(path)
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise CalibrationError(f"parameters: cannot read {path}: {error.strerror or error}") from error
-    except (json.JSONDecodeError, UnicodeDecodeError) as error:
-        raise CalibrationError(f"{path}: expected JSON as `calibrate` writes it, found {error}") from error
-    entries = content.get("parameters") if isinstance(content, dict) else None
-    if not isinstance(entries, dict) or not entries:
-        raise CalibrationError(
-            f"{path}: expected a key 'parameters' with an entry a parameter, as in calibration.json"
-        )
-    values: dict[str, float] = {}
-    for name, entry in entries.items():
-        value = entry.get("value") if isinstance(entry, dict) else entry
-        if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value):
-            raise CalibrationError(
-                f"{path}: parameters.{name}: expected a positive number under 'value', found {value!r}"
-            )
-        values[name] = float(value)
-    signed = {p.name for p in network.parameters if p.scale == "linear"}
-    wrong = [name for name, value in values.items() if value <= 0 and name not in signed]
-    if wrong:
-        raise CalibrationError(
-            f"{path}: parameters.{wrong[0]}: expected a positive number under 'value', found {values[wrong[0]]!r}"
-        )
-    for p in network.parameters:
-        if p.scale == "logit" and values.get(p.name, 0.0) > 1.0:
-            raise CalibrationError(f"{path}: parameters.{p.name}: expected at most 1, found {values[p.name]!r}")
-    wanted = {p.name for p in network.parameters}
-    unknown = sorted(set(values) - wanted - set(network.nominal))
-    missing = sorted(wanted - set(values))
-    if unknown or missing:
-        raise CalibrationError(
-            f"{path}: parameters of another building: unknown {unknown or 'none'}, missing {missing or 'none'}; "
-            "calibrate this case, or give the file that belongs to it"
-        )
-    return network.values({name: value for name, value in values.items() if name in wanted})
+    deviations = dict(zip(found.problem.free, np.sqrt(np.diag(found.covariance)), strict=True))
+    described = describe_parameters(found.problem.grid.network.parameters, found.theta, deviations, nominal)
+    told = {p.name for p in information.parameters if p.status == "determined"}
+    return tuple(replace(p, identifiable=p.identifiable and p.name in told) for p in described)
+
+
+def describe_parameters(
+    parameters: Sequence[Parameter],
+    theta: FloatArray,
+    deviations: Mapping[int, float],
+    nominal: Mapping[str, tuple[float, str]],
+) -> tuple[ParameterEstimate, ...]:
+    """Parameters of a network with what is known of each.
+
+    Parameters
+    ----------
+    parameters : sequence of Parameter
+        Of the network.
+    theta : ndarray, shape (n_parameter,)
+        Their values [parameter units].
+    deviations : mapping of int to float
+        Standard errors on the estimation scale [-], by position; the others were fixed.
+    nominal : mapping of str to (float, str)
+        Values that were never estimated, with their units [that unit].
+    """
+    described = [_estimated(p, float(theta[i]), deviations.get(i)) for i, p in enumerate(parameters)]
+    for name, (value, unit) in nominal.items():
+        source = "nominal: enters only as a product with the heat capacity"
+        described.append(ParameterEstimate(name, unit, value, None, None, value, False, None, False, source))
+    return tuple(described)
+
+
+def _estimated(p: Parameter, value: float, deviation: float | None) -> ParameterEstimate:
+    if deviation is None:
+        source = "fixed by the user"
+        return ParameterEstimate(p.name, p.unit, value, p.lower, p.upper, p.start, False, None, False, source)
+    low, high, z = p.transform(p.lower), p.transform(p.upper), p.transform(value)
+    at_bound = bool(min(z - low, high - z) < BOUND_SHARE * (high - low))
+    # a normal on the estimation scale, cut at the physical range: the truth does not leave it either
+    ends = stats.truncnorm((low - z) / deviation, (high - z) / deviation, loc=z, scale=deviation).ppf(_TAILS)
+    deviation = min(deviation, p.prior_deviation)  # the data never make a parameter less certain than its range does
+    identifiable = bool(deviation < DETERMINED * p.prior_deviation and not at_bound)
+    first, last = (float(np.clip(p.inverse(float(end)), p.lower, p.upper)) for end in ends)
+    error = float(deviation * p.slope(value))
+    return ParameterEstimate(
+        p.name, p.unit, value, p.lower, p.upper, p.start, at_bound, error, identifiable, p.source, (first, last)
+    )

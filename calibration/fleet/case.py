@@ -1,36 +1,90 @@
-"""One case of many: what travels to a worker, and what the worker does with it."""
+"""One case of many: what travels to a worker, what it does there, and the record by which it is known again."""
 
 from __future__ import annotations
 
+import hashlib
+import json
 import os
 import socket
-import tempfile
 import time
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, fields, replace
+from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar, Literal
 
-from calibration.errors import CalibrationError, WorkerLostError
-from calibration.evaluation.intervals import parse_interval
+from calibration.errors import CalibrationError, ResultsExistError, WorkerLostError
+from calibration.evaluation.intervals import Interval, parse_interval
+from calibration.evaluation.settings import INTERVALS, CalibrationSettings, ModelSettings, calibration_settings
 from calibration.fit.calibrate import calibrate
 from calibration.fit.least_squares import INTERRUPTED
 from calibration.fit.result import CalibrationResult
-from calibration.fleet.record import (
-    INTERVALS,
-    RECORD,
-    CaseOutcome,
-    Status,
-    check_settings,
-    digest,
-    outcome_of,
-    read_record,
-)
-from calibration.results import write_results
-from mpc.reports.calibration import write_calibration
+from calibration.results import Content, Plain, to_json, write_results
 from thermal.case.case import Case
-from thermal.case.load import load_case
-from thermal.errors import ThermalError
+from thermal.case.load import NAME, load_case, read_building_file
+from thermal.errors import CaseError, ThermalError
+
+#: File in the results of each case: what they were made from, and how it went.
+RECORD = "case.json"
+
+Status = Literal["calibrated", "not_converged", "failed", "lost", "interrupted"]
+
+#: Makes the files of a case's results, by name; importable by name, for it travels to the workers.
+Files = Callable[[CalibrationResult, Case], Mapping[str, Content]]
+
+
+def data_files(result: CalibrationResult, case: Case) -> dict[str, Content]:
+    """Files of a case's results with their data alone, ``calibration.json`` and ``evaluation.json``.
+
+    Parameters
+    ----------
+    result : CalibrationResult
+        From `calibrate`.
+    case : Case
+        The case it was calibrated on.
+    """
+    return {"calibration.json": result.to_dict(), "evaluation.json": result.calibrated["held_out"].to_dict()}
+
+
+@dataclass(frozen=True)
+class CaseOutcome(Plain):
+    """How one of many calibrations went.
+
+    Parameters
+    ----------
+    case : str
+        Name of the case folder, and of the folder of its results.
+    status : {"calibrated", "not_converged", "failed", "lost", "interrupted"}
+        The first two have results. A case is lost when its worker died more often than it may, and interrupted when the
+        run ended before it.
+    held_out_mae_before, held_out_mae_after : float, optional
+        Held-out error before and after calibration [K].
+    seconds : float
+        Wall time of loading, calibrating and writing [s]; of the run that did it, for a case that was done before.
+    resumed : bool
+        Whether the results are of an earlier run.
+    attempts : int
+        How many workers began it.
+    solver : mapping of str to Any, optional
+        Entry ``solver`` of its ``calibration.json``; None without results.
+    error, message : str, optional
+        Name and text of what went wrong.
+    bad_input : bool
+        Whether that is for the user to mend in the case or the settings, rather than a failure.
+    """
+
+    case: str
+    status: Status
+    held_out_mae_before: float | None = None
+    held_out_mae_after: float | None = None
+    seconds: float = 0.0
+    resumed: bool = False
+    attempts: int = 0
+    solver: Mapping[str, Any] | None = None
+    error: str | None = None
+    message: str | None = None
+    bad_input: bool = False
+    key: ClassVar[str] = "case"
 
 
 @dataclass(frozen=True)
@@ -41,24 +95,27 @@ class CaseTask:
     ----------
     case, out, running : Path
         Case folder, folder of its results, and the run's own folder beside them.
-    settings : mapping of str to Any
-        Of `calibrate`.
+    settings : CalibrationSettings, or mapping of str to Any
+        Of `calibrate`; a mapping may have its intervals too.
     run : str
         Name of the run.
     attempt, retries : int
         How often it was given to another worker, and how often it may be.
     force : bool
         Calibrate although there are results of an earlier run.
+    files : callable
+        Makes the files of the results.
     """
 
     case: Path
     out: Path
     running: Path
-    settings: Mapping[str, Any]
+    settings: ModelSettings | Mapping[str, Any]
     run: str
     attempt: int
     retries: int
     force: bool
+    files: Files = data_files
 
     @property
     def name(self) -> str:
@@ -105,7 +162,15 @@ class CaseTask:
         return outcome_of(there, self.out) if there is not None and there["run"] == self.run else None
 
     def unfinished(self, status: Status, error: Exception | None = None) -> CaseOutcome:
-        """Describe an end without results."""
+        """Describe an end without results.
+
+        Parameters
+        ----------
+        status : str
+            One of `Status`.
+        error : Exception, optional
+            What went wrong.
+        """
         bad = status == "failed" and isinstance(error, ThermalError | CalibrationError)
         kind, text = (type(error).__name__, str(error)) if error is not None else (None, None)
         return CaseOutcome(self.name, status, attempts=len(self.starts()), error=kind, message=text, bad_input=bad)
@@ -135,38 +200,171 @@ def _calibrate_one(task: CaseTask) -> CaseOutcome:
     task.begin()
     files = digest(task.case)  # before it is loaded: what changes from here on counts as another case
     case = load_case(task.case)
-    result = calibrate(case, **_settings_of(case, task.settings))
+    intervals, settings = split_settings(task.settings)
+    read = {
+        name: [parse_interval(entry, case) if isinstance(entry, str) else entry for entry in entries]
+        for name, entries in intervals.items()
+    }
+    result = calibrate(case, read.get("tune", ()), read.get("hold_out", ()), settings=settings)
     if result.solver.status == INTERRUPTED:  # the best so far is not what a later run should take over
         return task.unfinished("interrupted")
-    with tempfile.TemporaryDirectory(prefix="buildingmpc-") as work:
-        staged = Path(work) / task.name
-        write_calibration(result, case, staged)
-        outcome = _outcome(task, result, time.perf_counter() - began)
-        record = {
-            "settings": check_settings(task.settings),
-            "files": files,
-            "version": result.version,
-            "run": task.run,
-            "outcome": asdict(outcome),
-        }
-        task.check_running()  # a cluster cannot stop what it has begun when a run is interrupted
-        contents = {path.name: path.read_bytes() for path in sorted(staged.iterdir())}
-        write_results(task.out, {**contents, RECORD: record}, task.force)
+    contents = task.files(result, case)
+    before, after = (e["held_out"].metrics.mae for e in (result.uncalibrated, result.calibrated))
+    status: Status = "calibrated" if result.solver.success else "not_converged"
+    seconds, solver = time.perf_counter() - began, result.solver.to_dict()
+    outcome = CaseOutcome(task.name, status, before, after, seconds, attempts=len(task.starts()), solver=solver)
+    record = {
+        "settings": check_settings(task.settings),
+        "files": files,
+        "version": result.version,
+        "run": task.run,
+        "outcome": asdict(outcome),
+    }
+    task.check_running()  # a cluster cannot stop what it has begun when a run is interrupted
+    write_results(task.out, {**contents, RECORD: record}, task.force)
     return outcome
 
 
-def _settings_of(case: Case, settings: Mapping[str, Any]) -> dict[str, Any]:
-    """Read the intervals of the settings in the time of a case."""
-    read = {
-        name: [parse_interval(entry, case) if isinstance(entry, str) else entry for entry in settings[name]]
-        for name in INTERVALS
-        if name in settings
-    }
-    return {**settings, **read}
+def split_settings(
+    settings: ModelSettings | Mapping[str, Any] | None,
+) -> tuple[dict[str, Sequence[Interval | str]], CalibrationSettings]:
+    """Intervals and settings of many calibrations; refuse what `calibrate` does not take.
+
+    Parameters
+    ----------
+    settings : CalibrationSettings, mapping of str to Any, or None
+        A mapping may have the intervals too, as texts that each case reads in its own time zone.
+
+    Raises
+    ------
+    CalibrationError
+        When a name is unknown.
+    """
+    if not isinstance(settings, Mapping):
+        return {}, calibration_settings(settings)
+    intervals = {name: settings[name] for name in INTERVALS if name in settings}
+    for name, value in intervals.items():
+        if isinstance(value, str) or not isinstance(value, Sequence):
+            raise CalibrationError(f"settings.{name}: expected a list of intervals START/END, came {value!r}")
+    return intervals, calibration_settings({k: v for k, v in settings.items() if k not in intervals})
 
 
-def _outcome(task: CaseTask, result: CalibrationResult, seconds: float) -> CaseOutcome:
-    before, after = (e["held_out"].metrics.mae for e in (result.uncalibrated, result.calibrated))
-    status: Status = "calibrated" if result.solver.success else "not_converged"
-    solver = result.solver.to_dict()
-    return CaseOutcome(task.name, status, before, after, seconds, attempts=len(task.starts()), solver=solver)
+def check_settings(settings: ModelSettings | Mapping[str, Any] | None) -> dict[str, Any]:
+    """Spell settings as a record does, with their defaults; refuse what `calibrate` does not take.
+
+    Parameters
+    ----------
+    settings : CalibrationSettings, mapping of str to Any, or None
+        As `calibrate_many` takes them.
+
+    Raises
+    ------
+    CalibrationError
+        When a name is unknown, or a value cannot be written down.
+    """
+    intervals, chosen = split_settings(settings)
+    values: dict[str, Any] = dict.fromkeys(INTERVALS, ())
+    for name, entries in intervals.items():
+        values[name] = [e if isinstance(e, str) else f"{e.start.isoformat()}/{e.end.isoformat()}" for e in entries]
+    spelled = {}
+    for name, value in {**values, **{f.name: getattr(chosen, f.name) for f in fields(chosen)}}.items():
+        try:
+            spelled[name] = json.loads(to_json({name: value}))[name]
+        except TypeError as error:
+            raise CalibrationError(
+                f"settings.{name}: expected plain values that a record can hold, came {value!r}"
+            ) from error
+    return spelled
+
+
+def earlier_outcome(case: Path, out: Path, settings: Mapping[str, Any]) -> CaseOutcome | None:
+    """Read what an earlier run with the same settings, on the same case, left behind.
+
+    Parameters
+    ----------
+    case, out : Path
+        Case folder, and folder of its results.
+    settings : mapping of str to Any
+        From `check_settings`.
+
+    Returns
+    -------
+    CaseOutcome or None
+        None without results.
+
+    Raises
+    ------
+    ResultsExistError
+        When the results there are of other settings, other telemetry, or another version.
+    """
+    there = read_record(out)
+    if there is None:
+        if out.exists() or out.is_symlink():
+            raise ResultsExistError(f"{out}: holds no results of such a run; choose another --out or --force")
+        return None
+    here = {"settings": dict(settings), "files": digest(case), "version": version("buildingmpc")}
+    for what in here:
+        if there[what] != here[what]:
+            raise ResultsExistError(
+                f"{out}: holds results of {_difference(what, there[what], here[what])}; "
+                "choose another --out, or --force (force=True) to replace them"
+            )
+    return replace(outcome_of(there, out), resumed=True)
+
+
+def _difference(what: str, there: Any, here: Any) -> str:
+    if what == "files":
+        return "other plans or telemetry than the case holds now"
+    if what == "version":
+        return f"version {there}, and this is {here}"
+    name = next(n for n in {**there, **here} if there.get(n) != here.get(n))
+    return f"other settings: {name} is {there.get(name)!r} there and {here.get(name)!r} here"
+
+
+def read_record(out: Path) -> dict[str, Any] | None:
+    """Read the record of finished results; None where there are none, or they are of no such run.
+
+    Parameters
+    ----------
+    out : Path
+        Folder of the results of a case.
+    """
+    try:
+        content = json.loads((out / RECORD).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    whole = isinstance(content, dict) and set(content) == {"settings", "files", "version", "run", "outcome"}
+    outcome = content["outcome"] if whole else None
+    return content if isinstance(outcome, dict) and set(outcome) == {f.name for f in fields(CaseOutcome)} else None
+
+
+def outcome_of(record: Mapping[str, Any], out: Path) -> CaseOutcome:
+    """Outcome in a record.
+
+    Parameters
+    ----------
+    record : mapping of str to Any
+        From `read_record`.
+    out : Path
+        Folder that it lies in.
+    """
+    return CaseOutcome(**{**record["outcome"], "case": out.name})
+
+
+def digest(case: Path) -> str:
+    """SHA-256 of the files that make up a case, by which a later run knows it again; empty when they cannot be read.
+
+    Parameters
+    ----------
+    case : Path
+        Case folder.
+    """
+    total = hashlib.sha256()
+    try:
+        parsed = read_building_file(case)
+        for name in (NAME, *(floor.plan for floor in parsed.floors or ()), parsed.telemetry):
+            with (case / name).open("rb") as stream:
+                total.update(hashlib.file_digest(stream, "sha256").digest())
+    except (CaseError, OSError):
+        return ""
+    return total.hexdigest()

@@ -16,10 +16,19 @@ from typing import Any
 
 from calibration.errors import CalibrationError, ResultsExistError, WorkerLostError
 from calibration.evaluation.n_step import Progress
-from calibration.fleet.case import CaseTask, calibrate_one
+from calibration.evaluation.settings import ModelSettings
+from calibration.fleet.case import (
+    RECORD,
+    CaseOutcome,
+    CaseTask,
+    Files,
+    calibrate_one,
+    check_settings,
+    data_files,
+    earlier_outcome,
+)
 from calibration.fleet.cluster import ClusterExecutor, killed_worker
 from calibration.fleet.local import LocalProcesses, available_cores
-from calibration.fleet.record import RECORD, CaseOutcome, check_settings, earlier_outcome
 from calibration.results import check_results_folder, to_json
 from thermal.case.load import NAME
 
@@ -51,10 +60,10 @@ def case_folders(folder: str | Path) -> tuple[Path, ...]:
 def calibrate_many(
     cases: Sequence[str | Path],
     out: str | Path,
-    settings: Mapping[str, Any] | None = None,
+    settings: ModelSettings | Mapping[str, Any] | None = None,
     *,
-    executor: Executor | None = None,
-    workers: int | None = None,
+    files: Files = data_files,
+    workers: Executor | int | None = None,
     retries: int = 2,
     force: bool = False,
     progress: Progress | None = None,
@@ -71,16 +80,19 @@ def calibrate_many(
     cases : sequence of str or Path
         Case folders, such as `case_folders` finds; results are named after them.
     out : str or Path
-        Folder of the results: one folder a case, as `write_calibration` makes it with a record ``case.json``, and
+        Folder of the results: one folder a case with the files of its results and a record ``case.json``, and
         ``summary.json``. Workers elsewhere must see it, and the cases, under the same path.
-    settings : mapping of str to Any, optional
-        Keywords of `calibrate`, the same for each case; intervals are `Interval` or texts ``START/END``.
-    executor : Executor, optional
-        Where to calibrate, such as a `ClusterExecutor`; it is left open. One that breaks as a whole when a worker dies,
-        as `ProcessPoolExecutor`, cannot be mended from outside: its unfinished cases are lost. By default, processes of
-        this machine, each with one thread of linear algebra and replaced when it dies.
-    workers : int, optional
-        Number of these processes; by default one a core, and never more than cases.
+    settings : CalibrationSettings, or mapping of str to Any, optional
+        Of each calibration; a mapping may also have ``tune`` and ``hold_out``, lists of `Interval` or texts
+        ``START/END``.
+    files : callable
+        Makes the files of a case's results, importable by name: their data alone by default,
+        `mpc.reports.calibration.calibration_files` with predictions and a page to read.
+    workers : int or Executor, optional
+        Number of processes of this machine, each with one thread of linear algebra and replaced when it dies; by
+        default one a core, and never more than cases. Or where to calibrate, such as a `ClusterExecutor`; it is left
+        open. One that breaks as a whole when a worker dies, as `ProcessPoolExecutor`, cannot be mended from outside:
+        its unfinished cases are lost.
     retries : int
         How often a case is given to another worker after its own died.
     force : bool
@@ -111,24 +123,24 @@ def calibrate_many(
     []
     """
     began = time.perf_counter()
-    spelled = check_settings(settings or {})
-    for name, value, least in (("retries", retries, 0), ("workers", 1 if workers is None else workers, 1)):
-        if value < least:
+    spelled = check_settings(settings)
+    for name, value, least in (("retries", retries, 0), ("workers", workers, 1)):
+        if isinstance(value, int) and value < least:
             raise CalibrationError(f"{name}: expected at least {least}, came {value}")
     folder = _absolute(check_results_folder(out, force=True))
     paths = _check_cases(cases, folder)
     if not force:
         _refuse_other_contents(folder)
     with _claimed(folder) as running:
-        run = running.name
-        tasks = [CaseTask(p, folder / p.name, running, dict(settings or {}), run, 0, retries, force) for p in paths]
+        given = (running, settings or {}, running.name, 0, retries, force, files)
+        tasks = [CaseTask(path, folder / path.name, *given) for path in paths]
         there = {} if force else {t.name: earlier_outcome(t.case, t.out, spelled) for t in tasks}
         found = {name: outcome for name, outcome in there.items() if outcome is not None}
         todo = [task for task in tasks if task.name not in found]
         tell = progress or (lambda stage, done, total: None)
         try:
             tell(STAGE, len(found), len(tasks))
-            with closing(_outcomes(todo, executor, min(workers or available_cores(), len(todo)))) as coming:
+            with closing(_outcomes(todo, workers)) as coming:
                 for outcome in coming:
                     found[outcome.case] = outcome
                     tell(STAGE, len(found), len(tasks))
@@ -214,11 +226,12 @@ def _lock(descriptor: int, out: Path) -> None:
         return
 
 
-def _outcomes(tasks: Sequence[CaseTask], executor: Executor | None, workers: int) -> Generator[CaseOutcome, None, None]:
+def _outcomes(tasks: Sequence[CaseTask], workers: Executor | int | None) -> Generator[CaseOutcome, None, None]:
     """Outcome of each case as it comes; whatever happens, no work is left behind."""
     if not tasks:
         return
-    pool = LocalProcesses(workers) if executor is None else executor
+    own = not isinstance(workers, Executor)
+    pool = workers if isinstance(workers, Executor) else LocalProcesses(min(workers or available_cores(), len(tasks)))
     pending: dict[Future[CaseOutcome], CaseTask] = {}
     try:
         waiting = list(tasks)
@@ -239,7 +252,7 @@ def _outcomes(tasks: Sequence[CaseTask], executor: Executor | None, workers: int
     finally:
         for future in pending:
             future.cancel()
-        if executor is None:
+        if own:
             pool.shutdown(wait=False, cancel_futures=True)
 
 
@@ -276,7 +289,7 @@ def _outcome(future: Future[CaseOutcome], task: CaseTask) -> CaseOutcome | None:
 def _write_summary(running: Path, outcomes: Sequence[CaseOutcome], settings: Mapping[str, Any], seconds: float) -> None:
     """Write ``summary.json`` into the folder of the results, whole or not at all."""
     content = {
-        "cases": {outcome.case: outcome.to_dict() for outcome in outcomes},
+        "cases": {outcome.case: outcome for outcome in outcomes},
         "settings": settings,
         "seconds": seconds,
         "version": version("buildingmpc"),

@@ -4,30 +4,28 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from typing import Any, Literal
+from typing import ClassVar, Literal
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from calibration.errors import CalibrationError
-from calibration.evaluation.intervals import Interval, default_intervals, horizon_steps, merge
+from calibration.evaluation.intervals import Interval
 from calibration.evaluation.n_step import Progress
-from calibration.evaluation.settings import ModelSettings
-from calibration.fit.problem import FIRST_DEVIATION, Loss, Problem
-from calibration.fit.starts import tuning_runs
-from calibration.identifiability.information import Information, fisher_information, split_jacobian
-from calibration.identifiability.information_search import DETERMINED
-from mpc.reports.identifiability import spoken
+from calibration.evaluation.settings import ModelSettings, calibration_settings
+from calibration.fit.estimate import draw_starts
+from calibration.fit.problem import FIRST_DEVIATION, Problem, tuning_problem
+from calibration.identifiability.information import DETERMINED, Information, fisher_information, split_jacobian
+from calibration.results import Axes, Plain, Result, draw_rows
 from thermal._types import FloatArray
 from thermal.case.case import Case
 from thermal.errors import nearest
 from thermal.model.matrices import SymbolicModel
 from thermal.model.reduce import reduced_model
-from thermal.model.replay import replay_inputs
-from thermal.parameters import Parameter
 
 #: Draws of the parameters beside their start, from the prior at half its spread as the starts of a calibration are.
-DRAWS, DRAW_SPREAD = 4, 0.5
+DRAWS = 4
 
 #: Measured temperatures are shifted by this much a zone to see which residuals are whose [K].
 _MARK = 1000.0
@@ -36,7 +34,7 @@ Told = Literal["yes", "perhaps", "no"]
 
 
 @dataclass(frozen=True)
-class ParameterPower:
+class ParameterPower(Plain):
     """What data will tell of one parameter.
 
     Parameters
@@ -49,8 +47,6 @@ class ParameterPower:
         The same over the start and all draws [-].
     told : {"yes", "perhaps", "no"}
         Whether the data halve the deviation wherever the parameters lie, for some of the draws, or for none.
-    sentence : str
-        That in words.
     """
 
     name: str
@@ -58,11 +54,11 @@ class ParameterPower:
     least: float
     most: float
     told: Told
-    sentence: str
+    key: ClassVar[str] = "name"
 
 
-@dataclass(frozen=True)
-class Power:
+@dataclass(frozen=True, repr=False)
+class Power(Result):
     """What data will tell, before anything is fitted.
 
     Parameters
@@ -83,21 +79,18 @@ class Power:
     draws: int
     seed: int
 
-    @property
-    def sentences(self) -> tuple[str, ...]:
-        """One a parameter, then what the data determine at the start, combinations included."""
-        return (*(p.sentence for p in self.parameters), *self.information.sentences)
+    def to_frame(self) -> pd.DataFrame:
+        """Share of the prior's deviation that will be left of each parameter [-]."""
+        return pd.DataFrame([asdict(p) for p in self.parameters]).set_index("name")
 
-    def to_dict(self) -> dict[str, Any]:
-        """Plain numbers and texts, ready for JSON."""
-        return {
-            "parameters": {p.name: {k: v for k, v in asdict(p).items() if k != "name"} for p in self.parameters},
-            "information": self.information.to_dict(),
-            "deviation": dict(self.deviation),
-            "draws": self.draws,
-            "seed": self.seed,
-            "sentences": list(self.sentences),
-        }
+    def _summary(self) -> str:
+        told = sum(p.told == "yes" for p in self.parameters)
+        return f"the data will tell {told} of {len(self.parameters)} parameters, {self.draws} draws beside the start"
+
+    def _draw(self, axes: Axes) -> None:
+        table = self.to_frame()[["ratio", "least", "most"]]
+        draw_rows(axes, table, "share of the prior's deviation that will be left [-]")
+        axes.axvline(DETERMINED, linestyle="--", color="grey")
 
 
 def power_of_data(
@@ -105,11 +98,8 @@ def power_of_data(
     tune: Sequence[Interval] = (),
     settings: ModelSettings | None = None,
     *,
-    fixed: Mapping[str, float] | None = None,
-    horizon: str = "6h",
     deviation: float | Mapping[str, float] = FIRST_DEVIATION,
     draws: int = DRAWS,
-    seed: int = 0,
     progress: Progress | None = None,
 ) -> Power:
     """Tell what data will say of each parameter before fitting them.
@@ -125,19 +115,13 @@ def power_of_data(
         Building and telemetry.
     tune : sequence of Interval
         First two thirds of the telemetry by default.
-    settings : ModelSettings, optional
-        How the model is built and run.
-    fixed : mapping of str to float, optional
-        Parameters that keep a given value [parameter units].
-    horizon : str
-        Prediction horizon, such as ``6h``.
+    settings : CalibrationSettings or ModelSettings, optional
+        Model, what is fixed, horizon, and seed of the draws.
     deviation : float or mapping of str to float
         Standard deviation of the prediction error, for all zones or by zone, others at the default of 0.3 K; of a
         calibrated model, so more than a sensor's noise [K].
     draws : int
         Draws from the prior, at half its spread, beside the start.
-    seed : int
-        Seed of the draws.
     progress : callable, optional
         Called with stage, done, total.
 
@@ -155,66 +139,20 @@ def power_of_data(
     """
     if draws < 0:
         raise CalibrationError(f"draws: expected at least 0, came {draws}")
-    problem = tuning_problem(case, tune, settings, fixed=fixed, horizon=horizon)
+    chosen = calibration_settings(settings)
+    problem = tuning_problem(case, tune, chosen)
     spread = _deviations(problem.grid.network.zones, deviation)
     seen = np.flatnonzero(np.isfinite(problem.inputs.zone).any(axis=0))
-    measured = [problem.grid.network.zones[i] for i in seen]
-    points = _points(problem, draws, seed)
     known = []
-    for done, z in enumerate(points, 1):
+    for drawn in draw_starts(problem, draws + 1, chosen.seed):
+        z = problem.point(problem.theta(drawn))  # within the bounds
         known.append(_information(problem, z, np.array(list(spread.values()))))
         if progress is not None:
-            progress("power", done, len(points))
+            progress("power", len(known), draws + 1)
     ratios = np.array([[p.ratio for p in each.parameters] for each in known])
-    parameters = tuple(_power(p, r) for p, r in zip(problem.parameters, ratios.T, strict=True))
-    return Power(parameters, known[0], {z: spread[z] for z in measured}, draws, seed)
-
-
-def tuning_problem(
-    case: Case,
-    tune: Sequence[Interval] = (),
-    settings: ModelSettings | None = None,
-    *,
-    fixed: Mapping[str, float] | None = None,
-    horizon: str = "6h",
-    loss: Loss = "linear",
-) -> Problem:
-    """Make the least-squares problem of a case's tuning intervals.
-
-    Parameters
-    ----------
-    case : Case
-        Building and telemetry.
-    tune : sequence of Interval
-        First two thirds of the telemetry by default.
-    settings : ModelSettings, optional
-        How the model is built and run.
-    fixed : mapping of str to float, optional
-        Parameters that keep a given value [parameter units].
-    horizon : str
-        Prediction horizon, such as ``6h``.
-    loss : {"linear", "pseudo_huber"}
-        What an error costs.
-
-    Returns
-    -------
-    Problem
-        On the grid, at the start.
-
-    Raises
-    ------
-    CalibrationError
-        When an interval has no usable run.
-    """
-    chosen = settings or ModelSettings()
-    network = chosen.network(case.building)
-    inputs = replay_inputs(case, network)
-    steps = horizon_steps(horizon, inputs.step)
-    intervals = merge(tune) or default_intervals(case)[0]
-    runs = tuning_runs(inputs, intervals, steps, chosen.spin_up_seconds)
-    free = tuple(i for i, p in enumerate(network.parameters) if p.name not in (fixed or {}))
-    start = network.values(fixed or {})
-    return Problem(SymbolicModel(network), inputs, runs, steps, free, start, chosen.stepping, loss=loss)
+    parameters = tuple(_power(p.name, r) for p, r in zip(problem.parameters, ratios.T, strict=True))
+    measured = {problem.grid.network.zones[i]: spread[problem.grid.network.zones[i]] for i in seen}
+    return Power(parameters, known[0], measured, draws, chosen.seed)
 
 
 def _deviations(zones: Sequence[str], deviation: float | Mapping[str, float]) -> dict[str, float]:
@@ -226,15 +164,6 @@ def _deviations(zones: Sequence[str], deviation: float | Mapping[str, float]) ->
         if not 0.0 < value < np.inf:
             raise CalibrationError(f"deviation: expected a positive number of kelvin for {zone}, came {value!r}")
     return {zone: float(given.get(zone, FIRST_DEVIATION)) for zone in zones}
-
-
-def _points(problem: Problem, draws: int, seed: int) -> list[FloatArray]:
-    """Start and draws on the estimation scale, within the bounds."""
-    spread = np.array([p.prior_deviation for p in problem.parameters])
-    centre = np.array([p.transform(p.start) for p in problem.parameters])
-    rng = np.random.default_rng(seed)
-    further = [centre + DRAW_SPREAD * spread * rng.standard_normal(spread.size) for _ in range(draws)]
-    return [problem.point(problem.theta(z)) for z in (problem.point(problem.start), *further)]
 
 
 def _information(problem: Problem, z: FloatArray, deviation: FloatArray) -> Information:
@@ -254,12 +183,7 @@ def _zones_of_rows(problem: Problem, model: SymbolicModel, z: FloatArray) -> NDA
     return np.rint(moved / _MARK).astype(np.int64)
 
 
-def _power(parameter: Parameter, ratios: FloatArray) -> ParameterPower:
+def _power(name: str, ratios: FloatArray) -> ParameterPower:
     """Judge one parameter by the ratios of its deviations at the start and at the draws."""
     told: Told = "yes" if (ratios < DETERMINED).all() else "perhaps" if (ratios < DETERMINED).any() else "no"
-    first, least, most = (f"{100 * r:.0f} %" for r in (ratios[0], ratios.min(), ratios.max()))
-    span = f" ({least} to {most} over the prior)" if ratios.size > 1 and least != most else ""
-    left = f"{first} of the prior's deviation will be left{span}"
-    verb = {"yes": "will tell", "perhaps": "may tell", "no": "will not tell"}[told]
-    sentence = f"These data {verb} the {spoken(parameter)}: {left}."
-    return ParameterPower(parameter.name, float(ratios[0]), float(ratios.min()), float(ratios.max()), told, sentence)
+    return ParameterPower(name, float(ratios[0]), float(ratios.min()), float(ratios.max()), told)

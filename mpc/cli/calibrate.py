@@ -14,7 +14,7 @@ from mpc.cli.evaluate import Dx, SchemeName
 
 if TYPE_CHECKING:
     from calibration.fit.result import CalibrationResult
-    from calibration.fleet.record import CaseOutcome
+    from calibration.fleet.case import CaseOutcome
 
 _BUILDING = "building.yaml"
 
@@ -84,7 +84,9 @@ def calibrate(
     check_results_folder(out, force)
     result, report = _calibrate_one(case, out, settings, force)
     if json:
-        write_json(result.to_dict())
+        from mpc.reports.calibration import calibration_content
+
+        write_json(calibration_content(result))
     else:
         _show(result, report)
     return _exit_code(result)
@@ -97,9 +99,9 @@ def _calibrate_one(folder: Path, out: Path, settings: dict[str, Any], force: boo
     from thermal.case.load import load_case
 
     case = load_case(folder)
-    intervals = {name: [parse_interval(text, case) for text in settings[name]] for name in ("tune", "hold_out")}
+    tune, hold_out = ([parse_interval(text, case) for text in settings.pop(name)] for name in ("tune", "hold_out"))
     with Waiting(f"calibrate {folder.name}") as progress:
-        result = fit(case, progress=progress, **(settings | intervals))
+        result = fit(case, tune, hold_out, settings=settings, progress=progress)
         report = write_calibration(result, case, out, force=force)
     return result, report
 
@@ -160,6 +162,7 @@ def _calibrate_many(
     """Calibrate each case into a folder of its name; one that fails is reported beside the others."""
     from calibration.fleet.cluster import ClusterExecutor
     from calibration.fleet.run import calibrate_many, case_folders
+    from mpc.reports.calibration import calibration_files
 
     cases = case_folders(folder)
     inside = [p for p in sorted(folder.iterdir()) if p.is_dir() and p.name[0] != "."]
@@ -172,7 +175,7 @@ def _calibrate_many(
             ClusterExecutor(scheduler, folders=[folder]) if scheduler is not None else nullcontext() as executor,
         ):
             outcomes = calibrate_many(
-                cases, out, settings, executor=executor, workers=workers, force=force,
+                cases, out, settings, files=calibration_files, workers=executor or workers, force=force,
                 progress=lambda _, done, total: waiting(f"{done} of {total}", done, total),
             )  # fmt: skip
     except KeyboardInterrupt:

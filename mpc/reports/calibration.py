@@ -11,7 +11,7 @@ import pandas as pd
 
 from calibration.evaluation.case_model import CHECK_TOLERANCE
 from calibration.fit.result import CalibrationResult, ParameterEstimate
-from calibration.results import check_results_folder, write_results
+from calibration.results import Content, check_results_folder, write_results
 from mpc.reports import figures
 from mpc.reports.evaluation import (
     evaluation_figures,
@@ -21,7 +21,7 @@ from mpc.reports.evaluation import (
     unchanged_error,
     zone_rows,
 )
-from mpc.reports.identifiability import in_words
+from mpc.reports.identifiability import in_words, information_content, information_sentences
 from mpc.reports.page import clock, counted, duration, kelvin, plain, render, signed, significant, unit
 from mpc.reports.residuals import diagnostics_content
 from thermal.case.case import Case
@@ -59,21 +59,39 @@ def write_calibration(result: CalibrationResult, case: Case, out: str | Path, *,
         When the folder holds something and ``force`` is not set.
     """
     check_results_folder(out, force)
+    return write_results(out, calibration_files(result, case), force) / "report.html"
+
+
+def calibration_files(result: CalibrationResult, case: Case) -> dict[str, Content]:
+    """Files of a calibration by name, see `write_calibration`.
+
+    Parameters
+    ----------
+    result : CalibrationResult
+        From `calibrate`.
+    case : Case
+        The case it was calibrated on.
+    """
     grid = SymbolicModel(result.settings.network(case.building))
     inputs = replay_inputs(case, grid.network)
     held_out = result.calibrated["held_out"]
-    page = render("calibration", _content(result, case, grid, inputs))
-    folder = write_results(
-        out,
-        {
-            "calibration.json": result.to_dict(),
-            "evaluation.json": held_out.to_dict(),
-            "predictions.parquet": predictions_table(held_out),
-            "report.html": page,
-        },
-        force,
-    )
-    return folder / "report.html"
+    return {
+        "calibration.json": calibration_content(result),
+        "evaluation.json": held_out.to_dict(),
+        "predictions.parquet": predictions_table(held_out),
+        "report.html": render("calibration", _content(result, case, grid, inputs)),
+    }
+
+
+def calibration_content(result: CalibrationResult) -> dict[str, Any]:
+    """Contents of ``calibration.json``: the numbers of a calibration, with what the data determine in words.
+
+    Parameters
+    ----------
+    result : CalibrationResult
+        From `calibrate`.
+    """
+    return result.to_dict() | {"information": information_content(result.information)}
 
 
 def calibration_verdict(result: CalibrationResult) -> str:
@@ -159,7 +177,7 @@ def _content(result: CalibrationResult, case: Case, grid: SymbolicModel, inputs:
         "figures": drawn,
         "parameters": _parameter_rows(result.parameters),
         "parameter_figure": figures.parameter_ranges(result.parameters),
-        "told": result.information.sentences,
+        "told": information_sentences(result.information),
         "zones": zone_rows(after.by_zone()),
         "intervals": [["tuning", *r] for r in interval_rows(result.calibrated["tuning"])]
         + [["held out", *r] for r in interval_rows(after)],

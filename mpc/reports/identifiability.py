@@ -1,4 +1,4 @@
-"""What the data determine, in words that are true on the estimation scale: products, ratios, odds."""
+"""What the data determine and prefer, in words: on the estimation scale these are products, ratios, odds."""
 
 from __future__ import annotations
 
@@ -8,6 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from calibration.fit.cross_validation import CrossValidation
+from calibration.fit.selection import LEAST_DAYS, HeldOutDifference, LikelihoodRatio, Reason, Selection
+from calibration.identifiability.information import Combination, Information, ParameterInformation
+from calibration.identifiability.power import ParameterPower, Power
+from calibration.identifiability.profile import Profile
 from mpc.reports.page import unit
 from thermal.parameters import FACADE_PREFIX, Parameter
 
@@ -110,42 +115,147 @@ def listed(words: Iterable[str], last: str = "and") -> str:
     return f"{', '.join(first)} {last} {end}" if first else end
 
 
-def describe(
-    parameters: Sequence[Parameter],
-    known: Sequence[Any],
-    combinations: Sequence[Any],
-    correlations: Sequence[tuple[str, str, float]],
-    nominal: Mapping[str, tuple[float, str]],
-) -> tuple[str, ...]:
-    """Say all that is known of the parameters.
+def information_sentences(information: Information) -> tuple[str, ...]:
+    """Say what the data determine.
 
     Parameters
     ----------
-    parameters : sequence of Parameter
-        The estimated ones.
-    known : sequence of ParameterInformation
-        One a parameter.
-    combinations : sequence of Combination
-        What is determined although its factors are not.
-    correlations : sequence of (str, str, float)
-        Pairs that go together.
-    nominal : mapping of str to (float, str)
-        Values that enter only as a product, with unit [that unit].
+    information : Information
+        From `fisher_information`, or of a result.
     """
-    named = {p.name: p for p in parameters}
+    known, found = information.parameters, information.combinations
+    named = {p.name: p for p in information.estimated}
     told = {k.name: k for k in known if k.status == "determined"}
-    sentences = [_summary(len(told), len(known), len(combinations))]
+    sentences = [_summary(len(told), len(known), len(found))]
     if told:
         each = _gathered([(named[n], k.posterior_deviation) for n, k in told.items()], _precision_words)
         sentences.append(f"Determined: {', '.join(each)}.")
-    sentences += [_combination(named, set(told), c) for c in combinations]
-    members = {name for c in combinations for name in c.exponents}
+    sentences += [_combination(named, set(told), c) for c in found]
+    members = {name for c in found for name in c.exponents}
     sentences += _open(named, [k for k in known if k.name not in members | set(told)])
-    sentences += [_nominal(named, set(told), name, *value) for name, value in nominal.items()]
+    sentences += [_nominal(named, set(told), name, *value) for name, value in information.nominal.items()]
     sentences += [
         f"The errors of {spoken(named[a])} and {spoken(named[b])} go together: correlation {r:.2f}."
-        for a, b, r in correlations
+        for a, b, r in information.correlations
     ]
+    return tuple(sentences)
+
+
+def information_content(information: Information) -> dict[str, Any]:
+    """Entry of ``calibration.json``: the numbers with what they say.
+
+    Parameters
+    ----------
+    information : Information
+        Of a result.
+    """
+    named, content = {p.name: p for p in information.estimated}, information.to_dict()
+    for entry in content["combinations"]:
+        entry["words"] = combination_words(named, entry["exponents"])
+    return content | {"sentences": list(information_sentences(information))}
+
+
+def power_sentences(power: Power) -> tuple[str, ...]:
+    """Say what data will tell, one sentence a parameter, then what they determine at the start.
+
+    Parameters
+    ----------
+    power : Power
+        From `power_of_data`.
+    """
+    named = {p.name: p for p in power.information.estimated}
+    each = (_power_sentence(named[p.name], p, power.draws > 0) for p in power.parameters)
+    return (*each, *information_sentences(power.information))
+
+
+def _power_sentence(parameter: Parameter, power: ParameterPower, drawn: bool) -> str:
+    first, least, most = (f"{100 * r:.0f} %" for r in (power.ratio, power.least, power.most))
+    span = f" ({least} to {most} over the prior)" if drawn and least != most else ""
+    verb = {"yes": "will tell", "perhaps": "may tell", "no": "will not tell"}[power.told]
+    return f"These data {verb} the {spoken(parameter)}: {first} of the prior's deviation will be left{span}."
+
+
+def profile_sentence(profile: Profile) -> str:
+    """Say the first interval of a profile.
+
+    Parameters
+    ----------
+    profile : Profile
+        From `profile_likelihood`.
+    """
+    name, interval = spoken(profile.parameter), profile.intervals[0]
+    of = "" if profile.parameter.unit == "1" else f" {profile.parameter.unit}"
+    lower, upper = f"{interval.lower:.3g}{of}", f"{interval.upper:.3g}{of}"
+    source = "data and prior" if profile.with_prior else "the data alone"
+    sure = f"with {100 * interval.level:g} % confidence by {source}"
+    name = name[0].upper() + name[1:]
+    if interval.open_lower and interval.open_upper:
+        return f"{name}: nothing between {lower} and {upper}, its physical range, is excluded {sure}."
+    if interval.open_lower:
+        return f"{name}: at most {upper} {sure}; no lower limit within its physical range."
+    if interval.open_upper:
+        return f"{name}: at least {lower} {sure}; no upper limit within its physical range."
+    return f"{name}: {interval.lower:.3g} to {upper} {sure}."
+
+
+def selection_verdict(selection: Selection) -> str:
+    """Say which structure the data prefer, and why.
+
+    Parameters
+    ----------
+    selection : Selection
+        From `select_structure`.
+    """
+    days = selection.differences[0].days
+    left = [c for c in selection.candidates if c.name not in selection.against]
+    if len(left) == 1:
+        sentences = [f"The structure {left[0].name} is preferred."]
+    else:
+        plural, few = "s"[: days != 1], ", which is too few," if days < LEAST_DAYS else ""
+        simplest = min(left, key=lambda c: c.parameters)
+        sentences = [
+            f"Cannot tell {listed(c.name for c in left)} apart, by {days} day{plural} held out{few} or by the tuning "
+            f"data: the simplest of them, {simplest.name}, is enough."
+        ]
+    sentences += [f"Against {n} speak {_reason_words(selection, n, r)}." for n, r in selection.against.items()]
+    size = selection.effective_size
+    return " ".join([*sentences, f"({days} days held out, {size:.0f} effective observations tuned on.)"])
+
+
+def _reason_words(selection: Selection, name: str, reason: Reason) -> str:
+    if isinstance(reason, HeldOutDifference):
+        span = f"({reason.lower:.3f} to {reason.upper:.3f} K)"
+        return f"the days held out, by {reason.mae:.3f} K more than {reason.second} {span}"
+    if isinstance(reason, LikelihoodRatio):
+        return (
+            f"the tuning data, by a likelihood ratio of {reason.statistic:.1f} for the {reason.degrees} more "
+            f"parameters of {reason.large} (p = {reason.p_value:.2g})"
+        )
+    evidence = {c.name: c.log_evidence(selection.effective_size) for c in selection.candidates}
+    return f"the tuning data, by a log evidence {evidence[reason] - evidence[name]:.1f} below that of {reason}"
+
+
+def cross_validation_sentences(found: CrossValidation) -> tuple[str, ...]:
+    """Say how large errors on days left out are, and which parameters move with the days.
+
+    Parameters
+    ----------
+    found : CrossValidation
+        From `cross_validate`.
+    """
+    folds, failed = len(found.folds), sum(fold.failure is not None for fold in found.folds)
+    sentences = [
+        f"On days that it was not calibrated on the model misses by {found.mae:.3f} K, give or take "
+        f"{found.standard_error:.3f} K ({folds - failed} folds)."
+    ]
+    if failed:
+        sentences.append(f"{failed} of {folds} folds failed and are not in these numbers.")
+    moving = [p.name.replace("_", " ") for p in found.parameters if p.moves]
+    if moving:
+        sentences.append(
+            f"Leaving out days moves {', '.join(moving)} by more than the standard errors say: either these are too "
+            "small, or the building was not the same on all days."
+        )
     return tuple(sentences)
 
 
@@ -155,14 +265,15 @@ def _summary(told: int, count: int, combinations: int) -> str:
     return f"The data determine {alone} of {count} parameters by themselves{beside}."
 
 
-def _combination(named: Mapping[str, Parameter], told: set[str], combination: Any) -> str:
+def _combination(named: Mapping[str, Parameter], told: set[str], combination: Combination) -> str:
     apart = [spoken(named[name]) for name in combination.exponents if name not in told]
     kept = "by themselves" if len(apart) > 1 else "by itself"
     precise = _precision_words(None, combination.deviation)
-    return f"Only the {combination.words} is determined ({precise}), not {listed(apart, 'or')} {kept}."
+    words = combination_words(named, combination.exponents)
+    return f"Only the {words} is determined ({precise}), not {listed(apart, 'or')} {kept}."
 
 
-def _open(named: Mapping[str, Parameter], known: Sequence[Any]) -> list[str]:
+def _open(named: Mapping[str, Parameter], known: Sequence[ParameterInformation]) -> list[str]:
     def having(status: str, words: Callable[[Parameter, float], str]) -> list[str]:
         return _gathered([(named[k.name], k.ratio) for k in known if k.status == status], words)
 

@@ -9,12 +9,12 @@ import numpy as np
 
 from calibration.errors import FilterError, NotEnoughDataError
 from calibration.estimation.disturbance import DisturbanceModel
-from calibration.estimation.filtered import evaluate_filter, filter_interval
+from calibration.estimation.filtered import FilterSettings, evaluate_filter, filter_interval
 from calibration.estimation.heat_balance import CV_RMSE_LIMIT, NMBE_LIMIT, HeatBalance, HeatFit, heat_balance
 from calibration.estimation.kalman import Filtered
 from calibration.estimation.whiteness import Whiteness, whiteness
-from calibration.evaluation.n_step import HORIZONS, Evaluation
-from calibration.fit.problem import Objective
+from calibration.evaluation.n_step import HORIZONS, Evaluation, EvaluationSettings
+from calibration.evaluation.settings import Objective
 from calibration.fit.result import CalibrationResult
 from mpc.reports import figures
 from mpc.reports.page import clock, counted, duration, significant
@@ -143,19 +143,10 @@ def _filter(
     """Filter the longest held-out interval, and predict all of them from filtered states."""
     longest = max(result.held_out, key=lambda i: i.end - i.start)
     scheme, spin = result.settings.stepping, result.settings.spin_up_seconds
-    filtered = filter_interval(model, result.theta, inputs, longest, disturbance, scheme=scheme, spin_up_seconds=spin)
-    corrected = evaluate_filter(
-        model,
-        result.theta,
-        inputs,
-        result.held_out,
-        disturbance,
-        result.horizon,
-        horizons=HORIZONS,
-        scheme=scheme,
-        spin_up_seconds=spin,
-    )
-    return filtered, corrected
+    filtering = FilterSettings(scheme, spin_up_seconds=spin)
+    filtered = filter_interval(model, result.theta, inputs, longest, disturbance, filtering)
+    runs = EvaluationSettings(result.horizon, horizons=HORIZONS, scheme=scheme, spin_up_seconds=spin)
+    return filtered, evaluate_filter(model, result.theta, inputs, result.held_out, disturbance, runs)
 
 
 def _ranked(found: Whiteness) -> list[str]:

@@ -14,6 +14,7 @@ from calibration.diagnosis.diagnosis import Diagnosis, diagnose
 from calibration.evaluation.case_model import evaluate_case
 from calibration.evaluation.intervals import Interval, default_intervals
 from calibration.evaluation.n_step import Evaluation
+from calibration.evaluation.settings import CalibrationSettings
 from calibration.fit.calibrate import calibrate
 from calibration.fit.result import CalibrationResult
 from calibration.results import check_results_folder, write_results
@@ -167,7 +168,7 @@ def run_demo(
 
     checked = describe_case(case)
     end("check", write_check(checked, folder / "check", force=force), check_verdict(checked))
-    fitted = calibrate(case, dx=dx, progress=_staged(done, "calibrate"))
+    fitted = calibrate(case, settings=CalibrationSettings(dx=dx), progress=_staged(done, "calibrate"))
     end("calibrate", write_calibration(fitted, case, folder / "calibrate", force=force), calibration_verdict(fitted))
     found = diagnose(case, dx=dx, progress=_staged(done, "diagnose"))
     end("diagnose", write_diagnosis(found, case, folder / "diagnose", force), diagnosis_verdict(found))

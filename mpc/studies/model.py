@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from calibration.evaluation.settings import ModelSettings, read_settings
-from calibration.fit.result import load_parameters
+from calibration.evaluation.settings import ModelSettings, load_parameters, read_settings
 from mpc.errors import ControlError
 from thermal.case.building import Building
 from thermal.effects.effect import Chosen

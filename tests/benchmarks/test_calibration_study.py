@@ -13,6 +13,7 @@ import pandas as pd
 import pytest
 
 from calibration import Interval, evaluate_model
+from calibration.evaluation.n_step import EvaluationSettings
 from thermal import Case
 from thermal.model.replay import SPIN_UP
 from thermal.network.structure import BASELINE
@@ -69,7 +70,7 @@ def test_errors_are_those_of_an_evaluation(study: ModuleType, bench: Any) -> Non
     theta, stamps = grid.network.start(), bench.inputs.stamps
     target = Interval(stamps[at + 71], stamps[at + 72])
     spin_up_seconds = SPIN_UP + 71 * bench.inputs.step  # counted from the interval
-    found = evaluate_model(grid, theta, bench.inputs, [target], spin_up_seconds=spin_up_seconds)
+    found = evaluate_model(grid, theta, bench.inputs, [target], EvaluationSettings(spin_up_seconds=spin_up_seconds))
     predictions = found.predictions[0]
     assert list(predictions.start) == [stamps[at]]
     error = study.run_error(grid, grid.matrices(theta), bench.inputs, at)

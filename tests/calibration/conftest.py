@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from calibration import DisturbanceModel, StateSpace
 from calibration.estimation.state_space import state_space
-from calibration.fleet.record import RECORD, CaseOutcome
+from calibration.fleet.case import RECORD, CaseOutcome
 from thermal import Inputs
 from thermal.model.matrices import Matrices
 from thermal.pilot.pilot import PilotSettings, generate_pilot

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from calibration import CalibrationResult, calibrate
+from calibration import CalibrationResult, CalibrationSettings, calibrate
 from thermal import load_case
 
 CASES = Path(__file__).parents[2].parent / "shared" / "cases"
@@ -17,7 +17,7 @@ CASES = Path(__file__).parents[2].parent / "shared" / "cases"
 def calibrated(name: str) -> CalibrationResult:
     if not (CASES / name).is_dir():
         pytest.skip(f"the shared case is not here: {CASES / name}")
-    return calibrate(load_case(CASES / name), starts=1)
+    return calibrate(load_case(CASES / name), settings=CalibrationSettings(starts=1))
 
 
 LIMITS = {"practice_none_schedule": 0.10, "practice_none_prbs": 0.16, "twinhouse_N2_exp1": 0.8}

@@ -18,10 +18,9 @@ from calibration.evaluation.intervals import (
     horizon_steps,
     select_runs,
 )
-from calibration.evaluation.n_step import Predictions, evaluate_model
+from calibration.evaluation.n_step import EvaluationSettings, Predictions, evaluate_model
 from calibration.evaluation.settings import ModelSettings
-from calibration.fit.problem import Problem
-from calibration.fit.starts import tuning_runs
+from calibration.fit.problem import Problem, tuning_runs
 from thermal._types import FloatArray
 from thermal.case.case import Case
 from thermal.effects.catalogue import CATALOGUE, chosen
@@ -304,8 +303,6 @@ class Bench:
             The bench's own by default.
         """
         s = self.settings
-        found = evaluate_model(
-            fit.model, fit.theta, fit.built.inputs, self.judged, horizon or self.horizon,
-            scheme=s.stepping, spin_up_seconds=s.spin_up_seconds,
-        )  # fmt: skip
+        runs = EvaluationSettings(horizon or self.horizon, scheme=s.stepping, spin_up_seconds=s.spin_up_seconds)
+        found = evaluate_model(fit.model, fit.theta, fit.built.inputs, self.judged, runs)
         return list(found.predictions)

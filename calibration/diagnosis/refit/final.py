@@ -13,9 +13,8 @@ from calibration.diagnosis.diagnosis import Diagnosis
 from calibration.diagnosis.refit.comparison import Fit
 from calibration.diagnosis.screen.missing import Missing, at_start, missing_heat
 from calibration.evaluation.intervals import Interval
-from calibration.evaluation.n_step import Evaluation, evaluate_model
-from calibration.fit.describe import describe_parameters
-from calibration.fit.result import ParameterEstimate, SolverReport, effect_entries
+from calibration.evaluation.n_step import Evaluation, EvaluationSettings, evaluate_model
+from calibration.fit.result import ParameterEstimate, SolverReport, describe_parameters, effect_entries
 from mpc.reports.evaluation import predictions_table
 
 
@@ -171,7 +170,7 @@ def _mae(result: Diagnosis, fit: Fit, intervals: Sequence[Interval]) -> dict[str
 
 def _evaluated(result: Diagnosis, fit: Fit, intervals: Sequence[Interval], trajectories: bool = False) -> Evaluation:
     settings = result.settings
-    return evaluate_model(
-        fit.model, fit.theta, fit.built.inputs, intervals, result.horizon, trajectories=trajectories,
-        scheme=settings.stepping, spin_up_seconds=settings.spin_up_seconds,
-    )  # fmt: skip
+    runs = EvaluationSettings(
+        result.horizon, trajectories, scheme=settings.stepping, spin_up_seconds=settings.spin_up_seconds
+    )
+    return evaluate_model(fit.model, fit.theta, fit.built.inputs, intervals, runs)

@@ -10,10 +10,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import lsq_linear
 from scipy.special import log_ndtr
 
 from calibration.fit.estimate import DRIFT_TOLERANCE
+from calibration.fit.least_squares import bounded_step
 from calibration.fit.problem import Problem
 from thermal._types import FloatArray
 from thermal.model.matrices import SymbolicModel
@@ -147,7 +147,7 @@ def _descend(problem: Problem, model: SymbolicModel, start: FloatArray | Found, 
     while used - before < evaluations:
         if share is None:
             low, high = np.maximum(lower - z, -reach), np.minimum(upper - z, reach)
-            step = lsq_linear(jacobian, -residual, (np.minimum(low, -1e-12), np.maximum(high, 1e-12))).x
+            step = bounded_step(residual, jacobian, low, high)
             if np.linalg.norm(jacobian @ step) < shortest:
                 settled = True
                 break

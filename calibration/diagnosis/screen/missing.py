@@ -12,12 +12,10 @@ from scipy.special import ndtri
 
 from calibration.diagnosis.refit.comparison import Fit
 from calibration.estimation.disturbance import DisturbanceModel
-from calibration.estimation.filtered import filter_interval
-from calibration.estimation.gains import Covariance
+from calibration.estimation.filtered import FilterSettings, filter_interval
 from calibration.estimation.heat_balance import HOUR, heat_balance, hourly_means
-from calibration.estimation.innovations import tune_disturbance
+from calibration.estimation.innovations import TuningSettings, air_volumes, tune_disturbance
 from calibration.estimation.smoother import averaged_deviation, smooth
-from calibration.estimation.tuner import air_volumes
 from calibration.evaluation.intervals import Interval
 from thermal._types import FloatArray
 from thermal.model.reduce import ReducedModel, reduced_model
@@ -114,14 +112,11 @@ def missing_heat(
     many = len(network.zones) > _MANY_ZONES
     if many and model.order > _ORDER:
         model = reduced_model(fit.built.grid, [fit.theta], order=_ORDER)
-    covariance: Covariance = "steady" if many else "exact"
+    settings = FilterSettings(scheme, "steady" if many else "exact", spin_up_seconds)
     disturbance = _tuned(fit, model, near, scheme, spin_up_seconds)
     parts = []
     for interval in intervals:
-        filtered = filter_interval(
-            model, fit.theta, inputs, interval, disturbance,
-            scheme=scheme, covariance=covariance, spin_up_seconds=spin_up_seconds,
-        )  # fmt: skip
+        filtered = filter_interval(model, fit.theta, inputs, interval, disturbance, settings)
         found = smooth(filtered)
         rows = np.arange(filtered.begin + 1, filtered.begin + 1 + len(found.stamps))
         known = _known(inputs, rows)
@@ -158,14 +153,14 @@ def _tuned(
     spin_up_seconds: float,
 ) -> DisturbanceModel:
     """Size and course of the missing heat and noise of the sensors, on the last of what was fitted."""
-    many, last = len(model.network.zones) > _MANY_ZONES, fit.problem.stretches[-1]
+    many, last = len(model.network.zones) > _MANY_ZONES, fit.problem.fitted[-1]
     latest = last.end - pd.Timedelta(seconds=_TUNED_MANY if many else _TUNED)
     stretch = Interval(max(last.start, latest), last.end)
-    return tune_disturbance(
-        model, fit.theta, fit.built.inputs, [stretch], per_zone=() if many else ("deviation",),
-        weights=air_volumes(model.network), start=near, scheme=scheme, covariance="steady",
-        spin_up_seconds=spin_up_seconds, curvature=False,
-    ).disturbance  # fmt: skip
+    settings = TuningSettings(
+        scheme, "steady", spin_up_seconds, per_zone=() if many else ("deviation",),
+        weights=air_volumes(model.network), start=near, curvature=False,
+    )  # fmt: skip
+    return tune_disturbance(model, fit.theta, fit.built.inputs, [stretch], settings).disturbance
 
 
 def _parameter_variance(

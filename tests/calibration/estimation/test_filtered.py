@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 
 from calibration import DisturbanceModel, Interval, evaluate_model, smooth, tune_disturbance
 from calibration.errors import FilterError, NotEnoughDataError
-from calibration.estimation.filtered import evaluate_filter, filter_interval
+from calibration.estimation.filtered import FilterSettings, evaluate_filter, filter_interval
+from calibration.estimation.innovations import TuningSettings
 from calibration.estimation.whiteness import whiteness
 from calibration.evaluation.intervals import default_intervals
-from calibration.evaluation.n_step import HORIZONS, spatial_metrics
+from calibration.evaluation.n_step import HORIZONS, EvaluationSettings, spatial_metrics
 from thermal import (
     Inputs,
     SymbolicModel,
@@ -49,8 +50,8 @@ def part(first: int, last: int) -> Interval:
 def test_runs_are_those_of_the_model_alone() -> None:
     model, inputs = setting()
     theta, parts = model.network.start(), [part(1000, 1150), part(1400, 1700)]
-    alone = evaluate_model(model, theta, inputs, parts, horizons=HORIZONS, trajectories=True)
-    found = evaluate_filter(model, theta, inputs, parts, DISTURBANCE, horizons=HORIZONS, trajectories=True)
+    alone = evaluate_model(model, theta, inputs, parts, EvaluationSettings(horizons=HORIZONS, trajectories=True))
+    found = evaluate_filter(model, theta, inputs, parts, DISTURBANCE, EvaluationSettings(horizons=HORIZONS, trajectories=True))
     assert (found.steps, found.step_seconds, found.zones) == (alone.steps, alone.step_seconds, alone.zones)
     for a, b in zip(alone.predictions, found.predictions, strict=True):
         assert a.interval == b.interval
@@ -60,7 +61,7 @@ def test_runs_are_those_of_the_model_alone() -> None:
         assert a.simulated.shape == b.simulated.shape
     assert list(found.by_horizon) == list(alone.by_horizon)
     assert found.by_horizon["6h"] == pytest.approx(found.metrics.mae)
-    short = evaluate_filter(model, theta, inputs, parts, DISTURBANCE, "1h")
+    short = evaluate_filter(model, theta, inputs, parts, DISTURBANCE, EvaluationSettings("1h"))
     assert short.metrics.mae == pytest.approx(found.by_horizon["1h"])
     np.testing.assert_allclose(
         evaluate_filter(model, theta, inputs, parts, DISTURBANCE).predictions[0].simulated[:, -1],
@@ -102,8 +103,8 @@ def test_it_predicts_better_than_the_model_alone() -> None:
     theta = model.network.start()
     tuned = tune_disturbance(model, theta, inputs, [part(300, 1100)])
     assert tuned.success
-    alone = evaluate_model(model, theta, inputs, [part(1200, 1700)], "1h")
-    found = evaluate_filter(model, theta, inputs, [part(1200, 1700)], tuned.disturbance, "1h")
+    alone = evaluate_model(model, theta, inputs, [part(1200, 1700)], EvaluationSettings("1h"))
+    found = evaluate_filter(model, theta, inputs, [part(1200, 1700)], tuned.disturbance, EvaluationSettings("1h"))
     assert found.metrics.mae < 0.75 * alone.metrics.mae
 
 
@@ -114,9 +115,9 @@ def test_interval_is_filtered_from_its_beginning_where_there_is_telemetry_before
     assert (found.stamps[0], found.stamps[-1]) == (inputs.stamps[1000], inputs.stamps[1200])
     early = filter_interval(model, theta, inputs, part(0, 400), DISTURBANCE)
     assert early.stamps[0] == inputs.stamps[145]
-    steady = filter_interval(model, theta, inputs, part(0, 400), DISTURBANCE, covariance="steady")
+    steady = filter_interval(model, theta, inputs, part(0, 400), DISTURBANCE, FilterSettings(covariance="steady"))
     assert steady.stamps[0] == inputs.stamps[145]
-    steady = filter_interval(model, theta, inputs, part(0, 1600), DISTURBANCE, covariance="steady")
+    steady = filter_interval(model, theta, inputs, part(0, 1600), DISTURBANCE, FilterSettings(covariance="steady"))
     assert steady.stamps[0] == inputs.stamps[534]
 
 
@@ -138,10 +139,7 @@ def test_grid_and_short_intervals_are_refused() -> None:
 def test_progress_counts_intervals() -> None:
     model, inputs = setting()
     told: list[tuple[str, int, int]] = []
-    evaluate_filter(
-        model, model.network.start(), inputs, [part(1200, 1300)], DISTURBANCE,
-        horizons=("1h", "7min", "1000h"), progress=lambda *message: told.append(message),
-    )  # fmt: skip
+    evaluate_filter(model, model.network.start(), inputs, [part(1200, 1300)], DISTURBANCE, EvaluationSettings(horizons=("1h", "7min", "1000h")), progress=lambda *message: told.append(message))  # fmt: skip
     assert told == [("predict", 1, 1)]
 
 
@@ -156,7 +154,7 @@ def test_cases_of_others_at_their_start_parameters(name: str, share: float) -> N
     model, inputs = reduced_model(grid, [theta]), replay_inputs(case, grid.network)
     tuning, held_out = default_intervals(case)
     days = Interval(tuning[0].end - np.timedelta64(2, "D"), tuning[0].end)
-    tuned = tune_disturbance(model, theta, inputs, [days], time_constant=86400.0)
+    tuned = tune_disturbance(model, theta, inputs, [days], TuningSettings(time_constant=86400.0))
     alone = evaluate_model(model, theta, inputs, held_out).metrics.mae
     found = evaluate_filter(model, theta, inputs, held_out, tuned.disturbance).metrics.mae
     assert found < share * alone
@@ -177,7 +175,7 @@ def test_directed_airflows_are_in_the_prediction() -> None:
     theta = grid.network.start()
     model, inputs = reduced_model(grid, [theta]), replay_inputs(case, grid.network)
     where = [Interval(inputs.stamps[1000], inputs.stamps[1100])]
-    found = evaluate_filter(model, theta, inputs, where, DisturbanceModel(0.0, 3600.0, 1e6), "2h")
+    found = evaluate_filter(model, theta, inputs, where, DisturbanceModel(0.0, 3600.0, 1e6), EvaluationSettings("2h"))
     at, starts = 1000 - 3 * 144 + 72, inputs.stamps.get_indexer(found.predictions[0].start)
     matrices = model.matrices(theta)
     states, _ = spin_up(matrices, inputs, 1000 - 3 * 144, np.array([at]))

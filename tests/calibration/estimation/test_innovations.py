@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from calibration import DisturbanceModel, Interval, tune_disturbance
 from calibration.errors import FilterError
 from calibration.estimation.filtered import filter_interval
-from calibration.estimation.innovations import DISTURBANCE_PRIORS, TunedDisturbance
+from calibration.estimation.innovations import DISTURBANCE_PRIORS, TunedDisturbance, TuningSettings
 from calibration.estimation.state_space import state_space
 from thermal import Inputs, SymbolicModel, build_network, load_bundled_case, reduced_model, replay_inputs
 
@@ -104,10 +104,8 @@ def test_result_is_the_likeliest_and_says_so() -> None:
 def test_a_start_near_the_optimum_finds_the_same_sooner() -> None:
     inputs, wanted = telemetry(0), tuned(0)
     for per_zone in ((), ("deviation", "sensor_deviation")):
-        cold = wanted if not per_zone else tune_disturbance(model(), theta(), inputs, whole(inputs), per_zone=per_zone)
-        found = tune_disturbance(
-            model(), theta(), inputs, whole(inputs), per_zone=per_zone, start=cold.disturbance
-        )  # fmt: skip
+        cold = wanted if not per_zone else tune_disturbance(model(), theta(), inputs, whole(inputs), TuningSettings(per_zone=per_zone))
+        found = tune_disturbance(model(), theta(), inputs, whole(inputs), TuningSettings(per_zone=per_zone, start=cold.disturbance))  # fmt: skip
         assert found.evaluations < 0.5 * cold.evaluations
         assert found.disturbance.near(cold.disturbance, 0.02)
 
@@ -134,7 +132,7 @@ def test_gaps_and_several_intervals() -> None:
 
 def test_steady_gains_find_the_same_after_a_long_spin_up() -> None:
     inputs = holed(1, 6.0)
-    found = tune_disturbance(model(), theta(), inputs, whole(inputs), covariance="steady")
+    found = tune_disturbance(model(), theta(), inputs, whole(inputs), TuningSettings(covariance="steady"))
     assert found.success
     off = distances(found) * np.array([found.spread[n] for n in ("deviation", "time_constant", "sensor_deviation")])
     assert np.abs(off).max() < 0.2
@@ -143,7 +141,7 @@ def test_steady_gains_find_the_same_after_a_long_spin_up() -> None:
 
 def test_time_constant_can_be_given() -> None:
     inputs = telemetry(2, days=2.0)
-    found = tune_disturbance(model(), theta(), inputs, whole(inputs), time_constant=5400.0)
+    found = tune_disturbance(model(), theta(), inputs, whole(inputs), TuningSettings(time_constant=5400.0))
     assert found.disturbance.time_constant == 5400.0
     assert set(found.spread) == {"deviation", "sensor_deviation"}
     assert abs(np.log(float(np.asarray(found.disturbance.deviation)[0]) / 60.0)) < 4.0 * found.spread["deviation"]
@@ -154,7 +152,7 @@ def test_random_walk_is_found_again_and_left_out_where_nothing_is_measured() -> 
     inputs = telemetry(3, truth, 2.0)
     zone = inputs.zone.copy()
     zone[:, 2] = np.nan
-    found = tune_disturbance(model(), theta(), sensed(inputs, zone), whole(inputs), time_constant=np.inf)
+    found = tune_disturbance(model(), theta(), sensed(inputs, zone), whole(inputs), TuningSettings(time_constant=np.inf))
     deviation = np.asarray(found.disturbance.deviation)
     assert deviation[2] == 0.0
     np.testing.assert_allclose(np.log(deviation[[0, 1, 3, 4]] / 200.0), 0.0, atol=4.0 * found.spread["deviation"] + 0.1)
@@ -163,7 +161,7 @@ def test_random_walk_is_found_again_and_left_out_where_nothing_is_measured() -> 
 def test_deviation_of_each_zone() -> None:
     truth = DisturbanceModel(np.array([20.0, 120.0, 50.0, 200.0, 80.0]), 5400.0, 0.06)
     inputs = telemetry(4, truth, 2.0)
-    found = tune_disturbance(model(), theta(), inputs, whole(inputs), per_zone=["deviation"])
+    found = tune_disturbance(model(), theta(), inputs, whole(inputs), TuningSettings(per_zone=["deviation"]))
     assert found.success
     zones = model().network.zones
     spread = np.array([found.spread[f"deviation@{z}"] for z in zones])
@@ -176,9 +174,7 @@ def test_deviation_of_each_zone() -> None:
 def test_noise_of_each_sensor() -> None:
     truth = DisturbanceModel(60.0, 5400.0, np.array([0.02, 0.15, 0.06, 0.06, 0.3]))
     inputs = telemetry(6, truth, 1.5)
-    found = tune_disturbance(
-        model(), theta(), inputs, whole(inputs), per_zone="sensor_deviation", time_constant=5400.0
-    )  # fmt: skip
+    found = tune_disturbance(model(), theta(), inputs, whole(inputs), TuningSettings(per_zone="sensor_deviation", time_constant=5400.0))  # fmt: skip
     assert next(iter(found.spread)) == "deviation"
     spread = np.array([found.spread[f"sensor_deviation@{z}"] for z in model().network.zones])
     off = np.log(np.asarray(found.disturbance.sensor_deviation) / np.asarray(truth.sensor_deviation)) / spread
@@ -188,7 +184,7 @@ def test_noise_of_each_sensor() -> None:
 def test_weights_share_the_deviation_out() -> None:
     shares = np.array([20.0, 120.0, 50.0, 200.0, 80.0])
     inputs = telemetry(4, DisturbanceModel(shares, 5400.0, 0.06), 2.0)
-    found = tune_disturbance(model(), theta(), inputs, whole(inputs), weights=shares)
+    found = tune_disturbance(model(), theta(), inputs, whole(inputs), TuningSettings(weights=shares))
     deviation = np.asarray(found.disturbance.deviation)
     np.testing.assert_allclose(deviation / deviation[0], shares / shares[0])
     assert abs(np.log(deviation[0] / 20.0)) < 4.0 * found.spread["deviation"]
@@ -208,16 +204,14 @@ def test_a_number_on_its_limit_is_named() -> None:
     inputs = telemetry(0, days=1.0)
     narrow = replace(DISTURBANCE_PRIORS["sensor_deviation"], median=0.02, upper=0.03)
     priors = {**DISTURBANCE_PRIORS, "sensor_deviation": narrow}
-    found = tune_disturbance(model(), theta(), inputs, whole(inputs), time_constant=5400.0, priors=priors)
+    found = tune_disturbance(model(), theta(), inputs, whole(inputs), TuningSettings(time_constant=5400.0, priors=priors))
     assert found.at_bound == ("sensor_deviation",)
 
 
 def test_progress_and_file() -> None:
     told: list[tuple[str, int, int]] = []
     inputs = telemetry(0, days=1.0)
-    found = tune_disturbance(
-        model(), theta(), inputs, whole(inputs), time_constant=5400.0, progress=lambda *message: told.append(message)
-    )  # fmt: skip
+    found = tune_disturbance(model(), theta(), inputs, whole(inputs), TuningSettings(time_constant=5400.0), progress=lambda *message: told.append(message))  # fmt: skip
     assert {stage for stage, _, _ in told} == {"tune"}
     assert [done for _, done, _ in told] == sorted(done for _, done, _ in told)
     content = json.loads(json.dumps(found.to_dict()))
@@ -231,14 +225,14 @@ def test_bad_wishes_are_refused() -> None:
     with pytest.raises(FilterError, match="expected a reduced model, came the grid"):
         tune_disturbance(grid, theta(), inputs, whole(inputs))
     with pytest.raises(FilterError, match="weights: expected 5 numbers of 0 or more"):
-        tune_disturbance(model(), theta(), inputs, whole(inputs), weights=np.ones(3))
+        tune_disturbance(model(), theta(), inputs, whole(inputs), TuningSettings(weights=np.ones(3)))
     with pytest.raises(FilterError, match=r"came none for \['time_constant'\]"):
         some = {k: v for k, v in DISTURBANCE_PRIORS.items() if k != "time_constant"}
-        tune_disturbance(model(), theta(), inputs, whole(inputs), priors=some)
+        tune_disturbance(model(), theta(), inputs, whole(inputs), TuningSettings(priors=some))
     with pytest.raises(FilterError, match="room for a step after 12 h of spin-up"):
         tune_disturbance(model(), theta(), inputs, [Interval(inputs.stamps[0], inputs.stamps[100])])
     with pytest.raises(FilterError, match=r"some of deviation, sensor_deviation, came \['time_constant'\]"):
-        tune_disturbance(model(), theta(), inputs, whole(inputs), per_zone=["time_constant"])
+        tune_disturbance(model(), theta(), inputs, whole(inputs), TuningSettings(per_zone=["time_constant"]))
     with pytest.raises(FilterError, match="at least one interval"):
         tune_disturbance(model(), theta(), inputs, [])
 

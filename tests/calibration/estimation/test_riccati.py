@@ -9,7 +9,7 @@ import scipy.linalg as sl
 from numpy.typing import NDArray
 
 from calibration.errors import FilterError
-from calibration.estimation.riccati import doubled_riccati, summed_stein
+from calibration.estimation.disturbance import doubled_riccati, summed_stein
 
 FloatArray = NDArray[np.float64]
 

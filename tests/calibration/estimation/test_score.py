@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from calibration import DisturbanceModel, KalmanFilter, StateSpace
 from calibration.estimation.kalman import Filtered
-from calibration.estimation.score import log_likelihood_slopes
+from calibration.estimation.smoother import log_likelihood_slopes
 from calibration.estimation.state_space import state_space
 from thermal import Inputs
 from thermal.model.matrices import Matrices

@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from calibration.estimation.start_spread import BOUNDARY_SPREAD, ZONE_SPREAD, start_spread
+from calibration.estimation.filtered import BOUNDARY_SPREAD, ZONE_SPREAD, start_spread
 from thermal import SymbolicModel, build_network, load_bundled_case, reduced_model
 from thermal.model.matrices import Matrices
 

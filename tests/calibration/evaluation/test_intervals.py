@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from calibration import Interval, calibrate
+from calibration import CalibrationSettings, Interval, calibrate
 from calibration.errors import CalibrationError, HorizonError, NotEnoughDataError
 from calibration.evaluation.intervals import (
     alternating_intervals,
@@ -21,7 +21,7 @@ from calibration.evaluation.intervals import (
     parse_interval,
     select_runs,
 )
-from calibration.fit.starts import tuning_runs
+from calibration.fit.problem import tuning_runs
 from thermal import Case, Inputs, Telemetry, build_network, load_bundled_case, replay_inputs
 from thermal.model.replay import SPIN_UP
 
@@ -281,4 +281,4 @@ def test_overlapping_tuning_and_held_out_intervals_are_refused() -> None:
         "2023-03-01/2023-03-11",
     ):
         with pytest.raises(CalibrationError, match="overlap"):
-            calibrate(case, tune, [parse_interval(text, case)], dx=1.5)
+            calibrate(case, tune, [parse_interval(text, case)], settings=CalibrationSettings(dx=1.5))

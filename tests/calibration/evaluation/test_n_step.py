@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from calibration import Interval, evaluate_model
 from calibration.errors import NotEnoughDataError
-from calibration.evaluation.n_step import HORIZONS, spatial_metrics
+from calibration.evaluation.n_step import HORIZONS, EvaluationSettings, spatial_metrics
 from thermal import Case, Inputs, SymbolicModel, build_network, free_runs, load_bundled_case, replay_inputs, spin_up
 from thermal.model.step import TR_BDF2
 
@@ -90,7 +90,7 @@ def test_trajectories_end_in_the_targets_and_begin_near_the_start() -> None:
     _, model, inputs = setting()
     theta = model.network.start()
     short = evaluate_model(model, theta, inputs, [part(1200, 1400)])
-    whole = evaluate_model(model, theta, inputs, [part(1200, 1400)], trajectories=True)
+    whole = evaluate_model(model, theta, inputs, [part(1200, 1400)], EvaluationSettings(trajectories=True))
     a, b = short.predictions[0], whole.predictions[0]
     assert b.simulated.shape == (a.simulated.shape[0], 72, 5)
     np.testing.assert_allclose(b.simulated[:, -1], a.simulated[:, -1], rtol=0, atol=1e-12)
@@ -112,11 +112,11 @@ def test_several_intervals_count_run_by_run() -> None:
 def test_horizons_have_runs_of_their_own_and_only_multiples_of_the_step() -> None:
     _, model, inputs = setting()
     theta = model.network.start()
-    found = evaluate_model(model, theta, inputs, [part(1200, 1700)], horizons=(*HORIZONS, "7min", "1000h"))
+    found = evaluate_model(model, theta, inputs, [part(1200, 1700)], EvaluationSettings(horizons=(*HORIZONS, "7min", "1000h")))
     assert list(found.by_horizon) == list(HORIZONS)
     assert found.by_horizon["6h"] == pytest.approx(found.metrics.mae)
     assert found.by_horizon["5min"] < found.by_horizon["1h"] < found.by_horizon["6h"]
-    one = evaluate_model(model, theta, inputs, [part(1200, 1700)], "1h")
+    one = evaluate_model(model, theta, inputs, [part(1200, 1700)], EvaluationSettings("1h"))
     assert found.by_horizon["1h"] == pytest.approx(one.metrics.mae)
     assert one.steps == 12
 
@@ -125,7 +125,7 @@ def test_scheme_reaches_the_runs() -> None:
     _, model, inputs = setting()
     theta = model.network.start()
     errors = [
-        evaluate_model(model, theta, inputs, [part(1200, 1300)], **options).predictions[0].error
+        evaluate_model(model, theta, inputs, [part(1200, 1300)], EvaluationSettings(**options)).predictions[0].error
         for options in ({}, {"scheme": TR_BDF2})
     ]
     assert 1e-6 < np.abs(errors[0] - errors[1]).max() < 0.2
@@ -167,9 +167,6 @@ def test_interval_whose_runs_all_miss_telemetry_is_refused() -> None:
 def test_progress_counts_to_its_total() -> None:
     _, model, inputs = setting()
     told: list[tuple[str, int, int]] = []
-    evaluate_model(
-        model, model.network.start(), inputs, [part(1200, 1300), part(1400, 1500)], horizons=("1h",),
-        progress=lambda *message: told.append(message),
-    )  # fmt: skip
+    evaluate_model(model, model.network.start(), inputs, [part(1200, 1300), part(1400, 1500)], EvaluationSettings(horizons=("1h",)), progress=lambda *message: told.append(message))  # fmt: skip
     assert [done for _, done, _ in told] == [1, 2]
     assert {total for _, _, total in told} == {2}

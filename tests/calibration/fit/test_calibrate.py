@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
-from functools import cache, partial
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ import pandas as pd
 import pytest
 from numpy.typing import NDArray
 
-from calibration import CalibrationError, CalibrationResult, Interval
+from calibration import CalibrationError, CalibrationResult, CalibrationSettings, Interval
 from calibration import calibrate as calibrate_from_several_starts
 from thermal import Building, Case, Inputs, Simulator, Telemetry, ThermalError, ZoneTable, build_network
 from thermal.case.building import Airflow, Device, Layer, Location, Surface, ZoneEntry
@@ -22,8 +23,10 @@ SITE = Location(latitude=48.0, longitude=12.0, elevation=0.0, timezone="Etc/GMT-
 NOISE = 0.02  # K
 
 
-#: One start is enough here, but where starts are what is tested.
-calibrate = partial(calibrate_from_several_starts, starts=1)
+def calibrate(case: Case, *intervals: Sequence[Interval], progress: Any = None, **settings: Any) -> CalibrationResult:
+    """One start is enough here, but where starts are what is tested."""
+    chosen = CalibrationSettings(**{"starts": 1, **settings})
+    return calibrate_from_several_starts(case, *intervals, settings=chosen, progress=progress)
 
 
 def cabin(zones: int = 1) -> Building:
@@ -248,7 +251,7 @@ def test_progress_is_told() -> None:
 @pytest.mark.parametrize("rows", [2000, 400])
 def test_held_out_targets_do_not_reach_the_estimate(monkeypatch: pytest.MonkeyPatch, rows: int) -> None:
     """Held out first, tuned after it: sensors of the held-out interval may serve the spin-up, never a residual."""
-    import calibration.fit.calibrate as module
+    import calibration.fit.problem as module
 
     case = plain_case()
     stamps = case.stamps

@@ -16,9 +16,10 @@ import pytest
 from calibration import CalibrationError, CrossValidation, Interval, cross_validate
 from calibration.evaluation.intervals import select_runs
 from calibration.evaluation.n_step import Evaluation, Predictions
-from calibration.evaluation.settings import ModelSettings
+from calibration.evaluation.settings import CalibrationSettings
 from calibration.fit import cross_validation as module
-from calibration.identifiability.power import tuning_problem
+from calibration.fit.problem import tuning_problem
+from mpc.reports.identifiability import cross_validation_sentences
 from thermal import Case, build_network, load_bundled_case, replay_inputs
 
 STEPS = 72
@@ -76,8 +77,9 @@ def test_mean_error_and_jackknife_are_those_of_the_folds(monkeypatch: pytest.Mon
     assert wall.jackknife_error == pytest.approx(np.sqrt(0.8 * np.sum((np.array(values) - 0.1) ** 2)))
     assert wall.standard_error == pytest.approx(0.1)
     assert wall.moves
-    assert "misses by 0.200 K, give or take 0.032 K (5 folds)" in found.sentences[0]
-    assert "moves exterior wall conductivity by more than" in found.sentences[1]
+    sentences = cross_validation_sentences(found)
+    assert "misses by 0.200 K, give or take 0.032 K (5 folds)" in sentences[0]
+    assert "moves exterior wall conductivity by more than" in sentences[1]
 
 
 def test_jackknife_of_a_mean_is_its_standard_error() -> None:
@@ -102,7 +104,7 @@ def test_no_residual_of_a_fold_is_near_the_days_that_it_is_judged_on(
     inputs = replay_inputs(case, build_network(case.building, dx=1.5))
     judged = []
     for tune, hold_out, _ in fake.calls:
-        problem = tuning_problem(case, tune, ModelSettings(dx=1.5))
+        problem = tuning_problem(case, tune, CalibrationSettings(dx=1.5))
         seen = np.concatenate([(r.starts[:, None] + problem.keep).ravel() for r in problem.runs])
         begun = np.concatenate([r.starts for r in problem.runs])
         for held in hold_out:
@@ -150,7 +152,7 @@ def test_a_fold_that_fails_is_reported_beside_the_others(monkeypatch: pytest.Mon
     found = run(monkeypatch, Calibration([0.0] * 5, [0.1] * 5, fail=2), 5)
     assert [f.failure for f in found.folds] == [None, None, "CalibrationError: no run", None, None]
     assert found.mae == pytest.approx(0.1)
-    assert "1 of 5 folds failed" in found.sentences[1]
+    assert "1 of 5 folds failed" in cross_validation_sentences(found)[1]
     with pytest.raises(CalibrationError, match="fewer than two folds succeeded"):
         run(monkeypatch, Calibration([0.0] * 2, [0.1] * 2, fail=1), 2)
 
@@ -158,7 +160,7 @@ def test_a_fold_that_fails_is_reported_beside_the_others(monkeypatch: pytest.Mon
 def test_settings_reach_the_calibration(monkeypatch: pytest.MonkeyPatch) -> None:
     fake = Calibration([0.0] * 2, [0.1] * 2)
     run(monkeypatch, fake, 2, settings={"dx": 1.5, "fixed": {WALL: 0.3}})
-    assert all(call[2] == {"dx": 1.5, "fixed": {WALL: 0.3}} for call in fake.calls)
+    assert all(call[2] == {"settings": CalibrationSettings(dx=1.5, fixed={WALL: 0.3})} for call in fake.calls)
 
 
 @pytest.mark.parametrize(

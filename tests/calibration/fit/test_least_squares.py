@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from calibration import solve_least_squares
+from calibration.fit.least_squares import solve_least_squares
 
 FloatArray = NDArray[np.float64]
 Residuals = Callable[[FloatArray], tuple[FloatArray, FloatArray]]

@@ -14,17 +14,17 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from calibration import CalibrationResult, calibrate, evaluate_model, load_parameters
+from calibration import CalibrationResult, CalibrationSettings, calibrate, evaluate_model, load_parameters
 from calibration.errors import CalibrationError
-from calibration.evaluation.n_step import HORIZONS
-from calibration.fit.describe import describe
+from calibration.evaluation.n_step import HORIZONS, EvaluationSettings
 from calibration.fit.estimate import Estimate
+from calibration.fit.result import describe
 from thermal import SymbolicModel, ThermalNetwork, build_network, load_bundled_case, replay_inputs
 
 
 @cache
 def calibrated() -> CalibrationResult:
-    return calibrate(load_bundled_case(), dx=1.0, starts=1)
+    return calibrate(load_bundled_case(), settings=CalibrationSettings(dx=1.0, starts=1))
 
 
 @cache
@@ -194,7 +194,7 @@ def test_evaluation_follows_the_contract() -> None:
     found, case = calibrated(), load_bundled_case()
     model = SymbolicModel(network())
     inputs = replay_inputs(case, network())
-    evaluation = evaluate_model(model, found.theta, inputs, found.held_out, horizons=HORIZONS)
+    evaluation = evaluate_model(model, found.theta, inputs, found.held_out, EvaluationSettings(horizons=HORIZONS))
     content = json.loads(json.dumps(evaluation.to_dict(), allow_nan=False))
     check_evaluation(content)
     assert content["steps"] == 72

@@ -14,10 +14,11 @@ from numpy.typing import NDArray
 from scipy.stats import chi2, multivariate_normal
 
 from calibration import CalibrationError, Interval, select_structure
-from calibration.evaluation.settings import ModelSettings
+from calibration.evaluation.settings import CalibrationSettings, ModelSettings
 from calibration.fit import selection as module
-from calibration.fit.selection_verdict import Candidate, _day_bootstrap, _likelihood_ratio, _nested, compare_candidates
-from calibration.identifiability.information_search import InformationSearch
+from calibration.fit.selection import Candidate, _day_bootstrap, _likelihood_ratio, _nested, compare_candidates
+from calibration.identifiability.information import InformationSearch
+from mpc.reports.identifiability import selection_verdict
 from thermal import Structure, load_bundled_case
 
 FloatArray = NDArray[np.float64]
@@ -49,10 +50,10 @@ def test_clearly_less_error_on_days_held_out_decides() -> None:
     (difference,) = found.differences
     assert (difference.first, difference.second, difference.days) == ("bare", "with interior mass", 12)
     assert 0.07 < difference.lower < difference.mae < difference.upper < 0.13
-    assert found.verdict.startswith(
+    assert selection_verdict(found).startswith(
         "The structure with interior mass is preferred. Against bare speak the days held out, by 0.1"
     )
-    assert found.verdict.endswith("(12 days held out, 60 effective observations tuned on.)")
+    assert selection_verdict(found).endswith("(12 days held out, 60 effective observations tuned on.)")
 
 
 def test_nested_structures_fall_back_on_the_likelihood_ratio() -> None:
@@ -66,7 +67,7 @@ def test_nested_structures_fall_back_on_the_likelihood_ratio() -> None:
     assert ratio.statistic == pytest.approx(60.0 * np.log(0.35**2 / 0.28**2))
     assert (ratio.small, ratio.large, ratio.degrees) == ("bare", "full", 4)
     assert ratio.p_value == pytest.approx(chi2.sf(ratio.statistic, 4))
-    assert found.verdict == (
+    assert selection_verdict(found) == (
         "The structure full is preferred. Against bare speak the tuning data, by a likelihood ratio of 26.8 for the 4 "
         f"more parameters of full (p = {ratio.p_value:.2g}). (10 days held out, 60 effective observations tuned on.)"
     )
@@ -77,7 +78,7 @@ def test_what_neither_tells_is_said() -> None:
     large = candidate("full", runs(10, 0.29, 0.1, 2), parameters=13, tuning_error=0.299, prior_cost=8.0)
     found = compare_candidates([small, large])
     assert found.preferred is None
-    assert found.verdict.startswith(
+    assert selection_verdict(found).startswith(
         "Cannot tell bare and full apart, by 10 days held out or by the tuning data: the simplest of them, bare, is enough."
     )
 
@@ -102,14 +103,14 @@ def test_others_fall_back_on_the_evidence() -> None:
     found = compare_candidates([one, two])
     assert found.ratios == ()
     assert found.preferred == "three nodes"
-    assert "Against one node speak the tuning data, by a log evidence 3.5 below that of three nodes." in found.verdict
+    assert "Against one node speak the tuning data, by a log evidence 3.5 below that of three nodes." in selection_verdict(found)
     assert compare_candidates([one, candidate("b", runs(10, 0.31, 0.1, 2), prior_cost=-4.0)]).preferred is None
 
 
 def test_few_days_tell_nothing() -> None:
     found = compare_candidates([candidate("a", runs(3, 0.2)), candidate("b", runs(3, 0.9))])
     assert np.isnan(found.differences[0].lower)
-    assert "Cannot tell a and b apart, by 3 days held out, which is too few, or by the tuning data" in found.verdict
+    assert "Cannot tell a and b apart, by 3 days held out, which is too few, or by the tuning data" in selection_verdict(found)
 
 
 def test_a_difference_too_small_to_matter_does_not_decide() -> None:
@@ -125,8 +126,8 @@ def test_three_candidates_of_which_one_is_out() -> None:
     found = compare_candidates([candidate(n, e) for n, e in zip("abc", parts, strict=True)])
     assert [d.told for d in found.differences if d.first == "c"] == [True]
     assert found.preferred is None
-    assert found.verdict.startswith("Cannot tell a and b apart")
-    assert "Against c speak the days held out" in found.verdict
+    assert selection_verdict(found).startswith("Cannot tell a and b apart")
+    assert "Against c speak the days held out" in selection_verdict(found)
 
 
 def test_two_that_are_alike_leave_the_third_out() -> None:
@@ -134,8 +135,8 @@ def test_two_that_are_alike_leave_the_third_out() -> None:
     errors = [runs(3, e) for e in (0.3, 0.2, 0.2)]
     parts = [candidate(n, e, prior_cost=v) for n, e, v in zip("abc", errors, (35.2, 12.0, 12.2), strict=True)]
     found = compare_candidates(parts)
-    assert found.verdict.startswith("Cannot tell b and c apart")
-    assert "Against a speak the tuning data, by a log evidence 11.6 below that of b." in found.verdict
+    assert selection_verdict(found).startswith("Cannot tell b and c apart")
+    assert "Against a speak the tuning data, by a log evidence 11.6 below that of b." in selection_verdict(found)
 
 
 def test_nested_means_with_something_left_out() -> None:
@@ -206,9 +207,9 @@ def test_bootstrap_is_seeded_and_weighs_days_by_their_runs() -> None:
     assert all(np.isnan(_day_bootstrap(means[:4], counts[:4])))
 
 
-def fake_calibrate(case: Any, tune: Any, hold_out: Any, **settings: Any) -> SimpleNamespace:
+def fake_calibrate(case: Any, tune: Any, hold_out: Any, settings: CalibrationSettings) -> SimpleNamespace:
     """The start of the model instead of a fit."""
-    chosen = ModelSettings(dx=1.5, structure=settings.get("structure", FULL))
+    chosen = settings.model
     network = chosen.network(case.building)
     judged = runs(8, 0.3 if chosen.structure == BARE else 0.2, 0.01, 1)
     prediction = SimpleNamespace(
@@ -228,7 +229,9 @@ def test_each_structure_is_calibrated_and_judged(monkeypatch: pytest.MonkeyPatch
     told: list[Any] = []
     structures = {"bare": BARE, "full": {"structure": FULL}}
     with ThreadPoolExecutor(2) as pool:
-        found = select_structure(load_bundled_case(), structures, executor=pool, progress=lambda *a: told.append(a))
+        found = select_structure(
+            load_bundled_case(), structures, settings={"dx": 1.5}, executor=pool, progress=lambda *a: told.append(a)
+        )
     assert told == [("select", 1, 2), ("select", 2, 2)]
     assert found.preferred == "full"
     bare, full = found.candidates
@@ -250,15 +253,15 @@ def test_what_cannot_be_compared_is_refused(monkeypatch: pytest.MonkeyPatch) -> 
     with pytest.raises(CalibrationError, match="'hold_out' is the same for all"):
         select_structure(case, {"a": BARE, "b": {"hold_out": []}})
 
-    def longer(*args: Any, **settings: Any) -> SimpleNamespace:
-        found = fake_calibrate(*args, **settings)
-        if settings.get("horizon"):
+    def longer(*args: Any, settings: CalibrationSettings) -> SimpleNamespace:
+        found = fake_calibrate(*args, settings=settings)
+        if settings.horizon != "6h":
             found.calibrated["held_out"].predictions[0].start += pd.Timedelta(hours=1)
         return found
 
     monkeypatch.setattr(module, "calibrate", longer)
     with pytest.raises(CalibrationError, match="'a' and 'b' are not judged on the same runs"):
-        select_structure(case, {"a": BARE, "b": {"horizon": "6h"}})
+        select_structure(case, {"a": BARE, "b": {"horizon": "360min"}}, settings={"dx": 1.5})
 
 
 def test_a_real_case_with_and_without_interior_mass() -> None:
@@ -271,4 +274,4 @@ def test_a_real_case_with_and_without_interior_mass() -> None:
     assert (ratio.small, ratio.large, ratio.degrees) == ("bare", "full", 4)
     assert 0.0 < found.effective_size <= 5.0  # five zones on the day that two days leave after their spin-up
     assert found.candidates[0].tuning_error > found.candidates[1].tuning_error
-    assert found.verdict.startswith("Cannot tell bare and full apart, by 1 day held out, which is too few,")
+    assert selection_verdict(found).startswith("Cannot tell bare and full apart, by 1 day held out, which is too few,")

@@ -20,6 +20,7 @@ from calibration.errors import CalibrationError
 from calibration.fleet.cluster import ClusterExecutor
 from calibration.fleet.local import ONE_THREAD
 from calibration.fleet.run import case_folders
+from mpc.reports.calibration import calibration_files
 from thermal.errors import MissingExtraError
 
 SETTINGS = {"horizon": "1h", "starts": 1}
@@ -79,7 +80,7 @@ def test_a_killed_worker_of_a_cluster_loses_nothing(
     start_worker()
     kill = kill_at_first(tmp_path / "out")
     with ClusterExecutor(scheduler, timeout=LONG, folders=[cases]) as executor:
-        outcomes = calibrate_many(case_folders(cases), tmp_path / "out", SETTINGS, executor=executor, progress=kill)
+        outcomes = calibrate_many(case_folders(cases), tmp_path / "out", SETTINGS, files=calibration_files, workers=executor, progress=kill)
         check_nothing_is_lost(tmp_path / "out", outcomes, kill.killed)
     with pytest.raises(CalibrationError, match=r"does not see .*nowhere; .* under the same path"):
         ClusterExecutor(scheduler, timeout=LONG, folders=[tmp_path / "nowhere"])
@@ -117,7 +118,7 @@ def test_a_cluster_that_dies_is_given_up(
 ) -> None:
     start_worker()
     with ClusterExecutor(scheduler, timeout=LONG, patience=1.0) as executor, kill_always(tmp_path / "out", "*"):
-        (lost,) = calibrate_many([cases / "office 0"], tmp_path / "out", SETTINGS, executor=executor)
+        (lost,) = calibrate_many([cases / "office 0"], tmp_path / "out", SETTINGS, workers=executor)
     assert (lost.status, lost.attempts) == ("lost", 1)
     assert "had no worker for 1 s; the same command goes on from here" in str(lost.message)
 

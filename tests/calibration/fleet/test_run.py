@@ -14,12 +14,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from calibration import Interval, calibrate, calibrate_many
+from calibration import CalibrationSettings, Interval, calibrate, calibrate_many
 from calibration.errors import CalibrationError, ResultsExistError
 from calibration.fit.least_squares import INTERRUPTED
-from calibration.fleet.case import CaseTask, calibrate_one
-from calibration.fleet.record import RECORD, CaseOutcome, check_settings
+from calibration.fleet.case import RECORD, CaseOutcome, CaseTask, calibrate_one, check_settings
 from calibration.fleet.run import case_folders
+from mpc.reports.calibration import calibration_files
 from thermal import load_case
 
 SETTINGS = {"horizon": "1h", "starts": 1}
@@ -31,7 +31,7 @@ def finished(cases: Path, kill_at_first: Any) -> Finished:
     """Results over two local processes, one of which was killed in the middle of a case."""
     out = cases / "results"  # inside of the folder of cases, which is no case for that
     kill = kill_at_first(out)
-    outcomes = calibrate_many(case_folders(cases), out, SETTINGS, workers=2, progress=kill)
+    outcomes = calibrate_many(case_folders(cases), out, SETTINGS, files=calibration_files, workers=2, progress=kill)
     return out, outcomes, kill.killed
 
 
@@ -42,7 +42,7 @@ def test_a_killed_process_loses_nothing(finished: Finished, check_nothing_is_los
 
 
 def test_a_worker_finds_what_calibrate_finds(cases: Path, finished: Finished) -> None:
-    result = calibrate(load_case(cases / "office 1"), horizon="1h", starts=1)
+    result = calibrate(load_case(cases / "office 1"), settings=CalibrationSettings(horizon="1h", starts=1))
     content = json.loads((finished[0] / "office 1" / "calibration.json").read_text(encoding="utf-8"))
     for p in result.parameters:
         assert content["parameters"][p.name]["value"] == pytest.approx(p.value, rel=1e-6), p.name
@@ -57,7 +57,7 @@ def test_a_second_run_takes_over_what_is_done(cases: Path, finished: Finished) -
             case_folders(cases),
             out,
             SETTINGS,
-            executor=pool,
+            workers=pool,
             progress=lambda _, done, total: told.append((done, total)),
         )
     assert told == [(2, 3), (3, 3)]  # the broken one was tried again
@@ -83,29 +83,29 @@ def one(cases: Path, finished: Finished, tmp_path: Path) -> tuple[Path, Path]:
 
 def test_results_of_other_settings_are_refused(one: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch) -> None:
     case, out = one
-    assert calibrate_many([case], out, SETTINGS, executor=Idle())[0].resumed
+    assert calibrate_many([case], out, SETTINGS, workers=Idle())[0].resumed
     with pytest.raises(ResultsExistError, match=r"settings: horizon is '1h' there and '2h' here; .* --force"):
-        calibrate_many([case], out, SETTINGS | {"horizon": "2h"}, executor=Idle())
+        calibrate_many([case], out, SETTINGS | {"horizon": "2h"}, workers=Idle())
     (case / "notes.txt").write_text("not a part of the case", encoding="utf-8")
-    assert calibrate_many([case], out, SETTINGS, executor=Idle())[0].resumed
+    assert calibrate_many([case], out, SETTINGS, workers=Idle())[0].resumed
     with (case / "building.yaml").open("a", encoding="utf-8") as stream:
         stream.write("# surveyed again\n")
     with pytest.raises(ResultsExistError, match="other plans or telemetry"):
-        calibrate_many([case], out, SETTINGS, executor=Idle())
+        calibrate_many([case], out, SETTINGS, workers=Idle())
     shutil.copy(out / "office 0" / RECORD, case)  # what a broken record looks like must not matter
     (out / "office 0" / RECORD).write_text('{"outcome": null}', encoding="utf-8")
     with pytest.raises(ResultsExistError, match="holds no results of such a run"):
-        calibrate_many([case], out, SETTINGS, executor=Idle())
+        calibrate_many([case], out, SETTINGS, workers=Idle())
     (out / "office 0" / RECORD).unlink()
     with pytest.raises(ResultsExistError, match="found office 0"):
-        calibrate_many([case], out, SETTINGS, executor=Idle())
+        calibrate_many([case], out, SETTINGS, workers=Idle())
     assert not (out / ".running").exists()
 
 
 def test_results_of_another_version_are_refused(one: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("calibration.fleet.record.version", lambda _: "99")
+    monkeypatch.setattr("calibration.fleet.case.version", lambda _: "99")
     with pytest.raises(ResultsExistError, match="version .*, and this is 99"):
-        calibrate_many([one[0]], one[1], SETTINGS, executor=Idle())
+        calibrate_many([one[0]], one[1], SETTINGS, workers=Idle())
 
 
 def test_force_calibrates_anew_and_keeps_what_it_did_not_make(one: tuple[Path, Path]) -> None:
@@ -113,11 +113,11 @@ def test_force_calibrates_anew_and_keeps_what_it_did_not_make(one: tuple[Path, P
     (out / "office 0" / "notes.txt").write_text("mine", encoding="utf-8")
     tune = [Interval(*load_case(case).stamps[[0, 60]])]
     with ThreadPoolExecutor(1) as pool:
-        done = calibrate_many([case], out, {"starts": 1, "horizon": "2h", "tune": tune}, executor=pool, force=True)
+        done = calibrate_many([case], out, {"starts": 1, "horizon": "2h", "tune": tune}, files=calibration_files, workers=pool, force=True)
     assert [(o.status, o.resumed) for o in done] == [("calibrated", False)]
     assert {p.name for p in (out / "office 0").iterdir()} > {"calibration.json", "report.html", RECORD, "notes.txt"}
     text = f"{tune[0].start.isoformat()}/{tune[0].end.isoformat()}"
-    again = calibrate_many([case], out, {"starts": 1, "horizon": "2h", "tune": [text]}, executor=Idle())
+    again = calibrate_many([case], out, {"starts": 1, "horizon": "2h", "tune": [text]}, workers=Idle())
     assert again[0].resumed
 
 
@@ -134,7 +134,7 @@ def test_a_case_that_ends_its_workers_is_given_up_alone(cases: Path, tmp_path: P
 def test_an_executor_that_breaks_as_a_whole_is_reported(cases: Path, tmp_path: Path, kill_always: Any) -> None:
     paths = [cases / "office 0", cases / "office 1"]
     with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool, kill_always(tmp_path, "*"):
-        outcomes = calibrate_many(paths, tmp_path, SETTINGS, executor=pool)
+        outcomes = calibrate_many(paths, tmp_path, SETTINGS, workers=pool)
     assert [o.status for o in outcomes] == ["lost", "lost"]
     assert all("the executor takes no more cases" in str(o.message) for o in outcomes)
 
@@ -211,7 +211,7 @@ def test_settings_are_spelled_with_their_defaults() -> None:
 def test_cases_that_cannot_go_together_are_refused(cases: Path, tmp_path: Path) -> None:
     def refused(message: str, paths: list[Path], out: Path = tmp_path / "out", **options: Any) -> None:
         with pytest.raises(CalibrationError, match=message):
-            calibrate_many(paths, out, executor=Idle(), **options)
+            calibrate_many(paths, out, **{"workers": Idle(), **options})
         assert not (tmp_path / "out").exists()
 
     office = cases / "office 0"
@@ -233,22 +233,22 @@ def test_a_folder_of_something_else_is_refused(cases: Path, tmp_path: Path) -> N
     (tmp_path / "thesis.tex").write_text("", encoding="utf-8")
     (tmp_path / ".hidden").mkdir()
     with pytest.raises(ResultsExistError, match=r"found thesis\.tex; .* --force"):
-        calibrate_many([cases / "office 0"], tmp_path, executor=Idle())
-    assert calibrate_many([cases / "office 0"], tmp_path, executor=Idle(), force=True)[0].status == "lost"
+        calibrate_many([cases / "office 0"], tmp_path, workers=Idle())
+    assert calibrate_many([cases / "office 0"], tmp_path, workers=Idle(), force=True)[0].status == "lost"
     assert sorted(p.name for p in tmp_path.iterdir()) == [".hidden", "summary.json", "thesis.tex"]
 
 
 def test_two_runs_do_not_write_to_one_folder(cases: Path, tmp_path: Path) -> None:
     class Again(Executor):
         def submit(self, *_: Any, **__: Any) -> Future[Any]:
-            calibrate_many([cases / "office 0"], tmp_path, executor=Idle())
+            calibrate_many([cases / "office 0"], tmp_path, workers=Idle())
             raise AssertionError
 
     with pytest.raises(CalibrationError, match="another run"):
-        calibrate_many([cases / "office 0"], tmp_path, executor=Again())
+        calibrate_many([cases / "office 0"], tmp_path, workers=Again())
     left = tmp_path / ".running" / "killed"
     left.mkdir(parents=True)  # as a run leaves behind that was killed: its lock went with it
-    assert calibrate_many([cases / "office 0"], tmp_path, executor=Idle())[0].status == "lost"
+    assert calibrate_many([cases / "office 0"], tmp_path, workers=Idle())[0].status == "lost"
     assert [p.name for p in tmp_path.iterdir()] == ["summary.json"]
 
 

@@ -11,12 +11,13 @@ import numpy as np
 import pytest
 
 from calibration import CalibrationError, Interval, Power, fisher_information, power_of_data
-from calibration.evaluation.settings import ModelSettings
-from calibration.fit.problem import Problem
-from calibration.identifiability.power import _information, _zones_of_rows, tuning_problem
+from calibration.evaluation.settings import CalibrationSettings
+from calibration.fit.problem import Problem, tuning_problem
+from calibration.identifiability.power import _information, _zones_of_rows
+from mpc.reports.identifiability import information_sentences, power_sentences
 from thermal import load_bundled_case, reduced_model
 
-COARSE = ModelSettings(dx=1.5)
+COARSE = CalibrationSettings(dx=1.5)
 
 
 @cache
@@ -40,7 +41,7 @@ def test_problem_is_that_of_the_first_two_thirds() -> None:
 
 def test_problem_keeps_what_is_fixed() -> None:
     part = Interval(load_bundled_case().stamps[300], load_bundled_case().stamps[900])
-    p = tuning_problem(load_bundled_case(), [part], COARSE, fixed={"window_u_value": 1.7}, horizon="3h")
+    p = tuning_problem(load_bundled_case(), [part], replace(COARSE, fixed={"window_u_value": 1.7}, horizon="3h"))
     names = [q.name for q in p.parameters]
     assert "window_u_value" not in names
     assert p.theta(p.point(p.start))[[q.name for q in p.grid.network.parameters].index("window_u_value")] == 1.7
@@ -106,9 +107,11 @@ def test_least_and_most_hold_the_start_and_sentences_say_it() -> None:
     told = {p.name: p for p in found.parameters}
     assert told["shuffle_probability"].told == "no"
     assert told["slab_heat_capacity"].told == "yes"
-    assert told["shuffle_probability"].sentence.startswith("These data will not tell the shuffle probability: ")
-    assert "over the prior" in told["slab_heat_capacity"].sentence
-    assert found.sentences[len(found.parameters) :] == found.information.sentences
+    sentences = power_sentences(found)
+    spoken = dict(zip(told, sentences, strict=False))
+    assert spoken["shuffle_probability"].startswith("These data will not tell the shuffle probability: ")
+    assert "over the prior" in spoken["slab_heat_capacity"]
+    assert sentences[len(found.parameters) :] == information_sentences(found.information)
     assert set(found.deviation.values()) == {0.3}
     assert json.loads(json.dumps(found.to_dict()))["parameters"]["window_u_value"]["told"] in {"yes", "perhaps", "no"}
 
@@ -116,7 +119,7 @@ def test_least_and_most_hold_the_start_and_sentences_say_it() -> None:
 def test_progress_and_seed() -> None:
     told: list[Any] = []
     one = power_of_data(load_bundled_case(), settings=COARSE, draws=1, progress=lambda *a: told.append(a))
-    other = power_of_data(load_bundled_case(), settings=COARSE, draws=1, seed=1)
+    other = power_of_data(load_bundled_case(), settings=replace(COARSE, seed=1), draws=1)
     assert told == [("power", 1, 2), ("power", 2, 2)]
     assert [p.ratio for p in one.parameters] == [p.ratio for p in other.parameters]
     assert [p.most for p in one.parameters] != [p.most for p in other.parameters]

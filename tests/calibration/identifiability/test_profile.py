@@ -14,9 +14,10 @@ import pytest
 from numpy.typing import NDArray
 
 from calibration import CalibrationError, Profile, profile_likelihood
-from calibration.evaluation.settings import ModelSettings
+from calibration.evaluation.settings import CalibrationSettings
 from calibration.fit.estimate import Estimate, estimate
-from calibration.identifiability.power import tuning_problem
+from calibration.fit.problem import tuning_problem
+from mpc.reports.identifiability import profile_sentence
 from thermal import Parameter, load_bundled_case, reduced_model
 
 FloatArray = NDArray[np.float64]
@@ -113,7 +114,7 @@ def test_what_the_data_leave_open_is_open() -> None:
     interval = found.intervals[0]
     assert (interval.open_lower, interval.open_upper) == (True, True)
     assert (interval.lower, interval.upper) == pytest.approx((np.exp(-2.0), np.exp(2.0)))
-    assert "nothing between 0.135 W/m/K and 7.39 W/m/K, its physical range, is excluded" in found.sentence
+    assert "nothing between 0.135 W/m/K and 7.39 W/m/K, its physical range, is excluded" in profile_sentence(found)
     assert found.deviance.max() < 0.1
     (held,) = profile_likelihood(started(toy), ["p0"])
     assert held.intervals[0].upper == pytest.approx(np.exp(Q90 * np.sqrt(0.5)), rel=0.03)
@@ -129,8 +130,8 @@ def test_an_estimate_at_its_bound_is_open_to_that_side() -> None:
     assert not interval.open_lower
     edge = 3.0 - np.sqrt(1.0 + Q90**2 / 25.0)  # deviance counts from the bound: 25 (3 - z)² - 25
     assert np.log(interval.lower) == pytest.approx(edge, abs=0.01)
-    assert "at least" in found.sentence
-    assert "no upper limit within its physical range" in found.sentence
+    assert "at least" in profile_sentence(found)
+    assert "no upper limit within its physical range" in profile_sentence(found)
 
 
 def test_a_curved_likelihood_has_an_interval_to_one_side() -> None:
@@ -215,12 +216,12 @@ def test_progress_and_json() -> None:
     assert content["name"] == "p0"
     assert content["intervals"][0]["level"] == 0.9
     assert len(content["values"]) == len(content["deviance"])
-    assert profiles[0].sentence.startswith("P0: 0.")
+    assert profile_sentence(profiles[0]).startswith("P0: 0.")
 
 
 @cache
 def bundled() -> tuple[Estimate, Profile]:
-    problem = tuning_problem(load_bundled_case(), settings=ModelSettings(dx=1.5))
+    problem = tuning_problem(load_bundled_case(), settings=CalibrationSettings(dx=1.5))
     found = estimate(problem, problem.point(problem.start))
     return found, profile_likelihood(found, ["interior_film_coefficient"])[0]
 

@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from calibration import CalibrationResult, Evaluation, Interval, calibrate
+from calibration import CalibrationResult, CalibrationSettings, Evaluation, Interval, calibrate
 from calibration.errors import ResultsExistError
 from calibration.evaluation.n_step import Predictions
 from mpc.reports import figures
@@ -92,7 +92,7 @@ def case() -> Case:
 
 @pytest.fixture(scope="module")
 def result(case: Case) -> CalibrationResult:
-    return calibrate(case, dx=1.0, starts=1)
+    return calibrate(case, settings=CalibrationSettings(dx=1.0, starts=1))
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from calibration import CalibrationResult, DisturbanceModel, calibrate
+from calibration import CalibrationResult, CalibrationSettings, DisturbanceModel, calibrate
 from calibration.estimation.heat_balance import HeatBalance
 from calibration.estimation.whiteness import Whiteness, ZoneWhiteness
 from mpc.reports.residuals import (
@@ -39,7 +39,7 @@ def case() -> Case:
 
 @pytest.fixture(scope="module")
 def result(case: Case) -> CalibrationResult:
-    return calibrate(case, dx=1.0, starts=1)
+    return calibrate(case, settings=CalibrationSettings(dx=1.0, starts=1))
 
 
 @pytest.fixture(scope="module")

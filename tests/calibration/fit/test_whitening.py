@@ -10,9 +10,10 @@ import pytest
 from numpy.typing import NDArray
 
 from calibration import DisturbanceModel, Interval
-from calibration.estimation.filtered import filter_interval
+from calibration.estimation.filtered import FilterSettings, filter_interval
 from calibration.estimation.gains import Covariance
-from calibration.estimation.whitening import Whitening, whitening
+from calibration.estimation.innovations import ROUGH_TOLERANCE
+from calibration.fit.likelihood import Whitening, whitening
 from thermal import (
     Inputs,
     SymbolicModel,
@@ -24,8 +25,6 @@ from thermal import (
     spin_up,
 )
 from thermal.model.reduce import ReducedModel
-from thermal.model.replay import SPIN_UP
-from thermal.model.step import IMPLICIT_EULER
 
 FloatArray = NDArray[np.float64]
 
@@ -55,9 +54,8 @@ def interval() -> Interval:
 
 def made(gaps: bool = False, covariance: Covariance = "exact") -> Whitening:
     theta = model().network.start()
-    return whitening(
-        model(), theta, telemetry(gaps), interval(), DISTURBANCE, IMPLICIT_EULER, covariance, SPIN_UP
-    )  # fmt: skip
+    settings = FilterSettings(covariance=covariance, tolerance=ROUGH_TOLERANCE)
+    return whitening(model(), theta, telemetry(gaps), interval(), DISTURBANCE, settings)
 
 
 def errors_of_a_free_run(white: Whitening, inputs: Inputs) -> FloatArray:
@@ -74,7 +72,7 @@ def test_squares_of_whitened_errors_make_the_filter_s_likelihood(gaps: bool, cov
     """-2 log L = Σ r² + Σ log det S + n log 2π, r from a run that nothing corrects."""
     white, inputs = made(gaps, covariance), telemetry(gaps)
     found = white(errors_of_a_free_run(white, inputs))
-    filtered = filter_interval(model(), model().network.start(), inputs, interval(), DISTURBANCE, covariance=covariance)
+    filtered = filter_interval(model(), model().network.start(), inputs, interval(), DISTURBANCE, FilterSettings(covariance=covariance))
     determinants = sum(filtered.gains[g].log_determinant for g in filtered.gain_of)
     wanted = -2.0 * white.log_likelihood - determinants - white.measured.sum() * np.log(2.0 * np.pi)
     assert found.shape == (white.measured.sum(), 1)

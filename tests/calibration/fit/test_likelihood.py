@@ -9,11 +9,19 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from calibration import CalibrationError, CalibrationResult, DisturbanceModel, Interval, KalmanFilter, calibrate
+from calibration import (
+    CalibrationError,
+    CalibrationResult,
+    CalibrationSettings,
+    DisturbanceModel,
+    Interval,
+    KalmanFilter,
+    calibrate,
+)
 from calibration.estimation.filtered import prepare
-from calibration.estimation.likelihood import InnovationsProblem
+from calibration.evaluation.settings import Objective
+from calibration.fit.likelihood import InnovationsProblem
 from calibration.fit.precision import precision, unexplained
-from calibration.fit.problem import Objective
 from thermal import (
     Case,
     Inputs,
@@ -185,7 +193,7 @@ def without(case: Case) -> Case:
 
 @cache
 def calibrated(objective: Objective) -> CalibrationResult:
-    return calibrate(twin()[0], dx=2.0, objective=objective, starts=1, horizon="3h")
+    return calibrate(twin()[0], settings=CalibrationSettings(dx=2.0, objective=objective, starts=1, horizon="3h"))
 
 
 def off(result: CalibrationResult) -> tuple[FloatArray, FloatArray]:
@@ -223,7 +231,7 @@ def test_innovations_determine_more_of_a_twin_than_errors_of_runs() -> None:
 def test_gaps_widen_an_estimate_and_do_not_move_it() -> None:
     """Every fiftieth reading lost, and a sensor for a day and a half: within two standard errors of the whole's."""
     whole = calibrated("innovations")
-    found = calibrate(without(twin()[0]), dx=2.0, objective="innovations", starts=1, horizon="3h")
+    found = calibrate(without(twin()[0]), settings=CalibrationSettings(dx=2.0, objective="innovations", starts=1, horizon="3h"))
     assert found.solver.success
     for a, b in zip(whole.parameters, found.parameters, strict=True):
         if a.standard_error is not None and b.standard_error is not None:
@@ -234,4 +242,4 @@ def test_result_says_what_was_minimised() -> None:
     assert calibrated("innovations").to_dict()["objective"] == "innovations"
     assert calibrated("multi_step").to_dict()["objective"] == "multi_step"
     with pytest.raises(CalibrationError, match="objective: expected one of multi_step, innovations, came 'kalman'"):
-        calibrate(twin()[0], objective="kalman")  # type: ignore[arg-type]
+        calibrate(twin()[0], settings=CalibrationSettings(objective="kalman"))  # type: ignore[arg-type]
