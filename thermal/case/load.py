@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable
+from dataclasses import fields
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -216,16 +217,8 @@ def _building(parsed: BuildingFile, folder: Path) -> Building:
         geometry = FloorPlans(parsed.cell_size, floors, parsed.glazing or {})
     else:
         geometry = ZoneTable(parsed.zones or (), parsed.surfaces or (), parsed.constructions or {})
-    return Building(
-        name=parsed.name,
-        location=parsed.location,
-        orientation=parsed.orientation,
-        geometry=geometry,
-        devices=parsed.devices,
-        airflows=parsed.airflows,
-        weather_station=parsed.weather_station,
-        geometry_quality=parsed.geometry_quality,
-    )
+    kept = {field.name: getattr(parsed, field.name) for field in fields(Building) if field.name != "geometry"}
+    return Building(geometry=geometry, **kept)
 
 
 def _inside(folder: Path, name: str, key: str) -> Path:

@@ -83,9 +83,12 @@ def generate_office(
     >>> [len(floor.zone_names) for floor in plans.floors]
     [6, 6]
     """
-    _check_seed(seed)
+    low, high = window_to_wall_ratio
+    if seed < 0:
+        raise ThermalError(f"seed: expected 0 or more, found {seed}")
     _check_size(floor_area, zones, floors, cell_size, height, min_zone_area)
-    _check_ratio(window_to_wall_ratio)
+    if not 0.0 <= low <= high <= 1.0:
+        raise ThermalError(f"window_to_wall_ratio: expected (smallest, largest) between 0 and 1, found {low, high}")
     counts = [zones // floors + (floor < zones % floors) for floor in range(floors)]
     for attempt in range(_OUTLINES):
         rng = np.random.default_rng([seed, attempt])
@@ -170,14 +173,7 @@ def _exposed_cells(storey: FloorPlan, turns: int) -> dict[str, int]:
     tokens = np.rot90(storey.tokens, turns)
     beside = tokens[1:][tokens[:-1] == EXTERIOR_WALL]
     names, cells = np.unique(beside, return_counts=True)
-    walls = {OUTSIDE, EXTERIOR_WALL, INTERIOR_WALL}
-    return {name: count for name, count in zip(names.tolist(), cells.tolist(), strict=True) if name not in walls}
-
-
-def _check_seed(seed: int) -> None:
-    """Refuse a seed that numpy has no generator for."""
-    if seed < 0:
-        raise ThermalError(f"seed: expected 0 or more, found {seed}")
+    return dict(zip(names.tolist(), cells.tolist(), strict=True))
 
 
 def _check_size(
@@ -196,12 +192,6 @@ def _check_size(
             f"zones: expected at most {most} on {floor_area} m2, so that they have {_MEAN_OVER_SMALLEST} times "
             f"min_zone_area ({min_zone_area} m2) on average, found {zones}"
         )
-
-
-def _check_ratio(ratio: tuple[float, float]) -> None:
-    """Refuse shares of glass that are none."""
-    if not 0.0 <= ratio[0] <= ratio[1] <= 1.0:
-        raise ThermalError(f"window_to_wall_ratio: expected (smallest, largest) between 0 and 1, found {ratio}")
 
 
 def pilot_building(

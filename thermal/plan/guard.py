@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import yaml
+from pydantic import ValidationError
 
 from thermal.errors import MissingExtraError, OversizedFileError, PlanError
 
@@ -170,6 +171,21 @@ def inside_folder(folder: Path, name: str, where: str) -> Path:
     if not inside:
         raise PlanError(where, "a file in the folder of the list", repr(name), "copy the file beside the list")
     return target
+
+
+def first_fault(error: ValidationError, where: str) -> tuple[str, str, str]:
+    """Place, expectation and finding of the first fault of a file or a request, as errors take them.
+
+    Parameters
+    ----------
+    error : ValidationError
+        What the model of it says.
+    where : str
+        File or request.
+    """
+    first = error.errors(include_url=False)[0]
+    place = ".".join(str(part) for part in first["loc"]) or "content"
+    return f"{where}: {place}", first["msg"], repr(first["input"])[:80]
 
 
 def checked_number(value: object, name: str, lowest: float, highest: float, unit: str) -> float:
