@@ -35,7 +35,7 @@ from _table import markdown, write
 from calibration import calibrate_many
 from calibration.fleet.record import CaseOutcome
 from calibration.fleet.run import case_folders
-from thermal.pilot.pilot import PilotSettings, generate_pilot
+from thermal.pilot.building import PilotSettings, generate_pilot
 
 BUILDINGS = 40
 OFFICE: dict[str, Any] = {

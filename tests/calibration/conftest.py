@@ -24,7 +24,7 @@ from calibration.estimation.state_space import state_space
 from calibration.fleet.record import RECORD, CaseOutcome
 from thermal import Inputs
 from thermal.model.symbolic import Matrices
-from thermal.pilot.pilot import PilotSettings, generate_pilot
+from thermal.pilot.building import PilotSettings, generate_pilot
 
 FILES = ["calibration.json", RECORD, "evaluation.json", "predictions.parquet", "report.html"]
 FloatArray = NDArray[np.float64]

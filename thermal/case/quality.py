@@ -188,7 +188,8 @@ def assess(telemetry: Telemetry, building: Building) -> QualityReport:
         marks[name] += [(GAP, first, last, "") for first, last in runs(np.isnan(values))]
         _take_out(values, marks[name], IMPOSSIBLE, impossible_values(values, POINT_TYPES[split_column(name, "")[1]]))
     outdoor = [name for name in clean if name.endswith(f"/{OUTDOOR_TEMPERATURE}")]
-    reference = _outdoor_reference(building, clean)
+    station = f"{building.weather_station}/{OUTDOOR_TEMPERATURE}"
+    reference = next((clean[name] for name in (station, *outdoor) if name in clean), None)
     for name in [*outdoor, *(name for name in clean if name.endswith(f"/{ZONE_TEMPERATURE}"))]:
         values, entity = clean[name], name.rpartition("/")[0]
         is_input = name in outdoor or entity in building.measured_boundaries
@@ -227,12 +228,6 @@ def usable(frame: pd.DataFrame, report: QualityReport) -> pd.DataFrame:
             last = frame.index.searchsorted(finding.end, side="right")
             values[first:last, positions[column]] = np.nan
     return pd.DataFrame(values, index=frame.index, columns=frame.columns)
-
-
-def _outdoor_reference(building: Building, clean: dict[str, FloatArray]) -> FloatArray | None:
-    station = clean.get(f"{building.weather_station}/{OUTDOOR_TEMPERATURE}")
-    others = [values for name, values in clean.items() if name.endswith(f"/{OUTDOOR_TEMPERATURE}")]
-    return station if station is not None else (others[0] if others else None)
 
 
 def _take_out(
