@@ -3,7 +3,7 @@
 import sys
 
 from thermal import Case
-from thermal.pilot.pilot import PilotSettings, generate_pilot
+from thermal.pilot.building import PilotSettings, generate_pilot
 
 
 def small(path: str) -> Case:

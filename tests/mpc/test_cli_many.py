@@ -21,7 +21,7 @@ from typer.testing import CliRunner
 import calibration.fleet.cluster
 from calibration import calibrate
 from mpc.cli.app import app
-from thermal.pilot.pilot import PilotSettings, generate_pilot
+from thermal.pilot.building import PilotSettings, generate_pilot
 
 OPTIONS = ("--horizon", "1h", "--starts", "1")
 NAMES = [f"office {k}" for k in range(3)]

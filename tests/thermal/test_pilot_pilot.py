@@ -13,7 +13,7 @@ from thermal.case.building import Building, FloorPlans
 from thermal.case.case import Case
 from thermal.case.load import load_case
 from thermal.errors import CaseError
-from thermal.pilot.pilot import PilotSettings, generate_pilot
+from thermal.pilot.building import PilotSettings, generate_pilot
 
 
 class HeldPlant:

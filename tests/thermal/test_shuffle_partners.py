@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from thermal.shuffle.partners import PartnerSampler, disc_offsets
+from thermal.shuffle.random import PartnerSampler, disc_offsets
 
 
 def grid(n_column, n_row, cell_size=1.0, keep=lambda column, row: True):

@@ -21,13 +21,13 @@ FACADES = ("north", "east", "south", "west")
 DEVICE_TYPES = ("vav", "fan_coil", "electric_heater", "radiator", "supply_air_terminal", "ahu", "boiler", "chiller")
 
 
-class _Entry(BaseModel):
+class Entry(BaseModel):
     """Base of the models: what is not named is refused, and nothing changes afterwards."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
 
-class Location(_Entry):
+class Location(Entry):
     """Where the building stands.
 
     Parameters
@@ -46,7 +46,7 @@ class Location(_Entry):
     timezone: Text
 
 
-class Device(_Entry):
+class Device(Entry):
     """A device that serves one zone, or none.
 
     Parameters
@@ -67,7 +67,7 @@ class Device(_Entry):
     fed_by: tuple[Text, ...] = ()
 
 
-class Airflow(_Entry):
+class Airflow(Entry):
     """Air of a device that goes on from one zone to another.
 
     Parameters
@@ -90,7 +90,7 @@ class Airflow(_Entry):
     fraction: Share
 
 
-class Layer(_Entry):
+class Layer(Entry):
     """One layer of a construction.
 
     Parameters
@@ -111,7 +111,7 @@ class Layer(_Entry):
     heat_capacity: Positive
 
 
-class Surface(_Entry):
+class Surface(Entry):
     """A surface of a zone table.
 
     Parameters
@@ -147,7 +147,7 @@ class Surface(_Entry):
     solar_transmittance: Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=1)] | None = None
 
 
-class ZoneEntry(_Entry):
+class ZoneEntry(Entry):
     """A zone of a zone table.
 
     Parameters
@@ -165,7 +165,7 @@ class ZoneEntry(_Entry):
     floor_area: Positive
 
 
-class FloorEntry(_Entry):
+class FloorEntry(Entry):
     """A floor of a building with plans.
 
     Parameters
@@ -183,7 +183,7 @@ class FloorEntry(_Entry):
     plan: Text
 
 
-class BuildingFile(_Entry):
+class BuildingFile(Entry):
     """All of `building.yaml`.
 
     Parameters
@@ -236,7 +236,8 @@ class BuildingFile(_Entry):
     constructions: dict[Text, tuple[Layer, ...]] | None = None
 
 
-OUTSIDE, EXTERIOR_WALL, INTERIOR_WALL = ".", "#", "+"
+#: Tokens of a plan that are no zone.
+PLAN_TOKENS = OUTSIDE, EXTERIOR_WALL, INTERIOR_WALL = ".", "#", "+"
 OUTDOOR, GROUND = "outdoor", "ground"
 
 
@@ -263,7 +264,7 @@ class FloorPlan:
     def zone_names(self) -> tuple[str, ...]:
         """Zones of the floor, in the order of their first cell, row by row."""
         seen = dict.fromkeys(str(token) for token in self.tokens.ravel())
-        return tuple(token for token in seen if token not in {OUTSIDE, EXTERIOR_WALL, INTERIOR_WALL})
+        return tuple(token for token in seen if token not in PLAN_TOKENS)
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from os import PathLike
 from typing import Any
 
@@ -14,7 +14,7 @@ from thermal.case.case import Case
 from thermal.case.load import load_case
 from thermal.case.plan import zone_floor_areas, zone_volumes
 from thermal.case.points import POINT_TYPES, ZONE_TEMPERATURE, split_column
-from thermal.case.quality import QualityReport
+from thermal.case.quality import QualityReport, plain
 from thermal.case.validation import unknown_device_types
 from thermal.units import QUANTITIES, from_si
 
@@ -266,28 +266,13 @@ class CaseCheck:
 
     def to_dict(self) -> dict[str, Any]:
         """Give the check as plain types, for JSON: no NaN, times in ISO 8601."""
-        return {
-            "name": self.name,
-            "location": self.location.model_dump(),
-            "geometry": self.geometry,
-            "floors": list(self.floors),
-            "floor_area": self.floor_area,
-            "volume": self.volume,
-            "zones": [_listed(asdict(zone)) for zone in self.zones],
-            "devices": [_listed(asdict(device)) for device in self.devices],
-            "unknown_device_types": dict(self.unknown_device_types),
-            "measured_boundaries": list(self.measured_boundaries),
-            "telemetry": {
-                "start": self.start.isoformat(),
-                "end": self.end.isoformat(),
-                "step_seconds": self.step,
-                "stamps": self.n_time,
-                "timezone": self.location.timezone,
-                "points": [asdict(point) for point in self.points],
-            },
-            "remarks": list(self.remarks),
-            "quality": self.quality.to_dict(),
+        building = ("name", "location", "geometry", "floors", "floor_area", "volume", "zones", "devices")
+        content = {key: plain(getattr(self, key)) for key in (*building, "unknown_device_types", "measured_boundaries")}
+        content["telemetry"] = {
+            **{"start": plain(self.start), "end": plain(self.end), "step_seconds": self.step, "stamps": self.n_time},
+            **{"timezone": self.location.timezone, "points": plain(self.points)},
         }
+        return content | {"remarks": list(self.remarks), "quality": self.quality.to_dict()}
 
 
 def check_case(path: str | PathLike[str]) -> CaseCheck:
@@ -349,7 +334,3 @@ def describe_case(case: Case) -> CaseCheck:
         remarks=case.remarks,
         quality=case.quality,
     )
-
-
-def _listed(content: dict[str, Any]) -> dict[str, Any]:
-    return {key: list(value) if isinstance(value, tuple) else value for key, value in content.items()}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable
+from dataclasses import fields
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -19,7 +20,7 @@ from thermal.case.migration import migrate
 from thermal.case.plan import read_plan
 from thermal.case.telemetry import check_units, read_telemetry
 from thermal.case.validation import check_building, check_columns
-from thermal.errors import CaseError, describe, nearest
+from thermal.errors import CaseError, ThermalError, describe, nearest
 
 NAME = "building.yaml"
 _ENTRIES: dict[str, type[BaseModel]] = {
@@ -117,25 +118,23 @@ def _check_geometry_choice(parsed: schema.BuildingFile) -> None:
 def _named(error: ValidationError) -> CaseError:
     """Turn the first of pydantic's findings into an error of the family; say how many more there are."""
     details = error.errors(include_url=False)
-    first = details[0]
-    where = f"{NAME}: {_key_path(first['loc'])}"
-    more = f" (and {len(details) - 1} more in this file)" if len(details) > 1 else ""
+    first, more = details[0], f" (and {len(details) - 1} more in this file)" if len(details) > 1 else ""
+    path = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in first["loc"]).removeprefix(".")
+    where, found = f"{NAME}: {path}", repr(first["input"])
     if first["type"] == "extra_forbidden":
-        advice = nearest(first["loc"][-1], _keys_at(first["loc"]))
-        return CaseError(describe(where, "a key of the format", repr(first["loc"][-1]), advice) + more)
+        key = first["loc"][-1]
+        model = schema.BuildingFile if len(first["loc"]) == 1 else _ENTRIES[str(first["loc"][0])]
+        keys = [field.alias or name for name, field in model.model_fields.items()]
+        return CaseError(describe(where, "a key of the format", repr(key), nearest(key, keys)) + more)
     if first["type"] == "missing":
         return CaseError(describe(where, "a value", "no such key") + more)
-    return CaseError(describe(where, _expected(first), _short(first["input"]), _advice(first)) + more)
+    found = found if len(found) <= 80 else found[:77] + "..."
+    return CaseError(describe(where, _expected(first), found, _advice(first)) + more)
 
 
 def _expected(detail: ErrorDetails) -> str:
     kinds = {"tuple_type": "a list", "dict_type": "a mapping", "model_type": "a mapping", "string_type": "text"}
     return kinds.get(detail["type"], detail["msg"].removeprefix("Input should be ").replace("a valid ", "a "))
-
-
-def _short(value: object) -> str:
-    text = repr(value)
-    return text if len(text) <= 80 else text[:77] + "..."
 
 
 def _advice(detail: ErrorDetails) -> str:
@@ -144,22 +143,9 @@ def _advice(detail: ErrorDetails) -> str:
     if detail["type"] == "float_type" and isinstance(detail["input"], str):
         return "write a plain number (YAML takes 1e-3 for text: write 1.0e-3 or 0.001)"
     if detail["type"] == "literal_error":
-        return nearest(
-            detail["input"], str(detail["ctx"]["expected"]).replace("'", "").replace(" or ", ", ").split(", ")
-        )
+        options = str(detail["ctx"]["expected"]).replace("'", "").replace(" or ", ", ").split(", ")
+        return nearest(detail["input"], options)
     return ""
-
-
-def _key_path(location: tuple[int | str, ...]) -> str:
-    path = ""
-    for part in location:
-        path += f"[{part}]" if isinstance(part, int) else f".{part}"
-    return path.removeprefix(".")
-
-
-def _keys_at(location: tuple[int | str, ...]) -> list[str]:
-    model = schema.BuildingFile if len(location) == 1 else _ENTRIES[str(location[0])]
-    return [field.alias or name for name, field in model.model_fields.items()]
 
 
 def load_case(path: str | PathLike[str]) -> Case:
@@ -200,7 +186,7 @@ def _load(folder: Path) -> Case:
     building = _building(parsed, folder)
     plan_files = {floor.name: floor.plan for floor in parsed.floors or ()}
     check_building(building, plan_files)
-    file = _inside(folder, parsed.telemetry, "telemetry")
+    file = _file(folder, parsed.telemetry, "telemetry")
     telemetry = read_telemetry(file, parsed.units, parsed.location)
     check_columns(building, list(telemetry.frame.columns), file.name)
     return Case(building=building, telemetry=telemetry, path=folder)
@@ -210,34 +196,49 @@ def _building(parsed: BuildingFile, folder: Path) -> Building:
     geometry: FloorPlans | ZoneTable
     if parsed.floors is not None and parsed.cell_size is not None:
         floors = tuple(
-            FloorPlan(floor.name, floor.height, read_plan(_inside(folder, floor.plan, f"floors[{i}].plan")))
+            FloorPlan(floor.name, floor.height, read_plan(_file(folder, floor.plan, f"floors[{i}].plan")))
             for i, floor in enumerate(parsed.floors)
         )
         geometry = FloorPlans(parsed.cell_size, floors, parsed.glazing or {})
     else:
         geometry = ZoneTable(parsed.zones or (), parsed.surfaces or (), parsed.constructions or {})
-    return Building(
-        name=parsed.name,
-        location=parsed.location,
-        orientation=parsed.orientation,
-        geometry=geometry,
-        devices=parsed.devices,
-        airflows=parsed.airflows,
-        weather_station=parsed.weather_station,
-        geometry_quality=parsed.geometry_quality,
-    )
+    kept = {field.name: getattr(parsed, field.name) for field in fields(Building) if field.name != "geometry"}
+    return Building(geometry=geometry, **kept)
 
 
-def _inside(folder: Path, name: str, key: str) -> Path:
-    """Resolve a file of the case; refuse one that lies elsewhere."""
-    where = f"building.yaml: {key}"
+def file_inside(folder: Path, name: str, where: str, expected: str, advice: str, kind: type[ThermalError]) -> Path:
+    """Resolve a name to a file inside a folder; refuse one that lies elsewhere.
+
+    Parameters
+    ----------
+    folder
+        The folder.
+    name
+        As a user or a file gives it.
+    where, expected, advice
+        Where it stands, what would be right and what to do, for the message.
+    kind
+        Error to raise.
+
+    Returns
+    -------
+    Path
+        Absolute, so that no link leads elsewhere; the file may not be there.
+    """
     try:
         target = (folder / name).resolve()
-        is_file = target.is_file()
-    except (OSError, ValueError, RuntimeError) as error:  # a NUL, a name too long, links in a circle
-        raise CaseError(where, "the name of a file", repr(name)) from error
+        target.is_file()  # a name that is too long for the disk says so here
+    except (OSError, ValueError, RuntimeError) as error:  # a NUL, links in a circle
+        raise kind(where, "the name of a file", repr(name)) from error
     if not target.is_relative_to(folder.resolve()):
-        raise CaseError(where, "a file inside the case folder", repr(name), "copy the file into the case")
-    if not is_file:
+        raise kind(where, expected, repr(name), advice)
+    return target
+
+
+def _file(folder: Path, name: str, key: str) -> Path:
+    """File that the case has to have."""
+    where, inside, advice = f"{NAME}: {key}", "a file inside the case folder", "copy the file into the case"
+    target = file_inside(folder, name, where, inside, advice, CaseError)
+    if not target.is_file():
         raise CaseError(where, "a file of the case folder", repr(name), "add the file or correct the name")
     return target

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from thermal.case.building import EXTERIOR_WALL, INTERIOR_WALL, OUTSIDE, FloorPlan, FloorPlans
+from thermal.case.building import EXTERIOR_WALL, INTERIOR_WALL, OUTSIDE, PLAN_TOKENS, FloorPlan, FloorPlans
 from thermal.errors import CaseError
 
 
@@ -78,7 +78,7 @@ def check_plan(tokens: NDArray[np.str_], where: str) -> None:
     tokens = np.asarray(tokens, dtype=np.str_)
     if tokens.ndim != 2 or tokens.size == 0:
         raise CaseError(where, "rows and columns of tokens", f"an array of shape {tokens.shape}")
-    is_zone = ~np.isin(tokens, [OUTSIDE, EXTERIOR_WALL, INTERIOR_WALL])
+    is_zone = ~np.isin(tokens, PLAN_TOKENS)
     if not is_zone.any():
         raise CaseError(where, "at least one zone", "none")
     _check_walls(tokens, is_zone, where)
@@ -246,4 +246,4 @@ def _wall_to_outside(tokens: NDArray[np.str_], step: Cell) -> NDArray[np.bool_]:
 def _zones_at(framed: NDArray[np.str_], cell: Cell, steps: tuple[Cell, ...]) -> set[str]:
     """Zones at some steps from a cell of a plan that has a row of outside around it."""
     found = {str(framed[1 + cell[0] + d_row, 1 + cell[1] + d_col]) for d_row, d_col in steps}
-    return found - {OUTSIDE, EXTERIOR_WALL, INTERIOR_WALL}
+    return found.difference(PLAN_TOKENS)

@@ -8,11 +8,12 @@ fit more than a short flaw does.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import Any
 
 import numpy as np
 import pandas as pd
+from pydantic import BaseModel
 
 from thermal._types import FloatArray
 from thermal.case.building import Building
@@ -46,11 +47,6 @@ class Finding:
     steps: int
     detail: str = ""
 
-    def to_dict(self) -> dict[str, Any]:
-        """Give the finding as plain types, for JSON."""
-        start, end = self.start.isoformat(), self.end.isoformat()
-        return {"kind": self.kind, "start": start, "end": end, "steps": self.steps, "detail": self.detail}
-
 
 @dataclass(frozen=True)
 class ColumnQuality:
@@ -72,15 +68,6 @@ class ColumnQuality:
     missing_share: float
     unusable_share: float
     findings: tuple[Finding, ...] = ()
-
-    def to_dict(self) -> dict[str, Any]:
-        """Give the column's quality as plain types, for JSON."""
-        return {
-            "column": self.column,
-            "missing_share": self.missing_share,
-            "unusable_share": self.unusable_share,
-            "findings": [finding.to_dict() for finding in self.findings],
-        }
 
 
 @dataclass(frozen=True)
@@ -152,14 +139,25 @@ class QualityReport:
 
     def to_dict(self) -> dict[str, Any]:
         """Give the report as plain types, for JSON."""
-        return {
-            "start": self.start.isoformat(),
-            "end": self.end.isoformat(),
-            "step_seconds": self.step,
-            "stamps": self.n_time,
-            "missing_rows": [finding.to_dict() for finding in self.missing_rows],
-            "columns": [entry.to_dict() for entry in self.columns],
-        }
+        names = {"step": "step_seconds", "n_time": "stamps"}
+        return {names.get(key, key): value for key, value in plain(self).items()}
+
+
+def plain(value: Any) -> Any:
+    """Give dataclasses, models, times and sequences as plain types, for JSON.
+
+    Parameters
+    ----------
+    value
+        What to take apart; other types stay as they are.
+    """
+    if is_dataclass(value):
+        return {field.name: plain(getattr(value, field.name)) for field in fields(value)}
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    if isinstance(value, BaseModel):
+        return value.model_dump()
+    return value.isoformat() if isinstance(value, pd.Timestamp) else value
 
 
 def assess(telemetry: Telemetry, building: Building) -> QualityReport:
@@ -190,7 +188,8 @@ def assess(telemetry: Telemetry, building: Building) -> QualityReport:
         marks[name] += [(GAP, first, last, "") for first, last in runs(np.isnan(values))]
         _take_out(values, marks[name], IMPOSSIBLE, impossible_values(values, POINT_TYPES[split_column(name, "")[1]]))
     outdoor = [name for name in clean if name.endswith(f"/{OUTDOOR_TEMPERATURE}")]
-    reference = _outdoor_reference(building, clean)
+    station = f"{building.weather_station}/{OUTDOOR_TEMPERATURE}"
+    reference = next((clean[name] for name in (station, *outdoor) if name in clean), None)
     for name in [*outdoor, *(name for name in clean if name.endswith(f"/{ZONE_TEMPERATURE}"))]:
         values, entity = clean[name], name.rpartition("/")[0]
         is_input = name in outdoor or entity in building.measured_boundaries
@@ -229,12 +228,6 @@ def usable(frame: pd.DataFrame, report: QualityReport) -> pd.DataFrame:
             last = frame.index.searchsorted(finding.end, side="right")
             values[first:last, positions[column]] = np.nan
     return pd.DataFrame(values, index=frame.index, columns=frame.columns)
-
-
-def _outdoor_reference(building: Building, clean: dict[str, FloatArray]) -> FloatArray | None:
-    station = clean.get(f"{building.weather_station}/{OUTDOOR_TEMPERATURE}")
-    others = [values for name, values in clean.items() if name.endswith(f"/{OUTDOOR_TEMPERATURE}")]
-    return station if station is not None else (others[0] if others else None)
 
 
 def _take_out(

@@ -113,12 +113,9 @@ def _checked_index(index: pd.Index, where: str) -> pd.DatetimeIndex:
     if (gaps <= 0).any():
         row = int(np.flatnonzero(gaps <= 0)[0]) + 1
         at = f"{where}: data row {row + 1}"
-        if gaps[row - 1] == 0:
-            raise CaseError(at, "a new stamp", f"{index[row]} again", "drop or merge the row")
-        found = f"{index[row]} after {index[row - 1]}"
         if (index == index[row]).sum() > 1:
             raise CaseError(at, "a new stamp", f"{index[row]} again", "drop or merge the row")
-        raise CaseError(at, "stamps that go forwards", found, "sort the rows")
+        raise CaseError(at, "stamps that go forwards", f"{index[row]} after {index[row - 1]}", "sort the rows")
     return index.as_unit("us")
 
 

@@ -10,12 +10,12 @@ from scipy import ndimage
 
 from thermal.case.building import (
     DEVICE_TYPES,
-    EXTERIOR_WALL,
     FACADES,
     GROUND,
     INTERIOR_WALL,
     OUTDOOR,
     OUTSIDE,
+    PLAN_TOKENS,
     Building,
     Device,
     FloorPlans,
@@ -35,7 +35,7 @@ from thermal.case.telemetry import Telemetry
 from thermal.errors import CaseError, check_known, nearest
 
 _ZONE, _DEVICE = ("a zone of the building", CaseError), ("a device of the building", CaseError)
-RESERVED = frozenset({OUTDOOR, GROUND, OUTSIDE, EXTERIOR_WALL, INTERIOR_WALL})
+RESERVED = frozenset({OUTDOOR, GROUND, *PLAN_TOKENS})
 GLAZING_TOLERANCE = 1.01  # drawings are rounded: a facade may be overdrawn by 1 %
 _LAYERED = frozenset({"wall", "floor", "ceiling"})
 _PROPERTIES: dict[str, frozenset[str]] = {  # what a kind needs; what another kind needs it must not have

@@ -65,10 +65,9 @@ class GraphBuilder:
     def copy(self) -> GraphBuilder:
         """Another with the same volumes and faces, to which more can be added."""
         other = copy(self)
-        for name in (
-            "nominal", "_signals", "_numbers", "_readings", "_sources", "_parameters", "_kind", "_zone", "_place",
-        ):  # fmt: skip
-            setattr(other, name, copy(getattr(self, name)))
+        for name, value in vars(self).items():
+            if isinstance(value, dict | list | set):
+                setattr(other, name, copy(value))
         other._faces = {key: (value, list(faces)) for key, (value, faces) in self._faces.items()}
         other._masses = {key: (value, list(masses)) for key, (value, masses) in self._masses.items()}
         other.anatomy = self.anatomy.copy()
@@ -93,9 +92,7 @@ class GraphBuilder:
             own = own.of("zone", zone)
         elif facade is not None and self.scopes.get(name) == "facade":
             own = own.of("facade", facade)
-        if own.name not in self._parameters:
-            self._parameters[own.name] = (own, ca.SX.sym(own.name))
-        return self._parameters[own.name][1]
+        return self.own(own)
 
     def own(self, parameter: Parameter) -> ca.SX:
         """Symbol of a parameter that an effect brings.
@@ -339,12 +336,10 @@ class GraphBuilder:
                     f"scopes: {name} is no parameter of this building with {self.structure}; "
                     f"it has {sorted({p.base for p in made})}"
                 )
-            raise ModelError(f"scopes: {name} belongs to no single {scope} of this building; {_fitting(name)}")
-
-
-def _fitting(name: str) -> str:
-    """Say which other scopes fit a parameter."""
-    return "the scopes global and facade fit it" if name in ENVELOPE_PARAMETERS else "only the global scope fits it"
+            fitting = (
+                "the scopes global and facade fit" if name in ENVELOPE_PARAMETERS else "only the global scope fits"
+            )
+            raise ModelError(f"scopes: {name} belongs to no single {scope} of this building; {fitting} it")
 
 
 def _check_scopes(scopes: Mapping[str, Scope], zones: tuple[str, ...]) -> None:

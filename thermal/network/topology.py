@@ -8,7 +8,6 @@ from dataclasses import dataclass, field, fields, replace
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from thermal._types import FloatArray, IntArray
 from thermal.case.building import FloorPlan, FloorPlans
@@ -260,7 +259,10 @@ def stacked_areas(
     roof: dict[str, float] = {}
     ground: dict[str, float] = {}
     shape = tuple(max(f.tokens.shape[axis] for f in plans.floors) for axis in (0, 1))
-    grids = [_padded(f, shape) for f in plans.floors]
+    grids = [
+        np.pad(f.tokens, [(0, n - m) for n, m in zip(shape, f.tokens.shape, strict=True)], constant_values=".")
+        for f in plans.floors
+    ]
     for level, floor in enumerate(plans.floors):
         for zone in floor.zone_names:
             mine = grids[level] == zone
@@ -279,8 +281,3 @@ def stacked_areas(
             if level == 0:
                 ground[zone] = areas[zone]
     return stacked, roof, ground
-
-
-def _padded(floor: FloorPlan, shape: tuple[int, ...]) -> NDArray[np.str_]:
-    tokens = np.asarray(floor.tokens)
-    return np.pad(tokens, [(0, n - m) for n, m in zip(shape, tokens.shape, strict=True)], constant_values=".")

@@ -1,7 +1,11 @@
-"""Plans, devices and building of a generated office."""
+"""Generated office: plans, devices, building, and a case of the size of the paper's pilot."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
@@ -16,11 +20,17 @@ from thermal.case.building import (
     Device,
     FloorPlan,
     FloorPlans,
+    Location,
 )
-from thermal.errors import ThermalError
+from thermal.case.case import Case
+from thermal.case.load import load_case
+from thermal.case.save import save_case
+from thermal.errors import CaseError, ThermalError
+from thermal.model.simulator import Simulator
 from thermal.pilot.outline import Mask, draw_outline, exterior_ring
 from thermal.pilot.partition import Region, partition
-from thermal.pilot.weather import MOUNTAIN_VIEW
+from thermal.pilot.telemetry import Plant, Progress, TelemetrySettings, generate_telemetry
+from thermal.pilot.weather import MOUNTAIN_VIEW, Period
 
 _OUTLINES = 6  # outlines to draw before a size is refused
 _NOTCHED_FROM = (1500.0, 20)  # m2 and zones a floor, from here on outlines may have notches
@@ -83,9 +93,12 @@ def generate_office(
     >>> [len(floor.zone_names) for floor in plans.floors]
     [6, 6]
     """
-    _check_seed(seed)
+    low, high = window_to_wall_ratio
+    if seed < 0:
+        raise ThermalError(f"seed: expected 0 or more, found {seed}")
     _check_size(floor_area, zones, floors, cell_size, height, min_zone_area)
-    _check_ratio(window_to_wall_ratio)
+    if not 0.0 <= low <= high <= 1.0:
+        raise ThermalError(f"window_to_wall_ratio: expected (smallest, largest) between 0 and 1, found {low, high}")
     counts = [zones // floors + (floor < zones % floors) for floor in range(floors)]
     for attempt in range(_OUTLINES):
         rng = np.random.default_rng([seed, attempt])
@@ -170,14 +183,7 @@ def _exposed_cells(storey: FloorPlan, turns: int) -> dict[str, int]:
     tokens = np.rot90(storey.tokens, turns)
     beside = tokens[1:][tokens[:-1] == EXTERIOR_WALL]
     names, cells = np.unique(beside, return_counts=True)
-    walls = {OUTSIDE, EXTERIOR_WALL, INTERIOR_WALL}
-    return {name: count for name, count in zip(names.tolist(), cells.tolist(), strict=True) if name not in walls}
-
-
-def _check_seed(seed: int) -> None:
-    """Refuse a seed that numpy has no generator for."""
-    if seed < 0:
-        raise ThermalError(f"seed: expected 0 or more, found {seed}")
+    return dict(zip(names.tolist(), cells.tolist(), strict=True))
 
 
 def _check_size(
@@ -196,12 +202,6 @@ def _check_size(
             f"zones: expected at most {most} on {floor_area} m2, so that they have {_MEAN_OVER_SMALLEST} times "
             f"min_zone_area ({min_zone_area} m2) on average, found {zones}"
         )
-
-
-def _check_ratio(ratio: tuple[float, float]) -> None:
-    """Refuse shares of glass that are none."""
-    if not 0.0 <= ratio[0] <= ratio[1] <= 1.0:
-        raise ThermalError(f"window_to_wall_ratio: expected (smallest, largest) between 0 and 1, found {ratio}")
 
 
 def pilot_building(
@@ -233,3 +233,99 @@ def pilot_building(
     """
     plans = generate_office(seed, floor_area=floor_area, zones=zones, floors=floors)
     return Building(name, MOUNTAIN_VIEW, 0.0, plans, devices(plans))
+
+
+#: Makes the plant of a building that goes in steps of so many seconds [s].
+PlantFactory = Callable[[Building, float], Plant]
+
+
+def _own_simulator(building: Building, step_seconds: float) -> Plant:
+    """Make the default plant: the grid model with the mean of the shuffle."""
+    return Simulator(building, step_seconds=step_seconds)
+
+
+@dataclass(frozen=True)
+class PilotSettings(Period):
+    """Size, place and period of a generated office.
+
+    Parameters
+    ----------
+    floor_area : float
+        Of all floors together [m2], positive; by default that of the paper's pilot building.
+    zones : int
+        On all floors together [-], at least one a floor; by default as many as the pilot has terminal units.
+    floors : int
+        Number of storeys [-], at least 1; two in the pilot building.
+    cell_size : float
+        Side of a plan cell [m], positive. Default as in the shared cases.
+    orientation : float
+        Direction of the plan's "up" [deg clockwise from north], -360 to 360.
+    location : Location
+        Where the building stands; by default the paper's pilot building's town.
+    name : str
+        Of the case.
+    start, days, spin_up_days, step_seconds
+        As in `Period` [-, d, d, s].
+    """
+
+    floor_area: float = 6317.0
+    zones: int = 123
+    floors: int = 2
+    cell_size: float = 0.5
+    orientation: float = 0.0
+    location: Location = MOUNTAIN_VIEW
+    name: str = "pilot"
+
+
+def generate_pilot(
+    path: str | PathLike[str],
+    settings: PilotSettings | None = None,
+    *,
+    seed: int = 0,
+    plant_factory: PlantFactory = _own_simulator,
+    overwrite: bool = False,
+    progress: Progress | None = None,
+) -> Case:
+    """Draw an office, run it through some weather, and save plans and telemetry as a case folder.
+
+    Parameters
+    ----------
+    path : str or path-like
+        Folder to make.
+    settings : PilotSettings, optional
+        Size, place and period.
+    seed : int
+        Same seed, same case [-]; 0 or more.
+    plant_factory : callable
+        Called as ``plant_factory(building, step_seconds)``; returns the plant that produces the telemetry.
+        The library's own stepping simulator with its starting parameters by default.
+    overwrite : bool
+        Whether a case that is there already is replaced.
+    progress : callable, optional
+        Called as ``progress(steps_done, steps)`` after every step.
+
+    Returns
+    -------
+    Case
+        As it was saved and loaded again.
+
+    Raises
+    ------
+    CaseError
+        When the folder holds something and `overwrite` is not set.
+    ThermalError
+        When there is no office of this size.
+    ThermalError
+        When a length is out of range or the plant does not fit the building.
+    """
+    at, target = settings or PilotSettings(), Path(path)
+    if target.exists() and not overwrite and (not target.is_dir() or any(target.iterdir())):  # before the long part
+        advice = "choose another folder or pass overwrite=True"
+        raise CaseError(str(target), "no folder or an empty one", "something there", advice)
+    plans = generate_office(seed, floor_area=at.floor_area, zones=at.zones, floors=at.floors, cell_size=at.cell_size)
+    building = Building(at.name, at.location, at.orientation, plans, devices(plans))
+    weather = at.weather(seed, at.location, building.weather_station)
+    sensors = TelemetrySettings(seed, at.spin_up_days, building.weather_station)
+    telemetry = generate_telemetry(plant_factory(building, at.step_seconds), plans, weather, sensors, progress=progress)
+    save_case(Case(building, telemetry), target, overwrite=overwrite)
+    return load_case(target)

@@ -10,14 +10,18 @@ import warnings
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
+from thermal.case.building import Entry
 from thermal.errors import MissingExtraError, OversizedFileError, PlanError
 from thermal.plan.guard import check_pixels, checked_file, checked_number, extra
 
-Point = tuple[float, float]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Point = tuple[Finite, Finite]
 
 #: Range of scales that are believed [m/px]: a detail at 1:20 and 600 dots per inch, walls of one pixel.
 FINEST, COARSEST = 5e-4, 0.5
@@ -277,3 +281,62 @@ def _checked_crop(crop: tuple[int, int, int, int], shape: tuple[int, ...]) -> tu
     if not whole or not (0 <= crop[0] < crop[2] <= shape[1] and 0 <= crop[1] < crop[3] <= shape[0]):
         raise PlanError("crop", f"left, top, right, bottom within {shape[1]} x {shape[0]} px", repr(tuple(crop)))
     return crop
+
+
+class DrawingScale(Entry):
+    """Scale of a raster drawing, in one of four ways.
+
+    Parameters
+    ----------
+    points
+        Two points of the drawing [px]; with `distance`.
+    distance
+        Between them [m].
+    pixels
+        A length on the drawing [px]; with `length`.
+    length
+        The same in the building [m].
+    paper
+        100 for a page of a PDF at 1:100 [-].
+    metres_per_pixel
+        [m/px].
+    """
+
+    points: tuple[Point, Point] | None = None
+    distance: Finite | None = None
+    pixels: Finite | None = None
+    length: Finite | None = None
+    paper: Finite | None = None
+    metres_per_pixel: Finite | None = None
+
+    def of(self, drawing: Drawing) -> float:
+        """Scale of a drawing.
+
+        Parameters
+        ----------
+        drawing
+            The drawing; its resolution counts for `paper`.
+
+        Returns
+        -------
+        float
+            [m/px].
+
+        Raises
+        ------
+        PlanError
+            There is none, or there are several, or it makes no building of the drawing.
+        """
+        given = [key for key, value in self if value is not None]
+        if given == ["points", "distance"] and self.points is not None and self.distance is not None:
+            return scale_from_points(*self.points, self.distance)
+        if given == ["pixels", "length"] and self.pixels is not None and self.length is not None:
+            return scale_from_length(self.pixels, self.length)
+        if given == ["metres_per_pixel"] and self.metres_per_pixel is not None:
+            return scale_from_length(1.0, self.metres_per_pixel)
+        if given == ["paper"] and self.paper is not None:
+            if drawing.dots_per_inch is None:
+                raise PlanError(f"{drawing.source}: scale", "a page of a PDF for 'paper'", "an image")
+            return scale_from_paper(self.paper, drawing.dots_per_inch)
+        expected = "points and distance, or pixels and length, or paper, or metres_per_pixel"
+        raise PlanError(f"{drawing.source}: scale", expected, ", ".join(given) or "none")

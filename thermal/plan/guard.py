@@ -9,7 +9,9 @@ from pathlib import Path
 from typing import Any
 
 import yaml
+from pydantic import ValidationError
 
+from thermal.case.load import file_inside
 from thermal.errors import MissingExtraError, OversizedFileError, PlanError
 
 
@@ -152,24 +154,28 @@ def inside_folder(folder: Path, name: str, where: str) -> Path:
     where : str
         Key of the list, for the message.
 
-    Returns
-    -------
-    Path
-        Resolved, so that no link leads elsewhere.
-
     Raises
     ------
     PlanError
         It lies elsewhere, or is no name of a file.
     """
-    try:
-        target = (folder / name).resolve()
-        inside = target.is_relative_to(folder.resolve())
-    except (OSError, ValueError, RuntimeError) as error:  # a NUL, a name too long, links in a circle
-        raise PlanError(where, "the name of a file", repr(name)) from error
-    if not inside:
-        raise PlanError(where, "a file in the folder of the list", repr(name), "copy the file beside the list")
-    return target
+    expected, advice = "a file in the folder of the list", "copy the file beside the list"
+    return file_inside(folder, name, where, expected, advice, PlanError)
+
+
+def first_fault(error: ValidationError, where: str) -> tuple[str, str, str]:
+    """Place, expectation and finding of the first fault of a file or a request, as errors take them.
+
+    Parameters
+    ----------
+    error : ValidationError
+        What the model of it says.
+    where : str
+        File or request.
+    """
+    first = error.errors(include_url=False)[0]
+    place = ".".join(str(part) for part in first["loc"]) or "content"
+    return f"{where}: {place}", first["msg"], repr(first["input"])[:80]
 
 
 def checked_number(value: object, name: str, lowest: float, highest: float, unit: str) -> float:

@@ -6,7 +6,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import ndimage
 
 from thermal._types import BoolArray, FloatArray
@@ -199,14 +198,9 @@ def _cover(drawing: Drawing, block: int) -> FloatArray:
         grey, threshold, light, black = 255 - grey, 254.0 - threshold, 255.0 - black, 255.0 - light
     # Grey is a pixel on the edge of a wall, or a line thinner than a pixel: half ink at the threshold.
     shares = np.interp(np.arange(256), [black, threshold + 0.5, light], [1.0, 0.5, 0.0]).astype(np.float32)
-    return _blocks(shares[grey], block)
-
-
-def _blocks(picture: NDArray[np.float32], block: int) -> FloatArray:
-    rows, columns = (-(-n // block) * block for n in picture.shape)
-    padded = np.zeros((rows, columns), dtype=np.float32)
-    padded[: picture.shape[0], : picture.shape[1]] = picture
-    return np.asarray(padded.reshape(rows // block, block, columns // block, block).mean(axis=(1, 3)), dtype=float)
+    padded = np.pad(shares[grey], [(0, -n % block) for n in grey.shape])
+    rows, columns = (n // block for n in padded.shape)
+    return np.asarray(padded.reshape(rows, block, columns, block).mean(axis=(1, 3)), dtype=float)
 
 
 def _with_hairlines(cover: FloatArray) -> BoolArray:

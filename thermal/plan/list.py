@@ -7,98 +7,22 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import yaml
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field, ValidationError
 
-from thermal.case.building import Location
+from thermal.case.building import Entry, Location
 from thermal.errors import PlanError
 from thermal.plan.assemble import PlanImport, Progress, assemble_plans
 from thermal.plan.cells import ZonedFloor, propose_zones
-from thermal.plan.drawing import (
-    DOTS_PER_INCH,
-    RASTER_KINDS,
-    Drawing,
-    read_drawing,
-    scale_from_length,
-    scale_from_paper,
-    scale_from_points,
-)
-from thermal.plan.guard import checked_file, inside_folder
+from thermal.plan.drawing import DOTS_PER_INCH, RASTER_KINDS, DrawingScale, Finite, Point, read_drawing
+from thermal.plan.guard import checked_file, first_fault, inside_folder
 from thermal.plan.rooms import find_rooms
 from thermal.plan.survey import CODE_KINDS, FloorSurvey, PlanSettings, read_codes
 from thermal.plan.vector import VECTOR_KINDS, read_dxf
 
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-Point = tuple[Finite, Finite]
-
 _MOST_YAML = 1_000_000  # bytes: a list of a hundred floors with the names of all rooms has a tenth of that
 
 
-class _Entry(BaseModel):
-    """Base of the models: what is not named is refused, and nothing changes afterwards."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-
-class DrawingScale(_Entry):
-    """Scale of a raster drawing, in one of four ways.
-
-    Parameters
-    ----------
-    points
-        Two points of the drawing [px]; with `distance`.
-    distance
-        Between them [m].
-    pixels
-        A length on the drawing [px]; with `length`.
-    length
-        The same in the building [m].
-    paper
-        100 for a page of a PDF at 1:100 [-].
-    metres_per_pixel
-        [m/px].
-    """
-
-    points: tuple[Point, Point] | None = None
-    distance: Finite | None = None
-    pixels: Finite | None = None
-    length: Finite | None = None
-    paper: Finite | None = None
-    metres_per_pixel: Finite | None = None
-
-    def of(self, drawing: Drawing) -> float:
-        """Scale of a drawing.
-
-        Parameters
-        ----------
-        drawing
-            The drawing; its resolution counts for `paper`.
-
-        Returns
-        -------
-        float
-            [m/px].
-
-        Raises
-        ------
-        PlanError
-            There is none, or there are several, or it makes no building of the drawing.
-        """
-        given = [key for key, value in self if value is not None]
-        if given == ["points", "distance"] and self.points is not None and self.distance is not None:
-            return scale_from_points(*self.points, self.distance)
-        if given == ["pixels", "length"] and self.pixels is not None and self.length is not None:
-            return scale_from_length(self.pixels, self.length)
-        if given == ["metres_per_pixel"] and self.metres_per_pixel is not None:
-            return scale_from_length(1.0, self.metres_per_pixel)
-        if given == ["paper"] and self.paper is not None:
-            if drawing.dots_per_inch is None:
-                raise PlanError(f"{drawing.source}: scale", "a page of a PDF for 'paper'", "an image")
-            return scale_from_paper(self.paper, drawing.dots_per_inch)
-        expected = "points and distance, or pixels and length, or paper, or metres_per_pixel"
-        raise PlanError(f"{drawing.source}: scale", expected, ", ".join(given) or "none")
-
-
-class FloorEntry(_Entry):
+class FloorEntry(Entry):
     """A floor in a list of drawings.
 
     Parameters
@@ -156,7 +80,7 @@ class FloorEntry(_Entry):
     smallest_zone: Finite = PlanSettings.smallest_zone
 
 
-class DrawingList(_Entry):
+class DrawingList(Entry):
     """A list of drawings.
 
     Parameters
@@ -216,10 +140,7 @@ def read_drawing_list(path: str | PathLike[str]) -> DrawingList:
     try:
         return DrawingList.model_validate(content)
     except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        where = f"{file.name}: {'.'.join(str(part) for part in first['loc']) or 'content'}"
-        found = repr(first["input"])
-        raise PlanError(where, first["msg"], found[:80]) from error
+        raise PlanError(*first_fault(error, file.name)) from error
 
 
 def import_drawings(path: str | PathLike[str], *, progress: Progress | None = None) -> PlanImport:

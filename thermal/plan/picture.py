@@ -11,7 +11,6 @@ from importlib.resources import files
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import ndimage
 
 from thermal.case.building import Device
@@ -19,7 +18,7 @@ from thermal.plan.assemble import AREA_TOLERANCE, PlanImport
 from thermal.plan.cells import ZonedFloor, split_walls
 from thermal.plan.devices import DeviceImport
 from thermal.plan.guard import extra
-from thermal.plan.survey import OUTSIDE_LABEL, WALL_LABEL
+from thermal.plan.survey import OUTSIDE_LABEL, WALL_LABEL, innermost
 
 _WIDEST = 1600  # px of the picture's ground; text and marks are drawn as vectors
 _EXTERIOR, _INTERIOR, _INK, _PAPER = (38, 43, 51), (110, 118, 130), (176, 184, 194), (255, 255, 255)
@@ -61,7 +60,8 @@ def draw_floor(floor: ZonedFloor, devices: Sequence[Device] = ()) -> str:
     for device in devices:
         by_zone.setdefault(device.zone or "", []).append(device.name)
     for number, (name, area) in enumerate(floor.areas.items(), start=1):
-        x, y, half = _innermost(floor.zones, number)
+        where = ndimage.find_objects((floor.zones == number).astype(np.int8))[0]
+        x, y, half = innermost(floor.zones[where] == number, where)
         lines = [name, f"{area:.1f} m²", *by_zone.get(name, ())[:2]]
         size = min(0.5 / pixel, 3.0 * half / max(len(line) for line in lines), 1.8 * half / len(lines))
         for k, line in enumerate(lines):
@@ -142,14 +142,6 @@ def _ground(floor: ZonedFloor, rows: slice, columns: slice) -> str:
 def _pastel(number: int) -> tuple[int, int, int]:
     red, green, blue = colorsys.hls_to_rgb((0.55 + _GOLDEN * number) % 1.0, 0.87, 0.55)
     return round(255 * red), round(255 * green), round(255 * blue)
-
-
-def _innermost(zones: NDArray[np.int32], number: int) -> tuple[float, float, float]:
-    """Column and row of a zone's innermost point, and how far it is from the zone's edge [px]."""
-    rows, columns = ndimage.find_objects((zones == number).astype(np.int8))[0]
-    depth = ndimage.distance_transform_edt(np.pad(zones[rows, columns] == number, 1))
-    row, column = np.unravel_index(int(depth.argmax()), depth.shape)
-    return float(columns.start + column - 1), float(rows.start + row - 1), float(depth.max())
 
 
 def _scale_bar(width: int, height: int, pixel: float) -> str:

@@ -20,7 +20,7 @@ from thermal.errors import PlanError
 from thermal.plan.drawing import Drawing, checked_scale
 from thermal.plan.guard import extra
 from thermal.plan.ink import Ink, ink_of, walls_of
-from thermal.plan.survey import OUTSIDE_LABEL, WALL_LABEL, Door, FloorSurvey, PlanSettings, finish
+from thermal.plan.survey import OUTSIDE_LABEL, WALL_LABEL, Door, FloorSurvey, PlanSettings, rooms_of
 
 _PEAK_REACH = 0.15  # m: lower peaks of the distance within this are part of a higher one's basin
 _WIDENS = 1.12  # -, of a door's width, reached close behind it: a corridor is at least that much wider than its doors
@@ -84,7 +84,9 @@ def find_basins(walls: BoolArray, pixel: float, settings: PlanSettings) -> Basin
             continue
         row, column = divmod(int(place[k]), cut.shape[1])
         reach = settings.thickest_wall / 2.0 + float(half[k]) + 2.0 * pixel
-        widens = _widens(cut, distance, roots, (a, b), (row, column), float(half[k]), round(reach / pixel))
+        near = tuple(slice(max(0, x - round(reach / pixel)), x + round(reach / pixel) + 1) for x in (row, column))
+        around, depth = roots[cut[near]], distance[near]
+        widens = all(float(depth[around == side].max(initial=0.0)) >= _WIDENS * float(half[k]) for side in (a, b))
         along = _jamb(walls, nearest, (row, column), settings.thickest_wall / pixel + 2.0) if widens else None
         if along is not None:
             closed |= _between_jambs(walls, (row, column), along, 2.0 * float(half[k]) / pixel, reach / pixel)
@@ -122,21 +124,6 @@ def _join_wide(count: int, first: Int32Array, second: Int32Array, wide: BoolArra
     parts = connected_components(graph, directed=False)[1]
     parts = np.where(parts == parts[0], 0, parts + 1)  # 0 is wall, and joined to nothing
     return np.asarray(parts, dtype=np.int32)
-
-
-def _widens(
-    cut: Int32Array,
-    distance: Float32Array,
-    roots: Int32Array,
-    sides: tuple[int, int],
-    place: tuple[int, int],
-    half: float,
-    reach: int,
-) -> bool:
-    """Whether the space widens on both sides of a saddle, within `reach` pixels."""
-    rows, columns = (slice(max(0, x - reach), x + reach + 1) for x in place)
-    around, depth = roots[cut[rows, columns]], distance[rows, columns]
-    return all(float(depth[around == side].max(initial=0.0)) >= _WIDENS * half for side in sides)
 
 
 def _jamb(walls: BoolArray, nearest: Int32Array, place: tuple[int, int], thickest: float) -> FloatArray | None:
@@ -265,8 +252,8 @@ def survey_ink(ink: Ink, source: str, settings: PlanSettings) -> FloorSurvey:
                     "arcs of doors and furniture too"
                 )
             remarks += _doubts(labels, ink, settings)
-            survey = finish(labels, ink.pixel, source, doors, ink.turned, shift, tuple(remarks))
-            return replace(survey, ink=np.pad(ink.mask, margin))
+            rooms, drawn = rooms_of(labels, ink.pixel), np.pad(ink.mask, margin)
+            return FloorSurvey(source, labels, ink.pixel, rooms, doors, ink.turned, shift, tuple(remarks), drawn)
     advice = "set widest_door to the widest gap in the walls, or crop to one floor's plan"
     raise PlanError(source, "walls that enclose rooms, but for doors", "none", advice)
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import ndimage
 
-from thermal._types import FloatArray, Int32Array
+from thermal._types import BoolArray, FloatArray, Int32Array
 from thermal.errors import OversizedFileError, PlanError
 from thermal.plan.guard import MOST_BYTES, check_pixels, checked_file, checked_number
 
@@ -140,7 +140,7 @@ class FloorSurvey:
     turned: float = 0.0
     placement: FloatArray | None = None
     remarks: tuple[str, ...] = ()
-    ink: NDArray[np.bool_] | None = None
+    ink: BoolArray | None = None
 
     def place(self, point: tuple[float, float]) -> tuple[float, float]:
         """Where a point of the drawing lies.
@@ -177,49 +177,47 @@ class FloorSurvey:
         return int(self.labels[row, column]) if 0 <= row < n_row and 0 <= column < n_col else OUTSIDE_LABEL
 
 
-def finish(
-    labels: Int32Array,
-    pixel: float,
-    source: str,
-    doors: tuple[Door, ...],
-    turned: float,
-    placement: FloatArray,
-    remarks: tuple[str, ...],
-) -> FloorSurvey:
+def innermost(inside: BoolArray, where: tuple[slice, ...]) -> tuple[float, float, float]:
+    """Column and row of the point of a shape that is the farthest from its edge, and how far that is.
+
+    Parameters
+    ----------
+    inside : ndarray of bool, shape (n_row, n_col)
+        Elements of the shape, in the box that holds it.
+    where : tuple of slice
+        Place of the box.
+
+    Returns
+    -------
+    tuple of float
+        Column, row and depth [px].
+    """
+    depth = ndimage.distance_transform_edt(np.pad(inside, 1))
+    row, column = np.unravel_index(int(depth.argmax()), depth.shape)
+    return float(column - 1 + where[1].start), float(row - 1 + where[0].start), float(depth.max())
+
+
+def rooms_of(labels: Int32Array, pixel: float) -> tuple[Room, ...]:
     """Measure the rooms of a floor whose elements are labelled.
 
     Parameters
     ----------
     labels : ndarray of int, shape (n_row, n_col)
-        -1 outside, 0 wall, else rooms from 1 on.
+        -1 outside, 0 wall, else rooms from 1 on [-].
     pixel : float
         Side of an element [m].
-    source : str
-        The drawing.
-    doors : tuple of Door
-        Closed gaps.
-    turned : float
-        Angle taken out [deg].
-    placement : ndarray, shape (3, 3)
-        Takes (column, row, 1) of the drawing to those of `labels` [px].
-    remarks : tuple of str
-        So far.
 
     Returns
     -------
-    FloorSurvey
+    tuple of Room
         With areas and innermost points.
     """
     count = int(labels.max())
     areas = np.bincount(labels[labels > 0].ravel(), minlength=count + 1) * pixel**2
-    rooms = []
-    for label, where in enumerate(ndimage.find_objects(np.maximum(labels, 0), count), start=1):
-        inside = np.pad(labels[where] == label, 1)
-        depth = ndimage.distance_transform_edt(inside)
-        row, column = np.unravel_index(int(depth.argmax()), depth.shape)
-        centre = (float(column - 1 + where[1].start), float(row - 1 + where[0].start))
-        rooms.append(Room(label, float(areas[label]), centre))
-    return FloorSurvey(source, labels, pixel, tuple(rooms), doors, turned, placement, remarks)
+    boxes = enumerate(ndimage.find_objects(np.maximum(labels, 0), count), start=1)
+    return tuple(
+        Room(label, float(areas[label]), innermost(labels[where] == label, where)[:2]) for label, where in boxes
+    )
 
 
 CODE_KINDS = (".csv", ".npy", ".npz")
@@ -308,7 +306,8 @@ def survey_codes(codes: ArrayLike, cell_size: float, source: str = "codes") -> F
     fine = np.repeat(np.repeat(labels, _REFINE, axis=0), _REFINE, axis=1)
     middle = 1.5 * _REFINE - 0.5
     placement = np.array([[_REFINE, 0, middle], [0, _REFINE, middle], [0, 0, 1]], dtype=float)
-    return finish(fine, cell_size / _REFINE, source, (), 0.0, placement, ())
+    pixel = cell_size / _REFINE
+    return FloorSurvey(source, fine, pixel, rooms_of(fine, pixel), placement=placement)
 
 
 def _check_closed(labels: NDArray[np.int32], source: str) -> None:

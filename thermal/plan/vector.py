@@ -19,7 +19,7 @@ from thermal.errors import OversizedFileError, PlanError
 from thermal.plan.guard import check_pixels, checked_file, checked_number, extra
 from thermal.plan.ink import FINE, Ink
 from thermal.plan.rooms import survey_ink
-from thermal.plan.survey import FloorSurvey, PlanSettings, finish
+from thermal.plan.survey import FloorSurvey, PlanSettings, rooms_of
 
 VECTOR_KINDS = (".dxf",)
 
@@ -254,7 +254,8 @@ def _from_outlines(
         labels[_drawn(outline, placement, shape)] = number
     numbers = np.unique(labels[labels > 0])
     labels[labels > 0] = 1 + np.searchsorted(numbers, labels[labels > 0])
-    return finish(labels, pixel, where, (), angle, placement, ("rooms are closed polylines of the drawing",))
+    remarks = ("rooms are closed polylines of the drawing",)
+    return FloorSurvey(where, labels, pixel, rooms_of(labels, pixel), (), angle, placement, remarks)
 
 
 def _polygon(points: FloatArray) -> Any:

@@ -8,7 +8,7 @@ import casadi
 import numpy as np
 
 from thermal.errors import ModelError
-from thermal.shuffle.partners import disc_offsets
+from thermal.shuffle.random import disc_offsets
 
 #: A float, an array, or a CasADi expression.
 Scalar = TypeVar("Scalar", bound=Any)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from threading import RLock
 from typing import Any
@@ -110,7 +111,7 @@ class LabelDesk:
         self.sessions.end()
 
     def _verdict(self, draft: Draft) -> dict[str, Any]:
-        findings = [finding.to_dict() for finding in self.store.findings]
+        findings = [asdict(finding) for finding in self.store.findings]
         # A case that the page has made has one column without a value, to be replaced.
         telemetry = self.store.telemetry if len(self.store.columns) > 1 else ""
         return {"findings": findings, "zones": zone_facts(draft), "telemetry": telemetry}

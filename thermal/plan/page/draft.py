@@ -7,15 +7,14 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field, ValidationError
 
 from thermal.case.building import (
-    EXTERIOR_WALL,
-    INTERIOR_WALL,
-    OUTSIDE,
+    PLAN_TOKENS,
     Airflow,
     Building,
     Device,
+    Entry,
     FloorPlan,
     FloorPlans,
     GeometryQuality,
@@ -23,24 +22,19 @@ from thermal.case.building import (
     ZoneTable,
 )
 from thermal.errors import LabelError
+from thermal.plan.drawing import Finite
+from thermal.plan.guard import first_fault
 from thermal.plan.list import FloorEntry
 
-Finite = Annotated[float, Field(allow_inf_nan=False)]
 Name = Annotated[str, Field(max_length=200)]
 
 #: The first tokens of every legend: outside, exterior wall, interior wall.
-BASIC = (OUTSIDE, EXTERIOR_WALL, INTERIOR_WALL)
+BASIC = PLAN_TOKENS
 
 _MOST_FLOORS, _MOST_DEVICES = 200, 20_000
 
 
-class _Entry(BaseModel):
-    """Base of the models: what is not named is refused, and nothing changes afterwards."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-
-class Picture(_Entry):
+class Picture(Entry):
     """A drawing under a floor's plan.
 
     Parameters
@@ -60,7 +54,7 @@ class Picture(_Entry):
     matrix: tuple[Finite, Finite, Finite, Finite, Finite, Finite]
 
 
-class DraftFloor(_Entry):
+class DraftFloor(Entry):
     """A floor on the page.
 
     Parameters
@@ -97,7 +91,7 @@ class DraftFloor(_Entry):
         return np.asarray(self.legend, dtype=np.str_)[cells.reshape(self.rows, self.columns)]
 
 
-class DraftDevice(_Entry):
+class DraftDevice(Entry):
     """A device on the page.
 
     Parameters
@@ -124,7 +118,7 @@ class DraftDevice(_Entry):
     y: Finite | None = None
 
 
-class Site(_Entry):
+class Site(Entry):
     """Where the building stands, as far as that is known.
 
     Parameters
@@ -143,7 +137,7 @@ class Site(_Entry):
     timezone: Name = ""
 
 
-class Draft(_Entry):
+class Draft(Entry):
     """A building on the page.
 
     Parameters
@@ -191,6 +185,8 @@ class Draft(_Entry):
     seconds: Annotated[float, Field(ge=0, allow_inf_nan=False)] = 0.0
 
 
+#: What a draft and a building hold alike.
+_SHARED = ("name", "orientation", "airflows", "weather_station", "geometry_quality")
 _MOST_CELLS = 4_000_000  # of one floor, as in the import of drawings
 
 
@@ -228,10 +224,8 @@ def encode_floor(
     counts = np.diff(np.concatenate([starts, [number.size]]))
     runs = np.column_stack([number[starts], counts]).ravel().tolist()
     rows, columns = tokens.shape
-    return DraftFloor(
-        name=name, height=height, rows=rows, columns=columns, legend=legend, runs=tuple(runs), drawing=drawing,
-        picture=picture,
-    )  # fmt: skip
+    cells_of = {"rows": rows, "columns": columns, "legend": legend, "runs": tuple(runs)}
+    return DraftFloor(name=name, height=height, drawing=drawing, picture=picture, **cells_of)
 
 
 def parse_draft(content: Any, where: str) -> Draft:
@@ -257,9 +251,7 @@ def parse_draft(content: Any, where: str) -> Draft:
     try:
         draft = Draft.model_validate(content)
     except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        place = f"{where}: {'.'.join(str(part) for part in first['loc']) or 'content'}"
-        raise LabelError(place, first["msg"], repr(first["input"])[:80]) from error
+        raise LabelError(*first_fault(error, where)) from error
     for floor in draft.floors:
         _check_runs(floor, f"{where}: floor {floor.name!r}")
     return draft
@@ -300,16 +292,12 @@ def draft_of(building: Building) -> Draft:
         raise LabelError(building.name, "a case with floor plans", "a zone table", advice)
     plans = building.geometry
     return Draft(
-        name=building.name,
         site=Site(**building.location.model_dump()),
-        orientation=building.orientation,
         cell_size=plans.cell_size,
         floors=tuple(encode_floor(floor.name, floor.height, floor.tokens) for floor in plans.floors),
         devices=tuple(DraftDevice(**d.model_dump()) for d in building.devices),
         glazing={zone: dict(by_facade) for zone, by_facade in plans.glazing.items()},
-        airflows=building.airflows,
-        weather_station=building.weather_station,
-        geometry_quality=building.geometry_quality,
+        **{key: getattr(building, key) for key in _SHARED},
     )
 
 
@@ -332,16 +320,11 @@ def building_of_draft(draft: Draft) -> Building:
         A part of the site, or a device's name or type, is missing.
     """
     floors = tuple(FloorPlan(floor.name, floor.height, floor.tokens) for floor in draft.floors)
-    devices = tuple(Device(name=d.name, type=d.type, zone=d.zone, fed_by=d.fed_by) for d in draft.devices)
     return Building(
-        name=draft.name,
         location=Location.model_validate(draft.site.model_dump()),
-        orientation=draft.orientation,
         geometry=FloorPlans(draft.cell_size, floors, _glazing(draft.glazing)),
-        devices=devices,
-        airflows=draft.airflows,
-        weather_station=draft.weather_station,
-        geometry_quality=draft.geometry_quality,
+        devices=tuple(Device(name=d.name, type=d.type, zone=d.zone, fed_by=d.fed_by) for d in draft.devices),
+        **{key: getattr(draft, key) for key in _SHARED},
     )
 
 

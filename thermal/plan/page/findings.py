@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
+from functools import partial
 from typing import Any
 from zoneinfo import ZoneInfo
 
@@ -46,9 +47,8 @@ class DraftFinding:
     message: str
     floor: str = ""
 
-    def to_dict(self) -> dict[str, Any]:
-        """Give it as plain types, for JSON."""
-        return asdict(self)
+
+_error, _remark = partial(DraftFinding, "error"), partial(DraftFinding, "remark")
 
 
 def find_faults(draft: Draft, columns: Sequence[str] = (), telemetry: str = "telemetry") -> tuple[DraftFinding, ...]:
@@ -75,7 +75,7 @@ def find_faults(draft: Draft, columns: Sequence[str] = (), telemetry: str = "tel
             check_building(building)
             check_columns(building, columns, telemetry)
         except CaseError as error:
-            found.append(DraftFinding("error", "case", draft.name, str(error)))
+            found.append(_error("case", draft.name, str(error)))
     return tuple(sorted(found, key=lambda finding: finding.level != "error"))
 
 
@@ -111,52 +111,51 @@ def _on_site(draft: Draft) -> Iterator[DraftFinding]:
             expected = f"expected {detail['msg'].removeprefix('Input should be ')}, found {detail['input']!r}"
             if detail["input"] in (None, ""):
                 expected = "fill it in"
-            yield DraftFinding("error", "site", key, f"{key}: {expected}")
+            yield _error("site", key, f"{key}: {expected}")
     if draft.site.timezone:
         try:
             ZoneInfo(draft.site.timezone)
         except (KeyError, ValueError, OSError):
             text = f"timezone: expected an IANA name such as Europe/Berlin, found {draft.site.timezone!r}"
-            yield DraftFinding("error", "site", "timezone", text)
+            yield _error("site", "timezone", text)
     if not draft.name.strip():
-        yield DraftFinding("error", "site", "name", "name: give the case a name")
+        yield _error("site", "name", "name: give the case a name")
     if not -360.0 <= draft.orientation <= 360.0:
-        text = f"orientation: expected -360 to 360 degrees, found {draft.orientation:g}"
-        yield DraftFinding("error", "site", "orientation", text)
+        yield _error("site", "orientation", f"orientation: expected -360 to 360 degrees, found {draft.orientation:g}")
 
 
 def _on_floors(draft: Draft) -> Iterator[DraftFinding]:
     if not draft.floors:
-        yield DraftFinding("error", "floor", "", "there is no floor: import a drawing, or draw one")
+        yield _error("floor", "", "there is no floor: import a drawing, or draw one")
     names = [floor.name for floor in draft.floors]
     for floor in draft.floors:
         if not floor.name.strip():
-            yield DraftFinding("error", "floor", floor.name, "give the floor a name")
+            yield _error("floor", floor.name, "give the floor a name")
         if names.count(floor.name) > 1:
-            yield DraftFinding("error", "floor", floor.name, f"two floors are named {floor.name!r}: rename one")
+            yield _error("floor", floor.name, f"two floors are named {floor.name!r}: rename one")
         if not floor.height > 0.0:
             text = f"clear height: expected a positive number of metres, found {floor.height:g}"
-            yield DraftFinding("error", "floor", floor.name, text)
+            yield _error("floor", floor.name, text)
         if not any(number >= len(BASIC) for number in floor.runs[::2]):
-            yield DraftFinding("error", "floor", floor.name, "the floor has no zone: draw walls around one")
+            yield _error("floor", floor.name, "the floor has no zone: draw walls around one")
 
 
 def _on_zones(draft: Draft) -> Iterator[DraftFinding]:
     places = zones_of(draft.floors)
     for floor in draft.floors:
         for zone, message in _faulty_zones(floor):
-            yield DraftFinding("error", "zone", zone, message, floor.name)
+            yield _error("zone", zone, message, floor.name)
     served = {device.zone for device in draft.devices}
     for zone, floors in places.items():
         if len(floors) > 1:
             text = f"zone names are unique in the building, {zone!r} is on {' and '.join(floors)}: rename one"
-            yield DraftFinding("error", "zone", zone, text, floors[-1])
+            yield _error("zone", zone, text, floors[-1])
         if zone in RESERVED or not zone.strip() or zone != zone.strip():
-            yield DraftFinding("error", "zone", zone, f"{zone!r} is a name that plans use for themselves", floors[0])
+            yield _error("zone", zone, f"{zone!r} is a name that plans use for themselves", floors[0])
         if zone == draft.weather_station:
-            yield DraftFinding("error", "zone", zone, "the weather station has this name: rename the zone", floors[0])
+            yield _error("zone", zone, "the weather station has this name: rename the zone", floors[0])
         if zone not in served:
-            yield DraftFinding("remark", "zone", zone, "no device serves this zone", floors[0])
+            yield _remark("zone", zone, "no device serves this zone", floors[0])
     yield from _on_glazing(draft, places)
 
 
@@ -164,14 +163,13 @@ def _on_glazing(draft: Draft, places: dict[str, list[str]]) -> Iterator[DraftFin
     facts = zone_facts(draft) if draft.glazing else {}
     for zone, by_facade in draft.glazing.items():
         if zone not in places:
-            yield DraftFinding("error", "case", zone, f"glazing of zone {zone!r}, which is on no floor: remove it")
+            yield _error("case", zone, f"glazing of zone {zone!r}, which is on no floor: remove it")
             continue
         for facade, area in by_facade.items():
             most = facts.get(zone, {"facades": {}})["facades"].get(facade)
             if most is None or area < 0.0 or not area <= most * GLAZING_TOLERANCE:
                 expected = "no such facade" if most is None else f"at most the zone's {most:.2f} m2"
-                text = f"glazing {facade}: expected {expected}, found {area:g} m2"
-                yield DraftFinding("error", "zone", zone, text, places[zone][0])
+                yield _error("zone", zone, f"glazing {facade}: expected {expected}, found {area:g} m2", places[zone][0])
 
 
 def _faulty_zones(floor: DraftFloor) -> Iterator[tuple[str, str]]:
@@ -202,18 +200,15 @@ def _on_devices(draft: Draft) -> Iterator[DraftFinding]:
     twice = {name for name in names if names.count(name) > 1} if len(set(names)) < len(names) else set()
     for device in draft.devices:
         if not device.name or not device.type:
-            yield DraftFinding("error", "device", device.name, "give the device a name and a type")
+            yield _error("device", device.name, "give the device a name and a type")
         if device.name in twice:
-            text = f"device names are unique, two are named {device.name!r}: rename one"
-            yield DraftFinding("error", "device", device.name, text)
+            yield _error("device", device.name, f"device names are unique, two are named {device.name!r}: rename one")
         if device.name == draft.weather_station:
-            yield DraftFinding("error", "device", device.name, "the weather station has this name: rename the device")
+            yield _error("device", device.name, "the weather station has this name: rename the device")
         if device.zone is not None and device.zone not in zones:
-            text = f"zone {device.zone!r} is on no floor; {nearest(device.zone, zones)}"
-            yield DraftFinding("error", "device", device.name, text)
+            yield _error("device", device.name, f"zone {device.zone!r} is on no floor; {nearest(device.zone, zones)}")
         if device.zone is None and device.type in TERMINAL_TYPES:
-            text = f"a {device.type} that serves no zone: its heat is not counted"
-            yield DraftFinding("remark", "device", device.name, text)
+            yield _remark("device", device.name, f"a {device.type} that serves no zone: its heat is not counted")
         if device.type and device.type not in DEVICE_TYPES:
             text = f"a type that the library does not know: {device.type!r}; {nearest(device.type, DEVICE_TYPES)}"
-            yield DraftFinding("remark", "device", device.name, text)
+            yield _remark("device", device.name, text)

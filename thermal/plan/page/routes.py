@@ -23,7 +23,7 @@ from thermal.errors import (
     describe,
 )
 from thermal.plan.drawing import DOTS_PER_INCH, RASTER_KINDS, read_drawing
-from thermal.plan.guard import inside_folder
+from thermal.plan.guard import first_fault, inside_folder
 from thermal.plan.list import FloorEntry
 from thermal.plan.models import read_devices
 from thermal.plan.page.desk import LabelDesk
@@ -237,9 +237,7 @@ def _floor_request(content: Any) -> tuple[list[FloorEntry], float | None]:
         entries = TypeAdapter(list[FloorEntry]).validate_python(content["floors"])
         size = TypeAdapter(float | None).validate_python(content.get("cell_size"))
     except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        where = f"floors: {'.'.join(str(part) for part in first['loc'])}"
-        raise LabelError(where, first["msg"], repr(first["input"])[:80]) from error
+        raise LabelError(*first_fault(error, "floors")) from error
     except (TypeError, KeyError, AttributeError) as error:
         raise LabelError("body", "{'floors': [...]}", repr(content)[:80]) from error
     if not entries:

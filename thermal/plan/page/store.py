@@ -164,17 +164,15 @@ class CaseStore:
                 if files.keys() >= {f["name"] for f in content["floors"]}:
                     floor["plan"] = files[floor["name"]]
                 _replace_if_other(inside_folder(self.folder, floor["plan"], "plan"), drawn)
-        if before and _filled(migrate(before, NAME)) == _filled(content) and not self._is_ours():
+        text = (self.folder / NAME).read_text(encoding="utf-8-sig") if before else ""
+        same = bool(before) and _filled(migrate(before, NAME)) == _filled(content)
+        if same and not text.startswith(_NOTE.partition("{")[0]):
             return  # nothing new to say: the file stays with the comments of its author
         text = yaml.safe_dump(content, sort_keys=False, allow_unicode=True, width=120)
         note = _NOTE.format(minutes=draft.seconds / 60.0)
         _replace_if_other(self.folder / NAME, (note + text).encode("utf-8"))
         for plan in {*files.values()} - {floor["plan"] for floor in content["floors"]}:
             inside_folder(self.folder, plan, "plan").unlink(missing_ok=True)
-
-    def _is_ours(self) -> bool:
-        """Whether the page wrote `building.yaml`."""
-        return (self.folder / NAME).read_text(encoding="utf-8-sig").startswith(_NOTE.partition("{")[0])
 
 
 def _filled(content: dict[str, Any]) -> dict[str, Any]:
