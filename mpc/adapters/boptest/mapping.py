@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from mpc.adapters.boptest.scenario import PRICE_POINTS
-from mpc.adapters.boptest.signals import ELECTRICITY_OUTPUT, GAS_OUTPUT, WEATHER_NAMES, Metadata
+from mpc.adapters.boptest.signals import ELECTRICITY_OUTPUT, GAS_OUTPUT, SITE_NAMES, WEATHER_NAMES, ZONE_NAMES, Metadata
 from mpc.adapters.foreign import ForeignSignals
 from mpc.errors import BoptestError
 from mpc.scenario.forecast import Forecast
@@ -20,17 +20,6 @@ from thermal.errors import describe, nearest
 
 _COLUMN = re.compile(r"([^/:]+/[a-z0-9_]+): ")
 _ZONE = re.compile(r"Air temperature of zone (.+) at this time, ")
-_ZONE_COLUMNS = {
-    "LowerSetp": "comfort_lower_temperature",
-    "UpperSetp": "comfort_upper_temperature",
-    "Occupancy": "occupancy_count_sensor",
-    "InternalGainsCon": "internal_gain",
-}
-_SINGLE = {
-    "PriceGasPower": "gas_price",
-    "EmissionsElectricPower": "electricity_carbon_intensity",
-    "EmissionsGasPower": "gas_carbon_intensity",
-}
 
 
 @dataclass(frozen=True)
@@ -151,10 +140,11 @@ def forecast_sources(known: Mapping[str, object], signals: BoptestSignals, price
     """
     found = {point: _Source(name, factor, True) for name, (_, point, factor, _) in WEATHER_NAMES.items()}
     found["electricity_price"] = _Source(PRICE_POINTS[price])
-    found |= {column: _Source(name) for name, column in _SINGLE.items()}
+    found |= {column: _Source(name) for name, (_, column, _) in SITE_NAMES.items()}
     for zone in signals.zones:
         index = signals.forecast_zones.get(zone, zone)
-        found |= {f"{zone}/{column}": _Source(f"{name}[{index}]") for name, column in _ZONE_COLUMNS.items()}
+        named = {name: column for name, (_, column, _) in ZONE_NAMES.items() if column}
+        found |= {f"{zone}/{column}": _Source(f"{name}[{index}]") for name, column in named.items()}
     return {column: source for column, source in found.items() if source.point in known}
 
 

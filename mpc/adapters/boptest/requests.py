@@ -159,7 +159,7 @@ def names(argument: str, value: Any, known: Iterable[str]) -> list[str]:
     listed = [value] if isinstance(value, str) else value
     if not isinstance(listed, list) or not all(isinstance(name, str) for name in listed):
         raise BoptestRequestError(f"Invalid value for {argument}. It must be a list of names, but is {_short(value)}.")
-    allowed = set(known)
+    allowed = dict.fromkeys(known)  # in their order, so that an advice is the same each time
     for name in listed:
         if name not in allowed:
             advice = nearest(name[:200], allowed)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ipaddress
 import logging
-import os
 import socket
 import threading
 import time
@@ -113,14 +112,18 @@ def _listen(host: str, port: int) -> socket.socket:
     if not 0 <= port <= 65535:
         raise BoptestError(describe("port", "a number from 0 to 65535", repr(port)))
     try:
-        family, _, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
+        family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
+        listening = socket.socket(family, kind, protocol)  # TCP by name: asyncio then sends without delay
     except OSError as error:
         raise BoptestError(f"host {host!r}: {error.strerror or error}") from error
-    both = family == socket.AF_INET6 and socket.has_dualstack_ipv6()
     try:
-        return socket.create_server(address, family=family, backlog=1024, dualstack_ipv6=both)
+        listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listening.bind(address)
+        listening.listen(1024)
     except OSError as error:
-        raise BoptestError(f"port {port} of {host}: {os.strerror(error.errno or 0)}; choose another") from error
+        listening.close()
+        raise BoptestError(f"port {port} of {host}: {error.strerror or error}; choose another") from error
+    return listening
 
 
 def check_host(host: str, allow_remote: bool) -> None:

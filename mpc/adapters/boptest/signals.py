@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from itertools import chain, count
 from operator import attrgetter
 from typing import Any
@@ -60,13 +60,20 @@ WEATHER_NAMES: Mapping[str, tuple[str, str, float, str]] = {
     "winDir": ("rad", "wind_direction_sensor", float(np.pi / 180.0), "Direction that the wind comes from"),
 }
 
-#: BOPTEST's names of what each zone has, with unit and meaning; a point is ``name[zone]``.
-ZONE_NAMES: Mapping[str, tuple[str, str]] = {
-    "LowerSetp": ("K", "Lower edge of the comfort band"),
-    "UpperSetp": ("K", "Upper edge of the comfort band"),
-    "Occupancy": ("number of people", "People expected"),
-    "InternalGainsCon": ("W", "Expected sensible heat of people, light and equipment into the air"),
-    "InternalGainsLat": ("W", "Expected latent heat of people"),
+#: BOPTEST's names of what each zone has, with unit, column of our forecasts, and meaning; a point is ``name[zone]``.
+ZONE_NAMES: Mapping[str, tuple[str, str, str]] = {
+    "LowerSetp": ("K", "comfort_lower_temperature", "Lower edge of the comfort band"),
+    "UpperSetp": ("K", "comfort_upper_temperature", "Upper edge of the comfort band"),
+    "Occupancy": ("number of people", "occupancy_count_sensor", "People expected"),
+    "InternalGainsCon": ("W", "internal_gain", "Expected sensible heat of people, light and equipment into the air"),
+    "InternalGainsLat": ("W", "", "Expected latent heat of people"),
+}
+
+#: BOPTEST's names of what the whole building pays and emits, with unit, column of our forecasts, and meaning.
+SITE_NAMES: Mapping[str, tuple[str, str, str]] = {
+    "PriceGasPower": ("{currency}/kWh", "gas_price", "Price of gas by its upper heating value"),
+    "EmissionsElectricPower": ("kgCO2/kWh", "electricity_carbon_intensity", "Emissions of electricity, {carbon}"),
+    "EmissionsGasPower": ("kgCO2/kWh", "gas_carbon_intensity", "Emissions of gas"),
 }
 
 # Irradiances, and what `thermal.inputs.Sun` calls them.
@@ -231,14 +238,14 @@ def _reader(name: str, plant: SimulatedPlant) -> Callable[[PlantStep], float]:
     return lambda step: values(step)[at]
 
 
-def forecast_metadata(points: Collection[str], zones: Iterable[str], currency: str, carbon: str) -> Metadata:
+def forecast_metadata(points: Collection[str], zones: Sequence[str], currency: str, carbon: str) -> Metadata:
     """Describe each forecast point with its unit, as `GET /forecast_points` does.
 
     Parameters
     ----------
     points : collection of str
         Points of the weather station that are known.
-    zones : iterable of str
+    zones : sequence of str
         Names of the zones.
     currency : str
         Of prices.
@@ -248,19 +255,16 @@ def forecast_metadata(points: Collection[str], zones: Iterable[str], currency: s
     known = set(points)
     if "global_horizontal_irradiance_sensor" in known or known >= {*_SUN} - {"global_horizontal_irradiance_sensor"}:
         known |= {*_SUN}  # any two give the third, and the global one alone is split
-    per_kwh = f"{currency}/kWh"
     rows: dict[str, tuple[str, str]] = {
         name: (unit, f"{text}, mean from the time on")
         for name, (unit, point, _, text) in WEATHER_NAMES.items()
         if point in known
     }
     for kind, name in PRICE_POINTS.items():
-        rows[name] = (per_kwh, f"Price of electricity, {kind.replace('_', ' ')}")
-    rows["PriceGasPower"] = (per_kwh, "Price of gas by its upper heating value")
-    rows["EmissionsElectricPower"] = ("kgCO2/kWh", f"Emissions of electricity, {carbon}")
-    rows["EmissionsGasPower"] = ("kgCO2/kWh", "Emissions of gas")
-    zones = tuple(zones)
-    for name, (unit, text) in ZONE_NAMES.items():
+        rows[name] = (f"{currency}/kWh", f"Price of electricity, {kind.replace('_', ' ')}")
+    for name, (unit, _, text) in SITE_NAMES.items():
+        rows[name] = (unit.format(currency=currency), text.format(carbon=carbon))
+    for name, (unit, _, text) in ZONE_NAMES.items():
         rows |= {f"{name}[{zone}]": (unit, f"{text}, zone {zone}") for zone in zones}
     return {name: {"Unit": unit, "Description": text} for name, (unit, text) in rows.items()}
 

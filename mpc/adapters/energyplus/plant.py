@@ -157,7 +157,7 @@ class EnergyPlusPlant(ForeignPlant):
         self._process, self._number = EnergyPlusProcess(self.job(), self._patience), 0
         self._clear()
         rows, ends, _ = self._ask(self.settings.lead_days * self._per_day, {})
-        self._first = self._reader.rooms(ends[-1])
+        self._rooms.append(self._reader.rooms(ends[-1]))
         return self._seen(self._read(rows[-self.control_steps :], 0))
 
     def step(self, actions: Mapping[str, float]) -> Measurements:
@@ -218,7 +218,7 @@ class EnergyPlusPlant(ForeignPlant):
         PlantError
             When there was no step yet.
         """
-        step, temperature, electricity, gas = self.recent(len(self._rooms))
+        step, temperature, electricity, gas = self.recent(self.steps)
         return PlantRecord(step, np.array(temperature), np.array(electricity), np.array(gas))
 
     def recent(self, steps: int) -> RecentSteps:
@@ -235,11 +235,10 @@ class EnergyPlusPlant(ForeignPlant):
             When there was no step yet.
         """
         last, count = self._kept(self._energy)[-steps // self.control_steps :], self._electric
-        power = np.concatenate(last)[-steps:] / self.scenario.grid.step
-        before = len(self._rooms) - steps
-        zones = [self._rooms[before - 1] if before > 0 else self._first, *self._rooms[-steps:]]
+        step = float(self.scenario.grid.step)
+        power = np.concatenate(last)[-steps:] / step
         electricity, gas = power[:, :count].sum(axis=1), power[:, count:].sum(axis=1)
-        return RecentSteps(float(self.scenario.grid.step), zones, electricity.tolist(), gas.tolist())
+        return RecentSteps(step, self._rooms[-steps - 1 :], electricity.tolist(), gas.tolist())
 
     def metered(self) -> dict[str, float]:
         """Add up the meters over the run since the reset [J].
@@ -278,7 +277,6 @@ class EnergyPlusPlant(ForeignPlant):
         self._rows: list[FloatArray] = []
         self._energy: list[FloatArray] = []
         self._rooms: list[FloatArray] = []
-        self._first = np.zeros(len(self.zone_names))
 
     def _kept(self, parts: list[FloatArray]) -> list[FloatArray]:
         if not parts:

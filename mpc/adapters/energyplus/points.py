@@ -172,7 +172,7 @@ class Reader:
         Parameters
         ----------
         rows : ndarray, shape (n_row, n_output + n_product)
-            Means over a step, in EnergyPlus' units.
+            Means over a step [EnergyPlus' units].
         """
         outputs, products = rows[:, : len(self.outputs)], rows[:, len(self.outputs) :]
         values = outputs @ self._sum.T + self._offset
@@ -190,7 +190,7 @@ class Reader:
         Parameters
         ----------
         row : ndarray, shape (n_output,)
-            Values at an instant, in EnergyPlus' units.
+            Values at an instant [EnergyPlus' units].
         """
         return np.asarray((row @ self._sum.T + self._offset)[self._rooms])
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 import contextlib
 import json
 import os
-import queue
 import re
 import shutil
 import subprocess
 import sys
 import tempfile
 import threading
+import time
 import weakref
 from collections.abc import Mapping, Sequence
 from functools import cache
@@ -106,12 +106,10 @@ class EnergyPlusProcess:
         path.write_text(json.dumps(content), encoding="utf-8")
         environment = os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
         with (self.folder / "log.txt").open("w", encoding="utf-8") as log:
-            self._process = subprocess.Popen(
+            self._process: Any = subprocess.Popen(
                 [sys.executable, str(_WORKER), str(path)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=log,
                 env=environment, text=True, encoding="utf-8",
             )  # fmt: skip
-        self._messages: queue.Queue[str | None] = queue.Queue()
-        threading.Thread(target=_listen, args=(self._process.stdout, self._messages), daemon=True).start()
         self._finalizer = weakref.finalize(self, _end, self._process, self.folder)
 
     @property
@@ -132,7 +130,7 @@ class EnergyPlusProcess:
         steps : int
             How many; 0 stops the simulation.
         values : sequence of float or None
-            Of the actuators, in EnergyPlus' units; None leaves one to the building.
+            Of the actuators [EnergyPlus' units]; None leaves one to the building.
 
         Returns
         -------
@@ -143,13 +141,12 @@ class EnergyPlusProcess:
         Raises
         ------
         EnergyPlusError
-            When EnergyPlus breaks off, or has not what the job names.
-        EnergyPlusError
-            When it does not answer.
+            When EnergyPlus breaks off, has not what the job names, or does not answer.
         """
         try:
-            self._tell({"steps": steps, "values": list(values)})
-        except OSError as error:
+            self._process.stdin.write(json.dumps({"steps": steps, "values": list(values)}) + "\n")
+            self._process.stdin.flush()
+        except (OSError, ValueError) as error:
             self._fail(f"its process is gone ({error})")
         return self._answer("rows")
 
@@ -159,9 +156,7 @@ class EnergyPlusProcess:
         Raises
         ------
         EnergyPlusError
-            When it did not end well, or with severe errors.
-        EnergyPlusError
-            When it does not end.
+            When it did not end well, with severe errors, or not at all.
         """
         self._answer("done")
         self.check()
@@ -183,21 +178,16 @@ class EnergyPlusProcess:
         """End the process and remove its folder; can be called twice."""
         self._finalizer()
 
-    def _tell(self, command: Mapping[str, Any]) -> None:
-        stdin = self._process.stdin
-        if stdin is None:
-            raise OSError("closed")
-        stdin.write(json.dumps(command) + "\n")
-        stdin.flush()
-
     def _answer(self, kind: str) -> Mapping[str, Any]:
-        try:
-            line = self._messages.get(timeout=self._patience)
-        except queue.Empty:
+        began, timer = time.monotonic(), threading.Timer(self._patience, self._process.kill)
+        timer.start()
+        line = self._process.stdout.readline()
+        timer.cancel()
+        if not line and time.monotonic() - began >= self._patience:
             self.close()
             expected = f"an answer within {self._patience:g} s"
-            raise EnergyPlusError(describe("EnergyPlus", expected, "none", "its process was ended")) from None
-        message: dict[str, Any] = {} if line is None else json.loads(line)
+            raise EnergyPlusError(describe("EnergyPlus", expected, "none", "its process was ended"))
+        message: dict[str, Any] = json.loads(line or "{}")
         if kind not in message:
             self._fail(_reason(message))
         return message
@@ -208,7 +198,7 @@ class EnergyPlusProcess:
         raise EnergyPlusError(describe("EnergyPlus", "a run without severe errors", f"{found}{errors}"))
 
 
-def run_energyplus(job: Job, read: Sequence[str], patience: float = 600.0) -> dict[str, bytes]:
+def run_energyplus(job: Job, read: Sequence[str]) -> dict[str, bytes]:
     """Run EnergyPlus by itself and read some of its files.
 
     Parameters
@@ -217,8 +207,6 @@ def run_energyplus(job: Job, read: Sequence[str], patience: float = 600.0) -> di
         What to run.
     read : sequence of str
         Names of files in its output folder.
-    patience : float
-        Longest time that it may take [s].
 
     Returns
     -------
@@ -230,7 +218,7 @@ def run_energyplus(job: Job, read: Sequence[str], patience: float = 600.0) -> di
     EnergyPlusError
         When the run failed, or there is no such file.
     """
-    process = EnergyPlusProcess(job, patience)
+    process = EnergyPlusProcess(job)
     try:
         if "--convert-only" in job.options:
             process._answer("done")
@@ -244,24 +232,14 @@ def run_energyplus(job: Job, read: Sequence[str], patience: float = 600.0) -> di
         process.close()
 
 
-def _listen(stream: Any, messages: queue.Queue[str | None]) -> None:
-    with contextlib.suppress(ValueError, OSError):  # closed while it waited
-        for line in stream:
-            messages.put(line)
-    messages.put(None)
-
-
-def _end(process: subprocess.Popen[str], folder: Path) -> None:
-    """End a process, asked first, and remove its folder."""
+def _end(process: Any, folder: Path) -> None:
+    """End a process and remove its folder."""
     with contextlib.suppress(OSError):
-        if process.stdin is not None:
-            process.stdin.close()
-    if process.poll() is None:
-        process.kill()
+        process.stdin.close()
+    process.kill()
     with contextlib.suppress(subprocess.TimeoutExpired):
         process.wait(_GOODBYE)
-    if process.stdout is not None:
-        process.stdout.close()
+    process.stdout.close()
     shutil.rmtree(folder, ignore_errors=True)
 
 

@@ -100,12 +100,6 @@ class FmuTime:
         if self.start.tzinfo is None:
             raise PlantError(describe("start", "a time with a time zone", str(self.start)))
 
-    @property
-    def own_start(self) -> float:
-        """The unit's own time at the start [s]."""
-        year = pd.Timestamp(self.start.year, 1, 1, tz=self.start.tz).timestamp()
-        return float(self.start.timestamp() - year if self.start_time is None else self.start_time)
-
 
 class FmuPlant(SignalPlant):
     """A functional mock-up unit for co-simulation (FMI 2.0) as a `Plant`.
@@ -157,7 +151,9 @@ class FmuPlant(SignalPlant):
         self.control_step, self.signals, self._time = float(control_step), signals, time
         self._step = control_step / steps
         self._actions, self._warm = int(time.duration / control_step + 1e-9), int(time.warm_up / self._step + 1e-9)
-        self._zero, self._start = int(time.start.timestamp()), time.own_start
+        self._zero = int(time.start.timestamp())
+        year = pd.Timestamp(time.start.year, 1, 1, tz=time.start.tz).timestamp()
+        self._start = float(time.start.timestamp() - year if time.start_time is None else time.start_time)
         self._given = dict(parameters or {})
         self._drivers = {name: np.asarray(values, dtype=float) for name, values in (drivers or {}).items()}
         self._number, self._rows = -1, list[list[float]]()

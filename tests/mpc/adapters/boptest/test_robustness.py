@@ -106,8 +106,10 @@ def test_unknown_paths_methods_and_tests(http: httpx.Client) -> None:
 
 
 def test_a_body_too_long_is_refused(http: httpx.Client, testid: str) -> None:
-    response = http.put(f"/step/{testid}", content=b"x" * 1_000_001)
-    assert response.status_code == 413
+    for _ in range(10):  # the answer gets there although the connection is closed on what is still being sent
+        assert http.get("/version").status_code == 200
+        response = http.put(f"/step/{testid}", content=b"x" * 1_000_001)
+        assert response.status_code == 413
 
     def pieces() -> Any:  # without a length in the header
         for _ in range(30):
@@ -132,6 +134,7 @@ def test_a_body_too_long_is_refused(http: httpx.Client, testid: str) -> None:
         ({"host": "[::1]:80"}, 200),
         ({"origin": "http://evil.example"}, 403),
         ({"origin": "null"}, 403),
+        ({"origin": "http://[::1"}, 403),
         ({"origin": "http://localhost:3000"}, 200),
     ],
 )
