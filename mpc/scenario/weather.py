@@ -45,7 +45,7 @@ _DAY = 86400
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Weather:
-    """Weather of a stretch of time at one place.
+    """Weather of an interval of time at one place.
 
     Parameters
     ----------
