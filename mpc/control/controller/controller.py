@@ -13,7 +13,7 @@ from mpc.control.controller.action import Action, ControllerSettings, Source
 from mpc.control.controller.observer import Observer
 from mpc.control.controller.reading import Reading, SitePoints, past_forecast, past_steps
 from mpc.control.controller.watch import FarFromModel, StuckSensors, explain_comfort
-from mpc.control.problem.assembly import DemandCount, Expected, expect, peak_data
+from mpc.control.problem.assembly import DemandCount, Expected, expect
 from mpc.control.problem.horizon import HorizonData
 from mpc.control.problem.problem import ControlProblem
 from mpc.control.solvers.solution import Solution, Solver, Starts, Status
@@ -195,7 +195,7 @@ class MpcController:
             cooling_setpoint=schedule.cooling, running=np.outer(schedule.running, every),
             ventilation=np.outer(schedule.ventilation, every), boiler=schedule.running,
             comfort_price=np.full(expected.gains.shape, settings.comfort_price), heat_value=settings.heat_value,
-            peaks=peak_data(settings.demand, horizon, now, self._demand.peaks, self._demand.used(now)),
+            peaks=self._demand.ahead(horizon, now),
         )  # fmt: skip
 
     def _estimate(
