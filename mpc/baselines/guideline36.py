@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from mpc.control.controller.reading import SitePoints, values_of
 from mpc.errors import ControlError
@@ -16,7 +15,6 @@ from mpc.loop.plant import Measurements
 from mpc.scenario.forecast import Forecast
 from thermal._types import FloatArray, IntArray
 from thermal.case.points import OUTDOOR_TEMPERATURE, ZONE_TEMPERATURE
-from thermal.errors import describe
 
 
 @dataclass(frozen=True)
@@ -56,15 +54,12 @@ class TrimRespond:
     ignored: int = 2
 
     def __post_init__(self) -> None:
-        if not self.lowest <= self.initial <= self.highest:
-            found = f"{self.lowest:g}, {self.initial:g} and {self.highest:g} K"
-            raise ControlError(describe("trim and respond", "lowest <= initial <= highest", found))
-        if not (self.trim * self.respond < 0.0 and self.respond * self.most_response > 0.0):
-            found = f"{self.trim:g}, {self.respond:g} and {self.most_response:g} K"
-            raise ControlError(describe("trim and respond", "a response against the trim", found))
-        if not (self.delay >= 0.0 and self.time_step > 0.0 and self.ignored >= 0):
-            found = f"{self.delay:g} s, {self.time_step:g} s and {self.ignored}"
-            raise ControlError(describe("trim and respond", "a delay, a positive time step, no negative count", found))
+        between = self.lowest <= self.initial <= self.highest
+        against = self.trim * self.respond < 0.0 and self.respond * self.most_response > 0.0
+        timed = self.delay >= 0.0 and self.time_step > 0.0 and self.ignored >= 0
+        ControlError.unless(between, "trim and respond", "lowest <= initial <= highest", self)
+        ControlError.unless(against, "trim and respond", "a response against the trim", self)
+        ControlError.unless(timed, "trim and respond", "a delay, a positive time step, no negative count", self)
 
     def change(self, requests: int) -> float:
         """Give the change of the setpoint in a time step [K].
@@ -266,8 +261,8 @@ class Guideline36Settings:
     discharge_rise: float = 11.0
 
     def __post_init__(self) -> None:
-        if not self.outdoor[0] < self.outdoor[1]:
-            raise ControlError(describe("Guideline 36: outdoor", "rising temperatures", f"{self.outdoor} K"))
+        rising = self.outdoor[0] < self.outdoor[1]
+        ControlError.unless(rising, "Guideline 36: outdoor", "rising temperatures", f"{self.outdoor} K")
 
 
 class Guideline36:
@@ -336,7 +331,7 @@ class Guideline36:
         held = {name: self._range[name] for name in chosen if name in self._range}
         return {name: float(np.clip(chosen[name], *ends)) for name, ends in held.items()}
 
-    def requests(self, measurements: Mapping[str, float], seconds: float) -> tuple[NDArray[np.int64], ...]:
+    def requests(self, measurements: Mapping[str, float], seconds: float) -> tuple[IntArray, ...]:
         """Count requests for cooler air and for warmer water, shape (n_terminal,) each.
 
         Parameters

@@ -14,9 +14,10 @@ from mpc.kpi.record import excess
 from mpc.scenario.rates import KILOWATT_HOUR
 from mpc.scenario.scenario import Scenario
 from thermal._types import FloatArray
-from thermal.errors import describe
 
 _HOUR = 3600.0  # s
+Pair = tuple[ArrayLike, ArrayLike]  # lower and upper edge, or electricity and gas
+Factors = tuple[float, float]  # of electricity and of gas
 
 
 class RewardTerms(NamedTuple):
@@ -95,12 +96,11 @@ class PaperReward:
         terms = ("productivity", "setpoint_deviation")
         MpcError.unless_known(self.comfort, terms, "reward: comfort", "a known term")
         weights = (self.comfort_weight, self.cost_weight, self.carbon_weight)
-        if min(weights) < 0 or not sum(weights) > 0:
-            raise MpcError(describe("reward: weights", "numbers of 0 or more, not all 0", repr(weights)))
+        some = min(weights) >= 0 and sum(weights) > 0
+        MpcError.unless(some, "reward: weights", "numbers of 0 or more, not all 0", weights)
         scales = (self.highest_electricity, self.highest_gas, self.stiffness, self.half_distance, self.deviation_scale)
-        if min(scales) <= 0 or not 0 <= self.lowest_productivity < self.highest_productivity:
-            found = f"{scales}, productivity {self.lowest_productivity} to {self.highest_productivity}"
-            raise MpcError(describe("reward: scales", "positive numbers, a productivity that rises", found))
+        rises = min(scales) > 0 and 0 <= self.lowest_productivity < self.highest_productivity
+        MpcError.unless(rises, "reward: scales", "positive numbers, a productivity that rises", self)
 
     def of_step(
         self, scenario: Scenario, k: int, temperature: ArrayLike, electricity: ArrayLike, gas: ArrayLike
@@ -129,13 +129,7 @@ class PaperReward:
         return self.of_values(temperature, band, scenario.occupancy[k], (electricity, gas), prices, carbons)
 
     def of_values(
-        self,
-        temperature: ArrayLike,
-        band: tuple[ArrayLike, ArrayLike],
-        occupancy: ArrayLike,
-        powers: tuple[ArrayLike, ArrayLike],
-        prices: tuple[float, float],
-        carbons: tuple[float, float],
+        self, temperature: ArrayLike, band: Pair, occupancy: ArrayLike, powers: Pair, prices: Factors, carbons: Factors
     ) -> RewardTerms:
         """Reward of a step from plain values.
 
@@ -178,7 +172,7 @@ class PaperReward:
         mean = np.maximum(share @ people / count, lowest)
         return np.asarray((mean - lowest) / (1.0 - lowest) - 1.0)
 
-    def _share(self, electricity: FloatArray, gas: FloatArray, factors: tuple[float, float]) -> FloatArray:
+    def _share(self, electricity: FloatArray, gas: FloatArray, factors: Factors) -> FloatArray:
         highest = self.highest_electricity * factors[0] + self.highest_gas * factors[1]
         return np.asarray((electricity * factors[0] + gas * factors[1]) / highest if highest > 0 else 0.0 * electricity)
 
@@ -213,8 +207,8 @@ class StageCost:
     carbon_price: float = 0.0
 
     def __post_init__(self) -> None:
-        if not (self.discomfort_price >= 0 and self.carbon_price >= 0):
-            raise MpcError(describe("stage cost", "prices of 0 or more", repr(self)))
+        none_negative = self.discomfort_price >= 0 and self.carbon_price >= 0
+        MpcError.unless(none_negative, "stage cost", "prices of 0 or more", self)
 
     def of_step(
         self, scenario: Scenario, k: int, start: ArrayLike, end: ArrayLike, electricity: ArrayLike, gas: ArrayLike

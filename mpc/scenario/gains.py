@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike
 
 from mpc.errors import ScenarioError
 from thermal._types import FloatArray
-from thermal.errors import describe
 
 #: Shares of an office's gains that radiate [-]: people and equipment with fans by ASHRAE Fundamentals 2017, ch. 18,
 #: table 14; lights as recessed luminaires without lens, the middle of 0.48 to 0.68 in its table 3.
@@ -61,8 +60,8 @@ class InternalGains:
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
-            if not (np.isfinite(value) and 0 <= value <= (1.0 if name.startswith(("idle", "radiant")) else np.inf)):
-                raise ScenarioError(describe(f"gains: {name}", "0 or more, shares up to 1", repr(value)))
+            possible = np.isfinite(value) and 0 <= value <= (1.0 if name.startswith(("idle", "radiant")) else np.inf)
+            ScenarioError.unless(possible, f"gains: {name}", "0 or more, shares up to 1", value)
 
     def heat(self, occupancy: ArrayLike, people: ArrayLike, areas: ArrayLike) -> FloatArray:
         """Sensible heat given to each zone.

@@ -63,7 +63,7 @@ class StepGrid:
 
     @classmethod
     def between(cls, start: str | datetime, end: str | datetime, step: float, building: Building) -> StepGrid:
-        """Cover a stretch of local time.
+        """Cover an interval of local time.
 
         Parameters
         ----------

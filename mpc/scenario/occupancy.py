@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import zlib
-from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import date
@@ -33,8 +32,8 @@ _STREAM = 11  # of random numbers of a seed
 
 
 @dataclass(frozen=True, eq=False)
-class Occupancy(ABC):
-    """People in the zones over time.
+class Occupancy:
+    """People in the zones over time: always in, unless a class says otherwise.
 
     Parameters
     ----------
@@ -71,7 +70,6 @@ class Occupancy(ABC):
         each = self.assigned if isinstance(self.assigned, Mapping) else dict.fromkeys(zones, self.assigned)
         return np.array([float(each.get(zone, 0.0)) for zone in zones])
 
-    @abstractmethod
     def expected(self, grid: StepGrid, zones: Sequence[str]) -> FloatArray:
         """Mean number of people expected in each zone over each step, shape (n_steps, n_zone) [-].
 
@@ -82,6 +80,7 @@ class Occupancy(ABC):
         zones : sequence of str
             Names.
         """
+        return np.outer(np.ones(grid.n_steps), self.people(zones))
 
     def draw(self, grid: StepGrid, zones: Sequence[str], seed: int) -> FloatArray:
         """Mean number of people in each zone over each step, as it came out, shape (n_steps, n_zone) [-].

@@ -5,16 +5,15 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mpc.errors import ScenarioError
 from mpc.scenario.grid import Calendar
 from mpc.scenario.rates import HourlyRate, Rate
 from mpc.scenario.tariff import DemandCharge, Tariff
-from thermal._types import FloatArray
+from thermal._types import FloatArray, IntArray
 from thermal.errors import describe
 
 # Parts of a tariff that change its bill and are not modelled.
@@ -63,23 +62,20 @@ def read_urdb(
     ScenarioError
         When the file is not such a tariff, or has a part that is not modelled: it is named.
     """
-    item, where = _item(source)
+    item, days = _found(source, tier), calendar or Calendar()
     for key, what in _REFUSED.items():
-        if np.any([bool(value) for value in _flat(item.get(key))]):
-            raise ScenarioError(describe(f"{where}: {key}", f"a tariff without {what}", "one"))
-    days = calendar or Calendar()
-    prices = _prices(item, "energyratestructure", tier, where, "kWh")
-    weekday, weekend = (_schedule(item, f"energy{day}schedule", len(prices), where) for day in ("weekday", "weekend"))
-    adjustment = np.asarray(item.get("fueladjustmentsmonthly") or [0.0] * 12, dtype=float)
-    if adjustment.shape != (12,):
-        raise ScenarioError(describe(f"{where}: fueladjustmentsmonthly", "12 numbers", f"{adjustment.size}"))
-    tables = [prices[table] + adjustment[:, None] for table in (weekday, weekend)]
-    demand = _demand(item, tier, days, where)
-    name = " ".join(str(item[key]) for key in ("utility", "name") if item.get(key))
-    return Tariff(HourlyRate(tables[0], tables[1], days), gas, demand, "USD", name)
+        none = not any(map(bool, _flat(item.parts.get(key))))
+        ScenarioError.unless(none, f"{item.where}: {key}", f"a tariff without {what}", "one")
+    prices = item.prices("energyratestructure", "kWh")
+    adjustment = np.asarray(item.parts.get("fueladjustmentsmonthly") or [0.0] * 12, dtype=float)
+    twelve = adjustment.shape == (12,)
+    ScenarioError.unless(twelve, f"{item.where}: fueladjustmentsmonthly", "12 numbers", f"{adjustment.size}")
+    tables = [prices[table] + adjustment[:, None] for table in item.schedules("energy", len(prices))]
+    name = " ".join(str(item.parts[key]) for key in ("utility", "name") if item.parts.get(key))
+    return Tariff(HourlyRate(tables[0], tables[1], days), gas, _demand(item, days), "USD", name)
 
 
-def _item(source: str | Path | Mapping[str, Any]) -> tuple[Mapping[str, Any], str]:
+def _found(source: str | Path | Mapping[str, Any], tier: int | None) -> _Item:
     where = "tariff" if isinstance(source, Mapping) else str(source)
     content: Any = source
     if not isinstance(source, Mapping):
@@ -91,61 +87,64 @@ def _item(source: str | Path | Mapping[str, Any]) -> tuple[Mapping[str, Any], st
     if not isinstance(items, Sequence) or len(items) != 1 or not isinstance(items[0], Mapping):
         found = f"{len(items)} items" if isinstance(items, Sequence) else type(items).__name__
         raise ScenarioError(describe(where, "one tariff", found, "pass the item that is meant"))
-    return items[0], where
+    return _Item(items[0], where, tier)
 
 
-def _demand(item: Mapping[str, Any], tier: int | None, days: Calendar, where: str) -> list[DemandCharge]:
-    window = 60.0 * float(item.get("demandwindow") or 15.0)
+def _demand(item: _Item, days: Calendar) -> list[DemandCharge]:
+    window = 60.0 * float(item.parts.get("demandwindow") or 15.0)
     charges = []
-    if item.get("flatdemandstructure"):
-        rates = _prices(item, "flatdemandstructure", tier, where, "kW", item.get("flatdemandunit"))
-        months = _integers(item, "flatdemandmonths", (12,), len(rates), where)
-        charges.append(DemandCharge(rates.tolist(), np.repeat(months[:, None], 24, axis=1), None, window, "flat", days))
-    if item.get("demandratestructure"):
-        rates = _prices(item, "demandratestructure", tier, where, "kW", item.get("demandrateunit"))
-        week, end = (_schedule(item, f"demand{day}schedule", len(rates), where) for day in ("weekday", "weekend"))
+    if item.parts.get("flatdemandstructure"):
+        rates = item.prices("flatdemandstructure", "kW", "flatdemandunit")
+        months = np.repeat(item.integers("flatdemandmonths", (12,), len(rates))[:, None], 24, axis=1)
+        charges.append(DemandCharge(rates.tolist(), months, None, window, "flat", days))
+    if item.parts.get("demandratestructure"):
+        rates = item.prices("demandratestructure", "kW", "demandrateunit")
+        week, end = item.schedules("demand", len(rates))
         charges.append(DemandCharge(rates.tolist(), week, end, window, "time of use", days))
     return [charge for charge in charges if any(charge.rates)]
 
 
-def _prices(
-    item: Mapping[str, Any], key: str, tier: int | None, where: str, unit: str, given: str | None = None
-) -> FloatArray:
-    """Price of each period of a structure."""
-    structure = item.get(key)
-    if not isinstance(structure, Sequence) or not structure or not all(structure):
-        raise ScenarioError(describe(f"{where}: {key}", "periods of tiers", repr(structure)[:60]))
-    prices = []
-    for number, tiers in enumerate(structure):
-        at = f"{where}: {key}[{number}]"
-        if len(tiers) > 1 and tier is None:
-            found = f"{len(tiers)}, the first up to {tiers[0].get('max')} {unit}"
-            raise ScenarioError(describe(at, "one tier", found, "choose one by `tier`"))
+class _Item(NamedTuple):
+    """A tariff as the database has it, where it stands, and which tier counts."""
+
+    parts: Mapping[str, Any]
+    where: str
+    tier: int | None
+
+    def prices(self, key: str, unit: str, given: str = "") -> FloatArray:
+        """Price of each period of a structure."""
+        structure, tier, prices = self.parts.get(key), self.tier, []
+        if not isinstance(structure, Sequence) or not structure or not all(structure):
+            raise ScenarioError(describe(f"{self.where}: {key}", "periods of tiers", repr(structure)[:60]))
         ScenarioError.unless((tier or 0) >= 0, "tier", "0 or more", repr(tier))
-        chosen = tiers[min(tier or 0, len(tiers) - 1)]
-        named = chosen.get("unit") or given or unit
-        ScenarioError.unless(named == unit, f"{at}: unit", repr(unit), repr(named))
+        for number, tiers in enumerate(structure):
+            at, found = f"{self.where}: {key}[{number}]", f"{len(tiers)}, the first up to {tiers[0].get('max')} {unit}"
+            ScenarioError.unless(len(tiers) == 1 or tier is not None, at, "one tier", found, "choose one by `tier`")
+            chosen = tiers[min(tier or 0, len(tiers) - 1)]
+            named = chosen.get("unit") or self.parts.get(given) or unit
+            ScenarioError.unless(named == unit, f"{at}: unit", repr(unit), repr(named))
+            try:
+                prices.append(float(chosen.get("rate") or 0.0) + float(chosen.get("adj") or 0.0))
+            except (TypeError, ValueError) as error:
+                raise ScenarioError(describe(f"{at}: rate", "a number", repr(chosen))) from error
+        return np.array(prices)
+
+    def schedules(self, of: str, periods: int) -> list[IntArray]:
+        """Period of each month and hour, on weekdays and at weekends."""
+        return [self.integers(f"{of}{day}schedule", (12, 24), periods) for day in ("weekday", "weekend")]
+
+    def integers(self, key: str, shape: tuple[int, ...], periods: int) -> IntArray:
+        """Whole numbers of a shape, below the number of periods."""
+        given, where = self.parts.get(key), f"{self.where}: {key}"
+        expected = f"{' x '.join(map(str, shape))} whole numbers from 0 to {periods - 1}"
         try:
-            prices.append(float(chosen.get("rate") or 0.0) + float(chosen.get("adj") or 0.0))
+            table = np.asarray(given, dtype=float)
         except (TypeError, ValueError) as error:
-            raise ScenarioError(describe(f"{at}: rate", "a number", repr(chosen))) from error
-    return np.array(prices)
-
-
-def _schedule(item: Mapping[str, Any], key: str, periods: int, where: str) -> NDArray[np.int64]:
-    return _integers(item, key, (12, 24), periods, where)
-
-
-def _integers(item: Mapping[str, Any], key: str, shape: tuple[int, ...], periods: int, where: str) -> NDArray[np.int64]:
-    expected = f"{' x '.join(map(str, shape))} whole numbers from 0 to {periods - 1}"
-    try:
-        table = np.asarray(item.get(key), dtype=float)
-    except (TypeError, ValueError) as error:
-        raise ScenarioError(describe(f"{where}: {key}", expected, repr(item.get(key))[:60])) from error
-    if table.shape != shape or not np.isin(table, np.arange(periods)).all():
-        found = "nothing" if item.get(key) is None else f"shape {table.shape}, values {np.unique(table)[:8].tolist()}"
-        raise ScenarioError(describe(f"{where}: {key}", expected, found))
-    return table.astype(np.int64)
+            raise ScenarioError(describe(where, expected, repr(given)[:60])) from error
+        found = "nothing" if given is None else f"shape {table.shape}, values {np.unique(table)[:8].tolist()}"
+        fit = table.shape == shape and bool(np.isin(table, np.arange(periods)).all())
+        ScenarioError.unless(fit, where, expected, found)
+        return table.astype(np.int64)
 
 
 def _flat(value: Any) -> list[Any]:

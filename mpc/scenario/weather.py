@@ -6,11 +6,9 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from mpc.errors import WeatherError
 from mpc.scenario.grid import (
@@ -24,6 +22,7 @@ from mpc.scenario.grid import (
 )
 from thermal._types import FloatArray
 from thermal.case.building import Location
+from thermal._types import BoolArray, FloatArray
 from thermal.case.points import OUTDOOR_TEMPERATURE
 from thermal.inputs.sun import Sun, sun_of
 
@@ -42,10 +41,12 @@ _LONGEST_STEP = 3600.0  # s
 _SHORTEST_PIECE = 60  # s: sub-steps of the sun's spread over an hour
 _DAY = 86400
 
+_Pieces = tuple[FloatArray, FloatArray]  # edges of the pieces that two clocks share [s], sine of the sun's altitude
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Weather:
-    """Weather of a stretch of time at one place.
+    """Weather of an interval of time at one place.
 
     Parameters
     ----------
@@ -192,11 +193,9 @@ class Weather:
         stamps, edges = index_seconds(self.stamps).astype(float), grid.edges.astype(float)
         bounds = np.concatenate([[stamps[0] - self.step], stamps])
         if point in SUN_POINTS and sun is not None:
-            # The beam does not know how high the sun is, only whether it is up.
-            shape = np.sign(sun.sine) if point == SUN_POINTS[0] else sun.sine
-            fine = means_by_shape(bounds, values, sun.edges, shape)
-            start = np.searchsorted(sun.edges, edges[0])
-            count = round(grid.step / (sun.edges[1] - sun.edges[0]))
+            pieces, sine = sun  # the beam does not know how high the sun is, only whether it is up
+            fine = means_by_shape(bounds, values, pieces, np.sign(sine) if point == SUN_POINTS[0] else sine)
+            start, count = np.searchsorted(pieces, edges[0]), round(grid.step / (pieces[1] - pieces[0]))
             return np.asarray(fine[start : start + grid.n_steps * count].reshape(grid.n_steps, count).mean(axis=1))
         if point == DIRECTION:
             angle = np.radians(values)
@@ -227,7 +226,7 @@ class Weather:
         middles = pd.to_datetime(edges[:-1] + piece / 2.0, unit="s", utc=True)
         place = self.location
         altitude = get_solarposition(middles, place.latitude, place.longitude, place.elevation)["elevation"].to_numpy()
-        return _Pieces(edges.astype(float), np.maximum(np.sin(np.radians(altitude)), 0.0))
+        return edges.astype(float), np.maximum(np.sin(np.radians(altitude)), 0.0)
 
     def _around(self, grid: StepGrid) -> Weather:
         """Cut this weather to a day around a grid, after a typical year has been repeated as often as needed."""
@@ -251,14 +250,7 @@ class Weather:
         return Weather(pd.DataFrame(rows, index=index, columns=ordered.columns), self.location, self.readings)
 
 
-class _Pieces(NamedTuple):
-    """Edges of the pieces that two clocks share [s], and sine of the sun's altitude at their middles, 0 at night."""
-
-    edges: FloatArray
-    sine: FloatArray
-
-
-def _covered(source: Weather, known: NDArray[np.bool_], grid: StepGrid) -> NDArray[np.bool_]:
+def _covered(source: Weather, known: BoolArray, grid: StepGrid) -> BoolArray:
     """Find the steps of a grid that lie wholly within known intervals of the source."""
     stamps = index_seconds(source.stamps)
     gap = np.concatenate([[0], np.cumsum(~known)])

@@ -11,9 +11,9 @@ import pandas as pd
 
 from mpc.control.controller.action import Action, ControllerSettings, Source
 from mpc.control.controller.observer import Observer
-from mpc.control.controller.reading import Reading, Readings, SitePoints, past_forecast, past_steps
+from mpc.control.controller.reading import Reading, SitePoints, past_forecast, past_steps
 from mpc.control.controller.watch import FarFromModel, StuckSensors, explain_comfort
-from mpc.control.problem.assembly import DemandCount, Expected, expect, peak_data
+from mpc.control.problem.assembly import DemandCount, Expected, expect
 from mpc.control.problem.horizon import HorizonData
 from mpc.control.problem.problem import ControlProblem
 from mpc.control.solvers.solution import Solution, Solver, Starts, Status
@@ -21,6 +21,7 @@ from mpc.errors import ControlError, MpcError
 from mpc.scenario.forecast import Forecast
 from thermal._types import FloatArray
 
+Measured = Mapping[str, float]  # by ``ENTITY/POINT``
 _USUAL_HUMIDITY = 0.006  # kg/kg, as `thermal.hvac` has it where none is measured
 
 
@@ -70,7 +71,8 @@ class MpcController:
     def __post_init__(self) -> None:
         self.problem: ControlProblem = self.solver.problem
         self._horizon, self._channels = self.problem.predictor.horizon, self.problem.predictor.channels
-        self._readings = Readings(self.points, self.problem.predictor.hvac.system)
+        self._system = self.problem.predictor.hvac.system
+        self.points.fit(self._system)
         self._known = _Known(self.settings.rule.setpoints(self._channels, 283.15))
         self._starts = Starts(self.settings.second_start)
         self._demand = DemandCount(self.settings.demand)
@@ -78,9 +80,7 @@ class MpcController:
         self._stuck = StuckSensors(self.points.zones, noise, self.settings.false_alarm, self.settings.resolution)
         self._far = FarFromModel(self.points.zones, self.observer.innovation_deviation)
 
-    def step(
-        self, measurements: Mapping[str, float], forecast: Forecast | None, now: pd.Timestamp | None = None
-    ) -> Action:
+    def step(self, measurements: Measured, forecast: Forecast | None, now: pd.Timestamp | None = None) -> Action:
         """Choose setpoints for the next control step.
 
         Parameters
@@ -138,24 +138,22 @@ class MpcController:
         steps = past_steps(telemetry, self.points, self._horizon.control_step)
         others = np.zeros((len(steps), 0))
         if self.signals is not None:
-            stamps = pd.DatetimeIndex([step.stamp for step in steps])
+            stamps = pd.DatetimeIndex([stamp for stamp, *_ in steps])
             others = self.signals(past_forecast(telemetry, self.points), stamps)
         started = False
-        for step, other in zip(steps, others, strict=True):
-            read = self._readings.read(step.measured)
-            boundary, seen = np.concatenate([[step.outdoor], other]), np.isfinite(read.zone)
+        for (stamp, measured, outdoor, gains), other in zip(steps, others, strict=True):
+            read = self.points.read(measured, self._system)
+            boundary, seen = np.concatenate([[outdoor], other]), np.isfinite(read.zone)
             if started:
-                self.observer.update(read.zone, np.nan_to_num(read.heat) + step.gains, boundary)
+                self.observer.update(read.zone, np.nan_to_num(read.heat) + gains, boundary)
             elif seen.any():
                 self.observer.start(np.where(seen, read.zone, read.zone[seen].mean()), boundary)
                 started = True
-            self._count(read, step.stamp)
+            self._count(read, stamp)
         ControlError.unless(started, "start-up: telemetry", "a zone that reports", "none that does")
-        self._known.started, self._known.gains = True, steps[-1].gains
+        self._known.started, self._known.gains = True, steps[-1][3]
 
-    def _now(
-        self, measurements: Mapping[str, float], forecast: Forecast | None, now: pd.Timestamp | None
-    ) -> pd.Timestamp:
+    def _now(self, measurements: Measured, forecast: Forecast | None, now: pd.Timestamp | None) -> pd.Timestamp:
         given = now if now is not None else getattr(measurements, "stamp", None)
         if given is not None:
             return pd.Timestamp(given)
@@ -168,7 +166,7 @@ class MpcController:
         raise MpcError("controller: expected the time of a first step, got none; pass now= or a forecast")
 
     def _data(
-        self, measurements: Mapping[str, float], forecast: Forecast | None, now: pd.Timestamp, reasons: list[str]
+        self, measurements: Measured, forecast: Forecast | None, now: pd.Timestamp, reasons: list[str]
     ) -> HorizonData:
         settings, horizon = self.settings, self._horizon
         fill: Literal["hold"] | None = None
@@ -197,7 +195,7 @@ class MpcController:
             cooling_setpoint=schedule.cooling, running=np.outer(schedule.running, every),
             ventilation=np.outer(schedule.ventilation, every), boiler=schedule.running,
             comfort_price=np.full(expected.gains.shape, settings.comfort_price), heat_value=settings.heat_value,
-            peaks=peak_data(settings.demand, horizon, now, self._demand.peaks, self._demand.used(now)),
+            peaks=self._demand.ahead(horizon, now),
         )  # fmt: skip
 
     def _estimate(
@@ -205,7 +203,7 @@ class MpcController:
         reasons: list[str],
     ) -> None:  # fmt: skip
         """Bring the state up to now, over a step with the boundary conditions before it."""
-        read, known = self._readings.read(measurements), self._known
+        read, known = self.points.read(measurements, self._system), self._known
         stuck = self._stuck.update(read.zone)
         zone, heat = np.where(stuck, np.nan, read.zone), np.where(stuck, np.nan, read.heat)
         reasons.extend(read.missing)
@@ -277,7 +275,8 @@ class MpcController:
             reasons.append("the previous plan is followed")
             return shifted[0], Source.PREVIOUS
         reasons.append("no plan: the rules decide")
-        return self.settings.rule.setpoints(self._channels, self._readings.read(measurements).outdoor), Source.RULES
+        outdoor = self.points.read(measurements, self._system).outdoor
+        return self.settings.rule.setpoints(self._channels, outdoor), Source.RULES
 
     def _safe(self, values: FloatArray, reasons: list[str]) -> FloatArray:
         """Hold setpoints within ranges and rates; what is not finite becomes what stood before."""

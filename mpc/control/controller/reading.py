@@ -80,6 +80,65 @@ class SitePoints:
             named |= {f"{entity}/{_POINTS[channel.quantity]}": float(value) for entity in entities}
         return named
 
+    def fit(self, system: HvacSystem) -> None:
+        """Refuse a plant that has another number of zones, terminals or air handlers.
+
+        Parameters
+        ----------
+        system : HvacSystem
+            The plant.
+
+        Raises
+        ------
+        ControlError
+            When there are not as many names.
+        """
+        found = (len(self.zones), len(self.terminals), len(self.air_handlers))
+        wanted = (system.zone_count, len(system.terminals), len(system.air_handlers))
+        expected = "names of {} zones, {} terminals, {} air handlers".format(*wanted)
+        ControlError.unless(found == wanted, "site points", expected, "{}, {}, {}".format(*found))
+
+    def read(self, measurements: Mapping[str, float], system: HvacSystem) -> Reading:
+        """Read a control step.
+
+        Parameters
+        ----------
+        measurements : mapping of str to float
+            By ``ENTITY/POINT`` [library's units].
+        system : HvacSystem
+            Which terminal belongs to which zone.
+        """
+        place, n_zone = system.terminals.zone, len(self.zones)
+        seen, flow, warm = (
+            values_of(measurements, self.terminals, point)
+            for point in (ZONE_TEMPERATURE, "supply_air_flowrate_sensor", "discharge_air_temperature_sensor")
+        )
+        known = np.isfinite(seen)
+        count, total = (np.bincount(place[known], weights, n_zone) for weights in (None, seen[known]))
+        zone = np.where(count > 0, total / np.maximum(count, 1), np.nan)
+        own = values_of(measurements, self.zones, ZONE_TEMPERATURE)
+        zone = np.where(np.isfinite(own), own, zone)
+        each = AIR_HEAT_CAPACITY * flow * (warm - zone[place])
+        heat = np.asarray(np.bincount(place, each, n_zone), dtype=float)
+        outdoor = float(values_of(measurements, [self.weather_station], OUTDOOR_TEMPERATURE)[0])
+        water = float(values_of(measurements, [self.boiler], "supply_water_temperature_sensor")[0])
+        power = float(values_of(measurements, self.meters).sum())
+        missing = [f"zone temperature of {z!r} is missing: its model goes on alone"
+                   for z, t in zip(self.zones, zone, strict=True) if not np.isfinite(t)]  # fmt: skip
+        # where the zone itself did not report, its heat is unknown too and has been said
+        lost = np.flatnonzero(~np.isfinite(each) & np.isfinite(zone[place]))
+        names = [self.terminals[k] for k in lost]
+        missing += [f"flow or discharge temperature of {name!r} is missing: the plan's heat is taken" for name in names]
+        if not np.isfinite(water):
+            missing.append(f"supply water temperature of {self.boiler!r} is missing: its last value is taken")
+        return Reading(zone, heat, outdoor, water, power, tuple(missing))
+
+
+
+#: Of a control step that has gone: its end, means by ``ENTITY/POINT``, outdoor temperature [K], and expected heat of
+#: people, lights and equipment in each zone, shape (n_zone,) [W].
+PastStep = tuple[pd.Timestamp, dict[str, float], float, FloatArray]
+
 
 class Reading(NamedTuple):
     """What was measured over a control step.
@@ -106,63 +165,6 @@ class Reading(NamedTuple):
     missing: tuple[str, ...]
 
 
-class Readings:
-    """Reads measurements by name.
-
-    Parameters
-    ----------
-    points : SitePoints
-        Names.
-    system : HvacSystem
-        Which terminal serves which zone.
-
-    Raises
-    ------
-    ControlError
-        When there are not as many names as zones, terminals and air handlers.
-    """
-
-    def __init__(self, points: SitePoints, system: HvacSystem) -> None:
-        found = (len(points.zones), len(points.terminals), len(points.air_handlers))
-        wanted = (system.zone_count, len(system.terminals), len(system.air_handlers))
-        expected = "names of {} zones, {} terminals, {} air handlers".format(*wanted)
-        ControlError.unless(found == wanted, "site points", expected, "{}, {}, {}".format(*found))
-        self.points, self.place = points, system.terminals.zone
-
-    def read(self, measurements: Mapping[str, float]) -> Reading:
-        """Read a control step.
-
-        Parameters
-        ----------
-        measurements : mapping of str to float
-            By ``ENTITY/POINT`` [library's units].
-        """
-        points, place, n_zone = self.points, self.place, len(self.points.zones)
-        seen, flow, warm = (
-            values_of(measurements, points.terminals, point)
-            for point in (ZONE_TEMPERATURE, "supply_air_flowrate_sensor", "discharge_air_temperature_sensor")
-        )
-        known = np.isfinite(seen)
-        count, total = (np.bincount(place[known], weights, n_zone) for weights in (None, seen[known]))
-        zone = np.where(count > 0, total / np.maximum(count, 1), np.nan)
-        own = values_of(measurements, points.zones, ZONE_TEMPERATURE)
-        zone = np.where(np.isfinite(own), own, zone)
-        each = AIR_HEAT_CAPACITY * flow * (warm - zone[place])
-        heat = np.asarray(np.bincount(place, each, n_zone), dtype=float)
-        outdoor = float(values_of(measurements, [points.weather_station], OUTDOOR_TEMPERATURE)[0])
-        water = float(values_of(measurements, [points.boiler], "supply_water_temperature_sensor")[0])
-        power = float(values_of(measurements, points.meters).sum())
-        missing = [f"zone temperature of {z!r} is missing: its model goes on alone"
-                   for z, t in zip(points.zones, zone, strict=True) if not np.isfinite(t)]  # fmt: skip
-        # where the zone itself did not report, its heat is unknown too and has been said
-        lost = np.flatnonzero(~np.isfinite(each) & np.isfinite(zone[place]))
-        names = [points.terminals[k] for k in lost]
-        missing += [f"flow or discharge temperature of {name!r} is missing: the plan's heat is taken" for name in names]
-        if not np.isfinite(water):
-            missing.append(f"supply water temperature of {points.boiler!r} is missing: its last value is taken")
-        return Reading(zone, heat, outdoor, water, power, tuple(missing))
-
-
 def values_of(measurements: Mapping[str, float], entities: Sequence[str], point: str = "") -> FloatArray:
     """Look a point of several entities up, shape (n_entity,) [library's units]; NaN where it is missing or no number.
 
@@ -180,28 +182,7 @@ def values_of(measurements: Mapping[str, float], entities: Sequence[str], point:
     return pd.to_numeric(found, errors="coerce").to_numpy(dtype=float)
 
 
-class _PastStep(NamedTuple):
-    """A control step that has gone.
-
-    Parameters
-    ----------
-    stamp : pandas.Timestamp
-        Its end.
-    measured : dict of str to float
-        Means by ``ENTITY/POINT`` [library's units].
-    outdoor : float
-        Its temperature, the last that was measured [K].
-    gains : ndarray, shape (n_zone,)
-        Heat of people, lights and equipment as far as it was expected [W].
-    """
-
-    stamp: pd.Timestamp
-    measured: dict[str, float]
-    outdoor: float
-    gains: FloatArray
-
-
-def past_steps(telemetry: pd.DataFrame, points: SitePoints, control_step: float) -> list[_PastStep]:
+def past_steps(telemetry: pd.DataFrame, points: SitePoints, control_step: float) -> list[PastStep]:
     """Cut telemetry into control steps, the last of which ends with it.
 
     Parameters
@@ -235,7 +216,7 @@ def past_steps(telemetry: pd.DataFrame, points: SitePoints, control_step: float)
         )
     gains = means.reindex(columns=[f"{zone}/internal_gain" for zone in points.zones]).fillna(0.0).to_numpy()
     rows = zip(means.index, means.to_dict("records"), outdoor, gains, strict=True)
-    return [_PastStep(stamp, {str(k): v for k, v in row.items()}, float(air), heat) for stamp, row, air, heat in rows]
+    return [(stamp, {str(k): v for k, v in row.items()}, float(air), heat) for stamp, row, air, heat in rows]
 
 
 def past_forecast(telemetry: pd.DataFrame, points: SitePoints) -> Forecast:

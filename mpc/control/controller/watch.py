@@ -82,7 +82,7 @@ class StuckSensors:
 
     @property
     def memory(self) -> FloatArray:
-        """Last values and how often they came, shape (2, n_zone), to be saved [K, -]."""
+        """Last values and how often each was read, shape (2, n_zone), to be saved [K, -]."""
         return np.vstack([self._last, self._count])
 
     @memory.setter

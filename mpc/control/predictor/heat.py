@@ -68,18 +68,6 @@ class HeatChannel:
         return f"{self.quantity} of zone {self.zone}"
 
 
-def heat_channels(heating: FloatArray, cooling: FloatArray) -> tuple[HeatChannel, ...]:
-    """Decide heating and cooling of every zone that has any.
-
-    Parameters
-    ----------
-    heating, cooling : ndarray, shape (n_zone,)
-        Capacities [W]; 0 where there is none.
-    """
-    parts: tuple[tuple[HeatQuantity, FloatArray], ...] = (("heating", heating), ("cooling", cooling))
-    return tuple(HeatChannel(what, z, float(most)) for what, sizes in parts for z, most in enumerate(sizes) if most > 0)
-
-
 class HeatPredictor(Predictor):
     """A building whose zones are given the heat that is decided: linear.
 

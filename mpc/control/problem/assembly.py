@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
@@ -171,49 +171,6 @@ class Schedule(NamedTuple):
     ventilation: FloatArray
 
 
-def peak_data(
-    charges: Sequence[DemandCharge],
-    horizon: Horizon,
-    now: pd.Timestamp,
-    so_far: Mapping[str, float] | None = None,
-    used: Sequence[float] = (),
-) -> PeakData:
-    """Windows of demand charges over a horizon.
-
-    Parameters
-    ----------
-    charges : sequence of DemandCharge
-        Of the tariff.
-    horizon : Horizon
-        Steps.
-    now : pandas.Timestamp
-        Start of the horizon, in the building's time zone.
-    so_far : mapping of str to float
-        Highest mean of each peak until now, by the names of `mpc.scenario.DemandBuckets` [W]; default none.
-    used : sequence of float
-        Mean power since the window of now began, of each charge [W]; default none.
-    """
-    parts: list[tuple[FloatArray | IntArray, ...]] = []
-    seconds, count, begin = horizon.edges, 0, now.timestamp()
-    for charge, power in zip(charges, used or [0.0] * len(charges), strict=True):
-        first = np.floor(begin / charge.window) * charge.window - begin
-        bounds = np.arange(first, seconds[-1], charge.window)
-        overlap = np.minimum(seconds[1:], bounds[:, None] + charge.window) - np.maximum(seconds[:-1], bounds[:, None])
-        weights = np.maximum(overlap, 0.0)
-        # windows that the horizon's end cuts count with the mean of their part
-        whole = np.maximum(weights.sum(axis=1), 1e-9)
-        offset, whole[0] = np.zeros(len(bounds)), charge.window
-        offset[0] = power * -first / charge.window
-        buckets = charge.on(StepGrid(now + pd.Timedelta(seconds=float(first)), charge.window, len(bounds)))
-        kept = buckets.bucket >= 0
-        before = np.array([(so_far or {}).get(name, 0.0) for name in buckets.names])
-        parts.append(
-            (weights[kept] / whole[kept, None], offset[kept], buckets.bucket[kept] + count, buckets.rate, before)
-        )
-        count += len(buckets.rate)
-    return PeakData(*map(np.concatenate, zip(*parts, strict=True))) if parts else PeakData.none(len(horizon))
-
-
 class DemandCount:
     """Counts the power of each step for the windows of demand charges.
 
@@ -253,16 +210,32 @@ class DemandCount:
                 start, used = begin + charge.window, 0.0
             self.windows[k] = (start, used)
 
-    def used(self, now: pd.Timestamp) -> list[float]:
-        """Mean power since the window of now began, of each charge [W].
+    def ahead(self, horizon: Horizon, now: pd.Timestamp) -> PeakData:
+        """Windows of the charges over a horizon, with what was used of those that run.
 
         Parameters
         ----------
+        horizon : Horizon
+            Steps.
         now : pandas.Timestamp
-            Time.
+            Start of the horizon, in the building's time zone.
         """
-        means = []
-        for (start, energy), charge in zip(self.windows, self.charges, strict=True):
-            lasted = now.timestamp() - start
-            means.append(energy / lasted if 0.0 < lasted < charge.window else 0.0)
-        return means
+        parts: list[tuple[FloatArray | IntArray, ...]] = []
+        seconds, count, begin = horizon.edges, 0, now.timestamp()
+        for charge, (start, energy) in zip(self.charges, self.windows, strict=True):
+            first = np.floor(begin / charge.window) * charge.window - begin
+            bounds = np.arange(first, seconds[-1], charge.window)[:, None]
+            overlap = np.minimum(seconds[1:], bounds + charge.window) - np.maximum(seconds[:-1], bounds)
+            weights, offset = np.maximum(overlap, 0.0), np.zeros(len(bounds))
+            # windows that the horizon's end cuts count with the mean of their part
+            whole = np.maximum(weights.sum(axis=1), 1e-9)
+            whole[0] = charge.window
+            if 0.0 < begin - start < charge.window:
+                offset[0] = energy / (begin - start) * -first / charge.window
+            buckets = charge.on(StepGrid(now + pd.Timedelta(seconds=float(first)), charge.window, len(bounds)))
+            kept = buckets.bucket >= 0
+            highest = np.array([self.peaks.get(name, 0.0) for name in buckets.names])
+            shares = weights[kept] / whole[kept, None]
+            parts.append((shares, offset[kept], buckets.bucket[kept] + count, buckets.rate, highest))
+            count += len(buckets.rate)
+        return PeakData(*map(np.concatenate, zip(*parts, strict=True))) if parts else PeakData.none(len(horizon))

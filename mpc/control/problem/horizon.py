@@ -10,7 +10,6 @@ import numpy as np
 import pandas as pd
 
 from mpc.errors import ControlError
-from mpc.scenario.grid import means_of_steps
 from thermal._types import FloatArray, IntArray
 from thermal.errors import describe
 
@@ -150,9 +149,11 @@ class Horizon:
         ndarray, shape (n_block, n_channel)
             On the blocks of the new start [unit of the channel].
         """
-        ends = np.append(self.block_starts, self.edges[-1])
+        edges = np.append(self.block_starts, self.edges[-1])
         held = np.append(self.block_starts, self.edges[-1] + seconds)
-        return means_of_steps(held, plan, ends + seconds)
+        summed = np.vstack([np.zeros(plan.shape[1]), np.cumsum(plan * np.diff(held)[:, None], axis=0)])
+        at = np.stack([np.interp(edges + seconds, held, column) for column in summed.T], axis=1)
+        return np.asarray(np.diff(at, axis=0) / np.diff(edges)[:, None])
 
     def stamps(self, now: pd.Timestamp) -> pd.DatetimeIndex:
         """Give the ends of the steps.

@@ -54,12 +54,12 @@ class Penalty(NamedTuple):
 
     Parameters
     ----------
-    value, slope, curvature : ndarray, shape (N, n_zone)
+    value, gradient, curvature : ndarray, shape (N, n_zone)
         [currency], [currency/K], [currency/K2].
     """
 
     value: FloatArray
-    slope: FloatArray
+    gradient: FloatArray
     curvature: FloatArray
 
 
@@ -218,8 +218,8 @@ class ControlProblem:
         size, weight, soft = np.abs(outside), data.comfort_price * self._comfort_hours, self.softness
         curved = size < soft
         value = weight * np.where(curved, 0.5 * size**2 / soft, size - 0.5 * soft)
-        slope = weight * np.clip(outside / soft, -1.0, 1.0)
-        return Penalty(value, slope, np.where(curved & (size > 0.0), weight / soft, 0.0))
+        gradient = weight * np.clip(outside / soft, -1.0, 1.0)
+        return Penalty(value, gradient, np.where(curved & (size > 0.0), weight / soft, 0.0))
 
     def terms(self, data: HorizonData, rollout: Rollout) -> CostTerms:
         """Cost of a roll-out.
@@ -284,7 +284,8 @@ class ControlProblem:
         sensitivity : Sensitivity
             Of it.
         """
-        comfort = self.penalty(data, rollout.zone[1:]).slope.ravel() @ sensitivity.zone[1:].reshape(-1, self.span.size)
+        zone = sensitivity.zone[1:].reshape(-1, self.span.size)
+        comfort = self.penalty(data, rollout.zone[1:]).gradient.ravel() @ zone
         moves = self.move_gradient(data, self.shares(rollout.plan))
         return np.asarray(self.energy_gradient(data, sensitivity) + comfort * self.span + moves)
 

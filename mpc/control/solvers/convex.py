@@ -196,8 +196,8 @@ class _Programme:
         values = {
             "start": data.state, "drive": predictor.drive(data), "before": problem.standing(data),
             "lower": data.lower - REFERENCE_TEMPERATURE, "upper": data.upper - REFERENCE_TEMPERATURE,
-            # the slope of a kelvin far outside is what a kelvin costs in a step
-            "weight": problem.penalty(data, data.upper + 100.0).slope,
+            # the gradient of a kelvin far outside is what a kelvin costs in a step
+            "weight": problem.penalty(data, data.upper + 100.0).gradient,
             "electricity": data.electricity_price * problem.hours, "gas": data.gas_price * problem.hours,
             "end": data.heat_value / KILOWATT_HOUR * predictor.heat_row,
         }  # fmt: skip

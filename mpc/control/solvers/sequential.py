@@ -36,16 +36,16 @@ class _Model(NamedTuple):
     shares: FloatArray
     zone: FloatArray
     zone_by_plan: FloatArray  # (N n_zone, D), by the plan itself
-    zone_slope: FloatArray  # (N n_zone, D), by shares of the ranges
+    zone_jacobian: FloatArray  # (N n_zone, D), by shares of the ranges
     means: FloatArray
-    mean_slope: FloatArray  # (n_window, D)
+    mean_jacobian: FloatArray  # (n_window, D)
     smooth: FloatArray
     gradient: FloatArray
     hessian: FloatArray
 
     def zone_at(self, step: FloatArray) -> FloatArray:
         """Temperatures after a step, shape (N, n_zone) [K]."""
-        return self.zone + (self.zone_slope @ step).reshape(self.zone.shape)
+        return self.zone + (self.zone_jacobian @ step).reshape(self.zone.shape)
 
 
 @dataclass(eq=False)
@@ -193,7 +193,7 @@ class SequentialSolver(Solver):
             energy = abs(point.terms.electricity) + abs(point.terms.gas)
             self._curvature = max(energy, 1e-3) / problem.shape[0] * np.eye(span.size)
         if last is not None:
-            felt = problem.penalty(data, point.rollout.zone[1:]).slope.ravel()
+            felt = problem.penalty(data, point.rollout.zone[1:]).gradient.ravel()
             bent = felt @ (zone_by_plan - last.zone_by_plan) * span
             self._learn(point.shares - last.shares, smooth - last.smooth + bent, self._curvature)
         moves = 2.0 * problem.move_weight * (problem.differences.T @ problem.differences)
@@ -217,7 +217,7 @@ class SequentialSolver(Solver):
     def _value(self, data: HorizonData, model: _Model, step: FloatArray) -> float:
         """Cost of a step according to the model, but for what is constant."""
         highest = data.peaks.so_far.copy()
-        np.maximum.at(highest, data.peaks.bucket, model.means + model.mean_slope @ step)
+        np.maximum.at(highest, data.peaks.bucket, model.means + model.mean_jacobian @ step)
         comfort = float(self.problem.penalty(data, model.zone_at(step)).value.sum())
         peaks = float(data.peaks.rate @ highest) / _KILOWATT
         return float(model.gradient @ step + 0.5 * step @ model.hessian @ step) + comfort + peaks
@@ -233,12 +233,12 @@ class SequentialSolver(Solver):
                 break
             penalty = self.problem.penalty(data, model.zone_at(step))
             curved = np.flatnonzero(penalty.curvature)
-            part = model.zone_slope[curved]
+            part = model.zone_jacobian[curved]
             bowl = (part * penalty.curvature.ravel()[curved, None]).T @ part
             hessian = np.zeros((n + n_peak, n + n_peak))
             hessian[:n, :n] = model.hessian + bowl
             hessian[range(n), range(n)] += 1e-9 * (1.0 + np.trace(hessian) / n)
-            gradient = model.gradient + penalty.slope.ravel() @ model.zone_slope - bowl @ step
+            gradient = model.gradient + penalty.gradient.ravel() @ model.zone_jacobian - bowl @ step
             found = solve_quadratic(
                 hessian, np.concatenate([gradient, data.peaks.rate]), rows, lower, upper, self.quadratic
             )
@@ -266,7 +266,7 @@ class SequentialSolver(Solver):
         rows = np.block([
             [np.eye(n), np.zeros((n, n_peak))],
             [problem.differences[limited], np.zeros((limited.size, n_peak))],
-            [model.mean_slope / _KILOWATT, -np.eye(n_peak)[data.peaks.bucket]],
+            [model.mean_jacobian / _KILOWATT, -np.eye(n_peak)[data.peaks.bucket]],
             [np.zeros((n_peak, n)), np.eye(n_peak)],
         ])  # fmt: skip
         parts = (

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from mpc.control.problem.assembly import ComfortOperation, expect, peak_data
+from mpc.control.problem.assembly import ComfortOperation, DemandCount, expect
 from mpc.control.problem.horizon import Horizon
 from mpc.errors import ScenarioError
 from mpc.scenario.forecast import Forecast
@@ -61,10 +61,12 @@ def test_windows_are_those_of_the_tariff() -> None:
     charge = DemandCharge([10.0, 4.0], np.where(np.arange(24) < 7, 1, 0) * np.ones((12, 1), dtype=int))
     ahead, now = Horizon.regular(2.0, 300.0, 2), START + pd.Timedelta(minutes=5)
     power = np.random.default_rng(0).uniform(1e3, 9e3, 25)  # the first step is over when the horizon begins
-    data = peak_data([charge], ahead, now, used=[power[0]])
+    count = DemandCount([charge])
+    count.add(power[0], now, 300.0)
+    data = count.ahead(ahead, now)
     grid = StepGrid(START, 300.0, 25)
     whole = charge.on(grid)
     peaks = data.peaks(power[1:])
     assert peaks == pytest.approx(whole.peaks(power))
     assert data.rate @ peaks / 1000.0 == pytest.approx(whole.cost(power))
-    assert peak_data([], ahead, now).rate.size == 0
+    assert DemandCount([]).ahead(ahead, now).rate.size == 0

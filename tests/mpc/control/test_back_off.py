@@ -10,7 +10,7 @@ from scipy.stats import binom, norm
 
 from calibration import DisturbanceModel, KalmanFilter
 from calibration.estimation.state_space import state_space
-from mpc.control.predictor.heat import HeatPredictor, heat_channels
+from mpc.control.predictor.heat import HeatChannel, HeatPredictor
 from mpc.control.problem.horizon import Horizon
 from mpc.control.problem.problem import ControlProblem
 from mpc.control.solvers.convex import LinearSolver
@@ -48,7 +48,7 @@ def drawn(kalman, modes, growth: ErrorGrowth, plan_heat: np.ndarray, data, rng) 
 
 def test_deviations_are_those_of_draws(kalman, modes, make_data) -> None:
     growth, rng = ErrorGrowth(2.0, 6 * 3600.0), np.random.default_rng(0)
-    problem = ControlProblem(HeatPredictor(modes, HORIZON, heat_channels(np.full(5, 3e3), np.zeros(5))))
+    problem = ControlProblem(HeatPredictor(modes, HORIZON, [HeatChannel("heating", z, 3e3) for z in range(5)]))
     data = make_data(problem, previous=np.zeros(5), disturbance=np.zeros(5))
     deviation = BackOff(kalman, modes, HORIZON, 0.1, outdoor=growth).deviation
     zones = drawn(kalman, modes, growth, np.zeros((12, 5)), data, rng)
@@ -69,7 +69,7 @@ def test_later_actions_stop_its_growth(kalman, modes) -> None:
 def test_bands_are_missed_as_often_as_was_asked_for(kalman, modes, make_data, violation) -> None:
     """Dear comfort and a heater just strong enough: zones sit on the narrowed edge, 500 futures miss the true one."""
     growth, rng = ErrorGrowth(2.0, 6 * 3600.0), np.random.default_rng(1)
-    predictor = HeatPredictor(modes, HORIZON, heat_channels(np.full(5, 2e4), np.zeros(5)), disturbance_time=3 * 3600.0)
+    predictor = HeatPredictor(modes, HORIZON, [HeatChannel("heating", z, 2e4) for z in range(5)], disturbance_time=3 * 3600.0)
     problem = ControlProblem(predictor, softness=0.005, terminal_time=0.0)
     data = make_data(problem, 270.0, 293.8, previous=np.zeros(5), comfort_price=np.full((12, 5), 100.0))
     data = replace(data, disturbance=np.zeros(5))
@@ -89,7 +89,7 @@ def test_bands_are_missed_as_often_as_was_asked_for(kalman, modes, make_data, vi
 
 
 def test_too_narrow_a_band_shrinks_to_its_middle(kalman, modes, make_data) -> None:
-    problem = ControlProblem(HeatPredictor(modes, HORIZON, heat_channels(np.full(5, 3e3), np.zeros(5))))
+    problem = ControlProblem(HeatPredictor(modes, HORIZON, [HeatChannel("heating", z, 3e3) for z in range(5)]))
     data = make_data(problem, previous=np.zeros(5), upper=np.full((12, 5), 294.16))
     narrowed = BackOff(kalman, modes, HORIZON, 0.01).narrow(data)
     np.testing.assert_allclose(narrowed.lower, 294.155)
@@ -100,7 +100,7 @@ def test_too_narrow_a_band_shrinks_to_its_middle(kalman, modes, make_data) -> No
 
 def test_a_margin_prices_the_expected_excess(modes, make_data) -> None:
     """With a softness of twice its width it is the mean penalty of a zone whose prediction has a normal error."""
-    channels = heat_channels(np.full(5, 3e3), np.zeros(5))
+    channels = [HeatChannel("heating", z, 3e3) for z in range(5)]
     deviation = 0.2
     width = 1.5 * deviation
     problem = ControlProblem(HeatPredictor(modes, HORIZON, channels), softness=2.0 * width, terminal_time=0.0)

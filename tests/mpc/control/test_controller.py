@@ -74,7 +74,7 @@ def test_a_closed_loop_without_offset(controller, modes, points, make_forecast) 
         twin.step(action)
     for _ in range(60):
         controller.observer.update(
-            twin.zone, controller._readings.read(twin.measure(points)).heat + 30.0, np.array([276.0])
+            twin.zone, points.read(twin.measure(points), controller._system).heat + 30.0, np.array([276.0])
         )
         twin.step(None)
     np.testing.assert_allclose(controller.observer.disturbance, 120.0, rtol=0.1)

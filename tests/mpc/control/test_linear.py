@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mpc.control.predictor.heat import HeatChannel, HeatPredictor, heat_channels
+from mpc.control.predictor.heat import HeatChannel, HeatPredictor
 from mpc.control.problem.horizon import Horizon, PeakData
 from mpc.control.problem.problem import ControlProblem
 from mpc.control.solvers.convex import LinearSolver
@@ -21,7 +21,8 @@ from mpc.errors import ControlError
 def problem(modes) -> ControlProblem:
     n = modes.output.shape[0]
     horizon = Horizon.growing([(1.0, 300.0), (3.0, 900.0)], [0.5, 0.5, 1.0, 1.0, 1.0])
-    channels = heat_channels(np.full(n, 2500.0), np.full(n, 2000.0))
+    channels = [HeatChannel("heating", zone, 2500.0) for zone in range(n)]
+    channels += [HeatChannel("cooling", zone, 2000.0) for zone in range(n)]
     return ControlProblem(HeatPredictor(modes, horizon, channels, disturbance_time=6 * 3600.0))
 
 
@@ -59,7 +60,7 @@ def test_no_move_is_better_nearby(problem, solver, make_data) -> None:
 
 def test_demand_charges_and_rates(problem, modes, make_data) -> None:
     n = modes.output.shape[0]
-    channels = tuple(replace(c, rate=1500.0) for c in heat_channels(np.zeros(n), np.full(n, 2000.0)))
+    channels = [HeatChannel("cooling", zone, 2000.0, rate=1500.0) for zone in range(n)]
     slow = ControlProblem(HeatPredictor(modes, problem.predictor.horizon, channels))
     count = len(slow.predictor.horizon)
     peaks = PeakData(

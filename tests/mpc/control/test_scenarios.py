@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from mpc.control.predictor.heat import HeatPredictor, heat_channels
+from mpc.control.predictor.heat import HeatChannel, HeatPredictor
 from mpc.control.problem.channels import Channel
 from mpc.control.problem.horizon import Horizon
 from mpc.control.problem.problem import ControlProblem
@@ -84,7 +84,7 @@ def test_common_blocks_and_rates_of_every_branch(make_problem, make_data) -> Non
 def heated(modes) -> ControlProblem:
     """One block: nothing can be corrected later."""
     horizon = Horizon.regular(1.5, 900.0, 1)
-    predictor = HeatPredictor(modes, horizon, heat_channels(np.full(5, 2e4), np.zeros(5)))
+    predictor = HeatPredictor(modes, horizon, [HeatChannel("heating", z, 2e4) for z in range(5)])
     return ControlProblem(predictor, softness=0.005, terminal_time=0.0, move_weight=0.0)
 
 
