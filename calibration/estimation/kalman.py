@@ -19,7 +19,7 @@ from thermal.model.replay import Inputs
 
 @dataclass(frozen=True)
 class Filtered:
-    """What the filter made of a stretch of telemetry; nothing is NaN but innovations of what was not measured.
+    """What the filter made of an interval of telemetry; nothing is NaN but innovations of what was not measured.
 
     Parameters
     ----------

@@ -21,7 +21,7 @@ Slopes = tuple[FloatArray, float, FloatArray]
 
 @dataclass(frozen=True)
 class Smoothed:
-    """Missing watts of every zone, and its temperature, from all of a stretch of telemetry.
+    """Missing watts of every zone, and its temperature, from all of an interval of telemetry.
 
     Parameters
     ----------
@@ -56,34 +56,6 @@ class Smoothed:
             raise FilterError(f"level: expected a probability between 0 and 1, came {level}")
         half = float(ndtri(0.5 * (1.0 + level))) * self.disturbance_deviation
         return self.disturbance - half, self.disturbance + half
-
-
-@dataclass(frozen=True)
-class _Spread:
-    """What a step's smoothing owes to covariances alone, not to the data: vectors over the zones.
-
-    Parameters
-    ----------
-    heat, zone : ndarray, shape (n_zone,)
-        Variances of the smoothed disturbance [W²] and zone temperature [K²].
-    drive : ndarray, shape (n_zone,)
-        Diagonal of N at the disturbances [1/W²].
-    carried : ndarray, shape (n_zone,)
-        Diagonal of ``N' L P`` at the disturbances, N' that of the next step [-].
-    noise : ndarray, shape (n_zone,)
-        Variance of the smoothed noise over that of the noise squared [1/K²].
-    """
-
-    heat: FloatArray
-    zone: FloatArray
-    drive: FloatArray
-    carried: FloatArray
-    noise: FloatArray
-
-    def near(self, other: _Spread, limit: float) -> bool:
-        """Whether all variances are within a share of another's."""
-        variances = [np.concatenate([s.heat, s.zone, s.drive]) for s in (self, other)]
-        return bool((np.abs(variances[0] - variances[1]) <= limit * variances[1]).all())
 
 
 def smooth(filtered: Filtered) -> Smoothed:
@@ -126,7 +98,7 @@ def smooth(filtered: Filtered) -> Smoothed:
         variances = _steady_variances(filtered)
     else:
         found, index, _ = spreads(filtered)
-        variances = np.array([[s.heat, s.zone] for s in found])[index]
+        variances = found[index, :2]
     deviations = np.sqrt(np.maximum(variances, 0.0))
     return Smoothed(filtered.stamps, heat, deviations[:, 0], zone, deviations[:, 1])
 
@@ -176,8 +148,12 @@ def costates(filtered: Filtered) -> tuple[FloatArray, FloatArray]:
     return slopes, noise
 
 
-def spreads(filtered: Filtered) -> tuple[list[_Spread], NDArray[np.int64], FloatArray]:
+def spreads(filtered: Filtered) -> tuple[FloatArray, NDArray[np.int64], FloatArray]:
     """Run N, the variance of the costates, backwards; a new one only until it is steady under the gain of its steps.
+
+    What a step's smoothing owes to covariances alone, not to the data, are five rows over the zones: variances of the
+    smoothed disturbance [W²] and zone temperature [K²]; N at the disturbances [1/W²]; ``N' L P`` there, N' that of the
+    next step [-]; and the variance of the smoothed noise over that of the noise squared [1/K²].
 
     Parameters
     ----------
@@ -187,20 +163,20 @@ def spreads(filtered: Filtered) -> tuple[list[_Spread], NDArray[np.int64], Float
     Returns
     -------
     tuple
-        What the steps need of it, which of these each step has (n_time,), and N of the first state (n, n).
+        The rows (n_found, 5, n_zone), which of these each step has (n_time,), and N of the first state (n, n).
     """
     kalman, gain_of = filtered.kalman, filtered.gain_of
-    found: list[_Spread] = []
+    found: list[FloatArray] = []
     index = np.empty(len(gain_of), dtype=np.int64)
     precision, settled, last = np.zeros((kalman.whole.n, kalman.whole.n)), False, -1
     for k in range(len(gain_of) - 1, -1, -1):
         if not (settled and gain_of[k] == last):
             spread, precision = _step(kalman.whole, filtered.gains[gain_of[k]], precision)
-            settled = gain_of[k] == last and spread.near(found[-1], kalman.tolerance)
+            settled = gain_of[k] == last and np.allclose(spread[:3], found[-1][:3], rtol=kalman.tolerance, atol=0.0)
             found.append(spread)
             last = gain_of[k]
         index[k] = len(found) - 1
-    return found, index, precision
+    return np.array(found), index, precision
 
 
 def averaged_deviation(filtered: Filtered, steps: int) -> FloatArray:
@@ -268,14 +244,13 @@ def _steady_variances(filtered: Filtered) -> FloatArray:
     variances = []
     for gain in filtered.gains:
         if gain.reach is not first.reach:
-            spread = _step(whole, gain, precision)[0]
-            variances.append([spread.heat, spread.zone])
+            variances.append(_step(whole, gain, precision)[0][:2])
             continue
         weight, seen = gain.weight, gain.seen
         middle = weight + weight @ inner @ weight
         informed = inner - 2.0 * inner @ weight @ seen + seen @ middle @ seen
         known = plain + 2.0 * _rows(across @ weight, observed) - _rows(observed @ middle, observed)
-        variances.append([known, np.diag(seen) - np.diag(informed)])
+        variances.append(np.array([known, np.diag(seen) - np.diag(informed)]))
     return np.array(variances)[filtered.gain_of]
 
 
@@ -284,8 +259,8 @@ def _rows(first: FloatArray, second: FloatArray) -> FloatArray:
     return np.asarray(np.einsum("ij,ij->i", first, second))
 
 
-def _step(whole: DisturbedSpace, gain: Gain, after: FloatArray) -> tuple[_Spread, FloatArray]:
-    """Spread of a step, and its N from that of the next step."""
+def _step(whole: DisturbedSpace, gain: Gain, after: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Rows of a step, see `spreads`, and its N from that of the next step."""
     r, observe = whole.space.order, whole.observation
     carried = whole.retreat(np.ascontiguousarray(whole.retreat(after).T))
     gained = gain.reach @ gain.weight
@@ -295,14 +270,14 @@ def _step(whole: DisturbedSpace, gain: Gain, after: FloatArray) -> tuple[_Spread
     before += observe.T @ (gain.weight @ observe - gained.T @ before)
     before = 0.5 * (before + before.T)
     filtered = gain.heat.T - gained @ gain.reach[r:].T
-    spread = _Spread(
-        heat=np.diag(gain.heat[:, r:]) - _rows(gain.heat @ before, gain.heat),
-        zone=np.diag(gain.seen) - _rows((before @ gain.reach).T, gain.reach.T),
-        drive=np.diag(before)[r:].copy(),
-        carried=_rows(after[r:], whole.advance(filtered).T),
-        noise=np.diag(gain.weight) + _rows(gained.T, across.T),
-    )
-    return spread, before
+    rows = [
+        np.diag(gain.heat[:, r:]) - _rows(gain.heat @ before, gain.heat),
+        np.diag(gain.seen) - _rows((before @ gain.reach).T, gain.reach.T),
+        np.diag(before)[r:],
+        _rows(after[r:], whole.advance(filtered).T),
+        np.diag(gain.weight) + _rows(gained.T, across.T),
+    ]
+    return np.array(rows), before
 
 
 def log_likelihood_slopes(filtered: Filtered) -> Slopes:
@@ -337,7 +312,7 @@ def _exact_slopes(filtered: Filtered) -> tuple[Slopes, FloatArray]:
     slopes, noise = costates(filtered)
     found, index, first = spreads(filtered)
     heat = slice(filtered.kalman.space.order, None)
-    drives, carried, noises = (np.array([getattr(s, n) for s in found])[index] for n in ("drive", "carried", "noise"))
+    drives, carried, noises = found[index, 2:].transpose(1, 0, 2)
     smoothed = smoothed_zones(filtered, slopes)[0]
     by_drive = 0.5 * (slopes[1:-1, heat] ** 2 - drives[1:]).sum(axis=0)
     by_keep = (slopes[1:-1, heat] * smoothed[:-1] - carried[:-1]).sum()

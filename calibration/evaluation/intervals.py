@@ -140,7 +140,7 @@ def alternating_intervals(case: Case) -> tuple[list[Interval], list[Interval]]:
 
 
 def _rest(stamps: pd.DatetimeIndex, given: Sequence[Interval]) -> Interval:
-    """Find the longer stretch of telemetry before or after the given intervals."""
+    """Find the longer part of the telemetry before or after the given intervals."""
     before, after = stamps[stamps < given[0].start], stamps[stamps > max(i.end for i in given)]
     longer = max((after, before), key=len)
     if len(longer) < 2:

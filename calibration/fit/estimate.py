@@ -26,14 +26,14 @@ ROUND_TOLERANCE = 0.05
 #: Drift of a reduced model beyond which it is made anew at the new θ [K].
 DRIFT_TOLERANCE = 0.005
 
-#: Change of the data's worth beyond which a round with the new one follows [-].
-_WORTH_TOLERANCE = 0.1
+#: Relative change of the effective sample size beyond which a round with the new one follows [-].
+_SIZE_TOLERANCE = 0.1
 
 #: Share by which numbers of the disturbance change in a round below which they are kept from there on [-].
 _SAME_DISTURBANCE = 0.05
 
-#: Times by which gradients of whitened residuals may be larger at convergence [-]: data that are worth a hundred times
-#: as much make them so at the same distance in standard errors.
+#: Times by which gradients of whitened residuals may be larger at convergence [-]: an effective sample a hundred times
+#: as large makes them so at the same distance in standard errors.
 _WHITENED_SLACK = 10.0
 
 #: Least standard deviation of an error [K]: sensors do not resolve less.
@@ -58,9 +58,9 @@ class Estimate:
     solve : LeastSquaresResult
         Last solve, on the estimation scale.
     problem : Problem
-        With the deviation and the worth of the errors that were found.
+        With the deviation and the effective size of the errors that were found.
     model : ReducedModel
-        Reduced model that serves θ.
+        Reduced model that is accurate at θ.
     iterations : int
         Ipopt iterations over all rounds.
     evaluations : int
@@ -113,7 +113,7 @@ def estimate(
     """Solve the problem from one start.
 
     Each round solves by Ipopt on a reduced model, then takes the deviation of the errors (and, with a tuner, how many
-    independent observations they are worth) for the next, and reduces anew where θ has moved too far from the
+    independent observations there are in them) for the next, and reduces anew where θ has moved too far from the
     basis; the rounds end when nothing moves.
 
     Parameters
@@ -127,9 +127,9 @@ def estimate(
     model : ReducedModel, optional
         Made at the start; saves reducing there.
     tuner : callable, optional
-        Finds the disturbance model that standard errors follow, and weights where it finds the errors worth less than
-        one a day and zone. It never makes them worth more: disturbances of zones are independent, while what a model
-        lacks is common to them, and priors must hold against it.
+        Finds the disturbance model that standard errors follow, and weights where it finds fewer independent errors
+        than one a day and zone. It never makes them count more: disturbances of zones are independent, while what a
+        model lacks is common to them, and priors must hold against it.
 
     Returns
     -------
@@ -209,9 +209,9 @@ class _Rounds:
             self.excess = max(1.0, unexplained(self.problem, self.model, theta, self.disturbance))
             self.known = precision(self.problem, self.model, theta, self.disturbance)
             most = replace(self.problem, effective=None).effective_size()
-            worth = min(most, self.known.effective(deviation) / self.excess)
-            self.problem = replace(self.problem, effective=worth)
-            still = still and abs(self.problem.effective_size() - before) < _WORTH_TOLERANCE * before
+            size = min(most, self.known.effective(deviation) / self.excess)
+            self.problem = replace(self.problem, effective=size)
+            still = still and abs(self.problem.effective_size() - before) < _SIZE_TOLERANCE * before
         self.settled = bool(still)
         return self.settled
 

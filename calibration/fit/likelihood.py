@@ -261,7 +261,7 @@ class InnovationsProblem(Problem):
         return 1.0
 
     def effective_size(self) -> float:
-        """Independent observations in the tuning intervals [-]: every innovation, unless they were found worth less."""
+        """Independent observations in the tuning intervals [-]: every innovation, unless fewer were found."""
         return float(sum(w.measured.sum() for w in self.whitenings)) if self.effective is None else self.effective
 
     def independent(self) -> NDArray[np.int64]:

@@ -1,6 +1,6 @@
 """How precise an estimate from multi-step errors is: their correlation, from unmeasured heat and sensor noise.
 
-Errors of a run grow from the same unmeasured heat, so that thousands of them are worth far fewer independent ones.
+Errors of a run grow from the same unmeasured heat, so that thousands of them hold far fewer independent ones.
 Least squares then is a composite likelihood: its curvature is not its precision. With B = J'J and M = J'ΣJ, where Σ is
 the covariance of the errors under a disturbance model, the weight w² = tr(A B) / tr(A M), A = (w²B + Λ)^-1, gives the
 data their information in the directions that they determine (Pauli, Racugno and Ventura 2011,
@@ -59,7 +59,7 @@ class Precision:
         return weight
 
     def effective(self, deviation: float) -> float:
-        """Independent observations that the errors are worth [-].
+        """Effective size of the errors [-].
 
         Parameters
         ----------

@@ -60,7 +60,7 @@ class Problem:
     deviation : float
         Standard deviation of a zone's prediction error [K].
     effective : float, optional
-        Independent observations that the errors are worth [-]; days times measured zones by default.
+        Effective size of the errors [-]; days times measured zones by default.
     loss : {"linear", "pseudo_huber"}
         What an error costs.
     shrinkage : mapping of str to float

@@ -68,7 +68,7 @@ class Candidate(Plain):
     success : bool
         Whether the solver converged.
     effective_size : float
-        Independent observations that the tuning residuals are worth [-].
+        Effective size of the tuning residuals [-].
     residuals : int
         Number of them.
     errors : Series

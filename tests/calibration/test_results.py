@@ -1,19 +1,41 @@
-"""Folders of results: refused, forced, and never half-written."""
+"""Results: plain values, tables and figures of them; folders of them are refused, forced, and never half-written."""
 
 from __future__ import annotations
 
 import json
 import math
 import os
+from collections.abc import Callable, Iterator
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
+from matplotlib import pyplot
 
-from calibration import CalibrationError
+from calibration import (
+    CalibrationError,
+    CalibrationResult,
+    CalibrationSettings,
+    CrossValidation,
+    Information,
+    Interval,
+    ModelSettings,
+    Power,
+    Profile,
+    Selection,
+    calibrate,
+    fisher_information,
+)
 from calibration.errors import ResultsExistError
-from calibration.results import check_results_folder, to_json, write_results
+from calibration.evaluation.settings import calibration_settings
+from calibration.fit.cross_validation import Fold, ParameterSpread
+from calibration.fit.selection import Candidate, compare_candidates
+from calibration.identifiability.power import ParameterPower
+from calibration.identifiability.profile import ProfileInterval
+from calibration.results import Result, check_results_folder, plain, to_json, write_results
+from thermal import PARAMETERS, Structure, load_bundled_case
 
 
 def table() -> pd.DataFrame:
@@ -131,3 +153,116 @@ def test_names_that_lead_elsewhere_are_refused(tmp_path: Path, name: str) -> Non
     with pytest.raises(CalibrationError, match="plain file names"):
         write_results(tmp_path / "results", {name: {}})
     assert list(tmp_path.iterdir()) == []
+
+
+# Shown
+
+
+@pytest.fixture(autouse=True)
+def figures_are_closed() -> Iterator[None]:
+    yield
+    pyplot.close("all")
+
+
+@cache
+def calibrated() -> CalibrationResult:
+    return calibrate(load_bundled_case(), settings={"dx": 1.5, "starts": 1})
+
+
+def information() -> Information:
+    pair = [PARAMETERS[name] for name in ("slab_coupling", "window_u_value")]
+    return fisher_information(pair, np.array([[9.0, 0.0], [0.0, 0.2]]), np.diag([p.prior_deviation**-2 for p in pair]))
+
+
+def power() -> Power:
+    parameters = (ParameterPower("slab_coupling", 0.3, 0.2, 0.4, "yes"), ParameterPower("window_u_value", 0.9, 0.8, 1.0, "no"))
+    return Power(parameters, information(), {"a": 0.3}, 2, 0)
+
+
+def profile() -> Profile:
+    values = np.array([1.0, 2.0, 3.0])
+    interval = ProfileInterval(0.9, 1.2, 2.8, False, False)
+    return Profile(PARAMETERS["slab_coupling"], True, 2.0, values, (values - 2.0) ** 2, np.ones((3, 1)), (interval,), 0.0, 0)
+
+
+def selection() -> Selection:
+    index = pd.date_range("2023-03-01T01:00", periods=240, freq="h", tz="Etc/GMT+5")
+    errors = [pd.Series(np.full(240, e), index=index) for e in (0.3, 0.2)]
+    return compare_candidates(
+        [Candidate(name, ModelSettings(), 9, 0.3, np.zeros(9), 0.0, float(e.mean()), True, 60.0, 3000, e)
+         for name, e in zip(("bare", "full"), errors, strict=True)]
+    )  # fmt: skip
+
+
+def cross_validation() -> CrossValidation:
+    stamps = load_bundled_case().stamps
+    days = [Interval(stamps[288 * k], stamps[288 * k + 287]) for k in range(3)]
+    folds = tuple(Fold((day,), (), 0.2 + 0.1 * k, 0.0) for k, day in enumerate(days))
+    return CrossValidation(folds, 0.3, 0.05, (ParameterSpread("slab_coupling", 0.1, 0.1, 0.1, False),))
+
+
+SHOWN: dict[str, tuple[Callable[[], Result], str, tuple[str, ...]]] = {
+    "calibration": (calibrated, "bundled_case, held-out MAE", ("value", "low90", "high90", "standard_error")),
+    "evaluation": (lambda: calibrated().calibrated["held_out"], "MAE 0.", ("mae", "bias")),
+    "information": (information, "1 of 2 parameters determined", ("ratio", "status")),
+    "power": (power, "will tell 1 of 2 parameters", ("ratio", "told")),
+    "profile": (profile, "slab_coupling 2 ", ("deviance",)),
+    "selection": (selection, "full preferred of bare, full", ("held_out_mae", "log_evidence")),
+    "cross-validation": (cross_validation, "MAE 0.300 ± 0.050 K over 3 folds", ("mae", "bias")),
+}
+
+
+@pytest.mark.parametrize("name", SHOWN)
+def test_a_result_shows_itself(name: str) -> None:
+    make, line, columns = SHOWN[name]
+    found = make()
+    assert repr(found).startswith(f"<{type(found).__name__}: ") and line in repr(found)
+    assert len(repr(found)) < 200 and "\n" not in repr(found)
+    table = found.to_frame()
+    assert set(columns) <= set(table.columns) and len(table) >= 1
+    assert "<table" in found._repr_html_() and line in found._repr_html_()
+    axes = found.plot()
+    assert axes.get_xlabel() and axes.has_data()
+    assert found.plot(axes) is axes
+    json.dumps(found.to_dict(), allow_nan=False)
+
+
+def test_numbers_of_the_tables_are_those_of_the_result() -> None:
+    found = calibrated()
+    table = found.to_frame()
+    assert list(table.index) == [p.name for p in found.parameters]
+    assert table["value"].to_dict() == {p.name: p.value for p in found.parameters}
+    for p in found.parameters:
+        if p.interval90 is not None:
+            assert tuple(table.loc[p.name, ["low90", "high90"]]) == p.interval90
+    held_out = found.calibrated["held_out"]
+    assert held_out.to_frame()["mae"].to_dict() == {z: e["mae"] for z, e in held_out.by_zone().items()}
+    growth = held_out.growth()
+    assert growth.iloc[-1] == pytest.approx(held_out.metrics.mae, rel=1e-9)
+    assert growth.index[-1] == 6.0 and growth.iloc[0] < growth.iloc[-1]
+
+
+def test_plain_values_are_those_of_the_fields() -> None:
+    spread = ParameterSpread("slab_coupling", 0.1, float("nan"), 0.1, False)
+    assert plain((spread,)) == {
+        "slab_coupling": {"deviation": 0.1, "jackknife_error": None, "standard_error": 0.1, "moves": False}
+    }
+    assert plain(ProfileInterval(0.9, 1.0, 2.0, False, True)) == {
+        "level": 0.9, "lower": 1.0, "upper": 2.0, "open_lower": False, "open_upper": True
+    }  # fmt: skip
+    start, end = load_bundled_case().stamps[[0, 9]]
+    assert Interval(start, end).to_dict() == {"start": start.isoformat(), "end": end.isoformat()}
+
+
+def test_settings_come_by_name_or_as_objects() -> None:
+    wanted = CalibrationSettings(dx=1.0, effects={"solar_gain": ()}, starts=1)
+    assert calibration_settings({"dx": 1.0, "effects": ["solar_gain"], "starts": 1}) == wanted
+    assert calibration_settings(wanted) == wanted
+    assert calibration_settings(wanted, {"seed": 3}).seed == 3
+    assert wanted.model == ModelSettings(dx=1.0, effects={"solar_gain": ()})
+    assert calibration_settings(wanted.model) == CalibrationSettings(dx=1.0, effects={"solar_gain": ()})
+    assert calibration_settings({"structure": {"furniture": False}}).structure == Structure(furniture=False)
+    with pytest.raises(CalibrationError, match="calibrate takes no 'dz'; the nearest valid one is 'dx'"):
+        calibration_settings({"dz": 1.0})
+    with pytest.raises(CalibrationError, match="starts: expected at least 1"):
+        CalibrationSettings(starts=0)
