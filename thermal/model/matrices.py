@@ -269,9 +269,9 @@ def congruent(rows: FloatArray, weight: FloatArray) -> FloatArray:
     Parameters
     ----------
     rows : ndarray, shape (n, r)
-        V.
+        V [-].
     weight : ndarray, shape (n,)
-        w, not negative.
+        w, not negative [any].
     """
     scaled = np.sqrt(weight)[:, None] * rows
     return np.asarray(scaled.T @ scaled)

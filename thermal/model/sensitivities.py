@@ -35,7 +35,7 @@ def convolution_sums(stay: FloatArray, drive: FloatArray, ends: NDArray[np.int64
     stay : ndarray, shape (r,)
         What a step leaves of each mode [-].
     drive : ndarray, shape (n_time, ...)
-        What drives, step by step.
+        What drives, step by step [any].
     ends : ndarray of int
         The numbers of steps n, increasing.
 
@@ -66,7 +66,7 @@ def all_convolution_sums(stay: FloatArray, drive: FloatArray, ends: NDArray[np.i
     stay : ndarray, shape (r,)
         What a step leaves of each mode [-].
     drive : ndarray, shape (n_time, n_drive)
-        What drives, step by step.
+        What drives, step by step [any].
     ends : ndarray of int
         The numbers of steps n, increasing.
     """
@@ -201,9 +201,9 @@ class ModalSensitivities:
         rows : slice
             The modes.
         quotient : ndarray, shape (r, r)
-            `divided_differences` of f or g.
+            `divided_differences` of f or g [their units per s].
         gain : ndarray, shape (r,), optional
-            g of the modes; f by default.
+            g of the modes [-]; f by default.
 
         Returns
         -------
