@@ -124,20 +124,20 @@ def rollout(
 def _sparse_rollout(model: SymbolicModel, data: RolloutData, step: float, scheme: Scheme) -> ca.Function:
     """Roll-out behind a Callback, with exact forward sensitivities as its Jacobian."""
 
-    def run(theta: FloatArray, slopes: bool) -> tuple[FloatArray, FloatArray]:
+    def run(theta: FloatArray, sensitivities: bool) -> tuple[FloatArray, FloatArray]:
         """Zone means (n_zone, N), and their sensitivities (n_zone N, n_parameter) in CasADi's column-major order."""
-        stepper = Stepper(model.matrices(theta, slopes), step, scheme)
+        stepper = Stepper(model.matrices(theta, sensitivities), step, scheme)
         states = data.initial[:, None]
-        moved = np.zeros((states.size, theta.size)) if slopes else None
-        means, mean_slopes = [], []
+        moved = np.zeros((states.size, theta.size)) if sensitivities else None
+        means, mean_sensitivities = [], []
         for boundary, heat, airflow in zip(data.boundary, data.heat, data.airflow, strict=True):
-            states, mean, moved, mean_slope = stepper.advance(
+            states, mean, moved, mean_moved = stepper.advance(
                 states, boundary[:, None], heat[:, None], airflow[:, None], moved
             )
             means.append(mean[:, 0])
-            if mean_slope is not None:
-                mean_slopes.append(mean_slope)
-        return np.array(means).T, np.concatenate(mean_slopes) if slopes else np.empty((0, theta.size))
+            if mean_moved is not None:
+                mean_sensitivities.append(mean_moved)
+        return np.array(means).T, np.concatenate(mean_sensitivities) if sensitivities else np.empty((0, theta.size))
 
     count, n_zone = data.heat.shape
     size = len(model.network.parameters)
