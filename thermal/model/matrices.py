@@ -83,6 +83,10 @@ class SymbolicModel:
         else:
             self._project(projection)
 
+    def __repr__(self) -> str:
+        n, network = self._uniform.size, self.network
+        return f"{type(self).__name__}({n} states, {len(network.zones)} zones, {len(network.parameters)} parameters)"
+
     def _project(self, v: FloatArray) -> None:
         self.class_flows = [_projected_class(c, v, self.network.n_boundary) for c in self._faces]
         self.class_masses = [congruent(v[c.node], c.weight) for c in self.network.capacities]
