@@ -91,12 +91,12 @@ def pilot() -> Building:
 def eight_parameters(model: SymbolicModel) -> Matrices:
     """Assemble the model at its start, with the slopes of the paper's parameters only."""
     names = [p.name for p in model.network.parameters]
-    matrices = model.matrices(model.network.start(), slopes=True)
+    matrices = model.matrices(model.network.start(), sensitivities=True)
     chosen = [names.index(name) for name in PARAMETERS]
     return replace(
         matrices,
-        capacity_slopes=[matrices.capacity_slopes[i] for i in chosen],
-        flow_slopes=[matrices.flow_slopes[i] for i in chosen],
+        capacity_sensitivities=[matrices.capacity_sensitivities[i] for i in chosen],
+        flow_sensitivities=[matrices.flow_sensitivities[i] for i in chosen],
     )
 
 
@@ -140,7 +140,9 @@ class Replay:
         """Six hours with forward sensitivities; zone means' slopes at the end, shape (n_zone, n_parameter)."""
         states, slopes = self.states, np.zeros((self.states.shape[0], n_parameter))
         for row in range(N_STEP):
-            states, _, slopes, mean = self.stepper.advance(states, self.boundary[row], self.heat[row], slopes=slopes)
+            states, _, slopes, mean = self.stepper.advance(
+                states, self.boundary[row], self.heat[row], sensitivities=slopes
+            )
         return mean
 
 

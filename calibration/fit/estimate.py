@@ -192,7 +192,7 @@ class _Rounds:
         """Weigh and reduce anew; True when another round would change nothing."""
         theta = self.problem.theta(z)
         still = self.moved < ROUND_TOLERANCE * np.sqrt(z.size) and self.last is not None and self.last.success
-        if not self.model.serves(theta, DRIFT_TOLERANCE):
+        if not self.model.is_accurate(theta, DRIFT_TOLERANCE):
             # both ends of a move where it does not come to rest: the optimum can jump to and fro between two bases
             both = number > 2 and not self.large
             self.model = reduced_model(self.problem.grid, [theta, self.model.theta] if both else [theta])
@@ -219,7 +219,7 @@ class _Rounds:
         """Collect what was found, with its covariance."""
         if self.last is None:  # pragma: no cover - there is at least one round
             raise RuntimeError
-        if self.interrupted and not self.model.serves(self.problem.theta(z), DRIFT_TOLERANCE):
+        if self.interrupted and not self.model.is_accurate(self.problem.theta(z), DRIFT_TOLERANCE):
             self.model = reduced_model(self.problem.grid, [self.problem.theta(z)])
         jacobian = self.last.jacobian
         covariance = np.asarray(np.linalg.inv(jacobian.T @ jacobian), dtype=float)

@@ -163,8 +163,8 @@ def _pencil(n_zone: int = 3, n: int = 9, seed: int = 0) -> Matrices:
         heating=observation.T.copy(),
         observation=observation,
         uniform=np.ones(n),
-        capacity_slopes=[],
-        flow_slopes=[],
+        capacity_sensitivities=[],
+        flow_sensitivities=[],
     )
 
 

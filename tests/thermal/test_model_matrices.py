@@ -131,11 +131,11 @@ def test_derivatives_of_classes_are_those_of_finite_differences(name: str) -> No
     """dκ/dθ and dc/dθ by CasADi, to 1e-6 of κ/θ and c/θ (and in fact to 1e-9)."""
     model = model_of(name)
     for theta in thetas(model)[::3]:
-        m = model.matrices(theta, slopes=True)
+        m = model.matrices(theta, sensitivities=True)
         value = [np.asarray(v).ravel() for v in model.classes(theta)]
         for j in range(theta.size):
             for k, (slopes, terms) in enumerate(
-                ((m.flow_slopes, model.class_flows), (m.capacity_slopes, model.class_masses))
+                ((m.flow_sensitivities, model.class_flows), (m.capacity_sensitivities, model.class_masses))
             ):
                 wanted = central(lambda t, k=k: np.asarray(model.classes(t)[k]).ravel(), theta, j)
                 difference = slopes[j] - sum(w * term for w, term in zip(wanted, terms, strict=True))
@@ -148,12 +148,12 @@ def test_slopes_of_the_matrices_are_those_of_finite_differences(name: str) -> No
     """Entry by entry, to 1e-6 of the entry over θ."""
     model = model_of(name)
     theta = thetas(model)[3]
-    m = model.matrices(theta, slopes=True)
-    assert len(m.flow_slopes) == len(m.capacity_slopes) == theta.size
+    m = model.matrices(theta, sensitivities=True)
+    assert len(m.flow_sensitivities) == len(m.capacity_sensitivities) == theta.size
     for j in range(theta.size):
         flow = central(lambda t: model.matrices(t).flow.toarray(), theta, j)
         capacity = central(lambda t: model.matrices(t).capacity.toarray(), theta, j)
-        for found, wanted, whole in ((m.flow_slopes[j], flow, m.flow), (m.capacity_slopes[j], capacity, m.capacity)):
+        for found, wanted, whole in ((m.flow_sensitivities[j], flow, m.flow), (m.capacity_sensitivities[j], capacity, m.capacity)):
             assert np.abs(found.toarray() - wanted).max() < 1e-6 * np.abs(whole.toarray()).max() / theta[j]
             strong = np.abs(wanted) > 1e-3 * np.abs(whole.toarray()) / theta[j]
             np.testing.assert_allclose(found.toarray()[strong], wanted[strong], rtol=1e-6)
@@ -162,14 +162,14 @@ def test_slopes_of_the_matrices_are_those_of_finite_differences(name: str) -> No
 @pytest.mark.parametrize("name", MODELS)
 def test_every_parameter_matters(name: str) -> None:
     model = model_of(name)
-    m = model.matrices(model.network.start(), slopes=True)
-    for p, flow, capacity in zip(model.network.parameters, m.flow_slopes, m.capacity_slopes, strict=True):
+    m = model.matrices(model.network.start(), sensitivities=True)
+    for p, flow, capacity in zip(model.network.parameters, m.flow_sensitivities, m.capacity_sensitivities, strict=True):
         assert flow.nnz or capacity.nnz, p.name
 
 
 def test_matrices_without_slopes_have_none() -> None:
     m = model_of("plan").matrices(model_of("plan").network.start())
-    assert m.flow_slopes == m.capacity_slopes == []
+    assert m.flow_sensitivities == m.capacity_sensitivities == []
 
 
 def test_theta_of_another_length_is_refused_with_the_names() -> None:
@@ -200,7 +200,7 @@ def test_projection_keeps_the_model_affine_in_the_classes() -> None:
     basis = np.linalg.qr(np.random.default_rng(1).standard_normal((model.network.n_node, 9)))[0]
     small = SymbolicModel(model.network, basis)
     for theta in thetas(model):
-        whole, found = model.matrices(theta, slopes=True), small.matrices(theta, slopes=True)
+        whole, found = model.matrices(theta, sensitivities=True), small.matrices(theta, sensitivities=True)
         n = whole.n
         np.testing.assert_allclose(found.flow[:, :9], basis.T @ (whole.flow[:, :n] @ basis), atol=1e-9)
         np.testing.assert_allclose(found.flow[:, 9:], basis.T @ whole.flow[:, n:].toarray(), atol=1e-9)
@@ -208,5 +208,5 @@ def test_projection_keeps_the_model_affine_in_the_classes() -> None:
         np.testing.assert_allclose(found.heating, basis.T @ whole.heating.toarray(), atol=1e-12)
         np.testing.assert_allclose(found.observation, whole.observation @ basis, atol=1e-12)
         np.testing.assert_allclose(found.uniform, basis.T @ np.ones(n), atol=1e-12)
-        for a, b in zip(found.flow_slopes, whole.flow_slopes, strict=True):
+        for a, b in zip(found.flow_sensitivities, whole.flow_sensitivities, strict=True):
             np.testing.assert_allclose(a[:, :9], basis.T @ (b[:, :n] @ basis), atol=1e-9)

@@ -30,22 +30,22 @@ def inputs(seed: int = 0) -> tuple[FloatArray, FloatArray]:
 
 def starting(m: Matrices) -> tuple[FloatArray, FloatArray]:
     rng = np.random.default_rng(4)
-    p = len(m.flow_slopes)
+    p = len(m.flow_sensitivities)
     shape = 0.1 * m.uniform[:, None]
     return 20.0 * m.uniform[:, None] + shape * rng.random(RUNS), shape * rng.random(p * RUNS)
 
 
 @pytest.mark.parametrize("scheme", [IMPLICIT_EULER, TR_BDF2], ids=["implicit_euler", "tr_bdf2"])
 def test_free_runs_are_those_of_the_generic_stepper(scheme: Scheme) -> None:
-    m = model().matrices(model().theta, slopes=True)
+    m = model().matrices(model().theta, sensitivities=True)
     boundary, heat = inputs()
     states, slopes = starting(m)
     keep = np.array([1, 7, STEPS])
     means, moved = m.modal.run(states, boundary, heat, keep, 300.0, scheme, slopes)
-    stepper, p = Stepper(m, 300.0, scheme), len(m.flow_slopes)
+    stepper, p = Stepper(m, 300.0, scheme), len(m.flow_sensitivities)
     seen = 0
     for k in range(STEPS):
-        states, mean, slopes, mean_slopes = stepper.advance(states, boundary[k], heat[k], slopes=slopes)
+        states, mean, slopes, mean_slopes = stepper.advance(states, boundary[k], heat[k], sensitivities=slopes)
         if k + 1 in keep:
             np.testing.assert_allclose(means[:, seen], mean.T, atol=1e-9)
             assert mean_slopes is not None
@@ -58,12 +58,12 @@ def test_free_runs_are_those_of_the_generic_stepper(scheme: Scheme) -> None:
 
 @pytest.mark.parametrize("free", [(), (1, 3)], ids=["all held", "two zones free"])
 def test_held_runs_are_those_of_the_generic_stepper(free: tuple[int, ...]) -> None:
-    m = model().matrices(model().theta, slopes=True)
+    m = model().matrices(model().theta, sensitivities=True)
     rng = np.random.default_rng(2)
     boundary, heat = (v[:, :, 0] for v in inputs())
     zone = 20.0 + rng.random((STEPS, 5))
     zone[:, list(free)] = np.nan
-    states, slopes = (v[:, :n] for v, n in zip(starting(m), (1, len(m.flow_slopes)), strict=True))
+    states, slopes = (v[:, :n] for v, n in zip(starting(m), (1, len(m.flow_sensitivities)), strict=True))
     keep = np.array([0, 4, STEPS - 1])
     found, moved = m.modal.hold(states, boundary, zone, heat, keep, 300.0, slopes)
     wanted, wanted_moved = Stepper(m, 300.0).hold_many(states, boundary, zone, keep, slopes, heat)
@@ -86,7 +86,7 @@ def test_sensitivities_are_differences(scheme: Scheme) -> None:
         m = model().matrices(at)
         return m.modal.run(19.0 * np.tile(m.uniform[:, None], RUNS), boundary, heat, keep, 300.0, scheme)[0]
 
-    m = model().matrices(theta, slopes=True)
+    m = model().matrices(theta, sensitivities=True)
     none = np.zeros((m.n, len(theta) * RUNS))
     _, moved = m.modal.run(19.0 * np.tile(m.uniform[:, None], RUNS), boundary, heat, keep, 300.0, scheme, none)
     assert moved is not None

@@ -40,8 +40,8 @@ def test_they_are_the_runs_one_by_one(scheme: Scheme) -> None:
 
 def test_matrices_and_their_runs_go_with_the_last_who_uses_them() -> None:
     """An evaluation's matrices are large; in a cycle they would wait for the collector."""
-    m = model().matrices(model().theta, slopes=True)
-    assert len(m.modal.slopes) == len(m.flow_slopes)
+    m = model().matrices(model().theta, sensitivities=True)
+    assert len(m.modal.sensitivities) == len(m.flow_sensitivities)
     left = weakref.ref(m.modal)
     gc.disable()
     try:

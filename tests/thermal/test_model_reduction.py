@@ -117,8 +117,8 @@ def test_drift_grows_as_theta_moves_away() -> None:
     assert drifts[0] < 2e-3 < drifts[-1]
     assert drifts[0] < drifts[1] < drifts[2]
     for spread, drift in zip((0.3, 0.5, 1.0), drifts, strict=True):
-        assert small.serves(draw(1, spread), 1.001 * drift)
-        assert not small.serves(draw(1, spread), 0.999 * drift)
+        assert small.is_accurate(draw(1, spread), 1.001 * drift)
+        assert not small.is_accurate(draw(1, spread), 0.999 * drift)
 
 
 def test_impossible_wishes_are_refused() -> None:

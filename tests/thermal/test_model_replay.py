@@ -125,7 +125,7 @@ def test_spin_up_is_holding_the_zones_step_by_step(name: str) -> None:
 
 def test_states_at_several_starts_are_those_of_spin_ups_apart() -> None:
     model, inputs, theta = model_of("plan"), inputs_of("plan"), theta_of("plan")
-    matrices = model.matrices(theta, slopes=True)
+    matrices = model.matrices(theta, sensitivities=True)
     both, both_slopes = spin_up(matrices, inputs, 5, np.array([300, 390]))
     for k, at in enumerate((300, 390)):
         alone, slopes = spin_up(matrices, inputs, 5, np.array([at]))
@@ -164,7 +164,7 @@ def test_slopes_of_a_spin_up_are_those_of_finite_differences(name: str, dense: b
     model, inputs, theta, at = model_of(name), inputs_of(name), theta_of(name), np.array([150, 220])
     if dense:
         model = SymbolicModel(model.network, np.eye(model.network.n_node))
-    _, slopes = spin_up(model.matrices(theta, slopes=True), inputs, 0, at)
+    _, slopes = spin_up(model.matrices(theta, sensitivities=True), inputs, 0, at)
     assert slopes is not None
     slopes = slopes.reshape(model.network.n_node, theta.size, at.size)
     for j in range(theta.size):
@@ -232,7 +232,7 @@ def test_slopes_of_spin_up_and_free_run_are_those_of_finite_differences(name: st
         states, _ = spin_up(matrices, inputs, 0, starts)
         return free_runs(matrices, inputs, starts, keep, states, scheme=SCHEMES[scheme])[0]
 
-    matrices = model.matrices(theta, slopes=True)
+    matrices = model.matrices(theta, sensitivities=True)
     states, moved = spin_up(matrices, inputs, 0, starts)
     found, slopes = free_runs(
         matrices, inputs, starts, keep, states, moved, scheme=SCHEMES[scheme]

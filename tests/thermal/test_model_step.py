@@ -234,7 +234,7 @@ def test_source_of_a_directed_airflow_loses_nothing_by_it() -> None:
 def test_runs_side_by_side_are_the_runs_alone(scheme: str) -> None:
     model = model_of("table")
     network = model.network
-    stepper = Stepper(model.matrices(network.start(), slopes=True), 300.0, SCHEMES[scheme])
+    stepper = Stepper(model.matrices(network.start(), sensitivities=True), 300.0, SCHEMES[scheme])
     p = len(network.parameters)
     rng = np.random.default_rng(6)
     states, slopes = 290.0 + rng.random((network.n_node, 2)), rng.random((network.n_node, p * 2))
@@ -298,7 +298,7 @@ def test_holding_many_steps_dense_is_holding_them_sparse(name: str, free: bool) 
     slopes = 1e-2 * rng.random((network.n_node, theta.size)) / theta
     found = []
     for model in (sparse, dense):
-        stepper = Stepper(model.matrices(theta, slopes=True), 300.0)
+        stepper = Stepper(model.matrices(theta, sensitivities=True), 300.0)
         found.append(stepper.hold_many(start, boundary, zone, keep, slopes))
         without = Stepper(model.matrices(theta), 300.0).hold_many(start, boundary, zone, keep)
         np.testing.assert_allclose(without[0], found[-1][0], rtol=0, atol=1e-12)
@@ -313,7 +313,7 @@ def test_holding_many_steps_dense_is_holding_them_sparse(name: str, free: bool) 
 def test_holding_many_steps_is_holding_one_after_the_other() -> None:
     model = model_of("plan 1.0")
     network = model.network
-    stepper = Stepper(model.matrices(network.start(), slopes=True), 300.0)
+    stepper = Stepper(model.matrices(network.start(), sensitivities=True), 300.0)
     rng = np.random.default_rng(2)
     zone, boundary = rng.random((6, 2)), rng.random((6, 1))
     states, slopes = np.zeros((network.n_node, 1)), np.zeros((network.n_node, len(network.parameters)))

@@ -72,6 +72,7 @@ def test_names_say_what_goes_in_and_out() -> None:
     assert system.output_labels == [f"temperature of {zone}" for zone in network.zones]
     assert system.input_labels[0] == "temperature of outdoor" and system.input_labels[-1] == "heat of F1_S"
     assert len(system.input_labels) == 1 + len(network.signals) + len(network.zones)
+    assert repr(reduced()).startswith("ReducedModel(") and repr(modes()).startswith("ModalModel(")
     assert system.dt == 0 and reduced().to_control(step=60.0).dt == 60.0
 
 

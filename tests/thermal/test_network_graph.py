@@ -93,11 +93,11 @@ def test_sources_are_columns_that_no_temperature_moves() -> None:
     heating = sp.csr_matrix(([1.0], ([0], [0])), shape=(2, 1))
     network = graph.finish(heating.T.tocsr(), heating, ())
     assert [s.name for s in network.signals] == ["sun", "fire"]
-    matrices = SymbolicModel(network).matrices(np.array([0.5]), slopes=True)
+    matrices = SymbolicModel(network).matrices(np.array([0.5]), sensitivities=True)
     # nodes room, mass; outdoor, sun, fire
     wanted = [[6.0, -6.0, 0.0, -2.5, 0.0], [-6.0, 13.0, -7.0, 0.0, -5.5]]
     np.testing.assert_allclose(matrices.flow.toarray(), wanted, rtol=1e-14, atol=1e-14)
-    np.testing.assert_allclose(matrices.flow_slopes[0].toarray()[:, 3:], [[-5.0, 0.0], [0.0, -11.0]], atol=1e-14)
+    np.testing.assert_allclose(matrices.flow_sensitivities[0].toarray()[:, 3:], [[-5.0, 0.0], [0.0, -11.0]], atol=1e-14)
     assert matrices.n_boundary == 3 and matrices.n_signal == 2
 
 

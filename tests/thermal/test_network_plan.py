@@ -328,10 +328,10 @@ def test_parameter_of_a_zone_acts_there_alone(name: str) -> None:
     # and it is the derivative of the global parameter that the zones share
     slopes = []
     for network, wanted in ((one, [name]), (own, [f"{name}@A", f"{name}@B"])):
-        m = SymbolicModel(network).matrices(network.start(), slopes=True)
+        m = SymbolicModel(network).matrices(network.start(), sensitivities=True)
         at = [[p.name for p in network.parameters].index(w) for w in wanted]
-        slopes.append(sum(m.flow_slopes[i].toarray() for i in at))
-        slopes.append(sum(m.capacity_slopes[i].toarray() for i in at))
+        slopes.append(sum(m.flow_sensitivities[i].toarray() for i in at))
+        slopes.append(sum(m.capacity_sensitivities[i].toarray() for i in at))
     np.testing.assert_allclose(slopes[0], slopes[2], atol=1e-9)
     np.testing.assert_allclose(slopes[1], slopes[3], atol=1e-9)
 

@@ -140,8 +140,8 @@ def test_a_parameter_is_there_when_its_part_is(name: str, structure: Structure) 
     assert ("radiant" in network.kind) == structure.radiant
     assert ("furniture" in network.kind) == structure.furniture
     model = SymbolicModel(network)
-    m = model.matrices(network.start(), slopes=True)
-    moved = [abs(a).sum() + abs(b).sum() for a, b in zip(m.flow_slopes, m.capacity_slopes, strict=True)]
+    m = model.matrices(network.start(), sensitivities=True)
+    moved = [abs(a).sum() + abs(b).sum() for a, b in zip(m.flow_sensitivities, m.capacity_sensitivities, strict=True)]
     assert all(change > 0 for change in moved), "a parameter that nothing depends on"
 
 

@@ -298,8 +298,8 @@ def test_scopes_of_a_zone_table_give_each_zone_its_own_film() -> None:
     names = [p.name for p in network.parameters]
     assert {"interior_film_coefficient@room", "interior_film_coefficient@hall"} <= set(names)
     model = SymbolicModel(network)
-    m = model.matrices(network.start(), slopes=True)
-    only_hall = m.flow_slopes[names.index("interior_film_coefficient@hall")].toarray()
+    m = model.matrices(network.start(), sensitivities=True)
+    only_hall = m.flow_sensitivities[names.index("interior_film_coefficient@hall")].toarray()
     room_air = np.flatnonzero((network.kind == "air") & (network.zone == 0))
     assert not only_hall[room_air].any()
     assert only_hall.any()

@@ -31,7 +31,7 @@ class Normalisation:
     usual : mapping of str to tuple of float
         Temperature of each zone by hour, 24 values of a day off and 24 of a working day [K].
     people : float, optional
-        Largest number of people in the building [1]; None where nobody counts them.
+        Largest number of people in the building [-]; None where nobody counts them.
     wind : float, optional
         Mean wind speed [m/s]; None where it is not measured.
     flow, heat : mapping of str to float
@@ -124,7 +124,7 @@ def usual_temperatures(zone: pd.DataFrame) -> dict[str, tuple[float, ...]]:
 
 
 def counted_people(case: Case) -> pd.Series | None:
-    """Add up the people in the building, NaN where it is missing [1]; None where nobody counts them.
+    """Add up the people in the building, NaN where it is missing [-]; None where nobody counts them.
 
     Parameters
     ----------

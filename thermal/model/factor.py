@@ -52,7 +52,7 @@ class Pencil:
         Zone means.
     uniform : ndarray, shape (n,)
         The state in which every volume is at 1 K [K].
-    capacity_slopes, flow_slopes : list of matrices
+    capacity_sensitivities, flow_sensitivities : list of matrices
         dC/dθ_j and d[K, -B]/dθ_j, one a parameter.
     reading : matrix, shape (n_zone, n), optional
         What the zones' sensors read where these lag behind; see `output`.
@@ -67,8 +67,8 @@ class Pencil:
     heating: Matrix
     observation: Matrix
     uniform: FloatArray
-    capacity_slopes: list[Matrix]
-    flow_slopes: list[Matrix]
+    capacity_sensitivities: list[Matrix]
+    flow_sensitivities: list[Matrix]
     reading: Matrix = None
     n_signal: int = 0
     airflows: tuple[tuple[int, int], ...] = ()

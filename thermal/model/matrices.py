@@ -67,7 +67,7 @@ class SymbolicModel:
         theta = network.symbols
         jacobians = [ca.densify(ca.jacobian(e, theta)) for e in (kappa, heat)]
         self.classes = ca.Function("classes", [theta], [kappa, heat], ["theta"], ["conductance", "capacity"])
-        self._slopes = ca.Function("slopes", [theta], jacobians)
+        self._jacobians = ca.Function("jacobians", [theta], jacobians)
         self._heating: Matrix = network.heating
         self._observation: Matrix = network.observation
         self._reading: Matrix = network.reading if network.readings else None
@@ -83,6 +83,10 @@ class SymbolicModel:
         else:
             self._project(projection)
 
+    def __repr__(self) -> str:
+        n, network = self._uniform.size, self.network
+        return f"{type(self).__name__}({n} states, {len(network.zones)} zones, {len(network.parameters)} parameters)"
+
     def _project(self, v: FloatArray) -> None:
         self.class_flows = [_projected_class(c, v, self.network.n_boundary) for c in self._faces]
         self.class_masses = [congruent(v[c.node], c.weight) for c in self.network.capacities]
@@ -91,14 +95,14 @@ class SymbolicModel:
         self._observation = self.network.observation @ v
         self._reading = self.network.reading @ v if self.network.readings else None
 
-    def matrices(self, theta: FloatArray, slopes: bool = False) -> Matrices:
+    def matrices(self, theta: FloatArray, sensitivities: bool = False) -> Matrices:
         """Assemble the model at θ.
 
         Parameters
         ----------
         theta : ndarray, shape (n_parameter,)
             Parameter values, as in `ThermalNetwork.parameters` [parameter units].
-        slopes : bool
+        sensitivities : bool
             Also the derivatives with respect to θ.
 
         Raises
@@ -126,26 +130,26 @@ class SymbolicModel:
             raise ModelError(
                 f"theta: makes the conductance of {negative} negative; a parameter lies outside of its physical range"
             )
-        flow_slopes: list[Matrix] = []
-        capacity_slopes: list[Matrix] = []
-        if slopes:
-            d_kappa, d_heat = (np.asarray(v) for v in self._slopes(theta))
-            flow_slopes = [self._flow(d_kappa[:, j]) for j in range(theta.size)]
-            capacity_slopes = [_weighted(self.class_masses, d_heat[:, j]) for j in range(theta.size)]
+        flow_sensitivities: list[Matrix] = []
+        capacity_sensitivities: list[Matrix] = []
+        if sensitivities:
+            d_kappa, d_heat = (np.asarray(v) for v in self._jacobians(theta))
+            flow_sensitivities = [self._flow(d_kappa[:, j]) for j in range(theta.size)]
+            capacity_sensitivities = [_weighted(self.class_masses, d_heat[:, j]) for j in range(theta.size)]
         return Matrices(
             capacity=_weighted(self.class_masses, heat),
             flow=self._flow(kappa),
             heating=self._heating,
             observation=self._observation,
             uniform=self._uniform,
-            capacity_slopes=capacity_slopes,
-            flow_slopes=flow_slopes,
+            capacity_sensitivities=capacity_sensitivities,
+            flow_sensitivities=flow_sensitivities,
             reading=self._reading,
             n_signal=len(self.network.signals),
             airflows=self.network.airflows,
         )
 
-    def source_slopes(self, theta: FloatArray) -> Matrix:
+    def source_sensitivities(self, theta: FloatArray) -> Matrix:
         """Heat that the signals bring per unit of every parameter, a column for each that the parameter moves.
 
         Parameters
@@ -153,8 +157,8 @@ class SymbolicModel:
         theta : ndarray, shape (n_parameter,)
             Parameter values [parameter units].
         """
-        slopes = np.asarray(self._slopes(np.asarray(theta, dtype=float))[0])
-        return self.sources.columns(slopes[len(self.class_flows) :])
+        sensitivities = np.asarray(self._jacobians(np.asarray(theta, dtype=float))[0])
+        return self.sources.columns(sensitivities[len(self.class_flows) :])
 
     def _flow(self, weights: FloatArray) -> Matrix:
         """Sum of the classes of faces, then of sources, with weights."""
@@ -193,7 +197,7 @@ class _Sources:
         flow : matrix, shape (n, n + n_boundary)
             Of the faces.
         weights : ndarray, shape (n_source,)
-            Values of the classes, or their slopes.
+            Values of the classes, or their sensitivities.
         """
         there = np.flatnonzero(weights)
         if not there.size:
@@ -206,19 +210,19 @@ class _Sources:
         np.add.at(flow.T, n + self.signal[there], -weights[there, None] * self.spread[:, there].T)
         return flow
 
-    def columns(self, slopes: FloatArray) -> Matrix:
+    def columns(self, sensitivities: FloatArray) -> Matrix:
         """Columns of B per unit of every parameter, those of one parameter after those of another, zeros left out.
 
         Parameters
         ----------
-        slopes : ndarray, shape (n_source, n_parameter)
+        sensitivities : ndarray, shape (n_source, n_parameter)
             Of the values of the classes.
         """
-        parameter, source = np.nonzero(slopes.T)
+        parameter, source = np.nonzero(sensitivities.T)
         place = parameter * (self.signal.max(initial=0) + 1) + self.signal[source]
         there, column = np.unique(place, return_inverse=True)
         return self.spread @ sp.csc_matrix(
-            (slopes[source, parameter], (source, column)), shape=(len(slopes), there.size)
+            (sensitivities[source, parameter], (source, column)), shape=(len(sensitivities), there.size)
         )
 
 
@@ -269,9 +273,9 @@ def congruent(rows: FloatArray, weight: FloatArray) -> FloatArray:
     Parameters
     ----------
     rows : ndarray, shape (n, r)
-        V.
+        V [-].
     weight : ndarray, shape (n,)
-        w, not negative.
+        w, not negative [any].
     """
     scaled = np.sqrt(weight)[:, None] * rows
     return np.asarray(scaled.T @ scaled)

@@ -44,7 +44,7 @@ class Propagator:
     mean_gain: FloatArray
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class ModalModel:
     """A reduced model at one θ in its modes: ``c dξ/dt = -k ξ + B u + H q``, diagonal c and k.
 
@@ -93,6 +93,10 @@ class ModalModel:
     coordinates: FloatArray
     reading: FloatArray | None = None
     n_signal: int = 0
+
+    def __repr__(self) -> str:
+        slowest = self.time_constants.max() / 3600.0
+        return f"ModalModel({self.capacity.size} modes up to {slowest:.3g} h, {len(self.observation)} zones)"
 
     @property
     def output(self) -> FloatArray:

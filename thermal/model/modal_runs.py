@@ -52,7 +52,7 @@ class ModalRuns:
     Parameters
     ----------
     matrices : Pencil
-        Of the reduced model at one θ; with slopes when sensitivities are wanted.
+        Of the reduced model at one θ; with sensitivities when sensitivities are wanted.
     """
 
     def __init__(self, matrices: Pencil) -> None:
@@ -62,7 +62,7 @@ class ModalRuns:
         self._frames: dict[bytes, PrescribedBasis] = {}
 
     @cached_property
-    def slopes(self) -> ModalSensitivities:
+    def sensitivities(self) -> ModalSensitivities:
         """Derivatives of the matrices in the modes."""
         return ModalSensitivities(self.matrices, self.modes)
 
@@ -88,7 +88,7 @@ class ModalRuns:
         keep: NDArray[np.int64],
         step: float,
         scheme: Scheme,
-        slopes: FloatArray | None = None,
+        sensitivities: FloatArray | None = None,
     ) -> tuple[FloatArray, FloatArray | None]:
         """Zone means of m free runs over N steps.
 
@@ -106,7 +106,7 @@ class ModalRuns:
             Time step [s].
         scheme : Scheme
             Time stepping; ``EXACT`` too.
-        slopes : ndarray, shape (n, n_parameter m), optional
+        sensitivities : ndarray, shape (n, n_parameter m), optional
             Derivatives of ``states``, parameter by parameter [K per unit of θ].
 
         Returns
@@ -127,55 +127,55 @@ class ModalRuns:
         last = keep - 1
         mean = propagator.mean[:, None, None] * path[:, last] + propagator.mean_gain[:, None, None] * pushed[:, last]
         means = np.tensordot(modes.output, mean, axes=1).transpose(2, 1, 0)
-        if slopes is None:
+        if sensitivities is None:
             return means, None
-        moved = self._run_slopes(path[:, :count], inputs, keep, step, scheme, slopes)
+        moved = self._run_sensitivities(path[:, :count], inputs, keep, step, scheme, sensitivities)
         return means, moved
 
-    def _run_slopes(
+    def _run_sensitivities(
         self,
         path: FloatArray,
         inputs: FloatArray,
         keep: NDArray[np.int64],
         step: float,
         scheme: Scheme,
-        slopes: FloatArray,
+        sensitivities: FloatArray,
     ) -> FloatArray:
         """Differentiate the means of `run`, (m, n_keep, n_zone, n_parameter)."""
-        modes, slope, propagator = self.modes, self.slopes, self.modes.propagator(step, scheme)
+        modes, moving, propagator = self.modes, self.sensitivities, self.modes.propagator(step, scheme)
         r, count, m = path.shape
         functions = propagator_functions(step, scheme)
         end, end_gain, mean, mean_gain = (divided_differences(f, modes.capacity) for f in functions)
         observe, drive, last = modes.output, np.hstack([modes.boundary, modes.heating]), keep - 1
-        n_zone, p = observe.shape[0], len(slope)
+        n_zone, p = observe.shape[0], len(moving)
         driven = np.concatenate([path, inputs.reshape(-1, count, m)]).transpose(1, 0, 2).copy()
-        starts = (modes.coordinates @ slopes).reshape(r, p, m)
+        starts = (modes.coordinates @ sensitivities).reshape(r, p, m)
         seen = observe * propagator.mean
         out = np.zeros((keep.size, n_zone, p, m))
-        by_path, by_input = (np.zeros((n_zone, slope.turning.size, r)) for _ in range(2))
+        by_path, by_input = (np.zeros((n_zone, moving.turning.size, r)) for _ in range(2))
         for rows in rows_of(r, (driven.shape[1] + p) * m, least=n_zone * p // driven.shape[1]):
             stay = propagator.end[rows]
-            push = propagator.end_gain[rows, None] * slope.boundary.values[rows]
+            push = propagator.end_gain[rows, None] * moving.boundary.values[rows]
             size = stay.size * driven.shape[1]
-            pushed = slope.boundary.spread(push, np.arange(r, size, driven.shape[1]), size)
+            pushed = moving.boundary.spread(push, np.arange(r, size, driven.shape[1]), size)
             if scheme == IMPLICIT_EULER:
-                turned, ahead = slope.summed_by_parts(rows, step)
-                starts[rows, slope.turning] -= ahead @ path[:, 0]
+                turned, ahead = moving.summed_by_parts(rows, step)
+                starts[rows, moving.turning] -= ahead @ path[:, 0]
                 by_path += np.tensordot(seen[:, rows], ahead, axes=1)
             else:
-                by_drive = slope.turned(rows, end_gain, propagator.end_gain) @ drive
-                turned = np.concatenate([slope.turned(rows, end), by_drive], axis=2)
-            by_path += np.tensordot(observe[:, rows], slope.turned(rows, mean), axes=1)
-            by_input += np.tensordot(observe[:, rows], slope.turned(rows, mean_gain, propagator.mean_gain), axes=1)
+                by_drive = moving.turned(rows, end_gain, propagator.end_gain) @ drive
+                turned = np.concatenate([moving.turned(rows, end), by_drive], axis=2)
+            by_path += np.tensordot(observe[:, rows], moving.turned(rows, mean), axes=1)
+            by_input += np.tensordot(observe[:, rows], moving.turned(rows, mean_gain, propagator.mean_gain), axes=1)
             for position, sums in enumerate(convolution_sums(stay, driven, last)):
                 moved = stay[:, None, None] ** last[position] * starts[rows]
-                moved[:, slope.turning] += turned @ sums[:, : turned.shape[2]]
+                moved[:, moving.turning] += turned @ sums[:, : turned.shape[2]]
                 moved += (pushed @ sums.reshape(-1, m)).reshape(moved.shape)
                 out[position] += (seen[:, rows] @ moved.reshape(stay.size, -1)).reshape(n_zone, p, m)
         now = driven[last].transpose(1, 0, 2).reshape(-1, keep.size * m)
-        push = (observe * propagator.mean_gain) @ slope.boundary.values
-        direct = (slope.boundary.spread(push, np.full(n_zone, r), len(now)) @ now).reshape(n_zone, p, -1)
-        direct[:, slope.turning] += by_path @ now[:r] + (by_input @ drive) @ now[r:]
+        push = (observe * propagator.mean_gain) @ moving.boundary.values
+        direct = (moving.boundary.spread(push, np.full(n_zone, r), len(now)) @ now).reshape(n_zone, p, -1)
+        direct[:, moving.turning] += by_path @ now[:r] + (by_input @ drive) @ now[r:]
         out += direct.reshape(n_zone, p, keep.size, m).transpose(2, 0, 1, 3)
         return out.transpose(3, 0, 1, 2)
 
@@ -217,7 +217,7 @@ class ModalRuns:
         heat: FloatArray,
         keep: NDArray[np.int64],
         step: float,
-        slopes: FloatArray | None = None,
+        sensitivities: FloatArray | None = None,
     ) -> tuple[FloatArray, FloatArray | None]:
         """Hold the zones over many implicit Euler steps and keep the states at some of them.
 
@@ -237,7 +237,7 @@ class ModalRuns:
             Steps (counted from 0) after which states are kept, increasing.
         step : float
             Time step [s].
-        slopes : ndarray, shape (n, n_parameter), optional
+        sensitivities : ndarray, shape (n, n_parameter), optional
             Derivatives of ``states`` [K per unit of θ].
 
         Returns
@@ -256,15 +256,15 @@ class ModalRuns:
         inner = scan(frame.capacity, step, frame.basis.T @ (start - frame.lift @ wanted[:, 0]), push)
         path = frame.lift @ wanted + frame.basis @ inner
         kept = modes.states @ path[:, keep + 1]
-        if slopes is None:
+        if sensitivities is None:
             return kept, None
-        begin = modes.coordinates @ slopes
+        begin = modes.coordinates @ sensitivities
         lifted = modes.observation[held] @ begin  # of the held means at the start, nothing from there on
         first = frame.basis.T @ (begin - frame.lift @ lifted)
-        moved = self._held_slopes(frame, path, boundary[:count], keep + 1, step, first, frame.coupling @ lifted)
+        moved = self._held_sensitivities(frame, path, boundary[:count], keep + 1, step, first, frame.coupling @ lifted)
         return kept, np.tensordot(modes.states @ frame.basis, moved, axes=1).reshape(states.shape[0], -1)
 
-    def _held_slopes(
+    def _held_sensitivities(
         self,
         frame: PrescribedBasis,
         path: FloatArray,
@@ -277,10 +277,10 @@ class ModalRuns:
         """Slopes of the held frame's states after some steps, (r, n_parameter, n_end), from ``first`` and one kick."""
         system = frame.capacity + step * (1.0 - SHIFT * frame.capacity)
         stay, gain = frame.capacity / system, frame.basis.T / system[:, None]
-        slopes, change = self.slopes, np.diff(path) - step * SHIFT * path[:, 1:]
+        sensitivities, change = self.sensitivities, np.diff(path) - step * SHIFT * path[:, 1:]
         left, since = (stay[:, None, None] ** n for n in (ends, ends - 1))
         out = first[:, :, None] * left + (kick / system[:, None])[:, :, None] * since
-        parts = ((change.T, -1.0, slopes.capacity), (path[:, 1:].T, -step, slopes.stiffness))
+        parts = ((change.T, -1.0, sensitivities.capacity), (path[:, 1:].T, -step, sensitivities.stiffness))
         for drive, factor, stack in parts:
             if len(boundary) == 1:  # one step: what drives is turned, not every matrix
                 out[:, stack.parameters] += factor * (gain @ (stack.values @ drive[0]))[:, :, None]
@@ -289,10 +289,9 @@ class ModalRuns:
             for rows in rows_of(stay.size, len(path) * ends.size):
                 out[rows, stack.parameters] += turned[rows] @ all_convolution_sums(stay[rows], drive, ends)
         sums = all_convolution_sums(stay, boundary, ends).reshape(-1, ends.size)
-        push = step * (gain @ slopes.boundary.values)
-        out += (slopes.boundary.spread(push, np.arange(0, len(sums), boundary.shape[1]), len(sums)) @ sums).reshape(
-            out.shape
-        )
+        columns = sensitivities.boundary
+        places = np.arange(0, len(sums), boundary.shape[1])
+        out += (columns.spread(step * (gain @ columns.values), places, len(sums)) @ sums).reshape(out.shape)
         return np.asarray(out)
 
     def held_response(self, held: NDArray[np.bool_], step: float) -> FloatArray:

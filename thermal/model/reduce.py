@@ -107,7 +107,7 @@ class ReducedModel(SymbolicModel):
         return modes.to_control(names, [name.replace(".", "_") for name in temperatures], step)
 
     def drift(self, theta: FloatArray) -> float:
-        """How far the basis is from serving another θ: largest error of the responses between its shifts [K].
+        """Error of the basis at another θ: the largest one of the responses between its shifts [K].
 
         Zones are heated together by what moves each by some 5 K in the long run, with random signs, and the outdoor
         temperature by 5 K.
@@ -119,7 +119,7 @@ class ReducedModel(SymbolicModel):
         """
         return max(self._errors(theta))
 
-    def serves(self, theta: FloatArray, tolerance: float) -> bool:
+    def is_accurate(self, theta: FloatArray, tolerance: float) -> bool:
         """Whether the drift at another θ is within a tolerance; the rest is not looked at once it is not.
 
         Parameters
@@ -281,7 +281,7 @@ def reduced_model(
     inputs = len(model.network.zones) + len(model.network.boundaries)
     chosen = shifts or (SHIFTS if inputs < _MANY_INPUTS else FEW_SHIFTS)
     whole = [model.matrices(t) for t in thetas]
-    sources = [model.source_slopes(t) for t in thetas]
+    sources = [model.source_sensitivities(t) for t in thetas]
     basis = krylov_basis(whole, chosen, sources=sources, elimination=model.elimination)
     if tolerance is not None:
         basis = basis @ _least(_turned(whole[0], basis), tolerance, closed_loop(whole[0]))
@@ -327,8 +327,8 @@ def _turned(m: Matrices, turn: FloatArray) -> Matrices:
         heating=_dense(turn.T @ m.heating),
         observation=_dense(m.observation @ turn),
         uniform=turn.T @ m.uniform,
-        capacity_slopes=[],
-        flow_slopes=[],
+        capacity_sensitivities=[],
+        flow_sensitivities=[],
         reading=None if m.reading is None else _dense(m.reading @ turn),
         n_signal=m.n_signal,
     )

@@ -200,7 +200,7 @@ def spin_up(
     Parameters
     ----------
     matrices : Matrices
-        The model at one θ; with slopes, sensitivities are returned as well.
+        The model at one θ; with sensitivities, sensitivities are returned as well.
     inputs : Inputs
         The telemetry.
     begin : int
@@ -215,13 +215,13 @@ def spin_up(
     tuple
         States (n, m) [K] and their derivatives (n, n_parameter m) parameter by parameter, or None.
     """
-    p = len(matrices.flow_slopes)
+    p = len(matrices.flow_sensitivities)
     # a day, or what lies before the first start: a state may know nothing of what comes after it
     first = slice(begin, min(begin + max(1, int(86400.0 / inputs.step)), int(at[0]) + 1))
     rows = np.arange(begin, int(at[-1]) + 1)
     held, boundary = inputs.held - _REFERENCE, inputs.boundary - _REFERENCE
     states = float(np.nanmean(held[first].mean(axis=0))) * matrices.uniform[:, None]
-    slopes = np.zeros((matrices.n, p)) if p else None
+    sensitivities = np.zeros((matrices.n, p)) if p else None
     driven = (boundary, held, inputs.heat)
     stages = (
         (_STEADY_STEP, [v[first].mean(axis=0)[None] for v in driven], np.array([0]), None),
@@ -229,11 +229,11 @@ def spin_up(
     )
     for step, (outside, zone, heat), keep, told in stages:
         if matrices.reduced and matrices.modal.heated_as_observed:
-            states, slopes = matrices.modal.hold(states, outside, zone, heat, keep, step, slopes)
+            states, sensitivities = matrices.modal.hold(states, outside, zone, heat, keep, step, sensitivities)
         else:
             stepper = Stepper(matrices, step, IMPLICIT_EULER)
-            states, slopes = stepper.hold_many(states, outside, zone, keep, slopes, heat, told)
-    return states + _REFERENCE * matrices.uniform[:, None], slopes
+            states, sensitivities = stepper.hold_many(states, outside, zone, keep, sensitivities, heat, told)
+    return states + _REFERENCE * matrices.uniform[:, None], sensitivities
 
 
 def free_runs(
@@ -242,7 +242,7 @@ def free_runs(
     starts: IntArray,
     steps: int | IntArray,
     states: FloatArray,
-    slopes: FloatArray | None = None,
+    sensitivities: FloatArray | None = None,
     scheme: Scheme = IMPLICIT_EULER,
     progress: Callable[[int], None] | None = None,
 ) -> tuple[FloatArray, FloatArray | None]:
@@ -260,7 +260,7 @@ def free_runs(
         Number of steps N, or which steps to return, from 1 on and increasing.
     states : ndarray, shape (n, m)
         States at the starts [K].
-    slopes : ndarray, shape (n, n_parameter m), optional
+    sensitivities : ndarray, shape (n, n_parameter m), optional
         Their sensitivities [K per unit of θ].
     scheme : Scheme
         Implicit Euler by default.
@@ -276,28 +276,28 @@ def free_runs(
     keep = np.arange(1, steps + 1) if isinstance(steps, int | np.integer) else steps
     states, boundary = states - _REFERENCE * matrices.uniform[:, None], inputs.boundary - _REFERENCE
     if matrices.reduced and not matrices.airflows:
-        if slopes is None:
+        if sensitivities is None:
             modes = matrices.modal.modes
             along = run_along(modes, states, boundary, inputs.heat, starts, keep, inputs.step, scheme)
             return along + _REFERENCE, None
         row = starts + np.arange(1, int(keep[-1]) + 1)[:, None]
         boundary, heat = ((v[row]).transpose(0, 2, 1) for v in (boundary, inputs.heat))
-        means, moved = matrices.modal.run(states, boundary, heat, keep, inputs.step, scheme, slopes)
+        means, moved = matrices.modal.run(states, boundary, heat, keep, inputs.step, scheme, sensitivities)
         return means + _REFERENCE, moved
     stepper = Stepper(matrices, inputs.step, scheme)
-    m, n_zone, p = starts.size, inputs.zone.shape[1], len(matrices.flow_slopes)
+    m, n_zone, p = starts.size, inputs.zone.shape[1], len(matrices.flow_sensitivities)
     means = np.empty((m, keep.size, n_zone))
-    mean_slopes = np.empty((m, keep.size, n_zone, p)) if slopes is not None else None
+    mean_sensitivities = np.empty((m, keep.size, n_zone, p)) if sensitivities is not None else None
     position = {int(s): i for i, s in enumerate(keep)}
     for k in range(1, int(keep[-1]) + 1):
         row = starts + k
-        states, mean, slopes, mean_slope = stepper.advance(
-            states, boundary[row].T, inputs.heat[row].T, inputs.airflow[row].T, slopes
+        states, mean, sensitivities, mean_moved = stepper.advance(
+            states, boundary[row].T, inputs.heat[row].T, inputs.airflow[row].T, sensitivities
         )
         if k in position:
             means[:, position[k]] = mean.T + _REFERENCE
-            if mean_slopes is not None and mean_slope is not None:
-                mean_slopes[:, position[k]] = mean_slope.reshape(n_zone, p, m).transpose(2, 0, 1)
+            if mean_sensitivities is not None and mean_moved is not None:
+                mean_sensitivities[:, position[k]] = mean_moved.reshape(n_zone, p, m).transpose(2, 0, 1)
         if progress is not None:
             progress(k)
-    return means, mean_slopes
+    return means, mean_sensitivities

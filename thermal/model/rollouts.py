@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -11,6 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from thermal._types import FloatArray
+from thermal.callback import ArrayFunction
 from thermal.errors import ModelError
 from thermal.model.factor import Matrix
 from thermal.model.matrices import SymbolicModel
@@ -108,7 +108,7 @@ def rollout(
     """
     data.check(model)
     if executor == "sparse":
-        return SparseRollout(model, data, step, scheme)
+        return _sparse_rollout(model, data, step, scheme)
     if executor != "symbolic":
         raise ModelError(f"executor: expected 'symbolic' or 'sparse', came {executor!r}")
     if model.projection is not None:
@@ -121,102 +121,27 @@ def rollout(
     return _symbolic_rollout(model, data, step, scheme)
 
 
-class SparseRollout(ca.Callback):
-    """Zone temperatures of a roll-out as a Callback of θ, with exact forward sensitivities as its Jacobian.
+def _sparse_rollout(model: SymbolicModel, data: RolloutData, step: float, scheme: Scheme) -> ca.Function:
+    """Roll-out behind a Callback, with exact forward sensitivities as its Jacobian."""
 
-    Parameters
-    ----------
-    model : SymbolicModel
-        On the grid or reduced.
-    data : RolloutData
-        Start and inputs.
-    step : float
-        Time step [s].
-    scheme : Scheme
-        Time stepping.
-    """
-
-    def __init__(self, model: SymbolicModel, data: RolloutData, step: float, scheme: Scheme) -> None:
-        ca.Callback.__init__(self)
-        self._model, self._data, self._step, self._scheme = model, data, step, scheme
-        self._kept: list[ca.Callback] = []  # CasADi holds no reference to the Jacobian it is handed
-        self.construct("rollout", {})
-
-    def get_n_in(self) -> int:
-        """One input, θ."""
-        return 1
-
-    def get_n_out(self) -> int:
-        """One output, the zone temperatures."""
-        return 1
-
-    def get_sparsity_in(self, i: int) -> ca.Sparsity:
-        """θ is a dense column."""
-        return ca.Sparsity.dense(len(self._model.network.parameters), 1)
-
-    def get_sparsity_out(self, i: int) -> ca.Sparsity:
-        """Zones by steps."""
-        return ca.Sparsity.dense(self._data.heat.shape[1], self._data.heat.shape[0])
-
-    def eval(self, arg: Sequence[ca.DM]) -> list[ca.DM]:
-        """Zone means over the steps."""
-        return [ca.DM(self._run(np.asarray(arg[0]).ravel(), slopes=False)[0])]
-
-    def has_jacobian(self) -> bool:
-        """Exact, by forward sensitivities."""
-        return True
-
-    def get_jacobian(
-        self, name: str, inames: Sequence[str], onames: Sequence[str], opts: Mapping[str, object]
-    ) -> ca.Function:
-        """Jacobian of the stacked output with respect to θ."""
-        p, m = len(self._model.network.parameters), self._data.heat.size
-        self._kept.append(
-            _Jacobian(name, lambda theta: self._run(theta, slopes=True)[1], p, self.get_sparsity_out(0), m)
-        )
-        return self._kept[-1]
-
-    def _run(self, theta: FloatArray, slopes: bool) -> tuple[FloatArray, FloatArray]:
-        """Zone means (n_zone, N), and their derivatives (n_zone N, n_parameter) in CasADi's column-major order."""
-        data, p = self._data, theta.size
-        stepper = Stepper(self._model.matrices(theta, slopes), self._step, self._scheme)
+    def run(theta: FloatArray, sensitivities: bool) -> tuple[FloatArray, FloatArray]:
+        """Zone means (n_zone, N), and their sensitivities (n_zone N, n_parameter) in CasADi's column-major order."""
+        stepper = Stepper(model.matrices(theta, sensitivities), step, scheme)
         states = data.initial[:, None]
-        moved = np.zeros((states.size, p)) if slopes else None
-        means, mean_slopes = [], []
+        moved = np.zeros((states.size, theta.size)) if sensitivities else None
+        means, mean_sensitivities = [], []
         for boundary, heat, airflow in zip(data.boundary, data.heat, data.airflow, strict=True):
-            states, mean, moved, mean_slope = stepper.advance(
+            states, mean, moved, mean_moved = stepper.advance(
                 states, boundary[:, None], heat[:, None], airflow[:, None], moved
             )
             means.append(mean[:, 0])
-            if mean_slope is not None:
-                mean_slopes.append(mean_slope)
-        return np.array(means).T, np.concatenate(mean_slopes) if slopes else np.empty((0, p))
+            if mean_moved is not None:
+                mean_sensitivities.append(mean_moved)
+        return np.array(means).T, np.concatenate(mean_sensitivities) if sensitivities else np.empty((0, theta.size))
 
-
-class _Jacobian(ca.Callback):
-    """Jacobian of a Callback of θ, as CasADi asks for it: inputs θ and the nominal output."""
-
-    def __init__(
-        self, name: str, function: Callable[[FloatArray], FloatArray], p: int, out: ca.Sparsity, m: int
-    ) -> None:
-        ca.Callback.__init__(self)
-        self._function, self._p, self._out, self._m = function, p, out, m
-        self.construct(name, {})
-
-    def get_n_in(self) -> int:
-        return 2
-
-    def get_n_out(self) -> int:
-        return 1
-
-    def get_sparsity_in(self, i: int) -> ca.Sparsity:
-        return ca.Sparsity.dense(self._p, 1) if i == 0 else self._out
-
-    def get_sparsity_out(self, i: int) -> ca.Sparsity:
-        return ca.Sparsity.dense(self._m, self._p)
-
-    def eval(self, arg: Sequence[ca.DM]) -> list[ca.DM]:
-        return [ca.DM(self._function(np.asarray(arg[0]).ravel()))]
+    count, n_zone = data.heat.shape
+    size = len(model.network.parameters)
+    return ArrayFunction("rollout", lambda t: run(t, False)[0], size, (n_zone, count), lambda t: run(t, True)[1])
 
 
 def _symbolic_rollout(model: SymbolicModel, data: RolloutData, step: float, scheme: Scheme) -> ca.Function:

@@ -35,7 +35,7 @@ def convolution_sums(stay: FloatArray, drive: FloatArray, ends: NDArray[np.int64
     stay : ndarray, shape (r,)
         What a step leaves of each mode [-].
     drive : ndarray, shape (n_time, ...)
-        What drives, step by step.
+        What drives, step by step [any].
     ends : ndarray of int
         The numbers of steps n, increasing.
 
@@ -66,7 +66,7 @@ def all_convolution_sums(stay: FloatArray, drive: FloatArray, ends: NDArray[np.i
     stay : ndarray, shape (r,)
         What a step leaves of each mode [-].
     drive : ndarray, shape (n_time, n_drive)
-        What drives, step by step.
+        What drives, step by step [any].
     ends : ndarray of int
         The numbers of steps n, increasing.
     """
@@ -162,7 +162,7 @@ class ModalSensitivities:
     Parameters
     ----------
     matrices : Pencil
-        Of the reduced model, with slopes.
+        Of the reduced model, with sensitivities.
     modes : ModalModel
         Its modes.
 
@@ -176,13 +176,13 @@ class ModalSensitivities:
 
     def __init__(self, matrices: Pencil, modes: ModalModel) -> None:
         t, n = modes.states, matrices.n
-        self._capacities, self._count = modes.capacity, len(matrices.flow_slopes)
-        slopes = list(zip(matrices.capacity_slopes, matrices.flow_slopes, strict=True))
-        heavy = [j for j, (capacity, _) in enumerate(slopes) if np.any(capacity)]
-        stiff = [j for j, (_, flow) in enumerate(slopes) if j in heavy or np.any(flow[:, :n])]
-        self.capacity = _stack(heavy, (slopes[j][0] for j in heavy), t)
-        self.stiffness = _stack(stiff, (slopes[j][1][:, :n] + SHIFT * slopes[j][0] for j in stiff), t)
-        self.boundary = _columns([flow[:, n:] for _, flow in slopes], t)
+        self._capacities, self._count = modes.capacity, len(matrices.flow_sensitivities)
+        sensitivities = list(zip(matrices.capacity_sensitivities, matrices.flow_sensitivities, strict=True))
+        heavy = [j for j, (capacity, _) in enumerate(sensitivities) if np.any(capacity)]
+        stiff = [j for j, (_, flow) in enumerate(sensitivities) if j in heavy or np.any(flow[:, :n])]
+        self.capacity = _stack(heavy, (sensitivities[j][0] for j in heavy), t)
+        self.stiffness = _stack(stiff, (sensitivities[j][1][:, :n] + SHIFT * sensitivities[j][0] for j in stiff), t)
+        self.boundary = _columns([flow[:, n:] for _, flow in sensitivities], t)
         self._heavy = np.searchsorted(stiff, heavy)
 
     def __len__(self) -> int:
@@ -201,9 +201,9 @@ class ModalSensitivities:
         rows : slice
             The modes.
         quotient : ndarray, shape (r, r)
-            `divided_differences` of f or g.
+            `divided_differences` of f or g [their units per s].
         gain : ndarray, shape (r,), optional
-            g of the modes; f by default.
+            g of the modes [-]; f by default.
 
         Returns
         -------

@@ -96,7 +96,7 @@ class Stepper:
     Parameters
     ----------
     matrices : Pencil
-        The model at one θ; with slopes when sensitivities are wanted.
+        The model at one θ; with sensitivities when sensitivities are wanted.
     step : float
         Time step [s].
     scheme : Scheme
@@ -114,12 +114,12 @@ class Stepper:
         self._stiffness = matrices.flow[:, :n]
         self._exchange = matrices.flow[:, n:]
         self._solve = factorise(matrices.capacity + scheme.implicit * step * self._stiffness)
-        self.n_parameter = len(matrices.flow_slopes)
+        self.n_parameter = len(matrices.flow_sensitivities)
 
     @cached_property
-    def _slope_stacks(self) -> tuple[tuple[list[int], Matrix], tuple[list[int], Matrix]]:
+    def _stacks(self) -> tuple[tuple[list[int], Matrix], tuple[list[int], Matrix]]:
         """dC/dθ and d[K, -B]/dθ, each as the parameters that it depends on and their matrices stacked."""
-        return _stacked(self.matrices.capacity_slopes), _stacked(self.matrices.flow_slopes)
+        return _stacked(self.matrices.capacity_sensitivities), _stacked(self.matrices.flow_sensitivities)
 
     @cached_property
     def response(self) -> tuple[FloatArray, FloatArray]:
@@ -134,7 +134,7 @@ class Stepper:
         boundary: FloatArray,
         heat: FloatArray,
         airflow: FloatArray | None = None,
-        slopes: FloatArray | None = None,
+        sensitivities: FloatArray | None = None,
     ) -> tuple[FloatArray, FloatArray, FloatArray | None, FloatArray | None]:
         """One step of m independent runs.
 
@@ -148,7 +148,7 @@ class Stepper:
             Heat given to the zones during the step [W].
         airflow : ndarray, shape (n_airflow, m), optional
             Directed airflows during the step [kg/s].
-        slopes : ndarray, shape (n, n_parameter m), optional
+        sensitivities : ndarray, shape (n, n_parameter m), optional
             Derivatives of ``states`` with respect to θ, parameter by parameter [K per unit of θ].
 
         Returns
@@ -159,7 +159,7 @@ class Stepper:
         scheme, m = self.scheme, self.matrices
         mixing = self._mixing(airflow)
         trail = [states]
-        slope_trail = [] if slopes is None else [slopes]
+        moved_trail = [] if sensitivities is None else [sensitivities]
         source = m.heating @ heat
         for stage in scheme.stages:
             base = _combine(stage.weights, trail)
@@ -168,20 +168,20 @@ class Stepper:
             if stage.explicit:
                 rhs += stage.explicit * self.step * self._flow_in(states, boundary, mixing)
             new = self._solve_mixed(rhs, mixing, stage.implicit)
-            if slopes is not None:
-                slope_trail.append(self._stage_slopes(stage, base, new, states, slope_trail, boundary, mixing))
+            if sensitivities is not None:
+                moved_trail.append(self._stage_sensitivities(stage, base, new, states, moved_trail, boundary, mixing))
             trail.append(new)
         mean = np.asarray(m.output @ _combine(scheme.mean, trail))
-        if slopes is None:
+        if sensitivities is None:
             return trail[-1], mean, None, None
-        return trail[-1], mean, slope_trail[-1], np.asarray(m.output @ _combine(scheme.mean, slope_trail))
+        return trail[-1], mean, moved_trail[-1], np.asarray(m.output @ _combine(scheme.mean, moved_trail))
 
     def hold(
         self,
         states: FloatArray,
         boundary: FloatArray,
         zone: FloatArray,
-        slopes: FloatArray | None = None,
+        sensitivities: FloatArray | None = None,
         heat: FloatArray | None = None,
     ) -> tuple[FloatArray, FloatArray | None, FloatArray]:
         """One implicit Euler step with zone means held at given temperatures by whatever heat that takes.
@@ -194,7 +194,7 @@ class Stepper:
             Boundary temperatures [K].
         zone : ndarray, shape (n_zone, 1)
             Zone means at the end of the step [K]; NaN leaves a zone free.
-        slopes : ndarray, shape (n, n_parameter), optional
+        sensitivities : ndarray, shape (n, n_parameter), optional
             Derivatives of ``states`` [K per unit of θ].
         heat : ndarray, shape (n_zone, 1), optional
             Metered heat, for the zones that are left free [W]; zero by default.
@@ -224,9 +224,10 @@ class Stepper:
         holding[held] = np.linalg.solve(gain if held.all() else gain[np.ix_(held, held)], missing[held])
         new = free + response @ holding
         watts = holding[:, 0] / self.step
-        if slopes is None:
+        if sensitivities is None:
             return new, None, watts
-        moved = self._solve(m.capacity @ slopes + self._slope_source(new - states, np.vstack([new, boundary])))
+        source = self._sensitivity_source(new - states, np.vstack([new, boundary]))
+        moved = self._solve(m.capacity @ sensitivities + source)
         return new, moved - self._lift(held) @ (m.observation @ moved)[held], watts
 
     def hold_many(
@@ -235,7 +236,7 @@ class Stepper:
         boundary: FloatArray,
         zone: FloatArray,
         keep: NDArray[np.int64],
-        slopes: FloatArray | None = None,
+        sensitivities: FloatArray | None = None,
         heat: FloatArray | None = None,
         progress: Callable[[int], None] | None = None,
     ) -> tuple[FloatArray, FloatArray | None]:
@@ -251,7 +252,7 @@ class Stepper:
             Zone means at the end of each step [K]; a zone that is NaN throughout stays free.
         keep : ndarray of int, shape (m,)
             Steps (counted from 0) after which states are kept, increasing.
-        slopes : ndarray, shape (n, n_parameter), optional
+        sensitivities : ndarray, shape (n, n_parameter), optional
             Derivatives of ``states`` [K per unit of θ].
         heat : ndarray, shape (n_time, n_zone), optional
             Metered heat of each step, for the zones that are left free [W]; zero by default.
@@ -264,29 +265,29 @@ class Stepper:
             Kept states (n, m) and derivatives (n, n_parameter m) parameter by parameter, or None.
         """
         n, p = self.matrices.n, self.n_parameter
-        kept, kept_slopes = np.empty((n, keep.size)), np.empty((n, p, keep.size))
+        kept, kept_sensitivities = np.empty((n, keep.size)), np.empty((n, p, keep.size))
         wanted = {int(k): i for i, k in enumerate(keep)}
         for k in range(int(keep[-1]) + 1):
             given = heat[k][:, None] if heat is not None else None
-            states, slopes, _ = self.hold(states, boundary[k][:, None], zone[k][:, None], slopes, given)
+            states, sensitivities, _ = self.hold(states, boundary[k][:, None], zone[k][:, None], sensitivities, given)
             if k in wanted:
                 kept[:, wanted[k]] = states[:, 0]
-                if slopes is not None:
-                    kept_slopes[:, :, wanted[k]] = slopes
+                if sensitivities is not None:
+                    kept_sensitivities[:, :, wanted[k]] = sensitivities
             if progress is not None:
                 progress(k + 1)
-        return kept, kept_slopes.reshape(n, p * keep.size) if slopes is not None else None
+        return kept, kept_sensitivities.reshape(n, p * keep.size) if sensitivities is not None else None
 
     def _lift(self, held: NDArray[np.bool_]) -> FloatArray:
         """States per kelvin of each held zone mean, shape (n, n_held) [K/K]."""
         response, gain = self.response
         return np.asarray(np.linalg.solve(gain[np.ix_(held, held)].T, response[:, held].T).T)
 
-    def _slope_source(self, change: FloatArray, full: FloatArray) -> FloatArray:
-        """Source of the slopes in a stage, (n, n_parameter m): ``-dC (T - T_base) - Δt d[K, -B] [T; u]``."""
-        capacity, flow = self._slope_stacks
+    def _sensitivity_source(self, change: FloatArray, full: FloatArray) -> FloatArray:
+        """Source of the sensitivities in a stage, (n, n_parameter m): ``-dC (T - T_base) - Δt d[K, -B] [T; u]``."""
+        capacity, flow = self._stacks
         n, m = change.shape
-        out = np.zeros((self.n_parameter, m, n))  # one slope after the other, as the solver wants its columns
+        out = np.zeros((self.n_parameter, m, n))  # one parameter after the other, as the solver wants its columns
         for (which, matrix), x in ((capacity, -change), (flow, -self.step * full)):
             if which:
                 out[which] += np.asarray(matrix @ x).reshape(len(which), n, m).transpose(0, 2, 1)
@@ -327,7 +328,7 @@ class Stepper:
         zone = np.asarray(self.matrices.observation @ states).reshape(n_zone, -1, m).transpose(2, 0, 1)
         return np.asarray((mixing @ zone).transpose(1, 2, 0).reshape(n_zone, -1))
 
-    def _stage_slopes(
+    def _stage_sensitivities(
         self,
         stage: Stage,
         base: FloatArray,
@@ -340,7 +341,7 @@ class Stepper:
         """Differentiate one stage with respect to θ."""
         m = self.matrices
         full = stage.implicit * np.vstack([new, boundary]) + stage.explicit * np.vstack([start, boundary])
-        rhs = m.capacity @ _combine(stage.weights, trail) + self._slope_source(new - base, full)
+        rhs = m.capacity @ _combine(stage.weights, trail) + self._sensitivity_source(new - base, full)
         if stage.explicit:
             rhs -= stage.explicit * self.step * (self._stiffness @ trail[0])
             if mixing is not None:
@@ -348,11 +349,11 @@ class Stepper:
         return self._solve_mixed(rhs, mixing, stage.implicit)
 
 
-def _stacked(slopes: list[Matrix]) -> tuple[list[int], Matrix]:
-    """Which slopes are not zero, and these on top of each other."""
-    sparse = bool(slopes) and sp.issparse(slopes[0])
-    which = [j for j, m in enumerate(slopes) if (m.nnz if sparse else np.any(m))]
-    chosen = [slopes[j] for j in which]
+def _stacked(sensitivities: list[Matrix]) -> tuple[list[int], Matrix]:
+    """Which sensitivities are not zero, and these on top of each other."""
+    sparse = bool(sensitivities) and sp.issparse(sensitivities[0])
+    which = [j for j, m in enumerate(sensitivities) if (m.nnz if sparse else np.any(m))]
+    chosen = [sensitivities[j] for j in which]
     return which, sp.vstack(chosen).tocsr() if sparse and chosen else np.vstack(chosen) if chosen else np.empty((0, 0))
 
 

@@ -105,7 +105,7 @@ def settle(
     while not here.settled and here.evaluations < evaluations:
         ahead = _descend(problem, model, here, min(together, evaluations - here.evaluations))
         together = _TOGETHER if ahead.cost < here.cost else _SHORTENED
-        if ahead.cost == here.cost or model.serves(problem.theta(ahead.point), DRIFT_TOLERANCE):
+        if ahead.cost == here.cost or model.is_accurate(problem.theta(ahead.point), DRIFT_TOLERANCE):
             here = ahead
             continue
         if ahead.cost > here.cost - (enough - _CONFIRMED):  # never in a small building

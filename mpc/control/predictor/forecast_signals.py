@@ -108,7 +108,7 @@ class ForecastSignals:
         if not known.usual:
             bands = {zone: [f"{zone}/comfort_{side}_temperature" for side in ("lower", "upper")] for zone in zones}
             middles = {zone: table[band].mean(axis=1) for zone, band in bands.items() if set(band) <= set(table)}
-            known = replace(known, usual=usual_temperatures(pd.DataFrame(middles).reindex(columns=list(zones))))
+            known = replace(known, usual=usual_temperatures(pd.DataFrame(middles, stamps, list(zones), dtype=float)))
         if known.wind is None and WIND in points:
             known = replace(known, wind=float(np.maximum(points[WIND], 0.0).mean()))
         return InputProvider(self.building, stamps, step.total_seconds(), series, known, "forecast")

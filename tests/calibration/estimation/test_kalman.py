@@ -140,7 +140,7 @@ def test_scalar_filter_by_hand(telemetry: Telemetry) -> None:
     """One volume without disturbance: P = q = 0, so the filter only predicts; with it, two steps by hand."""
     m = Matrices(
         capacity=np.array([[3e5]]), flow=np.array([[100.0, -100.0]]), heating=np.array([[1.0]]),
-        observation=np.array([[1.0]]), uniform=np.ones(1), capacity_slopes=[], flow_slopes=[],
+        observation=np.array([[1.0]]), uniform=np.ones(1), capacity_sensitivities=[], flow_sensitivities=[],
     )  # fmt: skip
     space = state_space(m.modal.modes, STEP)
     # implicit Euler: T' = (C T + Δt (U u + q)) / (C + Δt U), mean (T + T') / 2

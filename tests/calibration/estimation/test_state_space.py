@@ -38,8 +38,8 @@ def pencil(seed: int = 0, n: int = 9) -> Matrices:
         heating=observation.T.copy(),
         observation=observation,
         uniform=np.ones(n),
-        capacity_slopes=[],
-        flow_slopes=[],
+        capacity_sensitivities=[],
+        flow_sensitivities=[],
     )
 
 

@@ -35,7 +35,7 @@ def building() -> StateSpace:
     observation = np.eye(4)[:2]
     matrices = Matrices(
         capacity=np.diag([2e5, 3e5, 8e6, 6e6]), flow=np.hstack([link, -leak[:, None]]), heating=observation.T.copy(),
-        observation=observation, uniform=np.ones(4), capacity_slopes=[], flow_slopes=[],
+        observation=observation, uniform=np.ones(4), capacity_sensitivities=[], flow_sensitivities=[],
     )  # fmt: skip
     return state_space(matrices.modal.modes, STEP)
 
