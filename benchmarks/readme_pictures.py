@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from calibration import calibrate
-from mpc.reports.figures.error import error_growth
+from mpc.reports.figures.errors import error_growth
 from mpc.reports.figures.plan import floor_maps
 from thermal import FloorPlans, load_bundled_case
 

@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
-
-import pandas as pd
 
 from calibration.diagnosis.decide.drift import DriftCurve, drift_of
 from calibration.diagnosis.diagnosis import Diagnosis
 from calibration.diagnosis.refit.comparison import Fit
 from calibration.diagnosis.screen.missing import Missing, at_start, missing_heat
-from calibration.evaluation.intervals import Interval
-from calibration.evaluation.n_step import Evaluation, evaluate_model
+from calibration.evaluation.n_step import Evaluation
 from calibration.fit.describe import describe_parameters
 from calibration.fit.result import ParameterEstimate, SolverReport, effect_entries
-from mpc.reports.evaluation import predictions_table
 
 
 @dataclass(frozen=True)
@@ -46,73 +41,13 @@ def replays(result: Diagnosis) -> tuple[Replay, Replay | None]:
     result : Diagnosis
         From `diagnose`.
     """
-    baseline = result.rounds[0].before
-    before = Replay(
-        _evaluated(result, baseline, result.judged, trajectories=True), result.where.missing, result.where.drift
-    )
-    final = result.final
+    baseline, final, judged = result.rounds[0].before, result.final, result.judged
+    evaluation = baseline.evaluate(judged, result.horizon, trajectories=True)
+    before = Replay(evaluation, result.where.missing, result.where.drift)
     if not final.effects:
         return before, None
-    how = result.judged, result.settings.stepping, result.settings.spin_up_seconds
-    evaluation = _evaluated(result, final, result.judged, trajectories=True)
-    return before, Replay(evaluation, missing_heat(final, *how), drift_of(final, *how))
-
-
-def missing_table(result: Diagnosis, after: Replay | None) -> pd.DataFrame:
-    """Tabulate missing heat with its band, one row an hour and zone.
-
-    Parameters
-    ----------
-    result : Diagnosis
-        From `diagnose`.
-    after : Replay or None
-        Of the final model.
-
-    Returns
-    -------
-    DataFrame
-        Index ``timestamp``, where hours begin; ``zone``; heat that the model lacks, ``uncalibrated`` with parameters at
-        their starts, ``baseline`` calibrated, and ``with_effects``; each also as ``.._low`` and ``.._high``, ends of
-        its 90 % band [W].
-    """
-    models = {"uncalibrated": result.where.missing_at_start, "baseline": result.where.missing}
-    if after is not None:
-        models["with_effects"] = after.missing
-    parts = {}
-    for name, missing in models.items():
-        low, high = missing.band(0.9)
-        for column, values in ((name, missing.watts), (f"{name}_low", low), (f"{name}_high", high)):
-            parts[column] = values.stack(future_stack=True)
-    table = pd.DataFrame(parts).rename_axis(["timestamp", "zone"]).reset_index("zone")
-    table.attrs["units"] = {name: "W" for name in parts}
-    return table
-
-
-def both_predictions(before: Replay, after: Replay | None) -> pd.DataFrame:
-    """Tabulate the predictions of both models, one row a run, step and measured zone.
-
-    Parameters
-    ----------
-    before : Replay
-        Of the baseline.
-    after : Replay or None
-        Of the final model.
-
-    Returns
-    -------
-    DataFrame
-        Index ``timestamp``; ``run_start``, ``zone``, ``measured``, ``baseline`` and ``with_effects`` [degC].
-    """
-    table = predictions_table(before.evaluation).rename(columns={"simulated": "baseline"})
-    units = {"measured": "degC", "baseline": "degC"}
-    if after is not None:
-        other = predictions_table(after.evaluation).rename(columns={"simulated": "with_effects"})
-        keys = ["timestamp", "run_start", "zone"]
-        other = other.reset_index()[[*keys, "with_effects"]]
-        table = table.reset_index().merge(other, on=keys, how="left").set_index("timestamp")
-        units["with_effects"] = "degC"
-    table.attrs["units"] = units
-    return table
+    evaluation = final.evaluate(judged, result.horizon, trajectories=True)
+    return before, Replay(evaluation, missing_heat(final, judged), drift_of(final, judged))
 
 
 def final_calibration(result: Diagnosis) -> dict[str, Any]:
@@ -125,15 +60,15 @@ def final_calibration(result: Diagnosis) -> dict[str, Any]:
     """
     final, network = result.final, result.final.built.network
     described = describe_fit(final)
-    baseline = result.rounds[0].before
     found = final.found
     solver = SolverReport(
-        "gauss_newton", "settled" if found.settled else "evaluations used up", found.settled, found.evaluations,
-        result.seconds, 1, (), found.evaluations, found.settled,
+        "gauss_newton", "settled" if found.converged else "evaluations used up", found.converged, found.evaluations,
+        result.seconds, 1, (), found.evaluations, found.converged,
     )  # fmt: skip
     intervals = {"tuning": result.tuned, "held_out": result.judged}
     before, after = (
-        {name: _mae(result, fit, part) for name, part in intervals.items()} for fit in (at_start(baseline), final)
+        {name: fit.evaluate(part, result.horizon).metrics.to_dict() for name, part in intervals.items()}
+        for fit in (at_start(result.rounds[0].before), final)
     )
     return {
         "parameters": {p.name: p.to_dict() for p in described},
@@ -163,15 +98,3 @@ def describe_fit(fit: Fit) -> tuple[ParameterEstimate, ...]:
     known = dict(zip(fit.problem.free, fit.deviations.tolist(), strict=True))
     network = fit.built.network
     return describe_parameters(network.parameters, fit.theta, known, network.nominal)
-
-
-def _mae(result: Diagnosis, fit: Fit, intervals: Sequence[Interval]) -> dict[str, float]:
-    return _evaluated(result, fit, intervals).metrics.to_dict()
-
-
-def _evaluated(result: Diagnosis, fit: Fit, intervals: Sequence[Interval], trajectories: bool = False) -> Evaluation:
-    settings = result.settings
-    return evaluate_model(
-        fit.model, fit.theta, fit.built.inputs, intervals, result.horizon, trajectories=trajectories,
-        scheme=settings.stepping, spin_up_seconds=settings.spin_up_seconds,
-    )  # fmt: skip

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 from scipy.special import ndtri
 
 from calibration.diagnosis.refit.comparison import Fit
@@ -19,10 +18,9 @@ from calibration.estimation.innovations import tune_disturbance
 from calibration.estimation.smoother import averaged_deviation, smooth
 from calibration.estimation.tuner import air_volumes
 from calibration.evaluation.intervals import Interval
-from thermal._types import FloatArray
+from thermal._types import BoolArray, FloatArray, IntArray
 from thermal.model.reduce import ReducedModel, reduced_model
-from thermal.model.replay import SPIN_UP, Inputs
-from thermal.model.scheme import IMPLICIT_EULER, Scheme
+from thermal.model.replay import Inputs
 
 #: Telemetry that the size and the course of the missing heat are tuned on [s]: the last four days that were fitted,
 #: of which at most two are a weekend.
@@ -32,8 +30,8 @@ _TUNED = 4 * 86400.0
 #: air, and a day is tuned on: the five hundred states of 123 zones are too many to smooth by.
 _MANY_ZONES, _ORDER, _TUNED_MANY = 40, 200, 86400.0
 
-#: Step of a parameter on the estimation scale for the slope of the missing heat [-].
-_SLOPE_STEP = 1e-3
+#: Step of a parameter on the estimation scale for the sensitivity of the missing heat [-].
+_STEP = 1e-3
 
 
 @dataclass(frozen=True)
@@ -69,14 +67,14 @@ class Missing:
         """Root mean square over the hours of each zone, shape (n_zone,) [W]; NaN where it is not measured."""
         return np.asarray(np.sqrt((self.watts**2).mean()))
 
+    @property
+    def by_zone(self) -> dict[str, float]:
+        """Root mean square over the hours by zone [W]; 0 where it is not measured."""
+        return dict(zip(self.watts.columns, np.nan_to_num(self.rms).tolist(), strict=True))
+
 
 def missing_heat(
-    fit: Fit,
-    intervals: Sequence[Interval],
-    scheme: Scheme = IMPLICIT_EULER,
-    spin_up_seconds: float = SPIN_UP,
-    fixed: bool = False,
-    near: DisturbanceModel | None = None,
+    fit: Fit, intervals: Sequence[Interval], fixed: bool = False, near: DisturbanceModel | None = None
 ) -> Missing:
     """Estimate the heat that a fitted model lacks on intervals of telemetry, by the hour.
 
@@ -91,10 +89,6 @@ def missing_heat(
         The model.
     intervals : sequence of Interval
         Less the 12 hours of the least spin-up where the telemetry does not begin before.
-    scheme : Scheme
-        Time stepping.
-    spin_up_seconds : float
-        Telemetry before an interval that the spin-up may use [s].
     fixed : bool
         Take the parameters as they are: the band is of the noise alone.
     near : DisturbanceModel, optional
@@ -108,19 +102,19 @@ def missing_heat(
     Notes
     -----
     ``Var = r² V + D Σ D'``: V is the smoother's variance of a step, r from `averaged_deviation`, Σ the covariance of
-    the parameters, D the slopes of the heat that the measured temperatures ask for.
+    the parameters, D the sensitivities of the heat that the measured temperatures ask for.
     """
     network, inputs, model = fit.built.network, fit.built.inputs, fit.model
     many = len(network.zones) > _MANY_ZONES
     if many and model.order > _ORDER:
         model = reduced_model(fit.built.grid, [fit.theta], order=_ORDER)
     covariance: Covariance = "steady" if many else "exact"
-    disturbance = _tuned(fit, model, near, scheme, spin_up_seconds)
+    disturbance = _tuned(fit, model, near)
     parts = []
     for interval in intervals:
         filtered = filter_interval(
             model, fit.theta, inputs, interval, disturbance,
-            scheme=scheme, covariance=covariance, spin_up_seconds=spin_up_seconds,
+            scheme=fit.settings.stepping, covariance=covariance, spin_up_seconds=fit.settings.spin_up_seconds,
         )  # fmt: skip
         found = smooth(filtered)
         rows = np.arange(filtered.begin + 1, filtered.begin + 1 + len(found.stamps))
@@ -131,7 +125,7 @@ def missing_heat(
     stamps = pd.DatetimeIndex(parts[0][0].append([p[0] for p in parts[1:]]))
     watts, variance = (np.concatenate([p[i] for p in parts]) for i in (1, 2))
     if not fixed:
-        variance = variance + _parameter_variance(fit, model, intervals, spin_up_seconds)
+        variance = variance + _parameter_variance(fit, model, intervals)
     heat, deviation = (pd.DataFrame(v, stamps, list(network.zones)) for v in (watts, np.sqrt(variance)))
     return Missing(heat, deviation, disturbance)
 
@@ -150,42 +144,32 @@ def at_start(fit: Fit) -> Fit:
     return replace(fit, model=model, found=replace(fit.found, point=point))
 
 
-def _tuned(
-    fit: Fit,
-    model: ReducedModel,
-    near: DisturbanceModel | None,
-    scheme: Scheme,
-    spin_up_seconds: float,
-) -> DisturbanceModel:
+def _tuned(fit: Fit, model: ReducedModel, near: DisturbanceModel | None) -> DisturbanceModel:
     """Size and course of the missing heat and noise of the sensors, on the last of what was fitted."""
     many, last = len(model.network.zones) > _MANY_ZONES, fit.problem.stretches[-1]
     latest = last.end - pd.Timedelta(seconds=_TUNED_MANY if many else _TUNED)
-    stretch = Interval(max(last.start, latest), last.end)
+    interval = Interval(max(last.start, latest), last.end)
     return tune_disturbance(
-        model, fit.theta, fit.built.inputs, [stretch], per_zone=() if many else ("deviation",),
-        weights=air_volumes(model.network), start=near, scheme=scheme, covariance="steady",
-        spin_up_seconds=spin_up_seconds, curvature=False,
+        model, fit.theta, fit.built.inputs, [interval], per_zone=() if many else ("deviation",),
+        weights=air_volumes(model.network), start=near, scheme=fit.settings.stepping,
+        covariance="steady", spin_up_seconds=fit.settings.spin_up_seconds, curvature=False,
     ).disturbance  # fmt: skip
 
 
-def _parameter_variance(
-    fit: Fit, model: ReducedModel, intervals: Sequence[Interval], spin_up_seconds: float
-) -> FloatArray:
+def _parameter_variance(fit: Fit, model: ReducedModel, intervals: Sequence[Interval]) -> FloatArray:
     """Variance of the missing heat that the parameters of a fit leave, shape (n_hour, n_zone) [W²]."""
     point, jacobian, slopes = fit.found.point, fit.found.jacobian, []
-    for i, step in enumerate(_SLOPE_STEP * np.eye(point.size)):
+    inputs, spin_up = fit.built.inputs, fit.settings.spin_up_seconds
+    for i, step in enumerate(_STEP * np.eye(point.size)):
         # a strength at the end of its range is moved inwards only: beyond, heat would flow from cold to warm
         ends = [np.clip(moved, *fit.problem.bounds) for moved in (point - step, point + step)]
-        low, high = (
-            heat_balance(model, fit.problem.theta(end), fit.built.inputs, intervals, spin_up_seconds).needed
-            for end in ends
-        )
+        low, high = (heat_balance(model, fit.problem.theta(e), inputs, intervals, spin_up).needed for e in ends)
         slopes.append((high - low) / (ends[1] - ends[0])[i])
     roots = np.tensordot(np.linalg.inv(np.linalg.cholesky(jacobian.T @ jacobian)), np.array(slopes), axes=1)
     return np.asarray((roots**2).sum(axis=0))
 
 
-def _known(inputs: Inputs, rows: NDArray[np.int64]) -> NDArray[np.bool_]:
+def _known(inputs: Inputs, rows: IntArray) -> BoolArray:
     """Tell steps of zones whose temperature is measured before and after, and whose inputs are complete."""
     measured = np.isfinite(inputs.zone)
     return np.asarray(measured[rows] & measured[rows - 1] & inputs.complete[rows, None])

@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 import pandas as pd
-from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from mpc.reports.figures.style import MUTED, SIMULATED, WARNING, Picture, day_numbers, picture, styled, time_axis
+from mpc.reports.figures import style
+from mpc.reports.figures.style import Picture, keys_below, lines_over_time, panel, picture, styled
 from thermal.case.quality import QualityReport
 
 #: Colour of each kind of finding; what is constant is only reported, not left out.
-COLOURS = {"gap": MUTED, "impossible": WARNING, "flat": SIMULATED, "spike": "#7B3FA0", "constant": "#7FB2D6"}
+COLOURS = {
+    "gap": style.MUTED,
+    "impossible": style.WARNING,
+    "flat": style.SIMULATED,
+    "spike": "#7B3FA0",
+    "constant": "#7FB2D6",
+}
 
 #: More columns than this are not drawn; those with the most flaws are.
 MOST_ROWS = 40
@@ -28,8 +34,7 @@ def quality_timeline(report: QualityReport) -> list[Picture]:
     flawed = sorted((c for c in report.columns if c.findings), key=lambda c: -c.unusable_share)[:MOST_ROWS]
     if not flawed:
         return []
-    figure = Figure(figsize=(7.4, 1.1 + 0.24 * len(flawed)))
-    axes = figure.subplots()
+    figure, axes = panel(7.4, 1.1 + 0.24 * len(flawed))
     kinds = set()
     least = (report.end - report.start) / 400
     for row, column in enumerate(flawed):
@@ -37,13 +42,12 @@ def quality_timeline(report: QualityReport) -> list[Picture]:
         for finding in column.findings:
             kinds.add(finding.kind)
             ends = [finding.start, max(finding.end, finding.start + least)]
-            left, right = day_numbers(pd.DatetimeIndex(ends))
+            left, right = style.day_numbers(pd.DatetimeIndex(ends))
             axes.barh(row, right - left, left=left, height=0.6, color=COLOURS[finding.kind], zorder=2)
     axes.set_yticks(range(len(flawed)), [c.column for c in flawed], fontsize=7)
-    left, right = day_numbers(pd.DatetimeIndex([report.start, report.end]))
-    axes.set(xlim=(left, right), ylim=(len(flawed) - 0.4, -0.6))
+    lines_over_time(axes, pd.DatetimeIndex([report.start, report.end]))
+    axes.set_ylim(len(flawed) - 0.4, -0.6)
     axes.grid(axis="y", visible=False)
-    time_axis(axes, report.start.tzinfo)
     keys = [Patch(color=colour, label=kind) for kind, colour in COLOURS.items() if kind in kinds]
-    figure.legend(handles=keys, loc="outside lower center", ncols=5, fontsize=8)
+    keys_below(figure, 5, handles=keys)
     return [picture(figure, "Time line of what is missing or not usable, one row a telemetry column")]

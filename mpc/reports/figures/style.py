@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import io
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from datetime import tzinfo
 from functools import wraps
@@ -15,6 +15,7 @@ import matplotlib as mpl
 import numpy as np
 import pandas as pd
 from matplotlib import dates
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -113,6 +114,74 @@ def picture(figure: Figure, alt: str) -> Picture:
     drawn = buffer.getvalue()
     encoded = base64.b64encode(drawn[drawn.index(b"<svg") :]).decode("ascii")  # without the address of a DTD
     return Picture(f"data:image/svg+xml;base64,{encoded}", alt, round(figure.get_size_inches()[0] * 96))
+
+
+def panel(width: float, height: float, *, title: str = "", xlabel: str = "", ylabel: str = "") -> tuple[Figure, Axes]:
+    """Begin a figure of one pair of axes.
+
+    Parameters
+    ----------
+    width, height : float
+        Size [inch].
+    title, xlabel, ylabel : str
+        Above and beside the axes.
+    """
+    figure = Figure(figsize=(width, height))
+    axes = figure.subplots()
+    axes.set(title=title, xlabel=xlabel, ylabel=ylabel)
+    return figure, axes
+
+
+def keys_below(figure: Figure, columns: int, handles: Sequence[Artist] | None = None) -> None:
+    """Put the legend below the axes.
+
+    Parameters
+    ----------
+    figure : Figure
+        With labelled lines.
+    columns : int
+        Number of columns.
+    handles : sequence of Artist, optional
+        Keys in place of those of the lines.
+    """
+    figure.legend(handles=handles, fontsize=8, loc="outside lower center", ncols=columns)
+
+
+def lines_over_time(axes: Axes, stamps: pd.DatetimeIndex, ticks: int = 7) -> FloatArray:
+    """Prepare axes for lines over local time, from the first stamp to the last.
+
+    Parameters
+    ----------
+    axes : Axes
+        Of Matplotlib.
+    stamps : DatetimeIndex, length n_time
+        With a time zone.
+    ticks : int
+        Most of them.
+
+    Returns
+    -------
+    ndarray, shape (n_time,)
+        Where the stamps are along x [d].
+    """
+    x = day_numbers(stamps)
+    axes.set_xlim(x[0], x[-1])
+    time_axis(axes, stamps.tz, ticks)
+    return x
+
+
+def broken(x: FloatArray, *courses: FloatArray) -> list[FloatArray]:
+    """Break lines where times are missing: times first, then the courses with NaN there.
+
+    Parameters
+    ----------
+    x : ndarray, shape (n_time,)
+        Times of averages [d].
+    *courses : ndarray, shape (n_time,)
+        Values at these [any].
+    """
+    at = np.flatnonzero(np.diff(x) > 1.5 * np.min(np.diff(x), initial=np.inf)) + 1
+    return [np.insert(x, at, x[at]), *(np.insert(values, at, np.nan) for values in courses)]
 
 
 def day_numbers(stamps: pd.DatetimeIndex) -> FloatArray:
