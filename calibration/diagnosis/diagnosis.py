@@ -153,25 +153,32 @@ class Diagnosis:
         Returns
         -------
         DataFrame
-            Index ``effect``; ``probability``, ``score``, ``retained_share`` [-], ``group``, ``zones``, ``testable``.
+            Index ``effect``; ``probability``, ``score`` and ``retained_share`` [-], ``group``, ``zones``,
+            ``separate_by``, ``testable`` and ``reason``, as in `Candidate`.
         """
-        columns = ("effect", "probability", "score", "retained_share", "group", "zones", "testable")
-        rows = [{key: getattr(c, key) for key in columns} for c in self.verdict.candidates]
-        return pd.DataFrame(rows).set_index("effect")
+        rows = pd.DataFrame([c.to_dict() for c in self.verdict.candidates])
+        return rows.set_index("effect").drop(columns="parameters")
 
-    def plot(self) -> Axes:
-        """Draw the probability of each effect that the case can tell, as bars."""
+    def plot(self, axes: Axes | None = None) -> Axes:
+        """Draw the probability of each effect that the case can tell.
+
+        Parameters
+        ----------
+        axes : Axes, optional
+            Where to draw; axes of a new figure by default.
+        """
         shown = self.to_frame().query("testable")["probability"][::-1]
-        axes: Axes = shown.plot.barh(xlim=(0.0, 1.0), xlabel="probability that it is there [-]", title=repr(self))
-        return axes
+        drawn: Axes = shown.plot.barh(ax=axes, xlim=(0.0, 1.0), xlabel="probability that it is there [-]")
+        return drawn
 
     def __repr__(self) -> str:
         """Say case, verdict and errors in a line."""
-        found = f", {' + '.join(self.final.effects)}: {self.steps[-1].after:.3f} K" if self.steps else ""
-        return f"Diagnosis({self.case!r}: {self.verdict.name}; held-out error {self.gap:.3f} K{found})"
+        found = f", with {' + '.join(self.final.effects)} {self.steps[-1].after:.3f} K" if self.steps else ""
+        return f"<Diagnosis: {self.case}, {self.verdict.name}; held-out error {self.gap:.3f} K{found}>"
 
     def _repr_html_(self) -> str:
-        return f"<p>{escape(repr(self))}</p>{self.to_frame().head(_SHOWN).to_html()}"
+        table = self.to_frame()[["probability", "score", "group", "zones"]].head(_SHOWN).round(2)
+        return f"<p>{escape(repr(self))}</p>{table.to_html()}"
 
 
 def diagnose(

@@ -11,8 +11,7 @@ import pandas as pd
 
 from mpc.reports.evaluation import by_error, error_maps, tidy
 from mpc.reports.figures.errors import Series, zone_panels
-from mpc.reports.figures.plan import plan_drawings
-from mpc.reports.figures.quality import quality_timeline
+from mpc.reports.figures.plan import plan_drawings, quality_timeline
 from mpc.reports.figures.style import CELSIUS
 from mpc.reports.page import counted, duration, kelvin, significant, write_report
 from thermal.case.building import FloorPlans
@@ -116,14 +115,7 @@ def simulation_summary(simulation: Simulation, case: Case, parameters: str = "un
     """
     error = simulation.simulated - simulation.measured
     seen = error.columns[error.notna().any()]
-    by_zone = {
-        str(z): {
-            "mae": float(error[z].abs().mean()),
-            "bias": float(error[z].mean()),
-            "mean_heat": float(simulation.heat[z].mean()),
-        }
-        for z in seen
-    }
+    by_zone = pd.DataFrame({"mae": error.abs().mean(), "bias": error.mean(), "mean_heat": simulation.heat.mean()})
     stamps = pd.DatetimeIndex(error.index)
     return {
         "case": case.building.name,
@@ -133,7 +125,7 @@ def simulation_summary(simulation: Simulation, case: Case, parameters: str = "un
         "steps": len(stamps),
         "mae": float(error.abs().mean(axis=1).mean()) if len(seen) else float("nan"),
         "bias": float(error.mean(axis=1).mean()) if len(seen) else float("nan"),
-        "by_zone": by_zone,
+        "by_zone": by_zone.loc[seen].to_dict("index"),
         "parameters": parameters,
         "version": version("buildingmpc"),
     }
@@ -191,11 +183,8 @@ def simulation_verdict(summary: dict[str, Any]) -> str:
 def _simulation_content(simulation: Simulation, case: Case, summary: dict[str, Any]) -> dict[str, Any]:
     zones, by_zone = tuple(map(str, simulation.simulated.columns)), summary["by_zone"]
     bias = np.array([by_zone[z]["bias"] if z in by_zone else np.nan for z in zones])
-    series = Series(
-        pd.DatetimeIndex(simulation.simulated.index),
-        simulation.measured.to_numpy(dtype=float),
-        simulation.simulated.to_numpy(dtype=float),
-    )
+    courses = (frame.to_numpy(dtype=float) for frame in (simulation.measured, simulation.simulated))
+    series = Series(pd.DatetimeIndex(simulation.simulated.index), *courses)
     return {
         "case": case.building.name,
         "summary": summary,
@@ -213,11 +202,8 @@ def _simulation_content(simulation: Simulation, case: Case, summary: dict[str, A
 
 def _simulation_table(simulation: Simulation) -> pd.DataFrame:
     """Replay in tidy form: index ``timestamp``; ``zone``, ``simulated`` and ``measured`` [degC], ``heat`` [W]."""
-    values = {
-        "simulated": simulation.simulated.to_numpy(dtype=float) - CELSIUS,
-        "measured": simulation.measured.to_numpy(dtype=float) - CELSIUS,
-        "heat": simulation.heat.to_numpy(dtype=float),
-    }
+    tables = {"simulated": simulation.simulated - CELSIUS, "measured": simulation.measured - CELSIUS}
+    values = {name: t.to_numpy(dtype=float) for name, t in (tables | {"heat": simulation.heat}).items()}
     table = tidy(pd.DatetimeIndex(simulation.simulated.index), tuple(map(str, simulation.simulated.columns)), values)
     table.attrs["units"] = {"simulated": "degC", "measured": "degC", "heat": "W"}
     return table

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 from calibration.evaluation.n_step import Evaluation
 from mpc.reports.diagnosis_words import called
@@ -12,15 +11,6 @@ from mpc.reports.figures.control import cost_bars
 from mpc.reports.figures.style import Picture, panel, picture, styled
 from mpc.reports.page import render
 from mpc.studies.compare import Comparison
-
-#: What each step is, in the order in which they are done.
-_STEPS = {
-    "check": ("Check", "What the case holds, and how good its telemetry is."),
-    "calibrate": ("Calibrate", "Parameters of the building from two thirds of its telemetry, judged on the rest."),
-    "diagnose": ("Diagnose", "Where the calibrated model is still wrong, and which effect it lacks."),
-    "evaluate": ("Evaluate", "The model with what was found, on days that it was not fitted to."),
-    "compare": ("Control", "Rules and optimal control on this building for one day, on the same weather and people."),
-}
 
 
 def render_demo(
@@ -61,12 +51,15 @@ def render_demo(
     if mpc is not None and best is not None:
         saved = f"{1.0 - mpc.cost / best.cost:.0%}".replace("-", "−")
         cards.append((saved, "less spent on energy than by the best rule"))
-    pictures = {"evaluate": _error_lines(errors), "compare": cost_bars(comparison.runs)}
-    steps: list[dict[str, Any]] = [
-        {"title": title, "what": what, "verdict": verdicts[step], "link": links[step], "pictures": pictures.get(step)}
-        for step, (title, what) in _STEPS.items()
-    ]
-    content = {"case": case, "fine": fine, "cards": cards, "steps": steps, "study": comparison.study}
+    content = {
+        "case": case,
+        "fine": fine,
+        "cards": cards,
+        "verdicts": verdicts,
+        "links": links,
+        "pictures": {"evaluate": _error_lines(errors), "compare": cost_bars(comparison.runs)},
+        "study": comparison.study,
+    }
     return render("demo", content | {"verdict": f"{verdicts['diagnose']} {verdicts['compare']}"})
 
 

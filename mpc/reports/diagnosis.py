@@ -15,13 +15,13 @@ from calibration.diagnosis.refit.final import Replay, describe_fit, final_calibr
 from calibration.diagnosis.refit.refit import ACCEPTED
 from calibration.diagnosis.refit.search import Round
 from mpc.reports import diagnosis_words
-from mpc.reports.diagnosis_words import accepted, alike, called, in_zones, rivals, sure
+from mpc.reports.diagnosis_words import accepted, alike, called, in_zones, rivals
 from mpc.reports.evaluation import predictions_table, subtitle
 from mpc.reports.figures.diagnosis import change_panels, drift_lines, hour_bars, missing_lines
 from mpc.reports.figures.errors import series_of_runs
 from mpc.reports.figures.plan import heat_maps
 from mpc.reports.figures.style import CELSIUS, Picture
-from mpc.reports.page import kelvin, listed, percent, significant, spell, unit, write_report
+from mpc.reports.page import kelvin, listed, significant, sure, unit, write_report
 from thermal.case.building import FloorPlans
 from thermal.case.case import Case
 from thermal.effects.catalogue import CATALOGUE
@@ -128,7 +128,7 @@ def _both_predictions(before: Replay, after: Replay | None) -> pd.DataFrame:
 
 
 def _content(result: Diagnosis, case: Case, before: Replay, after: Replay | None) -> dict[str, Any]:
-    found = diagnosis_words.final_name(result)
+    found, inside = diagnosis_words.final_name(result), accepted(result)
     evaluations = [r.evaluation for r in (before, after) if r is not None]
     models = dict(zip(("calibrated model", found), map(series_of_runs, evaluations), strict=False))
     errors = [{z: e["mae"] for z, e in one.by_zone().items()} for one in evaluations]
@@ -139,7 +139,11 @@ def _content(result: Diagnosis, case: Case, before: Replay, after: Replay | None
         "fine": result.verdict.name != "unexplained",
         "found": found,
         "ahead": diagnosis_words.ahead(result),
-        "cards": _cards(result),
+        "accepted": inside,
+        "called": called,
+        "best": diagnosis_words.candidate(result, inside[0].screened.effect)
+        if inside
+        else result.verdict.candidates[0],
         "candidates": [_candidate_entry(result, c) for c in _shown(result)],
         "next": _measure_next(result),
         "untestable": [
@@ -166,20 +170,6 @@ def _command(result: Diagnosis) -> str:
     return " ".join([*parts, f"--horizon {result.horizon}{dx}"])
 
 
-def _cards(result: Diagnosis) -> list[tuple[str, str]]:
-    cards = [(f"{kelvin(result.gap)} K", f"error of the calibrated model, {diagnosis_words.ahead(result)}")]
-    if result.steps:
-        last = result.steps[-1]
-        share = "–" if last.share_closed is None else percent(min(1.0, last.share_closed))
-        told = "of what could be closed" if last.share_closed is not None else "share closed: gap too small to say"
-        cards += [(f"{kelvin(last.after)} K", diagnosis_words.final_name(result)), (share, told)]
-    cards.append((f"{kelvin(result.floor)} K", "floor: no regular missing heat would take it lower"))
-    inside = accepted(result)
-    best = diagnosis_words.candidate(result, inside[0].screened.effect) if inside else result.verdict.candidates[0]
-    told = "probability of" if inside else "is the highest probability of any effect:"
-    return [*cards, (sure(best.probability), f"{told} {called(best.effect)}")]
-
-
 def _shown(result: Diagnosis) -> list[Candidate]:
     inside = {r.screened.effect for r in accepted(result)}
     testable = [c for c in result.verdict.candidates if c.testable]
@@ -195,7 +185,6 @@ def _candidate_entry(result: Diagnosis, c: Candidate) -> dict[str, Any]:
     return {
         "name": called(c.effect).capitalize(),
         "probability": c.probability,
-        "sure": sure(c.probability),
         "accepted": fitted is not None,
         "where": in_zones(c.zones if fitted is None else fitted.screened.zones),
         "acts_on": CATALOGUE[c.effect].acts_on,
@@ -308,7 +297,7 @@ def _statistics(result: Diagnosis) -> dict[str, Any]:
     return {
         "limits": (ACCEPTED, GENERIC_GAP),
         "set90": listed([called(e) for e in result.verdict.set90]) if result.verdict.set90 else "",
-        "rounds": [_round(i, r) for i, r in enumerate(result.rounds, 1)],
+        "rounds": [_round(r) for r in result.rounds],
         "effects": [
             vars(c) | {"name": called(c.effect), "where": in_zones(c.zones), "sure": sure(c.probability)}
             | ({} if c.testable else nothing | {"sure": "not testable"})
@@ -334,20 +323,18 @@ def _statistics(result: Diagnosis) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _round(number: int, r: Round) -> dict[str, Any]:
+def _round(r: Round) -> dict[str, Any]:
     fitted = {x.screened.effect: x.gain for x in r.refits}
     rows = [
-        [called(g.effect), in_zones(g.zones), g.gain, fitted.get(g.effect), g.share, g.retained]
+        vars(g) | {"name": called(g.effect), "where": in_zones(g.zones), "fitted": fitted.get(g.effect)}
         for g in r.gains[:_MOST_GAINS]
     ]
-    rows.append(["heat of any regular kind", None, r.generic.gain, None, r.generic.share, None])
+    generic = {"name": "heat of any regular kind", "where": None, "fitted": None, "retained": None}
     best = [g for g in r.gains if g.share > 0.0][:_MOST_ALIKE]
-    inside = [called(e) for e in r.before.effects]
     return {
-        "title": f"Round {number}: " + (f"with {listed(inside)}" if inside else "the calibrated model"),
-        "outcome": "nothing gains enough" if r.accepted is None else f"accepted: {called(r.accepted.screened.effect)}",
-        "rows": [[spell(v, how) for v, how in zip(row, ("", "", ".1f", ".1f", "percent", "percent"), strict=True)]
-                 for row in rows],
+        "inside": [called(e) for e in r.before.effects],
+        "accepted": None if r.accepted is None else r.accepted.screened.effect,
+        "rows": [*rows, vars(r.generic) | generic],
         "names": [called(g.effect) for g in best],
         "alike": [[called(a.effect), *(f"{abs(r.screening.cosine(a, b)):.2f}" for b in best)] for a in best],
-    }  # fmt: skip
+    }

@@ -12,7 +12,7 @@ from calibration.diagnosis.decide.verdict import Candidate, group_of
 from calibration.diagnosis.decide.where import Where
 from calibration.diagnosis.diagnosis import Diagnosis
 from calibration.diagnosis.refit.refit import Refit
-from mpc.reports.page import duration, kelvin, listed, percent, watts
+from mpc.reports.page import duration, kelvin, listed, percent, sure, watts
 from thermal.effects.catalogue import CATALOGUE
 
 #: What an effect is called where its title would read oddly after "leaves out".
@@ -149,24 +149,6 @@ def in_zones(zones: Sequence[str]) -> str:
     if len(zones) > _MOST_NAMED:
         return f"in {len(zones)} zones"
     return f"in zone{'s' if len(zones) > 1 else ''} {listed(zones)}"
-
-
-def sure(probability: float) -> str:
-    """Spell a probability, never as certainty.
-
-    Parameters
-    ----------
-    probability : float
-        In [0, 1] [-].
-
-    Examples
-    --------
-    >>> sure(0.937), sure(0.9999), sure(0.001)
-    ('94 %', 'over 99 %', 'under 1 %')
-    """
-    if probability > 0.99:
-        return "over 99 %"
-    return percent(probability) if probability >= 0.01 else "under 1 %"
 
 
 def final_name(result: Diagnosis) -> str:

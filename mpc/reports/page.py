@@ -257,6 +257,24 @@ def percent(value: float) -> str:
     return f"{100 * value:.0f} %"
 
 
+def sure(probability: float) -> str:
+    """Spell a probability, never as certainty.
+
+    Parameters
+    ----------
+    probability : float
+        In [0, 1] [-].
+
+    Examples
+    --------
+    >>> sure(0.937), sure(0.9999), sure(0.001)
+    ('94 %', 'over 99 %', 'under 1 %')
+    """
+    if probability > 0.99:
+        return "over 99 %"
+    return percent(probability) if probability >= 0.01 else "under 1 %"
+
+
 def ends(interval: tuple[float, float]) -> str:
     """Spell the ends of an interval of shares.
 
@@ -290,5 +308,5 @@ def listed(words: Iterable[str], last: str = "and") -> str:
 #: How values read, by name of the filter.
 _SPELLINGS: dict[str, Callable[..., str]] = {
     f.__name__: f
-    for f in (kelvin, signed, watts, significant, plain, unit, duration, clock, counted, percent, ends, listed)
+    for f in (kelvin, signed, watts, significant, plain, unit, duration, clock, counted, percent, sure, ends, listed)
 }

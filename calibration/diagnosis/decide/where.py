@@ -24,6 +24,9 @@ _RESAMPLES, _LEVEL = 400, 0.9
 #: as heated or cooled, over the largest [-].
 _SUNNY, _ACTIVE = 100.0, 0.02
 
+#: Sides of a building.
+_POINTS = ("north", "north-east", "east", "south-east", "south", "south-west", "west", "north-west")
+
 #: Least share of predictions that the part that stands out may be of [-].
 _LEAST = 0.02
 
@@ -151,12 +154,11 @@ class _Parts:
     def zone_groups(self) -> dict[str, BoolArray]:
         """Perimeter by orientation, core, and floors."""
         groups: dict[str, list[str]] = {}
-        facades = _facades(self.models)
+        facades = [at for at, area in self.models.anatomy.facades.items() if area > 0.0]
         for zone in self.zones:
-            sides = facades.get(zone, [])
-            for side in sides:
-                groups.setdefault(f"the {side} perimeter", []).append(zone)
-            groups.setdefault("the perimeter" if sides else "the core", []).append(zone)
+            sides = [_POINTS[int((azimuth + 22.5) % 360.0 // 45.0)] for z, azimuth in facades if z == zone]
+            for name in (*(f"the {side} perimeter" for side in sides), "the perimeter" if sides else "the core"):
+                groups.setdefault(name, []).append(zone)
         geometry = self.models.case.building.geometry
         if isinstance(geometry, FloorPlans) and len(geometry.floors) > 1:
             for floor in geometry.floors:
@@ -165,12 +167,11 @@ class _Parts:
 
     def times(self) -> dict[str, BoolArray]:
         """Parts of the time, as far as the case measures what they go by."""
-        drivers, shape = self.models.drivers, self.squared.shape
-        most = np.maximum(np.abs(self.heat).max(axis=0), 1e-9)
-        heated, cooled = self.heat > _ACTIVE * most, self.heat < -_ACTIVE * most
-        found = {"heating": heated, "cooling": cooled, "neither heating nor cooling": ~heated & ~cooled}
-        found |= {name: np.broadcast_to(m[self.row][:, None], shape) for name, m in _weather(drivers).items()}
-        return found
+        active = _ACTIVE * np.maximum(np.abs(self.heat).max(axis=0), 1e-9)
+        heated, cooled, shape = self.heat > active, self.heat < -active, self.squared.shape
+        weather = {name: m[self.row][:, None] for name, m in _weather(self.models.drivers).items()}
+        found = {"heating": heated, "cooling": cooled, "neither heating nor cooling": ~heated & ~cooled, **weather}
+        return {name: np.broadcast_to(mask, shape) for name, mask in found.items()}
 
     def by_hour(self) -> FloatArray:
         """Shares of the squared error by hour of the day."""
@@ -215,15 +216,3 @@ def _weather(drivers: Drivers) -> dict[str, BoolArray]:
     found["in the coldest quarter"] = drivers.outdoor < np.quantile(drivers.outdoor, 0.25)
     found["in working hours"] = drivers.occupancy > 0.5
     return found
-
-
-def _facades(models: ModelComparison) -> dict[str, list[str]]:
-    """Sides of each zone that look outside: names of the nearest points of the compass."""
-    found: dict[str, list[str]] = {}
-    for (zone, azimuth), area in models.anatomy.facades.items():
-        if area > 0.0:
-            found.setdefault(zone, []).append(_POINTS[int((azimuth + 22.5) % 360.0 // 45.0)])
-    return found
-
-
-_POINTS = ("north", "north-east", "east", "south-east", "south", "south-west", "west", "north-west")

@@ -279,11 +279,12 @@ def look_again(work: Work, gains: Sequence[Gain], refits: Sequence[Refit], best:
         The refits, the best first, with at most one of open windows.
     """
     screened = next((g for g in gains if g.effect == WINDOWS), None)
-    if screened is None or best is None or not _may_be_windows(best.screened.effect):
+    own = "" if best is None else best.screened.effect
+    if screened is None or best is None or WINDOWS not in (own, *CATALOGUE[own].confounders):
         return list(refits)
     found, drivers = next((r for r in refits if r.screened.effect == WINDOWS), None), work.models.drivers
     exposed = {p.member for p in work.made.parameters if p.effect == WINDOWS}
-    fit, own = best.fit, best.screened.effect
+    fit = best.fit
     for _ in range(_LOOKS):
         opened = openings_beyond(fit.built.grid, _without(fit, own), drivers, fit.built.inputs)
         zones = tuple(z for k, z in enumerate(drivers.zones) if z in exposed and opened[:, k].any())
@@ -298,10 +299,6 @@ def look_again(work: Work, gains: Sequence[Gain], refits: Sequence[Refit], best:
         found, fit, own = again, again.fit, WINDOWS
     others = [r for r in refits if r.screened.effect != WINDOWS]
     return sorted([*others, *([] if found is None else [found])], key=lambda r: -r.gain)
-
-
-def _may_be_windows(effect: str) -> bool:
-    return effect == WINDOWS or WINDOWS in CATALOGUE[effect].confounders
 
 
 def _without(fit: Fit, effect: str) -> FloatArray:

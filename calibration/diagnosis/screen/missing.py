@@ -18,9 +18,8 @@ from calibration.estimation.innovations import tune_disturbance
 from calibration.estimation.smoother import averaged_deviation, smooth
 from calibration.estimation.tuner import air_volumes
 from calibration.evaluation.intervals import Interval
-from thermal._types import BoolArray, FloatArray, IntArray
+from thermal._types import FloatArray
 from thermal.model.reduce import ReducedModel, reduced_model
-from thermal.model.replay import Inputs
 
 #: Telemetry that the size and the course of the missing heat are tuned on [s]: the last four days that were fitted,
 #: of which at most two are a weekend.
@@ -110,7 +109,7 @@ def missing_heat(
         model = reduced_model(fit.built.grid, [fit.theta], order=_ORDER)
     covariance: Covariance = "steady" if many else "exact"
     disturbance = _tuned(fit, model, near)
-    parts = []
+    parts, measured = [], np.isfinite(inputs.zone)
     for interval in intervals:
         filtered = filter_interval(
             model, fit.theta, inputs, interval, disturbance,
@@ -118,7 +117,7 @@ def missing_heat(
         )  # fmt: skip
         found = smooth(filtered)
         rows = np.arange(filtered.begin + 1, filtered.begin + 1 + len(found.stamps))
-        known = _known(inputs, rows)
+        known = measured[rows] & measured[rows - 1] & inputs.complete[rows, None]  # before and after, inputs complete
         narrower = averaged_deviation(filtered, max(1, round(HOUR / inputs.step)))
         values = (found.disturbance, (narrower * found.disturbance_deviation) ** 2)
         parts.append(hourly_means(found.stamps, inputs.step, *(np.where(known, v, np.nan) for v in values)))
@@ -167,9 +166,3 @@ def _parameter_variance(fit: Fit, model: ReducedModel, intervals: Sequence[Inter
         slopes.append((high - low) / (ends[1] - ends[0])[i])
     roots = np.tensordot(np.linalg.inv(np.linalg.cholesky(jacobian.T @ jacobian)), np.array(slopes), axes=1)
     return np.asarray((roots**2).sum(axis=0))
-
-
-def _known(inputs: Inputs, rows: IntArray) -> BoolArray:
-    """Tell steps of zones whose temperature is measured before and after, and whose inputs are complete."""
-    measured = np.isfinite(inputs.zone)
-    return np.asarray(measured[rows] & measured[rows - 1] & inputs.complete[rows, None])

@@ -1,31 +1,32 @@
-"""The building as drawn: plans, or tiles as large as zones, with the paper's heat map of the error or missing heat."""
+"""Figures of a case: plans, or tiles as large as zones, with errors or missing heat; quality of its telemetry."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+import pandas as pd
 from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colorbar import Colorbar
 from matplotlib.colors import Colormap, Normalize, to_rgb
 from matplotlib.figure import Figure
-from matplotlib.patches import Rectangle
+from matplotlib.patches import Patch, Rectangle
 from matplotlib.text import OffsetFrom
 from scipy.ndimage import distance_transform_edt
 
+from mpc.reports.figures import style
 from mpc.reports.figures.field import Field
 from mpc.reports.figures.style import INK, Picture, panel, picture, styled
 from mpc.reports.page import watts
 from thermal._types import BoolArray, FloatArray
 from thermal.case.building import FloorPlan, FloorPlans
+from thermal.case.quality import QualityReport
 
-#: Red is a simulation that is too warm, blue one that is too cold, white none, as in the paper.
-ERROR_COLOURS = colormaps["RdBu_r"]
-
-#: White is no missing heat, dark red most; it reads in grey too.
-HEAT_COLOURS = colormaps["OrRd"]
+#: Red is a simulation that is too warm, blue one that is too cold, white none, as in the paper; and white no missing
+#: heat, dark red most, which reads in grey too.
+ERROR_COLOURS, HEAT_COLOURS = colormaps["RdBu_r"], colormaps["OrRd"]
 
 #: Labels below this size are left out [pt].
 SMALLEST_LABEL = 4.6
@@ -35,6 +36,11 @@ WALLS = {"#": to_rgb("#3A3F45"), "+": to_rgb("#8E949B"), ".": to_rgb("white")}
 UNMEASURED = to_rgb("#E3E5E8")
 _ZONES = [to_rgb(c) for c in ("#D7E8F5", "#FBE3D0", "#DDEFDC", "#F3E6F3", "#FFF3C9", "#DDEFEF", "#F0E4DA", "#E5E6F4")]
 
+#: Most columns of telemetry that are drawn, those with the most flaws, and the colour of each kind of finding; what is
+#: constant is only reported, not left out.
+_MOST_COLUMNS = 40
+_FINDINGS = {"gap": style.MUTED, "impossible": style.WARNING, "flat": style.SIMULATED, "spike": "#7B3FA0",
+             "constant": "#7FB2D6"}  # fmt: skip
 
 Box = tuple[float, float, float, float]
 Colour = tuple[float, float, float]
@@ -93,9 +99,8 @@ def plan_drawings(plans: FloorPlans, orientation: float) -> list[Picture]:
     drawn = []
     for floor in plans.floors:
         colours = {zone: _ZONES[i % len(_ZONES)] for i, zone in enumerate(floor.zone_names)}
-        image = np.array([[WALLS.get(str(t)) or colours[str(t)] for t in row] for row in floor.tokens])
         labels = {zone: (zone, colours[zone]) for zone in floor.zone_names}
-        figure, _ = _canvas(floor, plans.cell_size, orientation, image, f"floor {floor.name}", labels)
+        figure, _ = _canvas(floor, plans.cell_size, orientation, _filled(floor, colours), f"floor {floor.name}", labels)
         drawn.append(picture(figure, f"Plan of floor {floor.name} with {len(labels)} zones"))
     return drawn
 
@@ -176,14 +181,19 @@ def heat_maps(
     colour = {zone: _colour(HEAT_COLOURS, size / top) for zone, size in by_zone.items()}
     drawn = []
     for floor in plans.floors:
-        image = np.array([[WALLS.get(str(t)) or colour[str(t)] for t in row] for row in floor.tokens])
+        image, name = _filled(floor, colour), f"floor {floor.name}, {title}"
         labels = {z: (f"{z}\n{watts(by_zone[z])}", colour[z]) for z in floor.zone_names}
-        figure, axes = _canvas(floor, plans.cell_size, orientation, image, f"floor {floor.name}, {title}", labels)
+        figure, axes = _canvas(floor, plans.cell_size, orientation, image, name, labels)
         shades = ScalarMappable(Normalize(0.0, top), HEAT_COLOURS)
         _colour_bar(figure, axes, shades, "missing heat, root mean square [W]")
         listed = "; ".join(f"{z} {watts(by_zone[z])}" for z in floor.zone_names)
         drawn.append(picture(figure, f"Missing heat on floor {floor.name}, {title}: {listed}"))
     return drawn
+
+
+def _filled(floor: FloorPlan, colours: Mapping[str, Colour]) -> FloatArray:
+    """Image of a floor with one colour a zone, shape (n_row, n_column, 3)."""
+    return np.array([[WALLS.get(str(t)) or colours[str(t)] for t in row] for row in floor.tokens])
 
 
 def _signed_kelvin(value: float) -> str:
@@ -249,9 +259,9 @@ def _north(axes: Axes, orientation: float) -> None:
     def along(points: float) -> tuple[float, float]:
         return float(-14.0 + points * x), float(14.0 + points * y)
 
-    style = {"arrowstyle": "-|>", "color": INK, "shrinkA": 0, "shrinkB": 0, "linewidth": 1.0}
+    arrow = {"arrowstyle": "-|>", "color": INK, "shrinkA": 0, "shrinkB": 0, "linewidth": 1.0}
     tip, foot = along(9.0), along(-9.0)
-    axes.annotate("", tip, foot, xycoords=corner, textcoords=corner, annotation_clip=False, arrowprops=style)
+    axes.annotate("", tip, foot, xycoords=corner, textcoords=corner, annotation_clip=False, arrowprops=arrow)
     axes.annotate("N", along(16.0), xycoords=corner, fontsize=7, ha="center", va="center", annotation_clip=False)
 
 
@@ -357,3 +367,34 @@ def _worst(row: list[float], side: float) -> float:
     """Largest ratio of sides in a row of tiles along a side."""
     depth = sum(row) / side
     return max(max(depth * depth / size, size / (depth * depth)) for size in row)
+
+
+@styled
+def quality_timeline(report: QualityReport) -> list[Picture]:
+    """Draw the findings of each column that has any, over the time of the telemetry.
+
+    Parameters
+    ----------
+    report : QualityReport
+        Of a case.
+    """
+    flawed = sorted((c for c in report.columns if c.findings), key=lambda c: -c.unusable_share)[:_MOST_COLUMNS]
+    if not flawed:
+        return []
+    figure, axes = panel(7.4, 1.1 + 0.24 * len(flawed))
+    kinds = set()
+    least = (report.end - report.start) / 400
+    for row, column in enumerate(flawed):
+        axes.axhline(row, color="#E4E7EB", linewidth=6, zorder=1)
+        for finding in column.findings:
+            kinds.add(finding.kind)
+            ends = [finding.start, max(finding.end, finding.start + least)]
+            left, right = style.day_numbers(pd.DatetimeIndex(ends))
+            axes.barh(row, right - left, left=left, height=0.6, color=_FINDINGS[finding.kind], zorder=2)
+    axes.set_yticks(range(len(flawed)), [c.column for c in flawed], fontsize=7)
+    style.lines_over_time(axes, pd.DatetimeIndex([report.start, report.end]))
+    axes.set_ylim(len(flawed) - 0.4, -0.6)
+    axes.grid(axis="y", visible=False)
+    keys = [Patch(color=colour, label=kind) for kind, colour in _FINDINGS.items() if kind in kinds]
+    style.keys_below(figure, 5, handles=keys)
+    return [picture(figure, "Time line of what is missing or not usable, one row a telemetry column")]

@@ -7,9 +7,9 @@ import io
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from datetime import tzinfo
 from functools import wraps
-from typing import Any, ParamSpec, TypeVar
+from pathlib import Path
+from typing import ParamSpec, TypeVar
 
 import matplotlib as mpl
 import numpy as np
@@ -30,28 +30,12 @@ MEASURED, SIMULATED, WARNING, MUTED, INK = "#0072B2", "#D55E00", "#C00028", "#8A
 #: Zero of the Celsius scale [K].
 CELSIUS = 273.15
 
-_STYLE: dict[Any, Any] = {  # Matplotlib types its keys one by one
-    "axes.edgecolor": "#9AA0A8",
-    "axes.grid": True,
-    "axes.axisbelow": True,
-    "axes.labelcolor": INK,
-    "axes.spines.right": False,
-    "axes.spines.top": False,
-    "axes.titlelocation": "left",
-    "axes.titlesize": 10,
-    "figure.constrained_layout.use": True,
-    "font.family": "sans-serif",
-    "font.sans-serif": ["DejaVu Sans", "Verdana", "Arial", "sans-serif"],
-    "font.size": 9,
-    "grid.color": "#E4E7EB",
-    "legend.frameon": False,
-    "svg.fonttype": "none",
-    "svg.hashsalt": "buildingmpc",
-    "text.color": INK,
-    "text.parse_math": False,
-    "xtick.color": INK,
-    "ytick.color": INK,
-}
+_STYLE = mpl.rc_params_from_file(
+    Path(__file__).parents[1] / "templates" / "figures.mplstyle", use_default_template=False
+)
+
+#: Warnings: names in any script, which the page's font shows; a silent sensor, a gap in a line; ticks, chosen anyway.
+_EXPECTED = ("Glyph .* missing from", "Mean of empty slice|All-NaN slice", "AutoDateLocator")
 
 
 @dataclass(frozen=True)
@@ -87,13 +71,8 @@ def styled(function: Callable[P, T]) -> Callable[P, T]:
         with mpl.rc_context(), warnings.catch_warnings():
             mpl.rcdefaults()
             mpl.rcParams.update(_STYLE)
-            warnings.filterwarnings(
-                "ignore", message="Glyph .* missing from"
-            )  # names in any script: the page's font shows them
-            warnings.filterwarnings(
-                "ignore", message="Mean of empty slice|All-NaN slice"
-            )  # a sensor that is silent: a gap in a line
-            warnings.filterwarnings("ignore", message="AutoDateLocator")  # chooses its ticks all the same
+            for message in _EXPECTED:
+                warnings.filterwarnings("ignore", message=message)
             return function(*args, **kwargs)
 
     return drawn
@@ -166,7 +145,11 @@ def lines_over_time(axes: Axes, stamps: pd.DatetimeIndex, ticks: int = 7) -> Flo
     """
     x = day_numbers(stamps)
     axes.set_xlim(x[0], x[-1])
-    time_axis(axes, stamps.tz, ticks)
+    locator = dates.AutoDateLocator(tz=stamps.tz, minticks=3, maxticks=ticks)  # type: ignore[no-untyped-call]
+    axes.xaxis.set_major_locator(locator)
+    axes.xaxis.set_major_formatter(dates.ConciseDateFormatter(locator, tz=stamps.tz))  # type: ignore[no-untyped-call]
+    axes.xaxis.get_offset_text().set_fontsize(8)
+    axes.tick_params(axis="x", labelsize=8)
     return x
 
 
@@ -193,23 +176,3 @@ def day_numbers(stamps: pd.DatetimeIndex) -> FloatArray:
         With a time zone.
     """
     return np.asarray(stamps.tz_convert("UTC").tz_localize(None).as_unit("us").asi8 / 86400e6, dtype=float)
-
-
-def time_axis(axes: Axes, zone: tzinfo | None, ticks: int = 7) -> None:
-    """Local time along x.
-
-    Parameters
-    ----------
-    axes : Axes
-        Of Matplotlib.
-    zone : tzinfo or None
-        Whose clock.
-    ticks : int
-        Most of them.
-    """
-    locator = dates.AutoDateLocator(tz=zone, minticks=3, maxticks=ticks)  # type: ignore[no-untyped-call]
-    axes.xaxis.set_major_locator(locator)
-    formatter = dates.ConciseDateFormatter(locator, tz=zone)  # type: ignore[no-untyped-call]
-    axes.xaxis.set_major_formatter(formatter)
-    axes.xaxis.get_offset_text().set_fontsize(8)
-    axes.tick_params(axis="x", labelsize=8)
