@@ -149,13 +149,13 @@ def comparison_verdict(comparison: Comparison) -> str:
     if way is not None:
         parts.append(
             f"Counting discomfort at {comparison.study.settings.comfort_price:g} {mpc.kpis.currency} a kelvin hour and "
-            f"zone, it goes {way:.0%} of the way from that rule to what perfect knowledge would reach."
+            f"zone, that is {way:.0%} of the perfect-forecast savings."
         )
     return " ".join(parts)
 
 
 def comparison_rows(comparison: Comparison) -> list[list[str]]:
-    """Rows of the table of controllers: name, cost, saving, discomfort, worst zone, energy, peak, way to the bound.
+    """Rows of the table of controllers, from cost to the share of the perfect-forecast savings.
 
     Parameters
     ----------

@@ -28,7 +28,7 @@ _EVALUATIONS = 10
 #: the mean where it is held out [K].
 MATTERS = 0.03
 
-#: Share of that fall which tangents must promise for a fit to be worth its time [-]: of a hundred zones a fit takes
+#: Share of that fall which tangents must promise for a fit to pay for its time [-]: of a hundred zones a fit takes
 #: half a minute, and their evidence is in the tens for what no prediction shows.
 _PROMISING = 0.25
 
@@ -231,7 +231,7 @@ class Work:
 
 
 def promising(fit: Fit, share: float) -> bool:
-    """Whether what tangents promise is worth a fit.
+    """Whether what tangents promise justifies a fit.
 
     Parameters
     ----------

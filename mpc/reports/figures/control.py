@@ -1,4 +1,4 @@
-"""Figures of closed loops: what was done, what it was done for, and what came of it."""
+"""Figures of closed loops: what was done, what it was done for, and what was realised."""
 
 from __future__ import annotations
 
@@ -116,7 +116,7 @@ def _gas(run: ControlRun) -> FloatArray:
 
 @styled
 def expectations(run: ControlRun) -> list[Picture]:
-    """Draw what optimal control expected after an hour, and what came.
+    """Draw what optimal control expected after an hour, and what was realised.
 
     Parameters
     ----------

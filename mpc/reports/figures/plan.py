@@ -290,7 +290,7 @@ def _label(axes: Axes, mine: BoolArray, cell: float, scale: float, text: str, in
 
 
 def _runs(mask: BoolArray) -> list[tuple[int, int]]:
-    """First and last position of each stretch of True."""
+    """First and last position of each interval of True."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(np.int8), [0]])))
     return [(int(a), int(b) - 1) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 

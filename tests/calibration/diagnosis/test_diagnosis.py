@@ -76,7 +76,7 @@ def test_a_meter_that_reads_too_low_is_named_with_its_zone_and_its_error(number:
     assert max(found.where.zones, key=lambda s: s.share).name == zone
 
 
-def test_how_far_closes_the_gap_and_the_placebo_does_not() -> None:
+def test_how_far_closes_the_gap_and_permuted_signals_do_not() -> None:
     found = diagnosed(twin().building.zone_names[1])
     (step, *_) = found.steps
     assert step.share_closed is not None and step.interval is not None
