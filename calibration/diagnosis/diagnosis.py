@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from html import escape
 from importlib.metadata import version
 from typing import Any
@@ -12,6 +12,7 @@ from typing import Any
 import pandas as pd
 from matplotlib.axes import Axes
 
+from calibration.diagnosis.decide.drift import DriftCurve, drift_of
 from calibration.diagnosis.decide.levels import p_value
 from calibration.diagnosis.decide.verdict import Verdict, gains_of, judge
 from calibration.diagnosis.decide.where import Where, where_it_lies
@@ -19,9 +20,11 @@ from calibration.diagnosis.refit.comparison import Fit, ModelComparison
 from calibration.diagnosis.refit.how_far import Step, how_far
 from calibration.diagnosis.refit.refit import ACCEPTED, elsewhere, held_out
 from calibration.diagnosis.refit.search import Round, search
+from calibration.diagnosis.screen.missing import Missing, at_start, missing_heat
 from calibration.evaluation.intervals import Interval
-from calibration.evaluation.n_step import Progress
+from calibration.evaluation.n_step import Evaluation, Progress
 from calibration.evaluation.settings import ModelSettings
+from calibration.fit.result import SolverReport, effect_entries
 from thermal.case.case import Case
 from thermal.effects.catalogue import CATALOGUE
 
@@ -34,6 +37,25 @@ SUBSYSTEMS = {
 
 #: Effects that a notebook shows.
 _SHOWN = 8
+
+
+@dataclass(frozen=True)
+class Replay:
+    """A fitted model on the held-out intervals.
+
+    Parameters
+    ----------
+    evaluation : Evaluation
+        Its predictions, with every step.
+    missing : Missing
+        Heat that it lacks by hour and zone.
+    drift : DriftCurve
+        How the error of its free runs grows.
+    """
+
+    evaluation: Evaluation
+    missing: Missing
+    drift: DriftCurve
 
 
 @dataclass(frozen=True, repr=False)
@@ -146,6 +168,46 @@ class Diagnosis:
             },
             **{key: getattr(self, key) for key in ("seconds", "case", "version", "seed")},
         }  # fmt: skip
+
+    def replays(self) -> list[Replay]:
+        """Replay the calibrated baseline on the held-out intervals, and the final model where it has an effect."""
+        models = [(self.rounds[0].before, self.where.missing, self.where.drift)]
+        if self.final.effects:
+            models.append((self.final, missing_heat(self.final, self.judged), drift_of(self.final, self.judged)))
+        return [
+            Replay(fit.evaluate(self.judged, self.horizon, trajectories=True), missing, drift)
+            for fit, missing, drift in models
+        ]
+
+    def calibration(self) -> dict[str, Any]:
+        """Contents of the ``calibration.json`` of the final model."""
+        final, network = self.final, self.final.built.network
+        described = final.describe()
+        found = final.found
+        solver = SolverReport(
+            "gauss_newton", "settled" if found.converged else "evaluations used up", found.converged, found.evaluations,
+            self.seconds, 1, (), found.evaluations, found.converged,
+        )  # fmt: skip
+        intervals = {"tuning": self.tuned, "held_out": self.judged}
+        before, after = (
+            {name: fit.evaluate(part, self.horizon).metrics.to_dict() for name, part in intervals.items()}
+            for fit in (at_start(self.rounds[0].before), final)
+        )
+        return {
+            "parameters": {p.name: p.to_dict() for p in described},
+            "uncalibrated": before,
+            "calibrated": after,
+            "effects": effect_entries(final.effects, described),
+            "solver": solver.to_dict(),
+            "intervals": {name: [i.to_dict() for i in part] for name, part in intervals.items()},
+            "objective": "multi_step",
+            "horizon": self.horizon,
+            "settings": replace(self.settings, effects=dict(final.effects)).to_dict(),
+            "zones": list(network.zones),
+            "case": self.case,
+            "version": self.version,
+            "seed": self.seed,
+        }
 
     def to_frame(self) -> pd.DataFrame:
         """Tabulate the effects of the catalogue, the likeliest first.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,8 +11,7 @@ import pandas as pd
 
 from calibration.diagnosis.decide.levels import GENERIC_GAP, LARGEST_GROUP
 from calibration.diagnosis.decide.verdict import Candidate
-from calibration.diagnosis.diagnosis import Diagnosis
-from calibration.diagnosis.refit.final import Replay, describe_fit, final_calibration, replays
+from calibration.diagnosis.diagnosis import Diagnosis, Replay
 from calibration.diagnosis.refit.refit import ACCEPTED
 from calibration.diagnosis.refit.search import Round
 from mpc.reports import diagnosis_words
@@ -25,6 +25,9 @@ from mpc.reports.page import kelvin, listed, significant, sure, unit, write_repo
 from thermal.case.building import FloorPlans
 from thermal.case.case import Case
 from thermal.effects.catalogue import CATALOGUE
+
+#: Models of a diagnosis in its tables.
+_MODELS = ("baseline", "with_effects")
 
 #: Effects shown at the top: those at least so probable [-], and how many at least and at most.
 _LIKELY, _FEWEST, _MOST = 0.05, 3, 6
@@ -70,14 +73,14 @@ def write_diagnosis(result: Diagnosis, case: Case, out: str | Path, force: bool 
     ResultsExistError
         When the folder holds something and ``force`` is not set.
     """
-    before, after = replays(result)
+    models = result.replays()
     files = {
         "diagnosis.json": diagnosis_summary(result),
-        "calibration.json": final_calibration(result),
-        "missing_watts.parquet": _missing_table(result, after),
-        "predictions.parquet": _both_predictions(before, after),
+        "calibration.json": result.calibration(),
+        "missing_watts.parquet": _missing_table(result, models),
+        "predictions.parquet": _predictions(models),
     }
-    return write_report(out, "diagnosis", _content(result, case, before, after), files, force)
+    return write_report(out, "diagnosis", _content(result, case, models), files, force)
 
 
 def diagnosis_summary(result: Diagnosis) -> dict[str, Any]:
@@ -92,19 +95,17 @@ def diagnosis_summary(result: Diagnosis) -> dict[str, Any]:
     return numbers | {"where": {"sentence": diagnosis_words.where_sentence(result.where), **numbers["where"]}}
 
 
-def _missing_table(result: Diagnosis, after: Replay | None) -> pd.DataFrame:
+def _missing_table(result: Diagnosis, models: Sequence[Replay]) -> pd.DataFrame:
     """Tabulate missing heat with its band, one row an hour and zone.
 
     Index ``timestamp``, where hours begin; ``zone``; heat that the model lacks, ``uncalibrated`` with parameters at
     their starts, ``baseline`` calibrated, and ``with_effects``; each also as ``.._low`` and ``.._high``, ends of its
     90 % band [W].
     """
-    models = {"uncalibrated": result.where.missing_at_start, "baseline": result.where.missing}
-    if after is not None:
-        models["with_effects"] = after.missing
+    heat = (result.where.missing_at_start, *(r.missing for r in models))
     parts = {
         name + end: values.stack(future_stack=True)
-        for name, missing in models.items()
+        for name, missing in zip(("uncalibrated", *_MODELS), heat, strict=False)
         for end, values in zip(("", "_low", "_high"), (missing.watts, *missing.band(0.9)), strict=True)
     }
     table = pd.DataFrame(parts).rename_axis(["timestamp", "zone"]).reset_index("zone")
@@ -112,29 +113,29 @@ def _missing_table(result: Diagnosis, after: Replay | None) -> pd.DataFrame:
     return table
 
 
-def _both_predictions(before: Replay, after: Replay | None) -> pd.DataFrame:
-    """Tabulate the predictions of both models, one row a run, step and measured zone.
+def _predictions(models: Sequence[Replay]) -> pd.DataFrame:
+    """Tabulate the predictions of the models, one row a run, step and measured zone.
 
     Index ``timestamp``; ``run_start``, ``zone``, ``measured``, ``baseline`` and ``with_effects`` [degC].
     """
-    table = predictions_table(before.evaluation).rename(columns={"simulated": "baseline"})
-    if after is not None:
-        other = predictions_table(after.evaluation).rename(columns={"simulated": "with_effects"})
-        keys = ["timestamp", "run_start", "zone"]
-        other = other.reset_index()[[*keys, "with_effects"]]
-        table = table.reset_index().merge(other, on=keys, how="left").set_index("timestamp")
-    table.attrs["units"] = {c: "degC" for c in ("measured", "baseline", "with_effects") if c in table}
+    named = zip(_MODELS, models, strict=False)
+    table, *others = (predictions_table(r.evaluation).rename(columns={"simulated": name}) for name, r in named)
+    keys = ["timestamp", "run_start", "zone"]
+    for other in others:
+        further = other.reset_index().drop(columns="measured")
+        table = table.reset_index().merge(further, on=keys, how="left").set_index("timestamp")
+    table.attrs["units"] = {c: "degC" for c in ("measured", *_MODELS) if c in table}
     return table
 
 
-def _content(result: Diagnosis, case: Case, before: Replay, after: Replay | None) -> dict[str, Any]:
+def _content(result: Diagnosis, case: Case, replayed: Sequence[Replay]) -> dict[str, Any]:
     found, inside = diagnosis_words.final_name(result), accepted(result)
-    evaluations = [r.evaluation for r in (before, after) if r is not None]
+    evaluations = [r.evaluation for r in replayed]
     models = dict(zip(("calibrated model", found), map(series_of_runs, evaluations), strict=False))
     errors = [{z: e["mae"] for z, e in one.by_zone().items()} for one in evaluations]
     return {
         "result": result,
-        "subtitle": subtitle(case, before.evaluation),
+        "subtitle": subtitle(case, evaluations[0]),
         "verdict": diagnosis_words.diagnosis_verdict(result),
         "fine": result.verdict.name != "unexplained",
         "found": found,
@@ -151,7 +152,7 @@ def _content(result: Diagnosis, case: Case, before: Replay, after: Replay | None
             for c in result.verdict.candidates
             if not c.testable
         ],
-        **_where(result, case, before, after),
+        **_where(result, case, replayed),
         "waterfall": _waterfall(result),
         "tests": _test_sentences(result),
         "panels": change_panels(models, evaluations[0].zones, errors),
@@ -197,7 +198,7 @@ def _candidate_entry(result: Diagnosis, c: Candidate) -> dict[str, Any]:
 def _values(result: Diagnosis, effect: str) -> list[str]:
     """Spell the parameters of an effect as the final model has them."""
     own = {p.name for p in CATALOGUE[effect].parameters}
-    found = [p for p in describe_fit(result.final) if p.name.partition("@")[0] in own]
+    found = [p for p in result.final.describe() if p.name.partition("@")[0] in own]
     spelled = []
     for p in found[:_MOST_VALUES]:
         base, _, member = p.name.partition("@")
@@ -252,25 +253,25 @@ def _test_sentences(result: Diagnosis) -> list[str]:
     return sentences
 
 
-def _where(result: Diagnosis, case: Case, before: Replay, after: Replay | None) -> dict[str, Any]:
+def _where(result: Diagnosis, case: Case, replayed: Sequence[Replay]) -> dict[str, Any]:
     """Lay out where the gap lies: plans, zones, parts of the building and of the day, growth of the error."""
-    where, geometry, both = result.where, case.building.geometry, [r for r in (before, after) if r is not None]
+    where, geometry, before = result.where, case.building.geometry, replayed[0]
     names = ("calibrated", diagnosis_words.final_name(result))
     maps: list[Picture] = []
     if isinstance(geometry, FloorPlans):
         cells = [np.count_nonzero(floor.tokens == zone) for floor in geometry.floors for zone in floor.zone_names]
         area = float(np.median(cells)) * geometry.cell_size**2
         top = max(float(np.nanmax(before.missing.rms, initial=1.0)), _NOTABLE * area)
-        for r, title in zip(both, ("calibrated model", names[1]), strict=False):
+        for r, title in zip(replayed, ("calibrated model", names[1]), strict=False):
             zones = list(r.missing.watts.columns)
             maps += heat_maps(geometry, case.building.orientation, zones, r.missing.rms, title, top)
-    missing = {"uncalibrated": where.missing_at_start, **dict(zip(names, (r.missing for r in both), strict=False))}
+    missing = {"uncalibrated": where.missing_at_start, **dict(zip(names, (r.missing for r in replayed), strict=False))}
     sizes = dict(zip(before.missing.watts, np.column_stack([m.rms for m in missing.values()]).tolist(), strict=True))
     known = {zone: size for zone, size in before.missing.by_zone.items() if size > 0.0}
     worst = sorted(known, key=lambda zone: -known[zone])[:_MOST_DRAWN]
     means = before.missing.watts.mean()
     parts = [p for p in (*where.groups, *where.modes) if p.share > p.predictions > 0.0]
-    drifts = {name: (r.drift.seconds, r.drift.rms) for name, r in zip(names, both, strict=False)}
+    drifts = {name: (r.drift.seconds, r.drift.rms) for name, r in zip(names, replayed, strict=False)}
     return {
         "sentence": diagnosis_words.where_sentence(where).replace("%", " %"),
         "maps": maps,
@@ -284,14 +285,14 @@ def _where(result: Diagnosis, case: Case, before: Replay, after: Replay | None) 
             for p in sorted(parts, key=lambda p: p.predictions - p.share)[:_MOST_PARTS]
         ],
         "hours": hour_bars(where.hours),
-        "drift_sentence": diagnosis_words.drift_sentence(before.drift, after.drift if after else None, names[1]),
+        "drift_sentence": diagnosis_words.drift_sentence(names[1], *(r.drift for r in replayed)),
         "drift": drift_lines(drifts),
     }
 
 
 def _statistics(result: Diagnosis) -> dict[str, Any]:
     """Lay out the fold of the page: rounds, likeness, permutation tests, bounds and what would have been found."""
-    first, final = ({p.name: p for p in describe_fit(f)} for f in (result.rounds[0].before, result.final))
+    first, final = ({p.name: p for p in f.describe()} for f in (result.rounds[0].before, result.final))
     steps = [vars(s) | {"names": listed([called(e) for e in s.effects])} for s in result.steps]
     nothing = dict.fromkeys(("where", "score", "retained_share"))
     return {

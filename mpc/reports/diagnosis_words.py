@@ -311,17 +311,17 @@ def alternating_sentence(result: Diagnosis) -> str:
     )
 
 
-def drift_sentence(before: DriftCurve, after: DriftCurve | None, found: str) -> str:
+def drift_sentence(found: str, before: DriftCurve, after: DriftCurve | None = None) -> str:
     """Say what the growth of the error tells.
 
     Parameters
     ----------
-    before : DriftCurve
-        Of the calibrated model.
-    after : DriftCurve or None
-        Of the final model, where it has an effect.
     found : str
         What the final model is called, such as ``with the effect found``.
+    before : DriftCurve
+        Of the calibrated model.
+    after : DriftCurve, optional
+        Of the final model, where it has an effect.
     """
     text = f"Left to itself, the calibrated model's error {growth_words(before)}; it is {end_words(before)}."
     if after is None:

@@ -15,7 +15,9 @@ from calibration.evaluation import intervals
 from calibration.evaluation.intervals import Interval, horizon_steps
 from calibration.evaluation.n_step import Evaluation, evaluate_model
 from calibration.evaluation.settings import ModelSettings
+from calibration.fit.describe import describe_parameters
 from calibration.fit.problem import Problem
+from calibration.fit.result import ParameterEstimate
 from calibration.fit.starts import tuning_runs
 from thermal._types import FloatArray
 from thermal.case.case import Case
@@ -155,6 +157,12 @@ class Fit:
         """Parameters by name [parameter units]."""
         names = (p.name for p in self.built.network.parameters)
         return dict(zip(names, self.theta.tolist(), strict=True))
+
+    def describe(self) -> tuple[ParameterEstimate, ...]:
+        """Parameters with what is known of each."""
+        known = dict(zip(self.problem.free, self.deviations.tolist(), strict=True))
+        network = self.built.network
+        return describe_parameters(network.parameters, self.theta, known, network.nominal)
 
     def evaluate(self, intervals: Sequence[Interval], horizon: str, trajectories: bool = False) -> Evaluation:
         """Predict hourly on some intervals.

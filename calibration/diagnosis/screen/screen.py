@@ -61,7 +61,7 @@ class Screening:
         self._levels = {p.effect: p for p in own if p.effect in lacking and p.name == CATALOGUE[p.effect].level}
         levels = {p.name: (p.lower, p.upper) for p in self._levels.values()}
         theta, other = (built.theta({**fit.values, **{name: ends[k] for name, ends in levels.items()}}) for k in (0, 1))
-        # a Galerkin basis of a symmetric model is accurate for its tangents too: gains are those of the grid within 0.02
+        # a Galerkin basis of a symmetric model is accurate for tangents too: gains are those of the grid within 0.02
         shifts, order = (FEW_SHIFTS, _LARGEST_ORDER) if here else (SHIFTS, None)
         model = reduced_model(built.grid, [theta], shifts=shifts, order=order)
         problem = models.problem(built, theta)

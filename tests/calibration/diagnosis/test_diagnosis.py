@@ -113,6 +113,18 @@ def test_the_file_holds_every_effect_and_what_the_contract_asks() -> None:
     assert set(content["gap"]["smallest_detectable_watts"]) == set(twin().building.zone_names)
 
 
+def test_a_diagnosis_shows_itself() -> None:
+    found = diagnosed(twin().building.zone_names[1])
+    table = found.to_frame()
+    assert list(table.index) == [c.effect for c in found.verdict.candidates]
+    assert set(table.index) == set(CATALOGUE)
+    assert table["probability"].iloc[0] == found.verdict.candidates[0].probability
+    assert len(repr(found)) < 160 and found.verdict.name in repr(found) and f"{found.gap:.3f} K" in repr(found)
+    assert "<table" in found._repr_html_() and found.verdict.candidates[0].effect in found._repr_html_()
+    axes = found.plot()
+    assert len(axes.patches) == table["testable"].sum()
+
+
 def test_what_counts_for_little_is_ranked_by_what_it_gains_and_what_predicts_worse_is_not() -> None:
     """Two fits that gain much and are too small to matter, and one that gains more and predicts worse."""
     r = diagnosed(None).rounds[0]

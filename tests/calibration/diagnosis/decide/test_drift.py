@@ -99,9 +99,9 @@ def test_a_wrong_mass_makes_a_hump() -> None:
 
 
 def test_the_sentence_tells_both_models() -> None:
-    text = drift_sentence(curve(relaxing(0, 3600.0)), curve(noise(0, 0.1)), "with the effect found")
+    text = drift_sentence("with the effect found", curve(relaxing(0, 3600.0)), curve(noise(0, 0.1)))
     assert "in proportion to time" in text and "With the effect found it is there from the first step" in text
-    assert "With" not in drift_sentence(curve(walks(0)), None, "")
+    assert "With" not in drift_sentence("", curve(walks(0)))
 
 
 def test_a_zone_that_lacks_heat_drifts_in_proportion_to_time() -> None:
