@@ -36,7 +36,6 @@ from calibration import calibrate_many
 from calibration.fleet.case import CaseOutcome
 from calibration.fleet.run import case_folders
 from mpc.reports.calibration import calibration_files
-from thermal.pilot.pilot import PilotSettings, generate_pilot
 from thermal.pilot.building import PilotSettings, generate_pilot
 
 BUILDINGS = 40

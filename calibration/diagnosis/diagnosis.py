@@ -5,21 +5,26 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from html import escape
 from importlib.metadata import version
 from typing import Any
 
-from calibration.diagnosis.decide.evidence import gains_of
+import pandas as pd
+from matplotlib.axes import Axes
+
+from calibration.diagnosis.decide.drift import DriftCurve, drift_of
 from calibration.diagnosis.decide.levels import p_value
-from calibration.diagnosis.decide.verdict import Verdict, judge
+from calibration.diagnosis.decide.verdict import Verdict, gains_of, judge
 from calibration.diagnosis.decide.where import Where, where_it_lies
-from calibration.diagnosis.refit.comparison import Bench, Fit
-from calibration.diagnosis.refit.held_out import elsewhere, held_out
+from calibration.diagnosis.refit.comparison import Fit, ModelComparison
 from calibration.diagnosis.refit.how_far import Step, how_far
-from calibration.diagnosis.refit.refit import ACCEPTED
+from calibration.diagnosis.refit.refit import ACCEPTED, elsewhere, held_out
 from calibration.diagnosis.refit.search import Round, search
+from calibration.diagnosis.screen.missing import Missing, at_start, missing_heat
 from calibration.evaluation.intervals import Interval
-from calibration.evaluation.n_step import Progress
+from calibration.evaluation.n_step import Evaluation, Progress
 from calibration.evaluation.settings import ModelSettings
+from calibration.fit.result import SolverReport, effect_entries
 from thermal.case.case import Case
 from thermal.effects.catalogue import CATALOGUE
 
@@ -30,8 +35,30 @@ SUBSYSTEMS = {
     **dict.fromkeys(("internal_gains", "latent_load"), "use"),
 }
 
+#: Effects that a notebook shows.
+_SHOWN = 8
+
 
 @dataclass(frozen=True)
+class Replay:
+    """A fitted model on the held-out intervals.
+
+    Parameters
+    ----------
+    evaluation : Evaluation
+        Its predictions, with every step.
+    missing : Missing
+        Heat that it lacks by hour and zone.
+    drift : DriftCurve
+        How the error of its free runs grows.
+    """
+
+    evaluation: Evaluation
+    missing: Missing
+    drift: DriftCurve
+
+
+@dataclass(frozen=True, repr=False)
 class Diagnosis:
     """Outcome of `diagnose`.
 
@@ -102,7 +129,7 @@ class Diagnosis:
         return SUBSYSTEMS.get(first.screened.effect, "envelope")
 
     def to_dict(self) -> dict[str, Any]:
-        """Contents of ``diagnosis.json``."""
+        """Contents of ``diagnosis.json`` but for its sentence, which `mpc.reports` adds."""
         w = self.where
         return {
             "verdict": self.verdict.name,
@@ -110,45 +137,110 @@ class Diagnosis:
                 "mae": self.gap,
                 "floor": self.floor,
                 "p_value": self.p_value,
-                "smallest_detectable_watts": dict(self.detectable),
+                "smallest_detectable_watts": self.detectable,
             },
             "where": {
-                "sentence": w.sentence,
                 "zones": [
                     {
                         "zone": s.name,
                         "share": s.share,
-                        "missing_watts_rms": w.missing_watts[s.name],
-                        "missing_watts_rms_at_start": w.missing_watts_at_start[s.name],
+                        "missing_watts_rms": w.missing.by_zone[s.name],
+                        "missing_watts_rms_at_start": w.missing_at_start.by_zone[s.name],
                     }
                     for s in w.zones
                 ],
                 "hours": w.hours.tolist(),
                 "subsystem": self.subsystem,
-                "modes": {name: _share(s) for name, s in w.modes.items()},
-                "drift": {
-                    "seconds": w.drift.seconds.tolist(),
-                    "rms": w.drift.rms.tolist(),
-                    "slope": w.drift.slope,
-                    "kind": w.drift.kind,
-                },
-                "groups": {s.name: _share(s) for s in w.groups},
+                "modes": {s.name: s.to_dict() for s in w.modes},
+                "drift": {"seconds": w.drift.seconds.tolist(), "rms": w.drift.rms.tolist(), "slope": w.drift.slope,
+                          "kind": w.drift.kind},
+                "groups": {s.name: s.to_dict() for s in w.groups},
             },
-            "which": [s.to_dict() for s in self.verdict.suspects],
-            "set90": list(self.verdict.set90),
+            "which": [c.to_dict() for c in self.verdict.candidates],
+            "set90": self.verdict.set90,
             "combinations": [{"effects": list(e), "probability": p} for e, p in self.verdict.combinations.items()],
-            "how_far": [_step(s) for s in self.steps],
+            "how_far": [s.to_dict() for s in self.steps],
             "rounds": [r.to_dict() | {"worth": gains_of(r)} for r in self.rounds],
             "intervals": {
                 "tuning": [i.to_dict() for i in self.tuned],
                 "held_out": [i.to_dict() for i in self.judged],
                 "mae_of_last_third": self.last_third,
             },
-            "seconds": self.seconds,
+            **{key: getattr(self, key) for key in ("seconds", "case", "version", "seed")},
+        }  # fmt: skip
+
+    def replays(self) -> list[Replay]:
+        """Replay the calibrated baseline on the held-out intervals, and the final model where it has an effect."""
+        models = [(self.rounds[0].before, self.where.missing, self.where.drift)]
+        if self.final.effects:
+            models.append((self.final, missing_heat(self.final, self.judged), drift_of(self.final, self.judged)))
+        return [
+            Replay(fit.evaluate(self.judged, self.horizon, trajectories=True), missing, drift)
+            for fit, missing, drift in models
+        ]
+
+    def calibration(self) -> dict[str, Any]:
+        """Contents of the ``calibration.json`` of the final model."""
+        final, network = self.final, self.final.built.network
+        described = final.describe()
+        found = final.found
+        solver = SolverReport(
+            "gauss_newton", "settled" if found.converged else "evaluations used up", found.converged, found.evaluations,
+            self.seconds, 1, (), found.evaluations, found.converged,
+        )  # fmt: skip
+        intervals = {"tuning": self.tuned, "held_out": self.judged}
+        before, after = (
+            {name: fit.evaluate(part, self.horizon).metrics.to_dict() for name, part in intervals.items()}
+            for fit in (at_start(self.rounds[0].before), final)
+        )
+        return {
+            "parameters": {p.name: p.to_dict() for p in described},
+            "uncalibrated": before,
+            "calibrated": after,
+            "effects": effect_entries(final.effects, described),
+            "solver": solver.to_dict(),
+            "intervals": {name: [i.to_dict() for i in part] for name, part in intervals.items()},
+            "objective": "multi_step",
+            "horizon": self.horizon,
+            "settings": replace(self.settings, effects=dict(final.effects)).to_dict(),
+            "zones": list(network.zones),
             "case": self.case,
             "version": self.version,
             "seed": self.seed,
         }
+
+    def to_frame(self) -> pd.DataFrame:
+        """Tabulate the effects of the catalogue, the likeliest first.
+
+        Returns
+        -------
+        DataFrame
+            Index ``effect``; ``probability``, ``score`` and ``retained_share`` [-], ``group``, ``zones``,
+            ``separate_by``, ``testable`` and ``reason``, as in `Candidate`.
+        """
+        rows = pd.DataFrame([c.to_dict() for c in self.verdict.candidates])
+        return rows.set_index("effect").drop(columns="parameters")
+
+    def plot(self, axes: Axes | None = None) -> Axes:
+        """Draw the probability of each effect that the case can tell.
+
+        Parameters
+        ----------
+        axes : Axes, optional
+            Where to draw; axes of a new figure by default.
+        """
+        shown = self.to_frame().query("testable")["probability"][::-1]
+        drawn: Axes = shown.plot.barh(ax=axes, xlim=(0.0, 1.0), xlabel="probability that it is there [-]")
+        return drawn
+
+    def __repr__(self) -> str:
+        """Say case, verdict and errors in a line."""
+        found = f", with {' + '.join(self.final.effects)} {self.steps[-1].after:.3f} K" if self.steps else ""
+        return f"<Diagnosis: {self.case}, {self.verdict.name}; held-out error {self.gap:.3f} K{found}>"
+
+    def _repr_html_(self) -> str:
+        table = self.to_frame()[["probability", "score", "group", "zones"]].head(_SHOWN).round(2)
+        return f"<p>{escape(repr(self))}</p>{table.to_html()}"
 
 
 def diagnose(
@@ -188,58 +280,41 @@ def diagnose(
     Examples
     --------
     >>> from thermal.data import load_bundled_case
-    >>> diagnose(load_bundled_case(), dx=1.0).verdict.suspects[0].effect
+    >>> diagnose(load_bundled_case(), dx=1.0).verdict.candidates[0].effect
     'solar_gain'
     """
     began = time.perf_counter()
-    bench = Bench(case, ModelSettings(dx=dx), tune, hold_out, horizon)
-    untestable = bench.untestable()
-    baseline = bench.fit({}, [{}])
-    first = errors = held_out(bench, baseline)
-    turns = elsewhere(baseline, first) and bench.alternate(baseline.built.inputs)
+    models = ModelComparison(case, ModelSettings(dx=dx), tune, hold_out, horizon)
+    untestable = models.untestable()
+    baseline = models.fit({}, [{}])
+    first = errors = held_out(models, baseline)
+    turns = elsewhere(baseline, first) and models.alternate(baseline.built.inputs)
     if turns:
-        baseline = bench.fit({}, [{}], baseline.built)
-        errors = held_out(bench, baseline)
-    where = where_it_lies(bench, baseline)
-    rounds = search(bench, baseline, errors, [e for e in CATALOGUE if e not in untestable], progress)
-    steps, gap, floor = how_far(bench, rounds)
-    areas = {name: room.floor_area for name, room in bench.anatomy.rooms.items()}
+        baseline = models.fit({}, [{}], baseline.built)
+        errors = held_out(models, baseline)
+    where = where_it_lies(models, baseline)
+    rounds = search(models, baseline, errors, [e for e in CATALOGUE if e not in untestable], progress)
+    steps, floor = how_far(models, rounds)
+    areas = {name: room.floor_area for name, room in models.anatomy.rooms.items()}
     watts = rounds[0].screening.detectable(ACCEPTED)
     return Diagnosis(
         case=case.building.name,
         verdict=judge(rounds, untestable),
         where=where,
         steps=steps,
-        gap=gap,
+        gap=errors.mae,
         floor=floor,
         p_value=p_value(max(gains_of(rounds[0]).values())),
         detectable={zone: w * areas[zone] for zone, w in watts.items()},
         rounds=rounds,
-        tuned=tuple(bench.tuned),
-        judged=tuple(bench.judged),
+        tuned=tuple(models.tuned),
+        judged=tuple(models.judged),
         seconds=time.perf_counter() - began,
         version=version("buildingmpc"),
-        settings=replace(bench.settings, normalisation=bench.drivers.normalisation),
+        settings=replace(models.settings, normalisation=models.drivers.normalisation),
         horizon=horizon,
         last_third=first.mae if turns else None,
     )
-
-
-def _share(share: Any) -> dict[str, Any]:
-    return {"share": share.share, "predictions": share.predictions, "interval": list(share.interval)}
-
-
-def _step(step: Step) -> dict[str, Any]:
-    return {
-        "effects": list(step.effects),
-        "held_out_mae_before": step.before,
-        "held_out_mae_after": step.after,
-        "floor": step.floor,
-        "share_closed": step.share_closed,
-        "interval": None if step.interval is None else list(step.interval),
-        "placebo": {"shuffled": step.shuffled, "runner_up": step.runner_up},
-        "on_bound": list(step.bounds),
-    }
 
 
 def baseline_gap(
@@ -268,5 +343,5 @@ def baseline_gap(
     CalibrationError
         When an interval has no usable run.
     """
-    bench = Bench(case, ModelSettings(dx=dx), tune, hold_out, horizon)
-    return float(held_out(bench, bench.fit({}, [{}])).mae)
+    models = ModelComparison(case, ModelSettings(dx=dx), tune, hold_out, horizon)
+    return float(held_out(models, models.fit({}, [{}])).mae)

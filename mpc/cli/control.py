@@ -63,8 +63,7 @@ def control(
 ) -> int:
     """Run a building in closed loop with one controller."""
     from calibration.results import check_results_folder
-    from mpc.reports.control import write_control
-    from mpc.reports.control_tables import control_summary
+    from mpc.reports.control import control_summary, write_control
     from mpc.reports.control_words import control_verdict
     from mpc.studies.run import check_controller, run_controller
 
@@ -109,9 +108,8 @@ def compare(
 ) -> int:
     """Run a building with one controller after the other, on the same weather, people, prices and noise."""
     from calibration.results import check_results_folder
-    from mpc.reports.control import write_comparison
-    from mpc.reports.control_tables import comparison_rows, comparison_summary
-    from mpc.reports.control_words import comparison_verdict
+    from mpc.reports.control import comparison_summary, write_comparison
+    from mpc.reports.control_words import comparison_rows, comparison_verdict
     from mpc.studies.compare import compare_controllers
     from mpc.studies.run import check_controller
 

@@ -13,8 +13,8 @@ from mpc.cli.evaluate import Dx
 if TYPE_CHECKING:
     from calibration.diagnosis.diagnosis import Diagnosis
 
-#: Suspects on the terminal; the page and diagnosis.json have them all.
-_MOST_SUSPECTS = 5
+#: Candidates on the terminal; the page and diagnosis.json have them all.
+_MOST_CANDIDATES = 5
 
 
 def diagnose(
@@ -50,7 +50,7 @@ def diagnose(
     from calibration.diagnosis.diagnosis import diagnose as answer
     from calibration.evaluation.intervals import parse_interval
     from calibration.results import check_results_folder
-    from mpc.reports.diagnosis import write_diagnosis
+    from mpc.reports.diagnosis import diagnosis_summary, write_diagnosis
     from thermal.case.load import load_case
 
     check_results_folder(out, force)
@@ -60,7 +60,7 @@ def diagnose(
         result = answer(loaded, tuned, judged, dx=dx, horizon=horizon, progress=progress)
         report = write_diagnosis(result, loaded, out, force=force)
     if json:
-        write_json(result.to_dict())
+        write_json(diagnosis_summary(result))
         return 0
     _show(result)
     say(f"Report: {report}")
@@ -68,20 +68,20 @@ def diagnose(
 
 
 def _show(result: Diagnosis) -> None:
-    from mpc.reports.diagnosis_words import called, diagnosis_verdict, in_zones
+    from mpc.reports.diagnosis_words import called, diagnosis_verdict, in_zones, where_sentence
 
     say(diagnosis_verdict(result))
-    say(f"Where: {result.where.sentence}")
+    say(f"Where: {where_sentence(result.where)}")
     show_table(
-        "Suspects",
+        "Candidates",
         ("effect", "id", "probability", "where", "told apart by"),
         [
             (called(s.effect), s.effect, f"{s.probability:.2f}", in_zones(s.zones), s.separate_by)
-            for s in result.verdict.suspects[:_MOST_SUSPECTS]
+            for s in result.verdict.candidates[:_MOST_CANDIDATES]
         ],
         left=(0, 1, 3, 4),
     )
-    untestable = [s.effect for s in result.verdict.suspects if not s.testable]
+    untestable = [s.effect for s in result.verdict.candidates if not s.testable]
     if untestable:
         say(f"These data cannot test: {', '.join(untestable)}; the report says why.")
     rows = [("calibrated model", f"{result.gap:.3f}", "")]

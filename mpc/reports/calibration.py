@@ -12,7 +12,6 @@ import pandas as pd
 from calibration.evaluation.case_model import CHECK_TOLERANCE
 from calibration.fit.result import CalibrationResult, ParameterEstimate
 from calibration.results import Content, check_results_folder, write_results
-from mpc.reports import figures
 from mpc.reports.evaluation import (
     evaluation_figures,
     interval_rows,
@@ -21,6 +20,9 @@ from mpc.reports.evaluation import (
     unchanged_error,
     zone_rows,
 )
+from mpc.reports.figures.calibration import paper_values, parameter_ranges
+from mpc.reports.figures.errors import error_band, error_growth, median_run
+from mpc.reports.figures.field import spatial_field
 from mpc.reports.identifiability import in_words, information_content, information_sentences
 from mpc.reports.page import clock, counted, duration, kelvin, plain, render, signed, significant, unit
 from mpc.reports.residuals import diagnostics_content
@@ -144,14 +146,14 @@ def _content(result: CalibrationResult, case: Case, grid: SymbolicModel, inputs:
     before, after = result.uncalibrated["held_out"], result.calibrated["held_out"]
     field = None
     if grid.network.n_node <= MOST_VOLUMES and (grid.network.place >= 0).any():
-        which, run = figures.median_run(after)
+        which, run = median_run(after)
         start = after.predictions[which].start[run]
-        field = figures.spatial_field(
+        field = spatial_field(
             grid, result.theta, inputs, start, after.steps, result.settings.dx, result.settings.stepping
         )
-    band = figures.error_band(result.calibrated["tuning"])
+    band = error_band(result.calibrated["tuning"])
     drawn = evaluation_figures(after, case, before=before, field=field, band=band)
-    drawn["growth"] = figures.error_growth(
+    drawn["growth"] = error_growth(
         {
             "held out": {"before": before, "after": after},
             "tuning": {"before": result.uncalibrated["tuning"], "after": result.calibrated["tuning"]},
@@ -176,7 +178,7 @@ def _content(result: CalibrationResult, case: Case, grid: SymbolicModel, inputs:
         "step": duration(after.step_seconds),
         "figures": drawn,
         "parameters": _parameter_rows(result.parameters),
-        "parameter_figure": figures.parameter_ranges(result.parameters),
+        "parameter_figure": parameter_ranges(result.parameters),
         "told": information_sentences(result.information),
         "zones": zone_rows(after.by_zone()),
         "intervals": [["tuning", *r] for r in interval_rows(result.calibrated["tuning"])]
@@ -198,7 +200,7 @@ def _error_rows(result: CalibrationResult) -> list[list[str]]:
 
 
 def _parameter_rows(parameters: Sequence[ParameterEstimate]) -> list[dict[str, str]]:
-    paper = figures.paper_values(parameters)
+    paper = paper_values(parameters)
     return [_parameter_row(p, paper.get(p.name)) for p in parameters]
 
 

@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from calibration.results import check_results_folder, write_results
-from mpc.reports import figures
-from mpc.reports.evaluation import CELSIUS, error_maps, tidy
-from mpc.reports.page import clock, counted, duration, kelvin, render, signed, significant, unit
+from mpc.reports.evaluation import by_error, error_maps, tidy
+from mpc.reports.figures.errors import Series, zone_panels
+from mpc.reports.figures.plan import plan_drawings, quality_timeline
+from mpc.reports.figures.style import CELSIUS
+from mpc.reports.page import counted, duration, kelvin, significant, write_report
 from thermal.case.building import FloorPlans
 from thermal.case.case import Case
 from thermal.case.check import CaseCheck
@@ -41,9 +42,21 @@ def write_check(check: CaseCheck, out: str | Path, *, force: bool = False) -> Pa
     ResultsExistError
         When the folder holds something and ``force`` is not set.
     """
-    check_results_folder(out, force)
-    files: dict[str, Any] = {"check.json": check.to_dict(), "report.html": render("check", _check_content(check))}
-    return write_results(out, files, force) / "report.html"
+    building, quality = check.case.building, check.quality
+    plans = building.geometry if isinstance(building.geometry, FloorPlans) else None
+    content = {
+        "check": check,
+        "verdict": check_verdict(check),
+        "span": f"{(check.end - check.start).total_seconds() / 86400:.3g} days",
+        "plans": plan_drawings(plans, building.orientation) if plans else [],
+        "missing_rows": sum(finding.steps for finding in quality.missing_rows),
+        "timeline": quality_timeline(quality),
+        "flaws": quality_rows(check),
+        "zones": [vars(z) | {"seen": ", ".join(z.measured_by) or "nothing", "at": ", ".join(z.devices)}
+                  for z in check.zones],
+        "points": [vars(p) | {"of": p.zone or p.entity_kind, "usable": 100.0 * p.usable_share} for p in check.points],
+    }  # fmt: skip
+    return write_report(out, "check", content, {"check.json": check.to_dict()}, force)
 
 
 def check_verdict(check: CaseCheck) -> str:
@@ -69,59 +82,6 @@ def check_verdict(check: CaseCheck) -> str:
 def _days(check: CaseCheck) -> float:
     """Length of the telemetry [days]."""
     return float((check.end - check.start).total_seconds() + check.step) / 86400.0
-
-
-def _check_content(check: CaseCheck) -> dict[str, Any]:
-    geometry = check.case.building.geometry
-    site = check.location
-    return {
-        "case": check.name,
-        "subtitle": f"{site.latitude:g}°, {site.longitude:g}°, {site.elevation:g} m; times are local ({site.timezone})",
-        "verdict": check_verdict(check),
-        "cards": [
-            (str(len(check.zones)), f"zones, {check.geometry}"),
-            (f"{significant(check.floor_area)} m²", f"floor area; {significant(check.volume)} m³"),
-            (
-                f"{(check.end - check.start).total_seconds() / 86400:.3g} days",
-                f"{clock(check.start)} to {clock(check.end)}",
-            ),
-            (str(len(check.points)), "measured points"),
-        ],
-        "remarks": check.remarks,
-        "plans": figures.plan_drawings(geometry, check.case.building.orientation)
-        if isinstance(geometry, FloorPlans)
-        else [],
-        "zones": [
-            [
-                z.name,
-                z.floor or "–",
-                f"{z.floor_area:.1f}",
-                f"{z.volume:.1f}",
-                ", ".join(z.measured_by) or "nothing",
-                ", ".join(z.devices),
-            ]
-            for z in check.zones
-        ],
-        "missing_rows": sum(finding.steps for finding in check.quality.missing_rows),
-        "stamps": check.n_time,
-        "timeline": figures.quality_timeline(check.quality),
-        "flaws": quality_rows(check),
-        "points": [
-            [
-                p.column,
-                p.meaning,
-                p.zone or p.entity_kind,
-                unit(p.unit),
-                *(significant(v) for v in (p.lowest, p.mean, p.highest)),
-                f"{100 * p.usable_share:.1f}",
-            ]
-            for p in check.points
-        ],
-        "reproduce": [
-            ("version", f"buildingmpc {version('buildingmpc')}"),
-            ("command", "buildingmpc check CASE --out RESULTS"),
-        ],
-    }
 
 
 def quality_rows(check: CaseCheck) -> list[list[str]]:
@@ -155,14 +115,7 @@ def simulation_summary(simulation: Simulation, case: Case, parameters: str = "un
     """
     error = simulation.simulated - simulation.measured
     seen = error.columns[error.notna().any()]
-    by_zone = {
-        str(z): {
-            "mae": float(error[z].abs().mean()),
-            "bias": float(error[z].mean()),
-            "mean_heat": float(simulation.heat[z].mean()),
-        }
-        for z in seen
-    }
+    by_zone = pd.DataFrame({"mae": error.abs().mean(), "bias": error.mean(), "mean_heat": simulation.heat.mean()})
     stamps = pd.DatetimeIndex(error.index)
     return {
         "case": case.building.name,
@@ -172,7 +125,7 @@ def simulation_summary(simulation: Simulation, case: Case, parameters: str = "un
         "steps": len(stamps),
         "mae": float(error.abs().mean(axis=1).mean()) if len(seen) else float("nan"),
         "bias": float(error.mean(axis=1).mean()) if len(seen) else float("nan"),
-        "by_zone": by_zone,
+        "by_zone": by_zone.loc[seen].to_dict("index"),
         "parameters": parameters,
         "version": version("buildingmpc"),
     }
@@ -206,14 +159,9 @@ def write_simulation(
     ResultsExistError
         When the folder holds something and ``force`` is not set.
     """
-    check_results_folder(out, force)
     summary = simulation_summary(simulation, case, parameters)
-    files: dict[str, Any] = {
-        "simulation.json": summary,
-        "simulation.parquet": _simulation_table(simulation),
-        "report.html": render("simulation", _simulation_content(simulation, case, summary)),
-    }
-    return write_results(out, files, force) / "report.html"
+    files = {"simulation.json": summary, "simulation.parquet": _simulation_table(simulation)}
+    return write_report(out, "simulation", _simulation_content(simulation, case, summary), files, force)
 
 
 def simulation_verdict(summary: dict[str, Any]) -> str:
@@ -233,49 +181,29 @@ def simulation_verdict(summary: dict[str, Any]) -> str:
 
 
 def _simulation_content(simulation: Simulation, case: Case, summary: dict[str, Any]) -> dict[str, Any]:
-    zones = tuple(map(str, simulation.simulated.columns))
-    by_zone = summary["by_zone"]
+    zones, by_zone = tuple(map(str, simulation.simulated.columns)), summary["by_zone"]
     bias = np.array([by_zone[z]["bias"] if z in by_zone else np.nan for z in zones])
-    series = figures.Series(
-        pd.DatetimeIndex(simulation.simulated.index),
-        simulation.measured.to_numpy(dtype=float),
-        simulation.simulated.to_numpy(dtype=float),
-    )
-    ordered = sorted(by_zone.items(), key=lambda item: -item[1]["mae"])
+    courses = (frame.to_numpy(dtype=float) for frame in (simulation.measured, simulation.simulated))
+    series = Series(pd.DatetimeIndex(simulation.simulated.index), *courses)
     return {
         "case": case.building.name,
-        "subtitle": f"{clock(simulation.start)} to {clock(series.stamps[-1])}, local time",
+        "summary": summary,
         "verdict": simulation_verdict(summary),
-        "cards": [
-            (f"{kelvin(summary['mae'])} K", "mean absolute error over zones and time"),
-            (f"{signed(summary['bias'])} K", "bias, simulated minus measured"),
-            (
-                duration(summary["steps"] * summary["step_seconds"]),
-                f"in {summary['steps']} steps of {duration(summary['step_seconds'])}",
-            ),
-        ],
+        "span": (simulation.start, series.stamps[-1]),
         "figures": {
-            "growth": [],
-            "drift": [],
-            "runs": 0,
             "plan": isinstance(case.building.geometry, FloorPlans),
-            "cells": False,
             "zone_count": len(by_zone),
             "maps": error_maps(case, zones, bias, "mean over the time"),
-            "zones": figures.zone_panels(series, zones, {z: e["mae"] for z, e in by_zone.items()}),
+            "zones": zone_panels(series, zones, {z: e["mae"] for z, e in by_zone.items()}),
         },
-        "zones": [[z, f"{e['mae']:.3f}", signed(e["bias"]), significant(e["mean_heat"])] for z, e in ordered],
-        "reproduce": [("version", f"buildingmpc {version('buildingmpc')}"), ("parameters", summary["parameters"])],
+        "zones": by_error(by_zone),
     }
 
 
 def _simulation_table(simulation: Simulation) -> pd.DataFrame:
     """Replay in tidy form: index ``timestamp``; ``zone``, ``simulated`` and ``measured`` [degC], ``heat`` [W]."""
-    values = {
-        "simulated": simulation.simulated.to_numpy(dtype=float) - CELSIUS,
-        "measured": simulation.measured.to_numpy(dtype=float) - CELSIUS,
-        "heat": simulation.heat.to_numpy(dtype=float),
-    }
+    tables = {"simulated": simulation.simulated - CELSIUS, "measured": simulation.measured - CELSIUS}
+    values = {name: t.to_numpy(dtype=float) for name, t in (tables | {"heat": simulation.heat}).items()}
     table = tidy(pd.DatetimeIndex(simulation.simulated.index), tuple(map(str, simulation.simulated.columns)), values)
     table.attrs["units"] = {"simulated": "degC", "measured": "degC", "heat": "W"}
     return table

@@ -2,31 +2,23 @@
 
 from __future__ import annotations
 
-import platform
+from collections import Counter
 from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from calibration.results import check_results_folder, write_results
-from mpc.reports.control_log import reason_rows
-from mpc.reports.control_tables import comparison_rows, comparison_summary, control_summary, trajectory
-from mpc.reports.control_words import comparison_verdict, control_verdict, money
-from mpc.reports.figures.control import NAMES, cost_bars, course, expectations, side_by_side
-from mpc.reports.page import clock, counted, render, significant
+import numpy as np
+import pandas as pd
+
+from mpc.reports import control_words
+from mpc.reports.figures.control import cost_bars, course, expectations, side_by_side
+from mpc.reports.figures.style import CELSIUS
+from mpc.reports.page import write_report
 from mpc.studies.compare import Comparison
 from mpc.studies.run import ControlRun, prediction_errors
-
-_RULES = {
-    "schedule": "Supply air stands at its design value; supply water is hot by day and cooler by night.",
-    "reset": "Supply air and water follow the outdoor temperature.",
-    "guideline36": "Supply air and water drift to where they cost least until zones or valves ask for more "
-    "(ASHRAE Guideline 36, trim and respond).",
-    "mpc": "Every {step} minutes supply air and water are chosen so that energy and discomfort cost least over the "
-    "next {hours:g} hours, according to the model of the building, the forecast and the prices.",
-    "bound": "As optimal control, but on a plant that is its own model, with exact sensors, and with weather and "
-    "people known in advance: what perfect knowledge would reach.",
-}
+from thermal.case.points import POINT_TYPES, split_column
+from thermal.units import QUANTITIES, from_si
 
 
 def write_control(run: ControlRun, out: str | Path, *, command: str = "", force: bool = False) -> Path:
@@ -53,10 +45,14 @@ def write_control(run: ControlRun, out: str | Path, *, command: str = "", force:
     ResultsExistError
         When the folder holds something and ``force`` is not set.
     """
-    numbers = {"control.json": control_summary(run), "trajectory.parquet": trajectory(run)}
-    title = f"Control of {run.study.name}: {NAMES[run.controller]}"
-    together: dict[str, Any] = {"table": None, "bars": [], "together": []}
-    return _write((run,), run, title, control_verdict(run), together, numbers, out, command, force)
+    title = f"Control of {run.study.name}: {control_words.controller_name(run.controller)}"
+    content = _content((run,), run, command) | {
+        "title": title,
+        "verdict": control_words.control_verdict(run),
+        "table": None,
+    }
+    files = {"control.json": control_summary(run), "trajectory.parquet": trajectory(run)}
+    return write_report(out, "control", content, files, force)
 
 
 def write_comparison(comparison: Comparison, out: str | Path, *, command: str = "", force: bool = False) -> Path:
@@ -83,83 +79,119 @@ def write_comparison(comparison: Comparison, out: str | Path, *, command: str = 
     ResultsExistError
         When the folder holds something and ``force`` is not set.
     """
-    runs, title = comparison.runs, f"Controllers of {comparison.study.name} compared"
-    numbers: dict[str, Any] = {"comparison.json": comparison_summary(comparison)}
-    numbers |= {f"trajectory_{run.controller}.parquet": trajectory(run) for run in runs}
-    together = {"table": comparison_rows(comparison), "bars": cost_bars(runs), "together": side_by_side(runs)}
-    shown = comparison.of("mpc") or runs[0]
-    return _write(runs, shown, title, comparison_verdict(comparison), together, numbers, out, command, force)
+    runs = comparison.runs
+    content = _content(runs, comparison.of("mpc") or runs[0], command) | {
+        "title": f"Controllers of {comparison.study.name} compared",
+        "verdict": control_words.comparison_verdict(comparison),
+        "table": control_words.comparison_rows(comparison),
+        "pictures": [*cost_bars(runs), *side_by_side(runs)],
+    }
+    files: dict[str, Any] = {"comparison.json": comparison_summary(comparison)}
+    files |= {f"trajectory_{run.controller}.parquet": trajectory(run) for run in runs}
+    return write_report(out, "control", content, files, force)
 
 
-def _write(
-    runs: Sequence[ControlRun],
-    shown: ControlRun,
-    title: str,
-    verdict: str,
-    together: dict[str, Any],
-    numbers: dict[str, Any],
-    out: str | Path,
-    command: str,
-    force: bool,
-) -> Path:
-    """Write the files of numbers and the page of one run or of several."""
-    check_results_folder(out, force)
-    content = _frame(shown, verdict, title) | together
-    content |= {"runs": [_section(run, run is shown) for run in runs], "reproduce": _reproduce(runs[0], command)}
-    return write_results(out, {**numbers, "report.html": render("control", content)}, force) / "report.html"
-
-
-def _frame(run: ControlRun, verdict: str, title: str) -> dict[str, Any]:
-    """Give what both pages begin with: the run that matters most."""
-    study = run.study
-    k, planned = run.kpis, run.sources.get("optimal plan", 0)
-    cards = [
-        (money(run.cost, k.currency), f"energy, {NAMES[run.controller]}"),
-        (f"{significant(k.ener_tot)} kWh/m²", "energy"),
-        (f"{significant(k.tdis_tot, 2)} K h", "outside of the comfort band, mean zone"),
-        (f"{1e3 * (k.pele_tot or 0.0):.1f} W/m²", "highest quarter of an hour of electricity"),
-    ]
-    own = k.to_frame().loc[[*k.own]].dropna(subset="value")
-    cards += [(f"{significant(value)} {unit}", words) for value, unit, words in own.itertuples(index=False)]
-    if run.decisions:
-        cards.append((f"{planned} of {len(run.decisions)}", "actions from an optimal plan"))
-    area = f"{significant(k.floor_area)} m²"
-    when = f"{clock(study.scenario.grid.start)} to {clock(study.stamps[-1])}"
+def _content(runs: Sequence[ControlRun], shown: ControlRun, command: str) -> dict[str, Any]:
+    """Lay out a page: the run that matters most, and each controller's part."""
     return {
-        "title": title, "verdict": verdict, "cards": cards, "notes": study.notes, "currency": k.currency,
-        "subtitle": f"{when}, {counted(len(study.scenario.zones), 'zone')}, {area}; a simulated plant",
-        "fine": run.controller != "mpc" or planned == len(run.decisions),
-    }  # fmt: skip
+        "shown": shown,
+        "name": control_words.controller_name(shown.controller),
+        "fine": shown.controller != "mpc" or shown.sources.get("optimal plan", 0) == len(shown.decisions),
+        "planned": shown.sources.get("optimal plan", 0),
+        "indicators": control_words.own_indicators(shown.kpis),
+        "runs": [_section(run, run is shown) for run in runs],
+        "command": command,
+    }
 
 
 def _section(run: ControlRun, shown: bool) -> dict[str, Any]:
-    """Lay out one controller's part of a page."""
-    step, hours = round(run.plant.control_step / 60.0), 12.0
-    errors, zones = prediction_errors(run), sorted(run.kpis.zones, key=lambda z: -(z.below + z.above))
     return {
-        "name": NAMES[run.controller].capitalize(), "shown": shown,
-        "how": _RULES[run.controller].format(step=step, hours=hours),
+        "name": control_words.controller_name(run.controller).capitalize(),
+        "shown": shown,
+        "how": control_words.controller_rule(run),
         "course": course(run),
         "expectations": expectations(run) if shown else [],
-        "errors": errors,
-        "reasons": [[clock(r.first), clock(r.last), str(r.times), r.reason] for r in reason_rows(run)[:40]],
-        "more_reasons": max(len(reason_rows(run)) - 40, 0),
+        "errors": prediction_errors(run),
+        "reasons": control_words.reason_rows(run),
         "planned": bool(run.decisions),
-        "zones": [
-            [z.zone, f"{z.below:.2f}", f"{z.above:.2f}", f"{z.largest_below:.1f}", f"{z.largest_above:.1f}"]
-            for z in zones[:15]
-        ],
-        "all_zones": len(zones),
+        "zones": sorted(run.kpis.zones, key=lambda z: -(z.below + z.above)),
+    }
+
+
+def control_summary(run: ControlRun) -> dict[str, Any]:
+    """Contents of ``control.json``.
+
+    Parameters
+    ----------
+    run : ControlRun
+        Of `run_controller`.
+    """
+    study, times = run.study, [d.seconds for d in run.decisions]
+    return {
+        "controller": run.controller,
+        "start": study.scenario.grid.start.isoformat(),
+        "end": study.stamps[-1].isoformat(),
+        "cost": run.cost,
+        "cost_with_discomfort": run.objective,
+        "comfort_price": study.settings.comfort_price,
+        "kpis": run.kpis.to_dict(),
+        "actions": {"count": len(run.loop.actions), "sources": dict(run.sources),
+                    "statuses": dict(Counter(d.status for d in run.decisions if d.status)),
+                    "solve_seconds_mean": float(np.mean(times)) if times else None},
+        "prediction": prediction_errors(run),
+        "reasons": [{"first": row.first.isoformat(), "last": row.last.isoformat(), "count": row.times,
+                     "reason": row.reason} for row in control_words.reason_rows(run)],
+        "plant": {"building": study.kind, "step_seconds": study.scenario.grid.step, "noise": study.noise is not None,
+                  "control_step_seconds": run.plant.control_step, "effects": list(study.built.effects)},
+        "forecast": "with errors" if study.errors else "perfect",
+        "notes": list(study.notes), "case": study.name, "version": version("buildingmpc"), "seed": study.seed,
     }  # fmt: skip
 
 
-def _reproduce(run: ControlRun, command: str) -> list[tuple[str, str]]:
-    study = run.study
-    entries = [
-        ("plant", f"building {study.kind}, steps of {study.scenario.grid.step:g} s, "
-                  f"{'sensors with noise' if study.noise else 'exact sensors'}, "
-                  f"weather forecast {'with errors' if study.errors else 'perfect'}"),
-        ("version", f"buildingmpc {version('buildingmpc')}, Python {platform.python_version()}"),
-        ("seed", str(study.seed)),
-    ]  # fmt: skip
-    return entries + ([("command", command)] if command else [])
+def comparison_summary(comparison: Comparison) -> dict[str, Any]:
+    """Contents of ``comparison.json``.
+
+    Parameters
+    ----------
+    comparison : Comparison
+        Of `compare_controllers`.
+    """
+    best = comparison.best_rule
+    return {
+        "controllers": {
+            run.controller: control_summary(run)
+            | {"saving": comparison.saving(run), "way_to_bound": comparison.way_to_bound(run)}
+            for run in comparison.runs
+        },
+        "best_rule": None if best is None else best.controller,
+        "case": comparison.study.name, "version": version("buildingmpc"), "seed": comparison.study.seed,
+    }  # fmt: skip
+
+
+def trajectory(run: ControlRun) -> pd.DataFrame:
+    """Contents of ``trajectory.parquet``: what was measured, what was set, prices, bands and true powers.
+
+    Parameters
+    ----------
+    run : ControlRun
+        Of `run_controller`.
+
+    Returns
+    -------
+    DataFrame, shape (n_steps, n_column)
+        By the plant's own steps; points of the case format in the units of case folders [degC, kg/s, %, W], then
+        ``true/...``: zone temperatures without noise [degC] and powers [W].
+    """
+    frame, scenario, record, n = run.plant.telemetry(), run.study.scenario, run.loop.record, run.study.steps
+    columns = {}
+    for name in run.plant.columns:
+        quantity = POINT_TYPES[split_column(name, "plant")[1]].quantity
+        columns[name] = from_si(frame[name].to_numpy(), QUANTITIES[quantity].file_unit, quantity)
+    for k, zone in enumerate(scenario.zones):
+        columns[f"{zone}/comfort_lower_temperature"] = scenario.lower[:n, k] - CELSIUS
+        columns[f"{zone}/comfort_upper_temperature"] = scenario.upper[:n, k] - CELSIUS
+        columns[f"true/{zone}"] = record.zone_temperature[1:, k] - CELSIUS
+    columns["electricity_price"], columns["gas_price"] = scenario.electricity_price[:n], scenario.gas_price[:n]
+    columns["true/electricity"] = record.electricity
+    columns["true/gas"] = np.zeros(n) if record.gas is None else record.gas
+    return pd.DataFrame(columns, index=frame.index)

@@ -1,11 +1,74 @@
-"""Closed loops in plain words: what a run cost, how comfortable it was, what optimal control saves."""
+"""Closed loops in plain words: what a controller does, what a run cost, what optimal control saves, and the log."""
 
 from __future__ import annotations
 
-from mpc.reports.figures.control import NAMES
-from mpc.reports.page import significant
+import re
+from typing import NamedTuple
+
+import pandas as pd
+
+from mpc.kpi.kpis import Kpis
+from mpc.reports.page import significant, spell
 from mpc.studies.compare import Comparison
 from mpc.studies.run import ControlRun
+
+_NAMES = {"mpc": "optimal control", "bound": "perfect bound", "schedule": "fixed schedule", "reset": "outdoor reset",
+          "guideline36": "Guideline 36"}  # fmt: skip
+
+_RULES = {
+    "schedule": "Supply air stands at its design value; supply water is hot by day and cooler by night.",
+    "reset": "Supply air and water follow the outdoor temperature.",
+    "guideline36": "Supply air and water drift to where they cost least until zones or valves ask for more "
+    "(ASHRAE Guideline 36, trim and respond).",
+    "mpc": "Every {step} minutes supply air and water are chosen so that energy and discomfort cost least over the "
+    "next {hours:g} hours, according to the model of the building, the forecast and the prices.",
+    "bound": "As optimal control, but on a plant that is its own model, with exact sensors, and with weather and "
+    "people known in advance: what perfect knowledge would reach.",
+}
+
+#: Length of a prediction of optimal control [h].
+_HOURS = 12.0
+
+_CHANGING = re.compile(r"\d{4}-\d\d-\d\d \d\d:\d\d|\b\d+(\.\d+)?\b")  # times and numbers within a reason
+
+
+def controller_name(controller: str) -> str:
+    """Call a controller by what it is; one's own by its name.
+
+    Parameters
+    ----------
+    controller : str
+        Its name in a study.
+
+    Examples
+    --------
+    >>> controller_name("mpc"), controller_name("night_purge")
+    ('optimal control', 'night purge')
+    """
+    return _NAMES.get(controller, controller.replace("_", " "))
+
+
+def controller_rule(run: ControlRun) -> str:
+    """Say what a controller does; nothing of one's own, which the library does not know.
+
+    Parameters
+    ----------
+    run : ControlRun
+        Of `run_controller`.
+    """
+    return _RULES.get(run.controller, "").format(step=round(run.plant.control_step / 60.0), hours=_HOURS)
+
+
+def own_indicators(kpis: Kpis) -> list[tuple[str, str]]:
+    """List the values of indicators that users have registered, with what they say.
+
+    Parameters
+    ----------
+    kpis : Kpis
+        Of a run.
+    """
+    own = kpis.to_frame().loc[[*kpis.own]].dropna(subset="value")
+    return [(f"{significant(value)} {unit}", words) for value, unit, words in own.itertuples(index=False)]
 
 
 def control_verdict(run: ControlRun) -> str:
@@ -17,9 +80,12 @@ def control_verdict(run: ControlRun) -> str:
         Of `run_controller`.
     """
     k, worst = run.kpis, max(run.kpis.zones, key=lambda z: z.below + z.above)
+    powers = (run.loop.record.electricity, run.loop.record.gas)
+    electricity, gas = (0.0 if power is None else float(power.sum()) for power in powers)
     parts = [
-        f"{NAMES[run.controller].capitalize()} spent {money(run.cost, k.currency)} on energy in "
-        f"{k.hours / 24:g} days ({significant(k.ener_tot)} kWh/m², of which {_electric(run):.0%} electricity)."
+        f"{controller_name(run.controller).capitalize()} spent {money(run.cost, k.currency)} on energy in "
+        f"{k.hours / 24:g} days ({significant(k.ener_tot)} kWh/m², of which "
+        f"{electricity / max(electricity + gas, 1e-9):.0%} electricity)."
     ]
     if k.tdis_tot < 1e-3:
         parts.append("No zone left its comfort band.")
@@ -38,12 +104,6 @@ def control_verdict(run: ControlRun) -> str:
             "on rules; the log below says why."
         )
     return " ".join(parts)
-
-
-def _electric(run: ControlRun) -> float:
-    gas = 0.0 if run.loop.record.gas is None else float(run.loop.record.gas.sum())
-    electricity = float(run.loop.record.electricity.sum())
-    return electricity / max(electricity + gas, 1e-9)
 
 
 def money(value: float, currency: str) -> str:
@@ -70,9 +130,9 @@ def comparison_verdict(comparison: Comparison) -> str:
     best, mpc = comparison.best_rule, comparison.of("mpc")
     if best is None or mpc is None:
         cheapest = min(comparison.runs, key=lambda run: run.objective)
-        name = NAMES[cheapest.controller]
+        name = controller_name(cheapest.controller)
         return f"{name.capitalize()} costs least: {control_verdict(cheapest)}"
-    name, change = NAMES[best.controller], 1.0 - mpc.cost / best.cost
+    name, change = controller_name(best.controller), 1.0 - mpc.cost / best.cost
     comfort = mpc.kpis.tdis_tot - best.kpis.tdis_tot
     parts = [
         f"Optimal control spent {money(mpc.cost, mpc.kpis.currency)} on energy, the best rule ({name}) "
@@ -89,6 +149,63 @@ def comparison_verdict(comparison: Comparison) -> str:
     if way is not None:
         parts.append(
             f"Counting discomfort at {comparison.study.settings.comfort_price:g} {mpc.kpis.currency} a kelvin hour and "
-            f"zone, it goes {way:.0%} of the way from that rule to what perfect knowledge would reach."
+            f"zone, that is {way:.0%} of the perfect-forecast savings."
         )
     return " ".join(parts)
+
+
+def comparison_rows(comparison: Comparison) -> list[list[str]]:
+    """Rows of the table of controllers, from cost to the share of the perfect-forecast savings.
+
+    Parameters
+    ----------
+    comparison : Comparison
+        Of `compare_controllers`.
+    """
+    rows = []
+    for run in comparison.runs:
+        k, best = run.kpis, run is comparison.best_rule
+        worst = max(z.below + z.above for z in k.zones)
+        way = comparison.way_to_bound(run) if run.controller in ("mpc", "bound") else None
+        values = (
+            (run.cost, ",.2f"), (run.objective, ",.2f"), (None if best else comparison.saving(run), ".1%"),
+            (k.tdis_tot, ".3f"), (worst, ".2f"), (k.ener_tot, ".3f"), (1e3 * (k.pele_tot or 0.0), ".1f"),
+            (None if k.emis_tot is None else 1e3 * k.emis_tot, ".1f"), (way, ".0%"),
+        )  # fmt: skip
+        rows.append([controller_name(run.controller), *(spell(value, how) for value, how in values)])
+    return rows
+
+
+class _Reason(NamedTuple):
+    """A reason that was given once or more.
+
+    Parameters
+    ----------
+    first, last : pandas.Timestamp
+        When it was given first and last, local.
+    times : int
+        How often.
+    reason : str
+        In the words of the first time.
+    """
+
+    first: pd.Timestamp
+    last: pd.Timestamp
+    times: int
+    reason: str
+
+
+def reason_rows(run: ControlRun) -> list[_Reason]:
+    """Give the reasons of a run, those that differ in times and numbers only taken together, the first time first.
+
+    Parameters
+    ----------
+    run : ControlRun
+        Of `run_controller`.
+    """
+    found: dict[str, _Reason] = {}
+    for decision in run.decisions:
+        for reason in decision.reasons:
+            before = found.get(kind := _CHANGING.sub("#", reason), _Reason(decision.stamp, decision.stamp, 0, reason))
+            found[kind] = before._replace(last=decision.stamp, times=before.times + 1)
+    return list(found.values())

@@ -2,49 +2,48 @@
 
 from __future__ import annotations
 
-import platform
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
-from calibration.diagnosis.decide.levels import LARGEST_GROUP
-from calibration.diagnosis.decide.verdict import Suspect
-from calibration.diagnosis.diagnosis import Diagnosis
-from calibration.diagnosis.refit.final import (
-    Replay,
-    both_predictions,
-    describe_fit,
-    final_calibration,
-    missing_table,
-    replays,
-)
-from calibration.results import check_results_folder, write_results
-from mpc.reports import figures
-from mpc.reports.diagnosis_statistics import statistics_content
-from mpc.reports.diagnosis_where import where_content
-from mpc.reports.diagnosis_words import (
-    accepted,
-    ahead,
-    alike,
-    called,
-    diagnosis_verdict,
-    in_zones,
-    listed,
-    rivals,
-    sure,
-    suspect,
-)
-from mpc.reports.evaluation import CELSIUS, subtitle
-from mpc.reports.page import clock, counted, duration, kelvin, render, signed, significant, unit
+from calibration.diagnosis.decide.levels import GENERIC_GAP, LARGEST_GROUP
+from calibration.diagnosis.decide.verdict import Candidate
+from calibration.diagnosis.diagnosis import Diagnosis, Replay
+from calibration.diagnosis.refit.refit import ACCEPTED
+from calibration.diagnosis.refit.search import Round
+from mpc.reports import diagnosis_words
+from mpc.reports.diagnosis_words import accepted, alike, called, in_zones, rivals
+from mpc.reports.evaluation import predictions_table, subtitle
+from mpc.reports.figures.diagnosis import change_panels, drift_lines, hour_bars, missing_lines
+from mpc.reports.figures.errors import series_of_runs
+from mpc.reports.figures.plan import heat_maps
+from mpc.reports.figures.style import CELSIUS, Picture
+from mpc.reports.page import kelvin, listed, significant, sure, unit, write_report
+from thermal.case.building import FloorPlans
 from thermal.case.case import Case
 from thermal.effects.catalogue import CATALOGUE
+
+#: Models of a diagnosis in its tables.
+_MODELS = ("baseline", "with_effects")
 
 #: Effects shown at the top: those at least so probable [-], and how many at least and at most.
 _LIKELY, _FEWEST, _MOST = 0.05, 3, 6
 
 #: Parameters of an effect that are spelled out.
 _MOST_VALUES = 4
+
+#: Rows of a table of zones, of parts of the day and the building, and zones whose missing heat is drawn over time.
+_MOST_ZONES, _MOST_PARTS, _MOST_DRAWN = 24, 10, 4
+
+#: Effects of a round that are listed, and those whose likeness is.
+_MOST_GAINS, _MOST_ALIKE = 10, 6
+
+#: Missing heat that the darkest colour of a plan stands for at least [W/m2]: people, light and equipment of an office
+#: give about 10, and a few tenths are not to look alarming.
+_NOTABLE = 3.0
 
 
 def write_diagnosis(result: Diagnosis, case: Case, out: str | Path, force: bool = False) -> Path:
@@ -74,93 +73,132 @@ def write_diagnosis(result: Diagnosis, case: Case, out: str | Path, force: bool 
     ResultsExistError
         When the folder holds something and ``force`` is not set.
     """
-    check_results_folder(out, force)
-    before, after = replays(result)
-    files: dict[str, Any] = {
-        "diagnosis.json": result.to_dict(),
-        "calibration.json": final_calibration(result),
-        "missing_watts.parquet": missing_table(result, after),
-        "predictions.parquet": both_predictions(before, after),
-        "report.html": render("diagnosis", _content(result, case, before, after)),
+    models = result.replays()
+    files = {
+        "diagnosis.json": diagnosis_summary(result),
+        "calibration.json": result.calibration(),
+        "missing_watts.parquet": _missing_table(result, models),
+        "predictions.parquet": _predictions(models),
     }
-    return write_results(out, files, force) / "report.html"
+    return write_report(out, "diagnosis", _content(result, case, models), files, force)
 
 
-def _content(result: Diagnosis, case: Case, before: Replay, after: Replay | None) -> dict[str, Any]:
-    suspects = _shown(result)
+def diagnosis_summary(result: Diagnosis) -> dict[str, Any]:
+    """Contents of ``diagnosis.json``.
+
+    Parameters
+    ----------
+    result : Diagnosis
+        From `diagnose`.
+    """
+    numbers = result.to_dict()
+    return numbers | {"where": {"sentence": diagnosis_words.where_sentence(result.where), **numbers["where"]}}
+
+
+def _missing_table(result: Diagnosis, models: Sequence[Replay]) -> pd.DataFrame:
+    """Tabulate missing heat with its band, one row an hour and zone.
+
+    Index ``timestamp``, where hours begin; ``zone``; heat that the model lacks, ``uncalibrated`` with parameters at
+    their starts, ``baseline`` calibrated, and ``with_effects``; each also as ``.._low`` and ``.._high``, ends of its
+    90 % band [W].
+    """
+    heat = (result.where.missing_at_start, *(r.missing for r in models))
+    parts = {
+        name + end: values.stack(future_stack=True)
+        for name, missing in zip(("uncalibrated", *_MODELS), heat, strict=False)
+        for end, values in zip(("", "_low", "_high"), (missing.watts, *missing.band(0.9)), strict=True)
+    }
+    table = pd.DataFrame(parts).rename_axis(["timestamp", "zone"]).reset_index("zone")
+    table.attrs["units"] = dict.fromkeys(parts, "W")
+    return table
+
+
+def _predictions(models: Sequence[Replay]) -> pd.DataFrame:
+    """Tabulate the predictions of the models, one row a run, step and measured zone.
+
+    Index ``timestamp``; ``run_start``, ``zone``, ``measured``, ``baseline`` and ``with_effects`` [degC].
+    """
+    named = zip(_MODELS, models, strict=False)
+    table, *others = (predictions_table(r.evaluation).rename(columns={"simulated": name}) for name, r in named)
+    keys = ["timestamp", "run_start", "zone"]
+    for other in others:
+        further = other.reset_index().drop(columns="measured")
+        table = table.reset_index().merge(further, on=keys, how="left").set_index("timestamp")
+    table.attrs["units"] = {c: "degC" for c in ("measured", *_MODELS) if c in table}
+    return table
+
+
+def _content(result: Diagnosis, case: Case, replayed: Sequence[Replay]) -> dict[str, Any]:
+    found, inside = diagnosis_words.final_name(result), accepted(result)
+    evaluations = [r.evaluation for r in replayed]
+    models = dict(zip(("calibrated model", found), map(series_of_runs, evaluations), strict=False))
+    errors = [{z: e["mae"] for z, e in one.by_zone().items()} for one in evaluations]
     return {
-        "case": result.case,
-        "subtitle": subtitle(case, before.evaluation),
-        "verdict": diagnosis_verdict(result),
+        "result": result,
+        "subtitle": subtitle(case, evaluations[0]),
+        "verdict": diagnosis_words.diagnosis_verdict(result),
         "fine": result.verdict.name != "unexplained",
-        "found": _found(result),
-        "ahead": ahead(result),
-        "cards": _cards(result),
-        "suspects": [_suspect_entry(result, s) for s in suspects],
+        "found": found,
+        "ahead": diagnosis_words.ahead(result),
+        "accepted": inside,
+        "called": called,
+        "best": diagnosis_words.candidate(result, inside[0].screened.effect)
+        if inside
+        else result.verdict.candidates[0],
+        "candidates": [_candidate_entry(result, c) for c in _shown(result)],
         "next": _measure_next(result),
         "untestable": [
-            (called(s.effect).capitalize(), s.reason.replace("_sensor", "").replace("_", " "))
-            for s in result.verdict.suspects
-            if not s.testable
+            (called(c.effect).capitalize(), c.reason.replace("_sensor", "").replace("_", " "))
+            for c in result.verdict.candidates
+            if not c.testable
         ],
-        **where_content(result, case, before, after, _found(result)),
+        **_where(result, case, replayed),
         "waterfall": _waterfall(result),
-        "tests": _placebo_sentences(result),
-        "panels": _panels(before, after, _found(result)),
-        "statistics": statistics_content(result),
-        "reproduce": _reproduce(result, case),
+        "tests": _test_sentences(result),
+        "panels": change_panels(models, evaluations[0].zones, errors),
+        **_statistics(result),
+        "span": (case.stamps[0], case.stamps[-1], case.step),
+        "pandas": pd.__version__,
+        "command": _command(result),
     }
 
 
-def _found(result: Diagnosis) -> str:
-    """Call the final model beside the baseline; nothing where it has no effect."""
-    count = len(accepted(result))
-    return f"with the effect{'s' if count > 1 else ''} found" if count else ""
+def _command(result: Diagnosis) -> str:
+    parts = ["buildingmpc diagnose CASE --out RESULTS"]
+    for option, intervals in (("--tune", result.tuned), ("--hold-out", result.judged)):
+        parts += [f"{option} {'/'.join(i.to_dict().values())}" for i in intervals]
+    dx = "" if result.settings.dx is None else f" --dx {result.settings.dx:g}"
+    return " ".join([*parts, f"--horizon {result.horizon}{dx}"])
 
 
-def _cards(result: Diagnosis) -> list[tuple[str, str]]:
-    cards = [(f"{kelvin(result.gap)} K", f"error of the calibrated model, {ahead(result)}")]
-    if result.steps:
-        last = result.steps[-1]
-        share = "–" if last.share_closed is None else f"{min(100.0, 100 * last.share_closed):.0f} %"
-        told = "of what could be closed" if last.share_closed is not None else "share closed: gap too small to say"
-        cards += [(f"{kelvin(last.after)} K", _found(result)), (share, told)]
-    cards.append((f"{kelvin(result.floor)} K", "floor: no regular missing heat would take it lower"))
-    found = accepted(result)
-    best = suspect(result, found[0].screened.effect) if found else result.verdict.suspects[0]
-    told = "probability of" if found else "is the highest probability of any effect:"
-    return [*cards, (sure(best.probability), f"{told} {called(best.effect)}")]
-
-
-def _shown(result: Diagnosis) -> list[Suspect]:
+def _shown(result: Diagnosis) -> list[Candidate]:
     inside = {r.screened.effect for r in accepted(result)}
-    testable = [s for s in result.verdict.suspects if s.testable]
-    likely = [s for s in testable if s.probability >= _LIKELY or s.effect in inside][:_MOST]
+    testable = [c for c in result.verdict.candidates if c.testable]
+    likely = [c for c in testable if c.probability >= _LIKELY or c.effect in inside][:_MOST]
     return likely if len(likely) >= _FEWEST else testable[:_FEWEST]
 
 
-def _suspect_entry(result: Diagnosis, s: Suspect) -> dict[str, Any]:
-    fitted = next((r for r in accepted(result) if r.screened.effect == s.effect), None)
+def _candidate_entry(result: Diagnosis, c: Candidate) -> dict[str, Any]:
+    fitted = next((r for r in accepted(result) if r.screened.effect == c.effect), None)
     shown = fitted is not None or result.verdict.name == "unexplained"
-    group = rivals(result, s.effect) if fitted is not None else alike(result, s.effect)
-    others = [called(e) for e in group[:LARGEST_GROUP] if e != s.effect] if shown else []
+    group = rivals(result, c.effect) if fitted is not None else alike(result, c.effect)
+    others = [called(e) for e in group[:LARGEST_GROUP] if e != c.effect] if shown else []
     return {
-        "name": called(s.effect).capitalize(),
-        "probability": sure(s.probability),
-        "width": f"{100 * s.probability:.1f}",
+        "name": called(c.effect).capitalize(),
+        "probability": c.probability,
         "accepted": fitted is not None,
-        "where": in_zones(s.zones if fitted is None else fitted.screened.zones),
-        "acts_on": CATALOGUE[s.effect].acts_on,
-        "values": [] if fitted is None else _values(result, s.effect),
+        "where": in_zones(c.zones if fitted is None else fitted.screened.zones),
+        "acts_on": CATALOGUE[c.effect].acts_on,
+        "values": [] if fitted is None else _values(result, c.effect),
         "alike": listed(others, "or") if others else "",
-        "separate_by": s.separate_by,
+        "separate_by": c.separate_by,
     }
 
 
 def _values(result: Diagnosis, effect: str) -> list[str]:
     """Spell the parameters of an effect as the final model has them."""
     own = {p.name for p in CATALOGUE[effect].parameters}
-    found = [p for p in describe_fit(result.final) if p.name.partition("@")[0] in own]
+    found = [p for p in result.final.describe() if p.name.partition("@")[0] in own]
     spelled = []
     for p in found[:_MOST_VALUES]:
         base, _, member = p.name.partition("@")
@@ -183,37 +221,21 @@ def _measure_next(result: Diagnosis) -> list[tuple[str, str]]:
     if result.verdict.name == "no_gap":
         return []
     names = [r.screened.effect for r in accepted(result)]
-    for name in list(names) or [result.verdict.suspects[0].effect]:
+    for name in list(names) or [result.verdict.candidates[0].effect]:
         names += [e for e in (name, *rivals(result, name)[:LARGEST_GROUP]) if e not in names]
     return [(called(e).capitalize(), CATALOGUE[e].separated_by) for e in names if CATALOGUE[e].separated_by]
 
 
-def _waterfall(result: Diagnosis) -> list[dict[str, Any]]:
-    """Rows of held-out errors, from the baseline by each effect to the floor; bars in % of the largest."""
+def _waterfall(result: Diagnosis) -> list[tuple[str, float, float]]:
+    """List held-out errors, from the baseline by each effect to the floor, each with the one before."""
     values = [result.gap, *(s.after for s in result.steps)]
-    top = max([*values, result.floor, 1e-9])
-    rows = [_bar("The calibrated model", result.gap, result.gap, top, "")]
-    for i, step in enumerate(result.steps):
-        change = step.after - values[i]
-        rows.append(_bar(f"+ {called(step.effects[-1])}", step.after, values[i], top, f"{signed(change)} K"))
-    rows.append(_bar("Floor: with regular heat of any kind added", result.floor, result.floor, top, "floor"))
-    return rows
+    steps = [(f"+ {called(s.effects[-1])}", s.after, before) for s, before in zip(result.steps, values, strict=False)]
+    floor = ("Floor: with regular heat of any kind added", result.floor, result.floor)
+    return [("The calibrated model", result.gap, result.gap), *steps, floor]
 
 
-def _bar(name: str, value: float, previous: float, top: float, change: str) -> dict[str, Any]:
-    low, high = min(value, previous), max(value, previous)
-    return {
-        "name": name,
-        "value": f"{kelvin(value)} K",
-        "change": "" if change == "floor" else change,
-        "floor": change == "floor",
-        "solid": f"{100 * low / top:.1f}",
-        "delta": f"{100 * (high - low) / top:.1f}",
-        "worse": value > previous,
-    }
-
-
-def _placebo_sentences(result: Diagnosis) -> list[str]:
+def _test_sentences(result: Diagnosis) -> list[str]:
+    """Say what permuted signals and the runner-up make of the error."""
     sentences = []
     for i, (step, r) in enumerate(zip(result.steps, result.rounds, strict=False)):
         name = called(step.effects[-1])
@@ -231,24 +253,89 @@ def _placebo_sentences(result: Diagnosis) -> list[str]:
     return sentences
 
 
-def _panels(before: Replay, after: Replay | None, found: str) -> list[figures.Picture]:
-    both = [r.evaluation for r in (before, after) if r is not None]
-    series = [figures.series_of_runs(e) for e in both]
-    errors = [{z: e["mae"] for z, e in one.by_zone().items()} for one in both]
-    models = dict(zip(("calibrated model", found), series, strict=False))
-    return figures.change_panels(models, both[0].zones, errors)
+def _where(result: Diagnosis, case: Case, replayed: Sequence[Replay]) -> dict[str, Any]:
+    """Lay out where the gap lies: plans, zones, parts of the building and of the day, growth of the error."""
+    where, geometry, before = result.where, case.building.geometry, replayed[0]
+    names = ("calibrated", diagnosis_words.final_name(result))
+    maps: list[Picture] = []
+    if isinstance(geometry, FloorPlans):
+        cells = [np.count_nonzero(floor.tokens == zone) for floor in geometry.floors for zone in floor.zone_names]
+        area = float(np.median(cells)) * geometry.cell_size**2
+        top = max(float(np.nanmax(before.missing.rms, initial=1.0)), _NOTABLE * area)
+        for r, title in zip(replayed, ("calibrated model", names[1]), strict=False):
+            zones = list(r.missing.watts.columns)
+            maps += heat_maps(geometry, case.building.orientation, zones, r.missing.rms, title, top)
+    missing = {"uncalibrated": where.missing_at_start, **dict(zip(names, (r.missing for r in replayed), strict=False))}
+    sizes = dict(zip(before.missing.watts, np.column_stack([m.rms for m in missing.values()]).tolist(), strict=True))
+    known = {zone: size for zone, size in before.missing.by_zone.items() if size > 0.0}
+    worst = sorted(known, key=lambda zone: -known[zone])[:_MOST_DRAWN]
+    means = before.missing.watts.mean()
+    parts = [p for p in (*where.groups, *where.modes) if p.share > p.predictions > 0.0]
+    drifts = {name: (r.drift.seconds, r.drift.rms) for name, r in zip(names, replayed, strict=False)}
+    return {
+        "sentence": diagnosis_words.where_sentence(where).replace("%", " %"),
+        "maps": maps,
+        "missing": missing_lines(worst, {n: (m.watts, *m.band(0.9)) for n, m in missing.items()}) if worst else [],
+        "zones": [
+            {"zone": s.name, "share": s.share, "mean": float(means[s.name]), "sizes": sizes[s.name]}
+            for s in sorted(where.zones, key=lambda s: -s.share)[:_MOST_ZONES]
+        ],
+        "parts": [
+            vars(p) | {"name": diagnosis_words.part(p.name)}
+            for p in sorted(parts, key=lambda p: p.predictions - p.share)[:_MOST_PARTS]
+        ],
+        "hours": hour_bars(where.hours),
+        "drift_sentence": diagnosis_words.drift_sentence(names[1], *(r.drift for r in replayed)),
+        "drift": drift_lines(drifts),
+    }
 
 
-def _reproduce(result: Diagnosis, case: Case) -> list[tuple[str, str]]:
-    parts = ["buildingmpc diagnose CASE --out RESULTS"]
-    parts += [f"--tune {i.start.isoformat()}/{i.end.isoformat()}" for i in result.tuned]
-    parts += [f"--hold-out {i.start.isoformat()}/{i.end.isoformat()}" for i in result.judged]
-    parts += [f"--horizon {result.horizon}"]
-    parts += [f"--dx {result.settings.dx:g}"] if result.settings.dx is not None else []
-    span = f"{clock(case.stamps[0])} to {clock(case.stamps[-1])} every {duration(case.step)}"
-    return [
-        ("case", f"{result.case}, {span}"),
-        ("version", f"buildingmpc {result.version}, Python {platform.python_version()}, pandas {pd.__version__}"),
-        ("time", f"{result.seconds:.0f} s for {counted(len(result.rounds), 'round')}"),
-        ("command", " ".join(parts)),
+def _statistics(result: Diagnosis) -> dict[str, Any]:
+    """Lay out the fold of the page: rounds, likeness, permutation tests, bounds and what would have been found."""
+    first, final = ({p.name: p for p in f.describe()} for f in (result.rounds[0].before, result.final))
+    steps = [vars(s) | {"names": listed([called(e) for e in s.effects])} for s in result.steps]
+    nothing = dict.fromkeys(("where", "score", "retained_share"))
+    return {
+        "limits": (ACCEPTED, GENERIC_GAP),
+        "set90": listed([called(e) for e in result.verdict.set90]) if result.verdict.set90 else "",
+        "rounds": [_round(r) for r in result.rounds],
+        "effects": [
+            vars(c) | {"name": called(c.effect), "where": in_zones(c.zones), "sure": sure(c.probability)}
+            | ({} if c.testable else nothing | {"sure": "not testable"})
+            for c in result.verdict.candidates
+        ],
+        "closed": steps,
+        "parameters": [
+            [p.name.replace("_", " "), unit(p.unit).replace("*", "·"),
+             significant(first[p.name].value) if p.name in first else "absent",
+             significant(p.value) if result.final.effects else "–",
+             " to ".join(map(significant, p.interval90)) if p.interval90 else "–"]
+            for p in final.values() if p.standard_error is not None
+        ],
+        "bounds": [
+            listed([p.name.replace("_", " ") for p in model.values() if p.at_bound] or ["none"])
+            for model in (first, final)
+        ],
+        "alternating": diagnosis_words.alternating_sentence(result),
+        "intervals": [
+            vars(i) | {"part": name}
+            for name, part in (("tuning", result.tuned), ("held out", result.judged)) for i in part
+        ],
+    }  # fmt: skip
+
+
+def _round(r: Round) -> dict[str, Any]:
+    fitted = {x.screened.effect: x.gain for x in r.refits}
+    rows = [
+        vars(g) | {"name": called(g.effect), "where": in_zones(g.zones), "fitted": fitted.get(g.effect)}
+        for g in r.gains[:_MOST_GAINS]
     ]
+    generic = {"name": "heat of any regular kind", "where": None, "fitted": None, "retained": None}
+    best = [g for g in r.gains if g.share > 0.0][:_MOST_ALIKE]
+    return {
+        "inside": [called(e) for e in r.before.effects],
+        "accepted": None if r.accepted is None else r.accepted.screened.effect,
+        "rows": [*rows, vars(r.generic) | generic],
+        "names": [called(g.effect) for g in best],
+        "alike": [[called(a.effect), *(f"{abs(r.screening.cosine(a, b)):.2f}" for b in best)] for a in best],
+    }

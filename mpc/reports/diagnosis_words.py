@@ -6,11 +6,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from calibration.diagnosis.decide.drift import DriftCurve
 from calibration.diagnosis.decide.levels import LARGEST_GROUP
-from calibration.diagnosis.decide.verdict import Suspect, group_of
+from calibration.diagnosis.decide.verdict import Candidate, group_of
+from calibration.diagnosis.decide.where import Where
 from calibration.diagnosis.diagnosis import Diagnosis
 from calibration.diagnosis.refit.refit import Refit
-from mpc.reports.page import duration, kelvin, watts
+from mpc.reports.page import duration, kelvin, listed, percent, sure, watts
 from thermal.effects.catalogue import CATALOGUE
 
 #: What an effect is called where its title would read oddly after "leaves out".
@@ -21,6 +23,9 @@ _LIKELY = 0.5
 
 #: Probability from which another effect of a group is worth telling from the likeliest [-].
 _RIVAL = 0.05
+
+#: Share of the last value from which the growth of an error counts as levelled off [-].
+_LEVEL = 0.8
 
 #: More zones than this are counted, not named.
 _MOST_NAMED = 4
@@ -73,12 +78,12 @@ def rivals(result: Diagnosis, effect: str) -> tuple[str, ...]:
         Its id.
     """
     inside = {r.screened.effect for r in accepted(result)}
-    others = (e for e in alike(result, effect) if e not in inside and suspect(result, e).probability >= _RIVAL)
+    others = (e for e in alike(result, effect) if e not in inside and candidate(result, e).probability >= _RIVAL)
     return (effect, *others)
 
 
-def suspect(result: Diagnosis, effect: str) -> Suspect:
-    """Suspect of an id.
+def candidate(result: Diagnosis, effect: str) -> Candidate:
+    """Candidate of an id.
 
     Parameters
     ----------
@@ -87,11 +92,11 @@ def suspect(result: Diagnosis, effect: str) -> Suspect:
     effect : str
         Its id.
     """
-    return next(s for s in result.verdict.suspects if s.effect == effect)
+    return next(s for s in result.verdict.candidates if s.effect == effect)
 
 
 def alike(result: Diagnosis, effect: str) -> tuple[str, ...]:
-    """Effects that the data cannot tell from an accepted one, itself first; or what its suspect says of another.
+    """Effects that the data cannot tell from an accepted one, itself first; or what its candidate says of another.
 
     Parameters
     ----------
@@ -103,7 +108,7 @@ def alike(result: Diagnosis, effect: str) -> tuple[str, ...]:
     for r in result.rounds:
         if r.accepted is not None and r.accepted.screened.effect == effect:
             return group_of(r, effect)
-    return suspect(result, effect).group
+    return candidate(result, effect).group
 
 
 def called(effect: str, zones: Sequence[str] = ()) -> str:
@@ -118,10 +123,11 @@ def called(effect: str, zones: Sequence[str] = ()) -> str:
 
     Examples
     --------
-    >>> called("sensor_bias", ["F1_N"])
-    'a zone sensor that reads wrong, in zone F1_N'
+    >>> called("sensor_bias", ["F1_N"]), called("an_effect_of_ones_own")
+    ('a zone sensor that reads wrong, in zone F1_N', 'an effect of ones own')
     """
-    name = _CALLED.get(effect, CATALOGUE[effect].title)
+    title = CATALOGUE[effect].title if effect in CATALOGUE else ""
+    name = _CALLED.get(effect, title) or effect.replace("_", " ")
     return f"{name}, {in_zones(zones)}" if zones else name
 
 
@@ -145,40 +151,16 @@ def in_zones(zones: Sequence[str]) -> str:
     return f"in zone{'s' if len(zones) > 1 else ''} {listed(zones)}"
 
 
-def listed(names: Sequence[str], last: str = "and") -> str:
-    """Join names to a sentence's list.
+def final_name(result: Diagnosis) -> str:
+    """Call the final model beside the baseline; nothing where it has no effect.
 
     Parameters
     ----------
-    names : sequence of str
-        At least one.
-    last : str
-        Word before the last.
-
-    Examples
-    --------
-    >>> listed(["sun", "wind", "rain"], "or")
-    'sun, wind or rain'
+    result : Diagnosis
+        From `diagnose`.
     """
-    return f" {last} ".join(filter(None, [", ".join(names[:-1]), names[-1]]))
-
-
-def sure(probability: float) -> str:
-    """Spell a probability, never as certainty.
-
-    Parameters
-    ----------
-    probability : float
-        In [0, 1] [-].
-
-    Examples
-    --------
-    >>> sure(0.937), sure(0.9999), sure(0.001)
-    ('94 %', 'over 99 %', 'under 1 %')
-    """
-    if probability > 0.99:
-        return "over 99 %"
-    return f"{100 * probability:.0f} %" if probability >= 0.01 else "under 1 %"
+    count = len(accepted(result))
+    return f"with the effect{'s' if count > 1 else ''} found" if count else ""
 
 
 def ahead(result: Diagnosis) -> str:
@@ -195,7 +177,7 @@ def ahead(result: Diagnosis) -> str:
 
 def _named(result: Diagnosis, found: Sequence[Refit], begin: str, doubt: str) -> str:
     """Name effects: those more likely there than not, and what may be there besides."""
-    likely = [r for r in found if suspect(result, r.screened.effect).probability >= _LIKELY]
+    likely = [r for r in found if candidate(result, r.screened.effect).probability >= _LIKELY]
     rest = [r for r in found if r not in likely]
     if not likely:
         begin, likely, rest = doubt, rest[:1], rest[1:]
@@ -208,13 +190,13 @@ def _either(result: Diagnosis, first: Refit) -> str:
     effect = first.screened.effect
     likely = rivals(result, effect)
     if len(likely) > 1:
-        named = listed([f"{called(e)} ({sure(suspect(result, e).probability)})" for e in likely], "or")
+        named = listed([f"{called(e)} ({sure(candidate(result, e).probability)})" for e in likely], "or")
         either = "either " if len(likely) == 2 else ""
         told = CATALOGUE[effect].separated_by
         text = f"The model leaves out {either}{named}: these data cannot tell them apart."
         return f"{text} What would: {told}." if told else text
     inside = {r.screened.effect for r in accepted(result)}
-    rest = [suspect(result, e) for e in alike(result, effect) if e not in inside]
+    rest = [candidate(result, e) for e in alike(result, effect) if e not in inside]
     others = [f"{called(s.effect)} ({sure(s.probability)})" for s in rest]
     text = _named(result, [first], "The model leaves out", "Most likely the model leaves out")
     if not others:
@@ -225,7 +207,7 @@ def _either(result: Diagnosis, first: Refit) -> str:
 
 def _found(result: Diagnosis, fitted: Refit) -> str:
     gain = fitted.screened
-    return f"{called(gain.effect, gain.zones)} ({sure(suspect(result, gain.effect).probability)} sure)"
+    return f"{called(gain.effect, gain.zones)} ({sure(candidate(result, gain.effect).probability)} sure)"
 
 
 def _how_far(result: Diagnosis, found: int) -> str:
@@ -245,7 +227,7 @@ def _how_far(result: Diagnosis, found: int) -> str:
     text = f"{there} falls from {kelvin(step.before)} to {kelvin(step.after)} K"
     if step.share_closed is None:
         return f"{text}; the gap is too small beside its own scatter to state a share of it."
-    return f"{text}, {min(100.0, 100 * step.share_closed):.0f} % of what could be closed."
+    return f"{text}, {percent(min(1.0, step.share_closed))} of what could be closed."
 
 
 def _no_gap(result: Diagnosis) -> str:
@@ -268,7 +250,7 @@ def _unexplained(result: Diagnosis) -> str:
     error = (
         f"{ahead(result).capitalize()} it misses the measured zone temperatures by {kelvin(result.gap)} K on average"
     )
-    best = result.verdict.suspects[0]
+    best = result.verdict.candidates[0]
     if found:
         group = alike(result, found[0].screened.effect)
         if len(group) > LARGEST_GROUP:
@@ -284,3 +266,109 @@ def _unexplained(result: Diagnosis) -> str:
     if result.floor < result.gap:
         text += f", and {kelvin(result.gap - result.floor)} K of it follow time of day, zone or outdoor temperature"
     return f"{text}. The best single guess is {called(best.effect)} ({sure(best.probability)}): not enough to name it."
+
+
+def where_sentence(where: Where) -> str:
+    """Name the part that holds more of the squared error than any other beyond its share of the predictions.
+
+    Parameters
+    ----------
+    where : Where
+        From `diagnose`.
+    """
+    if where.most is None:
+        return "The error is spread evenly over zones, hours and weather."
+    place, moment, share, predictions = where.most
+    when = moment if not moment or moment.startswith(("with", "in")) else f"when {moment}"
+    spoken = " ".join(filter(None, (f"in {place}" if place else "", when)))
+    return f"{share:.0%} of the squared error is {spoken}, which has {predictions:.0%} of the predictions."
+
+
+def part(name: str) -> str:
+    """Name a part of the building or of the time as a place or a moment.
+
+    Parameters
+    ----------
+    name : str
+        Such as ``the core``, ``floor 2``, ``heating`` or ``in sun hours``.
+    """
+    return {"the": "in ", "flo": "on ", "in ": "", "wit": ""}.get(name[:3], "when ") + name
+
+
+def alternating_sentence(result: Diagnosis) -> str:
+    """Say why tuning and held-out days alternate; nothing where they do not.
+
+    Parameters
+    ----------
+    result : Diagnosis
+        From `diagnose`.
+    """
+    if result.last_third is None:
+        return ""
+    return (
+        "The telemetry's last third shows other weather or use than the days before it: a baseline tuned on these "
+        f"misses it by {kelvin(result.last_third)} K. So tuning and held-out days alternate."
+    )
+
+
+def drift_sentence(found: str, before: DriftCurve, after: DriftCurve | None = None) -> str:
+    """Say what the growth of the error tells.
+
+    Parameters
+    ----------
+    found : str
+        What the final model is called, such as ``with the effect found``.
+    before : DriftCurve
+        Of the calibrated model.
+    after : DriftCurve, optional
+        Of the final model, where it has an effect.
+    """
+    text = f"Left to itself, the calibrated model's error {growth_words(before)}; it is {end_words(before)}."
+    if after is None:
+        return text
+    if after.kind == before.kind != "hump":
+        slope = f"{max(0.0, after.slope):.2f}"
+        return f"{text} {found.capitalize()} it grows alike (slope {slope}) and is {end_words(after)}."
+    return f"{text} {found.capitalize()} it {growth_words(after)}; it is {end_words(after)}."
+
+
+def growth_words(curve: DriftCurve) -> str:
+    """Say how the error of free runs grows and what makes it so.
+
+    Parameters
+    ----------
+    curve : DriftCurve
+        Of a model.
+    """
+    how = f"slope {max(0.0, curve.slope):.2f}"
+    if curve.hump is not None:
+        at, top, low = curve.hump
+        return (
+            f"is largest {duration(at)} after the start ({kelvin(top)} K) and then falls to {kelvin(low)} K, as "
+            "where the mass of air and furniture is wrong or a sensor lags"
+        )
+    if curve.kind == "sensors":
+        cause = "as where readings are off, or air has yet to mix after a switch"
+        return f"is there from the first step and hardly grows ({how}), {cause}"
+    if curve.kind == "random":
+        return f"grows with the square root of time at first ({how}), as where heat comes and goes at random"
+    return f"grows nearly in proportion to time at first ({how}), as where heat is missing for hours on end"
+
+
+def end_words(curve: DriftCurve) -> str:
+    """Say where the error of free runs ends, and how soon it is near that.
+
+    Parameters
+    ----------
+    curve : DriftCurve
+        Of a model.
+    """
+    last, span = float(curve.rms[-1]), f"{curve.seconds[-1] / 3600.0:g} hours"
+    near = float(curve.seconds[int(np.argmax(curve.rms >= _LEVEL * last))])
+    ends = f"{kelvin(last)} K after {span}"
+    if near <= curve.seconds[0] or curve.kind in ("sensors", "hump"):
+        return ends
+    if near > 0.5 * curve.seconds[-1]:
+        return f"{ends}, and still grows there"
+    about = f"{near / 3600.0:.0f} hours" if near >= 5400.0 else duration(near)
+    return f"{ends}, four fifths of which it has after {about}"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from importlib.metadata import version
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -10,15 +10,14 @@ import numpy as np
 import pandas as pd
 
 from calibration.evaluation.n_step import Evaluation, spatial_metrics
-from calibration.results import check_results_folder, write_results
-from mpc.reports import figures
-from mpc.reports.page import clock, counted, duration, kelvin, render, signed
+from mpc.reports.figures.errors import Band, drift_boxes, error_growth, median_run, series_of_runs, zone_panels
+from mpc.reports.figures.field import Field
+from mpc.reports.figures.plan import floor_maps, tile_map
+from mpc.reports.figures.style import CELSIUS, Picture
+from mpc.reports.page import clock, counted, duration, kelvin, signed, write_report
 from thermal._types import FloatArray
 from thermal.case.building import FloorPlans
 from thermal.case.case import Case
-
-#: Zero of the Celsius scale [K].
-CELSIUS = 273.15
 
 
 def write_evaluation(
@@ -49,35 +48,20 @@ def write_evaluation(
     ResultsExistError
         When the folder holds something and ``force`` is not set.
     """
-    check_results_folder(out, force)
-    drawn = evaluation_figures(evaluation, case)
-    drawn["growth"] = figures.error_growth({"all runs": {"model": evaluation}})
-    metrics, rest = evaluation.metrics, unchanged_error(evaluation)
+    drawn = evaluation_figures(evaluation, case) | {"growth": error_growth({"all runs": {"model": evaluation}})}
     content = {
         "case": case.building.name,
         "subtitle": subtitle(case, evaluation),
         "verdict": evaluation_verdict(evaluation),
-        "cards": [
-            (f"{kelvin(metrics.mae)} K", "mean absolute error (MAE)"),
-            (f"{kelvin(rest)} K", "assuming that nothing changes"),
-            (f"{signed(metrics.bias)} K", "bias, simulated minus measured"),
-            (str(sum(len(p.start) for p in evaluation.predictions)), "runs"),
-        ],
-        "intervals": [
-            [*r, signed(m.median), signed(m.bias)]
-            for r, m in zip(interval_rows(evaluation), _metrics(evaluation), strict=True)
-        ],
-        "horizons": [[h, f"{mae:.3f}"] for h, mae in evaluation.by_horizon.items()],
+        "evaluation": evaluation,
+        "unchanged": unchanged_error(evaluation),
+        "intervals": [vars(p) | vars(spatial_metrics(p.error)) for p in evaluation.predictions],
         "figures": drawn,
-        "zones": zone_rows(evaluation.by_zone()),
-        "reproduce": [("version", f"buildingmpc {version('buildingmpc')}"), ("parameters", parameters)],
+        "zones": by_error(evaluation.by_zone()),
+        "parameters": parameters,
     }
-    files: dict[str, Any] = {
-        "evaluation.json": evaluation.to_dict(),
-        "predictions.parquet": predictions_table(evaluation),
-        "report.html": render("evaluation", content),
-    }
-    return write_results(out, files, force) / "report.html"
+    files = {"evaluation.json": evaluation.to_dict(), "predictions.parquet": predictions_table(evaluation)}
+    return write_report(out, "evaluation", content, files, force)
 
 
 def evaluation_verdict(evaluation: Evaluation) -> str:
@@ -145,7 +129,7 @@ def tidy(stamps: pd.DatetimeIndex, zones: tuple[str, ...], values: dict[str, Flo
     zones : tuple of str
         Zone names.
     values : dict of str to ndarray, shape (n_time, n_zone)
-        By column, in the columns' units.
+        By column [units of the columns].
 
     Returns
     -------
@@ -161,8 +145,8 @@ def evaluation_figures(
     evaluation: Evaluation,
     case: Case,
     before: Evaluation | None = None,
-    field: figures.Field | None = None,
-    band: figures.Band | None = None,
+    field: Field | None = None,
+    band: Band | None = None,
 ) -> dict[str, Any]:
     """Figures of the runs of an evaluation: drift, maps and zones.
 
@@ -179,7 +163,7 @@ def evaluation_figures(
     band : Band, optional
         About the predictions, from other runs.
     """
-    which, run = figures.median_run(evaluation)
+    which, run = median_run(evaluation)
     p = evaluation.predictions[which]
     ahead = duration(evaluation.steps * evaluation.step_seconds)
     shown = [("after calibration" if before else "the model", p, run)]
@@ -188,10 +172,10 @@ def evaluation_figures(
     runs = sum(len(x.start) for x in evaluation.predictions)
     errors = evaluation.by_zone()
     mean = np.array([errors[z]["bias"] if z in errors else np.nan for z in evaluation.zones])
-    series = figures.series_of_runs(evaluation, band)
+    series = series_of_runs(evaluation, band)
     inside = band.coverage(evaluation) if band is not None else np.nan
     return {
-        "drift": figures.drift_boxes(shown, evaluation.step_seconds),
+        "drift": drift_boxes(shown, evaluation.step_seconds),
         "run_start": clock(p.start[run]),
         "runs": runs,
         "maps": [
@@ -200,7 +184,7 @@ def evaluation_figures(
         ],
         "plan": isinstance(case.building.geometry, FloorPlans),
         "cells": field is not None,
-        "zones": figures.zone_panels(series, evaluation.zones, {z: e["mae"] for z, e in errors.items()}),
+        "zones": zone_panels(series, evaluation.zones, {z: e["mae"] for z, e in errors.items()}),
         "inside": f"{100 * inside:.0f} %" if np.isfinite(inside) else "",
         "zone_count": len(errors),
         "ahead": ahead,
@@ -208,29 +192,33 @@ def evaluation_figures(
 
 
 def error_maps(
-    case: Case, zones: tuple[str, ...], error: FloatArray, title: str, field: figures.Field | None = None
-) -> list[figures.Picture]:
+    case: Case, zones: tuple[str, ...], error: FloatArray, title: str, field: Field | None = None
+) -> list[Picture]:
     """Map the error of the zones on the plans, or on tiles where there is no plan."""
     geometry = case.building.geometry
     if isinstance(geometry, FloorPlans):
-        return figures.floor_maps(geometry, case.building.orientation, zones, error, title, field)
+        return floor_maps(geometry, case.building.orientation, zones, error, title, field)
     areas = np.array([zone.floor_area for zone in geometry.zones])
-    return figures.tile_map(zones, areas, error, title)
+    return tile_map(zones, areas, error, title)
 
 
 def interval_rows(evaluation: Evaluation) -> list[list[str]]:
     """Rows of the table of intervals: start, end, runs, skipped, error."""
     return [
-        [clock(p.interval.start), clock(p.interval.end), str(len(p.start)), str(p.skipped), f"{m.mae:.3f}"]
-        for p, m in zip(evaluation.predictions, _metrics(evaluation), strict=True)
-    ]
+        [clock(p.interval.start), clock(p.interval.end), str(len(p.start)), str(p.skipped),
+         f"{spatial_metrics(p.error).mae:.3f}"]
+        for p in evaluation.predictions
+    ]  # fmt: skip
 
 
-def zone_rows(errors: dict[str, dict[str, float]]) -> list[list[str]]:
+def zone_rows(errors: Mapping[str, Mapping[str, float]]) -> list[list[str]]:
     """Rows of the table of zones, the largest error first."""
-    return [
-        [z, f"{e['mae']:.3f}", signed(e["bias"])] for z, e in sorted(errors.items(), key=lambda item: -item[1]["mae"])
-    ]
+    return [[e["zone"], f"{e['mae']:.3f}", signed(e["bias"])] for e in by_error(errors)]
+
+
+def by_error(errors: Mapping[str, Mapping[str, float]]) -> list[dict[str, Any]]:
+    """List the errors of the zones as records, the largest first."""
+    return [{"zone": z, **e} for z, e in sorted(errors.items(), key=lambda item: -item[1]["mae"])]
 
 
 def subtitle(case: Case, evaluation: Evaluation) -> str:
@@ -238,7 +226,3 @@ def subtitle(case: Case, evaluation: Evaluation) -> str:
     zones, measured = len(evaluation.zones), len(evaluation.by_zone())
     seen = counted(zones, "zone") + ("" if measured == zones else f", {measured} of them measured")
     return f"{seen}; times are local ({case.building.location.timezone})"
-
-
-def _metrics(evaluation: Evaluation) -> list[Any]:
-    return [spatial_metrics(p.error) for p in evaluation.predictions]

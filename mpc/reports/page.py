@@ -1,40 +1,127 @@
-"""Pages of reports: templates, and how numbers, times and durations read in them."""
+"""Pages of reports: one way from contents to a page, and how numbers, times and lists read in them."""
 
 from __future__ import annotations
 
 import math
+import platform
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cache
 from importlib.metadata import version
+from pathlib import Path
 from typing import Any
 
 import jinja2
 import pandas as pd
+
+from calibration.results import write_results
 
 _NO_NUMBER = "–"
 
 
 @cache
 def _environment() -> jinja2.Environment:
-    return jinja2.Environment(
+    environment = jinja2.Environment(
         loader=jinja2.PackageLoader("mpc.reports", "templates"),
         autoescape=True,
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )
+    environment.filters |= {**_SPELLINGS, "spell": spell, "cells": _cells}
+    return environment
 
 
-def render(template: str, content: dict[str, Any]) -> str:
+def render(template: str, content: Mapping[str, Any]) -> str:
     """Fill a template; the page loads nothing from elsewhere.
 
     Parameters
     ----------
     template : str
         Name without its ending, such as ``calibration``.
-    content : dict
+    content : mapping
         What it shows; every text is escaped.
     """
-    return _environment().get_template(f"{template}.html.j2").render(version=version("buildingmpc"), **content)
+    made_by = {"version": version("buildingmpc"), "python": platform.python_version()}
+    return _environment().get_template(f"{template}.html.j2").render(made_by | dict(content))
+
+
+def write_report(
+    out: str | Path, template: str, content: Mapping[str, Any], files: Mapping[str, Any], force: bool = False
+) -> Path:
+    """Write ``report.html`` and the files of its numbers; see `calibration.results.write_results`.
+
+    Parameters
+    ----------
+    out : str or Path
+        Folder, made if need be.
+    template : str
+        Of the page.
+    content : mapping
+        What the page shows.
+    files : mapping of str to bytes, str, dict or DataFrame
+        By file name.
+    force : bool
+        Replace earlier results.
+
+    Returns
+    -------
+    Path
+        The page.
+
+    Raises
+    ------
+    ResultsExistError
+        When the folder holds something and ``force`` is not set.
+    """
+    return write_results(out, {**files, "report.html": render(template, content)}, force) / "report.html"
+
+
+def spell(value: Any, how: str = "") -> str:
+    """Spell a value of a table.
+
+    Parameters
+    ----------
+    value : object
+        Nothing, and what is no number, is a dash.
+    how : str
+        Name of a filter, such as ``kelvin``, or a format, such as ``.3f``.
+
+    Examples
+    --------
+    >>> spell(-0.0532, ".2f"), spell(0.0532, "kelvin"), spell(float("nan"), ".1f"), spell(0.26, "percent")
+    ('−0.05', '0.053', '–', '26 %')
+    """
+    if value is None or value == "" or (isinstance(value, float) and not math.isfinite(value)):
+        return _NO_NUMBER
+    if how in _SPELLINGS:
+        return _SPELLINGS[how](value)
+    return format(value, how).replace("-", "−") if how else str(value)
+
+
+def _cells(row: Any, columns: Sequence[Any], left: Sequence[int]) -> list[tuple[str, Any]]:
+    """Class and text of each cell of a row: of a list of texts, or of a record by the paths and spellings of columns.
+
+    Parameters
+    ----------
+    row : sequence of str, or record
+        An object, a mapping or a tuple.
+    columns : sequence of str or (str, str, str)
+        Titles; those of a record with the path of a value, such as ``interval.start``, and its spelling.
+    left : sequence of int
+        Columns of text.
+    """
+    if not isinstance(columns[0], str):
+        row = [spell(_found(row, path), how) for _, path, how in columns]
+    return [("name" if k == 0 else "text" if k in left else "n", text) for k, text in enumerate(row)]
+
+
+def _found(record: Any, path: str) -> Any:
+    for key in path.split("."):
+        if isinstance(record, tuple) and key.isdecimal():
+            record = record[int(key)]
+        else:
+            record = record[key] if isinstance(record, Mapping) else getattr(record, key)
+    return record
 
 
 def kelvin(value: float) -> str:
@@ -157,3 +244,69 @@ def counted(number: int, noun: str, plural: str = "") -> str:
     ('1 zone', 'no zones')
     """
     return f"{number or 'no'} {noun if number == 1 else plural or noun + 's'}"
+
+
+def percent(value: float) -> str:
+    """Spell a share.
+
+    Examples
+    --------
+    >>> percent(0.256)
+    '26 %'
+    """
+    return f"{100 * value:.0f} %"
+
+
+def sure(probability: float) -> str:
+    """Spell a probability, never as certainty.
+
+    Parameters
+    ----------
+    probability : float
+        In [0, 1] [-].
+
+    Examples
+    --------
+    >>> sure(0.937), sure(0.9999), sure(0.001)
+    ('94 %', 'over 99 %', 'under 1 %')
+    """
+    if probability > 0.99:
+        return "over 99 %"
+    return percent(probability) if probability >= 0.01 else "under 1 %"
+
+
+def ends(interval: tuple[float, float]) -> str:
+    """Spell the ends of an interval of shares.
+
+    Examples
+    --------
+    >>> ends((0.121, 0.3))
+    '12 to 30 %'
+    """
+    return f"{100 * interval[0]:.0f} to {percent(interval[1])}"
+
+
+def listed(words: Iterable[str], last: str = "and") -> str:
+    """Join words as a sentence does.
+
+    Parameters
+    ----------
+    words : iterable of str
+        At least one.
+    last : str
+        What stands before the last.
+
+    Examples
+    --------
+    >>> listed(["sun", "wind", "rain"], "or")
+    'sun, wind or rain'
+    """
+    *first, end = words
+    return f"{', '.join(first)} {last} {end}" if first else end
+
+
+#: How values read, by name of the filter.
+_SPELLINGS: dict[str, Callable[..., str]] = {
+    f.__name__: f
+    for f in (kelvin, signed, watts, significant, plain, unit, duration, clock, counted, percent, sure, ends, listed)
+}

@@ -16,7 +16,7 @@ from calibration.estimation.whiteness import Whiteness, whiteness
 from calibration.evaluation.n_step import HORIZONS, Evaluation, EvaluationSettings
 from calibration.evaluation.settings import Objective
 from calibration.fit.result import CalibrationResult
-from mpc.reports import figures
+from mpc.reports.figures.calibration import heat_lines, periodogram_bound, whiteness_panels
 from mpc.reports.page import clock, counted, duration, significant
 from thermal._types import FloatArray
 from thermal.model.matrices import SymbolicModel
@@ -120,7 +120,7 @@ def _innovations(result: CalibrationResult, model: SymbolicModel, inputs: Inputs
     if not ranked:
         return {"reason": "Innovations are not tested: no zone has enough of them."}
     alone = result.calibrated["held_out"].by_horizon
-    bound = figures.periodogram_bound(len(filtered.stamps))
+    bound = periodogram_bound(len(filtered.stamps))
     return {
         "verdict": _whiteness_sentence(found),
         "from": clock(filtered.stamps[0]),
@@ -130,7 +130,7 @@ def _innovations(result: CalibrationResult, model: SymbolicModel, inputs: Inputs
         "bound": f"{bound:.3f}",
         "rows": [_white_row(name, found) for name in ranked[:MOST_ROWS]],
         "count": len(ranked),
-        "pictures": figures.whiteness_panels(_shown(ranked, filtered, result.zones), found.step),
+        "pictures": whiteness_panels(_shown(ranked, filtered, result.zones), found.step),
         "horizons": [
             [h, f"{alone[h]:.3f}", f"{corrected.by_horizon[h]:.3f}"] for h in alone if h in corrected.by_horizon
         ],
@@ -226,7 +226,7 @@ def _heat(result: CalibrationResult, model: SymbolicModel, inputs: Inputs) -> di
         + [_heat_row(z, *_of(balance, z), zones[z]) for z in measured[:MOST_ROWS]],
         "count": len(measured),
         "limits": (f"{100 * NMBE_LIMIT:.0f}", f"{100 * CV_RMSE_LIMIT:.0f}"),
-        "pictures": figures.heat_lines(balance.stamps, *balance.building()),
+        "pictures": heat_lines(balance.stamps, *balance.building()),
     }
 
 

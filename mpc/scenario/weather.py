@@ -20,9 +20,8 @@ from mpc.scenario.grid import (
     regular_steps,
     require_cover,
 )
-from thermal._types import FloatArray
-from thermal.case.building import Location
 from thermal._types import BoolArray, FloatArray
+from thermal.case.building import Location
 from thermal.case.points import OUTDOOR_TEMPERATURE
 from thermal.inputs.sun import Sun, sun_of
 

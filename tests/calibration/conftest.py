@@ -24,8 +24,6 @@ from calibration.estimation.state_space import state_space
 from calibration.fleet.case import RECORD, CaseOutcome
 from thermal import Inputs
 from thermal.model.matrices import Matrices
-from thermal.pilot.pilot import PilotSettings, generate_pilot
-from thermal.model.symbolic import Matrices
 from thermal.pilot.building import PilotSettings, generate_pilot
 
 FILES = ["calibration.json", RECORD, "evaluation.json", "predictions.parquet", "report.html"]

@@ -13,10 +13,8 @@ from calibration.diagnosis.refit.comparison import Fit
 from calibration.errors import NotEnoughDataError
 from calibration.evaluation.intervals import Interval, Runs, select_runs
 from calibration.evaluation.n_step import Wanted, predict_runs
-from mpc.reports.page import duration, kelvin
 from thermal._types import FloatArray
-from thermal.model.replay import SPIN_UP, Inputs
-from thermal.model.step import IMPLICIT_EULER, Scheme
+from thermal.model.replay import Inputs
 
 Kind = Literal["sensors", "random", "persistent", "hump"]
 
@@ -39,9 +37,6 @@ _STEEPEST = 1.1
 
 #: Where a wrong mass or lag shows [s], and the least ratio to the smallest error of the six hours after [-].
 _HUMP, _HIGHER, _AFTER = (600.0, 3600.0), 1.1, 21600.0
-
-#: Share of the last value from which a curve counts as levelled off [-].
-_LEVEL = 0.8
 
 
 @dataclass(frozen=True)
@@ -79,8 +74,8 @@ class DriftCurve:
         for share in np.concatenate([[0.0], np.linspace(0.3, 0.95, 14)]):
             floor = (share * float(error.min())) ** 2
             grown = 0.5 * np.log(error**2 - floor)
-            for settling in [*(time[-1] * np.geomspace(0.3, 5.0, 12)), np.inf]:
-                x = np.log(time if np.isinf(settling) else -np.expm1(-time / settling))
+            for time_constant in [*(time[-1] * np.geomspace(0.3, 5.0, 12)), np.inf]:
+                x = np.log(time if np.isinf(time_constant) else -np.expm1(-time / time_constant))
                 p, a = np.polyfit(x, grown, 1)
                 misfit = float(np.mean((0.5 * np.log(floor + np.exp(2.0 * (a + p * x))) - target) ** 2))
                 if misfit < best and -0.1 <= p <= _STEEPEST:
@@ -108,36 +103,6 @@ class DriftCurve:
             return "sensors"
         return "random" if self.slope < _RANDOM else "persistent"
 
-    @property
-    def words(self) -> str:
-        """Say how the error grows and what makes it so."""
-        how = f"slope {max(0.0, self.slope):.2f}"
-        if self.hump is not None:
-            at, top, low = self.hump
-            return (
-                f"is largest {duration(at)} after the start ({kelvin(top)} K) and then falls to {kelvin(low)} K, as "
-                "where the mass of air and furniture is wrong or a sensor lags"
-            )
-        if self.kind == "sensors":
-            cause = "as where readings are off, or air has yet to mix after a switch"
-            return f"is there from the first step and hardly grows ({how}), {cause}"
-        if self.kind == "random":
-            return f"grows with the square root of time at first ({how}), as where heat comes and goes at random"
-        return f"grows nearly in proportion to time at first ({how}), as where heat is missing for hours on end"
-
-    @property
-    def end(self) -> str:
-        """Say where the error ends, and how soon it is near that."""
-        last, span = float(self.rms[-1]), f"{self.seconds[-1] / 3600.0:g} hours"
-        near = float(self.seconds[int(np.argmax(self.rms >= _LEVEL * last))])
-        ends = f"{kelvin(last)} K after {span}"
-        if near <= self.seconds[0] or self.kind in ("sensors", "hump"):
-            return ends
-        if near > 0.5 * self.seconds[-1]:
-            return f"{ends}, and still grows there"
-        about = f"{near / 3600.0:.0f} hours" if near >= 5400.0 else duration(near)
-        return f"{ends}, four fifths of which it has after {about}"
-
     def _growth(self) -> tuple[FloatArray, FloatArray]:
         """Find times and errors while it grows; all of a curve that begins near its top."""
         error = np.maximum(self.rms, 1e-9)
@@ -148,9 +113,7 @@ class DriftCurve:
         return self.seconds[:count], error[:count]
 
 
-def drift_of(
-    fit: Fit, intervals: Sequence[Interval], scheme: Scheme = IMPLICIT_EULER, spin_up_seconds: float = SPIN_UP
-) -> DriftCurve:
+def drift_of(fit: Fit, intervals: Sequence[Interval]) -> DriftCurve:
     """Error of a fitted model's free runs over a day, or as long as the telemetry allows.
 
     Parameters
@@ -159,10 +122,6 @@ def drift_of(
         The model.
     intervals : sequence of Interval
         Where the runs end.
-    scheme : Scheme
-        Time stepping of the free runs.
-    spin_up_seconds : float
-        Telemetry before an interval that the spin-up may use [s].
 
     Raises
     ------
@@ -170,12 +129,12 @@ def drift_of(
         When there is no room for a run of a single step.
     """
     inputs, matrices = fit.built.inputs, fit.model.matrices(fit.theta)
-    steps, runs = _longest(inputs, intervals, spin_up_seconds)
+    steps, runs = _longest(inputs, intervals, fit.settings.spin_up_seconds)
     keep = np.unique(np.round(np.geomspace(1, steps, min(steps, _KEPT))).astype(np.int64))
     squared = np.zeros(len(keep))
     count = np.zeros(len(keep))
     for interval, chosen in zip(intervals, runs, strict=True):
-        found = predict_runs(fit.model, matrices, inputs, interval, Wanted(chosen, keep), scheme)
+        found = predict_runs(fit.model, matrices, inputs, interval, Wanted(chosen, keep), fit.settings.stepping)
         error = (found.simulated - found.measured) ** 2
         squared += np.nansum(error, axis=(0, 2))
         count += np.isfinite(error).sum(axis=(0, 2))
@@ -195,23 +154,3 @@ def _longest(inputs: Inputs, intervals: Sequence[Interval], spin_up_seconds: flo
             return steps, runs
         steps //= 2
     raise NotEnoughDataError(f"drift: expected room for a run of one step in each of {len(intervals)} intervals")
-
-
-def drift_sentence(before: DriftCurve, after: DriftCurve | None, found: str) -> str:
-    """Say what the growth of the error tells.
-
-    Parameters
-    ----------
-    before : DriftCurve
-        Of the calibrated model.
-    after : DriftCurve or None
-        Of the final model, where it has an effect.
-    found : str
-        What the final model is called, such as ``with the effect found``.
-    """
-    text = f"Left to itself, the calibrated model's error {before.words}; it is {before.end}."
-    if after is None:
-        return text
-    if after.kind == before.kind != "hump":
-        return f"{text} {found.capitalize()} it grows alike (slope {max(0.0, after.slope):.2f}) and is {after.end}."
-    return f"{text} {found.capitalize()} it {after.words}; it is {after.end}."

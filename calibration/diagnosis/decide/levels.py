@@ -36,8 +36,8 @@ LARGEST_GROUP = 4
 #: many small ways are too sure of themselves.
 TEMPERATURE = 2.0
 
-#: Most gain that an effect is worth that matters to no prediction, and that one is worth that makes those worse which
-#: it was not fitted to [-].
+#: Most evidence of an effect that matters to no prediction, and of one that makes those worse which it was not fitted
+#: to [-].
 SMALL, DOUBTFUL = 4.0, 1.0
 
 #: Probability from which an effect belongs to the 90 % set [-].

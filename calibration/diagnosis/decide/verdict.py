@@ -1,30 +1,16 @@
-"""Which effect: probabilities, groups that cannot be told apart, and the verdict."""
+"""Which effect: evidence of each, probabilities, groups that cannot be told apart, and the verdict."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from calibration.diagnosis.decide.evidence import beyond, gains_of, levelled, probabilities, raw
-from calibration.diagnosis.decide.levels import (
-    ALIKE,
-    APART,
-    CONCENTRATED,
-    EXPLAINED,
-    EXPLAINED_OF_MUCH,
-    GENERIC_GAP,
-    IN_SET,
-    LARGEST_GROUP,
-    LEFT_IN_A_ZONE,
-    LEFT_OF_CHANGE,
-    LEFT_OVER,
-    RIVAL,
-)
+from calibration.diagnosis.decide import levels
 from calibration.diagnosis.refit.comparison import Fit
-from calibration.diagnosis.refit.refit import ACCEPTED, Refit
+from calibration.diagnosis.refit.refit import ACCEPTED, Refit, promising
 from calibration.diagnosis.refit.search import Round
 from calibration.diagnosis.screen.gains import Gain
 from thermal.effects.catalogue import CATALOGUE
@@ -35,8 +21,26 @@ _NINETY = 1.645
 VerdictName = Literal["no_gap", "named", "group", "unexplained"]
 
 
+class Estimate(NamedTuple):
+    """Estimate of a parameter.
+
+    Parameters
+    ----------
+    value : float
+        Estimate [parameter units].
+    unit : str
+        Its unit.
+    interval : tuple of float
+        90 % interval [parameter units].
+    """
+
+    value: float
+    unit: str
+    interval: tuple[float, float]
+
+
 @dataclass(frozen=True)
-class Suspect:
+class Candidate:
     """One effect of the catalogue, as a case sees it.
 
     Parameters
@@ -51,16 +55,14 @@ class Suspect:
         What cannot be told from it on this data, itself included.
     zones : tuple of str
         Where; empty for the whole building.
-    parameters : mapping of str to (float, str, (float, float))
-        Estimate, unit and 90 % interval by name.
+    parameters : mapping of str to Estimate
+        By name.
     retained_share : float
         Share of its signature that calibration cannot imitate [-].
     separate_by : str
         Experiment that would tell it from its group.
-    testable : bool
-        Whether the case can tell.
     reason : str
-        Why not, where it cannot.
+        Why the case cannot tell; empty where it can.
     """
 
     effect: str
@@ -68,29 +70,20 @@ class Suspect:
     score: float
     group: tuple[str, ...]
     zones: tuple[str, ...]
-    parameters: Mapping[str, tuple[float, str, tuple[float, float]]]
+    parameters: Mapping[str, Estimate]
     retained_share: float
     separate_by: str
-    testable: bool
     reason: str = ""
+
+    @property
+    def testable(self) -> bool:
+        """Whether the case can tell."""
+        return not self.reason
 
     def to_dict(self) -> dict[str, Any]:
         """Entry of ``which`` in ``diagnosis.json``."""
-        return {
-            "effect": self.effect,
-            "probability": self.probability,
-            "score": self.score,
-            "group": list(self.group),
-            "zones": list(self.zones),
-            "parameters": {
-                name: {"value": value, "unit": unit, "interval": list(ends)}
-                for name, (value, unit, ends) in self.parameters.items()
-            },
-            "retained_share": self.retained_share,
-            "separate_by": self.separate_by,
-            "testable": self.testable,
-            "reason": self.reason,
-        }
+        parameters = {name: estimate._asdict() for name, estimate in self.parameters.items()}
+        return {**vars(self), "parameters": parameters, "testable": self.testable}
 
 
 @dataclass(frozen=True)
@@ -101,7 +94,7 @@ class Verdict:
     ----------
     name : {"no_gap", "named", "group", "unexplained"}
         In a word.
-    suspects : tuple of Suspect
+    candidates : tuple of Candidate
         Every effect of the catalogue, the likeliest first.
     set90 : tuple of str
         Effects that hold all present ones with 90 % probability; empty when the answer may be none.
@@ -110,7 +103,7 @@ class Verdict:
     """
 
     name: VerdictName
-    suspects: tuple[Suspect, ...]
+    candidates: tuple[Candidate, ...]
     set90: tuple[str, ...]
     combinations: Mapping[tuple[str, ...], float]
 
@@ -147,17 +140,18 @@ def judge(rounds: Sequence[Round], untestable: Mapping[str, str]) -> Verdict:
     if name == "unexplained" and chain[1:]:  # what explains a part only is there with no more than that probability
         share = float(np.clip(_explained(rounds, _left_over(rounds[-1].after)), 0.0, 1.0))
         probability = {e: share * p for e, p in probability.items()}
-    suspects = sorted(
-        (_suspect(e, probability[e], score[e], best.get(e), rounds, untestable.get(e)) for e in CATALOGUE),
+    candidates = sorted(
+        (_candidate(e, probability[e], score[e], best.get(e), rounds, untestable.get(e, "")) for e in CATALOGUE),
         key=lambda s: (-s.probability, -last.get(s.effect, -np.inf), -s.score),
     )
-    return Verdict(name, tuple(suspects), _inside(rounds, suspects) if name in ("named", "group") else (), dict(chain))
+    set90 = _inside(rounds, candidates) if name in ("named", "group") else ()
+    return Verdict(name, tuple(candidates), set90, dict(chain))
 
 
-def _inside(rounds: Sequence[Round], suspects: Sequence[Suspect]) -> tuple[str, ...]:
+def _inside(rounds: Sequence[Round], candidates: Sequence[Candidate]) -> tuple[str, ...]:
     """Effects of the 90 % set: those that are likely enough, and what cannot be told from one that was accepted."""
     alike = {e for r in rounds if r.accepted is not None for e in group_of(r, r.accepted.screened.effect)}
-    return tuple(s.effect for s in suspects if s.probability >= IN_SET or s.effect in alike)
+    return tuple(s.effect for s in candidates if s.probability >= levels.IN_SET or s.effect in alike)
 
 
 def group_of(r: Round, effect: str) -> tuple[str, ...]:
@@ -178,10 +172,10 @@ def group_of(r: Round, effect: str) -> tuple[str, ...]:
     for g in r.gains:
         if g.effect == effect:
             continue
-        near = abs(gains[g.effect] - gains[effect]) < APART
+        near = abs(gains[g.effect] - gains[effect]) < levels.APART
         rival = gains[g.effect] > ACCEPTED and (
-            (own is not None and abs(r.screening.cosine(own, g)) > ALIKE)
-            or (g.effect in CATALOGUE[effect].confounders and gains[g.effect] > RIVAL * gains[effect])
+            (own is not None and abs(r.screening.cosine(own, g)) > levels.ALIKE)
+            or (g.effect in CATALOGUE[effect].confounders and gains[g.effect] > levels.RIVAL * gains[effect])
         )
         if near or rival:
             alike.append(g.effect)
@@ -191,12 +185,13 @@ def group_of(r: Round, effect: str) -> tuple[str, ...]:
 def _name(rounds: Sequence[Round]) -> VerdictName:
     first, final = rounds[0], rounds[-1].after
     left_over = _left_over(final)
-    if first.accepted is not None and _explained(rounds, left_over) >= (EXPLAINED_OF_MUCH if left_over else EXPLAINED):
+    enough = levels.EXPLAINED_OF_MUCH if left_over else levels.EXPLAINED
+    if first.accepted is not None and _explained(rounds, left_over) >= enough:
         size = len(group_of(first, first.accepted.screened.effect))
-        if size <= LARGEST_GROUP:
+        if size <= levels.LARGEST_GROUP:
             return "named" if size == 1 else "group"
         return "unexplained"
-    gap = first.accepted is not None or first.generic.gain > GENERIC_GAP or left_over
+    gap = first.accepted is not None or first.generic.gain > levels.GENERIC_GAP or left_over
     return "unexplained" if gap else "no_gap"
 
 
@@ -212,8 +207,8 @@ def _left_over(fit: Fit) -> bool:
     """Whether the errors of a model are larger than what cases without a missing effect keep."""
     zones = fit.by_zone[fit.by_zone > 0.0]
     size = float(np.sqrt(fit.found.mean_square))
-    return size > max(LEFT_OVER, LEFT_OF_CHANGE * fit.change) or (
-        size > LEFT_IN_A_ZONE and float(zones.max() / zones.mean()) > CONCENTRATED
+    return size > max(levels.LEFT_OVER, levels.LEFT_OF_CHANGE * fit.change) or (
+        size > levels.LEFT_IN_A_ZONE and float(zones.max() / zones.mean()) > levels.CONCENTRATED
     )
 
 
@@ -222,40 +217,115 @@ def _source(r: Round, effect: str) -> Gain | Refit:
     return fitted or next(g for g in r.gains if g.effect == effect)
 
 
-def _suspect(
-    effect: str,
-    probability: float,
-    score: float,
-    best: Gain | Refit | None,
-    rounds: Sequence[Round],
-    reason: str | None,
-) -> Suspect:
-    known = CATALOGUE[effect]
+def _candidate(
+    effect: str, probability: float, score: float, best: Gain | Refit | None, rounds: Sequence[Round], reason: str
+) -> Candidate:
+    told_by = CATALOGUE[effect].separated_by
     if best is None:
-        return Suspect(effect, 0.0, 0.0, (effect,), (), {}, 0.0, known.separated_by, reason is None, reason or "")
+        return Candidate(effect, 0.0, 0.0, (effect,), (), {}, 0.0, told_by, reason)
     gain = best.screened if isinstance(best, Refit) else best
     home = next(r for r in rounds if any(found is best for found in (*r.gains, *r.refits)))
-    return Suspect(
-        effect, probability, score, group_of(home, effect)[:LARGEST_GROUP], gain.zones, _parameters(best, effect),
-        gain.retained, known.separated_by, True,
-    )  # fmt: skip
+    group = group_of(home, effect)[: levels.LARGEST_GROUP]
+    return Candidate(effect, probability, score, group, gain.zones, _parameters(best, effect), gain.retained, told_by)
 
 
-def _parameters(best: Gain | Refit, effect: str) -> dict[str, tuple[float, str, tuple[float, float]]]:
+def _parameters(best: Gain | Refit, effect: str) -> dict[str, Estimate]:
     """Estimates of an effect's parameters with 90 % intervals: of the fit, or by tangents where it was not fitted."""
+    told = {}
     if isinstance(best, Gain):
         kinds = {p.name: p for p in CATALOGUE[effect].parameters}
-        told = {}
         for name, value in best.strengths.items():
             kind, reach = kinds[name.partition("@")[0]], _NINETY * best.deviations[name]
-            ends = [float(np.clip(value + s * reach, kind.lower, kind.upper)) for s in (-1.0, 1.0)]
-            told[name] = (value, kind.unit, (ends[0], ends[1]))
+            low, high = (float(np.clip(value + s * reach, kind.lower, kind.upper)) for s in (-1.0, 1.0))
+            told[name] = Estimate(value, kind.unit, (low, high))
         return told
-    problem, found, spread = best.fit.problem, best.fit.found, best.fit.deviations
-    told = {}
-    for i, p in enumerate(problem.parameters):
+    for p, z, spread in zip(best.fit.problem.parameters, best.fit.found.point, best.fit.deviations, strict=True):
         if p.effect == effect:
-            z = found.point[i]
-            ends = [float(np.clip(p.inverse(z + s * _NINETY * spread[i]), p.lower, p.upper)) for s in (-1.0, 1.0)]
-            told[p.name] = (float(p.inverse(z)), p.unit, (ends[0], ends[1]))
+            low, high = (float(np.clip(p.inverse(z + s * _NINETY * spread), p.lower, p.upper)) for s in (-1.0, 1.0))
+            told[p.name] = Estimate(float(p.inverse(z)), p.unit, (low, high))
     return told
+
+
+def gains_of(r: Round) -> dict[str, float]:
+    """Gain of every effect of a round: fitted where it was, by tangents otherwise.
+
+    It is little where it does not count, or promises little.
+
+    Parameters
+    ----------
+    r : Round
+        Of the search.
+    """
+    gains = {g.effect: g.gain if promising(r.before, g.share) else min(g.gain, levels.SMALL) for g in r.gains}
+    return gains | {x.screened.effect: _evidence(x) for x in r.refits} | _led(r)
+
+
+def levelled(r: Round) -> dict[str, float]:
+    """Gains by which probabilities are told: of what does not count, what it gains beyond nulls, and little.
+
+    Parameters
+    ----------
+    r : Round
+        Of the search.
+    """
+    fitted = {x.screened.effect: x for x in r.refits}
+    sure = {e for e, x in fitted.items() if x.counts} | set(_led(r))
+    evidence = {e: min(gain, levels.SMALL) for e, gain in beyond(r).items()}
+    evidence |= {e: min(evidence[e], levels.DOUBTFUL) for e, x in fitted.items() if x.worse}
+    return evidence | {e: gain for e, gain in raw(r).items() if e in sure}
+
+
+def beyond(r: Round) -> dict[str, float]:
+    """Gains; once an effect is in the model, beyond nulls: what it leaves looks like what answers to anything.
+
+    Parameters
+    ----------
+    r : Round
+        Of the search.
+    """
+    return {e: gain - levels.usual(e) * bool(r.before.effects) for e, gain in raw(r).items()}
+
+
+def raw(r: Round) -> dict[str, float]:
+    """Gain of every effect of a round, whether it counts or not.
+
+    Parameters
+    ----------
+    r : Round
+        Of the search.
+    """
+    return {g.effect: g.gain for g in r.gains} | {x.screened.effect: x.gain for x in r.refits} | _led(r)
+
+
+def _evidence(fitted: Refit) -> float:
+    return fitted.gain if fitted.counts else min(fitted.gain, levels.DOUBTFUL if fitted.worse else levels.SMALL)
+
+
+def _led(r: Round) -> dict[str, float]:
+    """Gain of an accepted effect that is not the first by its own.
+
+    Found as one of a pair, it has that of both, less the price of the other; preferred for what it does on held-out
+    days, it takes the place of the one that gains more.
+    """
+    if r.accepted is None:
+        return {}
+    mine = r.accepted.screened.effect
+    if r.pair is not None:
+        return {mine: r.pair.gain - ACCEPTED}
+    most = max((x for x in r.refits if x.counts), key=lambda x: x.gain, default=r.accepted)
+    return {most.screened.effect: r.accepted.gain, mine: most.gain} if most.gain > r.accepted.gain else {}
+
+
+def probabilities(gains: Mapping[str, float]) -> tuple[dict[str, float], float]:
+    """Share of each effect against all others and none, and that of none, whose gain is that at which effects count.
+
+    Parameters
+    ----------
+    gains : mapping of str to float
+        By effect, such as `levelled` [-].
+    """
+    top = max(*gains.values(), ACCEPTED)
+    weight = {effect: float(np.exp((gain - top) / levels.TEMPERATURE)) for effect, gain in gains.items()}
+    none = float(np.exp((ACCEPTED - top) / levels.TEMPERATURE))
+    whole = sum(weight.values()) + none
+    return {effect: w / whole for effect, w in weight.items()}, none / whole

@@ -1,4 +1,4 @@
-"""One case on the bench: models with some effects of the catalogue, fitted and compared on the same telemetry."""
+"""Comparison of models of one case: with some effects of the catalogue each, fitted to the same telemetry."""
 
 from __future__ import annotations
 
@@ -8,19 +8,18 @@ from functools import cached_property
 
 import numpy as np
 
-from calibration.diagnosis.refit.fit import Found, evidence_of, settle
+from calibration.diagnosis.refit.fit import Found, evidence_of, solve
 from calibration.diagnosis.screen.openings import seen_openings
 from calibration.errors import NotEnoughDataError
+from calibration.evaluation import intervals
 from calibration.evaluation.intervals import (
     Interval,
-    alternating_intervals,
-    default_intervals,
     horizon_steps,
-    select_runs,
 )
-from calibration.evaluation.n_step import EvaluationSettings, Predictions, evaluate_model
+from calibration.evaluation.n_step import Evaluation, EvaluationSettings, evaluate_model
 from calibration.evaluation.settings import ModelSettings
 from calibration.fit.problem import Problem, tuning_runs
+from calibration.fit.result import ParameterEstimate, describe_parameters
 from thermal._types import FloatArray
 from thermal.case.case import Case
 from thermal.effects.catalogue import CATALOGUE, chosen
@@ -113,11 +112,13 @@ class Fit:
     problem : Problem
         What was fitted.
     model : ReducedModel
-        That serves the estimate.
+        Reduced, and accurate at the estimate.
     found : Found
         The estimate.
     evidence : float
         Logarithm of the marginal likelihood of the tuning errors, but for a constant [-]; see `evidence_of`.
+    settings : ModelSettings
+        How the model without effects is built and run.
     """
 
     effects: Mapping[str, tuple[str, ...]]
@@ -126,6 +127,7 @@ class Fit:
     model: ReducedModel
     found: Found
     evidence: float
+    settings: ModelSettings
 
     @cached_property
     def theta(self) -> FloatArray:
@@ -157,9 +159,31 @@ class Fit:
         names = (p.name for p in self.built.network.parameters)
         return dict(zip(names, self.theta.tolist(), strict=True))
 
+    def describe(self) -> tuple[ParameterEstimate, ...]:
+        """Parameters with what is known of each."""
+        known = dict(zip(self.problem.free, self.deviations.tolist(), strict=True))
+        network = self.built.network
+        return describe_parameters(network.parameters, self.theta, known, network.nominal)
+
+    def evaluate(self, intervals: Sequence[Interval], horizon: str, trajectories: bool = False) -> Evaluation:
+        """Predict hourly on some intervals.
+
+        Parameters
+        ----------
+        intervals : sequence of Interval
+            That hold the targets of the runs.
+        horizon : str
+            Such as ``6h``.
+        trajectories : bool
+            Keep every step.
+        """
+        s = self.settings
+        runs = EvaluationSettings(horizon, trajectories, scheme=s.stepping, spin_up_seconds=s.spin_up_seconds)
+        return evaluate_model(self.model, self.theta, self.built.inputs, intervals, runs)
+
 
 @dataclass
-class Bench:
+class ModelComparison:
     """A case with intervals and settings, on which models are built and fitted.
 
     Parameters
@@ -181,7 +205,7 @@ class Bench:
     horizon: str = "6h"
 
     def __post_init__(self) -> None:
-        self.tuned, self.judged = default_intervals(self.case, self.tune, self.hold_out)
+        self.tuned, self.judged = intervals.default_intervals(self.case, self.tune, self.hold_out)
 
     def alternate(self, inputs: Inputs) -> bool:
         """Let tuning and held-out days take turns where no intervals were given; whether they do now.
@@ -195,9 +219,9 @@ class Bench:
             return False
         steps, spin_up = horizon_steps(self.horizon, inputs.step), self.settings.spin_up_seconds
         try:
-            tuned, judged = alternating_intervals(self.case)
+            tuned, judged = intervals.alternating_intervals(self.case)
             tuning_runs(inputs, tuned, steps, spin_up)
-            judged = [i for i in judged if select_runs(inputs, i, steps, spin_up=spin_up).starts.size]
+            judged = [i for i in judged if intervals.select_runs(inputs, i, steps, spin_up=spin_up).starts.size]
         except NotEnoughDataError:
             return False
         if len(judged) < _LEAST_DAYS:
@@ -273,7 +297,8 @@ class Bench:
         effects : mapping of str to sequence of str
             Effects with their zones.
         starts : sequence of mapping of str to float
-            Values by name; what they do not name starts at its prior, strengths at a quarter of their range.
+            Values by name [parameter units]; what they do not name starts at its prior, strengths at a quarter of their
+            range.
         built : Built, optional
             The model, where it is at hand.
         evaluations : int
@@ -284,25 +309,11 @@ class Bench:
         for known in starts:
             theta = built.theta(known, TYPICAL)
             problem = self.problem(built, theta)
-            model, found = settle(problem, built.grid, theta, evaluations)
+            model, found = solve(problem, built.grid, theta, evaluations)
             value = evidence_of(problem, found)
             if best is None or value > best.evidence:
-                best = Fit({e: tuple(z) for e, z in effects.items()}, built, problem, model, found, value)
+                zones = {e: tuple(z) for e, z in effects.items()}
+                best = Fit(zones, built, problem, model, found, value, self.settings)
         if best is None:
             raise ValueError("fit: expected at least one start")
         return best
-
-    def predictions(self, fit: Fit, horizon: str | None = None) -> list[Predictions]:
-        """Hourly N-step predictions of a fitted model on the held-out intervals, one entry an interval.
-
-        Parameters
-        ----------
-        fit : Fit
-            The model.
-        horizon : str, optional
-            The bench's own by default.
-        """
-        s = self.settings
-        runs = EvaluationSettings(horizon or self.horizon, scheme=s.stepping, spin_up_seconds=s.spin_up_seconds)
-        found = evaluate_model(fit.model, fit.theta, fit.built.inputs, self.judged, runs)
-        return list(found.predictions)

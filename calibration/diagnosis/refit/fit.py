@@ -25,7 +25,7 @@ _LONGEST = 1.5
 #: Length of a step in standard errors a parameter below which another would change nothing [-].
 _SHORTEST = 0.1
 
-#: Evaluations that a basis serves before it is judged, and fall of the cost that the next one must confirm for the
+#: Evaluations on a basis before it is judged, and fall of the cost that the next one must confirm for the
 #: descent to go on [-].
 _TOGETHER, _CONFIRMED = 2, 0.5
 
@@ -56,8 +56,8 @@ class Found:
         Weighted errors and priors there, and their derivatives [-].
     evaluations : int
         Of the errors with their derivatives.
-    settled : bool
-        Whether it came to rest within the evaluations allowed.
+    converged : bool
+        Whether it did within the evaluations allowed.
     pace : float
         Share of the next step with which to begin [-]: where the cost along the last one was lowest. In directions
         that hardly matter whole steps overshoot one after another.
@@ -69,14 +69,14 @@ class Found:
     residual: FloatArray
     jacobian: FloatArray
     evaluations: int
-    settled: bool
+    converged: bool
     pace: float = 1.0
 
 
-def settle(
+def solve(
     problem: Problem, grid: SymbolicModel, theta: FloatArray, evaluations: int, model: ReducedModel | None = None
 ) -> tuple[ReducedModel, Found]:
-    """Descend on reduced models, each made anew where the last one no longer serves.
+    """Descend on reduced models, each made anew where the last one is no longer accurate.
 
     A reduced model is exact where it was made. What a few steps gain on one counts as far as the next, made where they
     lead, confirms it: without that, a fit goes where its basis is wrong.
@@ -97,25 +97,25 @@ def settle(
     Returns
     -------
     tuple
-        The model that serves the estimate, and the estimate.
+        The model that is accurate at the estimate, and the estimate.
     """
     model = model or reduced_model(grid, [theta], shifts=FEW_SHIFTS)
     enough = _CONFIRMED * _slack(problem)
     here, together = _descend(problem, model, problem.point(theta), 1), _TOGETHER
-    while not here.settled and here.evaluations < evaluations:
+    while not here.converged and here.evaluations < evaluations:
         ahead = _descend(problem, model, here, min(together, evaluations - here.evaluations))
         together = _TOGETHER if ahead.cost < here.cost else _SHORTENED
         if ahead.cost == here.cost or model.is_accurate(problem.theta(ahead.point), DRIFT_TOLERANCE):
             here = ahead
             continue
         if ahead.cost > here.cost - (enough - _CONFIRMED):  # never in a small building
-            return model, replace(here, settled=True)
+            return model, replace(here, converged=True)
         anew = reduced_model(grid, [problem.theta(ahead.point)], shifts=FEW_SHIFTS)
         there = _descend(problem, anew, ahead.point, 1)
         there = replace(there, evaluations=ahead.evaluations + 1, pace=ahead.pace)
         if there.cost > here.cost - enough:
             model, here = (model, here) if here.cost <= there.cost else (anew, there)
-            return model, replace(here, settled=True)
+            return model, replace(here, converged=True)
         model, here = anew, there
     return model, here
 
@@ -142,14 +142,14 @@ def _descend(problem: Problem, model: SymbolicModel, start: FloatArray | Found, 
     else:
         z, (cost, mean, residual, jacobian) = start, _at(problem, model, start)
         used, before, pace = 1, 0, 1.0
-    settled, share = False, None
+    converged, share = False, None
     step, shortest = np.zeros_like(z), _SHORTEST * _slack(problem) * np.sqrt(z.size)
     while used - before < evaluations:
         if share is None:
             low, high = np.maximum(lower - z, -reach), np.minimum(upper - z, reach)
             step = bounded_step(residual, jacobian, low, high)
             if np.linalg.norm(jacobian @ step) < shortest:
-                settled = True
+                converged = True
                 break
             share = pace
         trial = np.clip(z + share * step, lower, upper)
@@ -160,11 +160,11 @@ def _descend(problem: Problem, model: SymbolicModel, start: FloatArray | Found, 
             z, (cost, mean, residual, jacobian) = trial, new
             share, pace = None, float(np.clip(best, _LEAST_PACE, 1.0))
         elif share <= _GIVEN_UP:
-            settled = True
+            converged = True
             break
         else:
             share = float(np.clip(best, 0.1 * share, 0.5 * share))
-    return Found(z, mean, cost, residual, jacobian, used, settled, pace)
+    return Found(z, mean, cost, residual, jacobian, used, converged, pace)
 
 
 def _lowest(slope: float, secant: float) -> float:

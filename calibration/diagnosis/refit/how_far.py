@@ -1,18 +1,18 @@
-"""How far the gap shrinks: held-out errors before and after each effect, the floor, and two placebos."""
+"""How far the gap shrinks: held-out errors before and after each effect, the floor, permutation test, runner-up."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from calibration.diagnosis.refit.comparison import Bench, Built, Fit
-from calibration.diagnosis.refit.fit import settle
-from calibration.diagnosis.refit.held_out import HeldOut, held_out
-from calibration.diagnosis.refit.refit import Refit
+from calibration.diagnosis.refit.comparison import Built, Fit, ModelComparison
+from calibration.diagnosis.refit.fit import solve
+from calibration.diagnosis.refit.refit import HeldOut, held_out
 from calibration.diagnosis.refit.search import Round
 from calibration.diagnosis.screen.generic import GENERIC
 from calibration.errors import HorizonError, NotEnoughDataError
@@ -26,7 +26,7 @@ _RESAMPLES, _LEVEL = 1000, 0.9
 #: Horizon at which missing heat is hardly felt yet.
 _SOON = pd.Timedelta("1h")
 
-#: Evaluations of the fit of a placebo.
+#: Evaluations of the fit of a permutation test.
 _EVALUATIONS = 6
 
 
@@ -47,7 +47,7 @@ class Step:
         90 % interval of it, from resampled days [-].
     shuffled, runner_up : float or None
         Held-out error with the signals of the last effect permuted by days, and with the effect that came next in its
-        place [K]; None where there is no such placebo.
+        place [K]; None where there is no such test.
     bounds : tuple of str
         Baseline parameters on a bound with the effects.
     """
@@ -62,13 +62,26 @@ class Step:
     runner_up: float | None
     bounds: tuple[str, ...]
 
+    def to_dict(self) -> dict[str, Any]:
+        """Entry of ``how_far`` in ``diagnosis.json``."""
+        return {
+            "effects": self.effects,
+            "held_out_mae_before": self.before,
+            "held_out_mae_after": self.after,
+            "floor": self.floor,
+            "share_closed": self.share_closed,
+            "interval": self.interval,
+            "placebo": {"shuffled": self.shuffled, "runner_up": self.runner_up},
+            "on_bound": self.bounds,
+        }
 
-def how_far(bench: Bench, rounds: Sequence[Round]) -> tuple[tuple[Step, ...], float, float]:
+
+def how_far(models: ModelComparison, rounds: Sequence[Round]) -> tuple[tuple[Step, ...], float]:
     """Measure what each accepted effect closes of the gap.
 
     Parameters
     ----------
-    bench : Bench
+    models : ModelComparison
         The case.
     rounds : sequence of Round
         Of the search.
@@ -76,36 +89,24 @@ def how_far(bench: Bench, rounds: Sequence[Round]) -> tuple[tuple[Step, ...], fl
     Returns
     -------
     tuple
-        The steps, the held-out error of the calibrated baseline, and the floor under it [K].
+        The steps, and the floor under the held-out error of the calibrated baseline [K].
     """
-    before = rounds[0].held_out
-    floor = _floor_of(bench, rounds[-1])
+    before, floor = rounds[0].held_out, _floor_of(models, rounds[-1])
     steps = []
     for r in rounds:
         if r.accepted is None:
             break
-        after = r.accepted.held_out
-        others = [x for x in r.refits if x is not r.accepted]
-        runner = others[0].held_out.mae if others else None
+        after, fit = r.accepted.held_out, r.accepted.fit
+        runner_up = next((x.held_out.mae for x in r.refits if x is not r.accepted), None)
         share, interval = _closed(before, after, floor)
-        effects = tuple(r.accepted.fit.effects)
-        steps.append(
-            Step(
-                effects,
-                before.mae,
-                after.mae,
-                floor.mae,
-                share,
-                interval,
-                _shuffled(bench, r, r.accepted),
-                runner,
-                _on_bound(r.accepted.fit),
-            )
-        )
-    return tuple(steps), before.mae, floor.mae
+        steps.append(Step(
+            tuple(fit.effects), before.mae, after.mae, floor.mae, share, interval, _permutation_test(models, r, fit),
+            runner_up, _on_bound(fit),
+        ))  # fmt: skip
+    return tuple(steps), floor.mae
 
 
-def _floor_of(bench: Bench, last: Round) -> HeldOut:
+def _floor_of(models: ModelComparison, last: Round) -> HeldOut:
     """Held-out errors below which nothing regular that is missing would take the last model.
 
     The least of three: the model's own; those with generic heat added, zone by zone, by time of day and outdoor
@@ -114,22 +115,22 @@ def _floor_of(bench: Bench, last: Round) -> HeldOut:
 
     Parameters
     ----------
-    bench : Bench
+    models : ModelComparison
         The case.
     last : Round
         The last of the search.
     """
     final = last.after
     found = [last.after_held_out]
-    if _SOON < pd.Timedelta(bench.horizon):
+    if _SOON < pd.Timedelta(models.horizon):
         with suppress(HorizonError, NotEnoughDataError):  # an hour may be no multiple of the step
-            found.append(held_out(bench, final, "1h"))
+            found.append(held_out(models, final, "1h"))
     if last.accepted is None and last.generic.gain > 0.0:
-        built = bench.build(final.effects, (Chosen(GENERIC),))
+        built = models.build(final.effects, (Chosen(GENERIC),))
         theta = built.theta({**final.values, **last.screening.promised(last.generic)})
-        problem = bench.problem(built, theta)
+        problem = models.problem(built, theta)
         fit = replace(final, built=built, problem=problem, model=reduced_model(built.grid, [theta]))
-        found.append(held_out(bench, replace(fit, found=replace(final.found, point=problem.point(theta)))))
+        found.append(held_out(models, replace(fit, found=replace(final.found, point=problem.point(theta)))))
     return min(found, key=lambda e: e.mae)
 
 
@@ -155,9 +156,8 @@ def _closed(before: HeldOut, after: HeldOut, floor: HeldOut) -> tuple[float | No
     return (before.mae - after.mae) / (before.mae - floor.mae), (float(ends[0]), float(ends[1]))
 
 
-def _shuffled(bench: Bench, r: Round, accepted: Refit) -> float | None:
+def _permutation_test(models: ModelComparison, r: Round, fit: Fit) -> float | None:
     """Held-out error with the signals of the round's effect permuted by days; None where it has none that vary."""
-    fit = accepted.fit
     built = fit.built
     earlier = {s.name for s in r.before.built.network.signals}
     first = len(built.network.boundaries)
@@ -166,9 +166,9 @@ def _shuffled(bench: Bench, r: Round, accepted: Refit) -> float | None:
     if not varying:
         return None
     permuted = Built(built.network, built.grid, _permuted(built.inputs, varying))
-    problem = bench.problem(permuted, fit.theta)
-    model, found = settle(problem, built.grid, fit.theta, _EVALUATIONS, fit.model)
-    return held_out(bench, replace(fit, built=permuted, problem=problem, model=model, found=found)).mae
+    problem = models.problem(permuted, fit.theta)
+    model, found = solve(problem, built.grid, fit.theta, _EVALUATIONS, fit.model)
+    return held_out(models, replace(fit, built=permuted, problem=problem, model=model, found=found)).mae
 
 
 def _permuted(inputs: Inputs, columns: Sequence[int]) -> Inputs:

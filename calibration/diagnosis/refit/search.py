@@ -1,21 +1,23 @@
-"""Rounds of screening and re-fitting: one effect after another, each sought with the earlier ones in the model."""
+"""Rounds of screening and re-fitting: one effect after another, each sought with the earlier ones in the model.
+
+Two effects may hide each other, and what is none of them may look like their sum. Both show in the Gram matrix of all
+signatures at once, so that every pair is weighed before any model is run.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 from typing import Any
 
 import numpy as np
 
 from calibration.diagnosis.decide.levels import APART
-from calibration.diagnosis.refit.comparison import Bench, Fit
-from calibration.diagnosis.refit.held_out import HeldOut
-from calibration.diagnosis.refit.refit import ACCEPTED, Refit, Work, promising
+from calibration.diagnosis.refit.comparison import Fit, ModelComparison
+from calibration.diagnosis.refit.refit import ACCEPTED, WINDOWS, HeldOut, Refit, Work, look_again, promising
 from calibration.diagnosis.screen.gains import Gain
-from calibration.diagnosis.screen.pairs import Pair, nominate
 from calibration.diagnosis.screen.screen import Screening, screen
-from calibration.diagnosis.screen.windows import WINDOWS, look_again
 from calibration.evaluation.n_step import Progress
 from thermal.effects.catalogue import CATALOGUE
 
@@ -78,35 +80,49 @@ class Round:
 
     def to_dict(self) -> dict[str, Any]:
         """Entry of ``rounds`` in ``diagnosis.json``."""
+        fitted = ("gain", "fall", "worse", "counts")
         return {
             "before": list(self.before.effects),
             "tuning_rms": float(np.sqrt(self.before.found.mean_square)),
             "held_out_mae": self.held_out.mae,
             "generic": self.generic.gain,
-            "gains": {
-                g.effect: {"gain": g.gain, "zones": list(g.zones), "share": g.share, "retained": g.retained}
-                for g in self.gains
-            },
-            "refits": {
-                r.screened.effect: {
-                    "gain": r.gain, "fall": r.fall, "held_out_mae": r.held_out.mae, "worse": r.worse,
-                    "counts": r.counts,
-                }
-                for r in self.refits
-            },
+            "gains": {g.effect: {key: getattr(g, key) for key in ("gain", "zones", "share", "retained")}
+                      for g in self.gains},
+            "refits": {r.screened.effect: {key: getattr(r, key) for key in fitted} | {"held_out_mae": r.held_out.mae}
+                       for r in self.refits},
             "accepted": None if self.accepted is None else self.accepted.screened.effect,
             "pair": None if self.pair is None else {"with": self.pair.screened.effect, "gain": self.pair.gain},
         }  # fmt: skip
 
 
+@dataclass(frozen=True)
+class Pair:
+    """What two effects could explain together.
+
+    Parameters
+    ----------
+    first, second : Gain
+        The two, with the strengths that they have together; the first gains more alone.
+    gain : float
+        Logarithm of the Bayes factor of both against neither, by tangents [-].
+    share : float
+        Of the squared error that both explain [-].
+    """
+
+    first: Gain
+    second: Gain
+    gain: float
+    share: float
+
+
 def search(
-    bench: Bench, baseline: Fit, errors: HeldOut, candidates: Sequence[str], progress: Progress | None = None
+    models: ModelComparison, baseline: Fit, errors: HeldOut, candidates: Sequence[str], progress: Progress | None = None
 ) -> tuple[Round, ...]:
     """Seek effects in rounds until none gains enough.
 
     Parameters
     ----------
-    bench : Bench
+    models : ModelComparison
         The case.
     baseline : Fit
         The calibrated model without any effect.
@@ -123,13 +139,13 @@ def search(
         if progress is not None:
             progress("diagnose", len(done), ROUNDS)
         open_ = [e for e in candidates if all(r in fit.effects for r in CATALOGUE[e].requires)]
-        made, gains, generic = screen(bench, fit, open_)
-        exchanged = _exchanged(bench, done, made, open_)
+        made, gains, generic = screen(models, fit, open_)
+        exchanged = _exchanged(models, done, made, open_)
         if exchanged is not None:
             done[-2:] = [exchanged]
             fit, errors, ahead = exchanged.after, exchanged.after_held_out, exchanged.pair
             continue
-        work = Work(bench, fit, errors, made)
+        work = Work(models, fit, errors, made)
         refits = _refits(work, gains, ahead)
         refits = look_again(work, gains, refits, _first(errors, refits))
         best = _first(errors, refits)
@@ -240,7 +256,33 @@ def _best_pair(
     return None if first is None else (first, both)
 
 
-def _exchanged(bench: Bench, done: Sequence[Round], made: Screening, candidates: Sequence[str]) -> Round | None:
+def nominate(made: Screening, gains: Sequence[Gain], least: float) -> list[Pair]:
+    """Pairs that gain more than the best single effect by tangents, the best first.
+
+    Parameters
+    ----------
+    made : Screening
+        Gram matrix of all.
+    gains : sequence of Gain
+        Single effects, the best first.
+    least : float
+        By how much a pair must gain more than the best single effect [-].
+    """
+    if len(gains) < 2:
+        return []
+    least += max(gains[0].gain, 0.0)
+    found = []
+    for first, second in combinations(gains, 2):
+        if made.reach(first, second) > least:
+            pair = Pair(*made.together(first, second))
+            if pair.gain > least and all(np.any(g.direction) for g in (pair.first, pair.second)):
+                found.append(pair)
+    return sorted(found, key=lambda p: -p.gain)
+
+
+def _exchanged(
+    models: ModelComparison, done: Sequence[Round], made: Screening, candidates: Sequence[str]
+) -> Round | None:
     """Give the round before the last anew, led by what the last one accepted, where another effect fits that better.
 
     What was accepted while much was missing may have stood for two effects; now that the second is in the model, the
@@ -248,7 +290,7 @@ def _exchanged(bench: Bench, done: Sequence[Round], made: Screening, candidates:
 
     Parameters
     ----------
-    bench : Bench
+    models : ModelComparison
         The case.
     done : sequence of Round
         So far.
@@ -268,7 +310,7 @@ def _exchanged(bench: Bench, done: Sequence[Round], made: Screening, candidates:
     other = max((less.of(e) for e in free), key=lambda g: g.gain, default=None)
     if other is None or other.gain < less.of(first.effect).gain - APART:
         return None
-    work = Work(bench, before.before, before.held_out, before.screening)
+    work = Work(models, before.before, before.held_out, before.screening)
     both = work.weighed([first, second.screened], second.fit)
     instead = work.refit([second.screened, other], less.promised(other))
     if instead is None or not instead.counts or not _better(before.held_out, instead, both):

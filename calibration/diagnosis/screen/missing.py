@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 from scipy.special import ndtri
 
 from calibration.diagnosis.refit.comparison import Fit
@@ -19,8 +18,6 @@ from calibration.estimation.smoother import averaged_deviation, smooth
 from calibration.evaluation.intervals import Interval
 from thermal._types import FloatArray
 from thermal.model.reduce import ReducedModel, reduced_model
-from thermal.model.replay import SPIN_UP, Inputs
-from thermal.model.step import IMPLICIT_EULER, Scheme
 
 #: Telemetry that the size and the course of the missing heat are tuned on [s]: the last four days that were fitted,
 #: of which at most two are a weekend.
@@ -30,8 +27,8 @@ _TUNED = 4 * 86400.0
 #: air, and a day is tuned on: the five hundred states of 123 zones are too many to smooth by.
 _MANY_ZONES, _ORDER, _TUNED_MANY = 40, 200, 86400.0
 
-#: Step of a parameter on the estimation scale for the slope of the missing heat [-].
-_SLOPE_STEP = 1e-3
+#: Step of a parameter on the estimation scale for the sensitivity of the missing heat [-].
+_STEP = 1e-3
 
 
 @dataclass(frozen=True)
@@ -67,14 +64,14 @@ class Missing:
         """Root mean square over the hours of each zone, shape (n_zone,) [W]; NaN where it is not measured."""
         return np.asarray(np.sqrt((self.watts**2).mean()))
 
+    @property
+    def by_zone(self) -> dict[str, float]:
+        """Root mean square over the hours by zone [W]; 0 where it is not measured."""
+        return dict(zip(self.watts.columns, np.nan_to_num(self.rms).tolist(), strict=True))
+
 
 def missing_heat(
-    fit: Fit,
-    intervals: Sequence[Interval],
-    scheme: Scheme = IMPLICIT_EULER,
-    spin_up_seconds: float = SPIN_UP,
-    fixed: bool = False,
-    near: DisturbanceModel | None = None,
+    fit: Fit, intervals: Sequence[Interval], fixed: bool = False, near: DisturbanceModel | None = None
 ) -> Missing:
     """Estimate the heat that a fitted model lacks on intervals of telemetry, by the hour.
 
@@ -89,10 +86,6 @@ def missing_heat(
         The model.
     intervals : sequence of Interval
         Less the 12 hours of the least spin-up where the telemetry does not begin before.
-    scheme : Scheme
-        Time stepping.
-    spin_up_seconds : float
-        Telemetry before an interval that the spin-up may use [s].
     fixed : bool
         Take the parameters as they are: the band is of the noise alone.
     near : DisturbanceModel, optional
@@ -106,27 +99,27 @@ def missing_heat(
     Notes
     -----
     ``Var = r² V + D Σ D'``: V is the smoother's variance of a step, r from `averaged_deviation`, Σ the covariance of
-    the parameters, D the slopes of the heat that the measured temperatures ask for.
+    the parameters, D the sensitivities of the heat that the measured temperatures ask for.
     """
     network, inputs, model = fit.built.network, fit.built.inputs, fit.model
     many = len(network.zones) > _MANY_ZONES
     if many and model.order > _ORDER:
         model = reduced_model(fit.built.grid, [fit.theta], order=_ORDER)
-    settings = FilterSettings(scheme, "steady" if many else "exact", spin_up_seconds)
-    disturbance = _tuned(fit, model, near, scheme, spin_up_seconds)
-    parts = []
+    settings = FilterSettings(fit.settings.stepping, "steady" if many else "exact", fit.settings.spin_up_seconds)
+    disturbance = _tuned(fit, model, near)
+    parts, measured = [], np.isfinite(inputs.zone)
     for interval in intervals:
         filtered = filter_interval(model, fit.theta, inputs, interval, disturbance, settings)
         found = smooth(filtered)
         rows = np.arange(filtered.begin + 1, filtered.begin + 1 + len(found.stamps))
-        known = _known(inputs, rows)
+        known = measured[rows] & measured[rows - 1] & inputs.complete[rows, None]  # before and after, inputs complete
         narrower = averaged_deviation(filtered, max(1, round(HOUR / inputs.step)))
         values = (found.disturbance, (narrower * found.disturbance_deviation) ** 2)
         parts.append(hourly_means(found.stamps, inputs.step, *(np.where(known, v, np.nan) for v in values)))
     stamps = pd.DatetimeIndex(parts[0][0].append([p[0] for p in parts[1:]]))
     watts, variance = (np.concatenate([p[i] for p in parts]) for i in (1, 2))
     if not fixed:
-        variance = variance + _parameter_variance(fit, model, intervals, spin_up_seconds)
+        variance = variance + _parameter_variance(fit, model, intervals)
     heat, deviation = (pd.DataFrame(v, stamps, list(network.zones)) for v in (watts, np.sqrt(variance)))
     return Missing(heat, deviation, disturbance)
 
@@ -145,42 +138,26 @@ def at_start(fit: Fit) -> Fit:
     return replace(fit, model=model, found=replace(fit.found, point=point))
 
 
-def _tuned(
-    fit: Fit,
-    model: ReducedModel,
-    near: DisturbanceModel | None,
-    scheme: Scheme,
-    spin_up_seconds: float,
-) -> DisturbanceModel:
+def _tuned(fit: Fit, model: ReducedModel, near: DisturbanceModel | None) -> DisturbanceModel:
     """Size and course of the missing heat and noise of the sensors, on the last of what was fitted."""
     many, last = len(model.network.zones) > _MANY_ZONES, fit.problem.fitted[-1]
     latest = last.end - pd.Timedelta(seconds=_TUNED_MANY if many else _TUNED)
-    stretch = Interval(max(last.start, latest), last.end)
+    interval = Interval(max(last.start, latest), last.end)
     settings = TuningSettings(
-        scheme, "steady", spin_up_seconds, per_zone=() if many else ("deviation",),
+        fit.settings.stepping, "steady", fit.settings.spin_up_seconds, per_zone=() if many else ("deviation",),
         weights=air_volumes(model.network), start=near, curvature=False,
     )  # fmt: skip
-    return tune_disturbance(model, fit.theta, fit.built.inputs, [stretch], settings).disturbance
+    return tune_disturbance(model, fit.theta, fit.built.inputs, [interval], settings).disturbance
 
 
-def _parameter_variance(
-    fit: Fit, model: ReducedModel, intervals: Sequence[Interval], spin_up_seconds: float
-) -> FloatArray:
+def _parameter_variance(fit: Fit, model: ReducedModel, intervals: Sequence[Interval]) -> FloatArray:
     """Variance of the missing heat that the parameters of a fit leave, shape (n_hour, n_zone) [W²]."""
     point, jacobian, slopes = fit.found.point, fit.found.jacobian, []
-    for i, step in enumerate(_SLOPE_STEP * np.eye(point.size)):
+    inputs, spin_up = fit.built.inputs, fit.settings.spin_up_seconds
+    for i, step in enumerate(_STEP * np.eye(point.size)):
         # a strength at the end of its range is moved inwards only: beyond, heat would flow from cold to warm
         ends = [np.clip(moved, *fit.problem.bounds) for moved in (point - step, point + step)]
-        low, high = (
-            heat_balance(model, fit.problem.theta(end), fit.built.inputs, intervals, spin_up_seconds).needed
-            for end in ends
-        )
+        low, high = (heat_balance(model, fit.problem.theta(e), inputs, intervals, spin_up).needed for e in ends)
         slopes.append((high - low) / (ends[1] - ends[0])[i])
     roots = np.tensordot(np.linalg.inv(np.linalg.cholesky(jacobian.T @ jacobian)), np.array(slopes), axes=1)
     return np.asarray((roots**2).sum(axis=0))
-
-
-def _known(inputs: Inputs, rows: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Tell steps of zones whose temperature is measured before and after, and whose inputs are complete."""
-    measured = np.isfinite(inputs.zone)
-    return np.asarray(measured[rows] & measured[rows - 1] & inputs.complete[rows, None])

@@ -160,16 +160,16 @@ def _most_likely_paths(odds: FloatArray, opens: FloatArray, shuts: float) -> tup
         The courses, shape (n_time, m); and what each gains in log-likelihood over a state that stays 0, (m,) [-].
     """
     to_open, stay_shut, to_shut, stay_open = np.log(opens), np.log1p(-opens), np.log(shuts), np.log1p(-shuts)
-    came = np.zeros((2, *odds.shape), dtype=bool)
+    previous = np.zeros((2, *odds.shape), dtype=bool)
     shut, open_ = np.zeros(odds.shape[1]), np.full(odds.shape[1], -np.inf)
     for k in range(len(odds)):
         from_shut, from_open = shut + stay_shut[k], open_ + to_shut
         opening, staying = shut + to_open[k], open_ + stay_open
-        came[0, k], came[1, k] = from_open > from_shut, staying > opening
+        previous[0, k], previous[1, k] = from_open > from_shut, staying > opening
         shut, open_ = np.maximum(from_shut, from_open), np.maximum(opening, staying) + odds[k]
     state = open_ > shut
     paths = np.zeros(odds.shape)
     for k in range(len(odds) - 1, -1, -1):
         paths[k] = state
-        state = np.where(state, came[1, k], came[0, k])
+        state = np.where(state, previous[1, k], previous[0, k])
     return paths, np.maximum(shut, open_) - stay_shut.sum()

@@ -14,7 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from calibration.diagnosis.refit.comparison import Bench, Fit, is_strength
+from calibration.diagnosis.refit.comparison import Fit, ModelComparison, is_strength
 from calibration.diagnosis.screen.gains import Gain, choice_of
 from calibration.diagnosis.screen.generic import GENERIC, ZONE_HEAT
 from thermal._types import BoolArray, FloatArray, IntArray
@@ -44,7 +44,7 @@ class Screening:
 
     Parameters
     ----------
-    bench : Bench
+    models : ModelComparison
         The case.
     fit : Fit
         The model.
@@ -52,19 +52,19 @@ class Screening:
         Effects to screen.
     """
 
-    def __init__(self, bench: Bench, fit: Fit, candidates: Sequence[str]) -> None:
+    def __init__(self, models: ModelComparison, fit: Fit, candidates: Sequence[str]) -> None:
         here = _worst_zones(fit)
         lacking = {e: here if CATALOGUE[e].zonal else () for e in candidates if e not in fit.effects}
-        built = bench.build({**fit.effects, **lacking}, (Chosen(GENERIC, here),))
+        built = models.build({**fit.effects, **lacking}, (Chosen(GENERIC, here),))
         self._elsewhere = len(built.network.zones) - len(here) if here else 0
         own: tuple[Parameter, ...] = built.network.parameters
         self._levels = {p.effect: p for p in own if p.effect in lacking and p.name == CATALOGUE[p.effect].level}
         levels = {p.name: (p.lower, p.upper) for p in self._levels.values()}
         theta, other = (built.theta({**fit.values, **{name: ends[k] for name, ends in levels.items()}}) for k in (0, 1))
-        # a Galerkin basis of a symmetric model serves its tangents too: gains are those of the grid within 0.02
+        # a Galerkin basis of a symmetric model is accurate for tangents too: gains are those of the grid within 0.02
         shifts, order = (FEW_SHIFTS, _LARGEST_ORDER) if here else (SHIFTS, None)
         model = reduced_model(built.grid, [theta], shifts=shifts, order=order)
-        problem = bench.problem(built, theta)
+        problem = models.problem(built, theta)
         jacobian = problem.residuals(model, theta)[1] * problem.slopes(theta)
         twice = [i for i, p in enumerate(own) if p.effect in self._levels and is_strength(p.name, p.effect)]
         for i in twice:
@@ -322,18 +322,18 @@ def _worst_zones(fit: Fit) -> tuple[str, ...]:
     return tuple(z for k, z in enumerate(zones) if k in worst)
 
 
-def screen(bench: Bench, fit: Fit, candidates: Sequence[str]) -> tuple[Screening, list[Gain], Gain]:
+def screen(models: ModelComparison, fit: Fit, candidates: Sequence[str]) -> tuple[Screening, list[Gain], Gain]:
     """Screen all candidates; they come by what they gain, and the generic heat beside them.
 
     Parameters
     ----------
-    bench : Bench
+    models : ModelComparison
         The case.
     fit : Fit
         The model so far.
     candidates : sequence of str
         Effects that the case can tell.
     """
-    made = Screening(bench, fit, candidates)
+    made = Screening(models, fit, candidates)
     gains = [made.of(e) for e in candidates if e not in fit.effects]
     return made, sorted(gains, key=lambda g: -g.gain), made.of(GENERIC.id)

@@ -1,36 +1,30 @@
-"""Figures of closed loops: what was done, what it was done for, and what came of it."""
+"""Figures of closed loops: what was done, what it was done for, and what was realised."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import count
 
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from mpc.reports.figures.style import (
-    CELSIUS,
-    INK,
-    MEASURED,
-    MUTED,
-    SIMULATED,
-    WARNING,
-    Picture,
-    day_numbers,
-    picture,
-    styled,
-    time_axis,
-)
+from mpc.reports.control_words import controller_name
+from mpc.reports.figures import style
+from mpc.reports.figures.style import CELSIUS, MEASURED, MUTED, SIMULATED, Picture, picture, styled
 from mpc.studies.run import AHEAD, ControlRun, compared_decisions
 from thermal._types import FloatArray
 
 _KILO = 1000.0
 _FELT = 0.1  # K h outside of the band: bars of less are to look like little
-_OTHERS = ("#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+_GREEN, _PINK, _YELLOW, _SKY = "#009E73", "#CC79A7", "#E69F00", "#56B4E9"
 
-#: Colour of each controller, from a palette that the colour-blind can tell apart.
-COLOURS = {"mpc": SIMULATED, "bound": INK, "schedule": _OTHERS[2], "reset": _OTHERS[1], "guideline36": MEASURED}
+#: Colour of each controller, from a palette that the colour-blind can tell apart, and those of one's own controllers.
+_COLOURS = {"mpc": SIMULATED, "bound": style.INK, "schedule": _YELLOW, "reset": _PINK, "guideline36": MEASURED}
+_OWN = (_GREEN, _SKY, MUTED, "#999933")
+
+_SUPPLY_AIR, _SUPPLY_WATER = "supply_air_temperature_setpoint", "supply_water_temperature_setpoint"
 
 
 @styled
@@ -42,82 +36,77 @@ def course(run: ControlRun) -> list[Picture]:
     run : ControlRun
         Of a study.
     """
-    study = run.study
+    scenario, n, record = run.study.scenario, run.study.steps, run.loop.record
     figure = Figure(figsize=(10.0, 10.5))
-    axes = figure.subplots(5, 1, sharex=True, gridspec_kw={"height_ratios": [1.0, 1.0, 1.7, 1.3, 1.3]})
-    x, n = day_numbers(study.stamps), study.steps
-    _prices(axes[0], run, x)
-    _forecast(axes[1], run, x)
-    _zones(axes[2], run, x)
-    _setpoints(axes[3], run)
-    axes[4].stackplot(
-        x, run.loop.record.electricity[:n] / _KILO, _gas(run) / _KILO, labels=["electricity", "gas"],
+    prices, weather, zones, setpoints, power = axes = figure.subplots(
+        5, 1, sharex=True, gridspec_kw={"height_ratios": [1.0, 1.0, 1.7, 1.3, 1.3]}
+    )
+    x = style.lines_over_time(power, run.study.stamps, ticks=9)
+    prices.step(x, scenario.electricity_price[:n], where="pre", color=MEASURED, label="electricity")
+    prices.step(x, scenario.gas_price[:n], where="pre", color=SIMULATED, label="gas")
+    prices.set(title="Prices", ylabel=f"[{scenario.currency}/kWh]")
+    prices.set_ylim(bottom=0.0)
+    weather.plot(x, scenario.outdoor[:n] - CELSIUS, color=MEASURED, label="outdoor air")
+    weather.set(title="What was to come: outdoor air, and heat of people, light and equipment", ylabel="[°C]")
+    right = _right(weather, "[kW]", MUTED, "heat of people ...")
+    right.step(x, scenario.gains[:n].sum(axis=1) / _KILO, where="pre", color=MUTED)
+    right.set_ylim(bottom=0.0)
+    _zones(zones, run, x)
+    _setpoints(setpoints, run)
+    power.stackplot(
+        x, record.electricity[:n] / _KILO, _gas(run) / _KILO, labels=["electricity", "gas"],
         colors=[MEASURED, SIMULATED], alpha=0.75, step="pre",
     )  # fmt: skip
-    axes[4].set_title("What it took")
-    axes[4].set_ylabel("power [kW]")
+    power.set(title="What it took", ylabel="power [kW]")
     for one in axes:
-        _legend(one)
-    axes[0].set_xlim(x[0], x[-1])
-    time_axis(axes[4], study.stamps.tz, ticks=9)
+        _legend(one, 1.06)
     return [picture(figure, "Prices, weather, zone temperatures, setpoints and power of the run, over time")]
 
 
-def _legend(axes: Axes) -> None:
-    axes.legend(loc="upper left", bbox_to_anchor=(1.06, 1.0), fontsize=8)
+def _legend(axes: Axes, beside: float = 1.01) -> None:
+    axes.legend(loc="upper left", bbox_to_anchor=(beside, 1.0), fontsize=8)
 
 
-def _prices(axes: Axes, run: ControlRun, x: FloatArray) -> None:
-    scenario, n = run.study.scenario, run.study.steps
-    axes.step(x, scenario.electricity_price[:n], where="pre", color=MEASURED, label="electricity")
-    axes.step(x, scenario.gas_price[:n], where="pre", color=SIMULATED, label="gas")
-    axes.set_ylim(bottom=0.0)
-    axes.set_title("Prices")
-    axes.set_ylabel(f"[{scenario.currency}/kWh]")
-
-
-def _forecast(axes: Axes, run: ControlRun, x: FloatArray) -> None:
-    scenario, n = run.study.scenario, run.study.steps
-    axes.plot(x, scenario.outdoor[:n] - CELSIUS, color=MEASURED, label="outdoor air")
-    axes.set_title("What was to come: outdoor air, and heat of people, light and equipment")
-    axes.set_ylabel("[°C]")
+def _right(axes: Axes, ylabel: str, colour: str, label: str) -> Axes:
+    """Add an axis on the right, whose lines have an entry in the legend of the left one."""
+    axes.plot([], [], color=colour, label=label)
     right = axes.twinx()
-    right.step(x, scenario.gains[:n].sum(axis=1) / _KILO, where="pre", color=MUTED)
-    axes.plot([], [], color=MUTED, label="heat of people ...")
-    right.set_ylabel("[kW]")
-    right.set_ylim(bottom=0.0)
+    right.set_ylabel(ylabel)
     right.grid(visible=False)
+    return right
+
+
+def _comfort_band(axes: Axes, run: ControlRun, x: FloatArray) -> None:
+    scenario, n = run.study.scenario, run.study.steps
+    low, high = scenario.lower[:n].max(axis=1) - CELSIUS, scenario.upper[:n].min(axis=1) - CELSIUS
+    axes.fill_between(x, low, high, step="pre", color=_GREEN, alpha=0.13, linewidth=0, label="comfort band")
 
 
 def _zones(axes: Axes, run: ControlRun, x: FloatArray) -> None:
-    scenario, n = run.study.scenario, run.study.steps
-    zone = run.loop.record.zone_temperature[1 : n + 1] - CELSIUS
-    low, high = scenario.lower[:n].max(axis=1) - CELSIUS, scenario.upper[:n].min(axis=1) - CELSIUS
-    axes.fill_between(x, low, high, step="pre", color="#009E73", alpha=0.13, linewidth=0, label="comfort band")
-    axes.fill_between(x, zone.min(axis=1), zone.max(axis=1), color=MUTED, alpha=0.35, linewidth=0, label="all zones")
-    first, last = np.percentile(zone, [10, 90], axis=1)
-    axes.fill_between(x, first, last, color=MUTED, alpha=0.45, linewidth=0, label="80 % of the zones")
-    axes.plot(x, np.median(zone, axis=1), color=INK, linewidth=1.2, label="median zone")
-    axes.set_title("Zone temperatures")
-    axes.set_ylabel("[°C]")
+    zone = run.loop.record.zone_temperature[1 : run.study.steps + 1] - CELSIUS
+    _comfort_band(axes, run, x)
+    for ends, alpha, label in (([0, 100], 0.35, "all zones"), ([10, 90], 0.45, "80 % of the zones")):
+        low, high = np.percentile(zone, ends, axis=1)
+        axes.fill_between(x, low, high, color=MUTED, alpha=alpha, linewidth=0, label=label)
+    axes.plot(x, np.median(zone, axis=1), color=style.INK, linewidth=1.2, label="median zone")
+    axes.set(title="Zone temperatures", ylabel="[°C]")
 
 
 def _setpoints(axes: Axes, run: ControlRun) -> None:
-    actions = run.loop.actions
-    air = [c for c in actions if str(c).endswith("supply_air_temperature_setpoint")]
-    water = [c for c in actions if str(c).endswith("supply_water_temperature_setpoint")]
-    x = day_numbers(pd.DatetimeIndex(actions.index))
-    for k, column in enumerate(air[:4]):
-        label = "supply air" if len(air) == 1 else str(column).partition("/")[0]
-        axes.step(x, actions[column] - CELSIUS, where="pre", color=(MEASURED, *_OTHERS)[k], linewidth=1.2, label=label)
-    axes.set_title("What was set")
-    axes.set_ylabel("supply air [°C]")
-    right = axes.twinx()
+    air, water = _actions(run, _SUPPLY_AIR), _actions(run, _SUPPLY_WATER)
+    x = style.day_numbers(pd.DatetimeIndex(run.loop.actions.index))
+    for column, colour in zip(air, (MEASURED, _GREEN, _PINK, _YELLOW), strict=False):
+        label = "supply air" if len(air.columns) == 1 else str(column).partition("/")[0]
+        axes.step(x, air[column], where="pre", color=colour, linewidth=1.2, label=label)
+    axes.set(title="What was set", ylabel="supply air [°C]")
+    right = _right(axes, "supply water [°C]", SIMULATED, "supply water")
     for column in water:
-        right.step(x, actions[column] - CELSIUS, where="pre", color=SIMULATED, linewidth=1.2)
-    axes.plot([], [], color=SIMULATED, label="supply water")
-    right.set_ylabel("supply water [°C]")
-    right.grid(visible=False)
+        right.step(x, water[column], where="pre", color=SIMULATED, linewidth=1.2)
+
+
+def _actions(run: ControlRun, kind: str) -> pd.DataFrame:
+    """Actions of a kind [degC]."""
+    return run.loop.actions.filter(regex=f"{kind}$") - CELSIUS
 
 
 def _gas(run: ControlRun) -> FloatArray:
@@ -127,7 +116,7 @@ def _gas(run: ControlRun) -> FloatArray:
 
 @styled
 def expectations(run: ControlRun) -> list[Picture]:
-    """Draw what optimal control expected after an hour, and what came.
+    """Draw what optimal control expected after an hour, and what was realised.
 
     Parameters
     ----------
@@ -138,25 +127,21 @@ def expectations(run: ControlRun) -> list[Picture]:
     if len(rows) < 2:  # a point is no course
         return []
     record, ahead = run.loop.record, round(AHEAD / run.loop.record.step)
-    stamps = run.study.stamps[[first + ahead - 1 for first, _ in rows]]
-    x = day_numbers(stamps)
-    expected = np.stack([d.zone for _, d in rows]) - CELSIUS
-    came = np.stack([record.zone_temperature[first + ahead] for first, _ in rows]) - CELSIUS
+    took = record.electricity + _gas(run)
+    zone = [float(record.zone_temperature[first + ahead].mean()) - CELSIUS for first, _ in rows]
+    power = [float(took[first : first + ahead].mean()) / _KILO for first, _ in rows]
     figure = Figure(figsize=(10.0, 5.4))
     upper, lower = figure.subplots(2, 1, sharex=True)
-    upper.plot(x, came.mean(axis=1), color=MEASURED, label="realised")
-    upper.plot(x, expected.mean(axis=1), color=SIMULATED, linewidth=1.0, label="expected an hour before")
-    upper.set_title("Mean temperature of the zones")
-    upper.set_ylabel("[°C]")
-    total = [float((record.electricity + _gas(run))[first : first + ahead].mean()) / _KILO for first, _ in rows]
-    lower.plot(x, total, color=MEASURED, label="realised")
-    lower.plot(x, [sum(d.power) / _KILO for _, d in rows], color=SIMULATED, linewidth=1.0, label="expected")
-    lower.set_title("Electricity and gas, mean of the hour")
-    lower.set_ylabel("[kW]")
-    for one in (upper, lower):
-        one.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), fontsize=8)
-    upper.set_xlim(x[0], x[-1])
-    time_axis(lower, stamps.tz, ticks=9)
+    x = style.lines_over_time(lower, run.study.stamps[[first + ahead - 1 for first, _ in rows]], ticks=9)
+    for axes, realised, expected, when in (
+        (upper, zone, [float(d.zone.mean()) - CELSIUS for _, d in rows], "expected an hour before"),
+        (lower, power, [sum(d.power) / _KILO for _, d in rows], "expected"),
+    ):
+        axes.plot(x, realised, color=MEASURED, label="realised")
+        axes.plot(x, expected, color=SIMULATED, linewidth=1.0, label=when)
+        _legend(axes)
+    upper.set(title="Mean temperature of the zones", ylabel="[°C]")
+    lower.set(title="Electricity and gas, mean of the hour", ylabel="[kW]")
     return [picture(figure, "Expected and realised zone temperatures and power")]
 
 
@@ -169,32 +154,27 @@ def side_by_side(runs: Sequence[ControlRun]) -> list[Picture]:
     runs : sequence of ControlRun
         Of one study.
     """
-    study = runs[0].study
+    study, own = runs[0].study, count()
     figure = Figure(figsize=(10.0, 9.5))
-    axes = figure.subplots(4, 1, sharex=True)
-    x, n, scenario = day_numbers(study.stamps), study.steps, study.scenario
-    low, high = scenario.lower[:n].max(axis=1) - CELSIUS, scenario.upper[:n].min(axis=1) - CELSIUS
-    axes[1].fill_between(x, low, high, step="pre", color="#009E73", alpha=0.13, linewidth=0)
+    cost, zones, air, water = figure.subplots(4, 1, sharex=True)
+    x = style.lines_over_time(water, study.stamps, ticks=9)
+    _comfort_band(zones, runs[0], x)
     for run in runs:
-        record, colour = run.loop.record, COLOURS[run.controller]
-        style = {"color": colour, "linewidth": 1.2, "linestyle": "--" if run.controller == "bound" else "-"}
-        spent = scenario.electricity_price[:n] * record.electricity + scenario.gas_price[:n] * _gas(run)
-        axes[0].plot(x, np.cumsum(spent) * record.step / 3.6e6, label=NAMES[run.controller], **style)
-        zone = record.zone_temperature[1 : n + 1] - CELSIUS
-        axes[1].plot(x, zone.min(axis=1), **style)
-        axes[1].plot(x, zone.max(axis=1), **style)
-        acted, actions = day_numbers(pd.DatetimeIndex(run.loop.actions.index)), run.loop.actions - CELSIUS
-        for one, kind in ((axes[2], "supply_air_temperature_setpoint"), (axes[3], "supply_water_temperature_setpoint")):
-            columns = [c for c in actions if str(c).endswith(kind)]
-            if columns:
-                one.step(acted, actions[columns].mean(axis=1), where="pre", **style)
-    titles = ("Energy cost so far", "Coldest and warmest zone", "Supply air setpoint", "Supply water setpoint")
-    for one, title, unit in zip(axes, titles, (f"[{scenario.currency}]", "[°C]", "[°C]", "[°C]"), strict=True):
-        one.set_title(title)
-        one.set_ylabel(unit)
-    axes[0].legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), fontsize=8)
-    axes[0].set_xlim(x[0], x[-1])
-    time_axis(axes[3], study.stamps.tz, ticks=9)
+        colour = _COLOURS.get(run.controller) or _OWN[next(own) % len(_OWN)]
+        line = {"color": colour, "linewidth": 1.2, "linestyle": "--" if run.controller == "bound" else "-"}
+        cost.plot(x, np.cumsum(np.sum(_costs(run), axis=0)), label=controller_name(run.controller), **line)
+        zone = run.loop.record.zone_temperature[1 : study.steps + 1] - CELSIUS
+        zones.plot(x, zone.min(axis=1), **line)
+        zones.plot(x, zone.max(axis=1), **line)
+        acted = style.day_numbers(pd.DatetimeIndex(run.loop.actions.index))
+        for axes, kind in ((air, _SUPPLY_AIR), (water, _SUPPLY_WATER)):
+            if not (actions := _actions(run, kind)).empty:
+                axes.step(acted, actions.mean(axis=1), where="pre", **line)
+    cost.set(title="Energy cost so far", ylabel=f"[{study.scenario.currency}]")
+    zones.set(title="Coldest and warmest zone", ylabel="[°C]")
+    air.set(title="Supply air setpoint", ylabel="[°C]")
+    water.set(title="Supply water setpoint", ylabel="[°C]")
+    _legend(cost)
     return [picture(figure, "Cost, zone temperatures and setpoints of the controllers over time")]
 
 
@@ -209,38 +189,24 @@ def cost_bars(runs: Sequence[ControlRun]) -> list[Picture]:
     """
     figure = Figure(figsize=(10.0, 0.9 + 0.42 * len(runs)))
     left, right = figure.subplots(1, 2, sharey=True, gridspec_kw={"width_ratios": [2.0, 1.0]})
-    names, place = [NAMES[run.controller] for run in runs], np.arange(len(runs))
-    parts = np.array([_cost_parts(run) for run in runs])
-    left.barh(place, parts[:, 0], color=MEASURED, alpha=0.8, label="electricity")
-    left.barh(place, parts[:, 1], left=parts[:, 0], color=SIMULATED, alpha=0.8, label="gas")
-    left.set_yticks(place, names)
+    place = np.arange(len(runs))
+    electricity, gas = np.array([[part.sum() for part in _costs(run)] for run in runs]).T
+    left.barh(place, electricity, color=MEASURED, alpha=0.8, label="electricity")
+    left.barh(place, gas, left=electricity, color=SIMULATED, alpha=0.8, label="gas")
+    left.set_yticks(place, [controller_name(run.controller) for run in runs])
     left.invert_yaxis()
     left.set_xlabel(f"energy cost [{runs[0].study.scenario.currency}]")
     left.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, fontsize=8)  # above: bars fill the axes
     discomfort = [run.kpis.tdis_tot for run in runs]
-    bars = right.barh(place, discomfort, color=WARNING, alpha=0.7)
+    bars = right.barh(place, discomfort, color=style.WARNING, alpha=0.7)
     right.bar_label(bars, fmt="%.2f", padding=3.0, fontsize=8)  # where nobody leaves the band there is no bar
     right.set_xlim(0.0, 1.25 * max(_FELT, *discomfort))
     right.set_xlabel("outside of the band, mean zone [K h]")
     return [picture(figure, "Energy cost and discomfort of the controllers")]
 
 
-def _cost_parts(run: ControlRun) -> tuple[float, float]:
-    """Give what electricity and gas cost [currency].
-
-    Parameters
-    ----------
-    run : ControlRun
-        Of a study.
-    """
+def _costs(run: ControlRun) -> tuple[FloatArray, FloatArray]:
+    """Give what electricity and gas cost, step by step, each of shape (n_steps,) [currency]."""
     record, scenario, n = run.loop.record, run.study.scenario, run.study.steps
     unit = record.step / 3.6e6
-    return (
-        float(scenario.electricity_price[:n] @ record.electricity) * unit,
-        float(scenario.gas_price[:n] @ _gas(run)) * unit,
-    )
-
-
-#: Controllers in words.
-NAMES = {"mpc": "optimal control", "bound": "perfect bound", "schedule": "fixed schedule", "reset": "outdoor reset",
-         "guideline36": "Guideline 36"}  # fmt: skip
+    return scenario.electricity_price[:n] * record.electricity * unit, scenario.gas_price[:n] * _gas(run) * unit

@@ -11,12 +11,12 @@ import pytest
 from calibration.diagnosis.decide.levels import CONCENTRATED, LEFT_OF_CHANGE, LEFT_OVER
 from calibration.diagnosis.decide.verdict import _left_over, judge
 from calibration.diagnosis.diagnosis import Diagnosis, baseline_gap, diagnose
-from calibration.diagnosis.refit.comparison import Bench, Fit
-from calibration.diagnosis.refit.held_out import held_out
-from calibration.diagnosis.refit.refit import ACCEPTED, CHANCE, MATTERS, Refit, Work, _beyond_a_step
+from calibration.diagnosis.refit.comparison import Fit, ModelComparison
+from calibration.diagnosis.refit.refit import ACCEPTED, CHANCE, MATTERS, Refit, Work, _beyond_a_step, held_out
 from calibration.diagnosis.refit.search import _first
 from calibration.diagnosis.screen.screen import Screening
 from calibration.evaluation.settings import ModelSettings
+from mpc.reports.diagnosis_words import where_sentence
 from thermal import Case, Telemetry
 from thermal.effects.catalogue import CATALOGUE
 from thermal.pilot.building import pilot_building
@@ -62,7 +62,7 @@ def test_nothing_is_found_where_nothing_is_missing() -> None:
 def test_a_meter_that_reads_too_low_is_named_with_its_zone_and_its_error(number: int) -> None:
     zone = twin().building.zone_names[number]
     found = diagnosed(zone)
-    best = found.verdict.suspects[0]
+    best = found.verdict.candidates[0]
     assert found.verdict.name in ("named", "group")
     assert best.effect in ("flow_gain", "duct_loss")
     assert "flow_gain" in best.group or best.effect == "flow_gain"
@@ -71,11 +71,11 @@ def test_a_meter_that_reads_too_low_is_named_with_its_zone_and_its_error(number:
         value, _, (low, high) = best.parameters[f"flow_gain@{zone}"]
         assert low < ERROR < high or abs(value - ERROR) < 0.06
     assert best.probability > 0.5
-    assert zone in found.where.sentence
+    assert zone in where_sentence(found.where)
     assert max(found.where.zones, key=lambda s: s.share).name == zone
 
 
-def test_how_far_closes_the_gap_and_the_placebo_does_not() -> None:
+def test_how_far_closes_the_gap_and_permuted_signals_do_not() -> None:
     found = diagnosed(twin().building.zone_names[1])
     (step, *_) = found.steps
     assert step.share_closed is not None and step.interval is not None
@@ -99,17 +99,29 @@ def test_the_file_holds_every_effect_and_what_the_contract_asks() -> None:
         "separate_by",
         "testable",
     )
-    for suspect in content["which"]:
-        assert set(keys) <= set(suspect)
-        assert 0.0 <= suspect["probability"] <= 1.0
-        assert suspect["testable"] or suspect["reason"]
-        assert len(suspect["group"]) <= 4
+    for candidate in content["which"]:
+        assert set(keys) <= set(candidate)
+        assert 0.0 <= candidate["probability"] <= 1.0
+        assert candidate["testable"] or candidate["reason"]
+        assert len(candidate["group"]) <= 4
     assert [s["probability"] for s in content["which"]] == sorted(
         (s["probability"] for s in content["which"]), reverse=True
     )
     assert sum(content["where"]["hours"]) == pytest.approx(1.0)
     assert sum(z["share"] for z in content["where"]["zones"]) == pytest.approx(1.0)
     assert set(content["gap"]["smallest_detectable_watts"]) == set(twin().building.zone_names)
+
+
+def test_a_diagnosis_shows_itself() -> None:
+    found = diagnosed(twin().building.zone_names[1])
+    table = found.to_frame()
+    assert list(table.index) == [c.effect for c in found.verdict.candidates]
+    assert set(table.index) == set(CATALOGUE)
+    assert table["probability"].iloc[0] == found.verdict.candidates[0].probability
+    assert len(repr(found)) < 160 and found.verdict.name in repr(found) and f"{found.gap:.3f} K" in repr(found)
+    assert "<table" in found._repr_html_() and found.verdict.candidates[0].effect in found._repr_html_()
+    axes = found.plot()
+    assert len(axes.patches) == table["testable"].sum()
 
 
 def test_what_counts_for_little_is_ranked_by_what_it_gains_and_what_predicts_worse_is_not() -> None:
@@ -122,9 +134,9 @@ def test_what_counts_for_little_is_ranked_by_what_it_gains_and_what_predicts_wor
 
     doubtful = (refit("infiltration", 40.0, True), refit("duct_loss", 20.0, False), refit("sensor_bias", 12.0, False))
     found = judge((replace(r, refits=doubtful, accepted=None),), {})
-    assert [s.effect for s in found.suspects[:2]] == ["duct_loss", "sensor_bias"]
-    worse = next(s for s in found.suspects if s.effect == "infiltration")
-    assert worse.probability < found.suspects[1].probability < 0.3
+    assert [s.effect for s in found.candidates[:2]] == ["duct_loss", "sensor_bias"]
+    worse = next(s for s in found.candidates if s.effect == "infiltration")
+    assert worse.probability < found.candidates[1].probability < 0.3
     assert found.name == "no_gap"
 
 
@@ -142,8 +154,8 @@ def test_held_out_days_decide_between_what_gains_alike() -> None:
     assert _first(r.held_out, [most, refit("flow_gain", 18.5, 0.79)]) is most  # held-out days cannot
     assert _first(r.held_out, [replace(most, counts=False)]) is None
     found = judge((replace(r, refits=(most, other), accepted=other),), {})
-    assert [s.effect for s in found.suspects[:2]] == ["flow_gain", "duct_loss"]
-    assert set(found.suspects[0].group) >= {"flow_gain", "duct_loss"}
+    assert [s.effect for s in found.candidates[:2]] == ["flow_gain", "duct_loss"]
+    assert set(found.candidates[0].group) >= {"flow_gain", "duct_loss"}
 
 
 def test_what_explains_a_part_of_large_errors_is_not_named() -> None:
@@ -161,15 +173,15 @@ def test_what_explains_a_part_of_large_errors_is_not_named() -> None:
         rounds = (replace(r, before=large, refits=(accepted,), accepted=accepted), replace(r, before=fit))
         verdicts.append(judge(rounds, {}))
     assert [v.name for v in verdicts] == ["unexplained", "named"]
-    assert verdicts[0].suspects[0].probability == pytest.approx(0.5, abs=0.01)
-    assert verdicts[1].suspects[0].probability > 0.99
+    assert verdicts[0].candidates[0].probability == pytest.approx(0.5, abs=0.01)
+    assert verdicts[1].candidates[0].probability > 0.99
 
 
 def test_telemetry_is_shifted_only_by_more_than_one_of_its_steps() -> None:
     """However much it gains: a shift within a step says how a value is spread over that."""
-    bench = Bench(twin(), ModelSettings(dx=1.0))
-    baseline = bench.fit({}, [{}])
-    work = Work(bench, baseline, held_out(bench, baseline), Screening(bench, baseline, ["clock_shift"]))
+    models = ModelComparison(twin(), ModelSettings(dx=1.0))
+    baseline = models.fit({}, [{}])
+    work = Work(models, baseline, held_out(models, baseline), Screening(models, baseline, ["clock_shift"]))
     gain = work.made.of("clock_shift")
     found = work.refit([gain], work.made.promised(gain))
     assert found is not None
@@ -226,7 +238,7 @@ def test_tangents_promise_what_a_fit_keeps() -> None:
 
 def test_screening_is_about_the_estimate() -> None:
     """An effect without strength gains nothing; cosines are those of a Gram matrix; detectable heat grows with gain."""
-    bench = Bench(twin(), tune=(), hold_out=())
+    models = ModelComparison(twin(), tune=(), hold_out=())
     made = diagnosed(None).rounds[0].screening
     gains = [made.of(e) for e in ("flow_gain", "duct_loss", "internal_gains")]
     for g in gains:
@@ -234,6 +246,6 @@ def test_screening_is_about_the_estimate() -> None:
         assert 0.0 <= g.share < 1.0
     assert abs(made.cosine(gains[0], gains[1])) <= 1.0 + 1e-9
     small, large = made.detectable(3.0), made.detectable(12.0)
-    assert all(0.0 < small[z] < large[z] for z in bench.case.building.zone_names)
+    assert all(0.0 < small[z] < large[z] for z in models.case.building.zone_names)
     assert np.all(np.linalg.eigvalsh(made.gram) > -1e-6 * np.abs(made.gram).max())
     assert isinstance(made, Screening)

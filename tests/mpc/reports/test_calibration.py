@@ -17,10 +17,12 @@ import pytest
 from calibration import CalibrationResult, CalibrationSettings, Evaluation, Interval, calibrate
 from calibration.errors import ResultsExistError
 from calibration.evaluation.n_step import Predictions
-from mpc.reports import figures
 from mpc.reports.calibration import calibration_verdict, write_calibration
 from mpc.reports.case import write_check, write_simulation
 from mpc.reports.evaluation import evaluation_verdict, write_evaluation
+from mpc.reports.figures.calibration import paper_values, parameter_ranges
+from mpc.reports.figures.errors import error_band, median_run, series_of_runs, zone_panels
+from mpc.reports.figures.field import spatial_field
 from mpc.reports.page import significant
 from thermal import (
     Building,
@@ -171,7 +173,7 @@ def test_the_page_says_what_the_model_leaves(written: Path, result: CalibrationR
 
 def test_the_band_is_that_of_the_tuning_errors(result: CalibrationResult, written: Path) -> None:
     tuning, held_out = result.calibrated["tuning"], result.calibrated["held_out"]
-    band = figures.error_band(tuning)
+    band = error_band(tuning)
     errors = np.concatenate([p.measured - p.simulated for p in tuning.predictions])
     np.testing.assert_allclose(band.high[10, 2], np.quantile(errors[:, 10, 2], 0.95))
     assert band.low.shape == (72, 5) and band.coverage(tuning) == pytest.approx(0.9, abs=0.02)
@@ -180,7 +182,7 @@ def test_the_band_is_that_of_the_tuning_errors(result: CalibrationResult, writte
     share = inside[np.isfinite(p.measured)].mean()
     assert len(held_out.predictions) == 1 and band.coverage(held_out) == pytest.approx(share, abs=1e-3)
     assert f"held-out measurements {100 * share:.0f} % lie inside" in Page(written / "report.html").text
-    series = figures.series_of_runs(held_out, band)
+    series = series_of_runs(held_out, band)
     assert series.low is not None and series.low.shape == series.measured.shape
     np.testing.assert_allclose(series.low[1:73] - series.simulated[1:73], band.low)
     np.testing.assert_array_equal(series.low[0], series.measured[0])  # a run starts where it was measured
@@ -188,29 +190,29 @@ def test_the_band_is_that_of_the_tuning_errors(result: CalibrationResult, writte
 
 def test_few_errors_make_no_band() -> None:
     evaluation = odd_evaluation(odd_case(2), runs=12)
-    band = figures.error_band(evaluation)
+    band = error_band(evaluation)
     assert np.isnan(band.low).all() and np.isnan(band.coverage(evaluation))
-    assert figures.zone_panels(figures.series_of_runs(evaluation, band), evaluation.zones, {"Büro <b>& [1]": 0.3})
+    assert zone_panels(series_of_runs(evaluation, band), evaluation.zones, {"Büro <b>& [1]": 0.3})
     many = odd_evaluation(odd_case(2), runs=21)
-    band = figures.error_band(many)
+    band = error_band(many)
     assert np.isfinite(band.low[0, 0]) and np.isnan(band.low[:, 1]).all()  # the other zone is not measured
 
 
 def test_the_papers_values_are_ours_where_they_correspond(result: CalibrationResult) -> None:
-    paper = figures.paper_values(result.parameters)
+    paper = paper_values(result.parameters)
     density = {p.name: p.value for p in result.parameters}["exterior_wall_density"]
     assert paper["exterior_convection_coefficient"] == 800.0 and paper["exterior_wall_conductivity"] == 0.01
     assert paper["exterior_wall_heat_capacity"] * density == pytest.approx(2748.0 * 2500.0)
     assert "window_u_value" not in paper
     table = [p for p in result.parameters if not p.name.endswith("_density")]
-    assert not any("wall" in name for name in figures.paper_values(table))
+    assert not any("wall" in name for name in paper_values(table))
     facade = replace(result.parameters[0], name="exterior_convection_coefficient@facade:south")
-    assert figures.paper_values([facade]) == {facade.name: 800.0}
+    assert paper_values([facade]) == {facade.name: 800.0}
 
 
 def test_parameters_without_an_interval_are_drawn(result: CalibrationResult) -> None:
     bare = [replace(p, interval90=None) for p in result.parameters]
-    assert figures.parameter_ranges(bare)
+    assert parameter_ranges(bare)
 
 
 def test_the_page_is_the_same_twice(case: Case, result: CalibrationResult, written: Path, tmp_path: Path) -> None:
@@ -223,9 +225,9 @@ def test_the_map_of_the_grid_agrees_with_the_reduced_model(case: Case, result: C
 
     network = build_network(case.building, dx=1.0)
     held_out = result.calibrated["held_out"]
-    which, run = figures.median_run(held_out)
+    which, run = median_run(held_out)
     p = held_out.predictions[which]
-    field = figures.spatial_field(
+    field = spatial_field(
         SymbolicModel(network), result.theta, replay_inputs(case, network), p.start[run], 72, 1.0
     )
     zones = network.observation @ field.temperatures

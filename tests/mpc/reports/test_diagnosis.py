@@ -69,7 +69,7 @@ def test_the_final_model_predicts_elsewhere_what_it_did_here(written: Path) -> N
 def test_series_are_those_of_both_models(written: Path) -> None:
     result = diagnosed()
     heat = pd.read_parquet(written / "missing_watts.parquet")
-    for zone, watts in result.where.missing_watts.items():
+    for zone, watts in result.where.missing.by_zone.items():
         own = heat.loc[heat["zone"] == zone, "baseline"].to_numpy()
         assert np.sqrt(np.nanmean(own**2)) == pytest.approx(watts)
     runs = pd.read_parquet(written / "predictions.parquet")
@@ -87,7 +87,7 @@ def test_the_page_loads_nothing_and_says_what_pictures_show(written: Path) -> No
     for title in ("Where the model is wrong", "What it leaves out", "How far it closes the gap",
                   "What to measure next", "What these data cannot test", "<details>"):  # fmt: skip
         assert title in page
-    for s in diagnosed().verdict.suspects:
+    for s in diagnosed().verdict.candidates:
         assert s.effect in page and (s.testable or s.reason.split(":")[0] in page)
 
 
@@ -127,11 +127,11 @@ def grouped(*probabilities: float) -> Diagnosis:
     gains = tuple(replace(g, gain=found if g.effect in others else -1.0) for g in first.gains)
     refits = tuple(r for r in first.refits if r is first.accepted)
     rounds = (replace(first, gains=gains, refits=refits), *diagnosed().rounds[1:])
-    suspects = tuple(
-        replace(s, probability=given.get(s.effect, 0.0)) for s in diagnosed().verdict.suspects
+    candidates = tuple(
+        replace(s, probability=given.get(s.effect, 0.0)) for s in diagnosed().verdict.candidates
     )  # fmt: skip
     return replace(
-        diagnosed(), rounds=rounds, verdict=replace(diagnosed().verdict, name="group", suspects=suspects)
+        diagnosed(), rounds=rounds, verdict=replace(diagnosed().verdict, name="group", candidates=candidates)
     )  # fmt: skip
 
 

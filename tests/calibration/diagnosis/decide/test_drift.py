@@ -9,10 +9,11 @@ import pytest
 from numpy.typing import NDArray
 
 from calibration import Interval
-from calibration.diagnosis.decide.drift import DriftCurve, drift_of, drift_sentence
-from calibration.diagnosis.refit.comparison import Bench
+from calibration.diagnosis.decide.drift import DriftCurve, drift_of
+from calibration.diagnosis.refit.comparison import ModelComparison
 from calibration.errors import NotEnoughDataError
 from calibration.evaluation.settings import ModelSettings
+from mpc.reports.diagnosis_words import drift_sentence, end_words, growth_words
 from thermal.pilot.building import pilot_building
 from thermal.pilot.twin import TwinRanges, TwinSettings, generate_twin
 
@@ -47,14 +48,14 @@ def test_sensors_that_read_wrong_have_no_slope() -> None:
     bias = np.random.default_rng(0).normal(0.0, 0.3, (RUNS, 1)) + noise(1, 0.1)
     found = curve(bias)
     assert found.kind == "sensors" and abs(found.slope) < 0.05
-    assert "from the first step" in found.words
+    assert "from the first step" in growth_words(found)
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_a_random_walk_has_slope_one_half(seed: int) -> None:
     found = curve(walks(seed))
     assert found.kind == "random" and found.slope == pytest.approx(0.5, abs=0.04)
-    assert "square root" in found.words and "still grows" in found.end
+    assert "square root" in growth_words(found) and "still grows" in end_words(found)
 
 
 def test_random_heat_that_a_zone_forgets_levels_off_with_slope_one_half() -> None:
@@ -64,15 +65,15 @@ def test_random_heat_that_a_zone_forgets_levels_off_with_slope_one_half() -> Non
         errors[:, k] = keep * errors[:, k - 1] * (k > 0) + drawn[:, k]
     found = curve(errors)
     assert found.kind == "random" and found.slope == pytest.approx(0.5, abs=0.1)
-    assert "four fifths" in found.end
+    assert "four fifths" in end_words(found)
 
 
 @pytest.mark.parametrize("settling", [3600.0, 14400.0, 1e7])
 def test_persistent_heat_has_slope_one_and_then_levels_off(settling: float) -> None:
     found = curve(relaxing(0, settling))
     assert found.kind == "persistent" and found.slope == pytest.approx(1.0, abs=0.05)
-    assert ("still grows" in found.end) == (settling > 86400.0)
-    assert "missing for hours" in found.words
+    assert ("still grows" in end_words(found)) == (settling > 86400.0)
+    assert "missing for hours" in growth_words(found)
 
 
 def test_noise_of_the_sensors_hides_no_slope() -> None:
@@ -93,13 +94,13 @@ def test_a_wrong_mass_makes_a_hump() -> None:
     at, top, low = found.hump
     exact = np.log(5400.0 / 900.0) / (1.0 / 900.0 - 1.0 / 5400.0)
     assert at == pytest.approx(exact, abs=2.0 * STEP) and low < 0.5 * top
-    assert "mass" in found.words
+    assert "mass" in growth_words(found)
 
 
 def test_the_sentence_tells_both_models() -> None:
-    text = drift_sentence(curve(relaxing(0, 3600.0)), curve(noise(0, 0.1)), "with the effect found")
+    text = drift_sentence("with the effect found", curve(relaxing(0, 3600.0)), curve(noise(0, 0.1)))
     assert "in proportion to time" in text and "With the effect found it is there from the first step" in text
-    assert "With" not in drift_sentence(curve(walks(0)), None, "")
+    assert "With" not in drift_sentence("", curve(walks(0)))
 
 
 def test_a_zone_that_lacks_heat_drifts_in_proportion_to_time() -> None:
@@ -107,13 +108,13 @@ def test_a_zone_that_lacks_heat_drifts_in_proportion_to_time() -> None:
     building = pilot_building(3, floor_area=120.0, zones=4, floors=1, name="office")
     quiet = TwinRanges(disturbance_deviation=(0.05, 0.1), noise=(0.002, 0.004))
     case, _ = generate_twin(building, 3, TwinSettings(days=9.0, step_seconds=300.0, dx=1.0, meter="exact", ranges=quiet))
-    bench = Bench(case, ModelSettings(dx=1.0))
-    fit = bench.fit({}, [{}])
-    before = drift_of(fit, bench.judged)
+    models = ModelComparison(case, ModelSettings(dx=1.0))
+    fit = models.fit({}, [{}])
+    before = drift_of(fit, models.judged)
     assert before.seconds[0] == 300.0 and before.seconds[-1] == 86400.0
     inputs = fit.built.inputs
     robbed = replace(fit, built=replace(fit.built, inputs=replace(inputs, heat=inputs.heat - 300.0)))
-    after = drift_of(robbed, bench.judged)
+    after = drift_of(robbed, models.judged)
     assert after.kind == "persistent" and (after.rms > before.rms).all()
     short = drift_of(fit, [Interval(case.stamps[0], case.stamps[200])])
     assert short.seconds[-1] == 86400.0 / 8

@@ -11,7 +11,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.integrate import trapezoid
 
-from calibration.diagnosis.refit.fit import _descend, _lowest, evidence_of, settle
+from calibration.diagnosis.refit.fit import _descend, _lowest, evidence_of, solve
 from thermal import Parameter
 
 FloatArray = NDArray[np.float64]
@@ -64,7 +64,7 @@ def test_least_squares_are_found_from_afar() -> None:
     problem = linear()
     found = _descend(problem, problem, np.array([-40.0, 30.0]), 60)
     best = np.linalg.lstsq(problem.matrix, problem.wanted, rcond=None)[0]
-    assert found.settled
+    assert found.converged
     np.testing.assert_allclose(found.point, best, atol=2e-3)
     assert found.mean_square == pytest.approx(np.mean((problem.matrix @ best - problem.wanted) ** 2), rel=1e-4)
 
@@ -90,7 +90,7 @@ def test_a_fit_that_overshoots_slows_down(monkeypatch: pytest.MonkeyPatch) -> No
     found = _descend(problem, problem, np.array([1.5, -1.0]), 60)
     monkeypatch.setattr("calibration.diagnosis.refit.fit._LEAST_PACE", 1.0)
     hasty = _descend(problem, problem, np.array([1.5, -1.0]), 60)
-    assert found.settled and found.pace < 1.0 == hasty.pace
+    assert found.converged and found.pace < 1.0 == hasty.pace
     assert found.evaluations < hasty.evaluations
     assert found.cost <= hasty.cost + 1e-3
 
@@ -157,7 +157,7 @@ def test_a_fit_counts_what_the_next_basis_confirms(made: list[Any]) -> None:
     plain = linear(4.0, -4.0)
     problem: Any = Flattered(plain.matrix, plain.wanted, plain.parameters, plain.count)
     start = np.array([-3.0, 3.0])
-    model, found = settle(problem, problem, start, 60)
+    model, found = solve(problem, problem, start, 60)
     exact = np.mean(plain.residuals(None, found.point)[0] ** 2)
     assert len(made) > 2
     assert model is made[-1] or model is made[-2]
@@ -172,7 +172,7 @@ def test_a_descent_in_parts_comes_to_where_one_does() -> None:
     problem = linear()
     whole = _descend(problem, problem, np.array([-40.0, 30.0]), 60)
     part = _descend(problem, problem, np.array([-40.0, 30.0]), 1)
-    while not part.settled:
+    while not part.converged:
         part = _descend(problem, problem, part, 3)
     np.testing.assert_array_equal(part.point, whole.point)
     assert part.evaluations == whole.evaluations
@@ -185,8 +185,8 @@ def test_where_much_is_measured_a_fit_ends_within_a_share_of_its_evidence(made: 
     for count in (300.0, 30000.0):  # as many errors, worth more days
         problem: Any = Flattered(plain.matrix, plain.wanted, plain.parameters, count)
         made.clear()
-        _, found = settle(problem, problem, np.array([-3.0, 3.0]), 60)
+        _, found = solve(problem, problem, np.array([-3.0, 3.0]), 60)
         needed.append(len(made))
-        assert found.settled
+        assert found.converged
         assert 0.5 * count * np.log(found.mean_square / best) < 0.01 * count
     assert needed[1] < needed[0]

@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 from numpy.typing import NDArray
 
-from calibration.diagnosis.refit.comparison import Bench, Fit
+from calibration.diagnosis.refit.comparison import Fit, ModelComparison
 from calibration.diagnosis.screen import missing as _missing
 from calibration.diagnosis.screen.missing import Missing, at_start, missing_heat
 from calibration.estimation.heat_balance import heat_balance
@@ -26,11 +26,11 @@ EXTRA, ZONE = 200.0, 1
 
 
 @cache
-def twin(seed: int, noise: float) -> tuple[Bench, TwinTruth]:
+def twin(seed: int, noise: float) -> tuple[ModelComparison, TwinTruth]:
     building = pilot_building(3, floor_area=120.0, zones=4, floors=1, name="office")
     ranges = TwinRanges(disturbance_deviation=(0.3, 1.0), noise=(noise, noise))
     case, truth = generate_twin(building, seed, TwinSettings(days=15.0, step_seconds=900.0, dx=1.0, meter="exact", ranges=ranges))  # fmt: skip
-    return Bench(case, ModelSettings(dx=1.0)), truth
+    return ModelComparison(case, ModelSettings(dx=1.0)), truth
 
 
 def robbed(fit: Fit) -> tuple[Fit, FloatArray]:
@@ -48,9 +48,9 @@ def robbed(fit: Fit) -> tuple[Fit, FloatArray]:
 @cache
 def estimated(seed: int, noise: float) -> tuple[Missing, FloatArray, FloatArray]:
     """Estimate of the calibrated model, and what it should be, by the hour; which hours are office hours."""
-    bench, truth = twin(seed, noise)
-    fit, extra = robbed(bench.fit({}, [{}]))
-    found = missing_heat(fit, bench.judged)
+    models, truth = twin(seed, noise)
+    fit, extra = robbed(models.fit({}, [{}]))
+    found = missing_heat(fit, models.judged)
     begins = fit.built.inputs.stamps - pd.Timedelta(seconds=fit.built.inputs.step)
 
     def hourly(values: FloatArray) -> FloatArray:
@@ -87,25 +87,25 @@ def test_band_covers_it_at_its_rate() -> None:
 
 
 def test_at_the_truth_noise_is_all_that_is_unknown() -> None:
-    bench, truth = twin(5, 0.05)
-    fit, _ = robbed(bench.fit({}, [{}]))
+    models, truth = twin(5, 0.05)
+    fit, _ = robbed(models.fit({}, [{}]))
     theta = np.array([truth.values[p.name] for p in fit.built.network.parameters])
     point = np.array([p.transform(v) for p, v in zip(fit.problem.parameters, theta, strict=True)])
     known = replace(fit, model=reduced_model(fit.built.grid, [theta]), found=replace(fit.found, point=point))
-    found = missing_heat(known, bench.judged, fixed=True)
+    found = missing_heat(known, models.judged, fixed=True)
     _, wanted, _ = estimated(5, 0.05)
     assert inside(found, wanted, 0.9).mean() == pytest.approx(0.9, abs=0.05)
-    wide = missing_heat(known, bench.judged)
+    wide = missing_heat(known, models.judged)
     assert (wide.deviation.to_numpy() > found.deviation.to_numpy()).all()
     pd.testing.assert_frame_equal(wide.watts, found.watts)
 
 
 def test_it_is_the_heat_that_the_temperatures_ask_for_and_nearer_the_truth() -> None:
     """The balance takes the mean temperature of a step for that of its end, the smoother does not."""
-    bench, _ = twin(5, 0.005)
-    fit, _ = robbed(bench.fit({}, [{}]))
+    models, _ = twin(5, 0.005)
+    fit, _ = robbed(models.fit({}, [{}]))
     found, wanted, _ = estimated(5, 0.005)
-    asked = heat_balance(fit.model, fit.theta, fit.built.inputs, bench.judged)
+    asked = heat_balance(fit.model, fit.theta, fit.built.inputs, models.judged)
     np.testing.assert_array_equal(found.watts.index, asked.stamps)
     balance, watts = asked.needed - asked.metered, found.watts.to_numpy()
     np.testing.assert_allclose(watts.mean(axis=0), balance.mean(axis=0), atol=0.02 * EXTRA)
@@ -113,23 +113,23 @@ def test_it_is_the_heat_that_the_temperatures_ask_for_and_nearer_the_truth() -> 
 
 
 def test_more_is_missing_where_parameters_are_at_their_start() -> None:
-    bench, _ = twin(5, 0.05)
-    fit = bench.fit({}, [{}])
+    models, _ = twin(5, 0.05)
+    fit = models.fit({}, [{}])
     start = at_start(fit)
     np.testing.assert_allclose(start.theta, [p.start for p in fit.built.network.parameters])
-    before, after = missing_heat(start, bench.judged, fixed=True), missing_heat(fit, bench.judged)
+    before, after = missing_heat(start, models.judged, fixed=True), missing_heat(fit, models.judged)
     assert before.rms.mean() > 1.5 * after.rms.mean()
 
 
 def test_hours_without_telemetry_are_not_known() -> None:
-    bench, _ = twin(5, 0.05)
-    fit = bench.fit({}, [{}])
+    models, _ = twin(5, 0.05)
+    fit = models.fit({}, [{}])
     inputs = fit.built.inputs
     zone = inputs.zone.copy()
-    at = int(inputs.stamps.searchsorted(bench.judged[0].start)) + 100
+    at = int(inputs.stamps.searchsorted(models.judged[0].start)) + 100
     zone[at, 2] = np.nan
     holed = replace(fit, built=replace(fit.built, inputs=replace(inputs, zone=zone)))
-    found = missing_heat(holed, bench.judged)
+    found = missing_heat(holed, models.judged)
     gone = found.watts.isna()
     pd.testing.assert_frame_equal(gone, found.deviation.isna())
     assert 1 <= gone.iloc[:, 2].sum() <= 2 and not gone.drop(columns=gone.columns[2]).any(axis=None)
@@ -137,21 +137,21 @@ def test_hours_without_telemetry_are_not_known() -> None:
 
 def test_many_zones_are_smoothed_alike(monkeypatch: pytest.MonkeyPatch) -> None:
     found, _, _ = estimated(5, 0.05)
-    bench, _ = twin(5, 0.05)
+    models, _ = twin(5, 0.05)
     monkeypatch.setattr(_missing, "_MANY_ZONES", 3)
     monkeypatch.setattr(_missing, "_TUNED_MANY", 3 * 86400.0)
     monkeypatch.setattr(_missing, "_ORDER", 20)
-    many = missing_heat(robbed(bench.fit({}, [{}]))[0], bench.judged)
+    many = missing_heat(robbed(models.fit({}, [{}]))[0], models.judged)
     assert np.nanmean(np.abs(many.watts.to_numpy() - found.watts.to_numpy())) < 0.05 * EXTRA
 
 
 def test_strengths_at_the_end_of_their_range_have_a_band_too() -> None:
     """A building without leakage: beyond its end of the range the strength would be a negative conductance."""
-    bench, _ = twin(5, 0.05)
-    fit = bench.fit({"infiltration": ()}, [{}])
+    models, _ = twin(5, 0.05)
+    fit = models.fit({"infiltration": ()}, [{}])
     names = [p.name for p in fit.problem.parameters]
     point = fit.found.point.copy()
     point[[k for k, name in enumerate(names) if name.startswith("infiltration")]] = 0.0
-    found = missing_heat(replace(fit, found=replace(fit.found, point=point)), bench.judged)
+    found = missing_heat(replace(fit, found=replace(fit.found, point=point)), models.judged)
     deviation = found.deviation.to_numpy()
     assert np.isfinite(deviation).any() and np.nanmin(deviation) > 0.0

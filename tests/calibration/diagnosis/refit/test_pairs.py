@@ -9,14 +9,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from calibration.diagnosis.decide.evidence import gains_of
 from calibration.diagnosis.decide.levels import SMALL
-from calibration.diagnosis.refit.comparison import Bench
-from calibration.diagnosis.refit.held_out import held_out
-from calibration.diagnosis.refit.refit import ACCEPTED, MATTERS, Work, promising
-from calibration.diagnosis.refit.search import Round, _best_pair, _exchanged, _refits
+from calibration.diagnosis.decide.verdict import gains_of
+from calibration.diagnosis.refit.comparison import ModelComparison
+from calibration.diagnosis.refit.refit import ACCEPTED, MATTERS, Work, held_out, promising
+from calibration.diagnosis.refit.search import Round, _best_pair, _exchanged, _refits, nominate
 from calibration.diagnosis.screen.gains import Gain, choice_of
-from calibration.diagnosis.screen.pairs import nominate
 from calibration.diagnosis.screen.screen import Screening
 from calibration.evaluation.settings import ModelSettings
 from thermal import Case, Telemetry
@@ -122,7 +120,7 @@ def test_a_screening_less_an_effect_is_that_of_the_model_without_it() -> None:
         assert less.promised(one) == pytest.approx(alone.promised(other), rel=1e-6)
 
 
-def biased_and_misread() -> tuple[Bench, str, str]:
+def biased_and_misread() -> tuple[ModelComparison, str, str]:
     """A twin whose meter of one zone reads low and whose sensor of another reads high; the two zones."""
     building = pilot_building(3, floor_area=120.0, zones=4, floors=1, name="office")
     quiet = TwinRanges(disturbance_deviation=(0.05, 0.1), noise=(0.005, 0.01))
@@ -133,19 +131,19 @@ def biased_and_misread() -> tuple[Bench, str, str]:
     frame[f"{device.name}/supply_air_flowrate_sensor"] /= 1.0 + ERROR
     (device,) = building.devices_of(high)
     frame[f"{device.name}/zone_air_temperature_sensor"] += BIAS
-    return Bench(Case(building, Telemetry.from_frame(frame)), ModelSettings(dx=1.0)), low, high
+    return ModelComparison(Case(building, Telemetry.from_frame(frame)), ModelSettings(dx=1.0)), low, high
 
 
 def test_a_screening_sees_the_tangents_of_the_grid(monkeypatch: pytest.MonkeyPatch) -> None:
     """A basis that was made where no effect is at work serves the tangents to all of them."""
-    bench, _, high = biased_and_misread()
+    models, _, high = biased_and_misread()
     names = ("flow_gain", "sensor_bias", "infiltration", "internal_gains", "hidden_mass", "zone_mixing")
     for effects in ({}, {"sensor_bias": (high,)}):
-        fit = bench.fit(effects, [{}])
-        reduced = Screening(bench, fit, names)
+        fit = models.fit(effects, [{}])
+        reduced = Screening(models, fit, names)
         with monkeypatch.context() as patch:
             patch.setattr("calibration.diagnosis.screen.screen.reduced_model", lambda grid, *_, **__: grid)
-            whole = Screening(bench, fit, names)
+            whole = Screening(models, fit, names)
         for name in set(names) - set(effects):
             one, other = reduced.of(name), whole.of(name)
             assert one.gain == pytest.approx(other.gain, abs=0.05), name
@@ -155,17 +153,17 @@ def test_a_screening_sees_the_tangents_of_the_grid(monkeypatch: pytest.MonkeyPat
 
 def test_tangents_know_both_ends_of_the_ground_temperature() -> None:
     """Columns of the Gram matrix are those of differences of runs; their mixture is U times the distance to T_g."""
-    bench, *_ = biased_and_misread()
-    fit = bench.fit({}, [{}])
-    made = Screening(bench, fit, ("ground_exchange",))
+    models, *_ = biased_and_misread()
+    fit = models.fit({}, [{}])
+    made = Screening(models, fit, ("ground_exchange",))
     names = [p.name for p in made.parameters]
     level = next(p for p in made.parameters if p.name == "ground_temperature")
     columns = [names.index("ground_u_value"), len(names) - 1]
-    built = bench.build({"ground_exchange": ()})
+    built = models.build({"ground_exchange": ()})
 
     def errors(u_value: float, temperature: float) -> FloatArray:
         theta = built.theta({**fit.values, "ground_u_value": u_value, "ground_temperature": temperature})
-        problem = bench.problem(built, theta)
+        problem = models.problem(built, theta)
         return np.concatenate([problem.errors(built.grid, theta, r, slopes=False)[0].ravel() for r in problem.runs])
 
     away = 1e-3
@@ -188,12 +186,12 @@ def in_zone(made: Screening, effect: str, zone: str) -> Gain:
 
 def test_a_pair_is_accepted_where_neither_member_would_be() -> None:
     """Each is hardly seen alone."""
-    bench, low, high = biased_and_misread()
-    baseline = bench.fit({}, [{}])
-    made = Screening(bench, baseline, ("flow_gain", "sensor_bias"))
+    models, low, high = biased_and_misread()
+    baseline = models.fit({}, [{}])
+    made = Screening(models, baseline, ("flow_gain", "sensor_bias"))
     gains = sorted((in_zone(made, "flow_gain", low), in_zone(made, "sensor_bias", high)), key=lambda g: -g.gain)
     assert all(g.gain < ACCEPTED for g in gains)
-    found = _best_pair(Work(bench, baseline, held_out(bench, baseline), made), gains, (), None)
+    found = _best_pair(Work(models, baseline, held_out(models, baseline), made), gains, (), None)
     assert found is not None
     first, both = found
     assert not first.counts and both.counts
@@ -204,13 +202,13 @@ def test_a_pair_is_accepted_where_neither_member_would_be() -> None:
 
 def test_what_promises_to_matter_little_is_not_fitted() -> None:
     """Falls of the root mean square by closed form; the pair that is fitted above is not where errors are tiny."""
-    bench, low, high = biased_and_misread()
-    baseline = bench.fit({}, [{}])
-    made = Screening(bench, baseline, ("flow_gain", "sensor_bias"))
+    models, low, high = biased_and_misread()
+    baseline = models.fit({}, [{}])
+    made = Screening(models, baseline, ("flow_gain", "sensor_bias"))
     gains = sorted((in_zone(made, "flow_gain", low), in_zone(made, "sensor_bias", high)), key=lambda g: -g.gain)
     for rms in (0.005, 0.2, 2.0):
         found = replace(baseline.found, mean_square=rms**2)
-        work = Work(bench, replace(baseline, found=found), held_out(bench, baseline), made)
+        work = Work(models, replace(baseline, found=found), held_out(models, baseline), made)
         for share in (0.0, 0.01, 0.1, 0.5):
             assert promising(work.fit, share) == (rms - np.sqrt((1.0 - share) * rms**2) > 0.25 * MATTERS)
         if rms == 0.005:
@@ -222,26 +220,26 @@ def test_what_promises_to_matter_little_is_not_fitted() -> None:
 
 
 def test_what_stood_for_another_effect_is_exchanged_once_the_second_is_in_the_model() -> None:
-    bench, low, high = biased_and_misread()
-    baseline = bench.fit({}, [{}])
+    models, low, high = biased_and_misread()
+    baseline = models.fit({}, [{}])
     names = ("flow_gain", "sensor_bias", "valve_leak")
 
     def searched(first: str) -> tuple[list[Round], Screening]:
         """Two rounds of which the first accepts an effect in the zone whose meter is wrong, the second the bias."""
         fit, rounds = baseline, []
         for effect, zone in ((first, low), ("sensor_bias", high)):
-            made = Screening(bench, fit, [n for n in names if n not in fit.effects])
-            work = Work(bench, fit, held_out(bench, fit), made)
+            made = Screening(models, fit, [n for n in names if n not in fit.effects])
+            work = Work(models, fit, held_out(models, fit), made)
             gain = in_zone(made, effect, zone)
             refit = work.refit([gain], made.promised(gain))
             assert refit is not None
             generic = replace(gain, effect="generic")
             rounds.append(Round(fit, work.held_out, made, (gain,), generic, (refit,), refit))
             fit = refit.fit
-        return rounds, Screening(bench, fit, [n for n in names if n not in fit.effects])
+        return rounds, Screening(models, fit, [n for n in names if n not in fit.effects])
 
     rounds, made = searched("valve_leak")
-    found = _exchanged(bench, rounds, made, names)
+    found = _exchanged(models, rounds, made, names)
     assert found is not None and found.accepted is not None and found.pair is not None
     assert found.before is baseline
     assert (found.accepted.screened.effect, found.pair.screened.effect) == ("sensor_bias", "flow_gain")
@@ -249,5 +247,5 @@ def test_what_stood_for_another_effect_is_exchanged_once_the_second_is_in_the_mo
     assert found.pair.fit.effects == {"sensor_bias": (high,), "flow_gain": (low,)}
     assert found.pair.fit.found.mean_square < rounds[-1].after.found.mean_square
     rounds, made = searched("flow_gain")
-    assert _exchanged(bench, rounds, made, names) is None
-    assert _exchanged(bench, rounds[:1], made, names) is None
+    assert _exchanged(models, rounds, made, names) is None
+    assert _exchanged(models, rounds[:1], made, names) is None

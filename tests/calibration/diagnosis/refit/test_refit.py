@@ -7,11 +7,11 @@ import pandas as pd
 import pytest
 
 from calibration.diagnosis.diagnosis import baseline_gap, diagnose
-from calibration.diagnosis.refit.comparison import Bench
-from calibration.diagnosis.refit.held_out import HeldOut, growth, held_out
+from calibration.diagnosis.refit.comparison import ModelComparison
+from calibration.diagnosis.refit.refit import HeldOut, growth, held_out
 from calibration.evaluation.intervals import alternating_intervals, default_intervals
 from calibration.evaluation.settings import ModelSettings
-from mpc.reports.diagnosis_statistics import statistics_content
+from mpc.reports.diagnosis_words import alternating_sentence
 from thermal import Case, Telemetry
 from thermal.pilot.building import pilot_building
 from thermal.pilot.twin import TwinRanges, TwinSettings, generate_twin
@@ -57,7 +57,7 @@ def test_days_alternate_where_the_last_third_shows_what_the_others_do_not() -> N
     assert (list(found.tuned), list(found.judged)) == alternating_intervals(case)
     assert answer["intervals"]["mae_of_last_third"] == found.last_third == pytest.approx(baseline_gap(case, dx=1.0), rel=1e-12)
     assert max(found.where.zones, key=lambda s: s.share).name == case.building.zone_names[1]
-    assert "tuning and held-out days alternate" in statistics_content(found)["elsewhere"]
+    assert "tuning and held-out days alternate" in alternating_sentence(found)
 
 
 def test_given_intervals_are_kept_whatever_they_show() -> None:
@@ -71,7 +71,7 @@ def test_given_intervals_are_kept_whatever_they_show() -> None:
 
 def test_days_do_not_alternate_where_runs_have_no_room_and_lose_what_is_not_measured() -> None:
     case = late_heat()
-    long = Bench(case, ModelSettings(dx=1.0), horizon="60h")
+    long = ModelComparison(case, ModelSettings(dx=1.0), horizon="60h")
     before = long.tuned, long.judged
     inputs = long.build({}).inputs
     assert not long.alternate(inputs)  # no run of 60 hours begins and ends in two days
@@ -80,7 +80,7 @@ def test_days_do_not_alternate_where_runs_have_no_room_and_lose_what_is_not_meas
     gap = case.telemetry.frame.copy()
     missing = (gap.index > judged[1].start - pd.Timedelta("6h")) & (gap.index <= judged[1].end)
     gap.loc[missing, [c for c in gap.columns if c.endswith("zone_air_temperature_sensor")]] = np.nan
-    bench = Bench(Case(case.building, Telemetry.from_frame(gap)), ModelSettings(dx=1.0))
-    assert bench.alternate(bench.build({}).inputs)
-    assert bench.judged == [judged[0], *judged[2:]]
-    assert held_out(bench, bench.fit({}, [{}])).days.size == len(bench.judged)  # each is one day
+    models = ModelComparison(Case(case.building, Telemetry.from_frame(gap)), ModelSettings(dx=1.0))
+    assert models.alternate(models.build({}).inputs)
+    assert models.judged == [judged[0], *judged[2:]]
+    assert held_out(models, models.fit({}, [{}])).days.size == len(models.judged)  # each is one day

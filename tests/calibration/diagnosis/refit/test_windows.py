@@ -8,12 +8,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from calibration.diagnosis.refit.comparison import Bench, Fit
-from calibration.diagnosis.refit.held_out import held_out
-from calibration.diagnosis.refit.refit import Refit, Work
+from calibration.diagnosis.refit.comparison import Fit, ModelComparison
+from calibration.diagnosis.refit.refit import WINDOWS, Refit, Work, held_out, look_again
 from calibration.diagnosis.screen.gains import Gain
 from calibration.diagnosis.screen.screen import screen
-from calibration.diagnosis.screen.windows import WINDOWS, look_again
 from calibration.evaluation.settings import ModelSettings
 from thermal import Case, Telemetry
 from thermal.inputs.provider import telemetry_inputs
@@ -54,12 +52,12 @@ def planted() -> tuple[Case, str, FloatArray]:
 
 
 @cache
-def at_work() -> tuple[Bench, Fit, Work, tuple[Gain, ...]]:
-    bench = Bench(planted()[0], ModelSettings(dx=1.0))
-    bench.drivers.openings = np.zeros_like(bench.drivers.openings)  # nothing was seen at the start
-    fit = bench.fit({}, [{}])
-    made, gains, _ = screen(bench, fit, [WINDOWS, "capacity_limit", "flow_gain"])
-    return bench, fit, Work(bench, fit, held_out(bench, fit), made), tuple(gains)
+def at_work() -> tuple[ModelComparison, Fit, Work, tuple[Gain, ...]]:
+    models = ModelComparison(planted()[0], ModelSettings(dx=1.0))
+    models.drivers.openings = np.zeros_like(models.drivers.openings)  # nothing was seen at the start
+    fit = models.fit({}, [{}])
+    made, gains, _ = screen(models, fit, [WINDOWS, "capacity_limit", "flow_gain"])
+    return models, fit, Work(models, fit, held_out(models, fit), made), tuple(gains)
 
 
 def refit(effect: str) -> Refit:
@@ -71,8 +69,8 @@ def refit(effect: str) -> Refit:
 
 
 def test_windows_are_found_behind_the_effect_that_won() -> None:
-    bench, _, work, gains = at_work()
-    bench.drivers.openings = np.zeros_like(bench.drivers.openings)
+    models, _, work, gains = at_work()
+    models.drivers.openings = np.zeros_like(models.drivers.openings)
     won = refit("capacity_limit")
     first, *others = look_again(work, gains, [won], won)
     assert first.screened.effect == WINDOWS
@@ -80,25 +78,25 @@ def test_windows_are_found_behind_the_effect_that_won() -> None:
     assert first.gain > won.gain
     _, zone, opened = planted()
     assert first.screened.zones == (zone,)
-    seen = bench.drivers.openings
+    seen = models.drivers.openings
     assert (seen[:, 0] * opened).sum() > 0.8 * max(opened.sum(), seen[:, 0].sum())
     assert not seen[:, 1:].any()
     assert first.fit.values[f"opened_window_area@{zone}"] == pytest.approx(AREA, rel=0.15)
 
 
 def test_the_old_openings_stay_where_the_new_ones_gain_less() -> None:
-    bench, _, work, gains = at_work()
-    won, before = refit("capacity_limit"), np.eye(*bench.drivers.openings.shape)
-    bench.drivers.openings = before
+    models, _, work, gains = at_work()
+    won, before = refit("capacity_limit"), np.eye(*models.drivers.openings.shape)
+    models.drivers.openings = before
     better = Refit(**{**vars(refit(WINDOWS)), "gain": 1e6})
     assert look_again(work, gains, [better, won], won) == [better, won]
-    assert bench.drivers.openings is before
+    assert models.drivers.openings is before
 
 
 def test_nobody_looks_where_windows_are_no_rival() -> None:
-    bench, _, work, gains = at_work()
-    before, won = bench.drivers.openings, refit("flow_gain")
+    models, _, work, gains = at_work()
+    before, won = models.drivers.openings, refit("flow_gain")
     assert look_again(work, gains, [won], won) == [won]
     assert look_again(work, gains, [won], None) == [won]
     assert look_again(work, [g for g in gains if g.effect != WINDOWS], [won], refit("capacity_limit")) == [won]
-    assert bench.drivers.openings is before
+    assert models.drivers.openings is before
