@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
 from threading import Lock, Timer
 from types import TracebackType
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
 if TYPE_CHECKING:
     from rich.console import Console
-    from rich.progress import Progress, TaskID
+    from rich.progress import Progress as Bar
+    from rich.progress import TaskID
 
-#: Options that every command with results has.
-Json = Annotated[bool, typer.Option("--json", help="Write JSON on stdout, and nothing else.")]
-Force = Annotated[bool, typer.Option("--force", help="Replace earlier results in the folder.")]
+#: Called with stage, done, total.
+Progress = Callable[[str, int, int], None]
 
 #: Width of tables where the output is no terminal [characters].
 PLAIN_WIDTH = 240
@@ -37,6 +38,18 @@ def _console() -> Console:
 
     width = None if sys.stdout.isatty() else PLAIN_WIDTH
     return Console(file=sys.stdout, width=width, markup=False, highlight=False, emoji=False)
+
+
+def silent(stage: str, done: int, total: int) -> None:
+    """Tell nobody of progress.
+
+    Parameters
+    ----------
+    stage : str
+        What is being done.
+    done, total : int
+        How much of it.
+    """
 
 
 def is_narrow() -> bool:
@@ -67,11 +80,7 @@ def complain(text: str) -> None:
 
 
 def show_table(
-    title: str,
-    columns: Sequence[str],
-    rows: Iterable[Sequence[str]],
-    left: Sequence[int] = (0,),
-    more: str = "--json lists them all",
+    title: str, columns: Mapping[str, str], rows: Iterable[Sequence[Any]], more: str = "--json lists them all"
 ) -> None:
     """Write a table to stdout.
 
@@ -79,12 +88,10 @@ def show_table(
     ----------
     title : str
         Above the table.
-    columns : sequence of str
-        Headers.
-    rows : iterable of sequence of str
-        Cells.
-    left : sequence of int
-        Columns of text; the others are numbers.
+    columns : mapping of str to str
+        How the numbers below each header are spelled, such as ``.3f``; columns of text have none.
+    rows : iterable of sequence
+        Cells; None is a dash, and text stands as it is in columns of numbers too.
     more : str
         Where to find the rows that are left out of a long table.
     """
@@ -94,15 +101,47 @@ def show_table(
 
     listed = list(rows)
     table = Table(box=SIMPLE_HEAD, pad_edge=False)
-    for number, name in enumerate(columns):
-        table.add_column(name, justify="left" if number in left else "right", overflow="fold")
+    for name, spelled in columns.items():
+        table.add_column(name, justify="right" if spelled else "left", overflow="fold")
     for row in listed[:MOST_ROWS]:
-        table.add_row(*row)
+        table.add_row(*(_cell(value, spelled) for value, spelled in zip(row, columns.values(), strict=True)))
     out = _console()
     out.print(Text(f"\n{title}", style="bold"))
     out.print(table)
     if len(listed) > MOST_ROWS:
         out.print(f"and {len(listed) - MOST_ROWS} more; {more}")
+
+
+def _cell(value: Any, spelled: str) -> str:
+    return "–" if value is None else value if isinstance(value, str) else format(value, spelled)
+
+
+def answer(json: bool, content: Mapping[str, Any], show: Callable[[], None], report: Path | None = None) -> int:
+    """Write what a command found, as JSON or in sentences and tables, and where its page is.
+
+    Parameters
+    ----------
+    json : bool
+        Whether JSON is asked for.
+    content : mapping
+        Plain types.
+    show : callable
+        Writes it in words.
+    report : Path, optional
+        The page.
+
+    Returns
+    -------
+    int
+        Exit code: 0.
+    """
+    if json:
+        write_json(content)
+        return 0
+    show()
+    if report is not None:
+        say(f"Report: {report}")
+    return 0
 
 
 def write_json(content: Mapping[str, Any]) -> None:
@@ -131,7 +170,7 @@ class Waiting:
         self.label = label
         self._lock = Lock()
         self._timer: Timer | None = None
-        self._bar: Progress | None = None
+        self._bar: Bar | None = None
         self._task: TaskID | None = None
         self._state: tuple[str, int, int | None] = (label, 0, None)
 

@@ -1,28 +1,31 @@
-"""The closed loop as a Gymnasium environment."""
+"""The closed loop as a Gymnasium environment, and that of an office in one call."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Protocol, runtime_checkable
 
 import gymnasium
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
-from mpc.environment.actions import SUPPLY_SETPOINTS, ActionLayout
-from mpc.environment.features import LARGEST
-from mpc.environment.observation import Observation, ObservationLayout
-from mpc.environment.outlook import BLOCK_ENDS, Outlook, clock
+from mpc.environment.features import BLOCK_ENDS, LARGEST, Outlook, clock
+from mpc.environment.layout import SUPPLY_SETPOINTS, ActionLayout, Observation, ObservationLayout
 from mpc.environment.reward import REWARDS, Reward
 from mpc.errors import MpcError
 from mpc.kpi.kpis import measure_kpis
 from mpc.loop.history import RecentSteps
+from mpc.loop.make import PlantSettings, pilot_weather, simulated_plant
+from mpc.loop.noise import SensorNoise
 from mpc.loop.plant import Measurements, Plant
 from mpc.scenario.forecaster import Forecaster
 from mpc.scenario.scenario import Scenario
 from thermal._types import FloatArray
 from thermal.errors import describe, nearest
+from thermal.pilot.building import pilot_building
 
 
 @runtime_checkable
@@ -273,3 +276,72 @@ def _last_steps(plant: Any, course: _Course) -> RecentSteps:
     gas = np.zeros(n) if whole.gas is None else whole.gas[-n:]
     temperature, electricity = list(whole.zone_temperature[-n - 1 :]), whole.electricity[-n:].tolist()
     return RecentSteps(whole.step, temperature, electricity, gas.tolist())
+
+
+@dataclass(frozen=True)
+class Office:
+    """A generated office, as `thermal.pilot.building.pilot_building` draws it.
+
+    Parameters
+    ----------
+    zones, floors : int
+        On all floors together; number of storeys.
+    floor_area : float
+        Of all floors together [m2].
+    seed : int
+        Of its plan, and of the first weather.
+    """
+
+    zones: int = 12
+    floors: int = 2
+    floor_area: float = 600.0
+    seed: int = 1
+
+
+def office_environment(
+    *,
+    office: Office | None = None,
+    plant: PlantSettings | None = None,
+    starts: Sequence[str] = ("2023-01-09",),
+    days: int = 7,
+    reward: str | Reward = "economic",
+    histograms: bool = False,
+    episode_steps: int | None = None,
+) -> ControlEnvironment:
+    """Make the environment of an office on its reduced model.
+
+    Parameters
+    ----------
+    office : Office, optional
+        Of twelve zones and 600 m2 by default.
+    plant : PlantSettings, optional
+        How it is simulated; control volumes of 1 m and the errors of `SensorNoise` by default. Forecasts are as long
+        as what is observed of them.
+    starts : sequence of str
+        Local days at which an episode may begin, ISO 8601; each has weather of a seed of its own.
+    days : int
+        Length of an episode [d]; the scenario is six hours longer, for the last forecast.
+    reward : str or Reward
+        As in `ControlEnvironment`.
+    histograms : bool
+        As in `ControlEnvironment`.
+    episode_steps : int, optional
+        As in `ControlEnvironment`.
+
+    Returns
+    -------
+    ControlEnvironment
+        To be reset.
+    """
+    drawn = office or Office()
+    building = pilot_building(
+        drawn.seed, floor_area=drawn.floor_area, zones=drawn.zones, floors=drawn.floors, name="office"
+    )  # fmt: skip
+    given = plant or PlantSettings(dx=1.0, noise=SensorNoise())
+    given = replace(given, horizon=round(BLOCK_ENDS[-1] * 3600.0 / given.step_seconds))
+    plants = []
+    for k, start in enumerate(starts):
+        end = pd.Timestamp(start) + pd.Timedelta(days=days, hours=BLOCK_ENDS[-1])
+        weather = pilot_weather(drawn.seed + k, start, days + 1.0)
+        plants.append(simulated_plant(building, weather, start, end.isoformat(), given))
+    return ControlEnvironment(plants, reward=reward, histograms=histograms, episode_steps=episode_steps)

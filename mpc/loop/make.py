@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from os import PathLike
-from typing import Literal
+from typing import Literal, get_args
 
 import pandas as pd
 
@@ -16,20 +17,22 @@ from mpc.loop.reduced import reduced_building
 from mpc.loop.run import FixedSetpoints
 from mpc.loop.simulated import SimulatedPlant
 from mpc.scenario.carbon import CarbonIntensity
+from mpc.scenario.comfort import ComfortBand
 from mpc.scenario.forecaster import Forecaster
 from mpc.scenario.gains import InternalGains
 from mpc.scenario.grid import StepGrid
 from mpc.scenario.occupancy import Occupancy
 from mpc.scenario.paper import paper_carbon, paper_tariff
-from mpc.scenario.scenario import build_scenario
+from mpc.scenario.scenario import Scenario, build_scenario
 from mpc.scenario.tariff import Tariff
 from mpc.scenario.weather import Weather
 from thermal.case.building import Building
 from thermal.case.case import Case
 from thermal.case.load import load_case
 from thermal.case.save import save_case
+from thermal.case.schema import Device
 from thermal.effects.effect import Chosen
-from thermal.errors import describe
+from thermal.errors import describe, nearest
 from thermal.hvac._system import HvacSystem
 from thermal.model.simulator import Simulator
 from thermal.network.extension import Extension
@@ -37,77 +40,131 @@ from thermal.pilot.building import pilot_building
 from thermal.pilot.sizing import size_system
 from thermal.pilot.weather import MOUNTAIN_VIEW, generate_weather
 
-ModelKind = Literal["reduced", "grid", "random"]
+#: What steps the plant: the reduced model, its grid with the mean of the shuffle, or with the random shuffle.
+PlantKind = Literal["reduced", "grid", "random"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class SimulationSettings:
+    """Building, HVAC system, prices and people of a simulated plant: what single plants and studies have in common.
+
+    Parameters
+    ----------
+    dx : float, optional
+        Distance between control volumes of a plan [m].
+    kind : {"reduced", "grid", "random"}
+        How the building steps: reduced to its modes, on the grid with the mean of the shuffle, or with the random one.
+    system : HvacSystem, optional
+        Its HVAC system; sized by `thermal.pilot.size_system` by default.
+    tariff : Tariff
+        Prices; those of the paper's simulator by default.
+    carbon : CarbonIntensity
+        Emissions; those of the paper's simulator by default.
+    occupancy : Occupancy, optional
+        People; an office's schedule by default.
+    comfort : ComfortBand, optional
+        Comfort band; BOPTEST's office by default.
+    noise : SensorNoise, optional
+        Errors of what is measured; none by default.
+    seed : int
+        Of all that is random.
+
+    Raises
+    ------
+    PlantError
+        When the kind is not known, with the nearest one.
+    """
+
+    dx: float | None = None
+    kind: PlantKind = "reduced"
+    system: HvacSystem | None = None
+    tariff: Tariff = field(default_factory=paper_tariff)
+    carbon: CarbonIntensity = field(default_factory=paper_carbon)
+    occupancy: Occupancy | None = None
+    comfort: ComfortBand | None = None
+    noise: SensorNoise | None = None
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        known = get_args(PlantKind)
+        if self.kind not in known:
+            advice = nearest(self.kind, known)
+            raise PlantError(describe("plant", f"one of {', '.join(known)}", repr(self.kind), advice))
+
+    def scenario(
+        self, building: Building, grid: StepGrid, weather: Weather, gains: InternalGains | None = None
+    ) -> Scenario:
+        """Put weather, people, prices and emissions on a grid of steps.
+
+        Parameters
+        ----------
+        building : Building
+            Zones and floor areas.
+        grid : StepGrid
+            Steps.
+        weather : Weather
+            Covers the grid.
+        gains : InternalGains, optional
+            Heat of people, light and equipment; an office's by default.
+        """
+        return build_scenario(
+            building, grid, weather, self.tariff, carbon=self.carbon, occupancy=self.occupancy, gains=gains,
+            comfort=self.comfort, seed=self.seed,
+        )  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlantSettings(SimulationSettings):
+    """Choices of `simulated_plant`, beside those of `SimulationSettings`.
+
+    Parameters
+    ----------
+    parameters : mapping of str to float, optional
+        Of the building, by name [parameter units]; starting values for the rest.
+    effects : tuple of Chosen
+        What the building has and the baseline lacks, `thermal.effects.chosen`.
+    order : int, optional
+        Largest number of states of a reduced building.
+    gains : InternalGains, optional
+        Heat of people, light and equipment; an office's, all of it into the air, by default.
+    step_seconds : float
+        Step of the plant [s].
+    control_steps : int
+        Steps of the plant in a control step.
+    horizon : int, optional
+        Steps of the forecasts, perfect ones; none by default.
+    warm_up_days : int
+        How often the first day is run before the start [d].
+    pressures : bool
+        Whether the pressures of ducts and loop are measured; a case that has them is one of format 2.
+    """
+
+    parameters: Mapping[str, float] | None = None
+    effects: tuple[Chosen, ...] = ()
+    order: int | None = None
+    gains: InternalGains | None = None
+    step_seconds: float = 300.0
+    control_steps: int = 1
+    horizon: int | None = None
+    warm_up_days: int = 1
+    pressures: bool = False
 
 
 def simulated_plant(
-    building: Building,
-    weather: Weather,
-    start: str,
-    end: str,
-    *,
-    step_seconds: float = 300.0,
-    model: ModelKind = "reduced",
-    dx: float | None = None,
-    parameters: Mapping[str, float] | None = None,
-    effects: tuple[Chosen, ...] = (),
-    order: int | None = None,
-    system: HvacSystem | None = None,
-    occupancy: Occupancy | None = None,
-    gains: InternalGains | None = None,
-    tariff: Tariff | None = None,
-    carbon: CarbonIntensity | None = None,
-    control_steps: int = 1,
-    noise: SensorNoise | None = None,
-    horizon: int | None = None,
-    warm_up_days: int = 1,
-    pressures: bool = False,
-    seed: int = 0,
+    building: Building, weather: Weather, start: str, end: str, settings: PlantSettings | None = None
 ) -> SimulatedPlant:
     """Make a plant of a building in one call; `SimulatedPlant` has every choice.
 
     Parameters
     ----------
     building : Building
-        With devices of types ``vav``, ``ahu`` and ``boiler``.
+        Devices of an HVAC system that it lacks are assumed, `equip`.
     weather : Weather
         Covers the time.
     start, end : str
         ISO 8601; without an offset local to the building.
-    step_seconds : float
-        Step of the plant [s].
-    model : {"reduced", "grid", "random"}
-        The building reduced to its modes, on the grid with the mean of the shuffle, or with the random one.
-    dx : float, optional
-        Distance between control volumes of a plan [m].
-    parameters : mapping of str to float, optional
-        Of the building, by name [parameter units]; starts for the rest.
-    effects : tuple of Chosen
-        What the building has and the baseline lacks, `thermal.effects.chosen`.
-    order : int, optional
-        Largest number of states of a reduced building.
-    system : HvacSystem, optional
-        Its plant; sized by `thermal.pilot.size_system` by default.
-    occupancy : Occupancy, optional
-        People; an office's schedule by default.
-    gains : InternalGains, optional
-        Heat of people, light and equipment; an office's, all of it into the air, by default.
-    tariff : Tariff, optional
-        Prices; those of the paper's simulator by default.
-    carbon : CarbonIntensity, optional
-        Emissions; those of the paper's simulator by default.
-    control_steps : int
-        Steps of the plant in a control step.
-    noise : SensorNoise, optional
-        Errors of what is measured; none by default.
-    horizon : int, optional
-        Steps of the forecasts, perfect ones; none by default.
-    warm_up_days : int
-        How often the first day is run before the start [d].
-    pressures : bool
-        Whether the pressures of ducts and loop are measured.
-    seed : int
-        Of all that is random.
+    settings : PlantSettings, optional
+        All that has a default.
 
     Returns
     -------
@@ -117,30 +174,72 @@ def simulated_plant(
     Raises
     ------
     PlantError
-        When the parts do not fit each other, the kind of model is not known, or the building cannot have an effect.
+        When the parts do not fit each other, or the building cannot have an effect.
     """
-    grid = StepGrid.between(start, end, step_seconds, building)
-    scenario = build_scenario(
-        building, grid, weather, tariff or paper_tariff(), carbon=carbon or paper_carbon(), occupancy=occupancy,
-        gains=gains, seed=seed,
-    )  # fmt: skip
+    given, (building, _) = settings or PlantSettings(), equip(building)
+    grid = StepGrid.between(start, end, given.step_seconds, building)
+    scenario = given.scenario(building, grid, weather, given.gains)
     built: BuildingModel
-    extras: tuple[Extension, ...] = (*effects, RadiantGains()) if scenario.heat.radiates else effects
-    if model == "reduced":
-        built = reduced_building(building, parameters, step_seconds=step_seconds, dx=dx, effects=extras, order=order)
-    elif model in ("grid", "random"):
-        shuffle: Literal["mean", "random"] = "random" if model == "random" else "mean"
-        built = GridBuilding(
-            Simulator(building, parameters, step_seconds, dx, shuffle=shuffle, seed=seed, effects=extras)
-        )
+    extras: tuple[Extension, ...] = (*given.effects, RadiantGains()) if scenario.heat.radiates else given.effects
+    step, dx = given.step_seconds, given.dx
+    if given.kind == "reduced":
+        built = reduced_building(
+            building, given.parameters, step_seconds=step, dx=dx, effects=extras, order=given.order
+        )  # fmt: skip
     else:
-        raise PlantError(describe("model", "'reduced', 'grid' or 'random'", repr(model)))
-    check_extras(effects, built.network)
+        shuffle: Literal["mean", "random"] = "random" if given.kind == "random" else "mean"
+        built = GridBuilding(
+            Simulator(building, given.parameters, step, dx, shuffle=shuffle, seed=given.seed, effects=extras)
+        )
+    check_extras(given.effects, built.network)
     return SimulatedPlant(
-        scenario, system or size_system(building), built, control_steps=control_steps, noise=noise,
-        forecaster=None if horizon is None else Forecaster(scenario, horizon), warm_up_days=warm_up_days,
-        pressures=pressures, seed=seed,
+        scenario, given.system or size_system(building), built, control_steps=given.control_steps, noise=given.noise,
+        forecaster=None if given.horizon is None else Forecaster(scenario, given.horizon),
+        warm_up_days=given.warm_up_days, pressures=given.pressures, seed=given.seed,
     )  # fmt: skip
+
+
+def equip(building: Building) -> tuple[Building, tuple[str, ...]]:
+    """Give a building the devices of an HVAC system that it lacks: a terminal a zone, an air handler, a boiler.
+
+    Parameters
+    ----------
+    building : Building
+        With any devices.
+
+    Returns
+    -------
+    tuple
+        The building, and what was done, in words.
+
+    Examples
+    --------
+    >>> from thermal.data import load_bundled_case
+    >>> equip(load_bundled_case().building)[1]
+    ('the case names no air handler and no boiler: one of each is assumed',)
+    """
+    terminals = {z: [d for d in building.devices_of(z) if d.type == "vav"] for z in building.zone_names}
+    spare = {d.name for found in terminals.values() for d in found[1:]}  # a plant is sized with one a zone
+    bare = [zone for zone, found in terminals.items() if not found]
+    names = {"ahu": "air handler", "boiler": "boiler"}
+    lacking = [kind for kind in names if not any(d.type == kind for d in building.devices)]
+    taken = {d.name for d in building.devices} | set(building.zone_names)
+    wanted = [(f"VAV_{zone}", "vav", zone) for zone in bare] + [(kind.upper(), kind, None) for kind in lacking]
+    devices = [d for d in building.devices if d.name not in spare]
+    for name, kind, zone in wanted:
+        while name in taken:
+            name += "_"
+        taken.add(name)
+        devices.append(Device(name=name, type=kind, zone=zone))
+    said = []
+    if bare:
+        said.append(f"zones without a terminal get one: {', '.join(bare[:6])}{' ...' if len(bare) > 6 else ''}")
+    if spare:
+        said.append(f"zones have one terminal each: left out {', '.join(sorted(spare)[:6])}")
+    if lacking:
+        one = " and ".join(f"no {names[kind]}" for kind in lacking)
+        said.append(f"the case names {one}: one{' of each' if len(lacking) > 1 else ''} is assumed")
+    return replace(building, devices=tuple(devices)), tuple(said)
 
 
 def pilot_weather(seed: int, start: str, days: float, step_seconds: float = 300.0) -> Weather:
@@ -168,20 +267,12 @@ def pilot_weather(seed: int, start: str, days: float, step_seconds: float = 300.
 
 def save_pilot(
     path: str | PathLike[str],
+    building: Building | None = None,
+    settings: PlantSettings | None = None,
     *,
-    seed: int = 0,
     start: str = "2023-01-09",
     days: int = 14,
-    floor_area: float = 6317.0,
-    zones: int = 123,
-    floors: int = 2,
-    dx: float = 0.5,
-    model: ModelKind = "reduced",
-    effects: tuple[Chosen, ...] = (),
-    parameters: Mapping[str, float] | None = None,
-    noise: SensorNoise | None = None,
     setpoints: Mapping[str, float] | None = None,
-    pressures: bool = False,
     overwrite: bool = False,
 ) -> Case:
     """Run the pilot building in closed loop and save plans, devices and telemetry as a case folder.
@@ -193,30 +284,16 @@ def save_pilot(
     ----------
     path : str or path-like
         Folder to make.
-    seed : int
-        Of building, weather, shuffle and noise; 0 or more.
+    building : Building, optional
+        Such as `thermal.pilot.building.pilot_building` makes in any size; the pilot of the settings' seed by default.
+    settings : PlantSettings, optional
+        Control volumes of 0.5 m and sensors with the errors of `SensorNoise` by default; the seed is the weather's too.
     start : str
         Local day of its begin, ISO 8601.
     days : int
         Length [d].
-    floor_area : float
-        Of all floors together [m2].
-    zones, floors : int
-        On all floors together; number of storeys.
-    dx : float
-        Distance between control volumes [m].
-    model : {"reduced", "grid", "random"}
-        As in `simulated_plant`.
-    effects : tuple of Chosen
-        What the building has and the baseline lacks.
-    parameters : mapping of str to float, optional
-        Of the building [parameter units].
-    noise : SensorNoise, optional
-        Errors of sensors; the defaults of `SensorNoise` by default.
     setpoints : mapping of str to float, optional
         By kind of action [K] or [Pa]; those of `SimulatedPlant.default_actions` by default.
-    pressures : bool
-        Whether the pressures of ducts and loop are measured; the case is then one of format 2.
     overwrite : bool
         Whether a case that is there already is replaced.
 
@@ -225,12 +302,10 @@ def save_pilot(
     Case
         As it was saved and loaded again.
     """
-    building = pilot_building(seed, floor_area=floor_area, zones=zones, floors=floors)
+    given = settings or PlantSettings(dx=0.5, noise=SensorNoise())
     end = (pd.Timestamp(start) + pd.Timedelta(days=days)).isoformat()
-    plant = simulated_plant(
-        building, pilot_weather(seed, start, days), start, end, model=model, dx=dx, effects=effects,
-        parameters=parameters, noise=noise or SensorNoise(), pressures=pressures, seed=seed,
-    )  # fmt: skip
+    weather = pilot_weather(given.seed, start, days)
+    plant = simulated_plant(building or pilot_building(given.seed), weather, start, end, given)
     plant.reset()
     chosen = dict(plant.default_actions)
     if setpoints:

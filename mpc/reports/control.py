@@ -12,21 +12,10 @@ from calibration.results import check_results_folder, write_results
 from mpc.reports.control_log import reason_rows
 from mpc.reports.control_tables import comparison_rows, comparison_summary, control_summary, trajectory
 from mpc.reports.control_words import comparison_verdict, control_verdict, money
-from mpc.reports.figures.control import NAMES, cost_bars, course, expectations, side_by_side
+from mpc.reports.figures.control import cost_bars, course, expectations, side_by_side
 from mpc.reports.page import clock, counted, render, significant
 from mpc.studies.compare import Comparison
 from mpc.studies.run import ControlRun, prediction_errors
-
-_RULES = {
-    "schedule": "Supply air stands at its design value; supply water is hot by day and cooler by night.",
-    "reset": "Supply air and water follow the outdoor temperature.",
-    "guideline36": "Supply air and water drift to where they cost least until zones or valves ask for more "
-    "(ASHRAE Guideline 36, trim and respond).",
-    "mpc": "Every {step} minutes supply air and water are chosen so that energy and discomfort cost least over the "
-    "next {hours:g} hours, according to the model of the building, the forecast and the prices.",
-    "bound": "As optimal control, but on a plant that is its own model, with exact sensors, and with weather and "
-    "people known in advance: what perfect knowledge would reach.",
-}
 
 
 def write_control(run: ControlRun, out: str | Path, *, command: str = "", force: bool = False) -> Path:
@@ -54,7 +43,7 @@ def write_control(run: ControlRun, out: str | Path, *, command: str = "", force:
         When the folder holds something and ``force`` is not set.
     """
     numbers = {"control.json": control_summary(run), "trajectory.parquet": trajectory(run)}
-    title = f"Control of {run.study.name}: {NAMES[run.controller]}"
+    title = f"Control of {run.study.name}: {run.entry.title}"
     together: dict[str, Any] = {"table": None, "bars": [], "together": []}
     return _write((run,), run, title, control_verdict(run), together, numbers, out, command, force)
 
@@ -114,7 +103,7 @@ def _frame(run: ControlRun, verdict: str, title: str) -> dict[str, Any]:
     study = run.study
     k, planned = run.kpis, run.sources.get("optimal plan", 0)
     cards = [
-        (money(run.cost, k.currency), f"energy, {NAMES[run.controller]}"),
+        (money(run.cost, k.currency), f"energy, {run.entry.title}"),
         (f"{significant(k.ener_tot)} kWh/m²", "energy"),
         (f"{significant(k.tdis_tot, 2)} K h", "outside of the comfort band, mean zone"),
         (f"{1e3 * (k.pele_tot or 0.0):.1f} W/m²", "highest quarter of an hour of electricity"),
@@ -135,8 +124,8 @@ def _section(run: ControlRun, shown: bool) -> dict[str, Any]:
     step, hours = round(run.plant.control_step / 60.0), 12.0
     errors, zones = prediction_errors(run), sorted(run.kpis.zones, key=lambda z: -(z.below + z.above))
     return {
-        "name": NAMES[run.controller].capitalize(), "shown": shown,
-        "how": _RULES[run.controller].format(step=step, hours=hours),
+        "name": run.entry.title.capitalize(), "shown": shown,
+        "how": run.entry.about.format(step=step, hours=hours),
         "course": course(run),
         "expectations": expectations(run) if shown else [],
         "errors": errors,
@@ -154,10 +143,10 @@ def _section(run: ControlRun, shown: bool) -> dict[str, Any]:
 def _reproduce(run: ControlRun, command: str) -> list[tuple[str, str]]:
     study = run.study
     entries = [
-        ("plant", f"building {study.kind}, steps of {study.scenario.grid.step:g} s, "
-                  f"{'sensors with noise' if study.noise else 'exact sensors'}, "
-                  f"weather forecast {'with errors' if study.errors else 'perfect'}"),
+        ("plant", f"building {study.settings.kind}, steps of {study.scenario.grid.step:g} s, "
+                  f"{'sensors with noise' if study.settings.noise else 'exact sensors'}, "
+                  f"weather forecast {'with errors' if study.settings.errors else 'perfect'}"),
         ("version", f"buildingmpc {version('buildingmpc')}, Python {platform.python_version()}"),
-        ("seed", str(study.seed)),
+        ("seed", str(study.settings.seed)),
     ]  # fmt: skip
     return entries + ([("command", command)] if command else [])

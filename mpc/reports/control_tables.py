@@ -10,7 +10,6 @@ import numpy as np
 import pandas as pd
 
 from mpc.reports.control_log import reason_rows
-from mpc.reports.figures.control import NAMES
 from mpc.studies.compare import Comparison
 from mpc.studies.run import ControlRun, prediction_errors
 from thermal.case.points import POINT_TYPES, split_column
@@ -46,12 +45,12 @@ def control_summary(run: ControlRun) -> dict[str, Any]:
 
 
 def _about(run: ControlRun) -> dict[str, Any]:
-    study = run.study
+    study, chosen = run.study, run.study.settings
     return {
-        "plant": {"building": study.kind, "step_seconds": study.scenario.grid.step, "noise": study.noise is not None,
+        "plant": {"building": chosen.kind, "step_seconds": study.scenario.grid.step, "noise": chosen.noise is not None,
                   "control_step_seconds": run.plant.control_step, "effects": list(study.built.effects)},
-        "forecast": "with errors" if study.errors else "perfect",
-        "notes": list(study.notes), "case": study.name, "version": version("buildingmpc"), "seed": study.seed,
+        "forecast": "with errors" if chosen.errors else "perfect",
+        "notes": list(study.notes), "case": study.name, "version": version("buildingmpc"), "seed": chosen.seed,
     }  # fmt: skip
 
 
@@ -101,7 +100,7 @@ def comparison_summary(comparison: Comparison) -> dict[str, Any]:
             for run in comparison.runs
         },
         "best_rule": None if best is None else best.controller,
-        "case": comparison.study.name, "version": version("buildingmpc"), "seed": comparison.study.seed,
+        "case": comparison.study.name, "version": version("buildingmpc"), "seed": comparison.study.settings.seed,
     }  # fmt: skip
 
 
@@ -118,10 +117,10 @@ def comparison_rows(comparison: Comparison) -> list[list[str]]:
         k, saving, way = run.kpis, comparison.saving(run), comparison.way_to_bound(run)
         worst = max(z.below + z.above for z in k.zones)
         rows.append([
-            NAMES[run.controller], f"{run.cost:,.2f}", f"{run.objective:,.2f}",
+            run.entry.title, f"{run.cost:,.2f}", f"{run.objective:,.2f}",
             "–" if saving is None or run is comparison.best_rule else f"{saving:.1%}".replace("-", "−"),
             f"{k.tdis_tot:.3f}", f"{worst:.2f}", f"{k.ener_tot:.3f}", f"{1e3 * (k.pele_tot or 0.0):.1f}",
             "–" if k.emis_tot is None else f"{1e3 * k.emis_tot:.1f}",
-            "–" if way is None or run.controller not in ("mpc", "bound") else f"{way:.0%}",
+            "–" if way is None or not run.entry.predictive else f"{way:.0%}",
         ])  # fmt: skip
     return rows

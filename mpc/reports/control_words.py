@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from mpc.reports.figures.control import NAMES
 from mpc.reports.page import significant
 from mpc.studies.compare import Comparison
 from mpc.studies.run import ControlRun
@@ -18,7 +17,7 @@ def control_verdict(run: ControlRun) -> str:
     """
     k, worst = run.kpis, max(run.kpis.zones, key=lambda z: z.below + z.above)
     parts = [
-        f"{NAMES[run.controller].capitalize()} spent {money(run.cost, k.currency)} on energy in "
+        f"{run.entry.title.capitalize()} spent {money(run.cost, k.currency)} on energy in "
         f"{k.hours / 24:g} days ({significant(k.ener_tot)} kWh/m², of which {_electric(run):.0%} electricity)."
     ]
     if k.tdis_tot < 1e-3:
@@ -70,9 +69,8 @@ def comparison_verdict(comparison: Comparison) -> str:
     best, mpc = comparison.best_rule, comparison.of("mpc")
     if best is None or mpc is None:
         cheapest = min(comparison.runs, key=lambda run: run.objective)
-        name = NAMES[cheapest.controller]
-        return f"{name.capitalize()} costs least: {control_verdict(cheapest)}"
-    name, change = NAMES[best.controller], 1.0 - mpc.cost / best.cost
+        return f"{cheapest.entry.title.capitalize()} costs least: {control_verdict(cheapest)}"
+    name, change = best.entry.title, 1.0 - mpc.cost / best.cost
     comfort = mpc.kpis.tdis_tot - best.kpis.tdis_tot
     parts = [
         f"Optimal control spent {money(mpc.cost, mpc.kpis.currency)} on energy, the best rule ({name}) "

@@ -85,7 +85,7 @@ def render_demo(
         "subtitle": f"Controlled on a simulated plant, {clock(study.scenario.grid.start)} to {clock(study.stamps[-1])}",
         "reproduce": [
             ("version", f"buildingmpc {version('buildingmpc')}, Python {platform.python_version()}"),
-            ("seed", str(study.seed)),
+            ("seed", str(study.settings.seed)),
         ],
     }  # fmt: skip
     return render("demo", content)

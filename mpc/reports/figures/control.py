@@ -176,10 +176,10 @@ def side_by_side(runs: Sequence[ControlRun]) -> list[Picture]:
     low, high = scenario.lower[:n].max(axis=1) - CELSIUS, scenario.upper[:n].min(axis=1) - CELSIUS
     axes[1].fill_between(x, low, high, step="pre", color="#009E73", alpha=0.13, linewidth=0)
     for run in runs:
-        record, colour = run.loop.record, COLOURS[run.controller]
+        record, colour = run.loop.record, COLOURS.get(run.controller, _OTHERS[3])
         style = {"color": colour, "linewidth": 1.2, "linestyle": "--" if run.controller == "bound" else "-"}
         spent = scenario.electricity_price[:n] * record.electricity + scenario.gas_price[:n] * _gas(run)
-        axes[0].plot(x, np.cumsum(spent) * record.step / 3.6e6, label=NAMES[run.controller], **style)
+        axes[0].plot(x, np.cumsum(spent) * record.step / 3.6e6, label=run.entry.title, **style)
         zone = record.zone_temperature[1 : n + 1] - CELSIUS
         axes[1].plot(x, zone.min(axis=1), **style)
         axes[1].plot(x, zone.max(axis=1), **style)
@@ -209,7 +209,7 @@ def cost_bars(runs: Sequence[ControlRun]) -> list[Picture]:
     """
     figure = Figure(figsize=(10.0, 0.9 + 0.42 * len(runs)))
     left, right = figure.subplots(1, 2, sharey=True, gridspec_kw={"width_ratios": [2.0, 1.0]})
-    names, place = [NAMES[run.controller] for run in runs], np.arange(len(runs))
+    names, place = [run.entry.title for run in runs], np.arange(len(runs))
     parts = np.array([_cost_parts(run) for run in runs])
     left.barh(place, parts[:, 0], color=MEASURED, alpha=0.8, label="electricity")
     left.barh(place, parts[:, 1], left=parts[:, 0], color=SIMULATED, alpha=0.8, label="gas")
@@ -239,8 +239,3 @@ def _cost_parts(run: ControlRun) -> tuple[float, float]:
         float(scenario.electricity_price[:n] @ record.electricity) * unit,
         float(scenario.gas_price[:n] @ _gas(run)) * unit,
     )
-
-
-#: Controllers in words.
-NAMES = {"mpc": "optimal control", "bound": "perfect bound", "schedule": "fixed schedule", "reset": "outdoor reset",
-         "guideline36": "Guideline 36"}  # fmt: skip
