@@ -49,9 +49,13 @@ def _imported(where: str, name: str) -> None:
     try:
         if path.suffix != ".py":
             import_module(name.partition(":")[0])
-        elif (spec := spec_from_file_location(f"buildingmpc_plugin_{path.stem}", path.resolve())) and spec.loader:
-            module = sys.modules[spec.name] = module_from_spec(spec)
+            return
+        spec = spec_from_file_location(f"buildingmpc_plugin_{path.stem}", path.resolve())
+        known = sys.modules.get(spec.name) if spec else None
+        if spec and spec.loader and getattr(known, "__file__", None) != spec.origin:
+            module = module_from_spec(spec)
             spec.loader.exec_module(module)
+            sys.modules[spec.name] = module
     except Exception as error:
         found = f"{type(error).__name__}: {error}"
         raise MpcError(f"{where}: expected a module that can be imported, {name!r} gives {found}") from error

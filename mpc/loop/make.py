@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from os import PathLike
 from typing import Literal, get_args
 
 import pandas as pd
 
+from calibration.evaluation.settings import ModelSettings
 from mpc.errors import PlantError
 from mpc.loop.building import BuildingModel, GridBuilding
 from mpc.loop.extras import RadiantGains, check_extras
 from mpc.loop.noise import SensorNoise
-from mpc.loop.reduced import reduced_building
+from mpc.loop.reduced import ReducedBuilding
 from mpc.loop.run import FixedSetpoints
 from mpc.loop.simulated import SimulatedPlant
 from mpc.scenario.carbon import CarbonIntensity
@@ -26,16 +27,23 @@ from mpc.scenario.paper import paper_carbon, paper_tariff
 from mpc.scenario.scenario import Scenario, build_scenario
 from mpc.scenario.tariff import Tariff
 from mpc.scenario.weather import Weather
+from mpc.studies.model import BuildingParameters, model_settings, parameter_vector
+from thermal._types import FloatArray
 from thermal.case.building import Building
 from thermal.case.case import Case
 from thermal.case.load import load_case
 from thermal.case.save import save_case
 from thermal.case.schema import Device
+from thermal.effects.catalogue import chosen
 from thermal.effects.effect import Chosen
 from thermal.errors import describe, nearest
 from thermal.hvac._system import HvacSystem
+from thermal.model.reduce import reduced_model
 from thermal.model.simulator import Simulator
+from thermal.model.symbolic import SymbolicModel
+from thermal.network.build import build_network
 from thermal.network.extension import Extension
+from thermal.network.structure import BASELINE
 from thermal.pilot.building import pilot_building
 from thermal.pilot.sizing import size_system
 from thermal.pilot.weather import MOUNTAIN_VIEW, generate_weather
@@ -50,8 +58,11 @@ class SimulationSettings:
 
     Parameters
     ----------
+    parameters : str, Path, CalibrationResult or mapping of str to float, optional
+        Of the building: a ``calibration.json`` or the result itself, with its effects, or values by name [parameter
+        units]; starting values for the rest.
     dx : float, optional
-        Distance between control volumes of a plan [m].
+        Distance between control volumes of a plan [m]; that of the calibration, or the plan's.
     kind : {"reduced", "grid", "random"}
         How the building steps: reduced to its modes, on the grid with the mean of the shuffle, or with the random one.
     system : HvacSystem, optional
@@ -75,6 +86,7 @@ class SimulationSettings:
         When the kind is not known, with the nearest one.
     """
 
+    parameters: BuildingParameters | None = None
     dx: float | None = None
     kind: PlantKind = "reduced"
     system: HvacSystem | None = None
@@ -112,6 +124,47 @@ class SimulationSettings:
             comfort=self.comfort, seed=self.seed,
         )  # fmt: skip
 
+    def building_model(
+        self, building: Building, grid: SymbolicModel, theta: FloatArray, built: ModelSettings,
+        extras: Sequence[Extension] = (), step_seconds: float = 300.0, order: int | None = None,
+    ) -> BuildingModel:  # fmt: skip
+        """Make what steps the building.
+
+        Parameters
+        ----------
+        building : Building
+            With its devices.
+        grid : SymbolicModel
+            Its model.
+        theta : ndarray, shape (n_parameter,)
+            Values of its parameters [parameter units].
+        built : ModelSettings
+            How the model was built.
+        extras : sequence of Extension
+            Effects, and what else was added to the baseline.
+        step_seconds : float
+            Time step [s].
+        order : int, optional
+            Largest number of states of a reduced building.
+
+        Raises
+        ------
+        PlantError
+            When the structure of the model is not that of the grid.
+        """
+        if self.kind == "reduced":
+            return ReducedBuilding(reduced_model(grid, [theta], order=order), theta, step_seconds)
+        if built.structure != BASELINE:
+            expected = "the usual structure of the model"
+            raise PlantError(describe("plant on the grid", expected, "another", "take kind='reduced'"))
+        values = {p.name: float(v) for p, v in zip(grid.network.parameters, theta, strict=True)}
+        shuffle: Literal["mean", "random"] = "random" if self.kind == "random" else "mean"
+        simulator = Simulator(
+            building, values, step_seconds, built.dx, shuffle=shuffle, reach=built.reach, seed=self.seed,
+            scopes=built.scopes, effects=extras,
+        )  # fmt: skip
+        return GridBuilding(simulator)
+
 
 @dataclass(frozen=True, kw_only=True)
 class PlantSettings(SimulationSettings):
@@ -119,10 +172,8 @@ class PlantSettings(SimulationSettings):
 
     Parameters
     ----------
-    parameters : mapping of str to float, optional
-        Of the building, by name [parameter units]; starting values for the rest.
     effects : tuple of Chosen
-        What the building has and the baseline lacks, `thermal.effects.chosen`.
+        What the building has and the baseline lacks, `thermal.effects.chosen`; with a calibration they are its own.
     order : int, optional
         Largest number of states of a reduced building.
     gains : InternalGains, optional
@@ -139,7 +190,6 @@ class PlantSettings(SimulationSettings):
         Whether the pressures of ducts and loop are measured; a case that has them is one of format 2.
     """
 
-    parameters: Mapping[str, float] | None = None
     effects: tuple[Chosen, ...] = ()
     order: int | None = None
     gains: InternalGains | None = None
@@ -179,21 +229,17 @@ def simulated_plant(
     given, (building, _) = settings or PlantSettings(), equip(building)
     grid = StepGrid.between(start, end, given.step_seconds, building)
     scenario = given.scenario(building, grid, weather, given.gains)
-    built: BuildingModel
-    extras: tuple[Extension, ...] = (*given.effects, RadiantGains()) if scenario.heat.radiates else given.effects
-    step, dx = given.step_seconds, given.dx
-    if given.kind == "reduced":
-        built = reduced_building(
-            building, given.parameters, step_seconds=step, dx=dx, effects=extras, order=given.order
-        )  # fmt: skip
-    else:
-        shuffle: Literal["mean", "random"] = "random" if given.kind == "random" else "mean"
-        built = GridBuilding(
-            Simulator(building, given.parameters, step, dx, shuffle=shuffle, seed=given.seed, effects=extras)
-        )
-    check_extras(given.effects, built.network)
+    built = model_settings(given.parameters, dx=given.dx, effects=given.effects)
+    effects = given.effects or chosen(built.effects)
+    extras: tuple[Extension, ...] = (*effects, RadiantGains()) if scenario.heat.radiates else effects
+    network = build_network(
+        building, dx=built.dx, reach=built.reach, scopes=built.scopes, structure=built.structure, effects=extras
+    )
+    check_extras(effects, network)
+    theta, step = parameter_vector(given.parameters, network), given.step_seconds
+    model = given.building_model(building, SymbolicModel(network), theta, built, extras, step, given.order)
     return SimulatedPlant(
-        scenario, given.system or size_system(building), built, control_steps=given.control_steps, noise=given.noise,
+        scenario, given.system or size_system(building), model, control_steps=given.control_steps, noise=given.noise,
         forecaster=None if given.horizon is None else Forecaster(scenario, given.horizon),
         warm_up_days=given.warm_up_days, pressures=given.pressures, seed=given.seed,
     )  # fmt: skip
@@ -307,9 +353,7 @@ def save_pilot(
     weather = pilot_weather(given.seed, start, days)
     plant = simulated_plant(building or pilot_building(given.seed), weather, start, end, given)
     plant.reset()
-    chosen = dict(plant.default_actions)
-    if setpoints:
-        chosen |= FixedSetpoints(setpoints, plant.actuators).at_hour(0.0)
+    actions = plant.default_actions | FixedSetpoints(setpoints or {}, plant.actuators).at_hour(0.0)
     while not plant.finished:
-        plant.step(chosen)
+        plant.step(actions)
     return load_case(save_case(plant.case(), path, overwrite=overwrite))

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from pathlib import Path
-from typing import Literal
 
 import numpy as np
 import pandas as pd
@@ -14,7 +12,7 @@ from calibration.evaluation.settings import ModelSettings
 from mpc.control.controller.action import ControllerSettings
 from mpc.errors import PlantError
 from mpc.kpi.rewards import DISCOMFORT_PRICE
-from mpc.loop.building import BuildingModel, GridBuilding
+from mpc.loop.building import BuildingModel
 from mpc.loop.make import SimulationSettings, equip
 from mpc.loop.reduced import ReducedBuilding
 from mpc.loop.simulated import SimulatedPlant
@@ -24,13 +22,12 @@ from mpc.scenario.grid import StepGrid
 from mpc.scenario.scenario import Scenario
 from mpc.scenario.weather import Weather
 from mpc.studies.controller import MODEL_STEP
-from mpc.studies.model import ORDER, model_settings, reduced
+from mpc.studies.model import ORDER, BuildingParameters, model_settings, reduced
 from thermal.case.building import Building
 from thermal.effects.catalogue import chosen
 from thermal.errors import describe
 from thermal.hvac._system import HvacSystem
-from thermal.model.reduce import ReducedModel, reduced_model
-from thermal.model.simulator import Simulator
+from thermal.model.reduce import ReducedModel
 from thermal.pilot.sizing import size_system
 
 #: How far forecasts reach [h].
@@ -45,10 +42,7 @@ class StudySettings(SimulationSettings):
 
     Parameters
     ----------
-    parameters : str, Path or mapping of str to float, optional
-        Of the building, and so of the plant: a ``calibration.json`` with its effects, or values by name [parameter
-        units]; starting values by default.
-    controller_parameters : str, Path or mapping of str to float, optional
+    controller_parameters : str, Path, CalibrationResult or mapping of str to float, optional
         What optimal control believes [parameter units]; the same by default.
     order : int, optional
         Largest number of states of the controller's model.
@@ -60,8 +54,7 @@ class StudySettings(SimulationSettings):
         Time between two actions of optimal control [s]; rules act every `MODEL_STEP`.
     """
 
-    parameters: str | Path | Mapping[str, float] | None = None
-    controller_parameters: str | Path | Mapping[str, float] | None = None
+    controller_parameters: BuildingParameters | None = None
     order: int | None = ORDER
     errors: Mapping[str, ErrorGrowth] = field(default_factory=dict)
     comfort_price: float = DISCOMFORT_PRICE
@@ -144,28 +137,16 @@ class Study:
             self.scenario, ahead, {} if bound else self.settings.errors,
             occupancy="actual" if bound else "expected", seed=self.settings.seed,
         )  # fmt: skip
-        known = bound and self.settings.kind == "reduced"
-        building = ReducedBuilding(self.truth, step_seconds=MODEL_STEP) if known else self._plants_building()
+        given, truth = self.settings, self.truth
+        if bound and given.kind == "reduced":
+            building: BuildingModel = ReducedBuilding(truth, step_seconds=MODEL_STEP)
+        else:
+            effects = chosen(self.built.effects)
+            building = given.building_model(self.building, truth.grid, truth.theta, self.built, effects, MODEL_STEP)
         return SimulatedPlant(
             self.scenario, self.system, building, control_steps=count, forecaster=forecaster,
-            noise=None if bound else self.settings.noise, seed=self.settings.seed,
+            noise=None if bound else given.noise, seed=given.seed,
         )  # fmt: skip
-
-    def _plants_building(self) -> BuildingModel:
-        """Make the building that the plant steps, from the same parameters as the truth."""
-        kind, built = self.settings.kind, self.built
-        if kind == "reduced":
-            return ReducedBuilding(reduced_model(self.truth.grid, [self.truth.theta]), step_seconds=MODEL_STEP)
-        if built.structure != ModelSettings().structure:
-            expected = "the usual structure of the model"
-            raise PlantError(describe("plant on the grid", expected, "another", "take kind='reduced'"))
-        values = {p.name: float(v) for p, v in zip(self.truth.network.parameters, self.truth.theta, strict=True)}
-        shuffle: Literal["mean", "random"] = "random" if kind == "random" else "mean"
-        simulator = Simulator(
-            self.building, values, MODEL_STEP, built.dx, shuffle=shuffle, reach=built.reach, seed=self.settings.seed,
-            scopes=built.scopes, effects=chosen(built.effects),
-        )  # fmt: skip
-        return GridBuilding(simulator)
 
 
 def make_study(
