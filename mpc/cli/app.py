@@ -19,11 +19,10 @@ from mpc.cli.control import compare, control
 from mpc.cli.demo import demo
 from mpc.cli.diagnose import diagnose
 from mpc.cli.doctor import doctor
-from mpc.cli.evaluate import evaluate
+from mpc.cli.evaluate import evaluate, simulate
 from mpc.cli.imports import import_devices, import_plan, import_telemetry
 from mpc.cli.label import label
 from mpc.cli.serve import serve
-from mpc.cli.simulate import simulate
 from mpc.plugins import load_plugins
 
 P = ParamSpec("P")

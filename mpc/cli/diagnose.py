@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
+from mpc.cli import options as opt
 from mpc.cli.console import Progress, Waiting, answer, say, show_table
-from mpc.cli.options import CaseFolder, Dx, Force, Horizon, Intervals, Json, folder, interval
 
 if TYPE_CHECKING:
     from calibration.diagnosis.diagnosis import Diagnosis
@@ -17,24 +17,24 @@ _MOST_SUSPECTS = 5
 
 
 def diagnose(
-    case: CaseFolder,
+    case: opt.CaseFolder,
     out: Annotated[
         Path,
-        folder("diagnosis.json, calibration.json of the model with the effects found, missing_watts.parquet, "
+        opt.folder("diagnosis.json, calibration.json of the model with the effects found, missing_watts.parquet, "
                "predictions.parquet, report.html"),
     ],
     tune: Annotated[
-        Intervals,
-        interval("Tuning interval, repeatable; default: the first two thirds, or two days in three where the last "
+        opt.Intervals,
+        opt.interval("Tuning interval, repeatable; default: the first two thirds, or two days in three where the last "
                  "third shows other weather."),
     ] = None,
     hold_out: Annotated[
-        Intervals, interval("Held-out interval, repeatable; default: the last third, or every third day.")
+        opt.Intervals, opt.interval("Held-out interval, repeatable; default: the last third, or every third day.")
     ] = None,
-    dx: Dx = None,
-    horizon: Horizon = "6h",
-    force: Force = False,
-    json: Json = False,
+    dx: opt.Dx = None,
+    horizon: opt.Horizon = "6h",
+    force: opt.Force = False,
+    json: opt.Json = False,
 ) -> int:  # fmt: skip
     """Say where model and building disagree, which missing effect causes it, and how far the error falls with it.
 
@@ -72,14 +72,10 @@ def run_diagnosis(
         Prediction horizon.
     """
     from calibration.diagnosis import diagnosis
-    from calibration.evaluation.intervals import parse_interval
-    from calibration.results import check_results_folder
     from mpc.reports.diagnosis import write_diagnosis
-    from thermal.case.load import load_case
 
-    check_results_folder(out, force)
-    loaded = load_case(case)
-    tuned, judged = ([parse_interval(text, loaded) for text in texts] for texts in intervals)
+    loaded = opt.open_case(case, out, force)
+    tuned, judged = (opt.parse_intervals(texts, loaded) for texts in intervals)
     result = diagnosis.diagnose(loaded, tuned, judged, dx=dx, horizon=horizon, progress=progress)
     return result, write_diagnosis(result, loaded, out, force=force)
 

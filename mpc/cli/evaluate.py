@@ -1,27 +1,29 @@
-"""``buildingmpc evaluate``."""
+"""``buildingmpc evaluate`` and ``buildingmpc simulate``: a model on the telemetry of a case."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
+import typer
+
+from mpc.cli import options as opt
 from mpc.cli.console import Waiting, answer, say, show_table
-from mpc.cli.options import CaseFolder, Dx, Force, Horizon, Intervals, Json, Parameters, SchemeName, folder, interval
 
 if TYPE_CHECKING:
     from calibration.evaluation.n_step import Evaluation
 
 
 def evaluate(
-    case: CaseFolder,
-    parameters: Parameters = None,
-    horizon: Horizon = "6h",
-    interval: Annotated[Intervals, interval("Interval to evaluate, repeatable; default: all the telemetry.")] = None,
-    dx: Dx = None,
-    scheme: SchemeName = None,
-    out: Annotated[Path | None, folder("evaluation.json, predictions.parquet, report.html")] = None,
-    force: Force = False,
-    json: Json = False,
+    case: opt.CaseFolder,
+    parameters: opt.Parameters = None,
+    horizon: opt.Horizon = "6h",
+    interval: Annotated[opt.Intervals, opt.interval("To evaluate, repeatable; default: all the telemetry.")] = None,
+    dx: opt.Dx = None,
+    scheme: opt.SchemeName = None,
+    out: Annotated[Path | None, opt.folder("evaluation.json, predictions.parquet, report.html")] = None,
+    force: opt.Force = False,
+    json: opt.Json = False,
 ) -> int:
     """N-step prediction error of a model on the telemetry of a case.
 
@@ -29,15 +31,10 @@ def evaluate(
     --interval 2023-10-16/2023-10-23 --out errors
     """
     from calibration.evaluation.case_model import evaluate_case
-    from calibration.evaluation.intervals import parse_interval
-    from calibration.results import check_results_folder
     from mpc.reports.evaluation import write_evaluation
-    from thermal.case.load import load_case
 
-    if out is not None:
-        check_results_folder(out, force)
-    loaded = load_case(case)
-    intervals = [parse_interval(text, loaded) for text in interval or ()]
+    loaded = opt.open_case(case, out, force)
+    intervals = opt.parse_intervals(interval, loaded)
     source = parameters.name if parameters is not None else "uncalibrated start values"
     with Waiting("evaluate") as progress:
         found = evaluate_case(
@@ -60,3 +57,49 @@ def _show(found: Evaluation, source: str) -> None:
         show_table("Horizons", {"horizon": "", "MAE [K]": ".3f"}, found.by_horizon.items())
     zones = sorted(((z, e["mae"], e["bias"]) for z, e in found.by_zone().items()), key=lambda row: -row[1])
     show_table("Zones", {"zone": "", "MAE [K]": ".3f", "bias [K]": ".3f"}, zones)
+
+
+def simulate(
+    case: opt.CaseFolder,
+    start: opt.Start,
+    end: Annotated[str, typer.Option(metavar="T", help="End.")],
+    parameters: opt.Parameters = None,
+    dx: opt.Dx = None,
+    scheme: opt.SchemeName = None,
+    out: Annotated[Path | None, opt.folder("simulation.json, simulation.parquet, report.html")] = None,
+    force: opt.Force = False,
+    json: opt.Json = False,
+) -> int:
+    """Replay the inputs of a building through its model.
+
+    Example: buildingmpc simulate cases/office --start 2023-10-16 --end 2023-10-18
+    --parameters results/calibration.json --out replay
+    """
+    from calibration.evaluation.case_model import case_model
+    from mpc.reports.case import simulation_summary, write_simulation
+    from thermal.case.times import local_timestamp
+    from thermal.model.simulation import simulate as replay
+
+    loaded = opt.open_case(case, out, force)
+    first, last = (local_timestamp(time, loaded.building) for time in (start, end))
+    steps = max(1, int((last - first).total_seconds() // loaded.step))
+    with Waiting("simulate") as progress:
+        ready = case_model(loaded, parameters, dx=dx, scheme=scheme)
+        stepping, spin_up = ready.settings.stepping, ready.settings.spin_up_seconds
+        found = replay(
+            loaded, ready.grid, ready.theta, first, last, stepping, spin_up,
+            progress=lambda done: progress("simulate", done, steps),
+        )  # fmt: skip
+        report = write_simulation(found, loaded, out, parameters=ready.source, force=force) if out is not None else None
+    summary = simulation_summary(found, loaded, ready.source)
+    return answer(json, summary, lambda: _show_replay(summary, ready.source), report)
+
+
+def _show_replay(summary: dict[str, Any], source: str) -> None:
+    from mpc.reports.case import simulation_verdict
+
+    say(f"{simulation_verdict(summary)} Parameters: {source}.")
+    zones = sorted(([z, *(e[k] for k in ("mae", "bias", "mean_heat"))] for z, e in summary["by_zone"].items()),
+                   key=lambda row: -row[1])  # fmt: skip
+    columns = {"zone": "", "MAE [K]": ".3f", "bias [K]": ".3f", "mean heat [W]": ".0f"}
+    show_table(f"Zones, {summary['start']} to {summary['end']}", columns, zones)

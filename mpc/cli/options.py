@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import wraps
 from inspect import Parameter, Signature, signature
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+
+if TYPE_CHECKING:
+    from calibration.evaluation.intervals import Interval
+    from thermal.case.case import Case
 
 
 def folder(contents: str) -> Any:
@@ -69,6 +73,41 @@ def interval(text: str) -> Any:
         What they are for.
     """
     return typer.Option(metavar="START/END", help=text)
+
+
+def open_case(case: Path, out: Path | None, force: bool) -> Case:
+    """Load a case, once it is sure that the results may be written.
+
+    Parameters
+    ----------
+    case : Path
+        Case folder.
+    out : Path or None
+        Folder of the results, where there are to be any.
+    force : bool
+        Whether earlier results are replaced.
+    """
+    from calibration.results import check_results_folder
+    from thermal.case.load import load_case
+
+    if out is not None:
+        check_results_folder(out, force)
+    return load_case(case)
+
+
+def parse_intervals(texts: Sequence[str] | None, case: Case) -> list[Interval]:
+    """Read intervals START/END.
+
+    Parameters
+    ----------
+    texts : sequence of str, optional
+        As they were given.
+    case : Case
+        Whose clock they are on.
+    """
+    from calibration.evaluation.intervals import parse_interval
+
+    return [parse_interval(text, case) for text in texts or ()]
 
 
 def spread(command: Callable[..., int]) -> Callable[..., int]:

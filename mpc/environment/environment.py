@@ -35,20 +35,6 @@ class ScenarioPlant(Plant, Protocol):
     scenario: Scenario
 
 
-@runtime_checkable
-class _RecordingPlant(Plant, Protocol):
-    """A plant that gives its last steps at a cost that does not grow with the run."""
-
-    def recent(self, steps: int) -> RecentSteps:
-        """Give the last steps of the record.
-
-        Parameters
-        ----------
-        steps : int
-            How many of the plant's own steps, 1 or more.
-        """
-
-
 class _Course:
     """What is known of a plant's time: where an episode ends, the clock, and forecasts where there are some.
 
@@ -59,11 +45,11 @@ class _Course:
         scenario, grid = plant.scenario, plant.scenario.grid
         self.timezone = scenario.building.location.timezone
         self.each = round(plant.control_step / grid.step)
-        self.recording = isinstance(plant, _RecordingPlant)  # asked once: such a check is slow
+        self.recording = hasattr(plant, "recent")  # its last steps at a cost that does not grow with the run
         forecaster = getattr(plant, "forecaster", None)
         self.forecaster: Forecaster | None = forecaster if isinstance(forecaster, Forecaster) else None
         self.outlook: Outlook | None = None
-        self.last, self._clocks = grid.n_steps, dict[int, FloatArray]()
+        self.last = grid.n_steps
         if block_ends is not None:
             columns = plant.forecast().table.columns if self.forecaster is None else self.forecaster.columns
             area = scenario.floor_area
@@ -75,13 +61,6 @@ class _Course:
     def ahead(self) -> FloatArray | None:
         """Observed forecasts, a row a step of the scenario; None where they are asked for one by one."""
         return None if self.outlook is None or self.forecaster is None else self.outlook.table(self.forecaster)
-
-    def now(self, seconds: int) -> FloatArray:
-        """Observe the clock, each time once."""
-        known = self._clocks.get(seconds)
-        if known is None:
-            known = self._clocks[seconds] = clock(seconds, self.timezone)
-        return known
 
 
 class ControlEnvironment(gymnasium.Env[Observation, NDArray[np.float32]]):
@@ -231,7 +210,7 @@ class ControlEnvironment(gymnasium.Env[Observation, NDArray[np.float32]]):
             self._ahead = course.ahead[min(self._step, len(course.ahead) - 1)]
         elif course.outlook is not None and not ended:  # at its end a plant may have nothing left to forecast
             self._ahead = course.outlook.of_forecast(self._plant.forecast())
-        return self.layout.observe(seen.values_array, self._ahead, course.now(seen.seconds))
+        return self.layout.observe(seen.values_array, self._ahead, clock(seen.seconds, course.timezone))
 
 
 def _checked(plants: Plant | Sequence[Plant]) -> tuple[ScenarioPlant, ...]:

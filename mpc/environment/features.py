@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
+from functools import lru_cache
 from itertools import pairwise
 from pathlib import Path
 from zoneinfo import ZoneInfo
@@ -274,6 +275,7 @@ CLOCK_FEATURES = tuple(
 )
 
 
+@lru_cache(maxsize=100_000)
 def clock(seconds: int, timezone: str) -> FloatArray:
     """Observe the local clock.
 

@@ -47,7 +47,8 @@ class RegisteredController:
     perfect: bool = False
 
 
-_REGISTERED: dict[str, RegisteredController] = {}
+#: Controllers by name.
+REGISTERED: dict[str, RegisteredController] = {}
 
 
 def register_controller(
@@ -73,11 +74,11 @@ def register_controller(
     ...     return day_schedule(required_actuators(plant))
     >>> find_controller("still").title
     'setpoints that stand still'
-    >>> del _REGISTERED["still"]
+    >>> del REGISTERED["still"]
     """
 
     def register(make: ControllerFactory) -> ControllerFactory:
-        _REGISTERED[name] = RegisteredController(name, make, title or name, about, predictive, perfect)
+        REGISTERED[name] = RegisteredController(name, make, title or name, about, predictive, perfect)
         return make
 
     return register
@@ -96,10 +97,10 @@ def find_controller(name: str) -> RegisteredController:
     ControlError
         When there is none of this name; with the nearest one.
     """
-    if name not in _REGISTERED:
-        expected = f"one of {', '.join(_REGISTERED)}"
-        raise ControlError(describe("controller", expected, repr(name), nearest(name, _REGISTERED)))
-    return _REGISTERED[name]
+    if name not in REGISTERED:
+        expected = f"one of {', '.join(REGISTERED)}"
+        raise ControlError(describe("controller", expected, repr(name), nearest(name, REGISTERED)))
+    return REGISTERED[name]
 
 
 def required_actuators(plant: SimulatedPlant) -> tuple[Actuator, ...]:

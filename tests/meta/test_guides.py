@@ -6,6 +6,7 @@ import json
 import re
 import shlex
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -34,38 +35,41 @@ def follow(guide: str, folder: Path) -> Path:
     return out
 
 
-@pytest.fixture
-def kept() -> Iterator[None]:
-    """What a plugin registers is gone after the test."""
-    from mpc.kpi import kpis
-    from mpc.studies import controllers
-    from thermal.effects.catalogue import CATALOGUE
-
-    registries: list[dict[str, Any]] = [CATALOGUE, controllers._REGISTERED, kpis.KPIS]
-    before = [dict(registry) for registry in registries]
+@contextmanager
+def kept(registry: dict[str, Any]) -> Iterator[None]:
+    """What a plugin registers is gone afterwards."""
+    before = dict(registry)
     yield
-    for registry, content in zip(registries, before, strict=True):
-        registry.clear()
-        registry.update(content)
+    registry.clear()
+    registry.update(before)
 
 
-def test_a_controller_of_ones_own(kept: None, tmp_path: Path) -> None:
-    out = follow("own_controller.md", tmp_path)
+def test_a_controller_of_ones_own(tmp_path: Path) -> None:
+    from mpc.studies.controllers import REGISTERED
+
+    with kept(REGISTERED):
+        out = follow("own_controller.md", tmp_path)
     found = json.loads((out / "comparison.json").read_text(encoding="utf-8"))["controllers"]
     assert list(found) == ["reset", "by_need"] and found["by_need"]["cost"] > 0.0
     page = (out / "report.html").read_text(encoding="utf-8")
     assert "Water by need" in page and "Supply water is hotter the colder the coldest zone is." in page
 
 
-def test_an_indicator_of_ones_own(kept: None, tmp_path: Path) -> None:
-    out = follow("own_kpi.md", tmp_path)
+def test_an_indicator_of_ones_own(tmp_path: Path) -> None:
+    from mpc.kpi.kpis import KPIS
+
+    with kept(KPIS):
+        out = follow("own_kpi.md", tmp_path)
     kpis = json.loads((out / "control.json").read_text(encoding="utf-8"))["kpis"]
     assert 15.0 < kpis["warmest_zone"] < 35.0
     assert "highest temperature of any zone" in (out / "report.html").read_text(encoding="utf-8")
 
 
-def test_an_effect_of_ones_own(kept: None, tmp_path: Path) -> None:
-    out = follow("own_effect.md", tmp_path)
+def test_an_effect_of_ones_own(tmp_path: Path) -> None:
+    from thermal.effects.catalogue import CATALOGUE
+
+    with kept(CATALOGUE):
+        out = follow("own_effect.md", tmp_path)
     found = json.loads((out / "calibration.json").read_text(encoding="utf-8"))
     assert [e["effect"] for e in found["effects"]] == ["night_machines"]
     assert 0.0 <= found["parameters"]["night_heat"]["value"] <= 20.0
