@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from typing import Any, Protocol, runtime_checkable
 
@@ -115,7 +115,9 @@ class ControlEnvironment(gymnasium.Env[Observation, NDArray[np.float32]]):
         ranges: Mapping[str, tuple[float, float]] | None = None,
     ) -> None:
         self.plants = _checked(plants)
-        self.reward = _reward_of(reward)
+        if isinstance(reward, str) and reward not in REWARDS:
+            raise MpcError(describe("reward", "a known one", repr(reward), nearest(reward, REWARDS)))
+        self.reward = REWARDS[reward] if isinstance(reward, str) else reward
         if episode_steps is not None and episode_steps < 1:
             raise MpcError(describe("episode_steps", "1 or more", repr(episode_steps)))
         self.episode_steps = episode_steps
@@ -128,14 +130,10 @@ class ControlEnvironment(gymnasium.Env[Observation, NDArray[np.float32]]):
         )
         self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (len(self.actions),), np.float32)
         self.observation_space = gymnasium.spaces.Box(-LARGEST, LARGEST, (len(self.layout),), np.float32)
-        self._plant, self._course = first, self._courses[0]
-        self._step, self._done = 0, 0
+        #: The plant of this episode.
+        self.plant = first
+        self._course, self._step, self._done = self._courses[0], 0, 0
         self._ahead: FloatArray | None = None
-
-    @property
-    def plant(self) -> ScenarioPlant:
-        """The plant of this episode."""
-        return self._plant
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -169,9 +167,9 @@ class ControlEnvironment(gymnasium.Env[Observation, NDArray[np.float32]]):
         if info["plant"] not in range(len(self.plants)):
             expected = f"a plant from 0 to {len(self.plants) - 1}"
             raise MpcError(describe("options: plant", expected, repr(info["plant"])))
-        self._plant, self._course = self.plants[info["plant"]], self._courses[info["plant"]]
+        self.plant, self._course = self.plants[info["plant"]], self._courses[info["plant"]]
         self._step = self._done = 0
-        return self._observe(self._plant.reset(info["plant_seed"])), info
+        return self._observe(self.plant.reset(info["plant_seed"])), info
 
     def step(self, action: NDArray[np.float32]) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Hold an action for a control step.
@@ -187,7 +185,7 @@ class ControlEnvironment(gymnasium.Env[Observation, NDArray[np.float32]]):
             Observation, reward, whether the episode terminated (never) and was truncated, and its indicators at the
             end.
         """
-        plant, course, begin = self._plant, self._course, self._step
+        plant, course, begin = self.plant, self._course, self._step
         seen = plant.step(self.actions.setpoints(action))
         self._step, self._done = begin + course.each, self._done + 1
         reward = self.reward.of_steps(_last_steps(plant, course), plant.scenario, begin)
@@ -200,47 +198,35 @@ class ControlEnvironment(gymnasium.Env[Observation, NDArray[np.float32]]):
     def close(self) -> None:
         """Close the plants that hold something open, such as a process of EnergyPlus."""
         for plant in self.plants:
-            close = getattr(plant, "close", None)
-            if close is not None:
-                close()
+            getattr(plant, "close", lambda: None)()
 
     def _observe(self, seen: Measurements, ended: bool = False) -> Observation:
         course = self._course
         if course.ahead is not None:
             self._ahead = course.ahead[min(self._step, len(course.ahead) - 1)]
         elif course.outlook is not None and not ended:  # at its end a plant may have nothing left to forecast
-            self._ahead = course.outlook.of_forecast(self._plant.forecast())
+            self._ahead = course.outlook.of_forecast(self.plant.forecast())
         return self.layout.observe(seen.values_array, self._ahead, clock(seen.seconds, course.timezone))
 
 
 def _checked(plants: Plant | Sequence[Plant]) -> tuple[ScenarioPlant, ...]:
     """Plants that have scenarios and fit each other."""
     several = tuple(plants) if isinstance(plants, Sequence) else (plants,)
+    checked = tuple(plant for plant in several if isinstance(plant, ScenarioPlant))
     if not several:
         raise MpcError(describe("environment", "a plant or more", "none"))
-    checked: list[ScenarioPlant] = []
-    for plant in several:
-        if not isinstance(plant, ScenarioPlant):
-            raise MpcError(describe("environment", "plants with a scenario", type(plant).__name__))
-        checked.append(plant)
-    first = checked[0]
+    if len(checked) < len(several):
+        found = ", ".join(type(plant).__name__ for plant in several)
+        raise MpcError(describe("environment", "plants with a scenario", found))
     for k, plant in enumerate(checked):
         for what in ("columns", "actuators", "control_step"):
-            if getattr(plant, what) != getattr(first, what):
+            if getattr(plant, what) != getattr(checked[0], what):
                 expected = f"the same {what.replace('_', ' ')} as plant 0"
                 raise MpcError(describe(f"environment: plant {k}", expected, "others"))
         if plant.control_step % plant.scenario.grid.step:
             expected = f"a control step of whole steps of {plant.scenario.grid.step:g} s"
             raise MpcError(describe(f"environment: plant {k}", expected, f"{plant.control_step:g} s"))
-    return tuple(checked)
-
-
-def _reward_of(reward: str | Reward) -> Reward:
-    if not isinstance(reward, str):
-        return reward
-    if reward not in REWARDS:
-        raise MpcError(describe("reward", "a known one", repr(reward), nearest(reward, REWARDS)))
-    return REWARDS[reward]
+    return checked
 
 
 def _last_steps(plant: Any, course: _Course) -> RecentSteps:
@@ -313,9 +299,7 @@ def office_environment(
         To be reset.
     """
     drawn = office or Office()
-    building = pilot_building(
-        drawn.seed, floor_area=drawn.floor_area, zones=drawn.zones, floors=drawn.floors, name="office"
-    )  # fmt: skip
+    building = pilot_building(**asdict(drawn), name="office")
     given = plant or PlantSettings(dx=1.0, noise=SensorNoise())
     given = replace(given, horizon=round(BLOCK_ENDS[-1] * 3600.0 / given.step_seconds))
     plants = []
