@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from mpc.cli import options as opt
+from mpc.cli import options
 from mpc.cli.console import Progress, Waiting, answer, complain, say, show_table
 
 if TYPE_CHECKING:
@@ -23,33 +23,33 @@ def calibrate(
     case: Annotated[Path, typer.Argument(metavar="CASE", help="Case folder, or a folder of case folders.")],
     out: Annotated[
         Path,
-        opt.folder("calibration.json, evaluation.json, predictions.parquet, report.html; of a folder of cases one such "
+        options.folder("calibration.json, evaluation.json, predictions.parquet, report.html; of a folder of cases one such "
                "folder a case, and summary.json"),
     ],
-    tune: Annotated[opt.Intervals, opt.interval("Tuning interval, repeatable; default: the first two thirds.")] = None,
-    hold_out: Annotated[opt.Intervals, opt.interval("Held-out interval, repeatable; default: the last third.")] = None,
-    dx: opt.Dx = None,
+    tune: Annotated[options.Intervals, options.interval("Tuning interval, repeatable; default: the first two thirds.")] = None,
+    hold_out: Annotated[options.Intervals, options.interval("Held-out interval, repeatable; default: the last third.")] = None,
+    dx: options.Dx = None,
     effects: Annotated[
         str, typer.Option(metavar="ID,...", help="Effects that are known to be there, in the whole building.")
     ] = "",
-    horizon: opt.Horizon = "6h",
-    scheme: opt.SchemeName = None,
+    horizon: options.Horizon = "6h",
+    scheme: options.SchemeName = None,
     objective: Annotated[
         str,
         typer.Option(metavar="OBJECTIVE", help="multi_step: errors of runs; innovations: a filter's likelihood."),
     ] = "multi_step",
     loss: Annotated[str, typer.Option(metavar="LOSS", help="linear, or pseudo_huber against outliers.")] = "linear",
-    starts: Annotated[int, opt.number("Starts of the solver; the best is kept.")] = 3,
-    seed: Annotated[int, opt.number("Seed of the further starts.")] = 0,
+    starts: Annotated[int, options.number("Starts of the solver; the best is kept.")] = 3,
+    seed: Annotated[int, options.number("Seed of the further starts.")] = 0,
     workers: Annotated[
-        int | None, opt.number("Processes that share a folder of cases; default: one a core.")
+        int | None, options.number("Processes that share a folder of cases; default: one a core.")
     ] = None,
     scheduler: Annotated[
         str | None,
         typer.Option(metavar="ADDRESS", help="Of a dask cluster for a folder of cases, such as tcp://10.0.0.1:8786."),
     ] = None,
-    force: opt.Force = False,
-    json: opt.Json = False,
+    force: options.Force = False,
+    json: options.Json = False,
 ) -> int:  # fmt: skip
     """Fit the physical parameters of a building to its telemetry; of each case in a folder of cases.
 
@@ -111,8 +111,8 @@ def run_calibration(
     from calibration.fit import calibrate as fit
     from mpc.reports.calibration import write_calibration
 
-    case, given = opt.open_case(folder, out, force), dict(settings or {})
-    given |= {name: opt.parse_intervals(given.get(name), case) for name in ("tune", "hold_out")}
+    case, given = options.open_case(folder, out, force), dict(settings or {})
+    given |= {name: options.parse_intervals(given.get(name), case) for name in ("tune", "hold_out")}
     result = fit.calibrate(case, progress=progress, **given)
     return result, write_calibration(result, case, out, force=force)
 

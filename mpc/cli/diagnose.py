@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from mpc.cli import options as opt
+from mpc.cli import options
 from mpc.cli.console import Progress, Waiting, answer, say, show_table
 
 if TYPE_CHECKING:
@@ -17,24 +17,24 @@ _MOST_SUSPECTS = 5
 
 
 def diagnose(
-    case: opt.CaseFolder,
+    case: options.CaseFolder,
     out: Annotated[
         Path,
-        opt.folder("diagnosis.json, calibration.json of the model with the effects found, missing_watts.parquet, "
+        options.folder("diagnosis.json, calibration.json of the model with the effects found, missing_watts.parquet, "
                "predictions.parquet, report.html"),
     ],
     tune: Annotated[
-        opt.Intervals,
-        opt.interval("Tuning interval, repeatable; default: the first two thirds, or two days in three where the last "
+        options.Intervals,
+        options.interval("Tuning interval, repeatable; default: the first two thirds, or two days in three where the last "
                  "third shows other weather."),
     ] = None,
     hold_out: Annotated[
-        opt.Intervals, opt.interval("Held-out interval, repeatable; default: the last third, or every third day.")
+        options.Intervals, options.interval("Held-out interval, repeatable; default: the last third, or every third day.")
     ] = None,
-    dx: opt.Dx = None,
-    horizon: opt.Horizon = "6h",
-    force: opt.Force = False,
-    json: opt.Json = False,
+    dx: options.Dx = None,
+    horizon: options.Horizon = "6h",
+    force: options.Force = False,
+    json: options.Json = False,
 ) -> int:  # fmt: skip
     """Say where model and building disagree, which missing effect causes it, and how far the error falls with it.
 
@@ -74,8 +74,8 @@ def run_diagnosis(
     from calibration.diagnosis import diagnosis
     from mpc.reports.diagnosis import write_diagnosis
 
-    loaded = opt.open_case(case, out, force)
-    tuned, judged = (opt.parse_intervals(texts, loaded) for texts in intervals)
+    loaded = options.open_case(case, out, force)
+    tuned, judged = (options.parse_intervals(texts, loaded) for texts in intervals)
     result = diagnosis.diagnose(loaded, tuned, judged, dx=dx, horizon=horizon, progress=progress)
     return result, write_diagnosis(result, loaded, out, force=force)
 

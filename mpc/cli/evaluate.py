@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from mpc.cli import options as opt
+from mpc.cli import options
 from mpc.cli.console import Waiting, answer, say, show_table
 
 if TYPE_CHECKING:
@@ -15,15 +15,15 @@ if TYPE_CHECKING:
 
 
 def evaluate(
-    case: opt.CaseFolder,
-    parameters: opt.Parameters = None,
-    horizon: opt.Horizon = "6h",
-    interval: Annotated[opt.Intervals, opt.interval("To evaluate, repeatable; default: all the telemetry.")] = None,
-    dx: opt.Dx = None,
-    scheme: opt.SchemeName = None,
-    out: Annotated[Path | None, opt.folder("evaluation.json, predictions.parquet, report.html")] = None,
-    force: opt.Force = False,
-    json: opt.Json = False,
+    case: options.CaseFolder,
+    parameters: options.Parameters = None,
+    horizon: options.Horizon = "6h",
+    interval: Annotated[options.Intervals, options.interval("To evaluate, repeatable; default: all the telemetry.")] = None,
+    dx: options.Dx = None,
+    scheme: options.SchemeName = None,
+    out: Annotated[Path | None, options.folder("evaluation.json, predictions.parquet, report.html")] = None,
+    force: options.Force = False,
+    json: options.Json = False,
 ) -> int:
     """N-step prediction error of a model on the telemetry of a case.
 
@@ -33,8 +33,8 @@ def evaluate(
     from calibration.evaluation.case_model import evaluate_case
     from mpc.reports.evaluation import write_evaluation
 
-    loaded = opt.open_case(case, out, force)
-    intervals = opt.parse_intervals(interval, loaded)
+    loaded = options.open_case(case, out, force)
+    intervals = options.parse_intervals(interval, loaded)
     source = parameters.name if parameters is not None else "uncalibrated start values"
     with Waiting("evaluate") as progress:
         found = evaluate_case(
@@ -60,15 +60,15 @@ def _show(found: Evaluation, source: str) -> None:
 
 
 def simulate(
-    case: opt.CaseFolder,
-    start: opt.Start,
+    case: options.CaseFolder,
+    start: options.Start,
     end: Annotated[str, typer.Option(metavar="T", help="End.")],
-    parameters: opt.Parameters = None,
-    dx: opt.Dx = None,
-    scheme: opt.SchemeName = None,
-    out: Annotated[Path | None, opt.folder("simulation.json, simulation.parquet, report.html")] = None,
-    force: opt.Force = False,
-    json: opt.Json = False,
+    parameters: options.Parameters = None,
+    dx: options.Dx = None,
+    scheme: options.SchemeName = None,
+    out: Annotated[Path | None, options.folder("simulation.json, simulation.parquet, report.html")] = None,
+    force: options.Force = False,
+    json: options.Json = False,
 ) -> int:
     """Replay the inputs of a building through its model.
 
@@ -80,7 +80,7 @@ def simulate(
     from thermal.case.times import local_timestamp
     from thermal.model.simulation import simulate as replay
 
-    loaded = opt.open_case(case, out, force)
+    loaded = options.open_case(case, out, force)
     first, last = (local_timestamp(time, loaded.building) for time in (start, end))
     steps = max(1, int((last - first).total_seconds() // loaded.step))
     with Waiting("simulate") as progress:
