@@ -23,11 +23,13 @@ def calibrate(
     case: Annotated[Path, typer.Argument(metavar="CASE", help="Case folder, or a folder of case folders.")],
     out: Annotated[
         Path,
-        options.folder("calibration.json, evaluation.json, predictions.parquet, report.html; of a folder of cases one such "
-               "folder a case, and summary.json"),
+        options.folder(
+            "calibration.json, evaluation.json, predictions.parquet, report.html; of a folder of cases one such folder "
+            "a case, and summary.json"
+        ),
     ],
-    tune: Annotated[options.Intervals, options.interval("Tuning interval, repeatable; default: the first two thirds.")] = None,
-    hold_out: Annotated[options.Intervals, options.interval("Held-out interval, repeatable; default: the last third.")] = None,
+    tune: Annotated[options.Intervals, options.interval("Tuning", "the first two thirds")] = None,
+    hold_out: Annotated[options.Intervals, options.interval("Held-out", "the last third")] = None,
     dx: options.Dx = None,
     effects: Annotated[
         str, typer.Option(metavar="ID,...", help="Effects that are known to be there, in the whole building.")

@@ -20,22 +20,25 @@ def diagnose(
     case: options.CaseFolder,
     out: Annotated[
         Path,
-        options.folder("diagnosis.json, calibration.json of the model with the effects found, missing_watts.parquet, "
-               "predictions.parquet, report.html"),
+        options.folder(
+            "diagnosis.json, calibration.json of the model with the effects found, missing_watts.parquet, "
+            "predictions.parquet, report.html"
+        ),
     ],
     tune: Annotated[
         options.Intervals,
-        options.interval("Tuning interval, repeatable; default: the first two thirds, or two days in three where the last "
-                 "third shows other weather."),
+        options.interval(
+            "Tuning", "the first two thirds, or two days in three where the last third shows other weather"
+        ),
     ] = None,
     hold_out: Annotated[
-        options.Intervals, options.interval("Held-out interval, repeatable; default: the last third, or every third day.")
+        options.Intervals, options.interval("Held-out", "the last third, or every third day")
     ] = None,
     dx: options.Dx = None,
     horizon: options.Horizon = "6h",
     force: options.Force = False,
     json: options.Json = False,
-) -> int:  # fmt: skip
+) -> int:
     """Say where model and building disagree, which missing effect causes it, and how far the error falls with it.
 
     Example: buildingmpc diagnose cases/office --out diagnosis

@@ -18,7 +18,7 @@ def evaluate(
     case: options.CaseFolder,
     parameters: options.Parameters = None,
     horizon: options.Horizon = "6h",
-    interval: Annotated[options.Intervals, options.interval("To evaluate, repeatable; default: all the telemetry.")] = None,
+    interval: Annotated[options.Intervals, options.interval("Evaluated", "all the telemetry")] = None,
     dx: options.Dx = None,
     scheme: options.SchemeName = None,
     out: Annotated[Path | None, options.folder("evaluation.json, predictions.parquet, report.html")] = None,

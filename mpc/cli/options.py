@@ -64,15 +64,17 @@ SchemeName = Annotated[
 Start = Annotated[str, typer.Option(metavar="T", help="Start, ISO 8601; local to the building without an offset.")]
 
 
-def interval(text: str) -> Any:
+def interval(what: str, default: str) -> Any:
     """Declare the option of intervals, which may be repeated.
 
     Parameters
     ----------
-    text : str
+    what : str
         What they are for.
+    default : str
+        What holds without any.
     """
-    return typer.Option(metavar="START/END", help=text)
+    return typer.Option(metavar="START/END", help=f"{what} interval, repeatable; default: {default}.")
 
 
 def open_case(case: Path, out: Path | None, force: bool) -> Case:
