@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from threading import Lock, Timer
+from threading import Timer
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +14,6 @@ import typer
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.progress import Progress as Bar
-    from rich.progress import TaskID
 
 #: Called with stage, done, total.
 Progress = Callable[[str, int, int], None]
@@ -168,26 +167,28 @@ class Waiting:
 
     def __init__(self, label: str) -> None:
         self.label = label
-        self._lock = Lock()
-        self._timer: Timer | None = None
         self._bar: Bar | None = None
-        self._task: TaskID | None = None
-        self._state: tuple[str, int, int | None] = (label, 0, None)
+        self._timer: Timer | None = None
 
     def __enter__(self) -> Waiting:
         if sys.stderr.isatty():
-            self._timer = Timer(PATIENCE, self._appear)
+            from rich.console import Console
+            from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+            words = TextColumn("{task.description}", markup=False)
+            columns = (SpinnerColumn(), words, BarColumn(), TimeElapsedColumn())
+            self._bar = Progress(*columns, console=Console(stderr=True), transient=True)
+            self._bar.add_task(self.label, total=None)
+            self._timer = Timer(PATIENCE, self._bar.start)
             self._timer.daemon = True
             self._timer.start()
         return self
 
     def __call__(self, stage: str, done: int, total: int) -> None:
         """Say what goes on, and how much of it is done."""
-        with self._lock:
-            self._state = (f"{self.label}: {stage}" if stage not in self.label else self.label, done, total)
-            if self._bar is not None and self._task is not None:
-                name, done, full = self._state
-                self._bar.update(self._task, description=name, completed=done, total=full)
+        if self._bar is not None:
+            name = f"{self.label}: {stage}" if stage not in self.label else self.label
+            self._bar.update(self._bar.task_ids[0], description=name, completed=done, total=total)
 
     def say(self, text: str) -> None:
         """Write a sentence or two to stdout, above the bar.
@@ -197,37 +198,17 @@ class Waiting:
         text : str
             As for `say`.
         """
-        with self._lock:
-            if self._bar is not None:
-                self._bar.stop()
-            say(text)
-            if self._bar is not None:
-                self._bar.start()
+        shown = self._bar if self._bar is not None and self._bar.live.is_started else None
+        if shown is not None:
+            shown.stop()
+        say(text)
+        if shown is not None:
+            shown.start()
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if self._timer is not None:
+        if self._bar is not None and self._timer is not None:
             self._timer.cancel()
-        with self._lock:
-            if self._bar is not None:
-                self._bar.stop()
-            self._timer = None
-
-    def _appear(self) -> None:
-        from rich.console import Console
-        from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
-
-        with self._lock:
-            if self._timer is None:
-                return
-            columns = (
-                SpinnerColumn(),
-                TextColumn("{task.description}", markup=False),
-                BarColumn(),
-                TimeElapsedColumn(),
-            )
-            self._bar = Progress(*columns, console=Console(stderr=True), transient=True)
-            name, done, total = self._state
-            self._task = self._bar.add_task(name, completed=done, total=total)
-            self._bar.start()
+            self._timer.join()  # it may be about to start the bar
+            self._bar.stop()
