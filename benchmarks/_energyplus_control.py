@@ -19,7 +19,7 @@ from mpc.control.problem.channels import Channel
 from mpc.control.problem.horizon import Horizon
 from mpc.loop.plant import Measurements
 from mpc.scenario.forecast import Forecast
-from mpc.studies.controller import make_controller, site_points
+from mpc.studies.controller import Site, make_controller
 from mpc.studies.model import control_model
 from thermal.effects.catalogue import chosen
 
@@ -147,8 +147,7 @@ def optimal(
     others = model.network.boundaries[1:]
     price = COMFORT_PRICE * float(plant.scenario.areas.mean()) if price is None else price
     controller = make_controller(
-        model, plant, system=controller_system(source, GAS / ELECTRICITY),
-        points=site_points(source.building, source.devices), building=source.building,
+        model, plant, site=Site(source.building, controller_system(source, GAS / ELECTRICITY), source.devices),
         settings=ControllerSettings(comfort_price=price, operation=OPERATION),
         horizon=AHEAD, channels=channels, boundaries=dict.fromkeys(others, 293.15),
     )  # fmt: skip

@@ -31,8 +31,8 @@ from mpc.control.controller.action import ControllerSettings
 from mpc.control.controller.controller import MpcController
 from mpc.control.problem.horizon import Horizon
 from mpc.control.solvers.uncertainty import Margin
-from mpc.environment.actions import SUPPLY_SETPOINTS
 from mpc.environment.environment import ScenarioPlant
+from mpc.environment.layout import SUPPLY_SETPOINTS
 from mpc.loop.make import pilot_weather
 from mpc.loop.noise import SensorNoise
 from mpc.loop.plant import Controller

@@ -31,7 +31,7 @@ import numpy as np
 from _table import markdown, write
 from simulator_speed import use_one_thread
 
-from mpc.loop.make import pilot_weather, simulated_plant
+from mpc.loop.make import PlantSettings, pilot_weather, simulated_plant
 from mpc.loop.noise import SensorNoise
 from mpc.loop.simulated import SimulatedPlant
 from thermal import Building
@@ -51,7 +51,8 @@ def make(
 ) -> tuple[SimulatedPlant, dict[str, float]]:
     """Make a plant and warm it up; with the CPU times of both [s]."""
     begin, weather = time.process_time(), pilot_weather(SEED, DAY, 1.0)
-    plant = simulated_plant(building, weather, DAY, NEXT, model=kind, dx=dx, system=system, noise=noise)
+    settings = PlantSettings(kind=kind, dx=dx, system=system, noise=noise)
+    plant = simulated_plant(building, weather, DAY, NEXT, settings)
     made = time.process_time()
     plant.reset()
     return plant, {"make": made - begin, "reset": time.process_time() - made}

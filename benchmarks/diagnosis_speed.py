@@ -26,7 +26,8 @@ from pathlib import Path
 from _code import code
 from _table import markdown, write
 
-from mpc.loop.make import save_pilot
+from mpc.loop.make import PlantSettings, save_pilot
+from mpc.loop.noise import SensorNoise
 from thermal import load_case
 from thermal.effects.catalogue import chosen
 
@@ -126,10 +127,9 @@ def main() -> int:
     if not options.no_pilot:
         paths.append(options.out / "pilot")
         print(f"making {paths[-1]}", flush=True)
-        save_pilot(
-            paths[-1], seed=3, start="2023-04-03", days=21, effects=tuple(chosen(dict.fromkeys(EFFECTS, ()))),
-            parameters=STRENGTHS, overwrite=True,
-        )  # fmt: skip
+        effects = chosen(dict.fromkeys(EFFECTS, ()))
+        settings = PlantSettings(dx=0.5, noise=SensorNoise(), effects=effects, parameters=STRENGTHS, seed=3)
+        save_pilot(paths[-1], settings=settings, start="2023-04-03", days=21, overwrite=True)
     found = []
     for path in paths:
         print(f"diagnosing {path}", flush=True)

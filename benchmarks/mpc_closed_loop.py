@@ -39,7 +39,7 @@ from mpc.loop.make import pilot_weather
 from mpc.loop.noise import SensorNoise
 from mpc.scenario.forecast import DAY_AHEAD_ERRORS
 from mpc.studies.run import prediction_errors, run_controller
-from mpc.studies.study import Study, make_study
+from mpc.studies.study import Study, StudySettings, make_study
 from thermal import Building
 from thermal.pilot.building import pilot_building
 
@@ -66,10 +66,11 @@ def study(season: str, days: float, floor_area: float, zones: int, dx: float, pr
     """Put a stretch of a season together."""
     start = SEASONS[season]
     end = (pd.Timestamp(start) + pd.Timedelta(days=days)).isoformat()
-    return make_study(
-        building(floor_area, zones), pilot_weather(SEED, start, math.ceil(days) + 1.0), start, end, dx=dx,
-        kind="random", noise=SensorNoise(), errors=DAY_AHEAD_ERRORS, comfort_price=price, seed=SEED,
-    )  # fmt: skip
+    settings = StudySettings(
+        dx=dx, kind="random", noise=SensorNoise(), errors=DAY_AHEAD_ERRORS, comfort_price=price, seed=SEED
+    )
+    weather = pilot_weather(SEED, start, math.ceil(days) + 1.0)
+    return make_study(building(floor_area, zones), weather, start, end, settings)
 
 
 def run(season: str, controller: str, options: argparse.Namespace) -> dict[str, Any]:
@@ -84,7 +85,7 @@ def run(season: str, controller: str, options: argparse.Namespace) -> dict[str, 
         "peak": 1e3 * (kpis.pele_tot or 0.0), "emissions": kpis.emis_tot, "floor_area": kpis.floor_area,
         "objective": found.cost + options.price * options.zones * kpis.tdis_tot,
         "sources": dict(found.sources), "prediction": prediction_errors(found),
-        "controller_seconds": 0.0 if kpis.time_rat is None else kpis.time_rat * made.control_step,
+        "controller_seconds": 0.0 if kpis.time_rat is None else kpis.time_rat * made.settings.control_step,
         "cpu": time.process_time() - begin,
     }  # fmt: skip
 

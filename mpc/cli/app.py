@@ -9,7 +9,7 @@ import traceback
 from collections.abc import Callable
 from functools import wraps
 from io import TextIOWrapper
-from typing import Annotated, ParamSpec
+from typing import Annotated, Any, ParamSpec
 
 import typer
 
@@ -19,18 +19,18 @@ from mpc.cli.control import compare, control
 from mpc.cli.demo import demo
 from mpc.cli.diagnose import diagnose
 from mpc.cli.doctor import doctor
-from mpc.cli.evaluate import evaluate
+from mpc.cli.evaluate import evaluate, simulate
 from mpc.cli.imports import import_devices, import_plan, import_telemetry
 from mpc.cli.label import label
 from mpc.cli.serve import serve
-from mpc.cli.simulate import simulate
+from mpc.plugins import load_plugins
 
 P = ParamSpec("P")
 
 #: Exit codes of the contract: success is 0.
 FAILURE, BAD_INPUT = 1, 2
 
-_settings = {"debug": False}
+_settings: dict[str, Any] = {"debug": False, "plugins": []}
 
 _FAMILIES = {"ThermalError", "CalibrationError", "MpcError"}
 
@@ -55,12 +55,17 @@ def _version(asked: bool) -> None:
 @app.callback()
 def options(
     debug: Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")] = False,
+    plugin: Annotated[
+        list[str] | None,
+        typer.Option(metavar="MODULE", help="Module or .py file that adds controllers, effects, ...; repeatable."),
+    ] = None,
     version: Annotated[
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version and exit.")
     ] = False,
 ) -> None:
     """Take the options that stand before the subcommand."""
     _settings["debug"] = debug
+    _settings["plugins"] = plugin or []
 
 
 def _guarded(command: Callable[P, int]) -> Callable[P, None]:
@@ -69,6 +74,8 @@ def _guarded(command: Callable[P, int]) -> Callable[P, None]:
     @wraps(command)
     def run(*args: P.args, **kwargs: P.kwargs) -> None:
         try:
+            if command is not doctor:  # it works where half of the packages are missing
+                load_plugins(_settings["plugins"])
             code = command(*args, **kwargs)
         except (typer.Exit, typer.Abort):
             raise
@@ -95,71 +102,11 @@ def _report(error: Exception, command: str) -> int:
     return FAILURE
 
 
-for _command, _help, _example in (
-    (
-        demo,
-        "Check, calibrate, diagnose, evaluate and control the bundled case, in under two minutes.",
-        "demo --out demo_results",
-    ),
-    (doctor, "Say what is installed and what is missing, and test the solvers.", "doctor"),
-    (check, "Validate a case folder: geometry, quality of the telemetry, what each point is.", "check cases/office"),
-    (
-        import_plan,
-        "Make a case folder of floor plans: PNG, JPEG, PDF, DXF, arrays of codes.",
-        "import-plan plans/plans.yaml --devices plans/devices.csv --out cases/office",
-    ),
-    (
-        import_devices,
-        "Give a case its devices from CSV, Brick or Haystack, and match columns of telemetry to them.",
-        "import-devices cases/office devices.ttl --telemetry export.csv --out cases/office-2",
-    ),
-    (
-        import_telemetry,
-        "Give a case its telemetry, whatever its columns are called.",
-        "import-telemetry cases/office export.csv --points points.csv --out cases/office-3",
-    ),
-    (
-        label,
-        "Turn floor plans and a list of devices into a case, on a page in the browser; show its reports.",
-        "label cases/office",
-    ),
-    (
-        simulate,
-        "Replay the inputs of a building through its model.",
-        "simulate cases/office --start 2023-10-16 --end 2023-10-18 --parameters results/calibration.json --out replay",
-    ),
-    (
-        evaluate,
-        "N-step prediction error of a model on the telemetry of a case.",
-        "evaluate cases/office --parameters results/calibration.json --interval 2023-10-16/2023-10-23 --out errors",
-    ),
-    (
-        calibrate,
-        "Fit the physical parameters of a building to its telemetry; of each case in a folder of cases.",
-        "calibrate cases/office --tune 2023-10-02/2023-10-16 --hold-out 2023-10-16T00:05/2023-10-23 --out results",
-    ),
-    (
-        diagnose,
-        "Say where model and building disagree, which missing effect causes it, and how far the error falls with it.",
-        "diagnose cases/office --out diagnosis",
-    ),
-    (
-        control,
-        "Run a building in closed loop with optimal control, or with a rule.",
-        "control cases/office --parameters results/calibration.json --start 2023-10-16 --end 2023-10-18 --out control",
-    ),
-    (
-        compare,
-        "Run a building with several controllers on the same weather, people and prices, and compare them.",
-        "compare cases/office --controllers guideline36,mpc,bound --start 2023-10-16 --end 2023-10-18 --out compared",
-    ),
-    (
-        serve,
-        "Put buildings behind BOPTEST's REST API, so that its controllers run on them; ends with Ctrl-C.",
-        "serve cases/office --boptest --parameters results/calibration.json --weather town.epw --port 8000",
-    ),
+for _command in (
+    *(demo, doctor, check, import_plan, import_devices, import_telemetry, label),
+    *(simulate, evaluate, calibrate, diagnose, control, compare, serve),
 ):
-    app.command(help=_help, epilog=f"Example: buildingmpc {_example}")(_guarded(_command))
+    app.command()(_guarded(_command))
 
 
 def main() -> None:

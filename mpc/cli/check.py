@@ -5,41 +5,56 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
-from mpc.cli.console import Force, Json, is_narrow, say, show_table, write_json
+from mpc.cli.console import Progress, answer, is_narrow, say, show_table, silent
+from mpc.cli.options import CaseFolder, Force, Json, folder
 
 if TYPE_CHECKING:
     from thermal.case.check import CaseCheck, PointSummary
 
 
 def check(
-    case: Annotated[Path, typer.Argument(metavar="CASE", help="Case folder.")],
-    out: Annotated[Path | None, typer.Option(metavar="DIR", help="Folder for check.json and report.html.")] = None,
+    case: CaseFolder,
+    out: Annotated[Path | None, folder("check.json and report.html")] = None,
     force: Force = False,
     json: Json = False,
 ) -> int:
-    """Validate a case and say what is in it."""
+    """Validate a case folder: geometry, quality of the telemetry, what each point is.
+
+    Example: buildingmpc check cases/office
+    """
+    found, report = run_check(case, out, force)
+    return answer(json, found.to_dict(), lambda: _show(found), report)
+
+
+def run_check(
+    case: Path, out: Path | None, force: bool, progress: Progress = silent
+) -> tuple[CaseCheck, Path | None]:
+    """Check a case and write what was found, where a folder is given.
+
+    Parameters
+    ----------
+    case : Path
+        Case folder.
+    out : Path or None
+        Folder of the results.
+    force : bool
+        Whether earlier results are replaced.
+    progress : callable
+        Called with stage, done, total.
+    """
     from calibration.results import check_results_folder
     from mpc.reports.case import write_check
     from thermal.case.check import check_case
 
     if out is not None:
         check_results_folder(out, force)
+    progress("check", 0, 1)
     found = check_case(case)
-    report = write_check(found, out, force=force) if out is not None else None
-    if json:
-        write_json(found.to_dict())
-        return 0
-    _show(found)
-    _show_points(found)
-    if report is not None:
-        say(f"Report: {report}")
-    return 0
+    return found, None if out is None else write_check(found, out, force=force)
 
 
 def _show(found: CaseCheck) -> None:
-    """Write the geometry and the quality of a case to stdout."""
+    """Write geometry, quality and points of a case to stdout."""
     from mpc.reports.case import check_verdict, quality_rows
 
     say(
@@ -49,29 +64,16 @@ def _show(found: CaseCheck) -> None:
     say(check_verdict(found))
     for remark in found.remarks:
         say(f"- {remark}")
-    show_table(
-        "Zones",
-        ("zone", "floor", "area [m²]", "volume [m³]", "sensors", "devices"),
-        left=(0, 1, 5),
-        rows=[
-            (
-                z.name,
-                z.floor or "–",
-                f"{z.floor_area:.1f}",
-                f"{z.volume:.1f}",
-                str(len(z.measured_by)),
-                ", ".join(z.devices),
-            )
-            for z in found.zones
-        ],
-    )
+    columns = {"zone": "", "floor": "", "area [m²]": ".1f", "volume [m³]": ".1f", "sensors": "d", "devices": ""}
+    zones = [
+        (z.name, z.floor or None, z.floor_area, z.volume, len(z.measured_by), ", ".join(z.devices)) for z in found.zones
+    ]
+    show_table("Zones", columns, zones)
     rows = quality_rows(found)
     if rows:
-        show_table(
-            "Findings in the telemetry, by column",
-            ("column", "missing [%]", "unusable [%]", "gaps", "impossible", "flat", "spikes", "constant"),
-            rows,
-        )
+        counted = ("missing [%]", "unusable [%]", "gaps", "impossible", "flat", "spikes", "constant")
+        show_table("Findings in the telemetry, by column", {"column": "", **dict.fromkeys(counted, "g")}, rows)
+    _show_points(found)
 
 
 def _show_points(found: CaseCheck) -> None:
@@ -82,14 +84,14 @@ def _show_points(found: CaseCheck) -> None:
     rows = []
     for name, points in by_type.items():
         means = [p.mean for p in points if p.mean is not None]
-        lowest = [p.lowest for p in points if p.lowest is not None]
-        highest = [p.highest for p in points if p.highest is not None]
-        numbers = (min(lowest), sum(means) / len(means), max(highest)) if means else ()
+        lowest = min((p.lowest for p in points if p.lowest is not None), default=None)
+        highest = max((p.highest for p in points if p.highest is not None), default=None)
+        mean = sum(means) / len(means) if means else None
         usable = 100 * sum(p.usable_share for p in points) / len(points)
-        spelled = [f"{number:.4g}" for number in numbers] or ["–"] * 3
-        rows.append((name, points[0].meaning, points[0].unit, str(len(points)), *spelled, f"{usable:.1f}"))
-    columns: tuple[str, ...] = ("point", "meaning", "unit", "sensors", "lowest", "mean", "highest", "usable [%]")
+        rows.append((name, points[0].meaning, points[0].unit, len(points), lowest, mean, highest, usable))
+    numbers = {"sensors": "d", "lowest": ".4g", "mean": ".4g", "highest": ".4g", "usable [%]": ".1f"}
+    columns = {"point": "", "meaning": "", "unit": "", **numbers}
     if is_narrow():
-        show_table("Measured points", columns[1:], [row[1:] for row in rows], left=(0, 1))
-    else:
-        show_table("Measured points", columns, rows, left=(0, 1, 2))
+        del columns["point"]
+        rows = [row[1:] for row in rows]  # type: ignore[misc]
+    show_table("Measured points", columns, rows)

@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Mapping, Sequence
-from threading import Lock, Timer
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
+from threading import Timer
 from types import TracebackType
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
 if TYPE_CHECKING:
     from rich.console import Console
-    from rich.progress import Progress, TaskID
+    from rich.progress import Progress as Bar
 
-#: Options that every command with results has.
-Json = Annotated[bool, typer.Option("--json", help="Write JSON on stdout, and nothing else.")]
-Force = Annotated[bool, typer.Option("--force", help="Replace earlier results in the folder.")]
+#: Called with stage, done, total.
+Progress = Callable[[str, int, int], None]
 
 #: Width of tables where the output is no terminal [characters].
 PLAIN_WIDTH = 240
@@ -37,6 +37,18 @@ def _console() -> Console:
 
     width = None if sys.stdout.isatty() else PLAIN_WIDTH
     return Console(file=sys.stdout, width=width, markup=False, highlight=False, emoji=False)
+
+
+def silent(stage: str, done: int, total: int) -> None:
+    """Tell nobody of progress.
+
+    Parameters
+    ----------
+    stage : str
+        What is being done.
+    done, total : int
+        How much of it.
+    """
 
 
 def is_narrow() -> bool:
@@ -67,11 +79,7 @@ def complain(text: str) -> None:
 
 
 def show_table(
-    title: str,
-    columns: Sequence[str],
-    rows: Iterable[Sequence[str]],
-    left: Sequence[int] = (0,),
-    more: str = "--json lists them all",
+    title: str, columns: Mapping[str, str], rows: Iterable[Sequence[Any]], more: str = "--json lists them all"
 ) -> None:
     """Write a table to stdout.
 
@@ -79,12 +87,10 @@ def show_table(
     ----------
     title : str
         Above the table.
-    columns : sequence of str
-        Headers.
-    rows : iterable of sequence of str
-        Cells.
-    left : sequence of int
-        Columns of text; the others are numbers.
+    columns : mapping of str to str
+        How the numbers below each header are spelled, such as ``.3f``; columns of text have none.
+    rows : iterable of sequence
+        Cells; None is a dash, and text stands as it is in columns of numbers too.
     more : str
         Where to find the rows that are left out of a long table.
     """
@@ -94,15 +100,47 @@ def show_table(
 
     listed = list(rows)
     table = Table(box=SIMPLE_HEAD, pad_edge=False)
-    for number, name in enumerate(columns):
-        table.add_column(name, justify="left" if number in left else "right", overflow="fold")
+    for name, spelled in columns.items():
+        table.add_column(name, justify="right" if spelled else "left", overflow="fold")
     for row in listed[:MOST_ROWS]:
-        table.add_row(*row)
+        table.add_row(*(_cell(value, spelled) for value, spelled in zip(row, columns.values(), strict=True)))
     out = _console()
     out.print(Text(f"\n{title}", style="bold"))
     out.print(table)
     if len(listed) > MOST_ROWS:
         out.print(f"and {len(listed) - MOST_ROWS} more; {more}")
+
+
+def _cell(value: Any, spelled: str) -> str:
+    return "–" if value is None else value if isinstance(value, str) else format(value, spelled)
+
+
+def answer(json: bool, content: Mapping[str, Any], show: Callable[[], None], report: Path | None = None) -> int:
+    """Write what a command found, as JSON or in sentences and tables, and where its page is.
+
+    Parameters
+    ----------
+    json : bool
+        Whether JSON is asked for.
+    content : mapping
+        Plain types.
+    show : callable
+        Writes it in words.
+    report : Path, optional
+        The page.
+
+    Returns
+    -------
+    int
+        Exit code: 0.
+    """
+    if json:
+        write_json(content)
+        return 0
+    show()
+    if report is not None:
+        say(f"Report: {report}")
+    return 0
 
 
 def write_json(content: Mapping[str, Any]) -> None:
@@ -129,26 +167,28 @@ class Waiting:
 
     def __init__(self, label: str) -> None:
         self.label = label
-        self._lock = Lock()
+        self._bar: Bar | None = None
         self._timer: Timer | None = None
-        self._bar: Progress | None = None
-        self._task: TaskID | None = None
-        self._state: tuple[str, int, int | None] = (label, 0, None)
 
     def __enter__(self) -> Waiting:
         if sys.stderr.isatty():
-            self._timer = Timer(PATIENCE, self._appear)
+            from rich.console import Console
+            from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+            words = TextColumn("{task.description}", markup=False)
+            columns = (SpinnerColumn(), words, BarColumn(), TimeElapsedColumn())
+            self._bar = Progress(*columns, console=Console(stderr=True), transient=True)
+            self._bar.add_task(self.label, total=None)
+            self._timer = Timer(PATIENCE, self._bar.start)
             self._timer.daemon = True
             self._timer.start()
         return self
 
     def __call__(self, stage: str, done: int, total: int) -> None:
         """Say what goes on, and how much of it is done."""
-        with self._lock:
-            self._state = (f"{self.label}: {stage}" if stage not in self.label else self.label, done, total)
-            if self._bar is not None and self._task is not None:
-                name, done, full = self._state
-                self._bar.update(self._task, description=name, completed=done, total=full)
+        if self._bar is not None:
+            name = f"{self.label}: {stage}" if stage not in self.label else self.label
+            self._bar.update(self._bar.task_ids[0], description=name, completed=done, total=total)
 
     def say(self, text: str) -> None:
         """Write a sentence or two to stdout, above the bar.
@@ -158,37 +198,17 @@ class Waiting:
         text : str
             As for `say`.
         """
-        with self._lock:
-            if self._bar is not None:
-                self._bar.stop()
-            say(text)
-            if self._bar is not None:
-                self._bar.start()
+        shown = self._bar if self._bar is not None and self._bar.live.is_started else None
+        if shown is not None:
+            shown.stop()
+        say(text)
+        if shown is not None:
+            shown.start()
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if self._timer is not None:
+        if self._bar is not None and self._timer is not None:
             self._timer.cancel()
-        with self._lock:
-            if self._bar is not None:
-                self._bar.stop()
-            self._timer = None
-
-    def _appear(self) -> None:
-        from rich.console import Console
-        from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
-
-        with self._lock:
-            if self._timer is None:
-                return
-            columns = (
-                SpinnerColumn(),
-                TextColumn("{task.description}", markup=False),
-                BarColumn(),
-                TimeElapsedColumn(),
-            )
-            self._bar = Progress(*columns, console=Console(stderr=True), transient=True)
-            name, done, total = self._state
-            self._task = self._bar.add_task(name, completed=done, total=total)
-            self._bar.start()
+            self._timer.join()  # it may be about to start the bar
+            self._bar.stop()

@@ -5,9 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
-from mpc.cli.console import Force, Json, Waiting, complain, say, show_table, write_json
+from mpc.cli.console import Waiting, answer, complain, say, show_table
+from mpc.cli.options import Force, Json, folder
 
 if TYPE_CHECKING:
     from mpc.studies.demo import Demo
@@ -16,11 +15,14 @@ OUT = Path("buildingmpc_demo")
 
 
 def demo(
-    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder of the results.")] = OUT,
+    out: Annotated[Path, folder("the results")] = OUT,
     force: Force = False,
     json: Json = False,
 ) -> int:
-    """Do the main job on the bundled case, from check to control."""
+    """Check, calibrate, diagnose, evaluate and control the bundled case, in under two minutes.
+
+    Example: buildingmpc demo --out demo_results
+    """
     from calibration.results import check_results_folder
     from mpc.studies.demo import run_demo
     from thermal.data import load_bundled_case
@@ -36,27 +38,22 @@ def demo(
                 progress.say(f"{step}: {verdict}")
 
         found = run_demo(out, case=case, force=force, progress=progress, told=told)
-    if json:
-        write_json(found.to_dict())
-    else:
-        _show(found)
-        say(f"Report: {out / 'report.html'}")
-        say("Next: buildingmpc label, for a case of your own")
+    answer(json, found.to_dict(), lambda: _show(found, out))
     if not found.fine:
         complain("error: the calibration did not converge, or optimal control never had a plan; the reports say which")
     return 0 if found.fine else 1
 
 
-def _show(found: Demo) -> None:
+def _show(found: Demo, out: Path) -> None:
     """Write what came of the error and of the costs to stdout."""
     from mpc.reports.control_words import comparison_rows
 
     content = found.to_dict()
     names = {"uncalibrated": "as it was drawn", "calibrated": "calibrated", "with_effects": "with what was found"}
-    errors = [(names[key], f"{mae:.3f}") for key, mae in content["held_out_mae"].items()]
-    show_table("Held-out error 6h ahead", ("model", "MAE [K]"), errors)
-    show_table(
-        f"Controllers, {content['control']['start'][:10]}",
-        ("controller", "cost", "discomfort [K h]", "energy [kWh/m2]"),
-        [(row[0], row[1], row[4], row[6]) for row in comparison_rows(found.comparison)],
-    )
+    errors = [(names[key], mae) for key, mae in content["held_out_mae"].items()]
+    show_table("Held-out error 6h ahead", {"model": "", "MAE [K]": ".3f"}, errors)
+    columns = {"controller": "", "cost": ".2f", "discomfort [K h]": ".3f", "energy [kWh/m2]": ".3f"}
+    rows = [(row[0], row[1], row[4], row[6]) for row in comparison_rows(found.comparison)]
+    show_table(f"Controllers, {content['control']['start'][:10]}", columns, rows)
+    say(f"Report: {out / 'report.html'}")
+    say("Next: buildingmpc label, for a case of your own")

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
-from mpc.cli.console import Force, Json, Waiting, say, show_table, write_json
-from mpc.cli.evaluate import Dx
+from mpc.cli import options
+from mpc.cli.console import Progress, Waiting, answer, say, show_table
 
 if TYPE_CHECKING:
     from calibration.diagnosis.diagnosis import Diagnosis
@@ -18,53 +17,72 @@ _MOST_CANDIDATES = 5
 
 
 def diagnose(
-    case: Annotated[Path, typer.Argument(metavar="CASE", help="Case folder.")],
+    case: options.CaseFolder,
     out: Annotated[
         Path,
-        typer.Option(
-            metavar="DIR",
-            help="Folder for diagnosis.json, calibration.json of the model with the effects found, "
-            "missing_watts.parquet, predictions.parquet, report.html.",
+        options.folder(
+            "diagnosis.json, calibration.json of the model with the effects found, missing_watts.parquet, "
+            "predictions.parquet, report.html"
         ),
     ],
     tune: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="START/END",
-            help="Tuning interval, repeatable; default: the first two thirds, "
-            "or two days in three where the last third shows other weather.",
+        options.Intervals,
+        options.interval(
+            "Tuning", "the first two thirds, or two days in three where the last third shows other weather"
         ),
     ] = None,
     hold_out: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="START/END", help="Held-out interval, repeatable; default: the last third, or every third day."
-        ),
+        options.Intervals, options.interval("Held-out", "the last third, or every third day")
     ] = None,
-    dx: Dx = None,
-    horizon: Annotated[str, typer.Option(metavar="TIME", help="Prediction horizon, such as 6h or 90min.")] = "6h",
-    force: Force = False,
-    json: Json = False,
+    dx: options.Dx = None,
+    horizon: options.Horizon = "6h",
+    force: options.Force = False,
+    json: options.Json = False,
 ) -> int:
-    """Diagnose a case."""
-    from calibration.diagnosis.diagnosis import diagnose as answer
-    from calibration.evaluation.intervals import parse_interval
-    from calibration.results import check_results_folder
-    from mpc.reports.diagnosis import diagnosis_summary, write_diagnosis
-    from thermal.case.load import load_case
+    """Say where model and building disagree, which missing effect causes it, and how far the error falls with it.
 
-    check_results_folder(out, force)
-    loaded = load_case(case)
-    tuned, judged = ([parse_interval(text, loaded) for text in texts or ()] for texts in (tune, hold_out))
+    Example: buildingmpc diagnose cases/office --out diagnosis
+    """
+    from mpc.reports.diagnosis import diagnosis_summary
+
     with Waiting(f"diagnose {case.name}") as progress:
-        result = answer(loaded, tuned, judged, dx=dx, horizon=horizon, progress=progress)
-        report = write_diagnosis(result, loaded, out, force=force)
-    if json:
-        write_json(diagnosis_summary(result))
-        return 0
-    _show(result)
-    say(f"Report: {report}")
-    return 0
+        result, report = run_diagnosis(case, out, force, progress, (tune or (), hold_out or ()), dx, horizon)
+    return answer(json, diagnosis_summary(result), lambda: _show(result), report)
+
+
+def run_diagnosis(
+    case: Path,
+    out: Path,
+    force: bool,
+    progress: Progress,
+    intervals: Sequence[Sequence[str]] = ((), ()),
+    dx: float | None = None,
+    horizon: str = "6h",
+) -> tuple[Diagnosis, Path]:
+    """Diagnose a case and write what was found.
+
+    Parameters
+    ----------
+    case, out : Path
+        Case folder, folder of the results.
+    force : bool
+        Whether earlier results are replaced.
+    progress : callable
+        Called with stage, done, total.
+    intervals : sequence of sequence of str
+        To tune and to hold out.
+    dx : float, optional
+        Distance between control volumes of a plan [m].
+    horizon : str
+        Prediction horizon.
+    """
+    from calibration.diagnosis import diagnosis
+    from mpc.reports.diagnosis import write_diagnosis
+
+    loaded = options.open_case(case, out, force)
+    tuned, judged = (options.parse_intervals(texts, loaded) for texts in intervals)
+    result = diagnosis.diagnose(loaded, tuned, judged, dx=dx, horizon=horizon, progress=progress)
+    return result, write_diagnosis(result, loaded, out, force=force)
 
 
 def _show(result: Diagnosis) -> None:
@@ -72,21 +90,13 @@ def _show(result: Diagnosis) -> None:
 
     say(diagnosis_verdict(result))
     say(f"Where: {where_sentence(result.where)}")
-    show_table(
-        "Candidates",
-        ("effect", "id", "probability", "where", "told apart by"),
-        [
-            (called(s.effect), s.effect, f"{s.probability:.2f}", in_zones(s.zones), s.separate_by)
-            for s in result.verdict.candidates[:_MOST_CANDIDATES]
-        ],
-        left=(0, 1, 3, 4),
-    )
-    untestable = [s.effect for s in result.verdict.candidates if not s.testable]
+    candidates = result.verdict.candidates
+    columns = {"effect": "", "id": "", "probability": ".2f", "where": "", "told apart by": ""}
+    rows = [(called(s.effect), s.effect, s.probability, in_zones(s.zones), s.separate_by) for s in candidates]
+    show_table("Candidates", columns, rows[:_MOST_CANDIDATES])
+    untestable = [s.effect for s in candidates if not s.testable]
     if untestable:
         say(f"These data cannot test: {', '.join(untestable)}; the report says why.")
-    rows = [("calibrated model", f"{result.gap:.3f}", "")]
-    for step in result.steps:
-        share = "–" if step.share_closed is None else f"{step.share_closed:.0%}"
-        rows.append((f"+ {step.effects[-1]}", f"{step.after:.3f}", share))
-    rows.append(("floor", f"{result.floor:.3f}", ""))
-    show_table(f"Held-out error {result.horizon} ahead", ("", "MAE [K]", "share closed"), rows)
+    steps = [(f"+ {step.effects[-1]}", step.after, step.share_closed) for step in result.steps]
+    errors = [("calibrated model", result.gap, ""), *steps, ("floor", result.floor, "")]
+    show_table(f"Held-out error {result.horizon} ahead", {"": "", "MAE [K]": ".3f", "share closed": ".0%"}, errors)

@@ -1,56 +1,40 @@
-"""``buildingmpc evaluate``."""
+"""``buildingmpc evaluate`` and ``buildingmpc simulate``: a model on the telemetry of a case."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from mpc.cli.console import Force, Json, Waiting, say, show_table, write_json
+from mpc.cli import options
+from mpc.cli.console import Waiting, answer, say, show_table
 
 if TYPE_CHECKING:
     from calibration.evaluation.n_step import Evaluation
 
-Dx = Annotated[
-    float | None, typer.Option(metavar="M", help="Distance between control volumes of a plan; default its cell size.")
-]
-Parameters = Annotated[
-    Path | None, typer.Option(metavar="FILE", help="calibration.json of this case; default: before calibration.")
-]
-SchemeName = Annotated[
-    str | None,
-    typer.Option(metavar="NAME", help="implicit_euler or tr_bdf2; default: as calibrated, else implicit_euler."),
-]
-
 
 def evaluate(
-    case: Annotated[Path, typer.Argument(metavar="CASE", help="Case folder.")],
-    parameters: Parameters = None,
-    horizon: Annotated[str, typer.Option(metavar="TIME", help="Prediction horizon, such as 6h or 90min.")] = "6h",
-    interval: Annotated[
-        list[str] | None,
-        typer.Option(metavar="START/END", help="Interval to evaluate, repeatable; default: all the telemetry."),
-    ] = None,
-    dx: Dx = None,
-    scheme: SchemeName = None,
-    out: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Folder for evaluation.json, predictions.parquet, report.html.")
-    ] = None,
-    force: Force = False,
-    json: Json = False,
+    case: options.CaseFolder,
+    parameters: options.Parameters = None,
+    horizon: options.Horizon = "6h",
+    interval: Annotated[options.Intervals, options.interval("Evaluated", "all the telemetry")] = None,
+    dx: options.Dx = None,
+    scheme: options.SchemeName = None,
+    out: Annotated[Path | None, options.folder("evaluation.json, predictions.parquet, report.html")] = None,
+    force: options.Force = False,
+    json: options.Json = False,
 ) -> int:
-    """Evaluate a model over N steps."""
-    from calibration.evaluation.case_model import evaluate_case
-    from calibration.evaluation.intervals import parse_interval
-    from calibration.results import check_results_folder
-    from mpc.reports.evaluation import write_evaluation
-    from thermal.case.load import load_case
+    """N-step prediction error of a model on the telemetry of a case.
 
-    if out is not None:
-        check_results_folder(out, force)
-    loaded = load_case(case)
-    intervals = [parse_interval(text, loaded) for text in interval or ()]
+    Example: buildingmpc evaluate cases/office --parameters results/calibration.json
+    --interval 2023-10-16/2023-10-23 --out errors
+    """
+    from calibration.evaluation.case_model import evaluate_case
+    from mpc.reports.evaluation import write_evaluation
+
+    loaded = options.open_case(case, out, force)
+    intervals = options.parse_intervals(interval, loaded)
     source = parameters.name if parameters is not None else "uncalibrated start values"
     with Waiting("evaluate") as progress:
         found = evaluate_case(
@@ -58,35 +42,64 @@ def evaluate(
             trajectories=out is not None, progress=progress,
         )  # fmt: skip
         report = write_evaluation(found, loaded, out, parameters=source, force=force) if out is not None else None
-    if json:
-        write_json(found.to_dict())
-        return 0
-    _show(found, source)
-    if report is not None:
-        say(f"Report: {report}")
-    return 0
+    return answer(json, found.to_dict(), lambda: _show(found, source), report)
 
 
 def _show(found: Evaluation, source: str) -> None:
     from mpc.reports.evaluation import evaluation_verdict
 
     say(f"{evaluation_verdict(found)} Parameters: {source}.")
-    show_table(
-        "Intervals",
-        ("from", "to", "runs", "skipped", "MAE [K]", "median [K]", "bias [K]"),
-        left=(0, 1),
-        rows=[
-            (
-                i["start"],
-                i["end"],
-                str(i["runs"]),
-                str(i["skipped"]),
-                *(f"{i[k]:.3f}" for k in ("mae", "median", "bias")),
-            )
-            for i in found.to_dict()["intervals"]
-        ],
-    )
+    errors = {"MAE [K]": ".3f", "median [K]": ".3f", "bias [K]": ".3f"}
+    keys = ("start", "end", "runs", "skipped", "mae", "median", "bias")
+    rows = [[i[key] for key in keys] for i in found.to_dict()["intervals"]]
+    show_table("Intervals", {"from": "", "to": "", "runs": "d", "skipped": "d", **errors}, rows)
     if found.by_horizon:
-        show_table("Horizons", ("horizon", "MAE [K]"), [(h, f"{mae:.3f}") for h, mae in found.by_horizon.items()])
-    zones = sorted(found.by_zone().items(), key=lambda item: -item[1]["mae"])
-    show_table("Zones", ("zone", "MAE [K]", "bias [K]"), [(z, f"{e['mae']:.3f}", f"{e['bias']:.3f}") for z, e in zones])
+        show_table("Horizons", {"horizon": "", "MAE [K]": ".3f"}, found.by_horizon.items())
+    zones = sorted(((z, e["mae"], e["bias"]) for z, e in found.by_zone().items()), key=lambda row: -row[1])
+    show_table("Zones", {"zone": "", "MAE [K]": ".3f", "bias [K]": ".3f"}, zones)
+
+
+def simulate(
+    case: options.CaseFolder,
+    start: options.Start,
+    end: Annotated[str, typer.Option(metavar="T", help="End.")],
+    parameters: options.Parameters = None,
+    dx: options.Dx = None,
+    scheme: options.SchemeName = None,
+    out: Annotated[Path | None, options.folder("simulation.json, simulation.parquet, report.html")] = None,
+    force: options.Force = False,
+    json: options.Json = False,
+) -> int:
+    """Replay the inputs of a building through its model.
+
+    Example: buildingmpc simulate cases/office --start 2023-10-16 --end 2023-10-18
+    --parameters results/calibration.json --out replay
+    """
+    from calibration.evaluation.case_model import case_model
+    from mpc.reports.case import simulation_summary, write_simulation
+    from thermal.case.case import local_timestamp
+    from thermal.model.simulation import simulate as replay
+
+    loaded = options.open_case(case, out, force)
+    first, last = (local_timestamp(time, loaded.building) for time in (start, end))
+    steps = max(1, int((last - first).total_seconds() // loaded.step))
+    with Waiting("simulate") as progress:
+        ready = case_model(loaded, parameters, dx=dx, scheme=scheme)
+        stepping, spin_up = ready.settings.stepping, ready.settings.spin_up_seconds
+        found = replay(
+            loaded, ready.grid, ready.theta, first, last, stepping, spin_up,
+            progress=lambda done: progress("simulate", done, steps),
+        )  # fmt: skip
+        report = write_simulation(found, loaded, out, parameters=ready.source, force=force) if out is not None else None
+    summary = simulation_summary(found, loaded, ready.source)
+    return answer(json, summary, lambda: _show_replay(summary, ready.source), report)
+
+
+def _show_replay(summary: dict[str, Any], source: str) -> None:
+    from mpc.reports.case import simulation_verdict
+
+    say(f"{simulation_verdict(summary)} Parameters: {source}.")
+    zones = sorted(([z, *(e[k] for k in ("mae", "bias", "mean_heat"))] for z, e in summary["by_zone"].items()),
+                   key=lambda row: -row[1])  # fmt: skip
+    columns = {"zone": "", "MAE [K]": ".3f", "bias [K]": ".3f", "mean heat [W]": ".0f"}
+    show_table(f"Zones, {summary['start']} to {summary['end']}", columns, zones)

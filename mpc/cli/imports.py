@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from mpc.cli.console import Force, Json, Waiting, say, show_table, write_json
+from mpc.cli.console import Waiting, answer, say, show_table
+from mpc.cli.options import Force, Json, file
 
 if TYPE_CHECKING:
     from thermal.plan.assemble import PlanImport
@@ -19,13 +21,14 @@ if TYPE_CHECKING:
 def import_plan(
     drawings: Annotated[Path, typer.Argument(metavar="LIST", help="YAML list of the floors' drawings.")],
     out: Annotated[Path, typer.Option(metavar="DIR", help="Case folder to make; report.html is in it.")],
-    devices: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Devices: CSV, Brick (.ttl), Haystack (.json, .zinc).")
-    ] = None,
+    devices: Annotated[Path | None, file("Devices: CSV, Brick (.ttl), Haystack (.json, .zinc).")] = None,
     force: Force = False,
     json: Json = False,
 ) -> int:
-    """Make a case of drawings."""
+    """Make a case folder of floor plans: PNG, JPEG, PDF, DXF, arrays of codes.
+
+    Example: buildingmpc import-plan plans/plans.yaml --devices plans/devices.csv --out cases/office
+    """
     from thermal.plan.folder import building_of, check_nothing_lost, held_work, save_plan_case
     from thermal.plan.list import import_drawings, read_drawing_list
     from thermal.plan.models import read_devices
@@ -37,42 +40,38 @@ def import_plan(
     listed = read_drawing_list(drawings)
     with Waiting(f"import {drawings.name}") as progress:
         found = import_drawings(drawings, progress=progress)
-    zones = list(found.area_errors)
-    served = read_devices(devices, zones) if devices is not None else None
-    building = building_of(
-        found,
-        listed.name,
-        listed.location,
-        orientation=listed.orientation,
-        devices=served.devices if served is not None else (),
-    )
+    served = read_devices(devices, list(found.area_errors)) if devices is not None else None
+    known = served.devices if served is not None else ()
+    building = building_of(found, listed.name, listed.location, orientation=listed.orientation, devices=known)
     page = import_page(found, listed.name, served)
     folder = save_plan_case(building, out, overwrite=force)
     (folder / "report.html").write_text(page, encoding="utf-8")
-    if json:
-        write_json({**_plan_content(found), **({"devices": _device_content(served)} if served is not None else {})})
-        return 0
-    _show_plan(found, listed.name)
-    for work in lost:
-        say(f"Replaced: {work}")
-    if served is not None:
-        _show_devices(served)
-    say(f"Case: {folder}   Picture: {folder / 'report.html'}")
-    say(f"Next: buildingmpc import-telemetry {folder} EXPORT --out CASE, or correct it: buildingmpc label {folder}")
-    return 0
+
+    def show() -> None:
+        _show_plan(found, listed.name)
+        for work in lost:
+            say(f"Replaced: {work}")
+        if served is not None:
+            _show_devices(served)
+        say(f"Case: {folder}   Picture: {folder / 'report.html'}")
+        say(f"Next: buildingmpc import-telemetry {folder} EXPORT --out CASE, or correct it: buildingmpc label {folder}")
+
+    content = _plan_content(found) | ({} if served is None else {"devices": _device_content(served)})
+    return answer(json, content, show)
 
 
 def import_devices(
     case: Annotated[Path, typer.Argument(metavar="CASE", help="Case folder with the zones.")],
     devices: Annotated[Path, typer.Argument(metavar="FILE", help="CSV, Brick (.ttl), Haystack (.json, .zinc).")],
     out: Annotated[Path, typer.Option(metavar="DIR", help="Case folder to make, with these devices.")],
-    telemetry: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="CSV or Parquet whose columns are matched to devices.")
-    ] = None,
+    telemetry: Annotated[Path | None, file("CSV or Parquet whose columns are matched to devices.")] = None,
     force: Force = False,
     json: Json = False,
 ) -> int:
-    """Give a case its devices, and match columns of telemetry to them."""
+    """Give a case its devices from CSV, Brick or Haystack, and match columns of telemetry to them.
+
+    Example: buildingmpc import-devices cases/office devices.ttl --telemetry export.csv --out cases/office-2
+    """
     from thermal.case.load import load_case
     from thermal.plan.folder import save_with_labels, with_devices
     from thermal.plan.match import match_points, read_columns, write_matches
@@ -87,24 +86,22 @@ def import_devices(
     folder = save_with_labels(new, case, out, overwrite=force)
     if telemetry is not None:
         write_matches(matches, folder / "points.csv")
-    if json:
-        write_json({"devices": _device_content(served), "points": [_match_content(m) for m in matches]})
-        return 0
-    _show_devices(served)
-    if telemetry is not None:
-        _show_matches(matches)
-        say(f"Points: {folder / 'points.csv'}")
-    say(f"Case: {folder}")
-    return 0
+
+    def show() -> None:
+        _show_devices(served)
+        if telemetry is not None:
+            _show_matches(matches)
+            say(f"Points: {folder / 'points.csv'}")
+        say(f"Case: {folder}")
+
+    return answer(json, {"devices": _device_content(served), "points": [asdict(m) for m in matches]}, show)
 
 
 def import_telemetry(
     case: Annotated[Path, typer.Argument(metavar="CASE", help="Case folder with zones and devices.")],
     file: Annotated[Path, typer.Argument(metavar="FILE", help="CSV or Parquet; columns of any names.")],
     out: Annotated[Path, typer.Option(metavar="DIR", help="Case folder to make, with this telemetry.")],
-    points: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="points.csv, corrected by hand; default: matched by name.")
-    ] = None,
+    points: Annotated[Path | None, file("points.csv, corrected by hand; default: matched by name.")] = None,
     unit: Annotated[
         list[str] | None,
         typer.Option(metavar="POINT=UNIT", help="Unit in the file, repeatable; default: degC, kg/s, W, %, W/m^2."),
@@ -112,7 +109,10 @@ def import_telemetry(
     force: Force = False,
     json: Json = False,
 ) -> int:
-    """Give a case its telemetry, whatever its columns are called."""
+    """Give a case its telemetry, whatever its columns are called.
+
+    Example: buildingmpc import-telemetry cases/office export.csv --points points.csv --out cases/office-3
+    """
     from thermal.case.load import load_case
     from thermal.plan.folder import save_with_labels
     from thermal.plan.match import match_points, read_columns, read_matches, with_telemetry, write_matches
@@ -128,15 +128,16 @@ def import_telemetry(
     folder = save_with_labels(new, case, out, overwrite=force)
     write_matches(matches, folder / "points.csv")
     frame = new.telemetry.frame
-    if json:
-        span = {"start": frame.index[0].isoformat(), "end": frame.index[-1].isoformat(), "step_seconds": new.step}
-        write_json({**span, "columns": frame.shape[1], "points": [_match_content(m) for m in matches]})
-        return 0
-    _show_matches(matches)
-    say(f"{frame.shape[1]} columns from {frame.index[0]:%Y-%m-%d %H:%M} to {frame.index[-1]:%Y-%m-%d %H:%M}")
-    say(f"Case: {folder}   Points: {folder / 'points.csv'}")
-    say(f"Next: buildingmpc check {folder}")
-    return 0
+    first, last = frame.index[0], frame.index[-1]
+
+    def show() -> None:
+        _show_matches(matches)
+        say(f"{frame.shape[1]} columns from {first:%Y-%m-%d %H:%M} to {last:%Y-%m-%d %H:%M}")
+        say(f"Case: {folder}   Points: {folder / 'points.csv'}")
+        say(f"Next: buildingmpc check {folder}")
+
+    content = {"start": first.isoformat(), "end": last.isoformat(), "step_seconds": new.step}
+    return answer(json, content | {"columns": frame.shape[1], "points": [asdict(m) for m in matches]}, show)
 
 
 def _units(given: Sequence[str]) -> dict[str, str]:
@@ -150,40 +151,23 @@ def _units(given: Sequence[str]) -> dict[str, str]:
 
 
 def _plan_content(found: PlanImport) -> dict[str, Any]:
+    floors = []
+    for floor in found.floors:
+        survey = floor.survey
+        zones = [{"name": z, "area": area, "area_error": found.area_errors[z]} for z, area in floor.areas.items()]
+        floors.append({
+            "name": floor.name, "source": survey.source, "turned": survey.turned, "offset": list(floor.offset),
+            "rooms": len(survey.rooms), "doors": len(survey.doors), "zones": zones,
+        })  # fmt: skip
     return {
-        "cell_size": found.plans.cell_size,
-        "largest_area_error": found.largest_error,
-        "floors": [
-            {
-                "name": floor.name,
-                "source": floor.survey.source,
-                "turned": floor.survey.turned,
-                "offset": list(floor.offset),
-                "rooms": len(floor.survey.rooms),
-                "doors": len(floor.survey.doors),
-                "zones": [
-                    {"name": zone, "area": area, "area_error": found.area_errors[zone]}
-                    for zone, area in floor.areas.items()
-                ],
-            }
-            for floor in found.floors
-        ],
+        "cell_size": found.plans.cell_size, "largest_area_error": found.largest_error, "floors": floors,
         "remarks": list(found.remarks),
-    }
+    }  # fmt: skip
 
 
 def _device_content(served: DeviceImport) -> dict[str, Any]:
-    return {
-        "devices": [device.model_dump() for device in served.devices],
-        "unplaced": served.unplaced,
-        "unknown_types": served.unknown_types,
-    }
-
-
-def _match_content(match: PointMatch) -> dict[str, Any]:
-    from dataclasses import asdict
-
-    return asdict(match)
+    devices = [device.model_dump() for device in served.devices]
+    return {"devices": devices, "unplaced": served.unplaced, "unknown_types": served.unknown_types}
 
 
 def _show_plan(found: PlanImport, name: str) -> None:
@@ -195,12 +179,8 @@ def _show_plan(found: PlanImport, name: str) -> None:
     say(f"{name}: {size}, cells of {found.plans.cell_size:g} m, {near}")
     for remark in found.remarks:
         say(f"- {remark}")
-    rows = [
-        (zone, floor.name, f"{area:.1f}", f"{100 * found.area_errors[zone]:+.1f}")
-        for floor in found.floors
-        for zone, area in floor.areas.items()
-    ]
-    show_table("Zones", ("zone", "floor", "area on the drawing [m²]", "plan [%]"), rows, left=(0, 1))
+    rows = [(z, f.name, area, 100 * found.area_errors[z]) for f in found.floors for z, area in f.areas.items()]
+    show_table("Zones", {"zone": "", "floor": "", "area on the drawing [m²]": ".1f", "plan [%]": "+.1f"}, rows)
 
 
 def _show_devices(served: DeviceImport) -> None:
@@ -209,15 +189,13 @@ def _show_devices(served: DeviceImport) -> None:
     for device, kind in served.unknown_types.items():
         say(f"- device {device!r} has a type that the library does not know: {kind!r}")
     if served.unplaced:
-        show_table("Devices without a zone", ("device", "zone in the list"), list(served.unplaced.items()), left=(0, 1))
+        show_table("Devices without a zone", {"device": "", "zone in the list": ""}, served.unplaced.items())
 
 
 def _show_matches(matches: tuple[PointMatch, ...]) -> None:
     """Write what columns were matched to, least certain first, to stdout."""
-    missed = [m for m in matches if m.remark]
-    say(f"{len(matches) - len(missed)} of {len(matches)} columns matched")
-    rows = [
-        (m.column, m.entity or "–", m.point or "–", f"{m.confidence:.2f}", m.remark)
-        for m in sorted(matches, key=lambda m: (not m.remark, m.confidence))
-    ]
-    show_table("Columns", ("column", "device", "point", "confidence", "not matched because"), rows, left=(0, 1, 2, 4))
+    ordered = sorted(matches, key=lambda m: (not m.remark, m.confidence))
+    say(f"{sum(not m.remark for m in matches)} of {len(matches)} columns matched")
+    rows = [(m.column, m.entity or None, m.point or None, m.confidence, m.remark) for m in ordered]
+    columns = {"column": "", "device": "", "point": "", "confidence": ".2f", "not matched because": ""}
+    show_table("Columns", columns, rows)

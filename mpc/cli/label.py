@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import multiprocessing
 import webbrowser
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from mpc.cli.console import say
+from mpc import plugins
+from mpc.cli.calibrate import run_calibration
+from mpc.cli.check import run_check
+from mpc.cli.console import Progress, Waiting, say
+from mpc.cli.diagnose import run_diagnosis
 
 if TYPE_CHECKING:
     from multiprocessing.connection import Connection
@@ -20,9 +24,10 @@ if TYPE_CHECKING:
 
 #: Folder of a new case, where the command names none.
 _NEW = Path("case")
+_MAKERS: dict[str, Callable[[Path, Path, bool, Progress], Any]] = {
+    "check": run_check, "calibrate": run_calibration, "diagnose": run_diagnosis,
+}  # fmt: skip
 _LISTS = (".yaml", ".yml")
-
-Progress = Callable[[str, int, int], None]
 
 
 def label(
@@ -44,12 +49,15 @@ def label(
         bool, typer.Option("--take-over", help="Take the case from a program that has it open.")
     ] = False,
 ) -> int:
-    """Open the labelling page of a case until Ctrl-C."""
+    """Turn floor plans and a list of devices into a case, on a page in the browser; show its reports.
+
+    Example: buildingmpc label cases/office
+    """
     from thermal.plan.page.desk import LabelDesk
     from thermal.plan.page.serve import serve_page
 
     case, drawings = _case_of(target, out)
-    makers = {name: partial(_make_apart, name) for name in ("check", "calibrate", "diagnose")}
+    makers = {name: partial(_make_apart, name) for name in _MAKERS}
     desk = LabelDesk(case, reports=results or (), makers=makers, take_over=take_over)
     try:
         if drawings is not None:
@@ -84,7 +92,6 @@ def _case_of(target: Path | None, out: Path | None) -> tuple[Path, Path | None]:
 
 def _prepare(desk: LabelDesk, drawings: Path) -> None:
     """Put a drawing, or all floors of a list, on the page of a new case."""
-    from mpc.cli.console import Waiting
     from thermal.errors import LabelError, describe
     from thermal.plan.page.desk import import_list, import_sheet
 
@@ -104,7 +111,7 @@ def _make_apart(kind: str, case: Path, out: Path, progress: Progress) -> None:
 
     context = multiprocessing.get_context("spawn")
     here, there = context.Pipe(duplex=False)
-    process = context.Process(target=_make, args=(kind, case, out, there), daemon=True)
+    process = context.Process(target=_make, args=(kind, case, out, there, plugins.loaded), daemon=True)
     process.start()
     there.close()
     try:
@@ -128,43 +135,16 @@ def _make_apart(kind: str, case: Path, out: Path, progress: Progress) -> None:
         raise MpcError(f"the process that makes the report ended with code {process.exitcode}")
 
 
-def _make(kind: str, case: Path, out: Path, connection: Connection[Any, Any]) -> None:
+def _make(kind: str, case: Path, out: Path, connection: Connection[Any, Any], named: Sequence[str]) -> None:
     """Make a report; what goes wrong is told in a sentence."""
 
     def progress(stage: str, done: int, total: int) -> None:
         connection.send((stage, done, total))
 
     try:
-        {"check": _check, "calibrate": _calibrate, "diagnose": _diagnose}[kind](case, out, progress)
+        plugins.load_plugins(named)
+        _MAKERS[kind](case, out, True, progress)
     except Exception as error:
         connection.send(("error", f"{type(error).__name__}: {error}"))
     finally:
         connection.close()
-
-
-def _check(case: Path, out: Path, progress: Progress) -> None:
-    from mpc.reports.case import write_check
-    from thermal.case.check import check_case
-
-    progress("check", 0, 1)
-    write_check(check_case(case), out, force=True)
-
-
-def _calibrate(case: Path, out: Path, progress: Progress) -> None:
-    from calibration.fit.calibrate import calibrate
-    from mpc.reports.calibration import write_calibration
-    from thermal.case.load import load_case
-
-    loaded = load_case(case)
-    result = calibrate(loaded, progress=progress)
-    write_calibration(result, loaded, out, force=True)
-
-
-def _diagnose(case: Path, out: Path, progress: Progress) -> None:
-    from calibration.diagnosis.diagnosis import diagnose
-    from mpc.reports.diagnosis import write_diagnosis
-    from thermal.case.load import load_case
-
-    loaded = load_case(case)
-    result = diagnose(loaded, progress=progress)
-    write_diagnosis(result, loaded, out, force=True)

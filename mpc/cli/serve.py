@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from mpc.cli.console import Json, Waiting, say, show_table, write_json
-from mpc.cli.evaluate import Dx, Parameters
+from mpc.cli.console import Waiting, answer, say, show_table
+from mpc.cli.options import Dx, Json, Parameters, file, number
 
 if TYPE_CHECKING:
     from mpc.adapters.boptest.case import BoptestCase
@@ -18,7 +20,7 @@ if TYPE_CHECKING:
 PORT = 8000
 
 #: A pilot of a size that many tests at once are quick with: floor area [m2], zones, distance of control volumes [m].
-SMALL_PILOT = (600.0, 12, 1.0)
+SMALL_PILOT: dict[str, Any] = {"floor_area": 600.0, "zones": 12, "dx": 1.0, "name": "pilot_12"}
 
 
 def serve(
@@ -30,7 +32,7 @@ def serve(
         bool, typer.Option("--pilot", help="Serve the generated pilot, too: 'pilot', and 'pilot_12' with 12 zones.")
     ] = False,
     host: Annotated[str, typer.Option(metavar="ADDRESS", help="Where to listen.")] = "127.0.0.1",
-    port: Annotated[int, typer.Option(metavar="N", help="Port; 0 takes a free one.")] = PORT,
+    port: Annotated[int, number("Port; 0 takes a free one.")] = PORT,
     allow_remote: Annotated[
         bool, typer.Option("--allow-remote", help="Let other machines in; there is no password.")
     ] = False,
@@ -38,16 +40,18 @@ def serve(
         list[str] | None, typer.Option(metavar="NAME", help="A name that clients call the server by, repeatable.")
     ] = None,
     parameters: Parameters = None,
-    weather: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="EPW or CSV of a whole year; default: the case's telemetry.")
-    ] = None,
-    step: Annotated[float, typer.Option(metavar="SECONDS", help="Step of the plants.")] = 300.0,
+    weather: Annotated[Path | None, file("EPW or CSV of a whole year; default: the case's telemetry.")] = None,
+    step: Annotated[float, number("Step of the plants.", "SECONDS")] = 300.0,
     dx: Dx = None,
-    most: Annotated[int, typer.Option(metavar="N", help="Tests that may run at once.")] = 64,
-    idle: Annotated[float, typer.Option(metavar="SECONDS", help="A test unused this long is freed.")] = 900.0,
+    most: Annotated[int, number("Tests that may run at once.")] = 64,
+    idle: Annotated[float, number("A test unused this long is freed.", "SECONDS")] = 900.0,
     json: Json = False,
 ) -> int:
-    """Serve plants until interrupted."""
+    """Put buildings behind BOPTEST's REST API, so that its controllers run on them; ends with Ctrl-C.
+
+    Example: buildingmpc serve cases/office --boptest --parameters results/calibration.json --weather town.epw
+    --port 8000
+    """
     from mpc.adapters.boptest.server import BoptestServer, check_host
     from mpc.errors import BoptestError
 
@@ -57,7 +61,8 @@ def serve(
         raise BoptestError("--parameters: expected one case that they belong to, found several; serve it alone")
     check_host(host, allow_remote)  # before the minutes that a large building takes
     with Waiting("reduce the buildings") as progress:
-        made = _make(cases or [], pilot, parameters, weather, step, dx, progress)
+        settings = {"parameters": parameters, "weather": weather, "step_seconds": step, "dx": dx}
+        made = list(_made(cases or [], pilot, settings, progress))
         server = BoptestServer(
             made, host, port, allow_remote=allow_remote, names=name or (), most=most, idle_seconds=idle
         )
@@ -67,52 +72,36 @@ def serve(
     return 0
 
 
-def _make(
-    cases: list[Path],
-    pilot: bool,
-    parameters: Path | None,
-    weather: Path | None,
-    step: float,
-    dx: float | None,
-    progress: Waiting,
-) -> list[BoptestCase]:
+def _made(cases: list[Path], pilot: bool, settings: dict[str, Any], progress: Waiting) -> Iterator[BoptestCase]:
+    """Make what is served, one after the other."""
     from mpc.adapters.boptest.make import case_to_serve, pilot_to_serve
     from thermal.case.load import load_case
     from thermal.data import load_bundled_case
 
-    made: list[BoptestCase] = []
-    count = (len(cases) or 1) + 2 * pilot
-    for case in [load_case(path) for path in cases] or [load_bundled_case()]:
-        made.append(case_to_serve(case, parameters, weather=weather, step_seconds=step, dx=dx))
-        progress(made[-1].name, len(made), count)
+    loaded = [load_case(path) for path in cases] or [load_bundled_case()]
+    makers = [partial(case_to_serve, case, **settings) for case in loaded]
     if pilot:
-        area, zones, spacing = SMALL_PILOT
-        made.append(pilot_to_serve(step_seconds=step))
-        progress(made[-1].name, len(made), count)
-        made.append(pilot_to_serve(1, floor_area=area, zones=zones, dx=spacing, step_seconds=step, name="pilot_12"))
-    return made
+        pilots = partial(pilot_to_serve, step_seconds=settings["step_seconds"])
+        makers += [pilots, partial(pilots, 1, **SMALL_PILOT)]
+    for done, make in enumerate(makers, 1):
+        yield (made := make())
+        progress(made.name, done, len(makers))
 
 
 def _announce(server: BoptestServer, made: list[BoptestCase], json: bool) -> None:
     """Say where the server is and what it serves; a line of JSON for programs that wait for it."""
-    if json:
-        listed = {case.name: {"zones": len(case.building.zone_names), "periods": list(case.periods)} for case in made}
-        write_json({"url": server.url, "testcases": listed})
-    else:
-        show_table(
-            f"BOPTEST's API at {server.url}",
-            ("test case", "zones", "weather", "time periods"),
-            [_row(case) for case in made],
-            left=(0, 2, 3),
-        )
+
+    def show() -> None:
+        columns = dict.fromkeys(("test case", "zones", "weather", "time periods"), "") | {"zones": "d"}
+        rows = [(case.name, len(case.building.zone_names), _covered(case), ", ".join(case.periods)) for case in made]
+        show_table(f"BOPTEST's API at {server.url}", columns, rows)
         say(f"Begin a test: curl -X POST {server.url}/testcases/{made[0].name}/select")
         say("Ctrl-C ends the server and all its tests.")
 
+    listed = {case.name: {"zones": len(case.building.zone_names), "periods": list(case.periods)} for case in made}
+    answer(json, {"url": server.url, "testcases": listed}, show)
 
-def _row(case: BoptestCase) -> tuple[str, str, str, str]:
+
+def _covered(case: BoptestCase) -> str:
     first, last = (case.clock.stamp(time) for time in case.covered)
-    if case.weather.typical:
-        covered = "a typical year"
-    else:
-        covered = f"{first:%Y-%m-%d %H:%M} to {last:%Y-%m-%d %H:%M}"
-    return case.name, str(len(case.building.zone_names)), covered, ", ".join(case.periods)
+    return "a typical year" if case.weather.typical else f"{first:%Y-%m-%d %H:%M} to {last:%Y-%m-%d %H:%M}"

@@ -3,12 +3,14 @@
 from thermal.errors import MissingExtraError
 
 try:
-    import gymnasium as _gymnasium  # noqa: F401
+    import gymnasium
 except ImportError as _error:
     raise MissingExtraError(
         'learning environments need gymnasium, which the extra brings: pip install "buildingmpc[rl]"'
     ) from _error
 
-from mpc.environment.registration import register
+#: Id of the environment in Gymnasium's registry; ``gymnasium.make("mpc.environment:buildingmpc/Office-v0")``.
+ENVIRONMENT_ID = "buildingmpc/Office-v0"
 
-register()
+if ENVIRONMENT_ID not in gymnasium.registry:
+    gymnasium.register(ENVIRONMENT_ID, entry_point="mpc.environment.environment:office_environment")

@@ -1,28 +1,31 @@
-"""The closed loop as a Gymnasium environment."""
+"""The closed loop as a Gymnasium environment, and that of an office in one call."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from typing import Any, Protocol, runtime_checkable
 
 import gymnasium
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
-from mpc.environment.actions import SUPPLY_SETPOINTS, ActionLayout
-from mpc.environment.features import LARGEST
-from mpc.environment.observation import Observation, ObservationLayout
-from mpc.environment.outlook import BLOCK_ENDS, Outlook, clock
+from mpc.environment.features import BLOCK_ENDS, LARGEST, Outlook, clock
+from mpc.environment.layout import SUPPLY_SETPOINTS, ActionLayout, Observation, ObservationLayout
 from mpc.environment.reward import REWARDS, Reward
 from mpc.errors import MpcError
 from mpc.kpi.kpis import measure_kpis
 from mpc.loop.history import RecentSteps
+from mpc.loop.make import PlantSettings, pilot_weather, simulated_plant
+from mpc.loop.noise import SensorNoise
 from mpc.loop.plant import Measurements, Plant
 from mpc.scenario.forecast import Forecaster
 from mpc.scenario.scenario import Scenario
 from thermal._types import FloatArray
 from thermal.errors import describe, nearest
+from thermal.pilot.building import pilot_building
 
 
 @runtime_checkable
@@ -30,20 +33,6 @@ class ScenarioPlant(Plant, Protocol):
     """A plant that says which scenario drives it; rewards and indicators need its prices, bands and people."""
 
     scenario: Scenario
-
-
-@runtime_checkable
-class _RecordingPlant(Plant, Protocol):
-    """A plant that gives its last steps at a cost that does not grow with the run."""
-
-    def recent(self, steps: int) -> RecentSteps:
-        """Give the last steps of the record.
-
-        Parameters
-        ----------
-        steps : int
-            How many of the plant's own steps, 1 or more.
-        """
 
 
 class _Course:
@@ -56,11 +45,11 @@ class _Course:
         scenario, grid = plant.scenario, plant.scenario.grid
         self.timezone = scenario.building.location.timezone
         self.each = round(plant.control_step / grid.step)
-        self.recording = isinstance(plant, _RecordingPlant)  # asked once: such a check is slow
+        self.recording = hasattr(plant, "recent")  # its last steps at a cost that does not grow with the run
         forecaster = getattr(plant, "forecaster", None)
         self.forecaster: Forecaster | None = forecaster if isinstance(forecaster, Forecaster) else None
         self.outlook: Outlook | None = None
-        self.last, self._clocks = grid.n_steps, dict[int, FloatArray]()
+        self.last = grid.n_steps
         if block_ends is not None:
             columns = plant.forecast().table.columns if self.forecaster is None else self.forecaster.columns
             area = scenario.floor_area
@@ -72,13 +61,6 @@ class _Course:
     def ahead(self) -> FloatArray | None:
         """Observed forecasts, a row a step of the scenario; None where they are asked for one by one."""
         return None if self.outlook is None or self.forecaster is None else self.outlook.table(self.forecaster)
-
-    def now(self, seconds: int) -> FloatArray:
-        """Observe the clock, each time once."""
-        known = self._clocks.get(seconds)
-        if known is None:
-            known = self._clocks[seconds] = clock(seconds, self.timezone)
-        return known
 
 
 class ControlEnvironment(gymnasium.Env[Observation, NDArray[np.float32]]):
@@ -133,7 +115,9 @@ class ControlEnvironment(gymnasium.Env[Observation, NDArray[np.float32]]):
         ranges: Mapping[str, tuple[float, float]] | None = None,
     ) -> None:
         self.plants = _checked(plants)
-        self.reward = _reward_of(reward)
+        if isinstance(reward, str) and reward not in REWARDS:
+            raise MpcError(describe("reward", "a known one", repr(reward), nearest(reward, REWARDS)))
+        self.reward = REWARDS[reward] if isinstance(reward, str) else reward
         if episode_steps is not None and episode_steps < 1:
             raise MpcError(describe("episode_steps", "1 or more", repr(episode_steps)))
         self.episode_steps = episode_steps
@@ -146,14 +130,10 @@ class ControlEnvironment(gymnasium.Env[Observation, NDArray[np.float32]]):
         )
         self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (len(self.actions),), np.float32)
         self.observation_space = gymnasium.spaces.Box(-LARGEST, LARGEST, (len(self.layout),), np.float32)
-        self._plant, self._course = first, self._courses[0]
-        self._step, self._done = 0, 0
+        #: The plant of this episode.
+        self.plant = first
+        self._course, self._step, self._done = self._courses[0], 0, 0
         self._ahead: FloatArray | None = None
-
-    @property
-    def plant(self) -> ScenarioPlant:
-        """The plant of this episode."""
-        return self._plant
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -187,9 +167,9 @@ class ControlEnvironment(gymnasium.Env[Observation, NDArray[np.float32]]):
         if info["plant"] not in range(len(self.plants)):
             expected = f"a plant from 0 to {len(self.plants) - 1}"
             raise MpcError(describe("options: plant", expected, repr(info["plant"])))
-        self._plant, self._course = self.plants[info["plant"]], self._courses[info["plant"]]
+        self.plant, self._course = self.plants[info["plant"]], self._courses[info["plant"]]
         self._step = self._done = 0
-        return self._observe(self._plant.reset(info["plant_seed"])), info
+        return self._observe(self.plant.reset(info["plant_seed"])), info
 
     def step(self, action: NDArray[np.float32]) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Hold an action for a control step.
@@ -205,7 +185,7 @@ class ControlEnvironment(gymnasium.Env[Observation, NDArray[np.float32]]):
             Observation, reward, whether the episode terminated (never) and was truncated, and its indicators at the
             end.
         """
-        plant, course, begin = self._plant, self._course, self._step
+        plant, course, begin = self.plant, self._course, self._step
         seen = plant.step(self.actions.setpoints(action))
         self._step, self._done = begin + course.each, self._done + 1
         reward = self.reward.of_steps(_last_steps(plant, course), plant.scenario, begin)
@@ -218,47 +198,35 @@ class ControlEnvironment(gymnasium.Env[Observation, NDArray[np.float32]]):
     def close(self) -> None:
         """Close the plants that hold something open, such as a process of EnergyPlus."""
         for plant in self.plants:
-            close = getattr(plant, "close", None)
-            if close is not None:
-                close()
+            getattr(plant, "close", lambda: None)()
 
     def _observe(self, seen: Measurements, ended: bool = False) -> Observation:
         course = self._course
         if course.ahead is not None:
             self._ahead = course.ahead[min(self._step, len(course.ahead) - 1)]
         elif course.outlook is not None and not ended:  # at its end a plant may have nothing left to forecast
-            self._ahead = course.outlook.of_forecast(self._plant.forecast())
-        return self.layout.observe(seen.values_array, self._ahead, course.now(seen.seconds))
+            self._ahead = course.outlook.of_forecast(self.plant.forecast())
+        return self.layout.observe(seen.values_array, self._ahead, clock(seen.seconds, course.timezone))
 
 
 def _checked(plants: Plant | Sequence[Plant]) -> tuple[ScenarioPlant, ...]:
     """Plants that have scenarios and fit each other."""
     several = tuple(plants) if isinstance(plants, Sequence) else (plants,)
+    checked = tuple(plant for plant in several if isinstance(plant, ScenarioPlant))
     if not several:
         raise MpcError(describe("environment", "a plant or more", "none"))
-    checked: list[ScenarioPlant] = []
-    for plant in several:
-        if not isinstance(plant, ScenarioPlant):
-            raise MpcError(describe("environment", "plants with a scenario", type(plant).__name__))
-        checked.append(plant)
-    first = checked[0]
+    if len(checked) < len(several):
+        found = ", ".join(type(plant).__name__ for plant in several)
+        raise MpcError(describe("environment", "plants with a scenario", found))
     for k, plant in enumerate(checked):
         for what in ("columns", "actuators", "control_step"):
-            if getattr(plant, what) != getattr(first, what):
+            if getattr(plant, what) != getattr(checked[0], what):
                 expected = f"the same {what.replace('_', ' ')} as plant 0"
                 raise MpcError(describe(f"environment: plant {k}", expected, "others"))
         if plant.control_step % plant.scenario.grid.step:
             expected = f"a control step of whole steps of {plant.scenario.grid.step:g} s"
             raise MpcError(describe(f"environment: plant {k}", expected, f"{plant.control_step:g} s"))
-    return tuple(checked)
-
-
-def _reward_of(reward: str | Reward) -> Reward:
-    if not isinstance(reward, str):
-        return reward
-    if reward not in REWARDS:
-        raise MpcError(describe("reward", "a known one", repr(reward), nearest(reward, REWARDS)))
-    return REWARDS[reward]
+    return checked
 
 
 def _last_steps(plant: Any, course: _Course) -> RecentSteps:
@@ -273,3 +241,70 @@ def _last_steps(plant: Any, course: _Course) -> RecentSteps:
     gas = np.zeros(n) if whole.gas is None else whole.gas[-n:]
     temperature, electricity = list(whole.zone_temperature[-n - 1 :]), whole.electricity[-n:].tolist()
     return RecentSteps(whole.step, temperature, electricity, gas.tolist())
+
+
+@dataclass(frozen=True)
+class Office:
+    """A generated office, as `thermal.pilot.building.pilot_building` draws it.
+
+    Parameters
+    ----------
+    zones, floors : int
+        On all floors together; number of storeys.
+    floor_area : float
+        Of all floors together [m2].
+    seed : int
+        Of its plan, and of the first weather.
+    """
+
+    zones: int = 12
+    floors: int = 2
+    floor_area: float = 600.0
+    seed: int = 1
+
+
+def office_environment(
+    *,
+    office: Office | None = None,
+    plant: PlantSettings | None = None,
+    starts: Sequence[str] = ("2023-01-09",),
+    days: int = 7,
+    reward: str | Reward = "economic",
+    histograms: bool = False,
+    episode_steps: int | None = None,
+) -> ControlEnvironment:
+    """Make the environment of an office on its reduced model.
+
+    Parameters
+    ----------
+    office : Office, optional
+        Of twelve zones and 600 m2 by default.
+    plant : PlantSettings, optional
+        How it is simulated; control volumes of 1 m and the errors of `SensorNoise` by default. Forecasts are as long
+        as what is observed of them.
+    starts : sequence of str
+        Local days at which an episode may begin, ISO 8601; each has weather of a seed of its own.
+    days : int
+        Length of an episode [d]; the scenario is six hours longer, for the last forecast.
+    reward : str or Reward
+        As in `ControlEnvironment`.
+    histograms : bool
+        As in `ControlEnvironment`.
+    episode_steps : int, optional
+        As in `ControlEnvironment`.
+
+    Returns
+    -------
+    ControlEnvironment
+        To be reset.
+    """
+    drawn = office or Office()
+    building = pilot_building(**asdict(drawn), name="office")
+    given = plant or PlantSettings(dx=1.0, noise=SensorNoise())
+    given = replace(given, horizon=round(BLOCK_ENDS[-1] * 3600.0 / given.step_seconds))
+    plants = []
+    for k, start in enumerate(starts):
+        end = pd.Timestamp(start) + pd.Timedelta(days=days, hours=BLOCK_ENDS[-1])
+        weather = pilot_weather(drawn.seed + k, start, days + 1.0)
+        plants.append(simulated_plant(building, weather, start, end.isoformat(), given))
+    return ControlEnvironment(plants, reward=reward, histograms=histograms, episode_steps=episode_steps)

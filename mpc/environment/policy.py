@@ -13,9 +13,8 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mpc.environment.actions import ActionLayout
-from mpc.environment.observation import Observation, ObservationLayout
-from mpc.environment.outlook import clock
+from mpc.environment.features import clock
+from mpc.environment.layout import ActionLayout, Observation, ObservationLayout
 from mpc.errors import MpcError
 from mpc.loop.plant import Measurements
 from mpc.scenario.forecast import Forecast

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Protocol
 
 from mpc.errors import MpcError
 from mpc.kpi.rewards import PaperReward, StageCost
 from mpc.loop.history import RecentSteps
 from mpc.scenario.scenario import Scenario
+from thermal._types import FloatArray
 from thermal.errors import describe
 
 
@@ -55,12 +58,8 @@ class EconomicReward:
         first_step : int
             Step of the scenario in which it began.
         """
-        each, temperature = _steps_each(done, scenario), done.zone_temperature
-        costs = [
-            float(self.stage.of_step(scenario, first_step + k // each, temperature[k], temperature[k + 1], *powers))
-            for k, powers in enumerate(zip(done.electricity, done.gas, strict=True))
-        ]
-        return -sum(costs) / each
+        costs = [float(self.stage.of_step(scenario, *step)) for step in _steps(done, scenario, first_step)]
+        return -sum(costs) * done.step / scenario.grid.step
 
 
 @dataclass(frozen=True)
@@ -87,10 +86,9 @@ class PaperStepReward:
         first_step : int
             Step of the scenario in which it began.
         """
-        each, ends = _steps_each(done, scenario), done.zone_temperature[1:]
         rewards = [
-            float(self.terms.of_step(scenario, first_step + k // each, ends[k], *powers).reward)
-            for k, powers in enumerate(zip(done.electricity, done.gas, strict=True))
+            float(self.terms.of_step(scenario, k, end, *powers).reward)
+            for k, _, end, *powers in _steps(done, scenario, first_step)
         ]
         return sum(rewards) / len(rewards)
 
@@ -99,10 +97,14 @@ class PaperStepReward:
 REWARDS: dict[str, Reward] = {"economic": EconomicReward(), "paper": PaperStepReward()}
 
 
-def _steps_each(done: RecentSteps, scenario: Scenario) -> int:
-    """Count the steps of the plant in a step of the scenario."""
+def _steps(
+    done: RecentSteps, scenario: Scenario, first_step: int
+) -> Iterator[tuple[int, FloatArray, FloatArray, float, float]]:
+    """Give step of the scenario, zones before and after, electricity and gas of each of the plant's steps."""
     each = round(scenario.grid.step / done.step)
     if abs(each * done.step - scenario.grid.step) > 1e-6:
         expected = f"steps that divide the scenario's {scenario.grid.step:g} s"
         raise MpcError(describe("reward: plant", expected, f"{done.step:g} s"))
-    return each
+    steps = zip(pairwise(done.zone_temperature), done.electricity, done.gas, strict=True)
+    for k, ((before, after), electricity, gas) in enumerate(steps):
+        yield first_step + k // each, before, after, electricity, gas

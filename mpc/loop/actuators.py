@@ -50,6 +50,11 @@ class Actuator:
     highest: float
     required: bool = True
 
+    @property
+    def expected(self) -> str:
+        """What is accepted, in words."""
+        return f"a number from {self.lowest:g} to {self.highest:g} {self.unit}"
+
 
 def actuators_of(
     air_handlers: Sequence[str], boiler: str, zones: Sequence[str], limits: Mapping[str, tuple[float, float]] | None
@@ -123,13 +128,12 @@ def checked_actions(actions: Mapping[str, float], actuators: Mapping[str, Actuat
         except (TypeError, ValueError):
             number = math.nan
         if not actuator.lowest <= number <= actuator.highest:  # NaN is in no range
-            expected = f"a number from {actuator.lowest:g} to {actuator.highest:g} {actuator.unit}"
-            raise PlantActionError(describe(f"action {name}", expected, repr(value)))
+            raise PlantActionError(describe(f"action {name}", actuator.expected, repr(value)))
         given[name] = number
     for name, actuator in actuators.items():
         if not actuator.required:
             break  # those that are required come first
         if name not in given:
-            expected = f"a number from {actuator.lowest:g} to {actuator.highest:g} {actuator.unit}"
-            raise PlantActionError(describe(f"action {name}", expected, "nothing", "give every required setpoint"))
+            advice = "give every required setpoint"
+            raise PlantActionError(describe(f"action {name}", actuator.expected, "nothing", advice))
     return given

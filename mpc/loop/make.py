@@ -2,111 +2,215 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from os import PathLike
-from typing import Literal
+from typing import Literal, get_args
 
 import pandas as pd
 
+from calibration.evaluation.settings import ModelSettings
 from mpc.errors import PlantError
 from mpc.loop.building import BuildingModel, GridBuilding
 from mpc.loop.noise import SensorNoise
-from mpc.loop.reduced import reduced_building
+from mpc.loop.reduced import ReducedBuilding
 from mpc.loop.run import FixedSetpoints
 from mpc.loop.signals import RadiantGains, check_extras
 from mpc.loop.simulated import SimulatedPlant
 from mpc.scenario.forecast import Forecaster
 from mpc.scenario.gains import InternalGains
 from mpc.scenario.grid import StepGrid
-from mpc.scenario.occupancy import Occupancy
+from mpc.scenario.occupancy import ComfortBand, Occupancy
 from mpc.scenario.paper import paper_carbon, paper_tariff
-from mpc.scenario.scenario import build_scenario
+from mpc.scenario.scenario import Scenario, build_scenario
 from mpc.scenario.tariff import CarbonIntensity, Tariff
 from mpc.scenario.weather import Weather
-from thermal.case.building import Building
+from mpc.studies.model import BuildingParameters, model_settings, parameter_vector
+from thermal._types import FloatArray
+from thermal.case.building import Building, Device
 from thermal.case.case import Case
 from thermal.case.load import load_case
 from thermal.case.save import save_case
+from thermal.effects.catalogue import chosen
 from thermal.effects.effect import Chosen
-from thermal.errors import describe
+from thermal.errors import describe, nearest
 from thermal.hvac._system import HvacSystem
+from thermal.model.matrices import SymbolicModel
+from thermal.model.reduce import reduced_model
 from thermal.model.simulator import Shuffle, Simulator
 from thermal.network.assembly import Extension
+from thermal.network.build import build_network
+from thermal.network.structure import BASELINE
 from thermal.pilot.building import pilot_building
 from thermal.pilot.sizing import size_system
 from thermal.pilot.weather import MOUNTAIN_VIEW, generate_weather
 
-ModelKind = Literal["reduced", "grid", "random"]
+#: What steps the plant: the reduced model, its grid with the mean of the shuffle, or with the random shuffle.
+PlantKind = Literal["reduced", "grid", "random"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class SimulationSettings:
+    """Building, HVAC system, prices and people of a simulated plant: what single plants and studies have in common.
+
+    Parameters
+    ----------
+    parameters : str, Path, CalibrationResult or mapping of str to float, optional
+        Of the building: a ``calibration.json`` or the result itself, with its effects, or values by name [parameter
+        units]; starting values for the rest.
+    dx : float, optional
+        Distance between control volumes of a plan [m]; that of the calibration, or the plan's.
+    kind : {"reduced", "grid", "random"}
+        How the building steps: reduced to its modes, on the grid with the mean of the shuffle, or with the random one.
+    system : HvacSystem, optional
+        Its HVAC system; sized by `thermal.pilot.size_system` by default.
+    tariff : Tariff
+        Prices; those of the paper's simulator by default.
+    carbon : CarbonIntensity
+        Emissions; those of the paper's simulator by default.
+    occupancy : Occupancy, optional
+        People; an office's schedule by default.
+    comfort : ComfortBand, optional
+        Comfort band; BOPTEST's office by default.
+    noise : SensorNoise, optional
+        Errors of what is measured; none by default.
+    seed : int
+        Of all that is random.
+
+    Raises
+    ------
+    PlantError
+        When the kind is not known, with the nearest one.
+    """
+
+    parameters: BuildingParameters | None = None
+    dx: float | None = None
+    kind: PlantKind = "reduced"
+    system: HvacSystem | None = None
+    tariff: Tariff = field(default_factory=paper_tariff)
+    carbon: CarbonIntensity = field(default_factory=paper_carbon)
+    occupancy: Occupancy | None = None
+    comfort: ComfortBand | None = None
+    noise: SensorNoise | None = None
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        known = get_args(PlantKind)
+        if self.kind not in known:
+            advice = nearest(self.kind, known)
+            raise PlantError(describe("plant", f"one of {', '.join(known)}", repr(self.kind), advice))
+
+    def scenario(
+        self, building: Building, grid: StepGrid, weather: Weather, gains: InternalGains | None = None
+    ) -> Scenario:
+        """Put weather, people, prices and emissions on a grid of steps.
+
+        Parameters
+        ----------
+        building : Building
+            Zones and floor areas.
+        grid : StepGrid
+            Steps.
+        weather : Weather
+            Covers the grid.
+        gains : InternalGains, optional
+            Heat of people, light and equipment; an office's by default.
+        """
+        return build_scenario(
+            building, grid, weather, self.tariff, carbon=self.carbon, occupancy=self.occupancy, gains=gains,
+            comfort=self.comfort,
+        ).redrawn(self.seed)  # fmt: skip
+
+    def building_model(
+        self, building: Building, grid: SymbolicModel, theta: FloatArray, built: ModelSettings,
+        extras: Sequence[Extension] = (), step_seconds: float = 300.0, order: int | None = None,
+    ) -> BuildingModel:  # fmt: skip
+        """Make what steps the building.
+
+        Parameters
+        ----------
+        building : Building
+            With its devices.
+        grid : SymbolicModel
+            Its model.
+        theta : ndarray, shape (n_parameter,)
+            Values of its parameters [parameter units].
+        built : ModelSettings
+            How the model was built.
+        extras : sequence of Extension
+            Effects, and what else was added to the baseline.
+        step_seconds : float
+            Time step [s].
+        order : int, optional
+            Largest number of states of a reduced building.
+
+        Raises
+        ------
+        PlantError
+            When the structure of the model is not that of the grid.
+        """
+        if self.kind == "reduced":
+            return ReducedBuilding(reduced_model(grid, [theta], order=order), theta, step_seconds)
+        if built.structure != BASELINE:
+            expected = "the usual structure of the model"
+            raise PlantError(describe("plant on the grid", expected, "another", "take kind='reduced'"))
+        values = {p.name: float(v) for p, v in zip(grid.network.parameters, theta, strict=True)}
+        shuffle = Shuffle("random" if self.kind == "random" else "mean", reach=built.reach, seed=self.seed)
+        simulator = Simulator(
+            building, values, step_seconds, built.dx, shuffle=shuffle, scopes=built.scopes, effects=extras
+        )
+        return GridBuilding(simulator)
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlantSettings(SimulationSettings):
+    """Choices of `simulated_plant`, beside those of `SimulationSettings`.
+
+    Parameters
+    ----------
+    effects : tuple of Chosen
+        What the building has and the baseline lacks, `thermal.effects.chosen`; with a calibration they are its own.
+    order : int, optional
+        Largest number of states of a reduced building.
+    gains : InternalGains, optional
+        Heat of people, light and equipment; an office's, all of it into the air, by default.
+    step_seconds : float
+        Step of the plant [s].
+    control_steps : int
+        Steps of the plant in a control step.
+    horizon : int, optional
+        Steps of the forecasts, perfect ones; none by default.
+    warm_up_days : int
+        How often the first day is run before the start [d].
+    pressures : bool
+        Whether the pressures of ducts and loop are measured; a case that has them is one of format 2.
+    """
+
+    effects: tuple[Chosen, ...] = ()
+    order: int | None = None
+    gains: InternalGains | None = None
+    step_seconds: float = 300.0
+    control_steps: int = 1
+    horizon: int | None = None
+    warm_up_days: int = 1
+    pressures: bool = False
 
 
 def simulated_plant(
-    building: Building,
-    weather: Weather,
-    start: str,
-    end: str,
-    *,
-    step_seconds: float = 300.0,
-    model: ModelKind = "reduced",
-    dx: float | None = None,
-    parameters: Mapping[str, float] | None = None,
-    effects: tuple[Chosen, ...] = (),
-    order: int | None = None,
-    system: HvacSystem | None = None,
-    occupancy: Occupancy | None = None,
-    gains: InternalGains | None = None,
-    tariff: Tariff | None = None,
-    carbon: CarbonIntensity | None = None,
-    control_steps: int = 1,
-    noise: SensorNoise | None = None,
-    horizon: int | None = None,
-    warm_up_days: int = 1,
-    pressures: bool = False,
-    seed: int = 0,
+    building: Building, weather: Weather, start: str, end: str, settings: PlantSettings | None = None
 ) -> SimulatedPlant:
     """Make a plant of a building in one call; `SimulatedPlant` has every choice.
 
     Parameters
     ----------
     building : Building
-        With devices of types ``vav``, ``ahu`` and ``boiler``.
+        Devices of an HVAC system that it lacks are assumed, `equip`.
     weather : Weather
         Covers the time.
     start, end : str
         ISO 8601; without an offset local to the building.
-    step_seconds : float
-        Step of the plant [s].
-    model : {"reduced", "grid", "random"}
-        The building reduced to its modes, on the grid with the mean of the shuffle, or with the random one.
-    dx : float, optional
-        Distance between control volumes of a plan [m].
-    parameters : mapping of str to float, optional
-        Of the building, by name [parameter units]; starts for the rest.
-    effects : tuple of Chosen
-        What the building has and the baseline lacks, `thermal.effects.chosen`.
-    order : int, optional
-        Largest number of states of a reduced building.
-    system : HvacSystem, optional
-        Its plant; sized by `thermal.pilot.size_system` by default.
-    occupancy : Occupancy, optional
-        People; an office's schedule by default.
-    gains : InternalGains, optional
-        Heat of people, light and equipment; an office's, all of it into the air, by default.
-    tariff : Tariff, optional
-        Prices; those of the paper's simulator by default.
-    carbon : CarbonIntensity, optional
-        Emissions; those of the paper's simulator by default.
-    control_steps : int
-        Steps of the plant in a control step.
-    noise : SensorNoise, optional
-        Errors of what is measured; none by default.
-    horizon : int, optional
-        Steps of the forecasts, perfect ones; none by default.
-    warm_up_days : int
-        How often the first day is run before the start [d].
-    pressures : bool
-        Whether the pressures of ducts and loop are measured.
-    seed : int
-        Of all that is random.
+    settings : PlantSettings, optional
+        All that has a default.
 
     Returns
     -------
@@ -116,30 +220,68 @@ def simulated_plant(
     Raises
     ------
     PlantError
-        When the parts do not fit each other, the kind of model is not known, or the building cannot have an effect.
+        When the parts do not fit each other, or the building cannot have an effect.
     """
-    grid = StepGrid.between(start, end, step_seconds, building)
-    scenario = build_scenario(
-        building, grid, weather, tariff or paper_tariff(), carbon=carbon or paper_carbon(), occupancy=occupancy,
-        gains=gains,
-    ).redrawn(seed)  # fmt: skip
-    built: BuildingModel
+    given, (building, _) = settings or PlantSettings(), equip(building)
+    grid = StepGrid.between(start, end, given.step_seconds, building)
+    scenario = given.scenario(building, grid, weather, given.gains)
+    built = model_settings(given.parameters, dx=given.dx, effects=given.effects)
+    effects = given.effects or chosen(built.effects)
     extras: tuple[Extension, ...] = (*effects, RadiantGains()) if scenario.heat.radiates else effects
-    if model == "reduced":
-        built = reduced_building(building, parameters, step_seconds=step_seconds, dx=dx, effects=extras, order=order)
-    elif model in ("grid", "random"):
-        shuffle: Literal["mean", "random"] = "random" if model == "random" else "mean"
-        built = GridBuilding(
-            Simulator(building, parameters, step_seconds, dx, shuffle=Shuffle(shuffle, seed=seed), effects=extras)
-        )
-    else:
-        raise PlantError(describe("model", "'reduced', 'grid' or 'random'", repr(model)))
-    check_extras(effects, built.network)
+    network = build_network(
+        building, dx=built.dx, reach=built.reach, scopes=built.scopes, structure=built.structure, effects=extras
+    )
+    check_extras(effects, network)
+    theta, step = parameter_vector(given.parameters, network), given.step_seconds
+    model = given.building_model(building, SymbolicModel(network), theta, built, extras, step, given.order)
     return SimulatedPlant(
-        scenario, system or size_system(building), built, control_steps=control_steps, noise=noise,
-        forecaster=None if horizon is None else Forecaster(scenario, horizon), warm_up_days=warm_up_days,
-        pressures=pressures, seed=seed,
+        scenario, given.system or size_system(building), model, control_steps=given.control_steps, noise=given.noise,
+        forecaster=None if given.horizon is None else Forecaster(scenario, given.horizon),
+        warm_up_days=given.warm_up_days, pressures=given.pressures, seed=given.seed,
     )  # fmt: skip
+
+
+def equip(building: Building) -> tuple[Building, tuple[str, ...]]:
+    """Give a building the devices of an HVAC system that it lacks: a terminal a zone, an air handler, a boiler.
+
+    Parameters
+    ----------
+    building : Building
+        With any devices.
+
+    Returns
+    -------
+    tuple
+        The building, and what was done, in words.
+
+    Examples
+    --------
+    >>> from thermal.data import load_bundled_case
+    >>> equip(load_bundled_case().building)[1]
+    ('the case names no air handler and no boiler: one of each is assumed',)
+    """
+    terminals = {z: [d for d in building.devices_of(z) if d.type == "vav"] for z in building.zone_names}
+    spare = {d.name for found in terminals.values() for d in found[1:]}  # a plant is sized with one a zone
+    bare = [zone for zone, found in terminals.items() if not found]
+    names = {"ahu": "air handler", "boiler": "boiler"}
+    lacking = [kind for kind in names if not any(d.type == kind for d in building.devices)]
+    taken = {d.name for d in building.devices} | set(building.zone_names)
+    wanted = [(f"VAV_{zone}", "vav", zone) for zone in bare] + [(kind.upper(), kind, None) for kind in lacking]
+    devices = [d for d in building.devices if d.name not in spare]
+    for name, kind, zone in wanted:
+        while name in taken:
+            name += "_"
+        taken.add(name)
+        devices.append(Device(name=name, type=kind, zone=zone))
+    said = []
+    if bare:
+        said.append(f"zones without a terminal get one: {', '.join(bare[:6])}{' ...' if len(bare) > 6 else ''}")
+    if spare:
+        said.append(f"zones have one terminal each: left out {', '.join(sorted(spare)[:6])}")
+    if lacking:
+        one = " and ".join(f"no {names[kind]}" for kind in lacking)
+        said.append(f"the case names {one}: one{' of each' if len(lacking) > 1 else ''} is assumed")
+    return replace(building, devices=tuple(devices)), tuple(said)
 
 
 def pilot_weather(seed: int, start: str, days: float, step_seconds: float = 300.0) -> Weather:
@@ -167,20 +309,12 @@ def pilot_weather(seed: int, start: str, days: float, step_seconds: float = 300.
 
 def save_pilot(
     path: str | PathLike[str],
+    building: Building | None = None,
+    settings: PlantSettings | None = None,
     *,
-    seed: int = 0,
     start: str = "2023-01-09",
     days: int = 14,
-    floor_area: float = 6317.0,
-    zones: int = 123,
-    floors: int = 2,
-    dx: float = 0.5,
-    model: ModelKind = "reduced",
-    effects: tuple[Chosen, ...] = (),
-    parameters: Mapping[str, float] | None = None,
-    noise: SensorNoise | None = None,
     setpoints: Mapping[str, float] | None = None,
-    pressures: bool = False,
     overwrite: bool = False,
 ) -> Case:
     """Run the pilot building in closed loop and save plans, devices and telemetry as a case folder.
@@ -192,30 +326,16 @@ def save_pilot(
     ----------
     path : str or path-like
         Folder to make.
-    seed : int
-        Of building, weather, shuffle and noise; 0 or more.
+    building : Building, optional
+        Such as `thermal.pilot.building.pilot_building` makes in any size; the pilot of the settings' seed by default.
+    settings : PlantSettings, optional
+        Control volumes of 0.5 m and sensors with the errors of `SensorNoise` by default; the seed is the weather's too.
     start : str
         Local day of its begin, ISO 8601.
     days : int
         Length [d].
-    floor_area : float
-        Of all floors together [m2].
-    zones, floors : int
-        On all floors together; number of storeys.
-    dx : float
-        Distance between control volumes [m].
-    model : {"reduced", "grid", "random"}
-        As in `simulated_plant`.
-    effects : tuple of Chosen
-        What the building has and the baseline lacks.
-    parameters : mapping of str to float, optional
-        Of the building [parameter units].
-    noise : SensorNoise, optional
-        Errors of sensors; the defaults of `SensorNoise` by default.
     setpoints : mapping of str to float, optional
         By kind of action [K] or [Pa]; those of `SimulatedPlant.default_actions` by default.
-    pressures : bool
-        Whether the pressures of ducts and loop are measured; the case is then one of format 2.
     overwrite : bool
         Whether a case that is there already is replaced.
 
@@ -224,16 +344,12 @@ def save_pilot(
     Case
         As it was saved and loaded again.
     """
-    building = pilot_building(seed, floor_area=floor_area, zones=zones, floors=floors)
+    given = settings or PlantSettings(dx=0.5, noise=SensorNoise())
     end = (pd.Timestamp(start) + pd.Timedelta(days=days)).isoformat()
-    plant = simulated_plant(
-        building, pilot_weather(seed, start, days), start, end, model=model, dx=dx, effects=effects,
-        parameters=parameters, noise=noise or SensorNoise(), pressures=pressures, seed=seed,
-    )  # fmt: skip
+    weather = pilot_weather(given.seed, start, days)
+    plant = simulated_plant(building or pilot_building(given.seed), weather, start, end, given)
     plant.reset()
-    chosen = dict(plant.default_actions)
-    if setpoints:
-        chosen |= FixedSetpoints(setpoints, plant.actuators).at_hour(0.0)
+    actions = plant.default_actions | FixedSetpoints(setpoints or {}, plant.actuators).at_hour(0.0)
     while not plant.finished:
-        plant.step(chosen)
+        plant.step(actions)
     return load_case(save_case(plant.case(), path, overwrite=overwrite))

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from mpc.errors import PlantError
 from mpc.loop.plant import PointLayout
 from thermal._types import FloatArray
-from thermal.case.points import POINT_TYPES, split_column
 from thermal.errors import describe
 
 _STREAM = 7  # of random numbers of a seed, apart from those of people, forecasts and the shuffle
@@ -76,14 +75,10 @@ class NoiseSource:
     def _scales(self) -> tuple[NDArray[np.intp], FloatArray, FloatArray, NDArray[np.bool_]]:
         """Columns with noise, their absolute and relative deviations, and which count in steps."""
         noise = self.noise
-        rows = []
-        for k, column in enumerate(self.layout.columns):
-            point = split_column(column, "plant")[1]
-            quantity = POINT_TYPES[point].quantity
-            by = {"temperature": (noise.temperature, 0.0), "air_flow": (0.0, noise.flow), "power": (0.0, noise.power),
-                  "pressure": (0.0, noise.pressure)}  # fmt: skip
-            if point.endswith("_sensor") and quantity in by:
-                rows.append((k, *by[quantity], quantity == "temperature"))
+        by = {"temperature": (noise.temperature, 0.0), "air_flow": (0.0, noise.flow), "power": (0.0, noise.power),
+              "pressure": (0.0, noise.pressure)}  # fmt: skip
+        columns = enumerate(zip(self.layout.columns, self.layout.quantities, strict=True))
+        rows = [(k, *by[q], q == "temperature") for k, (name, q) in columns if name.endswith("_sensor") and q in by]
         index, absolute, relative, stepped = (np.array(v) for v in zip(*rows, strict=True))
         return index.astype(np.intp), absolute.astype(float), relative.astype(float), stepped.astype(bool)
 

@@ -152,10 +152,7 @@ def run_closed_loop(
     >>> run = run_closed_loop(plant, FixedSetpoints(setpoints, plant.actuators))  # doctest: +SKIP
     """
     seen = plant.reset(seed)
-    rows: list[FloatArray] = []
-    stamps: list[pd.Timestamp] = []
-    chosen: list[dict[str, float]] = []
-    seconds: list[float] = []
+    rows, stamps, chosen, seconds = list[FloatArray](), list[pd.Timestamp](), list[dict[str, float]](), list[float]()
     while not plant.finished and (steps is None or len(rows) < steps):
         forecast = plant.forecast() if forecasts else None
         begin = time.perf_counter()

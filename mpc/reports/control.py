@@ -20,6 +20,9 @@ from mpc.studies.run import ControlRun, prediction_errors
 from thermal.case.points import POINT_TYPES, split_column
 from thermal.units import QUANTITIES, from_si
 
+#: Length of a prediction of optimal control [h].
+_HOURS = 12.0
+
 
 def write_control(run: ControlRun, out: str | Path, *, command: str = "", force: bool = False) -> Path:
     """Write ``control.json``, ``trajectory.parquet`` and ``report.html``.
@@ -45,7 +48,7 @@ def write_control(run: ControlRun, out: str | Path, *, command: str = "", force:
     ResultsExistError
         When the folder holds something and ``force`` is not set.
     """
-    title = f"Control of {run.study.name}: {control_words.controller_name(run.controller)}"
+    title = f"Control of {run.study.name}: {run.entry.title}"
     content = _content((run,), run, command) | {
         "title": title,
         "verdict": control_words.control_verdict(run),
@@ -95,7 +98,7 @@ def _content(runs: Sequence[ControlRun], shown: ControlRun, command: str) -> dic
     """Lay out a page: the run that matters most, and each controller's part."""
     return {
         "shown": shown,
-        "name": control_words.controller_name(shown.controller),
+        "name": shown.entry.title,
         "fine": shown.controller != "mpc" or shown.sources.get("optimal plan", 0) == len(shown.decisions),
         "planned": shown.sources.get("optimal plan", 0),
         "indicators": control_words.own_indicators(shown.kpis),
@@ -106,9 +109,9 @@ def _content(runs: Sequence[ControlRun], shown: ControlRun, command: str) -> dic
 
 def _section(run: ControlRun, shown: bool) -> dict[str, Any]:
     return {
-        "name": control_words.controller_name(run.controller).capitalize(),
+        "name": run.entry.title.capitalize(),
         "shown": shown,
-        "how": control_words.controller_rule(run),
+        "how": run.entry.about.format(step=round(run.plant.control_step / 60.0), hours=_HOURS),
         "course": course(run),
         "expectations": expectations(run) if shown else [],
         "errors": prediction_errors(run),
@@ -126,7 +129,7 @@ def control_summary(run: ControlRun) -> dict[str, Any]:
     run : ControlRun
         Of `run_controller`.
     """
-    study, times = run.study, [d.seconds for d in run.decisions]
+    study, chosen, times = run.study, run.study.settings, [d.seconds for d in run.decisions]
     return {
         "controller": run.controller,
         "start": study.scenario.grid.start.isoformat(),
@@ -141,10 +144,10 @@ def control_summary(run: ControlRun) -> dict[str, Any]:
         "prediction": prediction_errors(run),
         "reasons": [{"first": row.first.isoformat(), "last": row.last.isoformat(), "count": row.times,
                      "reason": row.reason} for row in control_words.reason_rows(run)],
-        "plant": {"building": study.kind, "step_seconds": study.scenario.grid.step, "noise": study.noise is not None,
+        "plant": {"building": chosen.kind, "step_seconds": study.scenario.grid.step, "noise": chosen.noise is not None,
                   "control_step_seconds": run.plant.control_step, "effects": list(study.built.effects)},
-        "forecast": "with errors" if study.errors else "perfect",
-        "notes": list(study.notes), "case": study.name, "version": version("buildingmpc"), "seed": study.seed,
+        "forecast": "with errors" if chosen.errors else "perfect",
+        "notes": list(study.notes), "case": study.name, "version": version("buildingmpc"), "seed": chosen.seed,
     }  # fmt: skip
 
 
@@ -164,7 +167,7 @@ def comparison_summary(comparison: Comparison) -> dict[str, Any]:
             for run in comparison.runs
         },
         "best_rule": None if best is None else best.controller,
-        "case": comparison.study.name, "version": version("buildingmpc"), "seed": comparison.study.seed,
+        "case": comparison.study.name, "version": version("buildingmpc"), "seed": comparison.study.settings.seed,
     }  # fmt: skip
 
 

@@ -12,51 +12,7 @@ from mpc.reports.page import significant, spell
 from mpc.studies.compare import Comparison
 from mpc.studies.run import ControlRun
 
-_NAMES = {"mpc": "optimal control", "bound": "perfect bound", "schedule": "fixed schedule", "reset": "outdoor reset",
-          "guideline36": "Guideline 36"}  # fmt: skip
-
-_RULES = {
-    "schedule": "Supply air stands at its design value; supply water is hot by day and cooler by night.",
-    "reset": "Supply air and water follow the outdoor temperature.",
-    "guideline36": "Supply air and water drift to where they cost least until zones or valves ask for more "
-    "(ASHRAE Guideline 36, trim and respond).",
-    "mpc": "Every {step} minutes supply air and water are chosen so that energy and discomfort cost least over the "
-    "next {hours:g} hours, according to the model of the building, the forecast and the prices.",
-    "bound": "As optimal control, but on a plant that is its own model, with exact sensors, and with weather and "
-    "people known in advance: what perfect knowledge would reach.",
-}
-
-#: Length of a prediction of optimal control [h].
-_HOURS = 12.0
-
 _CHANGING = re.compile(r"\d{4}-\d\d-\d\d \d\d:\d\d|\b\d+(\.\d+)?\b")  # times and numbers within a reason
-
-
-def controller_name(controller: str) -> str:
-    """Call a controller by what it is; one's own by its name.
-
-    Parameters
-    ----------
-    controller : str
-        Its name in a study.
-
-    Examples
-    --------
-    >>> controller_name("mpc"), controller_name("night_purge")
-    ('optimal control', 'night purge')
-    """
-    return _NAMES.get(controller, controller.replace("_", " "))
-
-
-def controller_rule(run: ControlRun) -> str:
-    """Say what a controller does; nothing of one's own, which the library does not know.
-
-    Parameters
-    ----------
-    run : ControlRun
-        Of `run_controller`.
-    """
-    return _RULES.get(run.controller, "").format(step=round(run.plant.control_step / 60.0), hours=_HOURS)
 
 
 def own_indicators(kpis: Kpis) -> list[tuple[str, str]]:
@@ -83,7 +39,7 @@ def control_verdict(run: ControlRun) -> str:
     powers = (run.loop.record.electricity, run.loop.record.gas)
     electricity, gas = (0.0 if power is None else float(power.sum()) for power in powers)
     parts = [
-        f"{controller_name(run.controller).capitalize()} spent {money(run.cost, k.currency)} on energy in "
+        f"{run.entry.title.capitalize()} spent {money(run.cost, k.currency)} on energy in "
         f"{k.hours / 24:g} days ({significant(k.ener_tot)} kWh/m², of which "
         f"{electricity / max(electricity + gas, 1e-9):.0%} electricity)."
     ]
@@ -130,9 +86,8 @@ def comparison_verdict(comparison: Comparison) -> str:
     best, mpc = comparison.best_rule, comparison.of("mpc")
     if best is None or mpc is None:
         cheapest = min(comparison.runs, key=lambda run: run.objective)
-        name = controller_name(cheapest.controller)
-        return f"{name.capitalize()} costs least: {control_verdict(cheapest)}"
-    name, change = controller_name(best.controller), 1.0 - mpc.cost / best.cost
+        return f"{cheapest.entry.title.capitalize()} costs least: {control_verdict(cheapest)}"
+    name, change = best.entry.title, 1.0 - mpc.cost / best.cost
     comfort = mpc.kpis.tdis_tot - best.kpis.tdis_tot
     parts = [
         f"Optimal control spent {money(mpc.cost, mpc.kpis.currency)} on energy, the best rule ({name}) "
@@ -172,7 +127,7 @@ def comparison_rows(comparison: Comparison) -> list[list[str]]:
             (k.tdis_tot, ".3f"), (worst, ".2f"), (k.ener_tot, ".3f"), (1e3 * (k.pele_tot or 0.0), ".1f"),
             (None if k.emis_tot is None else 1e3 * k.emis_tot, ".1f"), (way, ".0%"),
         )  # fmt: skip
-        rows.append([controller_name(run.controller), *(spell(value, how) for value, how in values)])
+        rows.append([run.entry.title, *(spell(value, how) for value, how in values)])
     return rows
 
 

@@ -11,14 +11,14 @@ from mpc.loop.reduced import ReducedBuilding
 from mpc.loop.simulated import SimulatedPlant
 from mpc.studies.controller import LASTING, SENSOR_NOISE, UNMEASURED, held_space
 from thermal._types import FloatArray
-from thermal.model.modal import ModalModel, modal_model
+from thermal.model.modal import modal_model
 from thermal.model.reduce import ReducedModel
 
 #: Unmeasured heat of a plant that is known, but for the random shuffle of its air [W/m2].
 SHUFFLED = 1.0
 
 
-def knowing_observer(model: ReducedModel, plant: SimulatedPlant) -> Observer:
+def knowing_observer(model: ReducedModel, plant: SimulatedPlant) -> Observer | DisturbanceModel:
     """Make the observer of a controller that has the plant's own parameters.
 
     Parameters
@@ -30,19 +30,12 @@ def knowing_observer(model: ReducedModel, plant: SimulatedPlant) -> Observer:
 
     Returns
     -------
-    Observer
-        `KnownState` where the plant's building is such a model, else a filter that hardly expects unmeasured heat.
+    Observer or DisturbanceModel
+        `KnownState` where the plant's building is such a model; else hardly any unmeasured heat is expected.
     """
     if isinstance(plant.model, ReducedBuilding):
         return KnownState(model, plant)
-    return Observer(*_filter(model, plant, SHUFFLED))
-
-
-def _filter(model: ReducedModel, plant: SimulatedPlant, unmeasured: float) -> tuple[KalmanFilter, ModalModel]:
-    """Make a filter over the plant's control step that expects so much unmeasured heat [W/m2], and its modes."""
-    modes = modal_model(model.matrices(model.theta))
-    expected = DisturbanceModel(unmeasured * plant.scenario.areas, LASTING, SENSOR_NOISE)
-    return KalmanFilter(held_space(modes, plant.control_step), expected), modes
+    return DisturbanceModel(SHUFFLED * plant.scenario.areas, LASTING, SENSOR_NOISE)
 
 
 class KnownState(Observer):
@@ -57,7 +50,9 @@ class KnownState(Observer):
     """
 
     def __init__(self, model: ReducedModel, plant: SimulatedPlant) -> None:
-        super().__init__(*_filter(model, plant, UNMEASURED))
+        modes = modal_model(model.matrices(model.theta))
+        expected = DisturbanceModel(UNMEASURED * plant.scenario.areas, LASTING, SENSOR_NOISE)
+        super().__init__(KalmanFilter(held_space(modes, plant.control_step), expected), modes)
         self._plant = plant
 
     def start(self, zone: FloatArray, boundary: FloatArray) -> None:

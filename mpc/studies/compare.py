@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from mpc.errors import ControlError
-from mpc.studies.run import ControlRun, Progress, check_controller, run_controller
+from mpc.studies.controllers import find_controller
+from mpc.studies.run import ControlRun, Progress, run_controller
 from mpc.studies.study import Study
 from thermal.errors import describe
 
@@ -39,7 +40,7 @@ class Comparison:
     @property
     def best_rule(self) -> ControlRun | None:
         """The rule that costs least with its discomfort, where there is one."""
-        rules = [run for run in self.runs if run.controller not in ("mpc", "bound")]
+        rules = [run for run in self.runs if not run.entry.predictive]
         return min(rules, key=lambda run: run.objective) if rules else None
 
     def saving(self, run: ControlRun) -> float | None:
@@ -89,7 +90,7 @@ def compare_controllers(study: Study, names: Sequence[str], progress: Progress |
     ControlError
         When a controller is not known, or named twice, or none is.
     """
-    known = [check_controller(name) for name in names]
+    known = [find_controller(name).name for name in names]
     if not known or len(set(known)) < len(known):
         raise ControlError(describe("controllers", "some, each once", f"{list(names)}"))
     return Comparison(study, tuple(run_controller(study, name, progress) for name in known))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -99,20 +99,40 @@ def site_points(building: Building, devices: PlantDevices) -> SitePoints:
     )  # fmt: skip
 
 
+@dataclass(frozen=True, eq=False)
+class Site:
+    """What a controller knows of a plant beside the model of its building.
+
+    Parameters
+    ----------
+    building : Building
+        Zones, floor areas and weather station.
+    system : HvacSystem
+        Air handlers, terminals and boiler as the controller believes them to be.
+    devices : PlantDevices
+        Their names.
+    """
+
+    building: Building
+    system: HvacSystem
+    devices: PlantDevices
+
+    @property
+    def points(self) -> SitePoints:
+        """Names of zones and devices."""
+        return site_points(self.building, self.devices)
+
+
 def make_controller(
     model: ReducedModel,
     plant: Plant,
     *,
-    system: HvacSystem | None = None,
-    points: SitePoints | None = None,
-    building: Building | None = None,
+    site: Site | None = None,
     settings: ControllerSettings | None = None,
     horizon: Horizon | None = None,
     channels: Sequence[Channel] | None = None,
-    disturbance: DisturbanceModel | None = None,
-    observer: Observer | None = None,
+    observer: Observer | DisturbanceModel | None = None,
     boundaries: Mapping[str, float] | None = None,
-    iterations: int = 25,
 ) -> MpcController:
     """Make an optimal controller of a plant, with sensible values for all that is not given.
 
@@ -122,13 +142,8 @@ def make_controller(
         Of the building, `control_model`; it may have effects.
     plant : Plant
         Whose setpoints are to be chosen: its control step and actuators count, nothing else of it.
-    system : HvacSystem, optional
-        Air handlers, terminals and boiler as the controller believes them to be; those of a `SimulatedPlant` by
-        default.
-    points : SitePoints, optional
-        Names of zones and devices; those of a `SimulatedPlant` by default.
-    building : Building, optional
-        Needed for another plant than a `SimulatedPlant` where the model has effects, and for its floor areas.
+    site : Site, optional
+        Building and HVAC system; those of a `SimulatedPlant` by default.
     settings : ControllerSettings, optional
         Prices of comfort and carbon, schedules, rule of the first guess; without a back-off of its own, bands are
         narrowed by `MARGIN`.
@@ -137,14 +152,11 @@ def make_controller(
     channels : sequence of Channel, optional
         What is decided; by default the supply air, common to all air handlers, and the supply water, where the plant
         has an actuator for them, in its ranges.
-    disturbance : DisturbanceModel, optional
-        Unmeasured heat and noise of the sensors; by default 5 W/m2 that last for six hours and 0.05 K.
-    observer : Observer, optional
-        In the place of the filter that is made here.
+    observer : Observer or DisturbanceModel, optional
+        In the place of the filter that is made here, or the unmeasured heat and noise of the sensors that it expects;
+        by default 5 W/m2 that last for six hours and 0.05 K.
     boundaries : mapping of str to float, optional
         Temperatures of boundaries beside outdoor, taken to stay [K].
-    iterations : int
-        Most of a solve.
 
     Returns
     -------
@@ -154,7 +166,7 @@ def make_controller(
     Raises
     ------
     ControlError
-        When the plant is none of ours and something that it does not tell is not given, or its forecasts are too short.
+        When the plant is none of ours and no site is given, or its forecasts are too short.
 
     Examples
     --------
@@ -164,28 +176,28 @@ def make_controller(
     """
     ours = plant if isinstance(plant, SimulatedPlant) else None
     if ours is not None:
-        building = building or ours.scenario.building
-        system = system or ours.system
-        points = points or site_points(building, ours.devices)
-    if system is None or points is None:
+        site = site or Site(ours.scenario.building, ours.system, ours.devices)
+    if site is None:
         found = "none; they are known of a SimulatedPlant only"
-        raise ControlError(describe("controller", "`system` and `points` of this plant", found))
-    ahead = horizon or default_horizon(plant.control_step)
-    _check_forecasts(ours, ahead)
+        raise ControlError(describe("controller", "`system` and `points` of this plant in a `site`", found))
+    ahead, points = horizon or default_horizon(plant.control_step), site.points
+    if ours is not None:
+        _check_forecasts(ours, ahead)
     modes = modal_model(model.matrices(model.theta))
     decided = tuple(channels) if channels is not None else _channels(plant.actuators, points)
-    unmeasured = disturbance or _disturbance(building, len(points.zones))
+    unmeasured = DisturbanceModel(UNMEASURED * zone_areas(site.building), LASTING, SENSOR_NOISE)
+    if isinstance(observer, DisturbanceModel):
+        unmeasured, observer = observer, None
     if observer is None:
         observer = Observer(KalmanFilter(held_space(modes, ahead.control_step), unmeasured), modes)
     pressures = any(c.quantity.endswith("pressure") for c in decided)
-    predictor = Predictor(modes, SmoothHvac(system, SMOOTHING, pressures), ahead, decided, unmeasured.time_constant)
-    solver = SequentialSolver(ControlProblem(predictor, 2.0 * MARGIN), iterations=iterations)
+    hvac = SmoothHvac(site.system, SMOOTHING, pressures)
+    predictor = Predictor(modes, hvac, ahead, decided, unmeasured.time_constant)
+    solver = SequentialSolver(ControlProblem(predictor, 2.0 * MARGIN), iterations=25)
     signals = None
     if model.network.signals or len(model.network.boundaries) > 1:
-        if building is None:
-            raise ControlError(describe("controller", "`building`, as its model has effects", "none"))
         people = 0.0 if ours is None else float(ours.scenario.expected_occupancy.sum(axis=1).max())
-        signals = ForecastSignals(model.network, building, people, boundaries)
+        signals = ForecastSignals(model.network, site.building, people, boundaries)
     chosen = settings or ControllerSettings()
     if chosen.back_off is None:
         chosen = replace(chosen, back_off=Margin(MARGIN))
@@ -236,14 +248,7 @@ def _channels(actuators: Sequence[Actuator], points: SitePoints) -> tuple[Channe
     return tuple(found)
 
 
-def _disturbance(building: Building | None, n_zone: int) -> DisturbanceModel:
-    heat = np.full(n_zone, 100.0) if building is None else UNMEASURED * zone_areas(building)
-    return DisturbanceModel(heat, LASTING, SENSOR_NOISE)
-
-
-def _check_forecasts(plant: SimulatedPlant | None, ahead: Horizon) -> None:
-    if plant is None:
-        return
+def _check_forecasts(plant: SimulatedPlant, ahead: Horizon) -> None:
     needed = float(ahead.edges[-1])
     known = 0.0 if plant.forecaster is None else plant.forecaster.horizon * plant.scenario.grid.step
     if known + 1e-6 < needed:

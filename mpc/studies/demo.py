@@ -32,7 +32,7 @@ from mpc.scenario.forecast import DAY_AHEAD_ERRORS
 from mpc.scenario.weather_files import weather_of_case
 from mpc.studies.compare import Comparison, compare_controllers
 from mpc.studies.run import Progress
-from mpc.studies.study import make_study
+from mpc.studies.study import StudySettings, make_study
 from thermal.case.case import Case
 from thermal.case.check import CaseCheck, describe_case
 from thermal.data import load_bundled_case
@@ -178,15 +178,8 @@ def run_demo(
     page = write_evaluation(errors, case, folder / "evaluate", parameters=name, force=force)
     end("evaluate", page, evaluation_verdict(errors))
     done("compare controllers: put the plant together", 0, 1)
-    study = make_study(
-        case.building,
-        weather_of_case(case),
-        first,
-        last,
-        parameters=model,
-        noise=SensorNoise(),
-        errors=DAY_AHEAD_ERRORS,
-    )
+    settings = StudySettings(parameters=model, noise=SensorNoise(), errors=DAY_AHEAD_ERRORS)
+    study = make_study(case.building, weather_of_case(case), first, last, settings)
     compared = compare_controllers(study, CONTROLLERS, _staged(done, "compare controllers"))
     end("compare", write_comparison(compared, folder / "compare", force=force), comparison_verdict(compared))
     demo = Demo(case, checked, fitted, found, errors, compared, pages, verdicts)

@@ -3,15 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 from calibration.evaluation.settings import ModelSettings, load_parameters, read_settings
+from calibration.fit.result import CalibrationResult
 from mpc.errors import ControlError
+from thermal._types import FloatArray
 from thermal.case.building import Building
 from thermal.effects.effect import Chosen
 from thermal.errors import describe
 from thermal.model.matrices import SymbolicModel
 from thermal.model.reduce import ReducedModel, reduced_model
+from thermal.network.network import ThermalNetwork
+
+#: Parameters of a building: a ``calibration.json`` or what it was written from, or values by name.
+BuildingParameters = str | Path | Mapping[str, float] | CalibrationResult
 
 #: Largest number of states of a controller's model: 76 mK from the grid on 123 zones at 0.5 m, at a third of the time.
 ORDER = 201
@@ -19,7 +26,7 @@ ORDER = 201
 
 def control_model(
     building: Building,
-    parameters: str | Path | Mapping[str, float] | None = None,
+    parameters: BuildingParameters | None = None,
     *,
     dx: float | None = None,
     effects: tuple[Chosen, ...] = (),
@@ -31,13 +38,13 @@ def control_model(
     ----------
     building : Building
         Floor plans or a zone table.
-    parameters : str, Path or mapping of str to float, optional
-        A ``calibration.json``, whose settings and effects are taken over; or values by name [parameter units]; starting
-        values by default.
+    parameters : str, Path, CalibrationResult or mapping of str to float, optional
+        A ``calibration.json`` or the result itself, whose settings and effects are taken over; or values by name
+        [parameter units]; starting values by default.
     dx : float, optional
-        Distance between control volumes of a plan [m]; that of the file, or the plan's.
+        Distance between control volumes of a plan [m]; that of the calibration, or the plan's.
     effects : tuple of Chosen
-        What is added to the baseline, `thermal.effects.chosen`; with a file they are its own.
+        What is added to the baseline, `thermal.effects.chosen`; with a calibration they are its own.
     order : int, optional
         Largest number of states; None keeps all that the reduction finds.
 
@@ -49,7 +56,7 @@ def control_model(
     Raises
     ------
     ControlError
-        When effects are given beside a file.
+        When effects are given beside a calibration.
     CalibrationError
         When the file cannot be read, or is of another building.
 
@@ -63,7 +70,7 @@ def control_model(
 
 
 def model_settings(
-    parameters: str | Path | Mapping[str, float] | None = None,
+    parameters: BuildingParameters | None = None,
     *,
     dx: float | None = None,
     effects: tuple[Chosen, ...] = (),
@@ -72,24 +79,28 @@ def model_settings(
 
     Parameters
     ----------
-    parameters : str, Path or mapping of str to float, optional
-        A ``calibration.json``, or values by name [parameter units].
+    parameters : str, Path, CalibrationResult or mapping of str to float, optional
+        A calibration, or values by name [parameter units].
     dx : float, optional
         Distance between control volumes of a plan [m].
     effects : tuple of Chosen
         What is added to the baseline.
     """
-    if not isinstance(parameters, str | Path):
+    if parameters is None or isinstance(parameters, Mapping):
         return ModelSettings(dx=dx, effects={c.effect.id: c.zones for c in effects})
     if effects:
         raise ControlError(describe("effects", "none beside a file of parameters", f"{len(effects)} of them"))
-    return ModelSettings(**read_settings(parameters) | ({} if dx is None else {"dx": dx}))
+    if isinstance(parameters, CalibrationResult):
+        built = parameters.settings
+    else:
+        built = ModelSettings(**read_settings(parameters))
+    return built if dx is None else replace(built, dx=dx)
 
 
 def reduced(
     settings: ModelSettings,
     building: Building,
-    parameters: str | Path | Mapping[str, float] | None = None,
+    parameters: BuildingParameters | None = None,
     order: int | None = ORDER,
 ) -> ReducedModel:
     """Build and reduce a model; arguments as those of `control_model`.
@@ -100,14 +111,27 @@ def reduced(
         How it is built.
     building : Building
         Floor plans or a zone table.
-    parameters : str, Path or mapping of str to float, optional
-        A file, or values by name [parameter units].
+    parameters : str, Path, CalibrationResult or mapping of str to float, optional
+        A calibration, or values by name [parameter units].
     order : int, optional
         Largest number of states.
     """
     network = settings.network(building)
+    return reduced_model(SymbolicModel(network), [parameter_vector(parameters, network)], order=order)
+
+
+def parameter_vector(parameters: BuildingParameters | None, network: ThermalNetwork) -> FloatArray:
+    """Give the values of a network's parameters, shape (n_parameter,) [parameter units].
+
+    Parameters
+    ----------
+    parameters : str, Path, CalibrationResult or mapping of str to float, optional
+        A calibration, or values by name [parameter units]; starting values for the rest.
+    network : ThermalNetwork
+        Whose parameters they are.
+    """
+    if isinstance(parameters, CalibrationResult):
+        return parameters.theta
     if isinstance(parameters, str | Path):
-        theta = load_parameters(parameters, network)
-    else:
-        theta = network.values(parameters or {})
-    return reduced_model(SymbolicModel(network), [theta], order=order)
+        return load_parameters(parameters, network)
+    return network.values(parameters or {})

@@ -5,31 +5,25 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple, cast, get_args
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 
-from mpc.baselines.guideline36 import Guideline36
-from mpc.baselines.rules import OutdoorReset, day_schedule
 from mpc.control.controller.action import Action
 from mpc.control.controller.controller import MpcController
-from mpc.errors import ControlError
+from mpc.control.predictor.predictor import Predictor
 from mpc.kpi.kpis import Kpis, measure_kpis
 from mpc.loop.plant import Controller, Measurements
 from mpc.loop.run import ClosedLoopRun, run_closed_loop
 from mpc.loop.simulated import SimulatedPlant
 from mpc.scenario.forecast import Forecast
-from mpc.studies.bound import knowing_observer
-from mpc.studies.controller import MODEL_STEP, default_horizon, make_controller, site_points
-from mpc.studies.study import HORIZON_HOURS, Study
+from mpc.studies.controller import MODEL_STEP
+from mpc.studies.controllers import RegisteredController, find_controller
+from mpc.studies.study import Study
 from thermal._types import FloatArray
-from thermal.errors import describe, nearest
 
 Progress = Callable[[str, int, int], None]
-
-#: Controllers by name: optimal control, three rules, and optimal control that knows everything.
-ControllerName = Literal["mpc", "schedule", "reset", "guideline36", "bound"]
 
 #: How far ahead predictions are kept to be compared with what came [s].
 AHEAD = 3600.0
@@ -71,8 +65,8 @@ class ControlRun:
 
     Parameters
     ----------
-    controller : str
-        Which one, a `ControllerName`.
+    entry : RegisteredController
+        Which controller.
     study : Study
         What it was run on.
     loop : ClosedLoopRun
@@ -85,12 +79,17 @@ class ControlRun:
         As the run left it, with its telemetry.
     """
 
-    controller: str
+    entry: RegisteredController
     study: Study
     loop: ClosedLoopRun
     kpis: Kpis
     decisions: tuple[Decision, ...]
     plant: SimulatedPlant
+
+    @property
+    def controller(self) -> str:
+        """Name of the controller."""
+        return self.entry.name
 
     @property
     def cost(self) -> float:
@@ -108,25 +107,6 @@ class ControlRun:
         return Counter(decision.source for decision in self.decisions)
 
 
-def check_controller(name: str) -> ControllerName:
-    """Refuse a controller that is not known.
-
-    Parameters
-    ----------
-    name : str
-        One of `ControllerName`.
-
-    Raises
-    ------
-    ControlError
-        With the nearest one.
-    """
-    known = get_args(ControllerName)
-    if name not in known:
-        raise ControlError(describe("controller", f"one of {', '.join(known)}", repr(name), nearest(name, known)))
-    return cast(ControllerName, name)
-
-
 def run_controller(study: Study, name: str, progress: Progress | None = None) -> ControlRun:
     """Run a study with a controller.
 
@@ -135,9 +115,9 @@ def run_controller(study: Study, name: str, progress: Progress | None = None) ->
     study : Study
         What it is run on.
     name : str
-        ``mpc``, ``schedule``, ``reset``, ``guideline36``, or ``bound``: optimal control with the plant's own parameters
-        and exact sensors, that knows the weather and the people. Where the plant is its own model it knows the state;
-        the state of a grid it estimates.
+        ``mpc``, ``schedule``, ``reset``, ``guideline36``, one that was registered, or ``bound``: optimal control with
+        the plant's own parameters and exact sensors, that knows the weather and the people. Where the plant is its own
+        model it knows the state; the state of a grid it estimates.
     progress : callable, optional
         Called with stage, done, total.
 
@@ -150,76 +130,43 @@ def run_controller(study: Study, name: str, progress: Progress | None = None) ->
     --------
     >>> run_controller(study, "guideline36").kpis.cost_tot  # doctest: +SKIP
     """
-    known = check_controller(name)
-    optimal = known in ("mpc", "bound")
-    step = study.control_step if optimal else MODEL_STEP
-    plant = study.plant(step, bound=known == "bound")
-    chosen, log = controller_of(study, plant, known), _Log()
-    watched = _Watched(chosen, log) if isinstance(chosen, MpcController) else chosen
+    entry = find_controller(name)
+    step = study.settings.control_step if entry.predictive else MODEL_STEP
+    plant = study.plant(step, bound=entry.perfect)
+    watched = _Watched(entry.make(study, plant))
     count = int(study.steps * MODEL_STEP / step)
-    report = None if progress is None else (lambda done, _: progress(known, done, count))
-    loop = run_closed_loop(plant, watched, steps=count, seed=study.seed, forecasts=optimal, progress=report)
-    kpis = measure_kpis(loop.record, plant.scenario, control_step=step)
-    return ControlRun(known, study, loop, kpis, tuple(log.decisions), plant)
-
-
-def controller_of(study: Study, plant: SimulatedPlant, name: ControllerName) -> Controller:
-    """Make a controller of a study by name.
-
-    Parameters
-    ----------
-    study : Study
-        Knows its settings.
-    plant : SimulatedPlant
-        Of the study.
-    name : str
-        Which one.
-    """
-    required = tuple(a for a in plant.actuators if a.required)
-    points = site_points(study.building, plant.devices)
-    if name == "schedule":
-        return day_schedule(required)
-    if name == "reset":
-        return OutdoorReset(required, points.weather_station)
-    if name == "guideline36":
-        return Guideline36(points, plant.system.terminals.air_handler.tolist(), required)
-    model = study.truth if name == "bound" else study.model
-    return make_controller(
-        model, plant, settings=study.settings, horizon=default_horizon(study.control_step, HORIZON_HOURS),
-        observer=knowing_observer(model, plant) if name == "bound" else None,
+    report = None if progress is None else (lambda done, _: progress(name, done, count))
+    loop = run_closed_loop(
+        plant, watched, steps=count, seed=study.settings.seed, forecasts=entry.predictive, progress=report
     )  # fmt: skip
-
-
-class _Log:
-    """Decisions of a run."""
-
-    def __init__(self) -> None:
-        self.decisions: list[Decision] = []
-
-    def take(self, action: Action, controller: MpcController) -> None:
-        """Keep what an action expected."""
-        horizon, solution = controller.problem.predictor.horizon, action.solution
-        zone, power = np.full(controller.problem.predictor.n_zone, np.nan), (np.nan, np.nan)
-        if solution is not None and solution.usable:
-            row = int(np.searchsorted(horizon.edges, AHEAD - 1e-6))
-            share = horizon.steps[:row] / horizon.edges[row]
-            zone = solution.rollout.zone[row].copy()
-            power = float(share @ solution.rollout.electric[:row]), float(share @ solution.rollout.fuel[:row])
-        status = "" if solution is None else str(solution.status)
-        seconds = 0.0 if solution is None else solution.seconds
-        self.decisions.append(Decision(action.stamp, str(action.source), status, action.reasons, zone, power, seconds))
+    kpis = measure_kpis(loop.record, plant.scenario, control_step=step)
+    return ControlRun(entry, study, loop, kpis, tuple(watched.decisions), plant)
 
 
 class _Watched:
-    """Optimal control whose decisions are written down."""
+    """A controller whose decisions are written down, where it is optimal control."""
 
-    def __init__(self, controller: MpcController, log: _Log) -> None:
-        self._controller, self._log = controller, log
+    def __init__(self, controller: Controller) -> None:
+        self._controller, self.decisions = controller, list[Decision]()
 
     def step(self, measurements: Measurements, forecast: Forecast | None) -> Mapping[str, float]:
         action = self._controller.step(measurements, forecast)
-        self._log.take(action, self._controller)
+        if isinstance(action, Action) and isinstance(self._controller, MpcController):
+            self.decisions.append(_decision(action, self._controller.problem.predictor))
         return action
+
+
+def _decision(action: Action, predictor: Predictor) -> Decision:
+    """Keep what an action expected."""
+    horizon, solution = predictor.horizon, action.solution
+    zone, power = np.full(predictor.n_zone, np.nan), (np.nan, np.nan)
+    if solution is not None and solution.usable:
+        row = int(np.searchsorted(horizon.edges, AHEAD - 1e-6))
+        share = horizon.steps[:row] / horizon.edges[row]
+        zone = solution.rollout.zone[row].copy()
+        power = float(share @ solution.rollout.electric[:row]), float(share @ solution.rollout.fuel[:row])
+    status, seconds = ("", 0.0) if solution is None else (str(solution.status), solution.seconds)
+    return Decision(action.stamp, str(action.source), status, action.reasons, zone, power, seconds)
 
 
 def prediction_errors(run: ControlRun) -> dict[str, Any]:

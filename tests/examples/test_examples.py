@@ -22,6 +22,7 @@ def test_every_example_is_tested_here() -> None:
     assert {p.stem for p in EXAMPLES.glob("*.py")} == {
         "step_a_building",
         "calibrate_a_case",
+        "case_to_controller",
         "close_the_loop",
         "make_the_pilot",
         "linear_response",
@@ -52,6 +53,13 @@ def test_calibrate_a_case() -> None:
     result = load("calibrate_a_case").run(dx=1.0)
     assert result.solver.success
     assert result.calibrated["held_out"].metrics.mae < 0.7 * result.uncalibrated["held_out"].metrics.mae
+
+
+def test_case_to_controller() -> None:
+    """Three hours of a mild March morning take little, and no zone leaves its band."""
+    kpis = load("case_to_controller").run()
+    assert kpis.hours == 3.0 and kpis.tdis_tot < 0.02
+    assert kpis.ener_tot == pytest.approx(0.0119, rel=0.05)
 
 
 def test_make_the_pilot(tmp_path: Path) -> None:

@@ -75,6 +75,21 @@ class Project:
         """``file:line`` in a module."""
         return f"{self.files[name].relative_to(ROOT)}:{line}"
 
+    @cached_property
+    def imports(self) -> list[tuple[str, int, str, str]]:
+        """Importing module, line, imported module and name of every import, inside functions too."""
+        found = []
+        for name, tree in self.trees.items():
+            inside = name.split(".") if self.files[name].name == "__init__.py" else name.split(".")[:-1]
+            for node in ast.walk(tree):
+                if isinstance(node, ast.Import):
+                    found += [(name, node.lineno, alias.name, "") for alias in node.names]
+                elif isinstance(node, ast.ImportFrom):
+                    above = inside[: len(inside) - node.level + 1] if node.level else []
+                    source = ".".join([*above, *filter(None, [node.module])])
+                    found += [(name, node.lineno, source, alias.name) for alias in node.names]
+        return found
+
     def definition(self, constant: str) -> tuple[str, bool]:
         """Where a constant is defined, and whether it is explained above, beside or below its definition."""
         for module, tree in self.trees.items():

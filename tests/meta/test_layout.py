@@ -8,7 +8,7 @@ import inspect
 import re
 import sys
 import tomllib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -23,22 +23,9 @@ LONGEST_MODULE = 400  # lines
 MACHINE_PATH = re.compile(r"(?<![\w.])/(work|tmp|root|home/\w+)(?![\w-])")
 
 
-def all_imports(project: Any) -> Iterator[tuple[str, int, str, str]]:
-    """Importing module, line, imported module and name of every import, inside functions too."""
-    for name, tree in project.trees.items():
-        inside = name.split(".") if project.files[name].name == "__init__.py" else name.split(".")[:-1]
-        for node in ast.walk(tree):
-            if isinstance(node, ast.Import):
-                yield from ((name, node.lineno, alias.name, "") for alias in node.names)
-            elif isinstance(node, ast.ImportFrom):
-                above = inside[: len(inside) - node.level + 1] if node.level else []
-                source = ".".join([*above, *filter(None, [node.module])])
-                yield from ((name, node.lineno, source, alias.name) for alias in node.names)
-
-
 def test_imports_run_one_way(project: Any, expect_none: Check) -> None:
     problems = []
-    for name, line, source, _ in all_imports(project):
+    for name, line, source, _ in project.imports:
         at, here, there = project.where(name, line), name.split(".")[0], source.split(".")[0]
         if there in (*PACKAGES[PACKAGES.index(here) + 1 :], "benchmarks", "tests", "examples"):
             problems.append(f"{at}: {here} imports {source}; imports run thermal <- calibration <- mpc")
@@ -50,7 +37,7 @@ def test_every_name_is_exported_used_or_private(project: Any, expect_none: Check
     shown = {word for folder in ("benchmarks", "examples", "docs") for path in (ROOT / folder).rglob("*")
              if path.suffix in (".py", ".md", ".ipynb")
              for word in re.findall(r"\w+", path.read_text(encoding="utf-8"))}  # fmt: skip
-    imported = {(source, name) for _, _, source, name in all_imports(project)}
+    imported = {(source, name) for _, _, source, name in project.imports}
     attributes = {(n.value.id, n.attr) for t in project.trees.values() for n in ast.walk(t)
                   if isinstance(n, ast.Attribute) and isinstance(n.value, ast.Name)}  # fmt: skip
     scripts = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["scripts"].values()

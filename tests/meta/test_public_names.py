@@ -6,6 +6,7 @@ import doctest
 import inspect
 import re
 from collections.abc import Callable
+from dataclasses import is_dataclass
 from functools import cached_property
 from typing import Any
 
@@ -41,6 +42,12 @@ def documented(doc: str) -> dict[str, tuple[str, str]]:
         else:
             entries |= {name: (entries[name][0], f"{entries[name][1]} {line.strip()}") for name in names}
     return entries
+
+
+def inherited(p: Any) -> dict[str, tuple[str, str]]:
+    """What the bases of a dataclass document: its own docstring need not repeat them."""
+    bases = p.value.__mro__[:0:-1] if inspect.isclass(p.value) and is_dataclass(p.value) else ()
+    return {name: entry for base in bases for name, entry in documented(base.__doc__ or "").items()}
 
 
 def is_numeric(annotation: Any, kind: str) -> bool:
@@ -80,13 +87,14 @@ def test_every_public_name_has_a_docstring(project: Any, expect_none: Check) -> 
 def test_every_parameter_is_documented_with_its_unit(project: Any, expect_none: Check) -> None:
     problems = []
     for p in (p for p in project.public if p.parameters is not None):
-        at, entries = f"{p.where}: {p.name}", documented(docstring(p))
+        at, own = f"{p.where}: {p.name}", documented(docstring(p))
+        entries = inherited(p) | own
         for name, parameter in p.parameters.items():
             if name not in entries:
                 problems.append(f"{at}: parameter {name!r} is not documented; add it under Parameters")
             elif is_numeric(parameter.annotation, entries[name][0]) and not UNIT.search(" ".join(entries[name])):
                 problems.append(f"{at}: parameter {name!r} has no unit; write it in brackets, such as [K] or [-]")
-        for name in sorted(set(entries) - set(p.parameters)):
+        for name in sorted(set(own) - set(p.parameters)):
             problems.append(f"{at}: documents {name!r}, which is no parameter; rename or drop it")
     expect_none(problems)
 

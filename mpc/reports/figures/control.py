@@ -10,7 +10,6 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from mpc.reports.control_words import controller_name
 from mpc.reports.figures import style
 from mpc.reports.figures.style import CELSIUS, MEASURED, MUTED, SIMULATED, Picture, picture, styled
 from mpc.studies.run import AHEAD, ControlRun, compared_decisions
@@ -162,7 +161,7 @@ def side_by_side(runs: Sequence[ControlRun]) -> list[Picture]:
     for run in runs:
         colour = _COLOURS.get(run.controller) or _OWN[next(own) % len(_OWN)]
         line = {"color": colour, "linewidth": 1.2, "linestyle": "--" if run.controller == "bound" else "-"}
-        cost.plot(x, np.cumsum(np.sum(_costs(run), axis=0)), label=controller_name(run.controller), **line)
+        cost.plot(x, np.cumsum(np.sum(_costs(run), axis=0)), label=run.entry.title, **line)
         zone = run.loop.record.zone_temperature[1 : study.steps + 1] - CELSIUS
         zones.plot(x, zone.min(axis=1), **line)
         zones.plot(x, zone.max(axis=1), **line)
@@ -193,7 +192,7 @@ def cost_bars(runs: Sequence[ControlRun]) -> list[Picture]:
     electricity, gas = np.array([[part.sum() for part in _costs(run)] for run in runs]).T
     left.barh(place, electricity, color=MEASURED, alpha=0.8, label="electricity")
     left.barh(place, gas, left=electricity, color=SIMULATED, alpha=0.8, label="gas")
-    left.set_yticks(place, [controller_name(run.controller) for run in runs])
+    left.set_yticks(place, [run.entry.title for run in runs])
     left.invert_yaxis()
     left.set_xlabel(f"energy cost [{runs[0].study.scenario.currency}]")
     left.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, fontsize=8)  # above: bars fill the axes

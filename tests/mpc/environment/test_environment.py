@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 
-from mpc.environment.environment import ControlEnvironment
-from mpc.environment.registration import office_environment
+from mpc.environment.environment import ControlEnvironment, Office, office_environment
 from mpc.environment.reward import EconomicReward, PaperStepReward
 from mpc.errors import MpcError, PlantActionError
 from mpc.kpi.record import PlantRecord
@@ -20,7 +19,7 @@ from mpc.loop.simulated import SimulatedPlant
 
 Make = Callable[..., ControlEnvironment]
 
-SMALL = {"zones": 4, "floor_area": 200.0, "days": 1}
+SMALL: dict[str, Any] = {"office": Office(zones=4, floor_area=200.0), "days": 1}
 
 
 def episode(world: Any, seed: int, steps: int = 40) -> Iterator[tuple[np.ndarray, float]]:

@@ -7,11 +7,9 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from mpc.environment.actions import ActionLayout
 from mpc.environment.environment import ControlEnvironment
-from mpc.environment.features import LARGEST, OBSERVED_RANGES
-from mpc.environment.observation import HISTOGRAM_EDGES, ObservationLayout
-from mpc.environment.outlook import Outlook, clock
+from mpc.environment.features import LARGEST, OBSERVED_RANGES, Outlook, clock
+from mpc.environment.layout import HISTOGRAM_EDGES, ActionLayout, ObservationLayout
 from mpc.loop.simulated import SimulatedPlant
 from thermal.case.points import POINT_TYPES
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from mpc.errors import PlantError
-from mpc.loop.make import ModelKind, pilot_weather, simulated_plant
+from mpc.loop.make import PlantKind, PlantSettings, pilot_weather, simulated_plant
 from mpc.loop.reduced import reduced_building
 from mpc.loop.signals import RadiantGains
 from mpc.loop.simulated import SimulatedPlant
@@ -55,14 +55,15 @@ def strengths(ids: tuple[str, ...]) -> dict[str, float]:
 
 
 def run(
-    ids: tuple[str, ...] = (), model: ModelKind = "reduced", hard: bool = False, **options: object
+    ids: tuple[str, ...] = (), model: PlantKind = "reduced", hard: bool = False, **options: object
 ) -> SimulatedPlant:
     """Most of a spring day, energy closing at every step; driven hard, with all zones called to 26 degC."""
     values = strengths(ids) if ids else None
-    plant = simulated_plant(
-        house(), spring(), "2023-04-10", "2023-04-11", model=model, dx=1.0, system=sized(), parameters=values,
-        effects=chosen(list(ids)), warm_up_days=0, **options,  # type: ignore[arg-type]
+    settings = PlantSettings(
+        kind=model, dx=1.0, system=sized(), parameters=values, effects=chosen(list(ids)), warm_up_days=0,
+        **options,  # type: ignore[arg-type]
     )  # fmt: skip
+    plant = simulated_plant(house(), spring(), "2023-04-10", "2023-04-11", settings)
     plant.reset()
     kind = "heating_temperature_setpoint"
     extra = {a.name: 299.0 for a in plant.actuators if a.name.endswith(kind)} if hard else {}
@@ -74,7 +75,7 @@ def run(
 
 
 @cache
-def plain(model: ModelKind = "reduced") -> np.ndarray:
+def plain(model: PlantKind = "reduced") -> np.ndarray:
     return run(model=model).record().zone_temperature
 
 
@@ -104,10 +105,9 @@ def test_open_doors_bring_zones_together() -> None:
     first, second = house().zone_names[:2]
     apart = []
     for ids in ((), ("zone_mixing",)):
-        plant = simulated_plant(
-            house(), spring(), "2023-04-10", "2023-04-11", dx=1.0, system=sized(), effects=chosen(list(ids)),
-            parameters=strengths(ids) if ids else None, warm_up_days=0,
-        )  # fmt: skip
+        values = strengths(ids) if ids else None
+        settings = PlantSettings(dx=1.0, system=sized(), effects=chosen(list(ids)), parameters=values, warm_up_days=0)
+        plant = simulated_plant(house(), spring(), "2023-04-10", "2023-04-11", settings)
         plant.reset()
         kind = "zone_air_heating_temperature_setpoint"
         for _ in range(150):
@@ -118,10 +118,11 @@ def test_open_doors_bring_zones_together() -> None:
 
 def test_other_people_open_other_windows() -> None:
     """After a reset with a seed, effects that follow people follow those of that seed; the first again is the first."""
-    plant = simulated_plant(
-        house(), spring(), "2023-04-10", "2023-04-11", dx=1.0, system=sized(), warm_up_days=1,
-        effects=chosen(["internal_gains"]), parameters={"internal_gain": 20.0}, occupancy=RandomOccupancy(3),
+    settings = PlantSettings(
+        dx=1.0, system=sized(), warm_up_days=1, effects=chosen(["internal_gains"]), parameters={"internal_gain": 20.0},
+        occupancy=RandomOccupancy(3),
     )  # fmt: skip
+    plant = simulated_plant(house(), spring(), "2023-04-10", "2023-04-11", settings)
     ends = []
     for seed in (1, 2, 1):
         plant.reset(seed)
@@ -135,7 +136,7 @@ def test_other_people_open_other_windows() -> None:
 
 
 @pytest.mark.parametrize("model", ["reduced", "grid"])
-def test_gains_that_radiate_move_heat_from_air_to_surfaces(model: ModelKind) -> None:
+def test_gains_that_radiate_move_heat_from_air_to_surfaces(model: PlantKind) -> None:
     plant = run(model=model, gains=InternalGains(**RADIANT_SHARES))
     assert abs(plant.balance().flows.effects) < 1e-9  # what goes to the surfaces does not go to the air
     if model == "grid":

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
 from calibration.fit.result import ParameterEstimate
 from mpc.kpi.kpis import KPIS, Indicator, Kpis
-from mpc.reports.control_words import controller_name, controller_rule, own_indicators
+from mpc.reports.control_words import own_indicators
 from mpc.reports.diagnosis_words import called
 from mpc.reports.figures.calibration import parameter_ranges
 from mpc.reports.page import render, spell
@@ -31,12 +30,6 @@ def test_a_parameter_of_an_effect_that_was_added_later_is_drawn(monkeypatch: pyt
     estimate = ParameterEstimate("cat_flap_area", "m^2", 0.1, 0.0, 1.0, 0.0, False, 0.02, True, "made up", (0.05, 0.15))
     (picture,) = parameter_ranges([estimate])
     assert picture.source
-
-
-def test_a_controller_is_called_by_its_name_and_needs_no_rule() -> None:
-    run: Any = SimpleNamespace(controller="night_purge", plant=SimpleNamespace(control_step=900.0))
-    assert controller_name("night_purge") == "night purge"
-    assert controller_rule(run) == ""
 
 
 def test_an_indicator_is_a_card(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from mpc.loop.make import pilot_weather, simulated_plant
+from mpc.loop.make import PlantSettings, pilot_weather, simulated_plant
 from mpc.loop.noise import SensorNoise
 from mpc.loop.simulated import SimulatedPlant
 from mpc.studies.model import control_model
@@ -48,6 +48,6 @@ def make_plant() -> Callable[..., SimulatedPlant]:
     def make(**options: Any) -> SimulatedPlant:
         weather = pilot_weather(1, "2023-01-09", 2.0)
         given = {"control_steps": 3, "noise": SensorNoise(), "horizon": 144, "system": sized(), "dx": 1.0} | options
-        return simulated_plant(office(), weather, "2023-01-09", "2023-01-11", **given)
+        return simulated_plant(office(), weather, "2023-01-09", "2023-01-11", PlantSettings(**given))
 
     return make

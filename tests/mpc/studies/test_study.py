@@ -13,7 +13,7 @@ import pytest
 
 from calibration.errors import ResultsExistError
 from mpc.errors import ControlError, PlantError
-from mpc.loop.make import pilot_weather
+from mpc.loop.make import equip, pilot_weather
 from mpc.loop.noise import SensorNoise
 from mpc.reports.control import comparison_summary, write_comparison, write_control
 from mpc.reports.control_words import comparison_verdict, control_verdict, reason_rows
@@ -21,9 +21,9 @@ from mpc.scenario.weather_files import weather_of_case
 from mpc.studies.bound import KnownState
 from mpc.studies.compare import Comparison, compare_controllers
 from mpc.studies.controller import make_controller
-from mpc.studies.devices import equip
-from mpc.studies.run import check_controller, prediction_errors, run_controller
-from mpc.studies.study import Study, check_kind, make_study
+from mpc.studies.controllers import find_controller
+from mpc.studies.run import prediction_errors, run_controller
+from mpc.studies.study import Study, StudySettings, make_study
 from thermal import Building, load_bundled_case
 
 START, END = "2023-01-09T06:00", "2023-01-09T08:00"
@@ -33,7 +33,7 @@ START, END = "2023-01-09T06:00", "2023-01-09T08:00"
 def make(building: Building) -> Callable[..., Study]:
     def study(**options) -> Study:
         weather = pilot_weather(1, "2023-01-09", 1.0)
-        return make_study(building, weather, START, END, dx=1.0, order=40, **options)
+        return make_study(building, weather, START, END, StudySettings(dx=1.0, order=40, **options))
 
     return study
 
@@ -59,18 +59,18 @@ def test_a_case_without_a_plant_gets_one_and_says_so() -> None:
 def test_the_last_day_of_the_weather_comes_again_for_the_forecast_but_not_for_the_run() -> None:
     case = load_bundled_case()
     weather = weather_of_case(case)
-    study = make_study(case.building, weather, "2023-03-10T12:00", "2023-03-11T00:00", dx=1.0, order=20)
+    study = make_study(case.building, weather, "2023-03-10T12:00", "2023-03-11T00:00", StudySettings(dx=1.0, order=20))
     last = weather.values("outside_air_temperature_sensor")[-288:]
     np.testing.assert_allclose(study.scenario.outdoor[study.steps :], last[:144])
     with pytest.raises(PlantError, match="weather: expected values until 2023-03-11 06:00"):
-        make_study(case.building, weather, "2023-03-10", "2023-03-11T06:00", dx=1.0)
+        make_study(case.building, weather, "2023-03-10", "2023-03-11T06:00", StudySettings(dx=1.0))
 
 
 def test_names_are_checked(make: Callable[..., Study]) -> None:
     with pytest.raises(ControlError, match="guideline36"):
-        check_controller("guideline")
+        find_controller("guideline")
     with pytest.raises(PlantError, match="one of reduced, grid, random"):
-        check_kind("full")
+        StudySettings(kind="full")  # type: ignore[arg-type]
     with pytest.raises(ControlError, match="some, each once"):
         compare_controllers(make(), ["reset", "reset"])
     with pytest.raises(PlantError, match="a multiple of 300 s"):

@@ -1,0 +1,133 @@
+"""Options that commands have in common, each declared once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import wraps
+from inspect import Parameter, Signature, signature
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from calibration.evaluation.intervals import Interval
+    from thermal.case.case import Case
+
+
+def folder(contents: str) -> Any:
+    """Declare the option of a folder of results.
+
+    Parameters
+    ----------
+    contents : str
+        What is written there.
+    """
+    return typer.Option(metavar="DIR", help=f"Folder for {contents}.")
+
+
+def file(text: str) -> Any:
+    """Declare the option of a file.
+
+    Parameters
+    ----------
+    text : str
+        What it holds.
+    """
+    return typer.Option(metavar="FILE", help=text)
+
+
+def number(text: str, metavar: str = "N") -> Any:
+    """Declare the option of a number.
+
+    Parameters
+    ----------
+    text : str
+        What it is for.
+    metavar : str
+        What stands for it.
+    """
+    return typer.Option(metavar=metavar, help=text)
+
+
+CaseFolder = Annotated[Path, typer.Argument(metavar="CASE", help="Case folder.")]
+Json = Annotated[bool, typer.Option("--json", help="Write JSON on stdout, and nothing else.")]
+Force = Annotated[bool, typer.Option("--force", help="Replace earlier results in the folder.")]
+Dx = Annotated[float | None, number("Distance between control volumes of a plan; default its cell size.", "M")]
+Horizon = Annotated[str, typer.Option(metavar="TIME", help="Prediction horizon, such as 6h or 90min.")]
+Intervals = list[str] | None
+Parameters = Annotated[Path | None, file("calibration.json of this case; default: before calibration.")]
+SchemeName = Annotated[
+    str | None,
+    typer.Option(metavar="NAME", help="implicit_euler or tr_bdf2; default: as calibrated, else implicit_euler."),
+]
+Start = Annotated[str, typer.Option(metavar="T", help="Start, ISO 8601; local to the building without an offset.")]
+
+
+def interval(what: str, default: str) -> Any:
+    """Declare the option of intervals, which may be repeated.
+
+    Parameters
+    ----------
+    what : str
+        What they are for.
+    default : str
+        What holds without any.
+    """
+    return typer.Option(metavar="START/END", help=f"{what} interval, repeatable; default: {default}.")
+
+
+def open_case(case: Path, out: Path | None, force: bool) -> Case:
+    """Load a case, once it is sure that the results may be written.
+
+    Parameters
+    ----------
+    case : Path
+        Case folder.
+    out : Path or None
+        Folder of the results, where there are to be any.
+    force : bool
+        Whether earlier results are replaced.
+    """
+    from calibration.results import check_results_folder
+    from thermal.case.load import load_case
+
+    if out is not None:
+        check_results_folder(out, force)
+    return load_case(case)
+
+
+def parse_intervals(texts: Sequence[str] | None, case: Case) -> list[Interval]:
+    """Read intervals START/END.
+
+    Parameters
+    ----------
+    texts : sequence of str, optional
+        As they were given.
+    case : Case
+        Whose clock they are on.
+    """
+    from calibration.evaluation.intervals import parse_interval
+
+    return [parse_interval(text, case) for text in texts or ()]
+
+
+def spread(command: Callable[..., int]) -> Callable[..., int]:
+    """Make options of the fields of a command's first argument, a dataclass.
+
+    Parameters
+    ----------
+    command : callable
+        Takes an instance of the dataclass, then arguments and options of its own.
+    """
+    first, *own = signature(command, eval_str=True).parameters.values()
+    fields = signature(first.annotation, eval_str=True).parameters
+
+    @wraps(command)
+    def run(**given: Any) -> int:
+        return command(first.annotation(**{name: given.pop(name) for name in fields}), **given)
+
+    required_first = sorted((*fields.values(), *own), key=lambda p: p.default is not p.empty)
+    run.__signature__ = Signature([p.replace(kind=Parameter.KEYWORD_ONLY) for p in required_first])  # type: ignore[attr-defined]
+    run.__annotations__ = {}
+    return run
