@@ -188,8 +188,10 @@ def calibration_settings(
     changes = {**(vars(given) if isinstance(given, ModelSettings) else given or {}), **(further or {})}
     known = [f.name for f in fields(CalibrationSettings)]
     for name in changes:
+        if name in INTERVALS:
+            raise CalibrationError(f"settings: {name!r} is no setting; give it to calibrate beside the settings")
         if name not in known:
-            raise CalibrationError(f"settings: calibrate takes no {name!r}; {nearest(name, [*known, *INTERVALS])}")
+            raise CalibrationError(f"settings: calibrate takes no {name!r}; {nearest(name, known)}")
     effects, structure = changes.get("effects"), changes.get("structure")
     if effects is not None and not isinstance(effects, Mapping):
         changes["effects"] = {name: () for name in effects}

@@ -264,5 +264,7 @@ def test_settings_come_by_name_or_as_objects() -> None:
     assert calibration_settings({"structure": {"furniture": False}}).structure == Structure(furniture=False)
     with pytest.raises(CalibrationError, match="calibrate takes no 'dz'; the nearest valid one is 'dx'"):
         calibration_settings({"dz": 1.0})
+    with pytest.raises(CalibrationError, match="'tune' is no setting; give it to calibrate beside the settings"):
+        calibration_settings({"tune": []})
     with pytest.raises(CalibrationError, match="starts: expected at least 1"):
         CalibrationSettings(starts=0)
