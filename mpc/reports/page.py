@@ -12,6 +12,7 @@ from typing import Any
 
 import jinja2
 import pandas as pd
+from jinja2.filters import make_attrgetter
 
 from calibration.results import write_results
 
@@ -98,11 +99,16 @@ def spell(value: Any, how: str = "") -> str:
     return format(value, how).replace("-", "−") if how else str(value)
 
 
-def _cells(row: Any, columns: Sequence[Any], left: Sequence[int]) -> list[tuple[str, Any]]:
+@jinja2.pass_environment
+def _cells(
+    environment: jinja2.Environment, row: Any, columns: Sequence[Any], left: Sequence[int]
+) -> list[tuple[str, Any]]:
     """Class and text of each cell of a row: of a list of texts, or of a record by the paths and spellings of columns.
 
     Parameters
     ----------
+    environment : Environment
+        Of the templates.
     row : sequence of str, or record
         An object, a mapping or a tuple.
     columns : sequence of str or (str, str, str)
@@ -111,17 +117,8 @@ def _cells(row: Any, columns: Sequence[Any], left: Sequence[int]) -> list[tuple[
         Columns of text.
     """
     if not isinstance(columns[0], str):
-        row = [spell(_found(row, path), how) for _, path, how in columns]
+        row = [spell(make_attrgetter(environment, path)(row), how) for _, path, how in columns]
     return [("name" if k == 0 else "text" if k in left else "n", text) for k, text in enumerate(row)]
-
-
-def _found(record: Any, path: str) -> Any:
-    for key in path.split("."):
-        if isinstance(record, tuple) and key.isdecimal():
-            record = record[int(key)]
-        else:
-            record = record[key] if isinstance(record, Mapping) else getattr(record, key)
-    return record
 
 
 def kelvin(value: float) -> str:

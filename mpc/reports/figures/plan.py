@@ -109,7 +109,7 @@ def plan_drawings(plans: FloorPlans, orientation: float) -> list[Picture]:
 def floor_maps(
     plans: FloorPlans,
     orientation: float,
-    zones: tuple[str, ...],
+    zones: Sequence[str],
     error: FloatArray,
     title: str,
     field: Field | None = None,
@@ -204,7 +204,7 @@ def _signed_kelvin(value: float) -> str:
 
 
 def _cell_errors(
-    floor: FloorPlan, number: int, cell: float, zones: tuple[str, ...], error: FloatArray, field: Field | None
+    floor: FloorPlan, number: int, cell: float, zones: Sequence[str], error: FloatArray, field: Field | None
 ) -> FloatArray:
     """Error of each pixel of a floor [K]; NaN in walls, outside, and where nothing is measured."""
     code = np.full(floor.tokens.shape, -1)
