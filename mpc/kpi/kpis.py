@@ -16,7 +16,6 @@ from mpc.scenario.rates import KILOWATT_HOUR
 from mpc.scenario.scenario import Scenario
 from mpc.scenario.tariff import window_means
 from thermal._types import FloatArray, IntArray
-from thermal.errors import describe
 
 #: Length of the mean whose highest value is a peak [s], as in BOPTEST.
 PEAK_WINDOW = 900.0
@@ -88,21 +87,20 @@ class MeasuredRun:
 
     def __post_init__(self) -> None:
         record, grid, counted = self.record, self.scenario.grid, bool(self.scenario.carbon_kind)
-        each, steps = grid.step / record.step, record.n_steps * record.step / grid.step
-        if not (each >= 1 and float(each).is_integer() and float(steps).is_integer()):
-            found = f"{record.n_steps} steps of {record.step:g} s"
-            raise MpcError(describe("record", f"whole steps of {grid.step:g} s of the scenario", found))
-        if self.first_step < 0 or self.first_step + steps > grid.n_steps:
-            found = f"{self.first_step} to {self.first_step + steps:g}"
-            raise MpcError(describe("record", f"steps within the scenario's {grid.n_steps}", found))
-        if record.zone_temperature.shape[1] != len(self.scenario.zones):
-            found = f"{record.zone_temperature.shape[1]}"
-            raise MpcError(describe("record: zone_temperature", f"{len(self.scenario.zones)} zones", found))
-        lacking = self.district_price is None or (counted and self.district_carbon is None)
-        if record.district_heating is not None and lacking:
-            raise MpcError(describe("district heating", "its price, and its emissions where they count", "none"))
-        if record.co2 is not None and (self.co2_limit is None or not 0 < self.co2_limit < 1):
-            raise MpcError(describe("co2_limit", "a share of volume, such as 1e-3", repr(self.co2_limit)))
+        each = float(grid.step / record.step)
+        steps = float(record.n_steps / each)
+        whole, found = each >= 1 and each.is_integer() and steps.is_integer(), f"{record.n_steps} of {record.step:g} s"
+        MpcError.unless(whole, "record: steps", f"whole steps of {grid.step:g} s of the scenario", found)
+        first, last, zones = self.first_step, self.first_step + steps, len(self.scenario.zones)
+        within = first >= 0 and last <= grid.n_steps
+        MpcError.unless(within, "record", f"steps within the scenario's {grid.n_steps}", f"{first} to {last:g}")
+        found = f"{record.zone_temperature.shape[1]}"
+        MpcError.unless(found == f"{zones}", "record: zone_temperature", f"{zones} zones", found)
+        priced = self.district_price is not None and (not counted or self.district_carbon is not None)
+        known = record.district_heating is None or priced
+        MpcError.unless(known, "district heating", "its price, and its emissions where they count", "none")
+        limited = record.co2 is None or 0 < (self.co2_limit or 0.0) < 1
+        MpcError.unless(limited, "co2_limit", "a share of volume, such as 1e-3", self.co2_limit)
 
     @cached_property
     def rows(self) -> IntArray:

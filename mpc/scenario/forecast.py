@@ -308,8 +308,7 @@ class Forecaster:
         expected = f"a horizon of 1 to {count} steps, a seed of 0 or more, a time between issues"
         found = f"{self.horizon}, {self.seed}, {self.issue_every} s"
         ScenarioError.unless(possible, "forecaster", expected, found)
-        kinds = ("expected", "actual")
-        ScenarioError.unless(self.occupancy in kinds, "occupancy", "'expected' or 'actual'", repr(self.occupancy))
+        ScenarioError.unless_known(self.occupancy, ("expected", "actual"), "occupancy", "'expected' or 'actual'")
         for name in errors:
             ScenarioError.unless_known(name, ERROR_POINTS, "errors", "a known one")
         truth = self.scenario.to_frame(expected=self.occupancy == "expected")

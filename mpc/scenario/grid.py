@@ -55,11 +55,10 @@ class StepGrid:
     n_steps: int
 
     def __post_init__(self) -> None:
-        if self.start.tzinfo is None or self.start.microsecond:
-            raise ScenarioError(describe("start", "a whole second in a time zone", repr(self.start)))
-        if not (self.step >= 1 and float(self.step).is_integer() and self.n_steps >= 1):
-            found = f"{self.n_steps} steps of {self.step} s"
-            raise ScenarioError(describe("grid", "at least one step of a whole number of seconds", found))
+        zoned = self.start.tzinfo is not None and not self.start.microsecond
+        ScenarioError.unless(zoned, "start", "a whole second in a time zone", repr(self.start))
+        whole = self.step >= 1 and float(self.step).is_integer() and self.n_steps >= 1
+        ScenarioError.unless(whole, "grid", "at least one step of a whole number of seconds", self)
 
     @classmethod
     def between(cls, start: str | datetime, end: str | datetime, step: float, building: Building) -> StepGrid:

@@ -15,7 +15,6 @@ from numpy.typing import ArrayLike
 from mpc.errors import ScenarioError
 from mpc.scenario.grid import RESOLUTION, WEEKDAY, Calendar, StepGrid, by_clock, index_seconds, local_hours
 from thermal._types import FloatArray
-from thermal.errors import describe
 
 #: Share of the people that are in at each hour of a weekday, a Saturday, and a Sunday or holiday [-]: offices of the
 #: U.S. DOE's reference buildings (Deru et al. 2011, NREL/TP-5500-46861), schedule BLDG_OCC_SCH.
@@ -52,8 +51,8 @@ class Occupancy:
     calendar: Calendar = field(default_factory=Calendar, kw_only=True)
 
     def __post_init__(self) -> None:
-        if not all(np.isfinite(count) and count >= 0 for count in self._counts):
-            raise ScenarioError(describe("assigned", "people of 0 or more", repr(self.assigned)))
+        possible = all(np.isfinite(count) and count >= 0 for count in self._counts)
+        ScenarioError.unless(possible, "assigned", "people of 0 or more", self.assigned)
 
     @property
     def _counts(self) -> list[float]:
@@ -124,9 +123,9 @@ class ScheduledOccupancy(Occupancy):
     def __post_init__(self) -> None:
         super().__post_init__()
         table = np.asarray(self.presence, dtype=float)
-        if table.shape != (3, 24) or not ((table >= 0) & (table <= 1)).all():
-            expected = "3 rows (weekday, Saturday, Sunday) of 24 shares from 0 to 1"
-            raise ScenarioError(describe("presence", expected, f"shape {table.shape}"))
+        possible = table.shape == (3, 24) and ((table >= 0) & (table <= 1)).all()
+        expected = "3 rows (weekday, Saturday, Sunday) of 24 shares from 0 to 1"
+        ScenarioError.unless(possible, "presence", expected, f"shape {table.shape}")
 
     def expected(self, grid: StepGrid, zones: Sequence[str]) -> FloatArray:
         """Mean number of people expected in each zone over each step, shape (n_steps, n_zone) [-].
@@ -180,13 +179,12 @@ class RandomOccupancy(Occupancy):
         hours = np.array([0.0, *self.arrival, *self.departure, 24.0])
         off = np.abs(hours * 3600.0 / RESOLUTION - np.round(hours * 3600.0 / RESOLUTION)) > 1e-6
         ordered = (np.diff(hours) >= 0.0).all() and hours[1] < hours[2] and hours[3] < hours[4]
-        if off.any() or not ordered:
-            found = f"arrival {self.arrival}, departure {self.departure}"
-            raise ScenarioError(describe("windows", "rising multiples of 5 minutes from 0 to 24 h", found))
-        if self.law not in ("exponential", "uniform"):
-            raise ScenarioError(describe("law", "'exponential' or 'uniform'", repr(self.law)))
-        if not all(float(count).is_integer() for count in self._counts):
-            raise ScenarioError(describe("assigned", "whole numbers of people", repr(self.assigned)))
+        found = f"arrival {self.arrival}, departure {self.departure}"
+        fit = ordered and not off.any()
+        ScenarioError.unless(fit, "windows", "rising multiples of 5 minutes from 0 to 24 h", found)
+        ScenarioError.unless_known(self.law, ("exponential", "uniform"), "law", "'exponential' or 'uniform'")
+        whole = all(float(count).is_integer() for count in self._counts)
+        ScenarioError.unless(whole, "assigned", "whole numbers of people", self.assigned)
 
     def chance(self, hours: ArrayLike) -> FloatArray:
         """Chance that a person is in at an hour of a working day [-].
@@ -319,13 +317,12 @@ class ComfortBand:
     def __post_init__(self) -> None:
         for name in ("occupied", "unoccupied"):
             lower, upper = getattr(self, name)
-            if not 223.15 <= lower < upper <= 373.15:
-                found = f"{lower:g} to {upper:g}"
-                raise ScenarioError(describe(f"comfort: {name}", "a lower and an upper temperature in K", found))
+            rising, expected = 223.15 <= lower < upper <= 373.15, "a lower and an upper temperature in K"
+            ScenarioError.unless(rising, f"comfort: {name}", expected, f"{lower:g} to {upper:g}")
         for name in ("weekday", "saturday", "sunday"):
             hours = getattr(self, name)
-            if hours is not None and not 0.0 <= hours[0] < hours[1] <= 24.0:
-                raise ScenarioError(describe(f"comfort: {name}", "rising hours from 0 to 24", repr(hours)))
+            rising = hours is None or 0.0 <= hours[0] < hours[1] <= 24.0
+            ScenarioError.unless(rising, f"comfort: {name}", "rising hours from 0 to 24", hours)
 
     def occupied_share(self, grid: StepGrid) -> FloatArray:
         """Share of each step that lies in occupied hours, shape (n_steps,) [-].

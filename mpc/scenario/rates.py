@@ -118,9 +118,9 @@ class HourlyRate:
 
 def _month_hours(values: ArrayLike, name: str) -> FloatArray:
     table = np.asarray(values, dtype=float)
-    if table.shape not in ((24,), (12, 24)) or not np.isfinite(table).all():
-        expected = "24 finite numbers, or 12 rows of 24, one an hour of the local day"
-        raise ScenarioError(describe(f"hourly rate: {name}", expected, f"shape {table.shape}"))
+    fit = table.shape in ((24,), (12, 24)) and bool(np.isfinite(table).all())
+    expected = "24 finite numbers, or 12 rows of 24, one an hour of the local day"
+    ScenarioError.unless(fit, f"hourly rate: {name}", expected, f"shape {table.shape}")
     return np.array(np.broadcast_to(table, (12, 24)))
 
 
@@ -137,8 +137,8 @@ def monthly_rate(values: Sequence[float]) -> HourlyRate:
     ScenarioError
         When there are not 12 finite numbers.
     """
-    if np.shape(values) != (12,) or not np.isfinite(values).all():
-        raise ScenarioError(describe("monthly rate", "12 finite numbers", repr(values)))
+    fit = np.shape(values) == (12,) and np.isfinite(values).all()
+    ScenarioError.unless(fit, "monthly rate", "12 finite numbers", values)
     return HourlyRate(np.repeat(np.asarray(values, dtype=float)[:, None], 24, axis=1))
 
 
@@ -165,8 +165,7 @@ class SeriesRate:
 
     def __post_init__(self) -> None:
         index = self.series.index
-        possible = self.stamped in ("start", "end")
-        ScenarioError.unless(possible, "series: stamped", "'start' or 'end'", repr(self.stamped))
+        ScenarioError.unless_known(self.stamped, ("start", "end"), "series: stamped", "'start' or 'end'")
         regular_steps(index, "series", ScenarioError)
         empty = self.series.isna().to_numpy()
         if empty.any():

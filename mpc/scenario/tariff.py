@@ -13,7 +13,6 @@ from mpc.errors import ScenarioError
 from mpc.scenario.grid import Calendar, StepGrid, by_clock, means_of_steps
 from mpc.scenario.rates import ConstantRate, Rate
 from thermal._types import FloatArray, IntArray
-from thermal.errors import describe
 
 
 def window_means(power: ArrayLike, starts: ArrayLike, step: float, window: float) -> tuple[FloatArray, FloatArray]:
@@ -95,9 +94,9 @@ class DemandBuckets:
         """
         values, length = np.asarray(power, dtype=float), self.grid.step if step is None else step
         starts = self.grid.edges[first_step] + np.arange(len(values)) * length
-        if values.ndim != 1 or not len(values) or starts[-1] + length > self.grid.edges[-1]:
-            expected = f"means over steps within {self.grid.start} to {self.grid.stamps[-1]}"
-            raise ScenarioError(describe("power", expected, f"shape {values.shape}, steps of {length:g} s"))
+        within = values.ndim == 1 and len(values) and starts[-1] + length <= self.grid.edges[-1]
+        expected = f"means over steps within {self.grid.start} to {self.grid.stamps[-1]}"
+        ScenarioError.unless(within, "power", expected, f"shape {values.shape}, steps of {length:g} s")
         mean, begin = window_means(values, starts, length, self.window)
         owner = self.bucket[np.searchsorted(self.grid.edges, begin, side="right") - 1]
         peak = np.zeros(len(self.rate))
@@ -162,15 +161,15 @@ class DemandCharge:
 
     def __post_init__(self) -> None:
         rates = np.asarray(self.rates, dtype=float)
-        if rates.ndim != 1 or not len(rates) or not (np.isfinite(rates) & (rates >= 0)).all():
-            raise ScenarioError(describe("demand charge: rates", "numbers of 0 or more", repr(self.rates)))
+        possible = rates.ndim == 1 and len(rates) and (np.isfinite(rates) & (rates >= 0)).all()
+        ScenarioError.unless(possible, "demand charge: rates", "numbers of 0 or more", self.rates)
         ScenarioError.unless(self.window > 0, "demand charge: window", "seconds above 0", repr(self.window))
         weekday = np.zeros((12, 24)) if self.weekday is None else np.asarray(self.weekday)
         weekend = weekday if self.weekend is None else np.asarray(self.weekend)
         for key, table in (("weekday", weekday), ("weekend", weekend)):
-            if table.shape != (12, 24) or not np.isin(table, np.arange(-1, len(rates))).all():
-                expected = f"12 rows of 24 periods from -1 to {len(rates) - 1}"
-                raise ScenarioError(describe(f"demand charge: {key}", expected, f"shape {table.shape}"))
+            fit = table.shape == (12, 24) and np.isin(table, np.arange(-1, len(rates))).all()
+            expected = f"12 rows of 24 periods from -1 to {len(rates) - 1}"
+            ScenarioError.unless(fit, f"demand charge: {key}", expected, f"shape {table.shape}")
             object.__setattr__(self, key, table.astype(float))
 
     def on(self, grid: StepGrid) -> DemandBuckets:
@@ -257,5 +256,4 @@ class CarbonIntensity:
     gas: Rate = field(default_factory=lambda: ConstantRate(GAS_CARBON))
 
     def __post_init__(self) -> None:
-        if self.kind not in ("average", "marginal"):
-            raise ScenarioError(describe("carbon: kind", "'average' or 'marginal'", repr(self.kind)))
+        ScenarioError.unless_known(self.kind, ("average", "marginal"), "carbon: kind", "'average' or 'marginal'")

@@ -38,9 +38,8 @@ class Observer:
     """
 
     def __init__(self, kalman: KalmanFilter, modes: ModalModel) -> None:
-        if kalman.space.order != modes.capacity.size:
-            found = f"{kalman.space.order} and {modes.capacity.size} states"
-            raise ControlError(describe("observer", "filter and modes of the same model", found))
+        orders = kalman.space.order, modes.capacity.size
+        ControlError.unless(orders[0] == orders[1], "observer", "filter and modes of the same model", orders)
         self.kalman, self.modes, self.order = kalman, modes, kalman.space.order
         self._gains: dict[bytes, FloatArray] = {}
         self._covariance, _ = kalman.steady(np.ones(kalman.space.n_zone, dtype=bool))

@@ -13,7 +13,6 @@ from mpc.control.problem.problem import ControlProblem
 from mpc.control.solvers.solution import Solution
 from mpc.errors import ControlError
 from thermal._types import BoolArray, FloatArray
-from thermal.errors import describe
 
 _SAME = 1e-6  # K: readings that differ by less are one and the same
 _FEWEST = 6  # readings that must be the same, whatever the sensor
@@ -54,9 +53,9 @@ class StuckSensors:
     def __init__(
         self, zones: Sequence[str], deviation: FloatArray, false_alarm: float = 1e-5, resolution: float = 0.1
     ) -> None:
-        if not (0.0 <= false_alarm < 1.0 and resolution >= 0.0 and (deviation > 0.0).all()):
-            found = f"{false_alarm!r}, {resolution!r} K, {deviation}"
-            raise ControlError(describe("stuck sensors", "a probability, a resolution, positive deviations", found))
+        possible = 0.0 <= false_alarm < 1.0 and resolution >= 0.0 and (deviation > 0.0).all()
+        found = f"{false_alarm}, {resolution} K, {deviation}"
+        ControlError.unless(possible, "stuck sensors", "a probability, a resolution, positive deviations", found)
         self.zones = tuple(zones)
         repeat = 2.0 * ndtr(0.5 * max(resolution, _SAME) / np.asarray(deviation)) - 1.0
         rare = np.log(false_alarm) if false_alarm > 0.0 else -np.inf

@@ -53,9 +53,8 @@ class HeatChannel:
 
     def __post_init__(self) -> None:
         ControlError.unless_known(self.quantity, get_args(HeatQuantity), "heat channel", "heating or cooling")
-        if not (0.0 <= self.lower < self.upper < np.inf and self.rate > 0.0 and self.zone >= 0):
-            found = f"zone {self.zone}, {self.lower!r} to {self.upper!r} W, {self.rate!r} W/h"
-            raise ControlError(describe("heat channel", "a zone, a range of watts and a positive rate", found))
+        possible = 0.0 <= self.lower < self.upper < np.inf and self.rate > 0.0 and self.zone >= 0
+        ControlError.unless(possible, "heat channel", "a zone, a range of watts and a positive rate", self)
 
     @property
     def unit(self) -> str:

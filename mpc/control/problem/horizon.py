@@ -11,7 +11,6 @@ import pandas as pd
 
 from mpc.errors import ControlError
 from thermal._types import FloatArray, IntArray
-from thermal.errors import describe
 
 #: Longest step of the predictor [s]: the water of the loop and the air's mixing are lost in longer ones.
 LONGEST_STEP = 1800.0
@@ -302,11 +301,9 @@ class HorizonData:
         }  # fmt: skip
         for name in (f.name for f in fields(self) if f.name in shapes):
             values = np.asarray(getattr(self, name), dtype=float)
-            if values.shape != shapes[name]:
-                raise ControlError(describe(f"horizon data: {name}", f"shape {shapes[name]}", f"{values.shape}"))
-            if not np.isfinite(values).all():
-                at = np.argwhere(~np.isfinite(np.atleast_1d(values)))[0].tolist()
-                raise ControlError(describe(f"horizon data: {name}", "finite numbers", f"{values.ravel()[0]} at {at}"))
+            fit, lost = values.shape == shapes[name], np.argwhere(~np.isfinite(np.atleast_1d(values))).tolist()
+            ControlError.unless(fit, f"horizon data: {name}", f"shape {shapes[name]}", f"{values.shape}")
+            ControlError.unless(not lost, f"horizon data: {name}", "finite numbers", f"others at {lost[:1]}")
         expected, found = f"weights of {n_steps} steps", f"{self.peaks.weights.shape}"
         ControlError.unless(self.peaks.weights.shape[1:] == each, "horizon data: peaks", expected, found)
 

@@ -13,7 +13,6 @@ from mpc.control.problem.horizon import HorizonData
 from mpc.errors import ControlError
 from mpc.scenario.rates import KILOWATT_HOUR
 from thermal._types import FloatArray, IntArray
-from thermal.errors import describe
 
 _HOUR = 3600.0  # s
 _KILOWATT = 1000.0  # W
@@ -96,9 +95,9 @@ class ControlProblem:
     paths: IntArray | None = None
 
     def __post_init__(self) -> None:
-        if not (0.0 < self.softness <= 5.0 and self.terminal_time >= 0.0 and self.move_weight >= 0.0):
-            found = f"{self.softness} K, {self.terminal_time} s, {self.move_weight}"
-            raise ControlError(describe("control problem", "a softness of 0 to 5 K, no negative number", found))
+        possible = 0.0 < self.softness <= 5.0 and self.terminal_time >= 0.0 and self.move_weight >= 0.0
+        found = f"{self.softness} K, {self.terminal_time} s, {self.move_weight}"
+        ControlError.unless(possible, "control problem", "a softness of 0 to 5 K, no negative number", found)
 
     @cached_property
     def _paths(self) -> IntArray:

@@ -14,7 +14,6 @@ import numpy as np
 from mpc.control.solvers.solution import Status
 from mpc.errors import ControlError
 from thermal._types import FloatArray
-from thermal.errors import describe
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,12 +54,10 @@ class StageProblem:
     def __post_init__(self) -> None:
         n, m = self.state.numel(), self.decision.numel()
         found = (self.next_state.numel(), self.lower.shape, self.upper.shape)
-        if found != (n, (m,), (m,)):
-            expected = f"{n} next states, and ranges of {m} decisions"
-            raise ControlError(describe("stage problem", expected, f"{found[0]}, {found[1]} and {found[2]}"))
-        if not (self.lower < self.upper).all():
-            empty = np.flatnonzero(~(self.lower < self.upper)).tolist()
-            raise ControlError(describe("stage problem", "lower ends below upper ones", f"others in decisions {empty}"))
+        expected = f"{n} next states, and ranges of {m} decisions"
+        ControlError.unless(found == (n, (m,), (m,)), "stage problem", expected, found)
+        empty = np.flatnonzero(~(self.lower < self.upper)).tolist()
+        ControlError.unless(not empty, "stage problem", "lower ends below upper ones", f"others in decisions {empty}")
 
     @cached_property
     def step(self) -> ca.Function:
@@ -165,8 +162,7 @@ class StageData:
     def __post_init__(self) -> None:
         wanted = (len(self.parameters) + 1, self.lower.shape[-1])
         found = self.lower.shape, self.upper.shape, self.price.shape
-        if any(shape != wanted for shape in found):
-            raise ControlError(describe("stage data", f"bands and prices of shape {wanted}", f"{found}"))
+        ControlError.unless(found == (wanted,) * 3, "stage data", f"bands and prices of shape {wanted}", found)
 
 
 #: Interior points that solve problems in stages.
@@ -322,8 +318,8 @@ class StageSolver:
         ControlError
             When the data are of another number of steps.
         """
-        if len(data.parameters) != self.n_steps:
-            raise ControlError(describe("stage data", f"{self.n_steps} steps", f"{len(data.parameters)}"))
+        steps = len(data.parameters)
+        ControlError.unless(steps == self.n_steps, "stage data", f"{self.n_steps} steps", steps)
         (n, m, b), count, begin = self._sizes, self.n_steps, time.perf_counter()
         guess = np.zeros((count + 1, n + m + b))
         guess[:, :n], guess[:-1, n : n + m] = states, np.clip(decisions, self.problem.lower, self.problem.upper)
