@@ -117,11 +117,6 @@ class EnergyPlusProcess:
         """Folder of EnergyPlus' own files, while the process is there."""
         return self.folder / "out"
 
-    @property
-    def alive(self) -> bool:
-        """Whether the process runs."""
-        return self._process.poll() is None
-
     def ask(self, steps: int, values: Sequence[float | None]) -> Mapping[str, Any]:
         """Let EnergyPlus take some steps.
 

@@ -13,15 +13,6 @@ from mpc.errors import PlantError
 from thermal.errors import describe, nearest
 
 
-def _fmpy() -> Any:
-    """Import FMPy, or say which extra brings it."""
-    try:
-        import fmpy
-    except ModuleNotFoundError as error:
-        raise PlantError(f'an FMU needs {error.name}: pip install "buildingmpc[fmu]"') from error
-    return fmpy
-
-
 class Unit:
     """A co-simulation unit of FMI 2.0.
 
@@ -37,7 +28,10 @@ class Unit:
     """
 
     def __init__(self, path: Path) -> None:
-        fmpy = _fmpy()
+        try:
+            import fmpy
+        except ModuleNotFoundError as error:
+            raise PlantError(f'an FMU needs {error.name}: pip install "buildingmpc[fmu]"') from error
         if not path.is_file():
             raise PlantError(describe(f"FMU {path.name}", "a file", "none"))
         try:

@@ -52,7 +52,7 @@ def test_it_saves_against_a_fixed_schedule(model, make_plant) -> None:
     kinds = {"supply_air_temperature_setpoint": 287.15, "supply_water_temperature_setpoint": 333.15}
     costs = []
     for chosen_one, forecasts in ((Recorded(), True), (FixedSetpoints(kinds, plant.actuators), False)):
-        run = run_closed_loop(plant, chosen_one, steps=48, seed=1, forecasts=forecasts)
+        run = run_closed_loop(plant, chosen_one, steps=32, seed=1, forecasts=forecasts)
         kpis = measure_kpis(run.record, plant.scenario)
         costs.append(kpis.cost_tot)
         assert kpis.tdis_tot < 0.1

@@ -130,9 +130,9 @@ for verb in ("GET", "PUT", "POST"):
 
 
 @pytest.fixture
-def house() -> Iterator[House]:
-    found = House()
-    yield found
+def house(monkeypatch: pytest.MonkeyPatch) -> House:
+    monkeypatch.setattr("mpc.adapters.boptest.client._FIRST_WAIT", 0.01)
+    return House()
 
 
 @pytest.fixture
