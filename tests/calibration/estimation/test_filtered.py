@@ -35,7 +35,7 @@ from thermal import (
     replay_inputs,
     spin_up,
 )
-from thermal.model.symbolic import Matrices
+from thermal.model.matrices import Matrices
 
 FloatArray = NDArray[np.float64]
 
