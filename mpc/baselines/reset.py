@@ -8,7 +8,7 @@ import numpy as np
 
 from mpc.control.controller.rules import ResetRule
 from mpc.control.problem.channels import Channel
-from mpc.loop.actuators import Actuator
+from mpc.loop.actuators import SUPPLY_AIR, SUPPLY_WATER, Actuator
 from mpc.scenario.forecast import Forecast
 from thermal.case.points import OUTDOOR_TEMPERATURE
 
@@ -37,10 +37,10 @@ class OutdoorReset:
         self.rule, self._outdoor = rule or ResetRule(), f"{weather_station}/{OUTDOOR_TEMPERATURE}"
         self._channels: dict[str, Channel] = {}
         for a in actuators:
-            if a.name.endswith("/supply_air_temperature_setpoint"):
-                self._channels[a.name] = Channel("supply_air_temperature", a.lowest, a.highest)
-            elif a.name.endswith("/supply_water_temperature_setpoint"):
-                self._channels[a.name] = Channel("supply_water_temperature", a.lowest, a.highest)
+            if a.name.endswith(f"/{SUPPLY_AIR}"):
+                self._channels[a.name] = Channel(SUPPLY_AIR, a.lowest, a.highest)
+            elif a.name.endswith(f"/{SUPPLY_WATER}"):
+                self._channels[a.name] = Channel(SUPPLY_WATER, a.lowest, a.highest)
 
     def step(self, measurements: Mapping[str, float], forecast: Forecast | None) -> dict[str, float]:
         """Choose setpoints [K].

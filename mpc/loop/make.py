@@ -30,12 +30,12 @@ from thermal.case.load import load_case
 from thermal.case.save import save_case
 from thermal.effects.effect import Chosen
 from thermal.errors import describe
-from thermal.hvac._system import HvacSystem
 from thermal.model.simulator import Simulator
 from thermal.network.extension import Extension
 from thermal.pilot.building import pilot_building
 from thermal.pilot.sizing import size_system
 from thermal.pilot.weather import MOUNTAIN_VIEW, generate_weather
+from thermal.system.system import HvacSystem
 
 ModelKind = Literal["reduced", "grid", "random"]
 

@@ -12,10 +12,10 @@ from mpc.loop.extras import ScenarioDrivers
 from mpc.scenario.scenario import Scenario
 from thermal._types import FloatArray
 from thermal.errors import describe
-from thermal.hvac._replay import replay_reheat
-from thermal.hvac._system import HvacSystem
 from thermal.inputs.drivers import Signal
 from thermal.network.network import ThermalNetwork
+from thermal.system.replay import replay_reheat
+from thermal.system.system import HvacSystem
 from thermal.units import AIR_HEAT_CAPACITY
 
 #: Zone, supply air and supply water that design capacities of terminals are counted at [K], those of `Terminals.sized`.
@@ -84,7 +84,7 @@ class EffectSignals:
     def __init__(self, network: ThermalNetwork, scenario: Scenario, system: HvacSystem) -> None:
         self._values = np.zeros((scenario.grid.n_steps, len(network.signals)))
         self._system, terminals = system, system.terminals
-        flow, heat = (system.rooms.T @ value for value in (terminals.design_flow, _most_heat(system)))
+        flow, heat = (system.by_zone(value) for value in (terminals.design_flow, _most_heat(system)))
         self._now = _Now(network.zones, flow, heat)
         self._live: list[tuple[int, Signal]] = []
         drivers = _InAdvance(scenario.driving_case(), scenario) if network.signals else None
@@ -132,7 +132,7 @@ class EffectSignals:
         row: FloatArray = self._values[k]
         if self._live:
             row = row.copy()
-            self._now.put(self._system.rooms.T @ airflow, heat)
+            self._now.put(self._system.by_zone(airflow), heat)
             for position, signal in self._live:
                 row[position] = self._of(signal)
         return row

@@ -34,10 +34,10 @@ from mpc.studies.model import ORDER, model_settings, reduced
 from thermal.case.building import Building
 from thermal.effects.catalogue import chosen
 from thermal.errors import describe, nearest
-from thermal.hvac._system import HvacSystem
 from thermal.model.reduce import ReducedModel, reduced_model
 from thermal.model.simulator import Simulator
 from thermal.pilot.sizing import size_system
+from thermal.system.system import HvacSystem
 
 #: What steps the plant: the reduced model, its grid with the mean of the shuffle, or with the random shuffle.
 PlantKind = Literal["reduced", "grid", "random"]

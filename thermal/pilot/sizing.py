@@ -9,18 +9,19 @@ import numpy.typing as npt
 
 from thermal.case.areas import zone_floor_areas
 from thermal.case.building import Building, FloorPlans, ZoneTable
+from thermal.components.air_handler import AirHandler
+from thermal.components.boiler_loop import BoilerLoop
+from thermal.components.cooling_coil import CoolingCoil
+from thermal.components.fan import Fan
+from thermal.components.pump import Pump
+from thermal.components.terminals import Terminals
+from thermal.components.thermostat import Thermostat
+from thermal.components.water_coil import WaterCoil
 from thermal.errors import ModelError, describe
-from thermal.hvac._air_handler import AirHandler
-from thermal.hvac._boiler import BoilerLoop, Pump
-from thermal.hvac._coil import WaterCoil
-from thermal.hvac._cooling import CoolingCoil
-from thermal.hvac._fan import Fan
-from thermal.hvac._system import HvacSystem
-from thermal.hvac._terminals import Terminals
-from thermal.hvac._thermostat import Thermostat
 from thermal.model.stepper import Stepper
 from thermal.model.symbolic import SymbolicModel
 from thermal.network.build import build_network
+from thermal.system.system import HvacSystem, vav_system
 from thermal.units import AIR_HEAT_CAPACITY, air_density
 
 Series = npt.NDArray[np.float64]
@@ -131,7 +132,7 @@ def size_system(
         capacity, pump, pipe_conductance=min(pipes, 0.4 * pump.minimum_share * pump.design_flow * 4186.0),
         standing_conductance=0.25 * pipes, water_volume=max(0.05, _LITRES * capacity / 1000.0),
     )  # fmt: skip
-    return HvacSystem(handlers, loop, terminals, thermostat or Thermostat())
+    return vav_system(handlers, loop, terminals, thermostat)
 
 
 def _air_handler(flow: float, at: DesignConditions, density: float) -> AirHandler:

@@ -8,17 +8,14 @@ from typing import Any
 
 from mpc.loop.actuators import (
     DIFFERENTIAL_PRESSURE,
-    HEATING_SETPOINT,
     STATIC_PRESSURE,
-    SUPPLY_AIR,
-    SUPPLY_WATER,
 )
 from mpc.loop.conversion import SIGNAL_UNITS
 from mpc.loop.history import PlantStep
 from mpc.loop.simulated import SimulatedPlant
 from thermal._types import FloatArray
 from thermal.case.points import POINT_TYPES, split_column
-from thermal.hvac._system import HvacSystem
+from thermal.system.system import HvacSystem
 
 Metadata = dict[str, dict[str, Any]]
 
@@ -104,7 +101,7 @@ class PlantSignals:
         setters = _signal_names(actuator.name for actuator in plant.actuators)
         self.inputs = {f"{setters[actuator.name]}_u": actuator for actuator in plant.actuators}
         self.input_names = tuple(name for u in self.inputs for name in (u, activation(u)))
-        self._reads = [_reader(a.name, plant.system, plant.devices.air_handlers, plant.zone_names)
+        self._reads = [_reader(a.name, plant.system, plant.zone_names)
                        for a in plant.actuators]  # fmt: skip
 
     def measurement_metadata(self) -> Metadata:
@@ -170,21 +167,10 @@ def _entry(text: str, unit: str | None, lowest: float | None = None, highest: fl
     return {"Unit": unit, "Description": text, "Minimum": lowest, "Maximum": highest}
 
 
-def _reader(name: str, system: HvacSystem, handlers: Sequence[str], zones: Sequence[str]) -> Any:
+def _reader(name: str, system: HvacSystem, zones: Sequence[str]) -> Any:
     """Find where a step holds the value of an actuator."""
     entity, _, kind = name.rpartition("/")
-    if kind == SUPPLY_AIR:
-        at = handlers.index(entity)
-        return lambda step: step.actions.supply_air_temperature[at]
-    if kind == STATIC_PRESSURE:
-        at = handlers.index(entity)
-        return lambda step: step.actions.static_pressure[at]
-    if kind == SUPPLY_WATER:
-        return lambda step: step.actions.supply_water_temperature
-    if kind == DIFFERENTIAL_PRESSURE:
-        design = system.loop.pump.differential_pressure
-        return lambda step: design if step.actions.differential_pressure is None else step.actions.differential_pressure
+    if name in system.actuators:
+        return lambda step: step.actions.get(name, system.defaults.get(name))
     zone = zones.index(entity)
-    if kind == HEATING_SETPOINT:
-        return lambda step: step.conditions.heating_setpoint[zone]
-    return lambda step: step.conditions.cooling_setpoint[zone]
+    return lambda step: getattr(step.conditions, kind)[zone]

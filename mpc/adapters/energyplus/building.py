@@ -26,7 +26,7 @@ from thermal.errors import describe
 
 _METER = re.compile(r"^Output:Meter,([^,]+),", re.M)
 _DAY = date(2023, 1, 2)  # any: sizes come from design days
-_WATER_DENSITY = 983.0  # kg/m3, as `thermal.hvac` has it
+_WATER_DENSITY = 983.0  # kg/m3, as `thermal.components` has it
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,8 +86,7 @@ class EnergyPlusBuilding:
             kind: [d.name for d in self.building.devices if d.type == kind]
             for kind in ("vav", "ahu", "boiler", "chiller")
         }
-        chiller = names["chiller"][0] if names["chiller"] else None
-        return PlantDevices(tuple(names["vav"]), tuple(names["ahu"]), (names["boiler"] or [""])[0], chiller)
+        return PlantDevices({kind: tuple(each[:1] if kind == "chiller" else each) for kind, each in names.items()})
 
     @property
     def full_water_flow(self) -> dict[str, float]:

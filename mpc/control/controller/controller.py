@@ -25,7 +25,7 @@ from mpc.scenario.forecast import Forecast
 from thermal._types import FloatArray
 from thermal.errors import describe
 
-_USUAL_HUMIDITY = 0.006  # kg/kg, as `thermal.hvac` has it where none is measured
+_USUAL_HUMIDITY = 0.006  # kg/kg, as `thermal.components` has it where none is measured
 
 
 class MpcController:

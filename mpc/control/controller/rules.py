@@ -9,6 +9,7 @@ import numpy as np
 
 from mpc.control.predictor.predictor import Predictor
 from mpc.control.problem.channels import Channel
+from mpc.loop.actuators import SUPPLY_AIR, SUPPLY_WATER
 from thermal._types import FloatArray
 
 
@@ -41,7 +42,7 @@ class ResetRule:
             Outdoor temperature [K]; what is not finite counts as half-way.
         """
         share = np.clip((outdoor - self.cold) / (self.warm - self.cold), 0.0, 1.0) if np.isfinite(outdoor) else 0.5
-        by_rule = {"supply_air_temperature": self.air, "supply_water_temperature": self.water}
+        by_rule = {SUPPLY_AIR: self.air, SUPPLY_WATER: self.water}
         values = []
         for channel in channels:
             first, last = by_rule.get(channel.quantity, (0.5 * (channel.lower + channel.upper),) * 2)

@@ -113,7 +113,7 @@ class _TreePredictor(Predictor):
         )
         first = runs[0]
         return _TreeRollout(
-            plan, zone, seen, electric, fuel, end, first.knobs, first.sums, heat, first.air, first.water, tuple(runs)
+            plan, zone, seen, electric, fuel, end, first.inputs, first.sums, heat, first.air, first.water, tuple(runs)
         )
 
     def reached(self, data: HorizonData, rollout: Rollout) -> FloatArray:

@@ -9,6 +9,7 @@ import pandas as pd
 from mpc.control.problem.channels import Channel
 from mpc.control.problem.data import HorizonData
 from mpc.control.solvers.solution import Solution, Solver
+from mpc.loop.actuators import SUPPLY_WATER
 from thermal._types import FloatArray
 
 #: Share of the cost by which a plan begun anew has to be cheaper [-]: of plans of equal cost the carried one is kept,
@@ -95,6 +96,6 @@ class Starts:
         """
         plan = rules.copy()
         for c, channel in enumerate(channels):
-            if channel.quantity == "supply_water_temperature":
+            if channel.quantity == SUPPLY_WATER:
                 plan[:, c] = channel.lower
         return plan
