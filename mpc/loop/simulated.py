@@ -136,6 +136,7 @@ class SimulatedPlant:
         self._drawn: int | None = None
         self._warm: tuple[LoopState, PlantStep] | None = None
         self._number, self._steps = -1, list[PlantStep]()
+        self._asked: tuple[Mapping[str, float] | None, dict[str, float]] = (None, {})
         self._first = np.zeros(len(scenario.zones))
 
     @property
@@ -208,7 +209,9 @@ class SimulatedPlant:
             When the scenario is over, or `reset` was not called.
         """
         need_running(self._number >= 0)
-        given = checked_actions(actions, self._by_name)
+        if actions != self._asked[0]:  # the same ones have been checked
+            self._asked = dict(actions), checked_actions(actions, self._by_name)
+        given = self._asked[1]
         if self.finished:
             found = f"{self.scenario.grid.n_steps - self._number} of its {self.scenario.grid.n_steps}"
             raise PlantError(describe("scenario", f"{self.control_steps} more steps", found, "make it longer"))

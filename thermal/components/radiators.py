@@ -6,6 +6,9 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Annotated, NamedTuple
 
+import numpy as np
+from numpy.typing import ArrayLike
+
 from thermal._types import FloatArray
 from thermal.components.component import Conditions, EnergyBalance, Given, Group, IndexArray, Port, Range, Run
 from thermal.components.moist_air import WATER_HEAT_CAPACITY
@@ -84,6 +87,19 @@ class Radiators(Group):
         if not self.room_temperature < self.return_temperature < self.supply_temperature:
             found = f"{self.room_temperature:g}, {self.return_temperature:g} and {self.supply_temperature:g} K"
             raise ModelError(describe("Radiators: nominal temperatures", "room < return < supply", found))
+
+    @classmethod
+    def sized(cls, heat: ArrayLike, zone: IndexArray) -> Radiators:
+        """Size radiators for the heat that they are to bring at nominal temperatures.
+
+        Parameters
+        ----------
+        heat : array_like, shape (n_radiator,)
+            Heat [W]; a radiator for nothing gets a watt.
+        zone : numpy.ndarray of int, shape (n_radiator,)
+            Positions of the zones.
+        """
+        return cls(np.maximum(np.asarray(heat, dtype=float), 1.0), zone)
 
     @cached_property
     def water_flow(self) -> FloatArray:

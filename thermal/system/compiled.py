@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
+from operator import itemgetter
 from struct import Struct
 from typing import Any, NamedTuple
 
@@ -313,19 +314,15 @@ def _leaves(template: Any) -> list[Any]:
 
 def _reader(template: Any, begin: int) -> _Read:
     """Make what reads a message or result, with its names, from a row of values."""
-    make: Callable[[Any], Any] = getattr(type(template), "_make", tuple)
+    make: Callable[[Any], Any] | None = getattr(type(template), "_make", None)
     if not any(isinstance(value, tuple | list) for value in template):
-        end = begin + len(template)
-        return lambda values: make(values[begin:end])
+        row = slice(begin, begin + len(template))
+        return itemgetter(row) if make is None else lambda values: make(values[row])
     parts: list[_Read] = []
     for value in template:
-        if isinstance(value, tuple | list):
-            parts.append(_reader(value, begin))
-            begin += len(_leaves(value))
-        else:
-            parts.append(lambda values, k=begin: values[k])  # type: ignore[misc]
-            begin += 1
-    return lambda values: make([part(values) for part in parts])
+        parts.append(_reader(value, begin) if isinstance(value, tuple | list) else itemgetter(begin))
+        begin += len(_leaves([value]))
+    return lambda values: make([part(values) for part in parts])  # type: ignore[misc]
 
 
 def _keeping(run: Callable[[], None], new: FloatArray, kept: FloatArray) -> Callable[[], None]:

@@ -386,5 +386,5 @@ def vav_system(
     connections = [Connection("VAV", "supply_air", tuple(handlers))]
     connections += [Connection(name, "hot_water", ("BOILER",)) for name in ("VAV", *wet)]
     return HvacSystem(
-        {**handlers, "BOILER": loop, "VAV": terminals}, tuple(connections), thermostat or Thermostat()
+        {"VAV": terminals, **handlers, "BOILER": loop}, tuple(connections), thermostat or Thermostat()
     )  # fmt: skip
