@@ -2,7 +2,7 @@
 
 States are the modes of the reduced model and the supply water, inputs the two setpoints. What the thermostats go by
 and the heat of the zones are algebraic states, since terminals go by the end of a step as in `mpc.control.Predictor`;
-heat and powers are the library's own equations (`thermal.hvac.hvac_function`), at the same smoothing. Comfort is a
+heat and powers are the library's own equations (`hvac_function`), at the same smoothing. Comfort is a
 soft constraint with do-mpc's linear price, changes of setpoints have its quadratic one. do-mpc knows steps of one
 length and an input for each, so the horizon is regular and its blocks are its steps.
 
@@ -28,8 +28,8 @@ from mpc.control.predictor.predictor import Rollout
 from mpc.control.problem.horizon import HorizonData
 from mpc.control.problem.problem import ControlProblem
 from mpc.control.solvers.solution import Solution, Status
-from thermal.hvac._symbolic import hvac_function
 from thermal.model.step import IMPLICIT_EULER
+from thermal.system.symbolic import hvac_function
 from thermal.units import REFERENCE_TEMPERATURE
 
 #: Ipopt's settings: quiet, a good first guess, tolerance, and when to give up. Of the barriers that were tried (1e-3 to
@@ -99,19 +99,21 @@ class DoMpcSolver:
         }  # fmt: skip
         known = {name: model.set_variable("_tvp", name, (size, 1)) for name, size in sizes.items()}
         plant = hvac_function(system, self.hvac.width)(
-            water=REFERENCE_TEMPERATURE + water, zone_temperature=REFERENCE_TEMPERATURE + seen,
-            heating_setpoint=known["heating"], cooling_setpoint=known["cooling"], outdoor_temperature=known["outdoor"],
+            supply_water_temperature=REFERENCE_TEMPERATURE + water, zone_temperature=REFERENCE_TEMPERATURE + seen,
+            zone_air_heating_temperature_setpoint=known["heating"],
+            zone_air_cooling_temperature_setpoint=known["cooling"], outdoor_temperature=known["outdoor"],
             outdoor_humidity=known["humidity"], return_humidity=np.full(n_air, HUMIDITY), room_temperature=ROOM,
-            supply_air_temperature=REFERENCE_TEMPERATURE + np.ones(n_air) * air,
-            supply_water_temperature=REFERENCE_TEMPERATURE + hot, static_pressure=system.static_pressures,
-            differential_pressure=system.loop.pump.differential_pressure, running=known["running"],
-            boiler=known["boiler"], ventilation=known["ventilation"], seconds=self.step,
+            supply_air_temperature_setpoint=REFERENCE_TEMPERATURE + np.ones(n_air) * air,
+            supply_water_temperature_setpoint=REFERENCE_TEMPERATURE + hot,
+            supply_air_static_pressure_setpoint=system.static_pressures,
+            differential_pressure_setpoint=system.loop.pump.differential_pressure, fan_running=known["running"],
+            boiler_running=known["boiler"], ventilation=known["ventilation"], seconds=self.step,
         )  # fmt: skip
         drive = self._part.end_gain * (self.modes.boundary @ known["boundary"] + self.modes.heating @ known["gains"])
         left = self._part.end * self._unit * x + drive
         own = np.diag(self._response)
         model.set_rhs("modes", (left + self._part.end_gain * (self.modes.heating @ (KILOWATT * heat))) / self._unit)
-        model.set_rhs("water", plant["water_end"] - REFERENCE_TEMPERATURE)
+        model.set_rhs("water", plant["supply_water_temperature_end"] - REFERENCE_TEMPERATURE)
         model.set_alg("plant", heat - plant["heat"] / KILOWATT)
         model.set_alg("thermostats", seen - self._output @ left - own * KILOWATT * heat)
         # the zones at the end of the step, by the two equations above
@@ -206,7 +208,7 @@ class DoMpcSolver:
         modes = [data.state]
         for push in free:
             modes.append(self._part.end * modes[-1] + self._part.end_gain * push)
-        water = first.knobs[:, self.hvac.knobs.water]
+        water = first.inputs[:, 0]
         water = np.append(water, water[-1]) - REFERENCE_TEMPERATURE
         states = np.column_stack([np.array(modes) / self._unit, water])
         inputs = first.plan - REFERENCE_TEMPERATURE

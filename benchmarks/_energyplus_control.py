@@ -17,6 +17,7 @@ from mpc.control.controller.controller import MpcController
 from mpc.control.problem.assembly import ComfortOperation
 from mpc.control.problem.channels import Channel
 from mpc.control.problem.horizon import Horizon
+from mpc.loop.actuators import SUPPLY_AIR, SUPPLY_WATER
 from mpc.loop.plant import Measurements
 from mpc.scenario.forecast import Forecast
 from mpc.studies.controller import Site, make_controller
@@ -139,11 +140,11 @@ def optimal(
     model = control_model(source.building, parameters, effects=chosen(effects or {}))
     limits = {a.name: (a.lowest, a.highest) for a in plant.actuators}
     channels = [
-        Channel("supply_air_temperature", *limits[f"{name}/supply_air_temperature_setpoint"], air_handlers=(k,))
+        Channel(SUPPLY_AIR, *limits[f"{name}/{SUPPLY_AIR}"], air_handlers=(k,))
         for k, name in enumerate(source.devices.air_handlers)
     ]
     if source.layout.water_loops:
-        channels.append(Channel("supply_water_temperature", *WATER))
+        channels.append(Channel(SUPPLY_WATER, *WATER))
     others = model.network.boundaries[1:]
     price = COMFORT_PRICE * float(plant.scenario.areas.mean()) if price is None else price
     controller = make_controller(

@@ -11,14 +11,17 @@ import psychrolib
 from _hvac_reference import STEPS_PER_HOUR, Reference
 from scipy.optimize import brentq
 
-from thermal.hvac._air_handler import AirHandler, Heater
-from thermal.hvac._boiler import BoilerLoop, Pump
-from thermal.hvac._coil import WaterCoil
-from thermal.hvac._cooling import CoolingCoil
-from thermal.hvac._curves import CONSTANT_EFFICIENCY
-from thermal.hvac._fan import Fan
-from thermal.hvac._replay import AirHandlerReplay, replay_air_handler, replay_loop, replay_reheat
-from thermal.hvac._terminals import Terminals
+from thermal.components.air_handler import AirCommand, AirHandler
+from thermal.components.boiler_loop import BoilerLoop
+from thermal.components.component import Conditions
+from thermal.components.cooling_coil import CoolingCoil
+from thermal.components.curves import CONSTANT_EFFICIENCY
+from thermal.components.fan import Fan
+from thermal.components.heater import Heater
+from thermal.components.pump import Pump
+from thermal.components.terminals import Terminals
+from thermal.components.water_coil import WaterCoil
+from thermal.system.replay import AirHandlerReplay, replay_air_handler, replay_loop, replay_reheat
 from thermal.units import air_density
 
 FloatArray = npt.NDArray[np.float64]
@@ -26,7 +29,7 @@ FloatArray = npt.NDArray[np.float64]
 FREEZING = 273.15
 ELEVATION = 190.0  # m, of the buildings' site
 DENSITY = air_density(ELEVATION)  # EnergyPlus turns volume flows into mass flows with the site's density too
-WATER_DENSITY = 983.0  # kg/m3, as `thermal.hvac` has it
+WATER_DENSITY = 983.0  # kg/m3, as `thermal.components` has it
 RATED_DRY_BULB, RATED_WET_BULB = 26.6667, 19.4444  # degC, of EnergyPlus' coils
 FILM_RATIO = 0.5  # of EnergyPlus' heating coils: hA of the air over that of the water
 TEMPERATURE, FLOW = "System Node Temperature", "System Node Mass Flow Rate"
@@ -237,13 +240,13 @@ def _replayed(handler: AirHandler, week: pd.DataFrame, k: int, water: FloatArray
         handler,
         _series(week, _outlet(k), FLOW),
         _series(week, _inlet(k), TEMPERATURE) + FREEZING,
-        _series(week, _outdoor(k), TEMPERATURE) + FREEZING,
-        _series(week, _outlet(k), SETPOINT) + FREEZING,
-        _series(week, _inlet(k), HUMIDITY),
-        _series(week, "ENVIRONMENT", "Site Outdoor Air Humidity Ratio"),
-        water=water,
-        ventilation=_series(week, *VENTILATION),
-    )
+        Conditions(
+            None, None, None, _series(week, _outdoor(k), TEMPERATURE) + FREEZING,
+            _series(week, "ENVIRONMENT", "Site Outdoor Air Humidity Ratio"), _series(week, _inlet(k), HUMIDITY),
+        ),
+        AirCommand(_series(week, _outlet(k), SETPOINT) + FREEZING, None, ventilation=_series(week, *VENTILATION)),
+        water,
+    )  # fmt: skip
 
 
 def _series(week: pd.DataFrame, key: str, variable: str) -> FloatArray:

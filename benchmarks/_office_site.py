@@ -50,10 +50,10 @@ from mpc.studies.controller import default_horizon, make_controller, site_points
 from mpc.studies.model import ORDER, control_model
 from thermal import Building, Case
 from thermal.effects.catalogue import chosen
-from thermal.hvac._system import HvacSystem
 from thermal.model.reduce import ReducedModel
 from thermal.pilot.building import pilot_building
 from thermal.pilot.sizing import size_system
+from thermal.system.system import HvacSystem
 
 EFFECTS = ("solar_gain", "infiltration")
 #: Parameters of the building that differ from the library's starting values [parameter units].

@@ -2,7 +2,7 @@
 
 The building is the generated pilot (two floors, 6,317 m2, 123 zones, 127 devices, seed 0) with a plant sized from its
 loads; a winter day of steps of 5 minutes under fixed supply setpoints, after a warm-up of one day. Every step has the
-thermostats, terminals, air handlers and hot water of `thermal.hvac` in it. The two buildings are the grid at 0.25 m
+thermostats, terminals, air handlers and hot water of `thermal/system` in it. The two buildings are the grid at 0.25 m
 between volumes (100,000 of them) with the mean of the shuffle, and its reduction to some 500 modes made at 0.5 m; both
 begin where their own warm-up ends. Their difference is that of the zones' temperatures over the day, with thermostats
 in the loop.
@@ -35,9 +35,9 @@ from mpc.loop.make import PlantSettings, pilot_weather, simulated_plant
 from mpc.loop.noise import SensorNoise
 from mpc.loop.simulated import SimulatedPlant
 from thermal import Building
-from thermal.hvac._system import HvacSystem
 from thermal.pilot.building import pilot_building
 from thermal.pilot.sizing import size_system
+from thermal.system.system import HvacSystem
 
 SEED = 0
 DAY, NEXT = "2023-01-09", "2023-01-10"

@@ -43,15 +43,16 @@ from mpc.control.solvers.solution import Status
 from mpc.control.solvers.stages import StageData, StageMethod, StageSolution, StageSolver
 from mpc.scenario.scenario import zone_areas
 from thermal import SymbolicModel, build_network, reduced_model
-from thermal.hvac._air_handler import AirHandler
-from thermal.hvac._boiler import BoilerLoop, Pump
-from thermal.hvac._coil import WaterCoil
-from thermal.hvac._cooling import CoolingCoil
-from thermal.hvac._fan import Fan
-from thermal.hvac._smooth import SmoothHvac
-from thermal.hvac._system import HvacSystem
-from thermal.hvac._terminals import Terminals
+from thermal.components.air_handler import AirHandler
+from thermal.components.boiler_loop import BoilerLoop
+from thermal.components.cooling_coil import CoolingCoil
+from thermal.components.fan import Fan
+from thermal.components.pump import Pump
+from thermal.components.terminals import Terminals
+from thermal.components.water_coil import WaterCoil
 from thermal.model.modal import ModalModel, modal_model
+from thermal.system.smooth import SmoothHvac
+from thermal.system.system import HvacSystem, vav_system
 
 ORDER, WARM, SEED = 201, 12, 0
 HORIZONS = {
@@ -80,7 +81,7 @@ def plant_of(areas: np.ndarray) -> HvacSystem:
         coil = WaterCoil.sized(8.0 * 1006.0 * flow, flow)
         parts.append((AirHandler(*fans, CoolingCoil(15.0 * 1006.0 * flow), coil), coil))
     pump = Pump(float(terminals.water_flow.sum()) + sum(coil.water_flow for _, coil in parts))
-    return HvacSystem(tuple(handler for handler, _ in parts), BoilerLoop(80.0 * areas.sum(), pump), terminals)
+    return vav_system(tuple(handler for handler, _ in parts), BoilerLoop(80.0 * areas.sum(), pump), terminals)
 
 
 def data_at(modes: ModalModel, areas: np.ndarray, horizon: Horizon, hour: float) -> HorizonData:
@@ -127,7 +128,7 @@ def measure(name: str, modes: ModalModel, areas: np.ndarray, hvac: SmoothHvac, w
         data = replace(
             data_at(modes, areas, horizon, 5.0 + (k + 1) / 12.0),
             state=gone.end_state + 0.05 * rng.standard_normal() * modes.uniform,
-            water=float(gone.knobs[0, 0] + 0.5 * rng.standard_normal()),
+            water=float(gone.inputs[0, 0] + 0.5 * rng.standard_normal()),
             previous=found.plan[0],
         )
     begin = time.process_time()

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from mpc.baselines.guideline36 import Guideline36
 from mpc.control.controller.action import ResetRule
 from mpc.control.controller.reading import SitePoints, values_of
-from mpc.control.problem.channels import Channel, Quantity
+from mpc.control.problem.channels import Channel
 from mpc.loop.actuators import Actuator
 from mpc.loop.plant import Controller
 from mpc.loop.run import FixedSetpoints
@@ -82,9 +82,8 @@ class OutdoorReset:
 
     def __init__(self, actuators: Sequence[Actuator], weather_station: str, rule: ResetRule | None = None) -> None:
         self.rule, self._outdoor = rule or ResetRule(), f"{weather_station}/{OUTDOOR_TEMPERATURE}"
-        kinds: dict[str, Quantity] = {_AIR: "supply_air_temperature", _WATER: "supply_water_temperature"}
-        named = [(a, kinds.get(a.name.rpartition("/")[2])) for a in actuators]
-        self._channels = {a.name: Channel(kind, a.lowest, a.highest) for a, kind in named if kind}
+        named = [(a, a.name.rpartition("/")[2]) for a in actuators]
+        self._channels = {a.name: Channel(kind, a.lowest, a.highest) for a, kind in named if kind in (_AIR, _WATER)}
 
     def step(self, measurements: Mapping[str, float], forecast: Forecast | None) -> dict[str, float]:
         """Choose setpoints [K].

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from mpc.errors import PlantActionError
+from thermal.components.registry import setpoints
 from thermal.errors import describe, nearest
 
 SUPPLY_AIR = "supply_air_temperature_setpoint"
@@ -16,16 +17,9 @@ DIFFERENTIAL_PRESSURE = "differential_pressure_setpoint"
 HEATING_SETPOINT = "zone_air_heating_temperature_setpoint"
 COOLING_SETPOINT = "zone_air_cooling_temperature_setpoint"
 
-#: Lowest and highest value of each kind of action [K] or [Pa]. Supply air and water: those of the paper's simulator.
-ACTION_LIMITS: Mapping[str, tuple[float, float]] = {
-    SUPPLY_AIR: (285.0, 300.0),
-    SUPPLY_WATER: (310.0, 355.0),
-    STATIC_PRESSURE: (25.0, 1000.0),
-    DIFFERENTIAL_PRESSURE: (5_000.0, 150_000.0),
-    HEATING_SETPOINT: (283.15, 299.15),
-    COOLING_SETPOINT: (291.15, 308.15),
-}
-_UNITS = {STATIC_PRESSURE: "Pa", DIFFERENTIAL_PRESSURE: "Pa"}
+#: Lowest and highest value of each kind of action [K] or [Pa], as the components declare them.
+ACTION_LIMITS: Mapping[str, tuple[float, float]] = {name: a.usual for name, a in setpoints().items() if a.usual}
+_UNITS = {name: a.unit for name, a in setpoints().items()}
 
 
 @dataclass(frozen=True)
@@ -92,7 +86,7 @@ def actuators_of(
         (COOLING_SETPOINT, zones, False),
     )
     return tuple(
-        Actuator(f"{entity}/{kind}", _UNITS.get(kind, "K"), *bounds[kind], required)
+        Actuator(f"{entity}/{kind}", _UNITS[kind], *bounds[kind], required)
         for kind, entities, required in kinds
         for entity in entities
     )

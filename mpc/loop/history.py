@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from mpc.loop.building import BuildingFlows
 from thermal._types import FloatArray
-from thermal.hvac._balance import EnergyBalance
-from thermal.hvac._step import Actions, Conditions, HvacStep
+from thermal.components.component import Conditions, EnergyBalance
+from thermal.system.step import HvacStep
 
 
 class PlantStep(NamedTuple):
@@ -20,8 +20,8 @@ class PlantStep(NamedTuple):
         Step of the scenario.
     conditions : Conditions
         Of the plant.
-    actions : Actions
-        For it.
+    actions : mapping of str to float
+        For it, by ``ENTITY/point`` [unit of the actuator].
     done : HvacStep
         What its devices did.
     mean : ndarray, shape (n_zone,)
@@ -32,7 +32,7 @@ class PlantStep(NamedTuple):
 
     number: int
     conditions: Conditions
-    actions: Actions
+    actions: Mapping[str, float]
     done: HvacStep
     mean: FloatArray
     end: FloatArray

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from thermal._types import FloatArray
-from thermal.hvac._system import HvacSystem
+from thermal.system.system import HvacSystem
 from thermal.units import AIR_HEAT_CAPACITY
 
 _FAR = 50.0  # K beyond the thermostat's ranges, where terminals are at their limits and q is a line

@@ -12,14 +12,12 @@ from mpc.loop.history import PlantStep
 from mpc.loop.local import LocalControl
 from mpc.loop.operation import Operation
 from mpc.loop.schedule import Schedule
-from mpc.loop.sensors import PlantDevices
 from mpc.loop.signals import EffectSignals, sensor_offset
-from mpc.loop.supply import SupplySetpoints
 from mpc.scenario.scenario import Scenario
 from thermal._types import FloatArray
-from thermal.hvac._plant import HvacPlant, HvacState
-from thermal.hvac._step import Conditions
-from thermal.hvac._system import HvacSystem
+from thermal.components.component import Conditions
+from thermal.system.plant import HvacPlant, HvacState
+from thermal.system.system import HvacSystem
 
 _WATER = 320.0  # K, of the loop at a start
 _ZONES = 293.15  # K, of the zones at a start
@@ -57,13 +55,11 @@ class PlantLoop:
     scenario : Scenario
         Steps and outdoor temperature.
     system : HvacSystem
-        Air handlers, hot water and terminals.
+        Air handlers, hot water and terminals, with the names of the devices.
     model : BuildingModel
         The building.
     operation : Operation
         Schedules.
-    devices : PlantDevices
-        Names of the devices.
     boundary : ndarray, shape (n_steps, n_boundary)
         Boundary temperatures [K].
     """
@@ -74,14 +70,13 @@ class PlantLoop:
         system: HvacSystem,
         model: BuildingModel,
         operation: Operation,
-        devices: PlantDevices,
         boundary: FloatArray,
     ) -> None:
         self.hvac, self._model, self._operation = HvacPlant(system), model, operation
         self._seconds, self._boundary = float(scenario.grid.step), boundary
         self._outdoor = [float(v) for v in scenario.outdoor]
-        self._supply, self._schedule = SupplySetpoints(devices, system), Schedule(operation, system, scenario.zones)
-        rated = system.rooms.T @ system.terminals.design_flow
+        self._schedule = Schedule(operation, system, scenario.zones)
+        rated = system.by_zone(system.terminals.design_flow)
         self._local = LocalControl(system, zone_response(model, 1e4 * rated))
         self._off = (False,) * len(system.air_handlers)
         self._offset = sensor_offset(model)
@@ -142,14 +137,14 @@ class PlantLoop:
         heating, cooling = self._schedule.setpoints(k, given)
         runs, self._cycling = self._schedule.runs(k, self._reading, heating, cooling, self._cycling)
         free = self._model.begin(gains, self._boundary[k], effects.known(k))
-        actions, reach = self._supply.actions(given, runs, self._schedule.ventilation[k])
+        actions, supply, reach = self._schedule.actions(given, runs, self._schedule.ventilation[k])
         zone = self._reading
         if self._local.settles:
-            zone = self._local.settle(free, heating, cooling, actions.supply_air_temperature, reach)
+            zone = self._local.settle(free, heating, cooling, supply, reach)
         conditions = Conditions(zone, heating, cooling, self._outdoor[k])
         set_back = self._schedule.set_back[k]
         self._state, done = self.hvac.step(self._state, conditions, actions, self._seconds, set_back)
         heat = self.hvac.heat(done)
-        mean, self._reading = self._model.finish(heat, effects.at(k, done.airflow, heat))
+        mean, self._reading = self._model.finish(heat, effects.at(k, done.terminals.airflow, heat))
         self._local.learn(self._reading)
         return PlantStep(k, conditions, actions, done, mean, self.air if self._biased else self._reading)

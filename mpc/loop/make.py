@@ -34,7 +34,6 @@ from thermal.case.save import save_case
 from thermal.effects.catalogue import chosen
 from thermal.effects.effect import Chosen
 from thermal.errors import describe, nearest
-from thermal.hvac._system import HvacSystem
 from thermal.model.matrices import SymbolicModel
 from thermal.model.reduce import reduced_model
 from thermal.model.simulator import Shuffle, Simulator
@@ -44,6 +43,7 @@ from thermal.network.structure import BASELINE
 from thermal.pilot.building import pilot_building
 from thermal.pilot.sizing import size_system
 from thermal.pilot.weather import MOUNTAIN_VIEW, generate_weather
+from thermal.system.system import HvacSystem
 
 #: What steps the plant: the reduced model, its grid with the mean of the shuffle, or with the random shuffle.
 PlantKind = Literal["reduced", "grid", "random"]

@@ -24,9 +24,9 @@ from thermal.case.case import Case
 from thermal.case.points import POINT_TYPES, split_column
 from thermal.case.telemetry import Telemetry
 from thermal.errors import describe
-from thermal.hvac._system import HvacSystem
 from thermal.model.matrices import SymbolicModel
 from thermal.model.replay import LEAST_SPIN_UP, SPIN_UP, replay_inputs
+from thermal.system.system import HvacSystem
 
 _HOUR = 3600.0
 _SIGNIFICANT = 3.0  # times what noise alone makes

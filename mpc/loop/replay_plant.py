@@ -12,14 +12,15 @@ from mpc.errors import MpcError
 from mpc.loop.sensors import PlantDevices
 from thermal._types import FloatArray
 from thermal.case.points import ZONE_TEMPERATURE
+from thermal.components.air_handler import AirCommand
+from thermal.components.component import Conditions
+from thermal.components.moist_air import WATER_HEAT_CAPACITY
+from thermal.components.water_coil import WaterCoil
 from thermal.errors import describe, nearest
-from thermal.hvac._coil import WaterCoil
-from thermal.hvac._replay import TerminalReplay, replay_air_handler, replay_loop, replay_terminals
-from thermal.hvac._system import HvacSystem
+from thermal.system.replay import TerminalReplay, replay_air_handler, replay_loop, replay_terminals
+from thermal.system.system import HvacSystem
 from thermal.units import AIR_HEAT_CAPACITY
 
-_WATER_HEAT_CAPACITY = 4186.0  # J/kg/K, liquid at 50 degC within 0.2 % (IAPWS-95)
-_USUAL_HUMIDITY = 0.006  # kg/kg, as the plant has where no humidity is known
 _LEAST_SHARE = 0.02  # of the design flow: less is a fan that is off
 
 
@@ -101,7 +102,7 @@ class Measured:
         self.differential = self._pressure((devices.boiler,), "differential_pressure_sensor", usual)[:, 0]
         # what is missing keeps its last value where a replay runs on, and is not compared
         self.running = self.flow > _LEAST_SHARE * system.terminals.design_flow
-        of_handler = system.members
+        of_handler = system.terminals.members
         self.supplied = np.nan_to_num(self.flow) @ of_handler
         self.handling = self.supplied > _LEAST_SHARE * (system.terminals.design_flow @ of_handler)
 
@@ -188,13 +189,12 @@ def _air_handler(
     on, rate = seen.handling[:, k], AIR_HEAT_CAPACITY * flow
     static = seen.static[:, k]
     outdoor, setpoint, mixed = seen.outdoor[:, k], seen.supply_setpoint[:, k], seen.mixed[:, k]
-    humid = _USUAL_HUMIDITY
-    whole = replay_air_handler(
-        handler, flow, seen.returning[:, k], outdoor, setpoint, humid, humid, static, seen.water, ventilation
-    )
+    conditions = Conditions(None, None, None, outdoor)
+    command = AirCommand(setpoint, static, ventilation=ventilation)
+    whole = replay_air_handler(handler, flow, seen.returning[:, k], conditions, command, seen.water)
     # the coils alone: air comes as it was measured behind the mixing box
     closed = replace(handler, economizer=False, minimum_outdoor_share=0.0, minimum_outdoor_flow=0.0, exhaust_fan=None)
-    coils = replay_air_handler(closed, flow, mixed, outdoor, setpoint, humid, humid, static, seen.water)
+    coils = replay_air_handler(closed, flow, mixed, conditions, command._replace(ventilation=1.0), seen.water)
 
     def gap(
         signal: str, model: FloatArray, real: FloatArray, scale: FloatArray | float, handled: FloatArray
@@ -245,7 +245,7 @@ def _hot_water(
     handled = np.where(on, np.maximum(load, seen.gas), np.nan)
     # a temperature counts as the heat that the circulating water carries by it
     return [
-        Replayed(Gap("hot water", boiler, "supply water temperature", "K"), warm, _WATER_HEAT_CAPACITY * pumped * warm,
+        Replayed(Gap("hot water", boiler, "supply water temperature", "K"), warm, WATER_HEAT_CAPACITY * pumped * warm,
                  handled, False),
         Replayed(Gap("hot water", boiler, "gas power", "W"), gas, gas, handled, False),
     ]  # fmt: skip

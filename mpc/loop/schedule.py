@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
-from mpc.loop.actuators import COOLING_SETPOINT, HEATING_SETPOINT
+from mpc.loop.actuators import COOLING_SETPOINT, HEATING_SETPOINT, STATIC_PRESSURE, SUPPLY_AIR
 from mpc.loop.operation import Operation, shared_rows
 from thermal._types import FloatArray
-from thermal.hvac._system import HvacSystem
+from thermal.components.air_handler import AirHandler
+from thermal.components.boiler_loop import BoilerLoop
+from thermal.system.system import HvacSystem
 
 
 class Schedule:
@@ -20,7 +24,7 @@ class Schedule:
     operation : Operation
         The schedules.
     system : HvacSystem
-        Which air handler serves which zones.
+        The plant, with the names of its devices.
     zones : tuple of str
         Their names.
 
@@ -40,7 +44,13 @@ class Schedule:
         self.set_back = list(operation.set_back)
         count, terminals = len(system.air_handlers), system.terminals
         self._served = [terminals.zone[terminals.air_handler == k] for k in range(count)]
-        kinds = (HEATING_SETPOINT, COOLING_SETPOINT)
+        kinds, self._optional = (HEATING_SETPOINT, COOLING_SETPOINT), system.defaults
+        handlers = system.of_kind(AirHandler)
+        self._switches = [f"{name}/fan_running" for name in handlers], [f"{name}/ventilation" for name in handlers]
+        self._boilers = [f"{name}/boiler_running" for name in system.of_kind(BoilerLoop)]
+        self._supply = [(f"{name}/{SUPPLY_AIR}", f"{name}/{STATIC_PRESSURE}") for name in handlers]
+        self._known: tuple[Any, ...] = (None, None, None)
+        self._made: tuple[dict[str, float], tuple[float, ...], tuple[float, ...]] = ({}, (), ())
         self._given = {f"{zone}/{kind}": (i, k) for k, zone in enumerate(zones) for i, kind in enumerate(kinds)}
 
     def setpoints(self, k: int, given: Mapping[str, float]) -> tuple[FloatArray, FloatArray]:
@@ -97,3 +107,36 @@ class Schedule:
         worst = [float(beyond[zones].max()) for zones in self._served]
         now = tuple(w > (0.0 if was else self._limit) for w, was in zip(worst, cycling, strict=True))
         return tuple(max(s, float(c)) for s, c in zip(scheduled, now, strict=True)), now
+
+    def actions(
+        self, given: Mapping[str, float], runs: tuple[float, ...], ventilation: float
+    ) -> tuple[dict[str, float], tuple[float, ...], tuple[float, ...]]:
+        """Give the plant's actions, the same object as long as nothing changes.
+
+        Parameters
+        ----------
+        given : mapping of str to float
+            The controller's, checked [K] or [Pa].
+        runs : tuple of float
+            1 or 0 for each air handler [-].
+        ventilation : float
+            Share of the minimum of outdoor air [-].
+
+        Returns
+        -------
+        tuple
+            Actions by ``ENTITY/point``; setpoints of the supply air [K]; and how much of its design flow each duct's
+            pressure drives [-].
+        """
+        if given != self._known[0] or (runs, ventilation) != self._known[1:]:
+            self._known = dict(given), runs, ventilation
+            chosen = {name: value for name, value in given.items() if name not in self._given}
+            fans, outdoor = self._switches
+            chosen |= dict(zip(fans, runs, strict=True)) | dict.fromkeys(outdoor, ventilation)
+            chosen |= dict.fromkeys(self._boilers, max(runs))
+            reach = [
+                run * math.sqrt(chosen.get(pressure, self._optional[pressure]) / self._optional[pressure])
+                for run, (_, pressure) in zip(runs, self._supply, strict=True)
+            ]
+            self._made = chosen, tuple(chosen[air] for air, _ in self._supply), tuple(reach)
+        return self._made

@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mpc.errors import PlantError
+from mpc.loop.history import PlantStep
 from mpc.loop.noise import NoiseSource, SensorNoise
 from mpc.loop.plant import PointLayout
 from mpc.scenario.scenario import Scenario
 from thermal._types import FloatArray
 from thermal.case.building import Building
+from thermal.case.points import DISCHARGE_TEMPERATURE, SUPPLY_FLOW
+from thermal.components.air_handler import AirHandler
+from thermal.components.component import Group
+from thermal.components.terminals import Terminals
 from thermal.errors import describe
-from thermal.hvac._points import HvacPoints
-from thermal.hvac._step import Actions, Conditions, HvacStep
-from thermal.hvac._system import HvacSystem
+from thermal.system.points import HvacPoints
+from thermal.system.system import HvacSystem
 
 _LEAST_FLOW = 1e-6  # kg/s: less is none
 
@@ -27,23 +32,46 @@ class PlantDevices:
 
     Parameters
     ----------
-    terminals, air_handlers : tuple of str
-        Names, in the order of the plant.
-    boiler : str
-        Name.
-    chiller : str or None
-        Name of the device that meters refrigeration; None when the air handlers' meters have it.
+    by_type : mapping of str to tuple of str
+        Names by type, in the order of the plant.
     """
 
-    terminals: tuple[str, ...]
-    air_handlers: tuple[str, ...]
-    boiler: str
-    chiller: str | None
+    by_type: Mapping[str, tuple[str, ...]]
+
+    @property
+    def terminals(self) -> tuple[str, ...]:
+        """Names of the terminals."""
+        return self.by_type["vav"]
+
+    @property
+    def air_handlers(self) -> tuple[str, ...]:
+        """Names of the air handlers."""
+        return self.by_type["ahu"]
+
+    @property
+    def boiler(self) -> str:
+        """Name of the boiler; empty where there is none."""
+        return next(iter(self.by_type["boiler"]), "")
+
+    @property
+    def chiller(self) -> str | None:
+        """Name of the device that meters refrigeration; None when the air handlers' meters have it."""
+        return next(iter(self.by_type["chiller"]), None)
 
     @property
     def count(self) -> int:
         """Number of devices."""
-        return len(self.terminals) + len(self.air_handlers) + 1 + (self.chiller is not None)
+        return sum(len(names) for names in self.by_type.values())
+
+    def named(self, system: HvacSystem) -> HvacSystem:
+        """Give a system's components the names of the devices.
+
+        Parameters
+        ----------
+        system : HvacSystem
+            The system.
+        """
+        return system.named({type(c): self.by_type[c.device] for c in system.components.values()})
 
 
 def plant_devices(building: Building, system: HvacSystem) -> PlantDevices:
@@ -52,7 +80,7 @@ def plant_devices(building: Building, system: HvacSystem) -> PlantDevices:
     Parameters
     ----------
     building : Building
-        Its devices of types ``vav``, ``ahu``, ``boiler`` and ``chiller``, in the order of the plant.
+        Its devices of the types that the system's components have, and ``chiller``, in the order of the plant.
     system : HvacSystem
         The plant.
 
@@ -61,26 +89,38 @@ def plant_devices(building: Building, system: HvacSystem) -> PlantDevices:
     PlantError
         When the building has not as many as the plant.
     """
-    zones = building.zone_names
+    zones, found = building.zone_names, dict[str, tuple[str, ...]]()
     if system.zone_count != len(zones):
         raise PlantError(describe("plant", f"terminals in all {len(zones)} zones", f"in {system.zone_count}"))
-    of_type = {kind: [d.name for d in building.devices if d.type == kind] for kind in ("ahu", "boiler", "chiller")}
-    waiting = {zone: [d.name for d in building.devices_of(zone) if d.type == "vav"][::-1] for zone in zones}
-    terminals: list[str] = []
-    for k in system.terminals.zone.tolist():
-        if not waiting[zones[k]]:
-            raise PlantError(describe(f"zone {zones[k]!r}", "a device of type 'vav' for each terminal", "too few"))
-        terminals.append(waiting[zones[k]].pop())
-    spare = [name for names in waiting.values() for name in names]
+    for component in system.components.values():
+        kind = component.device
+        if isinstance(component, Group):
+            found[kind] = _of_zones(building, kind, [zones[k] for k in component.zone])
+        elif kind not in found:
+            found[kind] = tuple(d.name for d in building.devices if d.type == kind)
+            wanted = len(system.of_kind(type(component)))
+            if len(found[kind]) != wanted:
+                raise PlantError(describe(f"devices of type {kind!r}", str(wanted), f"{len(found[kind])}"))
+    found["chiller"] = tuple(d.name for d in building.devices if d.type == "chiller")
+    if len(found["chiller"]) > 1:
+        raise PlantError(describe("devices of type 'chiller'", "one or none", f"{len(found['chiller'])}"))
+    return PlantDevices(found)
+
+
+def _of_zones(building: Building, kind: str, zones: Sequence[str]) -> tuple[str, ...]:
+    """Names of the devices of a type for the elements of a group, which are in these zones."""
+    waiting = {z: [d.name for d in building.devices_of(z) if d.type == kind][::-1] for z in building.zone_names}
+    names = []
+    for zone in zones:
+        if not waiting[zone]:
+            label = "terminal" if kind == "vav" else kind
+            raise PlantError(describe(f"zone {zone!r}", f"a device of type {kind!r} for each {label}", "too few"))
+        names.append(waiting[zone].pop())
+    spare = [name for left in waiting.values() for name in left]
     if spare:
-        raise PlantError(describe("building", "no more devices of type 'vav' than terminals", f"{spare[0]!r} too"))
-    for kind, wanted in (("ahu", len(system.air_handlers)), ("boiler", 1)):
-        if len(of_type[kind]) != wanted:
-            raise PlantError(describe(f"devices of type {kind!r}", str(wanted), f"{len(of_type[kind])}"))
-    if len(of_type["chiller"]) > 1:
-        raise PlantError(describe("devices of type 'chiller'", "one or none", f"{len(of_type['chiller'])}"))
-    chiller = of_type["chiller"][0] if of_type["chiller"] else None
-    return PlantDevices(tuple(terminals), tuple(of_type["ahu"]), of_type["boiler"][0], chiller)
+        expected = f"no more devices of type {kind!r} than the plant has"
+        raise PlantError(describe("building", expected, f"{spare[0]!r} too"))
+    return tuple(names)
 
 
 class Sensors:
@@ -89,9 +129,9 @@ class Sensors:
     Parameters
     ----------
     system : HvacSystem
-        The plant.
-    devices : PlantDevices
-        Its names.
+        The plant, with the names of its devices.
+    chiller : str or None
+        Name of the device that meters refrigeration.
     scenario : Scenario
         Weather, and people where they are counted.
     noise : SensorNoise or None
@@ -105,36 +145,30 @@ class Sensors:
     def __init__(
         self,
         system: HvacSystem,
-        devices: PlantDevices,
+        chiller: str | None,
         scenario: Scenario,
         noise: SensorNoise | None,
         counted: bool,
         pressures: bool = False,
     ) -> None:
-        self._points = HvacPoints(system, devices.terminals, devices.air_handlers, devices.boiler, pressures)
-        self._system, self._counted = system, counted
+        self._points, self._terminals, self._counted = HvacPoints(system, pressures), system.terminals, counted
         building = scenario.building
-        chiller = [] if devices.chiller is None else [f"{devices.chiller}/electrical_power_sensor"]
+        meter = [] if chiller is None else [f"{chiller}/electrical_power_sensor"]
         weather = [f"{building.weather_station}/{p}" for p in scenario.weather.frame]
         people = [f"{zone}/occupancy_count_sensor" for zone in scenario.zones] if counted else []
-        columns = (*self._points.columns, *chiller, *weather, *people)
-        self.layout = PointLayout(columns, building.location.timezone)
-        self._chiller = devices.chiller is not None
-        meters = [f"{name}/electrical_power_sensor" for name in devices.air_handlers]
-        self._meters = np.array([self.layout.position[name] for name in meters])
+        self.layout = PointLayout((*self._points.columns, *meter, *weather, *people), building.location.timezone)
+        self._chiller = chiller is not None
+        handlers, (group,) = system.of_kind(AirHandler), system.of_kind(Terminals)
+        self._meters = self._places(handlers, "electrical_power_sensor")
+        self._flow = self._places(system.entities(group), SUPPLY_FLOW)
+        self._discharge = self._places(system.entities(group), DISCHARGE_TEMPERATURE)
         self._weather = scenario.weather.frame.to_numpy(dtype=float)
         self._noise = None if noise is None else NoiseSource(self.layout, noise)
 
-    def read(
-        self,
-        k: int,
-        conditions: Conditions,
-        actions: Actions,
-        step: HvacStep,
-        zone: FloatArray,
-        people: FloatArray,
-        seed: int,
-    ) -> FloatArray:
+    def _places(self, entities: Iterable[str], point: str) -> NDArray[np.intp]:
+        return np.array([self.layout.position[f"{entity}/{point}"] for entity in entities], dtype=np.intp)
+
+    def read(self, step: PlantStep, people: FloatArray, seed: int) -> FloatArray:
         """Read all points after a step.
 
         The discharge temperature is that of the heat at the zone's mean temperature over the step, so that the metered
@@ -142,16 +176,8 @@ class Sensors:
 
         Parameters
         ----------
-        k : int
-            Number of the step.
-        conditions : Conditions
+        step : PlantStep
             Of the plant.
-        actions : Actions
-            For the step.
-        step : HvacStep
-            What happened.
-        zone : ndarray, shape (n_zone,)
-            What the zones' sensors read, mean over the step [K].
         people : ndarray, shape (n_zone,)
             In the zones [-].
         seed : int
@@ -162,18 +188,19 @@ class Sensors:
         ndarray, shape (n_column,)
             In the library's units.
         """
-        place = self._system.terminals.zone
-        flowing = step.airflow > _LEAST_FLOW
-        discharge = np.where(flowing, step.discharge + (zone - conditions.zone_temperature)[place], zone[place])
-        seen = step._replace(airflow=np.where(flowing, step.airflow, 0.0))
-        values = self._points.read(conditions._replace(zone_temperature=zone), actions, seen, discharge)
+        place, zone, conditions, air = self._terminals.zone, step.mean, step.conditions, step.done.terminals
+        values = self._points.read(conditions._replace(zone_temperature=zone), step.actions, step.done)
+        flowing = air.airflow > _LEAST_FLOW
+        lift = (zone - conditions.zone_temperature)[place]
+        values[self._discharge] = np.where(flowing, air.discharge + lift, zone[place])
+        values[self._flow] = np.where(flowing, air.airflow, 0.0)
         parts: list[Sequence[float] | FloatArray] = [values]
         if self._chiller:
-            cooling = np.array([m.cooling_power for m in step.mixed], dtype=float)
+            cooling = np.array([handler.mixed.cooling_power for handler in step.done.air_handlers], dtype=float)
             values[self._meters] -= cooling
             parts.append([float(cooling.sum())])
-        parts.append(self._weather[k])
+        parts.append(self._weather[step.number])
         if self._counted:
             parts.append(people)
         whole = np.concatenate(parts)
-        return whole if self._noise is None else self._noise.disturb(k, whole, seed)
+        return whole if self._noise is None else self._noise.disturb(step.number, whole, seed)

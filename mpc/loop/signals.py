@@ -16,14 +16,14 @@ from thermal._types import FloatArray
 from thermal.case.points import OUTDOOR_TEMPERATURE
 from thermal.effects.effect import Chosen
 from thermal.errors import describe
-from thermal.hvac._replay import replay_reheat
-from thermal.hvac._system import HvacSystem
 from thermal.inputs.normalisation import WIND, Normalisation, usual_temperatures
 from thermal.inputs.provider import HVAC_INPUTS, InputProvider, LiveInputs
 from thermal.inputs.signals import Signal
 from thermal.network.assembly import Extension
 from thermal.network.graph import GraphBuilder
 from thermal.network.network import ThermalNetwork
+from thermal.system.replay import replay_reheat
+from thermal.system.system import HvacSystem
 from thermal.units import AIR_HEAT_CAPACITY
 
 #: Zone, supply air and supply water that design capacities of terminals are counted at [K], those of `Terminals.sized`.
@@ -93,7 +93,7 @@ class EffectSignals:
         if not network.signals:
             return
         self._system, self._ahead = system, scenario_inputs(scenario, network.normalisation)
-        most = (system.rooms.T @ value for value in (system.terminals.design_flow, _most_heat(system)))
+        most = (system.by_zone(value) for value in (system.terminals.design_flow, _most_heat(system)))
         flow, heat = (dict(zip(network.zones, value.tolist(), strict=True)) for value in most)
         counted = self._ahead.normalisation
         if not counted.flow:
@@ -145,7 +145,7 @@ class EffectSignals:
         row: FloatArray = self._values[k]
         if self._live:
             row = row.copy()
-            self._put(k, self._system.rooms.T @ airflow, heat)
+            self._put(k, self._system.by_zone(airflow), heat)
             for position, signal in self._live:
                 row[position] = signal.of(self._now)[0]
         return row

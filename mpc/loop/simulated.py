@@ -26,8 +26,8 @@ from thermal._types import FloatArray
 from thermal.case.case import Case
 from thermal.case.telemetry import Telemetry
 from thermal.errors import describe
-from thermal.hvac._balance import energy_balance
-from thermal.hvac._system import HvacSystem
+from thermal.system.points import energy_balance
+from thermal.system.system import HvacSystem
 
 _DAY = 86400.0
 
@@ -109,10 +109,11 @@ class SimulatedPlant:
         seed: int = 0,
     ) -> None:
         check_parts(scenario, model, control_steps, warm_up_days, seed)
-        self.scenario, self.system, self.model, self.forecaster = scenario, system, model, forecaster
+        self.devices = plant_devices(scenario.building, system)
+        self.system = system = self.devices.named(system)
+        self.scenario, self.model, self.forecaster = scenario, model, forecaster
         self.control_steps, self._seed = control_steps, seed
         self._warm_up_steps = warm_up_days * round(_DAY / scenario.grid.step)
-        self.devices = plant_devices(scenario.building, system)
         self.actuators: tuple[Actuator, ...] = actuators_of(
             self.devices.air_handlers, self.devices.boiler, scenario.zones, limits
         )
@@ -125,14 +126,15 @@ class SimulatedPlant:
         self.operation = operation or scheduled_operation(scenario, len(system.air_handlers))
         self.operation.fits(scenario.grid.n_steps, len(scenario.zones), len(system.air_handlers))
         boundary = boundary_series(scenario, model, boundaries or {})
-        self._loop = PlantLoop(scenario, system, model, self.operation, self.devices, boundary)
+        self._loop = PlantLoop(scenario, system, model, self.operation, boundary)
         self._step = float(scenario.grid.step)
-        self._sensors = Sensors(system, self.devices, scenario, noise, count_people, pressures)
+        self._sensors = Sensors(system, self.devices.chiller, scenario, noise, count_people, pressures)
         self._signals = self._given_signals = EffectSignals(model.network, scenario, system)
         self._given, self._gains = scenario, shared_rows(scenario.gains)
         self._drawn: int | None = None
         self._warm: tuple[LoopState, PlantStep] | None = None
         self._number, self._steps = -1, list[PlantStep]()
+        self._asked: tuple[Mapping[str, float] | None, dict[str, float]] = (None, {})
         self._first = np.zeros(len(scenario.zones))
 
     @property
@@ -205,7 +207,9 @@ class SimulatedPlant:
             When the scenario is over, or `reset` was not called.
         """
         need_running(self._number >= 0)
-        given = checked_actions(actions, self._by_name)
+        if actions != self._asked[0]:  # the same ones have been checked
+            self._asked = dict(actions), checked_actions(actions, self._by_name)
+        given = self._asked[1]
         if self.finished:
             found = f"{self.scenario.grid.n_steps - self._number} of its {self.scenario.grid.n_steps}"
             raise PlantError(describe("scenario", f"{self.control_steps} more steps", found, "make it longer"))
@@ -320,8 +324,7 @@ class SimulatedPlant:
         return self._steps
 
     def _read(self, step: PlantStep, people: FloatArray, seed: int) -> FloatArray:
-        k = step.number
-        return self._sensors.read(k, step.conditions, step.actions, step.done, step.mean, people[k], seed)
+        return self._sensors.read(step, people[step.number], seed)
 
     def _seen(self, steps: list[PlantStep], seconds: int) -> Measurements:
         """Measurements of some steps, read when they are asked for."""

@@ -22,18 +22,18 @@ from mpc.control.problem.problem import ControlProblem
 from mpc.control.solvers.sequential import SequentialSolver
 from mpc.control.solvers.uncertainty import Margin
 from mpc.errors import ControlError
-from mpc.loop.actuators import Actuator
+from mpc.loop.actuators import SUPPLY_AIR, SUPPLY_WATER, Actuator
 from mpc.loop.plant import Plant
 from mpc.loop.sensors import PlantDevices
 from mpc.loop.simulated import SimulatedPlant
 from mpc.scenario.scenario import zone_areas
 from thermal.case.building import Building
 from thermal.errors import describe
-from thermal.hvac._smooth import SmoothHvac
-from thermal.hvac._system import HvacSystem
 from thermal.model.modal import ModalModel, modal_model
 from thermal.model.reduce import ReducedModel
 from thermal.model.step import IMPLICIT_EULER
+from thermal.system.smooth import SmoothHvac
+from thermal.system.system import HvacSystem
 
 #: Step of a controller's model [s]: that of telemetry in most cases.
 MODEL_STEP = 300.0
@@ -51,9 +51,6 @@ SMOOTHING = 0.005
 #: of 0.15): half a softness, so that what is optimised is the discomfort to be expected. Against bands that count from
 #: their edge on a week of August costs 0.9 % less with its discomfort, days of February the same.
 MARGIN = 0.2
-
-_KINDS = {"supply_air_temperature": "supply_air_temperature_setpoint",
-          "supply_water_temperature": "supply_water_temperature_setpoint"}  # fmt: skip
 
 
 def default_horizon(control_step: float = 900.0, hours: float = 12.0) -> Horizon:
@@ -190,7 +187,7 @@ def make_controller(
         unmeasured, observer = observer, None
     if observer is None:
         observer = Observer(KalmanFilter(held_space(modes, ahead.control_step), unmeasured), modes)
-    pressures = any(c.quantity.endswith("pressure") for c in decided)
+    pressures = any(c.unit == "Pa" for c in decided)
     hvac = SmoothHvac(site.system, SMOOTHING, pressures)
     predictor = Predictor(modes, hvac, ahead, decided, unmeasured.time_constant)
     solver = SequentialSolver(ControlProblem(predictor, 2.0 * MARGIN), iterations=25)
@@ -237,13 +234,12 @@ def held_space(modes: ModalModel, control_step: float) -> StateSpace:
 def _channels(actuators: Sequence[Actuator], points: SitePoints) -> tuple[Channel, ...]:
     """Channels of what the plant lets be set, each in the range that all of its actuators share."""
     found = []
-    for quantity, kind in _KINDS.items():
-        entities = points.air_handlers if quantity == "supply_air_temperature" else (points.boiler,)
-        named = [a for a in actuators if a.name in {f"{entity}/{kind}" for entity in entities}]
+    for quantity, entities in ((SUPPLY_AIR, points.air_handlers), (SUPPLY_WATER, (points.boiler,))):
+        named = [a for a in actuators if a.name in {f"{entity}/{quantity}" for entity in entities}]
         if named:
-            found.append(Channel(quantity, max(a.lowest for a in named), min(a.highest for a in named)))  # type: ignore[arg-type]
+            found.append(Channel(quantity, max(a.lowest for a in named), min(a.highest for a in named)))
     if not found:
-        expected = f"an actuator {' or '.join(_KINDS.values())} of {[*points.air_handlers, points.boiler]}"
+        expected = f"an actuator {SUPPLY_AIR} or {SUPPLY_WATER} of {[*points.air_handlers, points.boiler]}"
         raise ControlError(describe("plant", expected, f"{[a.name for a in actuators][:6]}"))
     return tuple(found)
 

@@ -26,9 +26,9 @@ from mpc.studies.model import ORDER, BuildingParameters, model_settings, reduced
 from thermal.case.building import Building
 from thermal.effects.catalogue import chosen
 from thermal.errors import describe
-from thermal.hvac._system import HvacSystem
 from thermal.model.reduce import ReducedModel
 from thermal.pilot.sizing import size_system
+from thermal.system.system import HvacSystem
 
 #: How far forecasts reach [h].
 HORIZON_HOURS = 12.0

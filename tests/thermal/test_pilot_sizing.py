@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from thermal import Building, Simulator, load_bundled_case
+from thermal.components.component import Conditions
 from thermal.errors import ModelError
-from thermal.hvac._plant import HvacPlant
-from thermal.hvac._step import Actions, Conditions
 from thermal.pilot.building import pilot_building
 from thermal.pilot.sizing import DesignConditions, size_system
+from thermal.system.plant import HvacPlant
 from thermal.units import AIR_HEAT_CAPACITY
 
 
@@ -27,13 +27,16 @@ def test_the_design_day_is_held(office: Building) -> None:
     plant = HvacPlant(system)
     conditions = Conditions(zones, zones + 5.0, zones + 8.0, at.winter_outdoor)
     state = plant.start(at.supply_water)
+    actions = system.actions(
+        supply_air_temperature_setpoint=at.supply_air, supply_water_temperature_setpoint=at.supply_water
+    )
     for _ in range(12):
-        state, step = plant.step(state, conditions, Actions(at.supply_air, at.supply_water), 300.0)
+        state, step = plant.step(state, conditions, actions, 300.0)
     simulator = Simulator(office, dx=1.0, step_seconds=3600.0)
     simulator.reset(zones, np.array([at.winter_outdoor]))
     after = simulator.step(plant.heat(step), np.array([at.winter_outdoor]))
     assert (after >= zones - 0.02).all()
-    assert step.loop.water == pytest.approx(at.supply_water, abs=0.5)
+    assert step.water == pytest.approx(at.supply_water, abs=0.5)
 
 
 def test_cooling_carries_gains_and_sun(office: Building) -> None:

@@ -2,26 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from thermal._types import FloatArray
-from thermal.case.building import Building, FloorPlans, ZoneTable
+from thermal.case.building import Building, Device, FloorPlans, ZoneTable
 from thermal.case.plan import zone_floor_areas
+from thermal.components.air_handler import AirHandler
+from thermal.components.boiler_loop import BoilerLoop
+from thermal.components.component import Group
+from thermal.components.cooling_coil import CoolingCoil
+from thermal.components.fan import Fan
+from thermal.components.pump import Pump
+from thermal.components.registry import COMPONENTS
+from thermal.components.terminals import Terminals
+from thermal.components.thermostat import Thermostat
+from thermal.components.water_coil import WaterCoil
 from thermal.errors import ModelError
-from thermal.hvac._air_handler import AirHandler
-from thermal.hvac._boiler import BoilerLoop, Pump
-from thermal.hvac._coil import WaterCoil
-from thermal.hvac._cooling import CoolingCoil
-from thermal.hvac._fan import Fan
-from thermal.hvac._system import HvacSystem
-from thermal.hvac._terminals import Terminals
-from thermal.hvac._thermostat import Thermostat
 from thermal.model.matrices import SymbolicModel
 from thermal.model.step import Stepper
 from thermal.network.build import build_network
+from thermal.system.devices import device_graph
+from thermal.system.system import HvacSystem, vav_system
 from thermal.units import AIR_HEAT_CAPACITY, air_density
 
 _LONG_RUN = 1e8  # s: one implicit step to the steady state
@@ -84,9 +88,10 @@ def size_system(
 ) -> HvacSystem:
     """Size the plant of a building: a terminal with reheat a zone, an air handler a device of type ``ahu``, one boiler.
 
+    Other devices in zones, such as radiators, get the heat that their zones lose, by the `sized` of their class.
     Heating loads are those of the steady state in the winter, from the building's model with its starting parameters;
-    cooling flows are those of gains, sun and warmth outdoors. With as many air handlers as floors each serves its own,
-    else zones go to them in turn.
+    cooling flows are those of gains, sun and warmth outdoors. Which air handler feeds which zone says
+    `thermal.system.devices.device_graph`.
 
     Parameters
     ----------
@@ -116,21 +121,35 @@ def size_system(
     flow = np.maximum(summer / (AIR_HEAT_CAPACITY * drop), at.least_flow * areas)
     flow = np.maximum(flow, loss / (AIR_HEAT_CAPACITY * rise * _HEATING_SHARE))
     reheat = loss + AIR_HEAT_CAPACITY * _HEATING_SHARE * flow * (at.heating - at.supply_air)
-    serving = _serving(building)
+    graph = device_graph(building)
+    serving = graph.serving
     terminals = Terminals.sized(
         flow, reheat, air_handler=serving, water_temperature=at.supply_water, supply_temperature=at.supply_air
     )
     density = air_density(building.location.elevation)
     handlers = tuple(_air_handler(float(flow[serving == k].sum()), at, density) for k in range(serving.max() + 1))
     coils = [h.heating for h in handlers if isinstance(h.heating, WaterCoil)]
-    pump = Pump(float(terminals.water_flow.sum() + sum(coil.water_flow for coil in coils)))
+    emitters = {kind: _emitters(building, kind, devices, loss) for kind, devices in graph.emitters.items()}
+    wet = [*coils, *emitters.values()]
+    pump = Pump(float(terminals.water_flow.sum() + sum(np.sum(getattr(part, "water_flow", 0.0)) for part in wet)))
     capacity = float(reheat.sum()) + sum(c.air_flow * AIR_HEAT_CAPACITY * 12.0 for c in coils)
     pipes = max(_LEAST_PIPES, 1e-3 * capacity / 10.0)
     loop = BoilerLoop(
         capacity, pump, pipe_conductance=min(pipes, 0.4 * pump.minimum_share * pump.design_flow * 4186.0),
         standing_conductance=0.25 * pipes, water_volume=max(0.05, _LITRES * capacity / 1000.0),
     )  # fmt: skip
-    return HvacSystem(handlers, loop, terminals, thermostat or Thermostat())
+    system = vav_system(handlers, loop, terminals, thermostat)
+    for kind, group in emitters.items():
+        suppliers = {port.name: "BOILER" for port in group.ports if port.quantity == "water"}
+        system = system.with_group(kind.upper(), group, **suppliers)
+    return system
+
+
+def _emitters(building: Building, kind: str, devices: Sequence[Device], loss: FloatArray) -> Group:
+    """Size devices of a type for the heat that their zones lose, which those of a zone share."""
+    zone = np.array([building.zone_names.index(str(device.zone)) for device in devices], dtype=np.intp)
+    made: Group = COMPONENTS[kind].sized(loss[zone] / np.bincount(zone)[zone], zone)  # type: ignore[attr-defined]
+    return made
 
 
 def _air_handler(flow: float, at: DesignConditions, density: float) -> AirHandler:
@@ -170,12 +189,3 @@ def _glass(building: Building) -> FloatArray:
         return np.array([sum(s.area for s in windows if s.zone == zone) for zone in building.zone_names], dtype=float)
     glazing = building.geometry.glazing
     return np.array([sum(glazing.get(zone, {}).values()) for zone in building.zone_names], dtype=float)
-
-
-def _serving(building: Building) -> npt.NDArray[np.intp]:
-    """Position of the air handler of each zone."""
-    count, zones = max(1, sum(d.type == "ahu" for d in building.devices)), building.zone_names
-    if isinstance(building.geometry, FloorPlans) and count == len(building.geometry.floors):
-        of_floor = {zone: k for k, floor in enumerate(building.geometry.floors) for zone in floor.zone_names}
-        return np.array([of_floor[zone] for zone in zones], dtype=np.intp)
-    return np.arange(len(zones), dtype=np.intp) % count

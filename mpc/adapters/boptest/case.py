@@ -29,7 +29,7 @@ from thermal._types import FloatArray
 from thermal.case.building import Building
 from thermal.case.points import OUTDOOR_TEMPERATURE
 from thermal.errors import describe
-from thermal.hvac._system import HvacSystem
+from thermal.system.system import HvacSystem
 
 _MINUTE = 60.0
 _KEPT, _WARM = 8, 4  # scenarios and warm-ups that are kept, so that tests of one period share theirs

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from itertools import chain, count
-from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -13,12 +12,8 @@ from numpy.typing import NDArray
 
 from mpc.adapters.boptest.scenario import PRICE_POINTS
 from mpc.loop.actuators import (
-    COOLING_SETPOINT,
     DIFFERENTIAL_PRESSURE,
-    HEATING_SETPOINT,
     STATIC_PRESSURE,
-    SUPPLY_AIR,
-    SUPPLY_WATER,
 )
 from mpc.loop.conversion import SIGNAL_UNITS
 from mpc.loop.history import PlantStep
@@ -28,6 +23,7 @@ from mpc.scenario.rates import Rate
 from mpc.scenario.scenario import Scenario
 from thermal._types import FloatArray
 from thermal.case.points import POINT_TYPES, split_column
+from thermal.system.system import HvacSystem
 
 Metadata = dict[str, dict[str, Any]]
 
@@ -37,13 +33,6 @@ ELECTRICITY_OUTPUT, GAS_OUTPUT = "reaPEle_y", "reaPGas_y"
 _MEANINGS = {
     STATIC_PRESSURE: "setpoint of the supply air's static pressure",
     DIFFERENTIAL_PRESSURE: "setpoint of the heating water's differential pressure",
-}
-# where a step has the setpoints that are one a device or a zone
-_HELD = {
-    SUPPLY_AIR: "actions.supply_air_temperature",
-    STATIC_PRESSURE: "actions.static_pressure",
-    HEATING_SETPOINT: "conditions.heating_setpoint",
-    COOLING_SETPOINT: "conditions.cooling_setpoint",
 }
 
 #: Names of the indicators that `GET /kpi` gives.
@@ -160,7 +149,8 @@ class PlantSignals:
         setters = _signal_names(actuator.name for actuator in plant.actuators)
         self.inputs = {f"{setters[actuator.name]}_u": actuator for actuator in plant.actuators}
         self.input_names = tuple(name for u in self.inputs for name in (u, activation(u)))
-        self._reads = [_reader(actuator.name, plant) for actuator in plant.actuators]
+        self._reads = [_reader(a.name, plant.system, plant.zone_names)
+                       for a in plant.actuators]  # fmt: skip
 
     def measurement_metadata(self) -> Metadata:
         """Describe each output with its unit, as `GET /measurements` does."""
@@ -225,17 +215,13 @@ def _entry(text: str, unit: str | None, lowest: float | None = None, highest: fl
     return {"Unit": unit, "Description": text, "Minimum": lowest, "Maximum": highest}
 
 
-def _reader(name: str, plant: SimulatedPlant) -> Callable[[PlantStep], float]:
+def _reader(name: str, system: HvacSystem, zones: Sequence[str]) -> Any:
     """Find where a step holds the value of an actuator."""
     entity, _, kind = name.rpartition("/")
-    if kind == SUPPLY_WATER:
-        return lambda step: step.actions.supply_water_temperature
-    if kind == DIFFERENTIAL_PRESSURE:
-        design = plant.system.loop.pump.differential_pressure
-        return lambda step: design if step.actions.differential_pressure is None else step.actions.differential_pressure
-    values, of_zone = attrgetter(_HELD[kind]), kind in (HEATING_SETPOINT, COOLING_SETPOINT)
-    at = (plant.zone_names if of_zone else plant.devices.air_handlers).index(entity)
-    return lambda step: values(step)[at]
+    if name in system.actuators:
+        return lambda step: step.actions.get(name, system.defaults.get(name))
+    zone = zones.index(entity)
+    return lambda step: getattr(step.conditions, kind)[zone]
 
 
 def forecast_metadata(points: Collection[str], zones: Sequence[str], currency: str, carbon: str) -> Metadata:

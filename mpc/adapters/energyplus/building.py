@@ -24,7 +24,7 @@ from thermal.errors import describe
 
 _METER = re.compile(r"^Output:Meter,([^,]+),", re.M)
 _DAY = date(2023, 1, 2)  # any: sizes come from design days
-_WATER_DENSITY = 983.0  # kg/m3, as `thermal.hvac` has it
+_WATER_DENSITY = 983.0  # kg/m3, as `thermal.components` has it
 
 Kind = Literal["wall", "floor", "ceiling"]
 
@@ -99,8 +99,8 @@ class EnergyPlusBuilding:
     def devices(self) -> PlantDevices:
         """Names of the devices; a building without boilers has an empty one, several chillers count as the first."""
         kinds = ("vav", "ahu", "boiler", "chiller")
-        vav, ahu, boiler, chiller = (tuple(d.name for d in self.building.devices if d.type == kind) for kind in kinds)
-        return PlantDevices(vav, ahu, next(iter(boiler), ""), next(iter(chiller), None))
+        names = {kind: [d.name for d in self.building.devices if d.type == kind] for kind in kinds}
+        return PlantDevices({kind: tuple(each[:1] if kind == "chiller" else each) for kind, each in names.items()})
 
     @property
     def full_water_flow(self) -> dict[str, float]:

@@ -1,4 +1,4 @@
-"""The plant as a controller may believe it to be: devices of `thermal.hvac` at the sizes that EnergyPlus found.
+"""The plant as a controller may believe it to be: devices of `thermal.components` at the sizes that EnergyPlus found.
 
 Cooling coils of chilled water have a constant coefficient of performance. Electric reheat is a hot-water loop that
 loses nothing, with coils that give whatever the discharge temperature asks for: its "fuel" stands for electricity.
@@ -10,18 +10,20 @@ import numpy as np
 
 from mpc.adapters.energyplus.building import EnergyPlusBuilding
 from mpc.adapters.energyplus.layout import AirLoop, Terminal
-from thermal.hvac._air_handler import AirHandler, Heater
-from thermal.hvac._boiler import BoilerLoop, Pump
-from thermal.hvac._coil import WaterCoil
-from thermal.hvac._cooling import CoolingCoil
-from thermal.hvac._curves import CONSTANT_EFFICIENCY, Biquadratic
-from thermal.hvac._fan import Fan
-from thermal.hvac._system import HvacSystem
-from thermal.hvac._terminals import Terminals
-from thermal.hvac._thermostat import Thermostat
+from thermal.components.air_handler import AirHandler
+from thermal.components.boiler_loop import BoilerLoop
+from thermal.components.cooling_coil import CoolingCoil
+from thermal.components.curves import CONSTANT_EFFICIENCY, Biquadratic
+from thermal.components.fan import Fan
+from thermal.components.heater import Heater
+from thermal.components.pump import Pump
+from thermal.components.terminals import Terminals
+from thermal.components.thermostat import Thermostat
+from thermal.components.water_coil import WaterCoil
+from thermal.system.system import HvacSystem, vav_system
 from thermal.units import air_density
 
-_WATER = 983.0  # kg/m3, as `thermal.hvac` has it
+_WATER = 983.0  # kg/m3, as `thermal.components` has it
 _FILMS = 0.5  # hA of the air over that of the water, of EnergyPlus' coils
 _TIGHT = 0.3  # K: EnergyPlus' thermostats hold their setpoint; a narrow range stands for that
 _WARMEST = 323.15  # K, of the discharge air in the reference buildings' sizing
@@ -58,7 +60,7 @@ def controller_system(source: EnergyPlusBuilding, price_ratio: float = 1.0) -> H
     """
     density = air_density(source.building.location.elevation)
     handlers = tuple(_air_handler(source, loop, density) for loop in source.layout.air_loops)
-    return HvacSystem(handlers, _loop(source, price_ratio), _terminals(source, density), Thermostat(_TIGHT))
+    return vav_system(handlers, _loop(source, price_ratio), _terminals(source, density), Thermostat(_TIGHT))
 
 
 def _terminals(source: EnergyPlusBuilding, density: float) -> Terminals:

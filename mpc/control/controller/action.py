@@ -15,6 +15,7 @@ from mpc.control.problem.channels import Channel
 from mpc.control.solvers.solution import Solution
 from mpc.control.solvers.uncertainty import BackOff, Margin
 from mpc.kpi.rewards import DISCOMFORT_PRICE
+from mpc.loop.actuators import SUPPLY_AIR, SUPPLY_WATER
 from mpc.scenario.tariff import DemandCharge
 from thermal._types import FloatArray
 
@@ -48,7 +49,7 @@ class ResetRule:
             Outdoor temperature [K]; what is not finite counts as half-way.
         """
         share = np.clip((outdoor - self.cold) / (self.warm - self.cold), 0.0, 1.0) if np.isfinite(outdoor) else 0.5
-        by_rule = {"supply_air_temperature": self.air, "supply_water_temperature": self.water}
+        by_rule = {SUPPLY_AIR: self.air, SUPPLY_WATER: self.water}
         values = []
         for channel in channels:
             first, last = by_rule.get(channel.quantity, (0.5 * (channel.lower + channel.upper),) * 2)

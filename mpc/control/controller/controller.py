@@ -22,7 +22,7 @@ from mpc.scenario.forecast import Forecast
 from thermal._types import FloatArray
 
 Measured = Mapping[str, float]  # by ``ENTITY/POINT``
-_USUAL_HUMIDITY = 0.006  # kg/kg, as `thermal.hvac` has it where none is measured
+_USUAL_HUMIDITY = 0.006  # kg/kg, as `thermal.components` has it where none is measured
 
 
 @dataclass

@@ -11,22 +11,14 @@ import pandas as pd
 
 from mpc.control.problem.channels import Channel
 from mpc.errors import ControlError
+from mpc.loop.actuators import STATIC_PRESSURE, SUPPLY_AIR
 from mpc.scenario.forecast import Forecast
 from thermal._types import FloatArray
 from thermal.case.points import OUTDOOR_TEMPERATURE, ZONE_TEMPERATURE
 from thermal.errors import describe
-from thermal.hvac._smooth import SmoothHvac
-from thermal.hvac._system import HvacSystem
+from thermal.system.smooth import SmoothHvac
+from thermal.system.system import HvacSystem
 from thermal.units import AIR_HEAT_CAPACITY
-
-_POINTS = {
-    "supply_air_temperature": "supply_air_temperature_setpoint",
-    "supply_water_temperature": "supply_water_temperature_setpoint",
-    "static_pressure": "supply_air_static_pressure_setpoint",
-    "differential_pressure": "differential_pressure_setpoint",
-    "heating_setpoint": "zone_air_heating_temperature_setpoint",
-    "cooling_setpoint": "zone_air_cooling_temperature_setpoint",
-}
 
 
 @dataclass(frozen=True)
@@ -70,14 +62,14 @@ class SitePoints:
         """
         named: dict[str, float] = {}
         for channel, value in zip(channels, values, strict=True):
-            of_air = channel.quantity in ("supply_air_temperature", "static_pressure")
+            of_air = channel.quantity in (SUPPLY_AIR, STATIC_PRESSURE)
             chosen = range(hvac.n_air_handler) if channel.air_handlers is None else channel.air_handlers
             entities = [self.air_handlers[k] for k in chosen] if of_air else [self.boiler]
-            if channel.quantity in ("heating_setpoint", "cooling_setpoint"):
+            if channel.of_zones:
                 zones = set(range(hvac.n_zone) if channel.zones is None else channel.zones)
                 place = hvac.system.terminals.zone
                 entities = [name for name, zone in zip(self.terminals, place, strict=True) if int(zone) in zones]
-            named |= {f"{entity}/{_POINTS[channel.quantity]}": float(value) for entity in entities}
+            named |= {f"{entity}/{channel.quantity}": float(value) for entity in entities}
         return named
 
     def fit(self, system: HvacSystem) -> None:

@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 from mpc.control.problem.channels import Channel
 from mpc.control.problem.horizon import Horizon, HorizonData
 from mpc.errors import ControlError
+from mpc.loop.actuators import COOLING_SETPOINT, HEATING_SETPOINT, SUPPLY_AIR, SUPPLY_WATER
 from thermal._types import FloatArray
 from thermal.errors import describe
-from thermal.hvac._smooth import SmoothHvac
 from thermal.model.modal import ModalModel
 from thermal.model.step import IMPLICIT_EULER, Scheme
+from thermal.system.smooth import SmoothHvac
 from thermal.units import REFERENCE_TEMPERATURE
 
 _SETTLED = 1e-5  # K: what thermostats go by is found to within this
@@ -39,10 +40,10 @@ class Rollout:
         Powers, means over the steps [W].
     end_state : ndarray, shape (r,)
         Of the modes at the end [(W K)^0.5].
-    knobs : ndarray, shape (N, n_knob)
-        Water at the starts, and setpoints [K or Pa].
+    inputs : ndarray, shape (N, n_input)
+        States of the devices, such as the supply water, at the starts, and setpoints [K or Pa].
     sums : ndarray, shape (N, m)
-        Of the plant, where its slopes are taken [as in `thermal.hvac.HvacSlopes`].
+        Of the system, where its derivatives are taken [as in `thermal.system.smooth.HvacJacobian`].
     heat : ndarray, shape (N, n_zone)
         From the plant into the zones [W].
     air : ndarray, shape (N, n_air_handler)
@@ -57,7 +58,7 @@ class Rollout:
     electric: FloatArray
     fuel: FloatArray
     end_state: FloatArray
-    knobs: FloatArray
+    inputs: FloatArray
     sums: FloatArray
     heat: FloatArray
     air: FloatArray
@@ -123,7 +124,7 @@ class Predictor:
     the start of the step instead, proportional thermostats of 1 K swing from step to step at 5 minutes already. The
     equations are solved by Newton's method with the zones' own slopes, each zone within a bracket. Slopes are forward
     sensitivities of the single shooting, exact by the implicit function theorem: one column a decision, through the
-    modes (diagonal) and the plant (diagonal and low rank, `thermal.hvac.SmoothHvac`).
+    modes (diagonal) and the plant (diagonal and low rank, `thermal.system.smooth.SmoothHvac`).
     """
 
     def __init__(
@@ -139,13 +140,13 @@ class Predictor:
         if hvac.n_zone != n_zone:
             raise ControlError(describe("predictor", f"a plant of {n_zone} zones", f"one of {hvac.n_zone}"))
         self.hvac, self.channels = hvac, tuple(channels)
-        self.at = [channel.knobs(hvac) for channel in self.channels]
+        self.at = [channel.places(hvac) for channel in self.channels]
         used = np.concatenate(self.at) if self.at else np.zeros(0, dtype=np.intp)
         if not used.size or len(np.unique(used)) != used.size:
             expected = "at least one channel, and one for each setpoint"
             raise ControlError(describe("predictor", expected, f"{[c.name for c in self.channels]}"))
         self._prepare(modes, horizon, disturbance_time, scheme)
-        self._design, self._scheduled = self._design_knobs(), self._undecided_setpoints(used)
+        self._design, self._scheduled = self._design_inputs(), self._undecided_setpoints(used)
         self._stepper = hvac.stepper()
         self._known: tuple[HorizonData | None, FloatArray, FloatArray] = (None, np.zeros(0), np.zeros(0))
 
@@ -162,20 +163,23 @@ class Predictor:
         self._own = {dt: np.ascontiguousarray(np.diag(response)) for dt, response in self._response.items()}
         self._fading = np.exp(-horizon.edges[:-1] / disturbance_time)
 
-    def _design_knobs(self) -> FloatArray:
-        at, system = self.hvac.knobs, self.hvac.system
-        knobs = np.zeros(at.size)
-        knobs[at.supply_air], knobs[at.supply_water] = 288.15, 333.15
-        if at.differential_pressure is not None:
-            knobs[at.static_pressure] = system.static_pressures
-            knobs[at.differential_pressure] = system.loop.pump.differential_pressure
-        return knobs
+    def _design_inputs(self) -> FloatArray:
+        """Give the inputs that hold where no channel decides: design values, or usual ones where there are none."""
+        system, inputs = self.hvac.system, np.zeros(self.hvac.n_input)
+        usual = {SUPPLY_AIR: 288.15, SUPPLY_WATER: 333.15}
+        for point, at in self.hvac.inputs.items():
+            keys = system.by_point.get(point, ())
+            inputs[at] = usual.get(point, [system.defaults.get(key, 0.0) for key in keys] if keys else 0.0)
+        return inputs
 
     def _undecided_setpoints(self, used: NDArray[np.intp]) -> NDArray[np.intp]:
-        """Thermostats' setpoints among the knobs that no channel sets: they follow their schedule."""
-        at = self.hvac.knobs
-        heating, cooling = (np.arange(s.start, s.stop) for s in (at.heating_setpoint, at.cooling_setpoint))
-        highest, lowest = np.full(at.size, -np.inf), np.full(at.size, np.inf)
+        """Thermostats' setpoints among the inputs that no channel sets: they follow their schedule."""
+        at = self.hvac.inputs
+        heating, cooling = (np.arange(s.start, s.stop) for s in
+                            (at.get(kind, slice(0, 0)) for kind in (HEATING_SETPOINT, COOLING_SETPOINT)))  # fmt: skip
+        if not heating.size:
+            return heating
+        highest, lowest = np.full(self.hvac.n_input, -np.inf), np.full(self.hvac.n_input, np.inf)
         for channel, mine in zip(self.channels, self.at, strict=True):
             highest[mine], lowest[mine] = channel.upper, channel.lower
         if (highest[heating] > lowest[cooling]).any():
@@ -187,11 +191,13 @@ class Predictor:
     def _given(self, data: HorizonData) -> tuple[FloatArray, FloatArray]:
         """Give what no plan changes: surroundings of the plant, and drive of the modes; kept for one horizon."""
         if self._known[0] is not data:
-            around = self.hvac.around(
-                data.heating_setpoint, data.cooling_setpoint, data.outdoor_temperature, data.outdoor_humidity,
-                data.running, data.boiler, data.ventilation, self.horizon.steps,
-            )  # fmt: skip
-            self._known = (data, around, self._undecided(data))
+            exogenous = self.hvac.surroundings({
+                HEATING_SETPOINT: data.heating_setpoint, COOLING_SETPOINT: data.cooling_setpoint,
+                "outdoor_temperature": data.outdoor_temperature, "outdoor_humidity": data.outdoor_humidity,
+                "fan_running": data.running, "boiler_running": data.boiler, "ventilation": data.ventilation,
+                "seconds": self.horizon.steps,
+            })  # fmt: skip
+            self._known = (data, exogenous, self._undecided(data))
         return self._known[1], self._known[2]
 
     def _undecided(self, data: HorizonData) -> FloatArray:
@@ -202,18 +208,18 @@ class Predictor:
         steps = zip(self.horizon.steps, outside, free, strict=True)
         return np.stack([self._drive[dt] @ o + self._push[dt] @ f for dt, o, f in steps])
 
-    def knobs(self, plan: FloatArray) -> FloatArray:
-        """Spread a plan over the steps, shape (N, n_knob) [K or Pa]; water and schedules are left for the roll-out.
+    def inputs(self, plan: FloatArray) -> FloatArray:
+        """Spread a plan over the steps, shape (N, n_input) [K or Pa]; states and schedules are left for the roll-out.
 
         Parameters
         ----------
         plan : ndarray, shape (n_block, n_channel)
             Setpoints [unit of the channel].
         """
-        knobs = np.tile(self._design, (len(self.horizon), 1))
+        inputs = np.tile(self._design, (len(self.horizon), 1))
         for c, at in enumerate(self.at):
-            knobs[:, at] = plan[self.horizon.block_of, c][:, None]
-        return knobs
+            inputs[:, at] = plan[self.horizon.block_of, c][:, None]
+        return inputs
 
     def rollout(self, data: HorizonData, plan: FloatArray, near: Rollout | None = None) -> Rollout:
         """Follow a plan.
@@ -227,19 +233,19 @@ class Predictor:
         near : Rollout, optional
             One that is likely to be like this, to start from.
         """
-        n, count, stepper, water_at = self.n_zone, len(self.horizon), self._stepper, self.hvac.knobs.water
-        around, drive = self._given(data)
-        knobs, x, water = self.knobs(plan), data.state, data.water
+        n, count, stepper, n_state = self.n_zone, len(self.horizon), self._stepper, self.hvac.n_state
+        exogenous, drive = self._given(data)
+        inputs, x, device = self.inputs(plan), data.state, np.atleast_1d(data.water)
         if self._scheduled.size:
-            first = self.hvac.knobs.heating_setpoint.start
-            knobs[:, self._scheduled] = np.hstack([data.heating_setpoint, data.cooling_setpoint])[
+            first = self.hvac.inputs[HEATING_SETPOINT].start
+            inputs[:, self._scheduled] = np.hstack([data.heating_setpoint, data.cooling_setpoint])[
                 :, self._scheduled - first
             ]
         zone, seen, done = np.empty((count + 1, n)), np.empty((count, n)), np.empty((count, stepper.output.size))
         zone[0], ahead = self._output @ x + REFERENCE_TEMPERATURE, np.zeros(n)
         for k, dt in enumerate(self.horizon.steps):
-            knobs[k, water_at] = water
-            stepper.knobs[:], stepper.around[:] = knobs[k], around[k]
+            inputs[k, :n_state] = device
+            stepper.inputs[:], stepper.exogenous[:] = inputs[k], exogenous[k]
             left = self._end[dt] * x + drive[k]
             free = self._output @ left + REFERENCE_TEMPERATURE
             if near is not None:
@@ -247,12 +253,12 @@ class Predictor:
             seen[k] = self._settle(free, self._own[dt], zone[k] + ahead)
             ahead = seen[k] - zone[k]
             done[k] = stepper.output
-            water = done[k, n + 2]
+            device = done[k, n + 2 : n + 2 + n_state]
             x = left + self._push[dt] @ done[k, :n]
             zone[k + 1] = free + self._response[dt] @ done[k, :n]
-        sums, air = np.split(done[:, n + 3 : -n], [self.hvac.n_sum], axis=1)
+        sums, air = np.split(done[:, n + 2 + n_state : -n], [self.hvac.n_sum], axis=1)
         return Rollout(
-            plan, zone, seen, done[:, n], done[:, n + 1], x, knobs, np.ascontiguousarray(sums), done[:, :n], air,
+            plan, zone, seen, done[:, n], done[:, n + 1], x, inputs, np.ascontiguousarray(sums), done[:, :n], air,
             done[:, n + 2],
         )  # fmt: skip
 
@@ -271,10 +277,10 @@ class Predictor:
         """
         plan = rollout.plan.copy()
         for c, channel in enumerate(self.channels):
-            if channel.quantity == "supply_air_temperature":
-                which = self.at[c] - self.hvac.knobs.supply_air.start
+            if channel.quantity == SUPPLY_AIR:
+                which = self.at[c] - self.hvac.inputs[SUPPLY_AIR].start
                 found, there = rollout.air[:, which], data.running[:, which] > 0.0
-            elif channel.quantity == "supply_water_temperature":
+            elif channel.quantity == SUPPLY_WATER:
                 found, there = rollout.water[:, None], data.boiler[:, None] > 0.0
             else:
                 continue
@@ -316,32 +322,35 @@ class Predictor:
         rollout : Rollout
             Of `rollout`, with the same data.
         """
-        around, _ = self._given(data)
-        count, n_channel, water_at = len(self.horizon), len(self.channels), self.hvac.knobs.water
-        slopes = self.hvac.slopes(rollout.seen, rollout.knobs, around, rollout.sums)
-        heat_by = np.stack([slopes.heat_by_knobs[:, :, at].sum(axis=2) for at in self.at], axis=2)
-        total_by = np.stack([slopes.totals_by_knobs[:, :, at].sum(axis=2) for at in self.at], axis=2)
+        exogenous, _ = self._given(data)
+        count, n_channel, n_state = len(self.horizon), len(self.channels), self.hvac.n_state
+        jacobian = self.hvac.jacobian(rollout.seen, rollout.inputs, exogenous, rollout.sums)
+        heat_by = np.stack([jacobian.heat_by_inputs[:, :, at].sum(axis=2) for at in self.at], axis=2)
+        total_by = np.stack([jacobian.totals_by_inputs[:, :, at].sum(axis=2) for at in self.at], axis=2)
         own = np.stack([self._own[dt] for dt in self.horizon.steps])
-        # (I - g (local + reach pull))^-1 by the matrix inversion lemma: diagonal and rank m
-        diagonal = 1.0 - own * slopes.local
-        spread = (own / diagonal)[:, :, None] * slopes.reach
-        core = spread @ np.linalg.inv(np.eye(self.hvac.n_sum) - slopes.pull @ spread)
-        zone, totals = np.zeros((count + 1, self.n_zone, self.n_decision)), np.zeros((count, 3, self.n_decision))
-        states, water = np.zeros((self._output.shape[1], self.n_decision)), np.zeros(self.n_decision)
+        # (I - g (local + heat_by_sums sums_by_zone))^-1 by the matrix inversion lemma: diagonal and rank m
+        diagonal = 1.0 - own * jacobian.local
+        spread = (own / diagonal)[:, :, None] * jacobian.heat_by_sums
+        core = spread @ np.linalg.inv(np.eye(self.hvac.n_sum) - jacobian.sums_by_zone @ spread)
+        zone = np.zeros((count + 1, self.n_zone, self.n_decision))
+        totals = np.zeros((count, 2 + n_state, self.n_decision))
+        states = np.zeros((self._output.shape[1], self.n_decision))
+        device = np.zeros((n_state, self.n_decision))
         for k, dt in enumerate(self.horizon.steps):
             block = self.horizon.block_of[k]
             mine = slice(block * n_channel, (block + 1) * n_channel)
             acted = slice(0, mine.stop)  # later blocks have had no effect yet
             left = self._end[dt][:, None] * states[:, acted]
             free = self._output @ left
-            moved = free + np.outer(own[k] * slopes.heat_by_knobs[k, :, water_at], water[acted])
+            moved = free + (own[k][:, None] * jacobian.heat_by_inputs[k, :, :n_state]) @ device[:, acted]
             moved[:, mine] += own[k][:, None] * heat_by[k]
             moved /= diagonal[k][:, None]
-            moved += core[k] @ (slopes.pull[k] @ moved)
+            moved += core[k] @ (jacobian.sums_by_zone[k] @ moved)
             heat = (moved - free) / own[k][:, None]
-            total = slopes.totals_by_zone[k] @ moved + np.outer(slopes.totals_by_knobs[k, :, water_at], water[acted])
+            total = jacobian.totals_by_zone[k] @ moved
+            total += jacobian.totals_by_inputs[k, :, :n_state] @ device[:, acted]
             total[:, mine] += total_by[k]
-            totals[k, :, acted], water[acted] = total, total[2]
+            totals[k, :, acted], device[:, acted] = total, total[2:]
             states[:, acted] = left + self._push[dt] @ heat
             zone[k + 1, :, acted] = free + self._response[dt] @ heat
         return Sensitivity(zone, totals[:, 0], totals[:, 1], states)

@@ -3,20 +3,28 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mpc.errors import ControlError
+from mpc.loop.actuators import (
+    COOLING_SETPOINT,
+    DIFFERENTIAL_PRESSURE,
+    HEATING_SETPOINT,
+    STATIC_PRESSURE,
+    SUPPLY_AIR,
+    SUPPLY_WATER,
+)
+from thermal.components.registry import setpoints
 from thermal.errors import describe, nearest
-from thermal.hvac._smooth import SmoothHvac
+from thermal.system.smooth import SmoothHvac
 
-#: What a channel can set.
-Quantity = Literal[
-    "supply_air_temperature", "supply_water_temperature", "static_pressure", "differential_pressure",
-    "heating_setpoint", "cooling_setpoint",
-]  # fmt: skip
+_WORDS = {
+    SUPPLY_AIR: "supply air temperature", SUPPLY_WATER: "supply water temperature", STATIC_PRESSURE: "static pressure",
+    DIFFERENTIAL_PRESSURE: "differential pressure", HEATING_SETPOINT: "heating setpoint",
+    COOLING_SETPOINT: "cooling setpoint",
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -26,8 +34,7 @@ class Channel:
     Parameters
     ----------
     quantity : str
-        ``supply_air_temperature``, ``supply_water_temperature``, ``static_pressure``, ``differential_pressure``, or
-        ``heating_setpoint`` or ``cooling_setpoint`` of thermostats.
+        Type of the point, such as ``supply_air_temperature_setpoint`` or ``zone_air_heating_temperature_setpoint``.
     lower, upper : float
         Range [K or Pa].
     rate : float
@@ -43,7 +50,7 @@ class Channel:
         When the quantity is not known, or a number is out of its range.
     """
 
-    quantity: Quantity
+    quantity: str
     lower: float
     upper: float
     rate: float = np.inf
@@ -51,8 +58,8 @@ class Channel:
     zones: tuple[int, ...] | None = None
 
     def __post_init__(self) -> None:
-        if self.quantity not in get_args(Quantity):
-            advice = nearest(self.quantity, get_args(Quantity))
+        if self.quantity not in setpoints():
+            advice = nearest(self.quantity, setpoints())
             raise ControlError(describe("channel: quantity", "a setpoint of the plant", repr(self.quantity), advice))
         if not (-np.inf < self.lower < self.upper < np.inf and self.rate > 0.0):
             found = f"{self.lower!r} to {self.upper!r}, {self.rate!r} an hour"
@@ -61,48 +68,42 @@ class Channel:
     @property
     def unit(self) -> str:
         """``K`` or ``Pa``."""
-        return "Pa" if self.quantity.endswith("pressure") else "K"
+        return setpoints()[self.quantity].unit
 
     @property
     def name(self) -> str:
         """In words, for reports."""
         which = "" if self.air_handlers is None else f" of air handlers {', '.join(map(str, self.air_handlers))}"
         where = "" if self.zones is None else f" of zones {', '.join(map(str, self.zones))}"
-        return self.quantity.replace("_", " ") + which + where
+        return _WORDS.get(self.quantity, self.quantity.replace("_", " ")) + which + where
 
-    def knobs(self, hvac: SmoothHvac) -> NDArray[np.intp]:
-        """Tell where the setpoint stands among the knobs of a plant.
+    @property
+    def of_zones(self) -> bool:
+        """Whether it is a thermostat's setpoint."""
+        return self.quantity in (HEATING_SETPOINT, COOLING_SETPOINT)
+
+    def places(self, hvac: SmoothHvac) -> NDArray[np.intp]:
+        """Tell where the setpoint stands among the inputs of a system.
 
         Parameters
         ----------
         hvac : SmoothHvac
-            The plant.
+            The system.
 
         Raises
         ------
         ControlError
-            When an air handler or zone is not one of the plant's, or the plant's functions do not have the setpoint.
+            When an air handler or zone is not one of the system's, or its functions do not have the setpoint.
         """
-        places: dict[str, slice | int | None] = {
-            "supply_air_temperature": hvac.knobs.supply_air,
-            "supply_water_temperature": hvac.knobs.supply_water,
-            "static_pressure": hvac.knobs.static_pressure,
-            "differential_pressure": hvac.knobs.differential_pressure,
-            "heating_setpoint": hvac.knobs.heating_setpoint,
-            "cooling_setpoint": hvac.knobs.cooling_setpoint,
-        }
-        at = places[self.quantity]
-        if at is None or at == slice(0, 0):
+        at = hvac.inputs.get(self.quantity)
+        if at is None:
             kind = "pressures" if self.unit == "Pa" else "setpoints"
             advice = f"make the plant's functions with SmoothHvac(system, {kind}=True)"
             raise ControlError(describe(f"channel {self.quantity}", f"a plant whose {kind} can be set", "none", advice))
-        if isinstance(at, int):
-            return np.array([at], dtype=np.intp)
-        of_zones = self.quantity in ("heating_setpoint", "cooling_setpoint")
-        count, given = (hvac.n_zone, self.zones) if of_zones else (hvac.n_air_handler, self.air_handlers)
-        chosen = tuple(range(count)) if given is None else given
+        count, given = at.stop - at.start, self.zones if self.of_zones else self.air_handlers
+        chosen = tuple(range(count)) if given is None or count == 1 else given
         if not chosen or not set(chosen) <= set(range(count)):
-            expected = f"{'zones' if of_zones else 'air handlers'} from 0 to {count - 1}"
+            expected = f"{'zones' if self.of_zones else 'air handlers'} from 0 to {count - 1}"
             raise ControlError(describe(f"channel {self.quantity}", expected, repr(given)))
         return np.arange(at.start, at.stop, dtype=np.intp)[list(chosen)]
 
@@ -123,6 +124,6 @@ def supply_channels(
         Most change in an hour [K/h].
     """
     return (
-        Channel("supply_air_temperature", *air, air_rate),
-        Channel("supply_water_temperature", *water, water_rate),
+        Channel(SUPPLY_AIR, *air, air_rate),
+        Channel(SUPPLY_WATER, *water, water_rate),
     )

@@ -14,6 +14,7 @@ from mpc.control.predictor.predictor import Rollout
 from mpc.control.problem.channels import Channel
 from mpc.control.problem.horizon import HorizonData
 from mpc.control.problem.problem import ControlProblem, CostTerms
+from mpc.loop.actuators import SUPPLY_WATER
 from thermal._types import FloatArray
 
 
@@ -203,6 +204,6 @@ class Starts:
         """
         plan = rules.copy()
         for c, channel in enumerate(channels):
-            if channel.quantity == "supply_water_temperature":
+            if channel.quantity == SUPPLY_WATER:
                 plan[:, c] = channel.lower
         return plan

@@ -16,15 +16,16 @@ from mpc.control.problem.problem import ControlProblem
 from mpc.scenario.forecast import Forecast
 from mpc.scenario.scenario import zone_areas
 from thermal import SymbolicModel, build_network, load_bundled_case, reduced_model
-from thermal.hvac._air_handler import AirHandler
-from thermal.hvac._boiler import BoilerLoop, Pump
-from thermal.hvac._coil import WaterCoil
-from thermal.hvac._cooling import CoolingCoil
-from thermal.hvac._fan import Fan
-from thermal.hvac._smooth import SmoothHvac
-from thermal.hvac._system import HvacSystem
-from thermal.hvac._terminals import Terminals
+from thermal.components.air_handler import AirHandler
+from thermal.components.boiler_loop import BoilerLoop
+from thermal.components.cooling_coil import CoolingCoil
+from thermal.components.fan import Fan
+from thermal.components.pump import Pump
+from thermal.components.terminals import Terminals
+from thermal.components.water_coil import WaterCoil
 from thermal.model.modal import ModalModel, modal_model
+from thermal.system.smooth import SmoothHvac
+from thermal.system.system import HvacSystem, vav_system
 
 START = pd.Timestamp("2023-01-16 06:00", tz="Etc/GMT+8")
 DataMaker = Callable[..., HorizonData]
@@ -47,7 +48,7 @@ def system(modes: ModalModel) -> HvacSystem:
     coil = WaterCoil.sized(8.0 * 1006.0 * flow, flow)
     handler = AirHandler(Fan(flow, 900.0), Fan(flow, 300.0, 100.0), CoolingCoil(15.0 * 1006.0 * flow), coil)
     pump = Pump(float(terminals.water_flow.sum()) + coil.water_flow)
-    return HvacSystem((handler,), BoilerLoop(120.0 * areas.sum(), pump, water_volume=0.1), terminals)
+    return vav_system((handler,), BoilerLoop(120.0 * areas.sum(), pump, water_volume=0.1), terminals)
 
 
 @pytest.fixture(scope="session")

@@ -14,12 +14,12 @@ from mpc.control.problem.problem import ControlProblem
 from mpc.control.solvers.ipopt import IpoptSolver
 from mpc.control.solvers.sequential import SequentialSolver
 from mpc.errors import ControlError
-from thermal.hvac._smooth import SmoothHvac
-from thermal.hvac._system import HvacSystem
+from thermal.system.smooth import SmoothHvac
+from thermal.system.system import HvacSystem
 
-PRESSURES = (Channel("static_pressure", 60.0, 300.0), Channel("differential_pressure", 2e4, 9e4))
-HEATING = Channel("heating_setpoint", 289.0, 295.0, zones=(0, 2))
-COOLING = Channel("cooling_setpoint", 295.5, 300.0)
+PRESSURES = (Channel("supply_air_static_pressure_setpoint", 60.0, 300.0), Channel("differential_pressure_setpoint", 2e4, 9e4))
+HEATING = Channel("zone_air_heating_temperature_setpoint", 289.0, 295.0, zones=(0, 2))
+COOLING = Channel("zone_air_cooling_temperature_setpoint", 295.5, 300.0)
 
 
 @pytest.fixture(scope="module")
@@ -88,7 +88,7 @@ def test_a_lower_static_pressure_saves_fan_power(make, make_data) -> None:
 
 def test_setback_of_zones_that_nobody_needs_is_found(make, make_data) -> None:
     """Their band is wide, their schedule is not: a lower heating setpoint saves gas."""
-    problem = make(*supply_channels(), Channel("heating_setpoint", 289.0, 295.0), setpoints=True)
+    problem = make(*supply_channels(), Channel("zone_air_heating_temperature_setpoint", 289.0, 295.0), setpoints=True)
     fixed = make(*supply_channels(), setpoints=True)
     wide = np.full((len(problem.predictor.horizon), 5), 288.15)
     data = data_of(make_data, problem, 268.0, 293.0, lower=wide)
@@ -113,6 +113,6 @@ def test_what_does_not_fit_is_named(make) -> None:
     with pytest.raises(ControlError, match="setpoints=True"):
         make(HEATING)
     with pytest.raises(ControlError, match="zones from 0 to 4"):
-        make(Channel("heating_setpoint", 289.0, 295.0, zones=(7,)), setpoints=True)
+        make(Channel("zone_air_heating_temperature_setpoint", 289.0, 295.0, zones=(7,)), setpoints=True)
     with pytest.raises(ControlError, match="below those of cooling"):
-        make(HEATING, Channel("cooling_setpoint", 294.0, 300.0), setpoints=True)
+        make(HEATING, Channel("zone_air_cooling_temperature_setpoint", 294.0, 300.0), setpoints=True)

@@ -51,7 +51,7 @@ class Site:
         air, water = action["AHU/supply_air_temperature_setpoint"], action["BOILER/supply_water_temperature_setpoint"]
         gone = self.predictor.rollout(self.data(state=self.x, water=self.water), np.array([[air, water]]))
         self.x, self.heat, self.zone = gone.end_state, gone.heat[0], gone.zone[1]
-        self.water = self.predictor.rollout(self.data(state=self.x, water=self.water), gone.plan).knobs[0, 0]
+        self.water = self.predictor.rollout(self.data(state=self.x, water=self.water), gone.plan).inputs[0, 0]
         self.course.append(self.zone)
 
 

@@ -9,8 +9,8 @@ from mpc.control.predictor.predictor import Predictor
 from mpc.control.problem.channels import Channel
 from mpc.control.problem.horizon import Horizon, HorizonData
 from mpc.errors import ControlError
-from thermal.hvac._symbolic import hvac_function
 from thermal.model.step import IMPLICIT_EULER
+from thermal.system.symbolic import hvac_function
 
 
 def test_a_rollout_solves_plant_and_building_together(make_problem, make_data, hvac, modes) -> None:
@@ -22,10 +22,12 @@ def test_a_rollout_solves_plant_and_building_together(make_problem, make_data, h
     for k, dt in enumerate(predictor.horizon.steps):
         air, hot = plan[predictor.horizon.block_of[k]]
         done = function(
-            water=water, zone_temperature=found.seen[k], heating_setpoint=294.65, cooling_setpoint=296.65,
+            supply_water_temperature=water, zone_temperature=found.seen[k],
+            zone_air_heating_temperature_setpoint=294.65, zone_air_cooling_temperature_setpoint=296.65,
             outdoor_temperature=276.0, outdoor_humidity=0.003, return_humidity=0.006, room_temperature=293.15,
-            supply_air_temperature=air, supply_water_temperature=hot, static_pressure=250.0,
-            differential_pressure=80_000.0, running=1.0, boiler=1.0, ventilation=1.0, seconds=dt,
+            supply_air_temperature_setpoint=air, supply_water_temperature_setpoint=hot,
+            supply_air_static_pressure_setpoint=250.0, differential_pressure_setpoint=80_000.0, fan_running=1.0,
+            boiler_running=1.0, ventilation=1.0, seconds=dt,
         )  # fmt: skip
         heat, step = np.array(done["heat"]).ravel(), modes.propagator(dt, IMPLICIT_EULER)
         left = np.exp(-predictor.horizon.edges[k] / (6 * 3600.0)) * data.disturbance + data.gains[k]
@@ -33,7 +35,7 @@ def test_a_rollout_solves_plant_and_building_together(make_problem, make_data, h
         free = step.end * x + step.end_gain * drive
         own = np.diag(modes.output @ (step.end_gain[:, None] * modes.heating))
         np.testing.assert_allclose(found.seen[k], modes.output @ free + 293.15 + own * heat, atol=1e-5)
-        x, water = free + step.end_gain * (modes.heating @ heat), float(done["water_end"])
+        x, water = free + step.end_gain * (modes.heating @ heat), float(done["supply_water_temperature_end"])
         np.testing.assert_allclose(found.zone[k + 1], modes.output @ x + 293.15, atol=1e-5)
         assert found.electric[k] == pytest.approx(float(done["electric_power"]), rel=1e-9)
         assert found.fuel[k] == pytest.approx(float(done["fuel_power"]), rel=1e-9)
@@ -76,11 +78,11 @@ def test_heat_content_is_that_of_capacities(make_problem, modes) -> None:
 
 
 def test_two_channels_for_one_setpoint_are_refused(modes, hvac) -> None:
-    twice = (Channel("supply_air_temperature", 285.0, 300.0), Channel("supply_air_temperature", 285.0, 300.0))
+    twice = (Channel("supply_air_temperature_setpoint", 285.0, 300.0), Channel("supply_air_temperature_setpoint", 285.0, 300.0))
     with pytest.raises(ControlError, match="one for each setpoint"):
         Predictor(modes, hvac, Horizon.regular(1.0, 300.0, 2), twice)
     with pytest.raises(ControlError, match="pressures=True"):
-        Predictor(modes, hvac, Horizon.regular(1.0, 300.0, 2), (Channel("static_pressure", 100.0, 300.0),))
+        Predictor(modes, hvac, Horizon.regular(1.0, 300.0, 2), (Channel("supply_air_static_pressure_setpoint", 100.0, 300.0),))
 
 
 def test_what_is_not_finite_is_named(make_problem, make_data) -> None:

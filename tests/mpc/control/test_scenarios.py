@@ -64,7 +64,7 @@ def test_equal_scenarios_are_the_plain_problem(make_problem, make_data) -> None:
 
 def test_common_blocks_and_rates_of_every_branch(make_problem, make_data) -> None:
     channels = (
-        Channel("supply_air_temperature", 285.0, 300.0, 6.0), Channel("supply_water_temperature", 310.0, 355.0, 40.0),
+        Channel("supply_air_temperature_setpoint", 285.0, 300.0, 6.0), Channel("supply_water_temperature_setpoint", 310.0, 355.0, 40.0),
     )  # fmt: skip
     problem = make_problem(channels=channels)
     solver, data = ScenarioSolver(problem, draw_of(problem, 3), 3), make_data(problem, 300.0, 297.0)

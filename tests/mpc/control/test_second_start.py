@@ -14,8 +14,9 @@ from mpc.control.problem.horizon import Horizon, HorizonData
 from mpc.control.problem.problem import ControlProblem, CostTerms
 from mpc.control.solvers.sequential import SequentialSolver
 from mpc.control.solvers.solution import CHEAPER, Solution, Starts
-from thermal.hvac._air_handler import Heater
-from thermal.hvac._smooth import SmoothHvac
+from thermal.components.heater import Heater
+from thermal.system.smooth import SmoothHvac
+from thermal.system.system import vav_system
 
 NOW = pd.Timestamp("2023-01-16 10:00", tz="Etc/GMT+8")
 HOUR = pd.Timedelta(hours=1)
@@ -27,8 +28,8 @@ def plateau(modes, system, make_data) -> tuple[ControlProblem, HorizonData]:
     handler = system.air_handlers[0]
     small = replace(handler, heating=Heater(1006.0 * handler.supply_fan.design_flow))
     horizon = Horizon.growing([(1.0, 300.0), (2.0, 900.0)], [0.5, 0.5, 1.0, 1.0])
-    hvac = SmoothHvac(replace(system, air_handlers=(small,)), 0.005)
-    channels = (Channel("supply_air_temperature", 283.15, 313.15),)
+    hvac = SmoothHvac(vav_system((small,), system.loop, system.terminals, system.thermostat), 0.005)
+    channels = (Channel("supply_air_temperature_setpoint", 283.15, 313.15),)
     problem = ControlProblem(Predictor(modes, hvac, horizon, channels, 6 * 3600.0))
     return problem, make_data(problem, outdoor=283.0, zone=299.5, previous=np.array([313.15]))
 

@@ -34,7 +34,7 @@ def test_within_half_a_percent_of_ipopt(make_problem, make_data, outdoor: float)
 @pytest.mark.parametrize("quadratic", ["clarabel", "osqp"])
 def test_demand_charges_and_limits_on_changes(make_problem, make_data, quadratic) -> None:
     channels = (
-        Channel("supply_air_temperature", 285.0, 300.0, 6.0), Channel("supply_water_temperature", 310.0, 355.0, 40.0),
+        Channel("supply_air_temperature_setpoint", 285.0, 300.0, 6.0), Channel("supply_water_temperature_setpoint", 310.0, 355.0, 40.0),
     )  # fmt: skip
     problem = make_problem(channels=channels)
     data = make_data(problem, 303.0, 297.0, peaks=charged(problem))

@@ -21,9 +21,9 @@ from mpc.scenario.occupancy import RandomOccupancy
 from mpc.scenario.paper import paper_carbon, paper_tariff
 from mpc.scenario.scenario import Scenario, build_scenario
 from thermal import Building
-from thermal.hvac._system import HvacSystem
 from thermal.pilot.building import pilot_building
 from thermal.pilot.sizing import size_system
+from thermal.system.system import HvacSystem
 
 
 @cache

@@ -17,9 +17,9 @@ from mpc.scenario.grid import StepGrid
 from mpc.scenario.paper import paper_carbon, paper_tariff
 from mpc.scenario.scenario import Scenario, build_scenario
 from thermal import Building
-from thermal.hvac._system import HvacSystem
 from thermal.pilot.building import pilot_building
 from thermal.pilot.sizing import size_system
+from thermal.system.system import HvacSystem
 
 MakePlant = Callable[..., SimulatedPlant]
 

@@ -18,11 +18,11 @@ from mpc.scenario.weather import Weather
 from thermal import Building, build_network
 from thermal.effects.catalogue import CATALOGUE, chosen
 from thermal.errors import EffectError
-from thermal.hvac._system import HvacSystem
 from thermal.inputs.provider import telemetry_inputs
 from thermal.inputs.signals import signal_values
 from thermal.pilot.building import pilot_building
 from thermal.pilot.sizing import size_system
+from thermal.system.system import HvacSystem
 
 #: Effects that a plant cannot have, and what is said.
 REFUSED = {"clock_shift": "leave that effect out", "neighbour": "every side has windows"}

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.optimize import brentq
 
 from mpc.loop.local import LocalControl
-from thermal.hvac._system import HvacSystem
+from thermal.system.system import HvacSystem
 from thermal.units import AIR_HEAT_CAPACITY
 
 SUPPLY, REACH = (287.0, 287.0), (1.0, 1.0)

@@ -17,10 +17,10 @@ from mpc.loop.simulated import SimulatedPlant
 from mpc.scenario.gains import InternalGains
 from mpc.scenario.scenario import Scenario
 from thermal import Building, Case, SymbolicModel, Telemetry, build_network, reduced_model
+from thermal.components.terminals import Terminals
+from thermal.components.water_coil import WaterCoil
 from thermal.effects.catalogue import chosen
-from thermal.hvac._coil import WaterCoil
-from thermal.hvac._system import HvacSystem
-from thermal.hvac._terminals import Terminals
+from thermal.system.system import HvacSystem, vav_system
 
 AIR, WATER = "supply_air_temperature_setpoint", "supply_water_temperature_setpoint"
 NO_GAINS = InternalGains(sensible=0.0, latent=0.0, equipment=0.0, lights=0.0)
@@ -104,7 +104,7 @@ def test_without_a_fault_nothing_is_found(lab: Lab) -> None:
 
 def test_a_leaking_valve_is_in_its_terminal(lab: Lab) -> None:
     name = f"VAV_{lab.sick}"
-    leaky = replace(lab.system, terminals=Leaky(**vars_of(lab.system.terminals)))
+    leaky = lab.system.having(VAV=Leaky(**vars_of(lab.system.terminals)))
 
     def closed(frame: pd.DataFrame) -> None:
         idle = frame[f"{name}/zone_air_temperature_sensor"] > frame[f"{name}/zone_air_heating_temperature_setpoint"]
@@ -120,7 +120,7 @@ def test_a_leaking_valve_is_in_its_terminal(lab: Lab) -> None:
 def test_a_fouled_reheat_coil_is_in_its_terminal(lab: Lab) -> None:
     terminals = lab.system.terminals
     films = {f: np.where(np.arange(12) == SICK, 0.3, 1.0) * getattr(terminals, f) for f in ("air_film", "water_film")}
-    found = lab.find(replace(lab.system, terminals=replace(terminals, **films)))
+    found = lab.find(lab.system.having(VAV=replace(terminals, **films)))
     assert [gap.device for gap in found.located] == [f"VAV_{lab.sick}"]
 
 
@@ -131,7 +131,7 @@ def test_a_fouled_heating_coil_is_in_its_air_handler(lab: Lab) -> None:
     assert isinstance(coil, WaterCoil)
     fouled = replace(coil, air_conductance=0.1 * coil.air_conductance, water_conductance=0.1 * coil.water_conductance)
     handlers[0] = replace(handlers[0], heating=fouled)
-    found = lab.find(replace(lab.system, air_handlers=tuple(handlers)), setpoints={AIR: 297.15})
+    found = lab.find(vav_system(handlers, lab.system.loop, lab.system.terminals), setpoints={AIR: 297.15})
     assert {(g.subsystem, g.device) for g in found.located} == {("air handler", "AHU_F1")}
     assert found.located[0].signal == "supply air temperature"
 
@@ -139,7 +139,7 @@ def test_a_fouled_heating_coil_is_in_its_air_handler(lab: Lab) -> None:
 def test_a_stuck_economiser_is_in_its_air_handler(lab: Lab) -> None:
     handlers = list(lab.system.air_handlers)
     handlers[1] = replace(handlers[1], minimum_outdoor_share=0.9)
-    found = lab.find(replace(lab.system, air_handlers=tuple(handlers)))
+    found = lab.find(vav_system(handlers, lab.system.loop, lab.system.terminals))
     assert {(g.device, g.signal) for g in found.located} == {("AHU_F2", "mixed air temperature")}
 
 
@@ -154,7 +154,7 @@ def test_a_boiler_that_is_off_its_setpoint_is_in_the_hot_water(lab: Lab) -> None
 
 def test_a_boiler_that_wastes_gas_is_in_the_hot_water(lab: Lab) -> None:
     worn = replace(lab.system.loop, efficiency=0.75 * lab.system.loop.efficiency)
-    found = lab.find(replace(lab.system, loop=worn))
+    found = lab.find(lab.system.having(BOILER=worn))
     assert {(g.device, g.signal) for g in found.located} == {("BOILER", "gas power")}
     assert found.located[0].bias < 0.0  # a sound one would burn less
 

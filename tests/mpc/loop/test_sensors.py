@@ -17,7 +17,7 @@ from mpc.loop.simulated import SimulatedPlant
 from thermal import Building, load_case, save_case
 from thermal.case.building import Device
 from thermal.case.points import POINT_TYPES, split_column
-from thermal.hvac._system import HvacSystem
+from thermal.system.system import HvacSystem
 
 Drive = Callable[..., SimulatedPlant]
 

@@ -14,8 +14,8 @@ from mpc.loop.simulated import SimulatedPlant
 from mpc.scenario.scenario import Scenario
 from thermal import Building, build_network
 from thermal.effects.catalogue import chosen
-from thermal.hvac._system import HvacSystem
 from thermal.inputs.signals import signal_values
+from thermal.system.system import HvacSystem
 from thermal.units import AIR_HEAT_CAPACITY
 
 

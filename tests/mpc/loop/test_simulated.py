@@ -18,8 +18,8 @@ from mpc.loop.simulated import SimulatedPlant
 from mpc.scenario.forecast import Forecaster
 from mpc.scenario.scenario import Scenario
 from thermal import Building, Simulator, load_case, save_case
-from thermal.hvac._system import HvacSystem
 from thermal.model.simulator import Shuffle
+from thermal.system.system import HvacSystem
 
 Make = Callable[..., SimulatedPlant]
 
@@ -154,7 +154,8 @@ def test_hotter_water_never_makes_a_zone_colder_and_no_air_is_hotter_than_its_wa
         plant = drive(make_plant(), 72, {"BOILER/supply_water_temperature_setpoint": water})
         coldest.append(plant.record().zone_temperature[-1])
         for step in plant._steps:
-            assert (step.done.discharge <= np.maximum(step.done.loop.water, step.done.entering) + 1e-9).all()
+            air = step.done.terminals
+            assert (air.discharge <= np.maximum(step.done.water, air.entering) + 1e-9).all()
     assert np.diff(coldest, axis=0).min() > -0.1
     assert (coldest[-1] > coldest[0]).all()
 
@@ -169,7 +170,7 @@ def test_a_cold_building_is_heated_at_night(make_plant: Make, drive: Make, scena
     for cycle in (None, 0.5):
         plan = scheduled_operation(sc, 2, night_cycle=cycle)
         plant = drive(make_plant(sc, operation=plan), 50)
-        nights[cycle] = plant.record().zone_temperature[1:50].min(), max(s.actions.boiler for s in plant._steps)
+        nights[cycle] = plant.record().zone_temperature[1:50].min(), max(s.actions["BOILER/boiler_running"] for s in plant._steps)
     assert nights[None][1] == 0.0 and nights[0.5][1] == 1.0
     assert nights[0.5][0] > nights[None][0] + 0.2
 

@@ -13,10 +13,10 @@ from mpc.loop.noise import SensorNoise
 from mpc.loop.simulated import SimulatedPlant
 from mpc.studies.model import control_model
 from thermal import Building
-from thermal.hvac._system import HvacSystem
 from thermal.model.reduce import ReducedModel
 from thermal.pilot.building import pilot_building
 from thermal.pilot.sizing import size_system
+from thermal.system.system import HvacSystem
 
 
 @cache

@@ -1,0 +1,178 @@
+"""Radiators on the hot-water loop, all radiators of a building at once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Annotated, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from thermal._types import FloatArray
+from thermal.components.component import Conditions, EnergyBalance, Given, Group, IndexArray, Port, Range, Run
+from thermal.components.moist_air import WATER_HEAT_CAPACITY
+from thermal.components.operations import Operations, Value
+from thermal.components.streams import HotWater, SupplyWater, WaterDrawn
+from thermal.components.water_coil import LEAST_FLOW
+from thermal.errors import ModelError, describe
+
+_LEAST = 1e-6  # K: of an overtemperature, so that its powers have finite slopes
+
+
+class RadiatorStep(NamedTuple):
+    """What radiators did in a step; one value a radiator.
+
+    Parameters
+    ----------
+    valve_flow : Value
+        Water over that of an open valve [-].
+    heat : Value
+        Heat into the zone, air and surfaces together [W].
+    radiant_heat : Value
+        The part of it that falls on the surfaces [W].
+    """
+
+    valve_flow: Value
+    heat: Value
+    radiant_heat: Value
+
+
+@dataclass(frozen=True, eq=False)
+class Radiators(Group):
+    """Radiators with valves that open with the thermostat's call for heating.
+
+    Parameters
+    ----------
+    nominal_heat : float or numpy.ndarray, shape (n_radiator,)
+        Heat at nominal temperatures [W], positive.
+    zone : numpy.ndarray of int, shape (n_radiator,)
+        Position of the zone that each stands in.
+    exponent : float or numpy.ndarray, shape (n_radiator,)
+        Exponent of the overtemperature [-], 1.05 to 1.6. The default is a panel radiator's (EN 442-2: 1.2 to 1.4).
+    supply_temperature, return_temperature, room_temperature : float
+        Nominal temperatures [K]; the defaults are EN 442's 75, 65 and 20 degC.
+    radiant_share : float
+        Share of the heat that falls on the surfaces of the zone [-]. The default is EnergyPlus' for
+        ZoneHVAC:Baseboard:RadiantConvective:Water.
+
+    Notes
+    -----
+    Each piece of the surface gives ``(T_water - T_zone)^n`` of EN 442, as in Modelica's RadiatorEN442_2 with many
+    elements. Along the radiator ``m c d theta = -K theta^n dx``, which integrates to the heat
+
+    ``q = m c theta (1 - (1 + (n - 1) K theta^(n-1) / (m c))^(-1/(n-1)))``,  theta = T_supply - T_zone,
+
+    with K from the nominal temperatures. It lies within 2 % of ``q_nominal (dT / dT_nominal)^n`` of EN 442 with the
+    logarithmic mean, scales with the overtemperatures to the power n, and no water leaves colder than the zone.
+    """
+
+    label, device = "radiator", "radiator"
+    ports = (
+        Port("hot_water", "water", "kg/s"), Port("heat", "heat", "W", "each"),
+        Port("radiant_heat", "heat", "W", "each"),
+    )  # fmt: skip
+    sensors = ("heating_water_valve_percentage_command", "heating_power_sensor")
+
+    nominal_heat: Annotated[FloatArray, Range("W", 1e-3, 1e7)]
+    zone: IndexArray
+    exponent: Annotated[FloatArray | float, Range("-", 1.05, 1.6)] = 1.3
+    supply_temperature: Annotated[float, Range("K", 293.15, 373.15)] = 348.15
+    return_temperature: Annotated[float, Range("K", 293.15, 373.15)] = 338.15
+    room_temperature: Annotated[float, Range("K", 273.15, 313.15)] = 293.15
+    radiant_share: Annotated[float, Range("-", 0.0, 1.0)] = 0.3
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not self.room_temperature < self.return_temperature < self.supply_temperature:
+            found = f"{self.room_temperature:g}, {self.return_temperature:g} and {self.supply_temperature:g} K"
+            raise ModelError(describe("Radiators: nominal temperatures", "room < return < supply", found))
+
+    @classmethod
+    def sized(cls, heat: ArrayLike, zone: IndexArray) -> Radiators:
+        """Size radiators for the heat that they are to bring at nominal temperatures.
+
+        Parameters
+        ----------
+        heat : array_like, shape (n_radiator,)
+            Heat [W]; a radiator for nothing gets a watt.
+        zone : numpy.ndarray of int, shape (n_radiator,)
+            Positions of the zones.
+        """
+        return cls(np.maximum(np.asarray(heat, dtype=float), 1.0), zone)
+
+    @cached_property
+    def water_flow(self) -> FloatArray:
+        """Water through the open valves at the design differential pressure [kg/s]."""
+        return self.nominal_heat / (WATER_HEAT_CAPACITY * (self.supply_temperature - self.return_temperature))
+
+    @cached_property
+    def surface(self) -> FloatArray:
+        """K of the radiators [W/K^n]."""
+        ends = self.supply_temperature - self.room_temperature, self.return_temperature - self.room_temperature
+        less = self.exponent - 1.0
+        rate = self.nominal_heat / (self.supply_temperature - self.return_temperature)
+        return rate * (ends[1] ** -less - ends[0] ** -less) / less
+
+    def emitted(self, water_flow: Value, overtemperature: Value) -> Value:
+        """Heat [W] at a flow and an overtemperature of the supply water.
+
+        Parameters
+        ----------
+        water_flow : Value
+            Water [kg/s], not negative.
+        overtemperature : Value
+            Supply water above the zone [K], positive.
+        """
+        rate, less = WATER_HEAT_CAPACITY * (water_flow + LEAST_FLOW), self.exponent - 1.0
+        transfer = less * self.surface * overtemperature**less / rate
+        return rate * overtemperature * (1.0 - (1.0 + transfer) ** (-1.0 / less))
+
+    def run(self, ops: Operations, given: Given) -> Run:
+        """Open valves by the calls, and bring the water's heat into the zones.
+
+        Parameters
+        ----------
+        ops : Operations
+            Arithmetic.
+        given : Given
+            Calls of the thermostats and temperatures of the zones.
+        """
+        zone = self.of_zones(ops, given.conditions.zone_temperature)
+        valve_flow = self.of_zones(ops, given.calls.heating)
+        pipe: HotWater = yield "hot_water"
+        over = ops.positive(pipe.warmest - zone) + _LEAST
+        conductance = self.emitted(valve_flow * self.water_flow * pipe.opening, over) / over
+        drawn = self.total(ops, conductance), ops.dot(conductance, zone), ops.dot(valve_flow, self.water_flow)
+        given.put("hot_water", WaterDrawn(*drawn))
+        water: SupplyWater = yield "hot_water"
+        heat = conductance * (water.temperature - zone)
+        return RadiatorStep(valve_flow, heat, self.radiant_share * heat)
+
+    def energy(self, conditions: Conditions, done: RadiatorStep) -> EnergyBalance:
+        """Where the energy of a step went.
+
+        Parameters
+        ----------
+        conditions : Conditions
+            Of the step.
+        done : RadiatorStep
+            What `run` returned.
+        """
+        return EnergyBalance(zones=done.heat.sum(axis=-1))
+
+    def read(self, ops: Operations, given: Given, done: RadiatorStep, water: Value) -> list[Value]:
+        """Values of its points, one a radiator each.
+
+        Parameters
+        ----------
+        ops : Operations
+            Arithmetic.
+        given : Given
+            As `run` had it.
+        done : RadiatorStep
+            What `run` returned.
+        water : Value
+            Supply water at the end of the step [K].
+        """
+        return [done.valve_flow, done.heat]

@@ -1,0 +1,46 @@
+"""Which component a device of a case is, by its type; one's own are added with `register_component`."""
+
+from __future__ import annotations
+
+from thermal.components.air_handler import AirHandler
+from thermal.components.boiler_loop import BoilerLoop
+from thermal.components.component import Actuator, Component
+from thermal.components.radiators import Radiators
+from thermal.components.terminals import Terminals
+from thermal.components.thermostat import Thermostat
+from thermal.errors import ModelError, describe
+
+#: Classes of components by type of device.
+COMPONENTS: dict[str, type[Component]] = {kind.device: kind for kind in (Terminals, AirHandler, BoilerLoop, Radiators)}
+
+
+def register_component(kind: type[Component]) -> type[Component]:
+    """Let devices of a type be components of a class; a decorator.
+
+    Parameters
+    ----------
+    kind : type
+        A subclass of `Component` with a `device` of its own.
+
+    Returns
+    -------
+    type
+        The same.
+
+    Raises
+    ------
+    ModelError
+        The class names no type of device, or one that another class has.
+    """
+    known = COMPONENTS.get(kind.device)
+    if not kind.device or (known is not None and known.__qualname__ != kind.__qualname__):
+        expected = f"a type of device beside {', '.join(sorted(COMPONENTS))}"
+        raise ModelError(describe(f"component {kind.__name__}: device", expected, repr(kind.device)))
+    COMPONENTS[kind.device] = kind
+    return kind
+
+
+def setpoints() -> dict[str, Actuator]:
+    """Give the setpoints that a supervisory controller may decide, by type of the point."""
+    kinds: list[type[Component]] = [*COMPONENTS.values(), Thermostat]
+    return {a.point: a for kind in kinds for a in kind.actuators if a.usual is not None}

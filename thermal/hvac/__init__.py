@@ -1,1 +1,0 @@
-"""Heating, ventilation and air conditioning: the plant of a building, for simulation and for control."""

@@ -1,0 +1,1 @@
+"""Components joined into a system, compiled once to NumPy and to CasADi."""

@@ -1,0 +1,103 @@
+"""A system's signals under the point names of the case format, as its components declare and read them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from thermal._types import FloatArray
+from thermal.case.points import POINT_TYPES
+from thermal.components.boiler_loop import BoilerLoop
+from thermal.components.component import Calls, Component, Conditions, EnergyBalance
+from thermal.components.operations import StepOperations
+from thermal.system.exchange import givens
+from thermal.system.step import HvacStep
+from thermal.system.system import HvacSystem
+
+_NO_CALLS = Calls(None, None)
+
+
+class HvacPoints:
+    """Reads the components of a system as telemetry does, without noise.
+
+    Parameters
+    ----------
+    system : HvacSystem
+        The system, whose components have the names of the devices.
+    pressures : bool
+        Whether the pressures of ducts and loop are read too, their drives holding the setpoints while they run.
+    """
+
+    def __init__(self, system: HvacSystem, pressures: bool = False) -> None:
+        self.system, self._ops = system, StepOperations()
+        kinds: dict[type[Component], list[str]] = {}
+        for name in [*system.groups, *(n for n in system.singles if not isinstance(system.components[n], BoilerLoop)),
+                     *system.of_kind(BoilerLoop)]:  # fmt: skip
+            kinds.setdefault(type(system.components[name]), []).append(name)
+        #: Components of each kind, and which of their points are read.
+        self._read = [
+            (names, k)
+            for of_pressure in (False, True)[: 1 + pressures]
+            for kind, names in kinds.items()
+            for k, point in enumerate(kind.sensors)
+            if (POINT_TYPES[point].quantity == "pressure") == of_pressure
+        ]
+        #: Columns ``ENTITY/POINT`` in the order of `read`, point by point.
+        self.columns = tuple(
+            f"{entity}/{type(system.components[names[0]]).sensors[k]}"
+            for names, k in self._read
+            for name in names
+            for entity in system.entities(name)
+        )
+
+    def read(self, conditions: Conditions, actions: Mapping[str, float], step: HvacStep) -> FloatArray:
+        """Read all points after a step.
+
+        Parameters
+        ----------
+        conditions : Conditions
+            Of the step.
+        actions : mapping of str to float
+            For the step, by ``ENTITY/point`` [unit of the actuator].
+        step : HvacStep
+            What happened.
+
+        Returns
+        -------
+        numpy.ndarray, shape (n_column,)
+            In the library's units: kelvin, kg/s, W, shares.
+        """
+        system, water = self.system, step.water
+        given = givens(system, _NO_CALLS, conditions, actions, step.state, 0.0, _nowhere)
+        values = {
+            name: component.read(self._ops, given[name], step.results[name], water)
+            for name, component in system.components.items()
+        }
+        return np.concatenate([np.atleast_1d(values[name][k]) for names, k in self._read for name in names])
+
+
+def energy_balance(system: HvacSystem, conditions: Conditions, step: HvacStep) -> EnergyBalance:
+    """Add up where the energy of a step went, from its flows and temperatures.
+
+    Parameters
+    ----------
+    system : HvacSystem
+        The system.
+    conditions : Conditions
+        That it met.
+    step : HvacStep
+        What it did.
+
+    Returns
+    -------
+    EnergyBalance
+        Closes to round-off.
+    """
+    parts = [c.energy(conditions, step.results[name]) for name, c in system.components.items()]
+    return EnergyBalance(*(sum(terms) for terms in zip(*parts, strict=True)))
+
+
+def _nowhere(name: str) -> Any:
+    return None

@@ -1,0 +1,56 @@
+"""What a step of a system gives."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+from thermal.components.air_handler import AirHandlerStep
+from thermal.components.boiler_loop import LoopStep
+from thermal.components.operations import Value
+from thermal.components.terminals import TerminalStep
+
+
+class HvacStep(NamedTuple):
+    """What a system did in a step; powers are means over it.
+
+    Parameters
+    ----------
+    results : mapping of str to named tuple
+        What each component did, by its name.
+    state : tuple of Value
+        States at the end, in the order of `HvacSystem.states` [unit of the state].
+    electric_power, fuel_power : Value
+        Of everything; fuel on the higher heating value [W].
+    """
+
+    results: Mapping[str, Any]
+    state: tuple[Value, ...]
+    electric_power: Value
+    fuel_power: Value
+
+    @property
+    def air_handlers(self) -> tuple[AirHandlerStep, ...]:
+        """What the air handlers did."""
+        return tuple([r for r in self.results.values() if type(r) is AirHandlerStep])
+
+    @property
+    def terminals(self) -> TerminalStep:
+        """What the terminals did."""
+        return next(r for r in self.results.values() if type(r) is TerminalStep)
+
+    @property
+    def loop(self) -> LoopStep:
+        """What the hot-water loop did."""
+        return next(r for r in self.results.values() if type(r) is LoopStep)
+
+    @property
+    def water(self) -> Value:
+        """Supply water at the end [K]."""
+        return self.loop.supply_water_temperature
+
+    @property
+    def supply_temperature(self) -> tuple[Value, ...]:
+        """Supply air of the air handlers [K]."""
+        water = self.water
+        return tuple([done.supply_temperature(water) for done in self.air_handlers])

@@ -1,0 +1,390 @@
+"""A building's HVAC system: components, how their ports are connected, and what follows from both."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any, NamedTuple, TypeVar
+
+import numpy as np
+
+from thermal._types import FloatArray
+from thermal.components.air_handler import AirHandler
+from thermal.components.boiler_loop import BoilerLoop
+from thermal.components.component import Actuator, Component, Group, Port, State
+from thermal.components.operations import Operations, Value
+from thermal.components.terminals import Terminals
+from thermal.components.thermostat import Thermostat
+from thermal.components.water_coil import WaterCoil
+from thermal.errors import ModelError, describe, nearest
+
+_Kind = TypeVar("_Kind", bound=Component)
+
+
+class Connection(NamedTuple):
+    """A port that draws, and what supplies it.
+
+    Parameters
+    ----------
+    consumer, port : str
+        Name of the component that draws, and of its port.
+    suppliers : tuple of str
+        Names of the components that supply; one, or for a port of shape ``each`` those that its elements point to.
+    """
+
+    consumer: str
+    port: str
+    suppliers: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class HvacSystem:
+    """Components of a building's HVAC system and how they are connected.
+
+    Parameters
+    ----------
+    components : mapping of str to Component
+        By name.
+    connections : tuple of Connection
+        Of all ports that draw.
+    thermostat : Thermostat
+        Of every zone.
+    names : mapping of str to tuple of str
+        Names of the elements of groups; the group's with a number by default.
+
+    Raises
+    ------
+    ModelError
+        When a connection does not fit its components, or a zone has nothing that heats or cools it.
+    """
+
+    components: Mapping[str, Component]
+    connections: tuple[Connection, ...]
+    thermostat: Thermostat = field(default_factory=Thermostat)
+    names: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for consumer, port, suppliers in self.connections:
+            for name in (consumer, *suppliers):
+                if name not in self.components:
+                    advice = nearest(name, self.components)
+                    raise ModelError(describe("HvacSystem: connection", "a component", repr(name), advice))
+            quantity = self.port(consumer, port).quantity
+            for name in suppliers:
+                self.supplying(name, quantity)
+        zones = np.unique(np.concatenate([g.zone for g in self.groups.values()] or [np.zeros(0, dtype=np.intp)]))
+        if not len(zones) or len(zones) != zones[-1] + 1:
+            missing = sorted(set(range(int(zones[-1]) if len(zones) else 1)) - set(zones.tolist()))
+            raise ModelError(describe("HvacSystem", "a terminal in each zone", f"none in zones {missing[:8]}"))
+
+    def port(self, component: str, name: str) -> Port:
+        """Find a port of a component.
+
+        Parameters
+        ----------
+        component, name : str
+            Names.
+        """
+        ports = {port.name: port for port in self.components[component].ports}
+        if name not in ports:
+            raise ModelError(describe(f"{component}: port", "one of its ports", repr(name), nearest(name, ports)))
+        return ports[name]
+
+    def supplying(self, component: str, quantity: str) -> str:
+        """Name of the port through which a component supplies a quantity.
+
+        Parameters
+        ----------
+        component, quantity : str
+            Name; ``air`` or ``water``.
+        """
+        for port in self.components[component].ports:
+            if port.supplies and port.quantity == quantity:
+                return port.name
+        raise ModelError(describe(f"{component}: port", f"one that supplies {quantity}", "none"))
+
+    def of_kind(self, kind: type[_Kind]) -> dict[str, _Kind]:
+        """Components of a class, by name.
+
+        Parameters
+        ----------
+        kind : type
+            The class.
+        """
+        return {name: c for name, c in self.components.items() if isinstance(c, kind)}
+
+    @cached_property
+    def groups(self) -> dict[str, Group]:
+        """Components that have an element in each of some zones."""
+        return self.of_kind(Group)
+
+    @cached_property
+    def singles(self) -> dict[str, Component]:
+        """Components that there is one of, or a few."""
+        return {name: c for name, c in self.components.items() if name not in self.groups}
+
+    @cached_property
+    def air_handlers(self) -> tuple[AirHandler, ...]:
+        """The air handlers."""
+        return tuple(self.of_kind(AirHandler).values())
+
+    @cached_property
+    def loop(self) -> BoilerLoop:
+        """The hot-water loop."""
+        return next(iter(self.of_kind(BoilerLoop).values()))
+
+    @cached_property
+    def terminals(self) -> Terminals:
+        """The VAV terminals."""
+        return next(iter(self.of_kind(Terminals).values()))
+
+    @cached_property
+    def zone_count(self) -> int:
+        """Zones that are heated or cooled."""
+        return 1 + max(int(group.zone.max()) for group in self.groups.values())
+
+    def by_zone(self, values: FloatArray) -> FloatArray:
+        """Sum values of the terminals, one a zone, shape (n_zone,).
+
+        Parameters
+        ----------
+        values : ndarray, shape (n_terminal,)
+            Values [any].
+        """
+        return np.bincount(self.terminals.zone, values, self.zone_count).astype(float)
+
+    @cached_property
+    def rooms(self) -> dict[str, FloatArray]:
+        """Elements of each zone as 1 of 0 and 1, by group, (n_element, n_zone)."""
+        return {name: np.eye(self.zone_count)[group.zone] for name, group in self.groups.items()}
+
+    @cached_property
+    def static_pressures(self) -> tuple[float, ...]:
+        """Design static pressures of the air handlers [Pa]."""
+        return tuple(handler.design_pressure for handler in self.air_handlers)
+
+    @cached_property
+    def states(self) -> tuple[tuple[str, State], ...]:
+        """States, each with the component that has it."""
+        return tuple((name, state) for name, c in self.singles.items() for state in c.states)
+
+    @cached_property
+    def actuators(self) -> dict[str, tuple[str, Actuator]]:
+        """Actuators by ``ENTITY/point``, each with the component that has it."""
+        return {f"{name}/{a.point}": (name, a) for name, c in self.singles.items() for a in c.actuators}
+
+    @cached_property
+    def defaults(self) -> dict[str, float]:
+        """Values of the actuators that need not be given, by ``ENTITY/point`` [unit of the actuator]."""
+        return {
+            key: float(getattr(self.components[name], a.default) if isinstance(a.default, str) else a.default)
+            for key, (name, a) in self.actuators.items()
+            if a.default is not None
+        }
+
+    @cached_property
+    def by_point(self) -> dict[str, tuple[str, ...]]:
+        """Actuators of each type, by the type of the point."""
+        points = dict.fromkeys(a.point for _, a in self.actuators.values())
+        return {p: tuple(key for key, (_, a) in self.actuators.items() if a.point == p) for p in points}
+
+    def actions(self, **values: Any) -> dict[str, Any]:
+        """Spread values of points over the components that have them.
+
+        Parameters
+        ----------
+        **values
+            By type of the point, one value for all or one each [unit of the actuator].
+
+        Returns
+        -------
+        dict
+            By ``ENTITY/point``.
+
+        Raises
+        ------
+        ModelError
+            When no component has such an actuator, or there are not as many values.
+        """
+        found: dict[str, Any] = {}
+        for point, value in values.items():
+            if point not in self.by_point:
+                raise ModelError(describe("actions", "a point", repr(point), nearest(point, self.by_point)))
+            keys, plain = self.by_point[point], value.tolist() if isinstance(value, np.ndarray) else value
+            each = list(plain) if isinstance(plain, tuple | list) else [plain] * len(keys)
+            if len(each) != len(keys):
+                raise ModelError(describe(point, f"one value or {len(keys)}, one a component", f"{len(each)} values"))
+            found |= zip(keys, each, strict=True)
+        return found
+
+    def entities(self, name: str) -> tuple[str, ...]:
+        """Names under which a component, or each element of a group, is known.
+
+        Parameters
+        ----------
+        name : str
+            Of the component.
+        """
+        component = self.components[name]
+        if not isinstance(component, Group):
+            return (name,)
+        return self.names.get(name) or tuple(f"{name}_{k}" for k in range(len(component)))
+
+    def named(self, names: Mapping[type[Component], Sequence[str]]) -> HvacSystem:
+        """Give components and elements of groups the names that a building has for them.
+
+        Parameters
+        ----------
+        names : mapping of type to sequence of str
+            By class, in the order of the system.
+
+        Raises
+        ------
+        ModelError
+            There are too many names, too few, or the same twice.
+        """
+        new: dict[str, str] = {}
+        elements, parts = dict(self.names), list[str]()
+        given = [name for each in names.values() for name in each]
+        fits = len(set(given)) == len(given)
+        for kind, each in names.items():
+            mine = self.of_kind(kind)
+            count = sum(len(self.entities(name)) for name in mine)
+            parts += [f"{count} {kind.label}s"] * (count > 1)
+            fits &= count == len(each)
+            if issubclass(kind, Group):
+                elements |= {name: tuple(each) for name in mine}
+            else:
+                new |= zip(mine, each, strict=False)
+        if not fits:
+            found = f"{', '.join(str(len(each)) for each in names.values())}, {len(set(given))} different"
+            raise ModelError(describe("names", f"{' and '.join(parts)}, all named differently", found))
+        known = {name: new.get(name, name) for name in self.components}
+        return replace(
+            self,
+            components={known[name]: c for name, c in self.components.items()},
+            connections=tuple(
+                Connection(known[c.consumer], c.port, tuple(known[s] for s in c.suppliers)) for c in self.connections
+            ),
+            names=elements,
+        )
+
+    def having(self, **components: Component) -> HvacSystem:
+        """Replace components by others of the same ports.
+
+        Parameters
+        ----------
+        **components : Component
+            By name.
+        """
+        return replace(self, components={**self.components, **components})
+
+    def with_group(self, name: str, group: Group, **suppliers: str | tuple[str, ...]) -> HvacSystem:
+        """Add a group, such as radiators, and connect its ports.
+
+        Parameters
+        ----------
+        name : str
+            Of the group.
+        group : Group
+            The group.
+        **suppliers : str or tuple of str
+            Names of the components that supply it, by port.
+        """
+        more = [Connection(name, port, (s,) if isinstance(s, str) else s) for port, s in suppliers.items()]
+        return replace(
+            self, components={**self.components, name: group}, connections=(*self.connections, *more)
+        )  # fmt: skip
+
+    def at_zones(self, ops: Operations, results: Mapping[str, Any], port: str = "heat") -> Value:
+        """Sum the heat that groups bring into the zones, one a zone [W].
+
+        Parameters
+        ----------
+        ops : Operations
+            Arithmetic.
+        results : mapping of str to named tuple
+            What components did.
+        port : str
+            Of the heat: all of it, or the radiant part.
+        """
+        total: Value = None
+        for name, group in self.heating.get(port, ()):
+            values = getattr(results[name], port)
+            if group.one_each != self.zone_count:
+                values = ops.gather(values, self.rooms[name])
+            total = values if total is None else total + values
+        return np.zeros(self.zone_count) if total is None else total
+
+    @cached_property
+    def heating(self) -> dict[str, list[tuple[str, Group]]]:
+        """Groups that bring heat into zones, by port."""
+        found: dict[str, list[tuple[str, Group]]] = {}
+        for name, group in self.groups.items():
+            for port in group.ports:
+                if port.quantity == "heat":
+                    found.setdefault(port.name, []).append((name, group))
+        return found
+
+    def powers(self, ops: Operations, results: Mapping[str, Any]) -> tuple[Value, Value]:
+        """Electric and fuel power of all components that have a result [W].
+
+        Parameters
+        ----------
+        ops : Operations
+            Arithmetic.
+        results : mapping of str to named tuple
+            What components did.
+        """
+        totals: list[Value] = [0.0, 0.0]
+        for place, port, name, group in self._metered:
+            if name in results:
+                power = getattr(results[name], port)
+                totals[place] = totals[place] + (power if group is None else group.total(ops, power))
+        return totals[0], totals[1]
+
+    @cached_property
+    def _metered(self) -> list[tuple[int, str, str, Group | None]]:
+        kinds = {"electricity": 0, "fuel": 1}
+        return [
+            (kinds[port.quantity], port.name, name, self.groups.get(name))
+            for name, c in self.components.items()
+            for port in c.ports
+            if port.quantity in kinds
+        ]
+
+
+def vav_system(
+    air_handlers: Sequence[AirHandler], loop: BoilerLoop, terminals: Terminals, thermostat: Thermostat | None = None
+) -> HvacSystem:
+    """Join air handlers, a hot-water loop and terminals, the usual system of an office.
+
+    Parameters
+    ----------
+    air_handlers : sequence of AirHandler
+        At least one; they become ``AHU_0`` and so on.
+    loop : BoilerLoop
+        The hot-water loop, ``BOILER``, that every water coil draws from.
+    terminals : Terminals
+        Each supplied by one of the air handlers; the group is ``VAV``.
+    thermostat : Thermostat, optional
+        Of every zone.
+
+    Raises
+    ------
+    ModelError
+        When an air handler has no terminal, or a terminal none of the air handlers.
+    """
+    n, supplied = len(air_handlers), set(terminals.air_handler.tolist())
+    if n == 0 or not supplied or supplied != set(range(n)):
+        expected = "at least one air handler, each with a terminal of its own"
+        advice = "Terminals.air_handler holds positions in air_handlers"
+        raise ModelError(describe("HvacSystem", expected, f"{n} of them and terminals at {supplied}", advice))
+    handlers = {f"AHU_{k}": handler for k, handler in enumerate(air_handlers)}
+    wet = [name for name, handler in handlers.items() if isinstance(handler.heating, WaterCoil)]
+    connections = [Connection("VAV", "supply_air", tuple(handlers))]
+    connections += [Connection(name, "hot_water", ("BOILER",)) for name in ("VAV", *wet)]
+    return HvacSystem(
+        {"VAV": terminals, **handlers, "BOILER": loop}, tuple(connections), thermostat or Thermostat()
+    )  # fmt: skip
