@@ -84,8 +84,7 @@ def filter_interval(
     chosen = settings or FilterSettings()
     ready = prepare(model, theta, inputs, chosen.scheme)
     kalman = KalmanFilter(ready.space, disturbance, covariance=chosen.covariance, tolerance=chosen.tolerance)
-    begin, at, stop = rows_of(inputs, interval, chosen)
-    return kalman.filter(inputs, at, stop, *ready.start(begin, at))
+    return kalman.filter(inputs, *ready.interval(interval, chosen))
 
 
 @dataclass(frozen=True)
@@ -117,6 +116,19 @@ class _Prepared:
         states, _ = spin_up(self.matrices, self.inputs, begin, np.array([at]))
         held = np.isfinite(self.inputs.held[begin])
         return states, start_spread(self.matrices.modal.modes, self.inputs.step, at - begin, held)
+
+    def interval(self, interval: Interval, settings: FilterSettings) -> tuple[int, int, FloatArray, FloatArray]:
+        """Row at which the filter of an interval starts and the last one, see `rows_of`, and what it starts from.
+
+        Parameters
+        ----------
+        interval : Interval
+            What is filtered.
+        settings : FilterSettings
+            With the longest spin-up.
+        """
+        begin, at, stop = rows_of(self.inputs, interval, settings)
+        return at, stop, *self.start(begin, at)
 
 
 def prepare(model: SymbolicModel, theta: FloatArray, inputs: Inputs, scheme: Scheme) -> _Prepared:

@@ -10,7 +10,7 @@ import scipy.optimize as so
 
 from calibration.errors import FilterError
 from calibration.estimation.disturbance import DisturbanceModel
-from calibration.estimation.filtered import FilterSettings, prepare, rows_of
+from calibration.estimation.filtered import FilterSettings, prepare
 from calibration.estimation.kalman import Filtered, KalmanFilter
 from calibration.estimation.smoother import log_likelihood_slopes
 from calibration.estimation.state_space import StateSpace
@@ -197,10 +197,7 @@ def tune_disturbance(
         raise FilterError("tune: expected at least one interval, came none")
     chosen = settings or TuningSettings()
     ready = prepare(model, theta, inputs, chosen.scheme)
-    parts = []
-    for interval in intervals:
-        begin, at, stop = rows_of(inputs, interval, chosen)
-        parts.append(_Part(at, stop, *ready.start(begin, at)))
+    parts = [ready.interval(interval, chosen) for interval in intervals]
     numbers = _numbers(model.network.zones, chosen)
     tuning = _Tuning(ready.space, inputs, parts, numbers, chosen)
     bounds = [(np.log(p.lower), np.log(p.upper)) for p in numbers.values()]
@@ -241,14 +238,8 @@ def air_volumes(network: ThermalNetwork) -> FloatArray:
     return np.asarray(volumes, dtype=float)
 
 
-@dataclass(frozen=True)
-class _Part:
-    """Rows of an interval, and what its filter starts from."""
-
-    at: int
-    stop: int
-    states: FloatArray
-    spread: FloatArray
+#: Row at which the filter of an interval starts, its last row, and what it starts from.
+_Part = tuple[int, int, FloatArray, FloatArray]
 
 
 class _Tuning:
@@ -264,7 +255,7 @@ class _Tuning:
     ) -> None:
         self.space, self.inputs, self.parts, self.numbers, self.settings = space, inputs, parts, numbers, settings
         self.time_constant, weights = settings.time_constant, _shares(settings.weights, space.n_zone)
-        seen = np.concatenate([np.isfinite(inputs.zone[s.at + 1 : s.stop + 1]) for s in parts])
+        seen = np.concatenate([np.isfinite(inputs.zone[at + 1 : stop + 1]) for at, stop, *_ in parts])
         self.count = int(seen.sum())
         walks = self.time_constant is not None and np.isinf(self.time_constant)
         self.weights = np.where(seen.any(axis=0), weights, 0.0) if walks else weights  # nothing holds a walk unseen
@@ -292,7 +283,7 @@ class _Tuning:
         """Filter every interval."""
         chosen = self.settings
         kalman = KalmanFilter(self.space, disturbance, covariance=chosen.covariance, tolerance=chosen.tolerance)
-        return [kalman.filter(self.inputs, s.at, s.stop, s.states, s.spread) for s in self.parts]
+        return [kalman.filter(self.inputs, *part) for part in self.parts]
 
     def cost(self, x: FloatArray) -> tuple[float, FloatArray]:
         """Cost and its derivatives [-]."""
