@@ -170,3 +170,17 @@ def test_the_simulator_rests_where_effects_and_heat_balance(lively_case: CaseOf)
     cold = np.full(2, 283.15)
     assert plant.reset(cold, cold, signals) == pytest.approx(cold, abs=1e-9)
     assert plant.step(np.zeros(2), cold, np.zeros(1), signals) == pytest.approx(cold, abs=1e-9)
+
+
+def test_a_strength_that_a_solver_leaves_a_hair_below_zero_is_absent(lively_case: CaseOf) -> None:
+    """Ipopt relaxes bounds by 1e-8; a conductance that is negative in earnest is refused."""
+    network = build_network(lively_case("plan").building, effects=chosen(["infiltration"]))
+    model, at = SymbolicModel(network), [p.name for p in network.parameters].index("infiltration_by_wind")
+    theta = network.start()
+    theta[at] = -1e-8
+    relaxed, absent = model.matrices(theta).flow, model.matrices(network.start()).flow
+    n = network.n_node + len(network.boundaries)
+    assert (relaxed[:, :n] != absent[:, :n]).nnz == 0
+    theta[at] = -1e-2
+    with pytest.raises(ModelError, match="negative"):
+        model.matrices(theta)

@@ -26,6 +26,10 @@ class Matrices(Pencil):
         return ModalRuns(self)
 
 
+#: Conductance below zero that counts as zero [its unit]: Ipopt relaxes the bounds of a strength by 1e-8.
+_RELAXED = 1e-6
+
+
 class SymbolicModel:
     """A network's conductances and capacities as CasADi functions of θ, differentiated by CasADi.
 
@@ -124,7 +128,8 @@ class SymbolicModel:
         for p, t in zip(self.network.parameters, theta, strict=True):
             if p.scale == "logit" and t > 1:
                 raise ModelError(f"theta: expected a probability of at most 1, came {t} for {p.name}")
-        kappa, heat = (np.asarray(v).ravel() for v in self.classes(theta))
+        kappa, heat = (np.array(v).ravel() for v in self.classes(theta))
+        kappa[(kappa < 0.0) & (kappa > -_RELAXED)] = 0.0
         negative = [c.name for c, k in zip(self._faces, kappa, strict=False) if not (np.isfinite(k) and k >= 0)]
         if negative:
             raise ModelError(
