@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pickle
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from mpc.loop.noise import SensorNoise
 from mpc.loop.operation import scheduled_operation
 from mpc.loop.simulated import SimulatedPlant
 from mpc.scenario.forecast import Forecaster
+from mpc.scenario.gains import InternalGains
 from mpc.scenario.scenario import Scenario
 from thermal import Building, Simulator, load_case, save_case
 from thermal.model.simulator import Shuffle
@@ -162,10 +164,9 @@ def test_hotter_water_never_makes_a_zone_colder_and_no_air_is_hotter_than_its_wa
 
 def test_a_cold_building_is_heated_at_night(make_plant: Make, drive: Make, scenario: Callable[..., Scenario]) -> None:
     """Without a night cycle it cools through; with one the air handlers run for a while."""
-    sc = scenario()
-    sc = sc.__class__(**{**vars(sc), "gains": 0.0 * sc.gains, "expected_gains": 0.0 * sc.expected_gains})
+    sc = replace(scenario(), heat=InternalGains(sensible=0.0, equipment=0.0, lights=0.0))
     warm = np.where(sc.lower < 290.0, 292.15, sc.lower)
-    sc = sc.__class__(**{**{k: v for k, v in vars(sc).items() if k != "floor_area"}, "lower": warm})
+    sc = replace(sc, lower=warm)
     nights = {}
     for cycle in (None, 0.5):
         plan = scheduled_operation(sc, 2, night_cycle=cycle)
