@@ -45,7 +45,7 @@ class Arms:
         if wanted > split > 1:
             raise ModelError(
                 f"structure.wall_nodes: expected at most {split} with dx = {floor.grid.spacing:g} m, which splits a "
-                f"wall of {thickness:g} m into {split} nodes, came {wanted}; leave dx or choose fewer nodes"
+                f"wall of {thickness:g} m into {split} nodes, got {wanted}; leave dx or choose fewer nodes"
             )
         self.floor, self.conductivity = floor, conductivity
         through = wanted if split == 1 else 1
