@@ -100,11 +100,8 @@ class Zone:
         key = graph.key(kind, self.name, *self.film_names, *depends, facade=facade)
         solid_, area_ = np.atleast_1d(solid), np.atleast_1d(np.asarray(area, float))
         if air is None:
-            air_solid, air_area, air_node = (
-                np.repeat(solid_, self.air.size),
-                np.outer(area_, self.share).ravel(),
-                np.tile(self.air, solid_.size),
-            )
+            air_solid, air_node = np.repeat(solid_, self.air.size), np.tile(self.air, solid_.size)
+            air_area = np.outer(area_, self.share).ravel()
         else:
             air_solid, air_area, air_node = np.broadcast_to(solid_, air.shape), np.broadcast_to(area_, air.shape), air
         if radiant < 0:

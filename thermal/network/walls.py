@@ -219,12 +219,8 @@ class Walls:
         """Faces between wall volumes in a direction; glass leaves the share ``along`` of those of exterior walls."""
         half, spacing = 0.5 * self.grid.cell, self.grid.spacing
         mixed = series(self.conductivity / half, inner / half)
-        for a, b, value in (
-            ("#", "#", self.conductivity / spacing),
-            ("+", "+", inner / spacing),
-            ("#", "+", mixed),
-            ("+", "#", mixed),
-        ):
+        values = {"##": self.conductivity / spacing, "++": inner / spacing, "#+": mixed, "+#": mixed}
+        for (a, b), value in values.items():
             first, second, faces = self.floor.pairs(FACADES[facade], a, b, along if a == b == "#" else None)
             if first.size:
                 key = "-".join(sorted((_KINDS[a], _KINDS[b])))
