@@ -220,10 +220,10 @@ class Walls:
         half, spacing = 0.5 * self.grid.cell, self.grid.spacing
         mixed = series(self.conductivity / half, inner / half)
         values = {"##": self.conductivity / spacing, "++": inner / spacing, "#+": mixed, "+#": mixed}
-        for (a, b), value in values.items():
-            first, second, faces = self.floor.pairs(FACADES[facade], a, b, along if a == b == "#" else None)
+        for pair, value in values.items():
+            first, second, faces = self.floor.pairs(FACADES[facade], pair[0], pair[1], along if pair == "##" else None)
             if first.size:
-                key = "-".join(sorted((_KINDS[a], _KINDS[b])))
+                key = "-".join(sorted(_KINDS[token] for token in pair))
                 self.graph.face(key, value, first, second, faces * (self.grid.cell * self.height))
 
     def _mass(self, opaque: Mapping[str, FloatArray]) -> None:
