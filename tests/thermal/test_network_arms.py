@@ -126,5 +126,5 @@ def test_a_finer_plan_has_nodes_of_its_own() -> None:
     house = building(*TWO_ROOMS)
     fine = build_network(house, dx=1.0 / 3.0)
     assert build_network(house, dx=1.0 / 3.0, structure=Structure(wall_nodes=3)).n_node == fine.n_node
-    with pytest.raises(ModelError, match=r"wall_nodes: expected at most 3 .* came 4"):
+    with pytest.raises(ModelError, match=r"wall_nodes: expected at most 3 .* got 4"):
         build_network(house, dx=1.0 / 3.0, structure=Structure(wall_nodes=4))

@@ -265,7 +265,7 @@ def test_a_zone_without_surfaces_has_no_radiant_node() -> None:
     ],
 )
 def test_a_structure_that_cannot_be_built_is_refused_by_its_field(field: str, value: Any) -> None:
-    with pytest.raises(ModelError, match=rf"structure\.{field}: expected .* came {value!r}"):
+    with pytest.raises(ModelError, match=rf"structure\.{field}: expected .* got {value!r}"):
         replace(Structure(), **{field: value})
 
 
@@ -301,7 +301,7 @@ def test_settings_without_structure_are_those_of_the_baseline(tmp_path: Path) ->
         ({"structure": "paper"}, r"settings\.structure: expected a mapping with keys among \['furniture'.*'paper'"),
         ({"structure": {"furnitur": True}}, r"settings\.structure: expected a mapping .*furnitur"),
         ({"structure": {"wall_nodes": 0}}, r"settings\.structure\.wall_nodes: expected a whole number from 1 to 100"),
-        ({"structure": {"radiant": "no"}}, r"settings\.structure\.radiant: expected true or false, came 'no'"),
+        ({"structure": {"radiant": "no"}}, r"settings\.structure\.radiant: expected true or false, got 'no'"),
         ({"scopes": ["window_u_value"]}, r"settings\.scopes: expected a mapping to global, facade, zone"),
         ({"scopes": {"window_u_value": "side"}}, r"settings\.scopes: expected .*side"),
     ],

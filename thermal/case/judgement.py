@@ -67,7 +67,7 @@ def impossible_values(values: FloatArray, point: PointType) -> list[Stretch]:
     Parameters
     ----------
     values
-        Shape (n_time,), in the library's unit; NaN = missing.
+        Shape (n_time,) [unit inside the library]; NaN = missing.
     point
         Point type, with its range.
 

@@ -15,7 +15,6 @@ import numpy as np
 import pandas as pd
 from pydantic import BaseModel
 
-from thermal._types import FloatArray
 from thermal.case.building import Building
 from thermal.case.judgement import flat_lines, impossible_values, runs, spikes
 from thermal.case.points import OUTDOOR_TEMPERATURE, POINT_TYPES, ZONE_TEMPERATURE, split_column
@@ -181,28 +180,38 @@ def assess(telemetry: Telemetry, building: Building) -> QualityReport:
     zones, measured boundaries and outdoors only. Other signals do jump, and do stand still, in sound buildings: flows
     and powers at zero or at full load, sun at night, wind calm, setpoints, water and supply air under control.
     """
-    frame, step = telemetry.frame, telemetry.step
+    frame, step, stamps = telemetry.frame, telemetry.step, telemetry.frame.index
     clean = {str(name): frame[name].to_numpy(dtype=float, copy=True) for name in frame.columns}
-    marks: dict[str, list[tuple[str, int, int, str]]] = {name: [] for name in clean}
+    findings: dict[str, list[Finding]] = {name: [] for name in clean}
+
+    def note(name: str, kind: str, found: list[tuple[int, int, str]]) -> None:
+        for first, last, detail in found:
+            findings[name].append(Finding(kind, stamps[first], stamps[last], last - first + 1, detail))
+            if kind in EXCLUDED:
+                clean[name][first : last + 1] = np.nan
+
     for name, values in clean.items():
-        marks[name] += [(GAP, first, last, "") for first, last in runs(np.isnan(values))]
-        _take_out(values, marks[name], IMPOSSIBLE, impossible_values(values, POINT_TYPES[split_column(name, "")[1]]))
+        note(name, GAP, [(*ends, "") for ends in runs(np.isnan(values))])
+        note(name, IMPOSSIBLE, impossible_values(values, POINT_TYPES[split_column(name, "")[1]]))
     outdoor = [name for name in clean if name.endswith(f"/{OUTDOOR_TEMPERATURE}")]
     station = f"{building.weather_station}/{OUTDOOR_TEMPERATURE}"
     reference = next((clean[name] for name in (station, *outdoor) if name in clean), None)
     for name in [*outdoor, *(name for name in clean if name.endswith(f"/{ZONE_TEMPERATURE}"))]:
         values, entity = clean[name], name.rpartition("/")[0]
         is_input = name in outdoor or entity in building.measured_boundaries
-        found = flat_lines(values, None if name in outdoor else reference, step, is_input=is_input)
-        _take_out(values, marks[name], FLAT, found)
+        note(name, FLAT, flat_lines(values, None if name in outdoor else reference, step, is_input=is_input))
         finite = values[np.isfinite(values)]
         if finite.size > 1 and np.ptp(finite) == 0.0:
-            marks[name].append((CONSTANT, 0, len(values) - 1, f"always {finite[0] - 273.15:.2f} degC"))
-        _take_out(values, marks[name], SPIKE, spikes(values, step))
-    columns = tuple(_column(name, marks[name], clean[name], frame.index) for name in clean)
-    rows = frame.index.isin(telemetry.missing_rows)
-    missing = tuple(_finding(frame.index, (GAP, *ends, "no row at all")) for ends in runs(rows))
-    return QualityReport(frame.index[0], frame.index[-1], step, len(frame), missing, columns)
+            note(name, CONSTANT, [(0, len(values) - 1, f"always {finite[0] - 273.15:.2f} degC")])
+        note(name, SPIKE, spikes(values, step))
+    columns = []
+    for name, flaws in findings.items():
+        missing = sum(finding.steps for finding in flaws if finding.kind == GAP) / len(frame)
+        flaws.sort(key=lambda finding: (finding.start, finding.kind))
+        columns.append(ColumnQuality(name, missing, float(np.isnan(clean[name]).mean()), tuple(flaws)))
+    missing_rows = runs(stamps.isin(telemetry.missing_rows))
+    rows = tuple(Finding(GAP, stamps[a], stamps[b], b - a + 1, "no row at all") for a, b in missing_rows)
+    return QualityReport(stamps[0], stamps[-1], step, len(frame), rows, tuple(columns))
 
 
 def usable(frame: pd.DataFrame, report: QualityReport) -> pd.DataFrame:
@@ -228,25 +237,6 @@ def usable(frame: pd.DataFrame, report: QualityReport) -> pd.DataFrame:
             last = frame.index.searchsorted(finding.end, side="right")
             values[first:last, positions[column]] = np.nan
     return pd.DataFrame(values, index=frame.index, columns=frame.columns)
-
-
-def _take_out(
-    values: FloatArray, marks: list[tuple[str, int, int, str]], kind: str, found: list[tuple[int, int, str]]
-) -> None:
-    for first, last, detail in found:
-        values[first : last + 1] = np.nan
-        marks.append((kind, first, last, detail))
-
-
-def _column(name: str, marks: list[tuple[str, int, int, str]], clean: FloatArray, index: pd.Index) -> ColumnQuality:
-    missing = sum(last - first + 1 for kind, first, last, _ in marks if kind == GAP)
-    findings = tuple(_finding(index, mark) for mark in sorted(marks, key=lambda mark: (mark[1], mark[0])))
-    return ColumnQuality(name, missing / len(clean), float(np.isnan(clean).mean()), findings)
-
-
-def _finding(index: pd.Index, mark: tuple[str, int, int, str]) -> Finding:
-    kind, first, last, detail = mark
-    return Finding(kind, index[first], index[last], last - first + 1, detail)
 
 
 def _stamps(start: pd.Timestamp, end: pd.Timestamp, step: float) -> int:

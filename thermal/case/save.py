@@ -6,6 +6,7 @@ import csv
 import os
 import re
 import tempfile
+from collections.abc import Mapping
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -13,8 +14,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import yaml
+from pydantic import BaseModel
 
-from thermal.case.building import Building, FloorPlan, FloorPlans
+from thermal.case.building import Building, FloorPlans
 from thermal.case.case import Case
 from thermal.case.load import NAME, load_case
 from thermal.case.migration import FORMAT
@@ -103,7 +105,8 @@ def _write(building: Building, frame: pd.DataFrame, folder: Path) -> None:
     content = _plain(_content(building, frame))
     if isinstance(building.geometry, FloorPlans):
         for floor, entry in zip(building.geometry.floors, content["floors"], strict=True):
-            _write_plan(floor, folder / entry["plan"])
+            with (folder / entry["plan"]).open("w", encoding="utf-8", newline="") as stream:
+                csv.writer(stream, lineterminator="\n").writerows(floor.tokens.tolist())
     with (folder / NAME).open("w", encoding="utf-8") as stream:
         yaml.safe_dump(content, stream, sort_keys=False, allow_unicode=True, width=120)
     columns = {}
@@ -113,22 +116,17 @@ def _write(building: Building, frame: pd.DataFrame, folder: Path) -> None:
     pd.DataFrame(columns, index=frame.index).to_parquet(folder / TELEMETRY_FILE, compression="zstd")
 
 
-def _write_plan(floor: FloorPlan, path: Path) -> None:
-    with path.open("w", encoding="utf-8", newline="") as stream:
-        csv.writer(stream, lineterminator="\n").writerows(floor.tokens.tolist())
-
-
 def _content(building: Building, frame: pd.DataFrame) -> dict[str, Any]:
     points = dict.fromkeys(split_column(str(column), TELEMETRY_FILE)[1] for column in frame.columns)
     return {
         "format": FORMAT,
         "name": building.name,
-        "location": building.location.model_dump(),
+        "location": building.location,
         "orientation": building.orientation,
         "geometry_quality": building.geometry_quality,
         **_geometry(building),
-        "devices": [device.model_dump(mode="json", exclude_defaults=True) for device in building.devices],
-        "airflows": [airflow.model_dump(by_alias=True) for airflow in building.airflows],
+        "devices": building.devices,
+        "airflows": building.airflows,
         "weather_station": building.weather_station,
         "telemetry": TELEMETRY_FILE,
         "units": {point: QUANTITIES[POINT_TYPES[point].quantity].file_unit for point in points},
@@ -137,9 +135,11 @@ def _content(building: Building, frame: pd.DataFrame) -> dict[str, Any]:
 
 def _plain(content: Any) -> Any:
     """Turn numpy's numbers and texts, which YAML does not know, into Python's."""
-    if isinstance(content, dict):
+    if isinstance(content, BaseModel):
+        content = content.model_dump(by_alias=True, exclude_defaults=True)
+    if isinstance(content, Mapping):
         return {_plain(key): _plain(value) for key, value in content.items()}
-    if isinstance(content, list):
+    if isinstance(content, list | tuple):
         return [_plain(value) for value in content]
     return str(content) if isinstance(content, str) else content.item() if isinstance(content, np.generic) else content
 
@@ -154,15 +154,9 @@ def _geometry(building: Building) -> dict[str, Any]:
                 {"name": floor.name, "height": floor.height, "plan": file}
                 for floor, file in zip(geometry.floors, files, strict=True)
             ],
-            "glazing": {zone: dict(by_facade) for zone, by_facade in geometry.glazing.items()},
+            "glazing": geometry.glazing,
         }
-    return {
-        "zones": [zone.model_dump() for zone in geometry.zones],
-        "surfaces": [surface.model_dump(exclude_none=True) for surface in geometry.surfaces],
-        "constructions": {
-            name: [layer.model_dump() for layer in layers] for name, layers in geometry.constructions.items()
-        },
-    }
+    return {key: getattr(geometry, key) for key in ("zones", "surfaces", "constructions")}
 
 
 def _plan_files(plans: FloorPlans) -> list[str]:

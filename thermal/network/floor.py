@@ -38,7 +38,7 @@ class Zone:
     air : ndarray, shape (n_air,)
         Node numbers of its air volumes.
     share : ndarray, shape (n_air,)
-        Share of the zone's air in each; sums to 1.
+        Share of the zone's air in each [-]; sums to 1.
     """
 
     def __init__(self, graph: GraphBuilder, name: str, air: NDArray[np.int64], share: NDArray[np.float64]) -> None:
@@ -100,11 +100,8 @@ class Zone:
         key = graph.key(kind, self.name, *self.film_names, *depends, facade=facade)
         solid_, area_ = np.atleast_1d(solid), np.atleast_1d(np.asarray(area, float))
         if air is None:
-            air_solid, air_area, air_node = (
-                np.repeat(solid_, self.air.size),
-                np.outer(area_, self.share).ravel(),
-                np.tile(self.air, solid_.size),
-            )
+            air_solid, air_node = np.repeat(solid_, self.air.size), np.tile(self.air, solid_.size)
+            air_area = np.outer(area_, self.share).ravel()
         else:
             air_solid, air_area, air_node = np.broadcast_to(solid_, air.shape), np.broadcast_to(area_, air.shape), air
         if radiant < 0:
@@ -125,13 +122,27 @@ class Zone:
             self.graph.anatomy.outer += [OuterFaces(v, node, area, outlook, self.name) for v, node, area in faces]
 
     def room(self, floor_area: float, volume: float) -> None:
-        """Remember the zone with what is in it, once it is complete [m2, m3]."""
+        """Remember the zone with what is in it, once it is complete [m2, m3].
+
+        Parameters
+        ----------
+        floor_area
+            Floor area [m2].
+        volume
+            Volume [m3].
+        """
         radiant = self._inside[1] if self._inside is not None else -1
         place, mass = (self.name, self.number, self.air, self.share), (self._floor, self._ceiling, self._furniture)
         self.graph.anatomy.rooms[self.name] = Room(*place, self.mean, radiant, *mass, floor_area, volume)
 
     def slabs(self, area: float) -> None:
-        """Floor and ceiling slab, adiabatic at their backs: a chain of nodes each, of one make [area: of each, m2]."""
+        """Floor and ceiling slab, adiabatic at their backs: a chain of nodes each, of one make [area: of each, m2].
+
+        Parameters
+        ----------
+        area
+            Floor area [m2].
+        """
         graph = self.graph
         layers = graph.structure.slab_nodes
         if layers == 0:
@@ -146,7 +157,13 @@ class Zone:
         graph.face(graph.key("slab-slab", self.name, "slab_coupling"), layers * coupling, near, far, area)
 
     def furniture(self, floor_area: float) -> None:
-        """Furniture: one node, coupled to air and radiant node in the ratio of the films [floor_area: m2]."""
+        """Furniture: one node, coupled to air and radiant node in the ratio of the films [floor_area: m2].
+
+        Parameters
+        ----------
+        floor_area
+            Floor area [m2].
+        """
         graph = self.graph
         if not graph.structure.furniture:
             return
@@ -167,7 +184,21 @@ class Zone:
         graph.face(f"radiant-{key}", coupling * radiation / total, radiant, node, floor_area)
 
     def window(self, u_value: ca.SX, area: float, air: NDArray[np.int64], facade: str, azimuth: float) -> None:
-        """Glass without mass towards outdoor: ``u_value`` [W/m2/K] with the zone's own inside film, azimuth [deg]."""
+        """Glass without mass towards outdoor: ``u_value`` [W/m2/K] with the zone's own inside film, azimuth [deg].
+
+        Parameters
+        ----------
+        u_value
+            Air to air, an expression of the parameters [W/m2/K].
+        area
+            Area of the glass [m2].
+        air
+            Air volumes behind it [-].
+        facade
+            Side of the plan.
+        azimuth
+            Direction that it looks to [deg].
+        """
         pane = 1.0 / (1.0 / u_value - 1.0 / WINDOW_RATED_FILM)
         far, each = np.full(air.size, self.graph.boundary("outdoor")), np.full(air.size, area / air.size)
         outlook = Outlook(azimuth, VERTICAL, RATED_OUTSIDE_FILM, glass=True)
@@ -207,7 +238,19 @@ class Floor:
         self.cells = np.bincount(grid.volume[grid.volume >= 0], minlength=token.size)
 
     def zone(self, name: str, area: float, reach: float | None, mean_shuffle: bool) -> Zone:
-        """Air of one zone with its shuffle, slabs and furniture."""
+        """Air of one zone with its shuffle, slabs and furniture.
+
+        Parameters
+        ----------
+        name
+            Name of the zone.
+        area
+            Floor area [m2].
+        reach
+            Reach of the shuffle [m]; None is the whole zone.
+        mean_shuffle
+            Whether the mean of the shuffle is a term of K.
+        """
         graph, grid = self.graph, self.grid
         mine = grid.token == name
         air, count = self.node[mine], self.cells[mine]
@@ -244,7 +287,15 @@ class Floor:
             graph.face(name, conductivity, first, second, faces * grid.cell * self.plan.height / grid.spacing)
 
     def diffuser_weight(self, name: str, mask: NDArray[np.bool_] | None) -> FloatArray:
-        """Share of the zone's heat in each of its air volumes, sums to 1."""
+        """Share of the zone's heat in each of its air volumes, sums to 1.
+
+        Parameters
+        ----------
+        name
+            Name of the zone.
+        mask
+            Cells of the plan with a diffuser; None for all of them.
+        """
         grid = self.grid
         split = (grid.tokens.shape[0] - 2) // self.plan.tokens.shape[0]
         cells = grid.tokens == name
@@ -252,16 +303,26 @@ class Floor:
             if np.shape(mask) != self.plan.tokens.shape:
                 raise ModelError(
                     f"diffusers of {name}: expected a mask of the plan's shape {self.plan.tokens.shape}, "
-                    f"came {np.shape(mask)}"
+                    f"got {np.shape(mask)}"
                 )
             if not (mask & (np.asarray(self.plan.tokens) == name)).any():
-                raise ModelError(f"diffusers of {name}: expected at least one cell of the zone, came none")
+                raise ModelError(f"diffusers of {name}: expected at least one cell of the zone, got none")
             cells &= np.pad(np.repeat(np.repeat(mask, split, axis=0), split, axis=1), 1)
         count = np.bincount(grid.volume[cells], minlength=grid.token.size)[grid.token == name]
         return np.asarray(count / count.sum(), dtype=float)
 
     def beside(self, step: tuple[int, int], a: str, b: str) -> tuple[IntArray, IntArray]:
-        """Flat numbers of the cells of token a and of those of token b beyond them in a direction."""
+        """Flat numbers of the cells of token a and of those of token b beyond them in a direction.
+
+        Parameters
+        ----------
+        step
+            Direction (row, column) [-].
+        a
+            Token here.
+        b
+            Token there.
+        """
         here, there = self.grid.neighbours(step)
         tokens = self.grid.tokens.ravel()
         keep = (tokens[here] == a) & (tokens[there] == b)
@@ -270,7 +331,19 @@ class Floor:
     def pairs(
         self, step: tuple[int, int], a: str, b: str, share: FloatArray | None = None
     ) -> tuple[IntArray, IntArray, FloatArray]:
-        """Pairs of volumes of tokens a and b across faces in a direction, and how many cell faces they share."""
+        """Pairs of volumes of tokens a and b across faces in a direction, and how many cell faces they share.
+
+        Parameters
+        ----------
+        step
+            Direction (row, column) [-].
+        a
+            Token here.
+        b
+            Token there.
+        share
+            Share of each cell that is wall [-]; 1 by default.
+        """
         here, there = self.beside(step, a, b)
         volume = self.grid.volume.ravel()
         first, second = volume[here], volume[there]

@@ -349,7 +349,7 @@ def _check_scopes(scopes: Mapping[str, Scope], zones: tuple[str, ...]) -> None:
         raise ModelError(f"scopes name unknown parameters {unknown}; known are {sorted(PARAMETERS)}")
     odd = {name: scope for name, scope in scopes.items() if scope not in get_args(Scope)}
     if odd:
-        raise ModelError(f"scopes: expected one of {get_args(Scope)} for each parameter, came {odd}")
+        raise ModelError(f"scopes: expected one of {get_args(Scope)} for each parameter, got {odd}")
     inner = sorted(name for name, scope in scopes.items() if scope == "facade" and name not in ENVELOPE_PARAMETERS)
     if inner:
         raise ModelError(

@@ -90,7 +90,7 @@ def _resolution(cell_size: float, dx: float | None) -> tuple[int, Fraction]:
     if dx is None:
         return 1, Fraction(1)
     if isinstance(dx, bool) or not isinstance(dx, int | float | np.number) or not 0 < dx < np.inf:
-        raise ModelError(f"cell size: expected a positive number of metres, came {dx!r}")
+        raise ModelError(f"cell size: expected a positive number of metres, got {dx!r}")
     ratio = Fraction(cell_size / dx).limit_denominator(1000)
     if ratio > 1:
         if ratio.denominator != 1:

@@ -195,5 +195,5 @@ class ThermalNetwork:
             number = isinstance(value, int | float | np.number) and not isinstance(value, bool)
             if not number or not np.isfinite(value) or (value <= 0 and name not in signed):
                 what = "a finite number" if name in signed else "a positive finite number"
-                raise ModelError(f"{name}: expected {what}, came {value!r}")
+                raise ModelError(f"{name}: expected {what}, got {value!r}")
         return np.array([float(given.get(p.name, p.start)) for p in self.parameters])

@@ -115,14 +115,14 @@ class Structure:
     def __post_init__(self) -> None:
         for name in ("furniture", "radiant"):
             if not isinstance(getattr(self, name), bool):
-                raise ModelError(f"structure.{name}: expected true or false, came {getattr(self, name)!r}")
+                raise ModelError(f"structure.{name}: expected true or false, got {getattr(self, name)!r}")
         for name, least in (("slab_nodes", 0), ("wall_nodes", 1)):
             value = getattr(self, name)
             if name == "wall_nodes" and value is None:
                 continue
             if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= MOST_NODES:
                 raise ModelError(
-                    f"structure.{name}: expected a whole number from {least} to {MOST_NODES}, came {value!r}"
+                    f"structure.{name}: expected a whole number from {least} to {MOST_NODES}, got {value!r}"
                 )
 
     @classmethod

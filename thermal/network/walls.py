@@ -45,7 +45,7 @@ class Arms:
         if wanted > split > 1:
             raise ModelError(
                 f"structure.wall_nodes: expected at most {split} with dx = {floor.grid.spacing:g} m, which splits a "
-                f"wall of {thickness:g} m into {split} nodes, came {wanted}; leave dx or choose fewer nodes"
+                f"wall of {thickness:g} m into {split} nodes, got {wanted}; leave dx or choose fewer nodes"
             )
         self.floor, self.conductivity = floor, conductivity
         through = wanted if split == 1 else 1
@@ -219,15 +219,11 @@ class Walls:
         """Faces between wall volumes in a direction; glass leaves the share ``along`` of those of exterior walls."""
         half, spacing = 0.5 * self.grid.cell, self.grid.spacing
         mixed = series(self.conductivity / half, inner / half)
-        for a, b, value in (
-            ("#", "#", self.conductivity / spacing),
-            ("+", "+", inner / spacing),
-            ("#", "+", mixed),
-            ("+", "#", mixed),
-        ):
-            first, second, faces = self.floor.pairs(FACADES[facade], a, b, along if a == b == "#" else None)
+        values = {"##": self.conductivity / spacing, "++": inner / spacing, "#+": mixed, "+#": mixed}
+        for pair, value in values.items():
+            first, second, faces = self.floor.pairs(FACADES[facade], pair[0], pair[1], along if pair == "##" else None)
             if first.size:
-                key = "-".join(sorted((_KINDS[a], _KINDS[b])))
+                key = "-".join(sorted(_KINDS[token] for token in pair))
                 self.graph.face(key, value, first, second, faces * (self.grid.cell * self.height))
 
     def _mass(self, opaque: Mapping[str, FloatArray]) -> None:

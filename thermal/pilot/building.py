@@ -264,8 +264,12 @@ class PilotSettings(Period):
         Where the building stands; by default the paper's pilot building's town.
     name : str
         Of the case.
-    start, days, spin_up_days, step_seconds
-        As in `Period` [-, d, d, s].
+    start : str
+        As in `Period`.
+    days, spin_up_days : float
+        As in `Period` [d].
+    step_seconds : float
+        As in `Period` [s].
     """
 
     floor_area: float = 6317.0

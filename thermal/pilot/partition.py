@@ -58,7 +58,7 @@ def parts(kind: Kind, side: int, cells: Mask, exposed: Mask, share: float) -> li
     Parameters
     ----------
     kind, side, share
-        As of `Region`.
+        As of `Region` [-].
     cells, exposed : numpy.ndarray of bool, shape (n_row, n_col)
         Cells on the floor, and the cells of the floor that touch the exterior wall.
 

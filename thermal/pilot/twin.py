@@ -146,8 +146,12 @@ class TwinSettings(Period):
         What the discharge sensor reports, see the notes of `generate_twin`.
     resolution : float
         Steps of the temperature sensors [K], 0 or more; 0 reports every digit.
-    start, days, spin_up_days, step_seconds
-        As in `Period` [-, d, d, s], by default three weeks from a Monday in winter.
+    start : str
+        As in `Period`; by default a Monday in winter.
+    days, spin_up_days : float
+        As in `Period` [d].
+    step_seconds : float
+        As in `Period` [s].
 
     Raises
     ------

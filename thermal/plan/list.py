@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from os import PathLike
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -199,9 +200,7 @@ def read_floor(entry: FloorEntry, folder: Path) -> ZonedFloor:
 
 
 def _survey(entry: FloorEntry, file: Path) -> FloorSurvey:
-    settings = PlanSettings(
-        entry.widest_door, entry.thickest_wall, entry.thinnest_wall, entry.smallest_room, entry.smallest_zone
-    )
+    settings = PlanSettings(**{field.name: getattr(entry, field.name) for field in fields(PlanSettings)})
     kind = file.suffix.lower()
     if kind in CODE_KINDS:
         if entry.cell_size is None:

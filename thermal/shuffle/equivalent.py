@@ -256,9 +256,9 @@ def _exp(value: Any) -> Any:
 
 def _require_probability(value: Any) -> None:
     if not _is_symbolic(value) and not np.all((np.asarray(value) >= 0.0) & (np.asarray(value) <= 1.0)):
-        raise ModelError(f"expected a shuffle probability in [0, 1], came {value}")
+        raise ModelError(f"expected a shuffle probability in [0, 1], got {value}")
 
 
 def _require_positive(name: str, value: float, unit: str) -> None:
     if not (0.0 < value < np.inf):
-        raise ModelError(f"expected {name} > 0 and finite [{unit}], came {value}")
+        raise ModelError(f"expected {name} > 0 and finite [{unit}], got {value}")

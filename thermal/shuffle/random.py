@@ -277,12 +277,12 @@ class RandomShuffle:
         capacities: npt.ArrayLike | None = None,
     ) -> None:
         if not 0.0 <= probability <= 1.0:
-            raise ModelError(f"expected a shuffle probability in [0, 1], came {probability}")
+            raise ModelError(f"expected a shuffle probability in [0, 1], got {probability}")
         if reach is not None and not (0.0 < reach < np.inf):
-            raise ModelError(f"expected a positive finite reach [m], or None for whole zones, came {reach}")
+            raise ModelError(f"expected a positive finite reach [m], or None for whole zones, got {reach}")
         points = np.asarray(positions, dtype=np.float64)
         if points.ndim != 2 or points.shape[1] != 2:
-            raise ModelError(f"expected positions of shape (n_cell, 2) [m], came {points.shape}")
+            raise ModelError(f"expected positions of shape (n_cell, 2) [m], got {points.shape}")
         zones = [cells for cells in _checked_zones(zone_cells, points) if cells.size > 1]
         self._probability = float(probability)
         self._n_cell = len(points)
@@ -311,7 +311,7 @@ class RandomShuffle:
         """
         shuffled = np.array(temperatures, dtype=np.float64)
         if shuffled.shape != (self._n_cell,):
-            raise ModelError(f"expected temperatures of shape ({self._n_cell},) [K], came {shuffled.shape}")
+            raise ModelError(f"expected temperatures of shape ({self._n_cell},) [K], got {shuffled.shape}")
         return execute_swaps(shuffled, *self.draw_swaps(), self._capacities)
 
     def draw_swaps(self) -> tuple[IndexArray, IndexArray]:
@@ -361,19 +361,19 @@ def _checked_zones(zone_cells: Sequence[npt.ArrayLike], points: FloatArray) -> l
         if cells.size == 0:
             continue
         if cells.ndim != 1 or not np.issubdtype(cells.dtype, np.integer):
-            raise ModelError(f"expected the cells of zone {zone} as a list of integers, came {cells!r}")
+            raise ModelError(f"expected the cells of zone {zone} as a list of integers, got {cells!r}")
         if cells.min() < 0 or cells.max() >= len(points):
             raise ModelError(
-                f"expected the cells of zone {zone} in [0, {len(points)}), came {cells.min()} to {cells.max()}"
+                f"expected the cells of zone {zone} in [0, {len(points)}), got {cells.min()} to {cells.max()}"
             )
         if np.unique(cells).size < cells.size:
-            raise ModelError(f"expected each cell once in zone {zone}, came repeated cells")
+            raise ModelError(f"expected each cell once in zone {zone}, got repeated cells")
         if taken[cells].any():
             raise ModelError(
                 f"expected each cell in one zone, cell {cells[taken[cells]][0]} of zone {zone} is in another"
             )
         if not np.isfinite(points[cells]).all():
-            raise ModelError(f"expected finite positions [m] of the cells of zone {zone}, came NaN or infinity")
+            raise ModelError(f"expected finite positions [m] of the cells of zone {zone}, got NaN or infinity")
         taken[cells] = True
         zones.append(cells.astype(np.intp))
     return zones
@@ -383,7 +383,7 @@ def _unequal_capacities(capacities: npt.ArrayLike, zones: Sequence[IndexArray], 
     """Return the capacities [J/K] where they differ within some zone, None where plain swaps conserve energy."""
     stores = np.array(capacities, dtype=np.float64)
     if stores.shape != (n_cell,):
-        raise ModelError(f"expected capacities of shape ({n_cell},) [J/K], came {stores.shape}")
+        raise ModelError(f"expected capacities of shape ({n_cell},) [J/K], got {stores.shape}")
     for cells in zones:
         if not (np.isfinite(stores[cells]).all() and (stores[cells] > 0.0).all()):
             raise ModelError("expected positive finite capacities [J/K] of all air cells; massless cells hold none")

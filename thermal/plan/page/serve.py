@@ -180,14 +180,10 @@ def create_app(desk: LabelDesk, token: str) -> Application:
 
 
 def _listen(port: int) -> socket.socket:
-    listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
-    listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
-        listener.bind((HOST, port))
+        return socket.create_server((HOST, port))
     except (OSError, OverflowError) as error:
-        listener.close()
         raise LabelError("port", "a free one on this machine", f"{port}: {error}", "choose another") from error
-    return listener
 
 
 def _when_ready(server: object, ready: Callable[[str], None], address: str) -> None:
