@@ -28,8 +28,6 @@ PAPER_WALLS = {  # conductivity [W/m/K], density [kg/m^3], heat capacity [J/kg/K
     "interior_wall": (780.0, 0.5, 500.0),
 }
 
-#: Parameters of the baseline and of the effects by name.
-_KINDS = PARAMETERS | {p.name: p for effect in CATALOGUE.values() for p in effect.parameters}
 
 
 def paper_values(parameters: Sequence[ParameterEstimate]) -> dict[str, float]:
@@ -121,7 +119,8 @@ def _paper_mark(axes: Axes, row: int, at: float, above: bool) -> None:
 
 def _scale(p: ParameterEstimate) -> Parameter:
     """Range and scale of estimation of an estimate; a parameter of one zone has those of its kind."""
-    kind = _KINDS.get(p.name.partition("@")[0])
+    kinds = PARAMETERS | {own.name: own for effect in CATALOGUE.values() for own in effect.parameters}
+    kind = kinds.get(p.name.partition("@")[0])
     if kind is None or p.lower is None or p.upper is None:
         return Parameter(p.name, p.unit, p.start, p.lower or p.value / 2, p.upper or p.value * 2, p.source)
     return replace(kind, start=p.start, lower=p.lower, upper=p.upper)
