@@ -22,7 +22,8 @@ from thermal.components.operations import Operations, Value
 from thermal.errors import ModelError, describe
 
 Quantity = Literal["air", "water", "heat", "electricity", "fuel"]
-#: A component's function while it runs: yields the port that it waits for, returns its named results.
+#: A component's function while it runs: yields the port that it waits for, returns its named results. One that waits
+#: for nobody may be a plain function that returns them.
 Run = Generator[str, Any, Any]
 IndexArray = NDArray[np.intp]
 
@@ -252,8 +253,8 @@ class Component:
         in_range(where, value, *limits)
         return float(value)
 
-    def run(self, ops: Operations, given: Given) -> Run:
-        """Give outputs of inputs: the component's equations.
+    def run(self, ops: Operations, given: Given) -> Any:
+        """Give outputs of inputs: the component's equations, as a `Run`.
 
         Parameters
         ----------

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from operator import itemgetter
 from struct import Struct
+from types import GeneratorType
 from typing import Any, NamedTuple
 
 import casadi
@@ -149,7 +150,7 @@ class CompiledSystem:
         runner, traces = Runner(mail, runs, deliver), list[_Trace]()
         runner.advance(system.groups)  # up to where they wait first
         while runner.waiting:
-            known, begin, drawn = set(runner.results), len(carried), len(load)
+            known, begin, drawn = {n for trace in traces for n in trace.results}, len(carried), len(load)
             moved = runner.advance(system.singles)
             held: list[Any] = []
             for (receiver, _), boxes in mail.waiting.items():
@@ -230,11 +231,15 @@ class CompiledSystem:
         if self._phases is None:
             self._phases = self._trace(calls, conditions, seconds)
         given, ops = Given(conditions, calls, {}, {}, seconds, self._put), self._ops
-        runs, results = {}, {}
+        runs, results = dict[str, Any](), dict[str, Any]()
         pending.clear()
         for name, group in system.groups.items():
-            runs[name] = run = group.run(ops, given)
-            run.send(None)
+            run: Any = group.run(ops, given)
+            if isinstance(run, GeneratorType):
+                runs[name] = run
+                run.send(None)
+            else:
+                results[name] = run
         for phase in self._phases:
             phase.receive(*pending)
             pending.clear()

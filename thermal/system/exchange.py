@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from types import GeneratorType
 from typing import Any
 
-from thermal.components.component import Calls, Conditions, Given, Run
+from thermal.components.component import Calls, Conditions, Given
 from thermal.components.operations import Operations, Value
 from thermal.errors import ModelError, describe
 from thermal.system.step import HvacStep
@@ -80,17 +81,18 @@ class Runner:
     mail : Mail
         Brings the messages.
     runs : mapping of str to generator
-        Functions, by component.
+        Functions, by component; the result itself of one that waits for nobody.
     on_take : callable, optional
         Gives what is handed over, of component and message; the message itself by default.
     """
 
     def __init__(
-        self, mail: Mail, runs: Mapping[str, Run], on_take: Callable[[str, Any], Any] = lambda name, message: message
+        self, mail: Mail, runs: Mapping[str, Any], on_take: Callable[[str, Any], Any] = lambda name, message: message
     ) -> None:
-        self._mail, self._runs, self._on_take = mail, dict(runs), on_take
-        self._wants: dict[str, str | None] = dict.fromkeys(runs)
-        self.results: dict[str, Any] = {}
+        self._mail, self._on_take = mail, on_take
+        self._runs = {name: run for name, run in runs.items() if isinstance(run, GeneratorType)}
+        self._wants: dict[str, str | None] = dict.fromkeys(self._runs)
+        self.results = {name: run for name, run in runs.items() if name not in self._runs}
 
     @property
     def waiting(self) -> dict[str, str]:

@@ -341,7 +341,7 @@ class HvacSystem:
         for place, port, name, group in self._metered:
             if name in results:
                 power = getattr(results[name], port)
-                totals[place] = totals[place] + (power if group is None else group.total(ops, power))
+                totals[place] = totals[place] + (power if group is None else group.total(ops.of(name), power))
         return totals[0], totals[1]
 
     @cached_property
