@@ -29,6 +29,7 @@ NOT_CAUGHT: dict[str, str] = {
     "ThermalError": "family: users catch it, and the command tells bad input by it",
     "CalibrationError": "family: users catch it, and the command tells bad input by it",
     "MpcError": "family: users catch it, and the command tells bad input by it",
+    "EffectError": "who tries effects on many buildings goes on with the next",
     "PlanError": "of a drawing or a list that others made: an importer of many goes on with the next",
     "MissingExtraError": "an ImportError: who can do without the extra catches it",
     "ResultsExistError": "who runs many studies skips those that are done",
