@@ -79,6 +79,7 @@ _STREAM = 22  # of random numbers of a seed
 # forecast points that may be uncertain: number of their random stream, and how their errors grow
 _ERRORS = {"TDryBul": (11, ErrorGrowth(2.0, 24 * 3600.0)), "HGloHor": (3, ErrorGrowth(0.3, 6 * 3600.0))}
 
+
 class ObservedPlant(SimulatedPlant):
     """A simulated plant that hands out the step it has just taken."""
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from mpc.adapters.boptest import requests as wire
+from mpc.adapters.boptest import requests
 from mpc.adapters.boptest.case import BegunPlant, BoptestCase, Trajectory
 from mpc.adapters.boptest.signals import KPI_NAMES, UNCERTAINTY, BoundaryConditions, uncertain
 from mpc.errors import BoptestRequestError
@@ -56,7 +56,7 @@ class BoptestTest:
         """BOPTEST's time now [s]; a test that was not initialized stands where the weather begins."""
         return self.case.covered[0] if self._begun is None else self._begun.time
 
-    def set_step(self, body: Mapping[str, Any]) -> wire.Answer:
+    def set_step(self, body: Mapping[str, Any]) -> requests.Answer:
         """Choose the control step.
 
         Parameters
@@ -64,17 +64,17 @@ class BoptestTest:
         body : mapping
             ``step`` [s], a multiple of the plant's own.
         """
-        (value,) = wire.required(body, "step")
-        step, own = wire.number("parameter step", value), self.case.step
+        (value,) = requests.required(body, "step")
+        step, own = requests.number("parameter step", value), self.case.step
         if not (step >= own and math.isclose(step / own, round(step / own), rel_tol=1e-9) and step <= _FOREVER):
             raise BoptestRequestError(
                 f"Invalid value {step:g} for parameter step. The plant has steps of {own:g} s: give a multiple of it, "
                 "or serve the plant with shorter steps."
             )
         self.control_step = round(step / own) * own
-        return wire.Answer("Control step set successfully.", {"step": self.control_step})
+        return requests.Answer("Control step set successfully.", {"step": self.control_step})
 
-    def set_scenario(self, body: Mapping[str, Any]) -> wire.Answer:
+    def set_scenario(self, body: Mapping[str, Any]) -> requests.Answer:
         """Choose price, uncertainty of forecasts and time period; the latter initializes.
 
         Parameters
@@ -82,24 +82,24 @@ class BoptestTest:
         body : mapping
             Any of ``electricity_price``, ``time_period``, ``temperature_uncertainty``, ``solar_uncertainty``, ``seed``.
         """
-        wire.allowed(body, _SCENARIO)
+        requests.allowed(body, _SCENARIO)
         price, period = body.get("electricity_price"), body.get("time_period")
         levels = _UNCERTAINTIES.values()
-        changed: dict[str, Any] = {n: wire.choice(n, body.get(n), UNCERTAINTY, none=True) for n in levels}
+        changed: dict[str, Any] = {n: requests.choice(n, body.get(n), UNCERTAINTY, none=True) for n in levels}
         if price is not None:
-            changed["electricity_price"] = wire.choice("electricity_price", price, self.case.prices)
+            changed["electricity_price"] = requests.choice("electricity_price", price, self.case.prices)
         if period is not None:
-            changed["time_period"] = wire.choice("time_period", period, self.case.periods)
+            changed["time_period"] = requests.choice("time_period", period, self.case.periods)
         seed = body.get("seed")
-        changed["seed"] = None if seed is None else int(wire.number("scenario parameter seed", seed, 0, 2**63 - 1))
+        changed["seed"] = None if seed is None else int(requests.number("scenario parameter seed", seed, 0, 2**63 - 1))
         payload: dict[str, Any] = dict.fromkeys(_SCENARIO) | changed
         if period is not None:
             start, end, warm_up = self.case.periods[str(period)]
             payload["time_period"] = self._begin(self.case.begin(start, warm_up, end)).rows.last()
         self._scenario |= changed
-        return wire.Answer("Test case scenario was set successfully.", payload)
+        return requests.Answer("Test case scenario was set successfully.", payload)
 
-    def initialize(self, body: Mapping[str, Any]) -> wire.Answer:
+    def initialize(self, body: Mapping[str, Any]) -> requests.Answer:
         """Begin anew at a time, after a warm-up.
 
         Parameters
@@ -107,18 +107,18 @@ class BoptestTest:
         body : mapping
             ``start_time`` and ``warmup_period`` [s].
         """
-        given = wire.required(body, "start_time", "warmup_period")
-        start = wire.number("parameter start_time", given[0], 0.0)
-        warm_up = wire.number("parameter warmup_period", given[1], 0.0)
+        given = requests.required(body, "start_time", "warmup_period")
+        start = requests.number("parameter start_time", given[0], 0.0)
+        warm_up = requests.number("parameter warmup_period", given[1], 0.0)
         run = self._begin(self.case.begin(start, warm_up))
         self._scenario["time_period"] = None
         ran = run.taken * self.case.step
         message = f"Test simulation initialized successfully to {self.time}s with warmup period of {ran}s."
         if self.time != start or ran != warm_up:
             message += f" Asked for were {start}s and {warm_up}s: times are whole minutes where there is weather."
-        return wire.Answer(message, run.rows.last())
+        return requests.Answer(message, run.rows.last())
 
-    def advance(self, body: Mapping[str, Any]) -> wire.Answer:
+    def advance(self, body: Mapping[str, Any]) -> requests.Answer:
         """Go on by a control step; inputs out of range are clipped, as BOPTEST does, and the message says so.
 
         Parameters
@@ -126,21 +126,21 @@ class BoptestTest:
         body : mapping
             Values of inputs and activations, by name.
         """
-        given, active, warnings = wire.read_overwrites(body, self.case.signals.inputs)
+        given, active, warnings = requests.read_overwrites(body, self.case.signals.inputs)
         run = self._running()
         if self._answered is not None:
             self._ratios.append((self._clock() - self._answered) / self.control_step)
         begin = run.time
         count = min(round(self.control_step / self.case.step), round((run.end - begin) / self.case.step))
         if count < 1:
-            return wire.Answer("End of test case scenario time period reached.", {})
+            return requests.Answer("End of test case scenario time period reached.", {})
         for _ in range(count):
             run.take(given, active)
         self._answered = self._clock()
         message = warnings or f"Advanced simulation successfully from {begin}s to {run.time}s."
-        return wire.Answer(message, run.rows.last())
+        return requests.Answer(message, run.rows.last())
 
-    def results(self, body: Mapping[str, Any]) -> wire.Answer:
+    def results(self, body: Mapping[str, Any]) -> requests.Answer:
         """Look up what was, with its warm-up.
 
         Parameters
@@ -148,14 +148,15 @@ class BoptestTest:
         body : mapping
             ``point_names``, ``start_time`` and ``final_time`` [s].
         """
-        given = wire.required(body, "point_names", "start_time", "final_time")
-        points = wire.names("point_names", given[0], (*self.case.signals.outputs, *self.case.signals.input_names))
-        start, final = wire.time_or_infinite("start_time", given[1]), wire.time_or_infinite("final_time", given[2])
+        given = requests.required(body, "point_names", "start_time", "final_time")
+        points = requests.names("point_names", given[0], (*self.case.signals.outputs, *self.case.signals.input_names))
+        start = requests.time_or_infinite("start_time", given[1])
+        final = requests.time_or_infinite("final_time", given[2])
         rows = self._running().rows
         payload = rows.between(points, start, final) if points else {}
         return _queried("results data", payload)
 
-    def forecast(self, body: Mapping[str, Any]) -> wire.Answer:
+    def forecast(self, body: Mapping[str, Any]) -> requests.Answer:
         """Forecast boundary conditions from now on; each value holds for the plant's step that begins at its time.
 
         Parameters
@@ -163,12 +164,12 @@ class BoptestTest:
         body : mapping
             ``point_names``, ``horizon`` and ``interval`` [s].
         """
-        given = wire.required(body, "point_names", "horizon", "interval")
-        points = wire.names("point_names", given[0], self.case.forecast_points)
-        horizon = wire.number("parameter horizon", given[1], 0.0, _FOREVER)
-        interval = wire.number("parameter interval", given[2], 1e-3, _FOREVER)
+        given = requests.required(body, "point_names", "horizon", "interval")
+        points = requests.names("point_names", given[0], self.case.forecast_points)
+        horizon = requests.number("parameter horizon", given[1], 0.0, _FOREVER)
+        interval = requests.number("parameter interval", given[2], 1e-3, _FOREVER)
         count = math.floor(horizon / interval + 1e-9) + 1
-        if count * max(len(points), 1) > wire.MOST_VALUES:
+        if count * max(len(points), 1) > requests.MOST_VALUES:
             raise BoptestRequestError(f"Invalid horizon {horizon:g} and interval {interval:g}: too many values.")
         conditions = self._running().conditions
         times = np.asarray(self.time + interval * np.arange(count), dtype=float)
@@ -182,9 +183,9 @@ class BoptestTest:
                 values = uncertain(name, values, level, seed, interval)
             payload[name] = values.tolist()
         message = "Queried the forecast data successfully."
-        return wire.Answer(f"{message} Beyond what is known the last day repeats." if late else message, payload)
+        return requests.Answer(f"{message} Beyond what is known the last day repeats." if late else message, payload)
 
-    def kpis(self) -> wire.Answer:
+    def kpis(self) -> requests.Answer:
         """Measure indicators from the start on, at the price of the current scenario; null is what there is none of."""
         run = self._running()
         k = run.warm_up_steps
@@ -265,12 +266,12 @@ class _Run:
         self.rows.append(self.time, [*outputs, *(v for name, value in used for v in (value, float(name in active)))])
 
 
-def _queried(what: str, payload: Any) -> wire.Answer:
-    return wire.Answer(f"Queried {what} successfully.", payload)
+def _queried(what: str, payload: Any) -> requests.Answer:
+    return requests.Answer(f"Queried {what} successfully.", payload)
 
 
 #: What a test is asked, by method and path; requests other than GET have arguments.
-REQUESTS: dict[tuple[str, str], Callable[..., wire.Answer]] = {
+REQUESTS: dict[tuple[str, str], Callable[..., requests.Answer]] = {
     ("GET", "name"): lambda test: _queried("the name of the test case", test.name),
     ("GET", "inputs"): lambda test: _queried("the inputs", test.case.signals.input_metadata()),
     ("GET", "measurements"): lambda test: _queried("the measurements", test.case.signals.measurement_metadata()),

@@ -282,6 +282,4 @@ def actuators_of(
     for point, control in ((HEATING_SETPOINT, "Heating Setpoint"), (COOLING_SETPOINT, "Cooling Setpoint")):
         for zone in source.layout.zones:
             names["Zone Temperature Control", control, zone] = f"{entity(zone)}/{point}"
-    return {
-        key: Actuator(name, "K", *bounds[name.rpartition("/")[2]], required=False) for key, name in names.items()
-    }
+    return {key: Actuator(name, "K", *bounds[name.rpartition("/")[2]], required=False) for key, name in names.items()}

@@ -306,9 +306,7 @@ def test_a_clock_that_jumps_is_another_client(house: House, connect: Connect) ->
     plant = connect()
     plant.reset()
     house.time += 900.0
-    with pytest.raises(
-        BoptestError, match="time of the test: expected 900900 s, found 901800 s; does another use it"
-    ):
+    with pytest.raises(BoptestError, match="time of the test: expected 900900 s, found 901800 s; does another use it"):
         plant.step({})
 
 

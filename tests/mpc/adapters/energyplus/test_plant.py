@@ -138,7 +138,9 @@ def test_a_warm_up_that_swings_without_end_is_no_error_of_the_run(office):
     from mpc.adapters.energyplus.make import energyplus_plant
     from mpc.adapters.energyplus.plant import EnergyPlusSettings
 
-    plant = energyplus_plant("RefBldgMediumOfficeNew2004_Chicago", "2023-08-28", 1, EnergyPlusSettings(control_steps=288))
+    plant = energyplus_plant(
+        "RefBldgMediumOfficeNew2004_Chicago", "2023-08-28", 1, EnergyPlusSettings(control_steps=288)
+    )
     plant.reset()
     process = plant._process
     assert "CheckWarmupConvergence" in (process.output / "eplusout.err").read_text(encoding="latin-1")
