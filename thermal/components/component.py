@@ -316,6 +316,18 @@ class Group(Component):
             return super()._checked(where, value, limits)
         return all_in_range(where, value, np.size(self.zone), *limits)
 
+    def energy(self, conditions: Conditions, done: Any) -> EnergyBalance:
+        """Where the energy of a step went: into the zones.
+
+        Parameters
+        ----------
+        conditions : Conditions
+            Of the step.
+        done : object
+            What `run` returned.
+        """
+        return EnergyBalance(zones=done.heat.sum(axis=-1))
+
     def positions(self, name: str) -> IndexArray:
         """Check a field of positions, one an element.
 

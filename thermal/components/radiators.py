@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from thermal._types import FloatArray
-from thermal.components.component import Conditions, EnergyBalance, Given, Group, IndexArray, Port, Range, Run
+from thermal.components.component import Given, Group, IndexArray, Port, Range, Run
 from thermal.components.moist_air import WATER_HEAT_CAPACITY
 from thermal.components.operations import Operations, Value
 from thermal.components.streams import HotWater, SupplyWater, WaterDrawn
@@ -148,18 +148,6 @@ class Radiators(Group):
         water: SupplyWater = yield "hot_water"
         heat = conductance * (water.temperature - zone)
         return RadiatorStep(valve_flow, heat, self.radiant_share * heat)
-
-    def energy(self, conditions: Conditions, done: RadiatorStep) -> EnergyBalance:
-        """Where the energy of a step went.
-
-        Parameters
-        ----------
-        conditions : Conditions
-            Of the step.
-        done : RadiatorStep
-            What `run` returned.
-        """
-        return EnergyBalance(zones=done.heat.sum(axis=-1))
 
     def read(self, ops: Operations, given: Given, done: RadiatorStep, water: Value) -> list[Value]:
         """Values of its points, one a radiator each.
