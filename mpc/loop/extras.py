@@ -18,7 +18,8 @@ from thermal.network.extension import Extension
 from thermal.network.graph import GraphBuilder
 from thermal.network.network import ThermalNetwork
 
-_RADIANT = "radiant gains of "
+#: What the signals of heat that radiates in a zone are called, before the name of the zone.
+RADIANT = "radiant gains of "
 
 
 class ScenarioDrivers(Drivers):
@@ -40,7 +41,7 @@ class ScenarioDrivers(Drivers):
 def _radiant(drivers: Drivers, zone: str) -> FloatArray:
     if not isinstance(drivers, ScenarioDrivers):
         found = "telemetry, which knows presence only"
-        raise EffectError(describe(_RADIANT + zone, "those of a plant's scenario", found, "use `internal_gains`"))
+        raise EffectError(describe(RADIANT + zone, "those of a plant's scenario", found, "use `internal_gains`"))
     return np.asarray(drivers.radiant[:, drivers.zones.index(zone)])
 
 
@@ -71,7 +72,7 @@ class RadiantGains:
         for room in graph.anatomy.rooms.values():
             if room.radiant < 0:
                 continue
-            signal = Signal(_RADIANT + room.name, "W", partial(_radiant, zone=room.name))
+            signal = Signal(RADIANT + room.name, "W", partial(_radiant, zone=room.name))
             node, share = np.append(room.air, room.radiant), np.append(-room.share, 1.0)
             graph.source("radiant gains", 1.0, node, signal, share)
 
@@ -114,7 +115,7 @@ def check_radiant(network: ThermalNetwork, scenario: Scenario) -> None:
     PlantError
         When there are no signals for the part that radiates.
     """
-    takes = any(signal.name.startswith(_RADIANT) for signal in network.signals)
+    takes = any(signal.name.startswith(RADIANT) for signal in network.signals)
     if scenario.heat.radiates and not takes and (network.kind == "radiant").any():
         advice = "build it with effects=(RadiantGains(),)"
         raise PlantError(describe("building model", "one that takes gains that radiate", "gains to air only", advice))

@@ -125,7 +125,9 @@ def simulated_plant(
         gains=gains, seed=seed,
     )  # fmt: skip
     built: BuildingModel
-    extras: tuple[Extension, ...] = (*effects, RadiantGains()) if scenario.heat.radiates else effects
+    system = system or size_system(building)
+    radiates = scenario.heat.radiates or "radiant_heat" in system.heating
+    extras: tuple[Extension, ...] = (*effects, RadiantGains()) if radiates else effects
     if model == "reduced":
         built = reduced_building(building, parameters, step_seconds=step_seconds, dx=dx, effects=extras, order=order)
     elif model in ("grid", "random"):
@@ -137,7 +139,7 @@ def simulated_plant(
         raise PlantError(describe("model", "'reduced', 'grid' or 'random'", repr(model)))
     check_extras(effects, built.network)
     return SimulatedPlant(
-        scenario, system or size_system(building), built, control_steps=control_steps, noise=noise,
+        scenario, system, built, control_steps=control_steps, noise=noise,
         forecaster=None if horizon is None else Forecaster(scenario, horizon), warm_up_days=warm_up_days,
         pressures=pressures, seed=seed,
     )  # fmt: skip

@@ -128,6 +128,19 @@ class Radiators(Group):
         transfer = less * self.surface * overtemperature**less / rate
         return rate * overtemperature * (1.0 - (1.0 + transfer) ** (-1.0 / less))
 
+    def likely_heat(self, call: float, zone: FloatArray) -> FloatArray:
+        """Heat at a call with water of the nominal temperature [W].
+
+        Parameters
+        ----------
+        call : float
+            For heating [-].
+        zone : numpy.ndarray, shape (n_radiator,)
+            Temperatures of their zones [K].
+        """
+        over = np.maximum(self.supply_temperature - zone, _LEAST)
+        return np.asarray(self.emitted(call * self.water_flow, over))
+
     def run(self, ops: Operations, given: Given) -> Run:
         """Open valves by the calls, and bring the water's heat into the zones.
 
