@@ -11,7 +11,7 @@ import psychrolib
 from _hvac_reference import STEPS_PER_HOUR, Reference
 from scipy.optimize import brentq
 
-from thermal.components.air_handler import AirCommand, AirHandler
+from thermal.components.air_handler import AirHandler
 from thermal.components.boiler_loop import BoilerLoop
 from thermal.components.component import Conditions
 from thermal.components.cooling_coil import CoolingCoil
@@ -19,6 +19,7 @@ from thermal.components.curves import CONSTANT_EFFICIENCY
 from thermal.components.fan import Fan
 from thermal.components.heater import Heater
 from thermal.components.pump import Pump
+from thermal.components.streams import AirCommand
 from thermal.components.terminals import Terminals
 from thermal.components.water_coil import WaterCoil
 from thermal.system.replay import AirHandlerReplay, replay_air_handler, replay_loop, replay_reheat

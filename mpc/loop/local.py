@@ -122,6 +122,10 @@ class LocalControl:
             np.bincount(zone, AIR_HEAT_CAPACITY * flow * (leaving - end[zone]), system.zone_count)
             for flow, leaving, end in zip(flows, discharge, ends, strict=True)
         ])  # fmt: skip
+        for group in (g for g in system.groups.values() if g is not terminals):
+            for row, (call, end) in enumerate(zip((1.0, 1.0, min(first, 0.999)), ends, strict=False)):
+                likely = group.likely_heat(call, end[group.zone])
+                heat[row] += np.bincount(group.zone, likely, system.zone_count)
         start = ends - self._response * heat
         slope = np.diff(ends, axis=0) / np.diff(start, axis=0)
         # the outer lines go on for ever

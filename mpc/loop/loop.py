@@ -12,10 +12,11 @@ from mpc.loop.history import PlantStep
 from mpc.loop.local import LocalControl
 from mpc.loop.operation import Operation
 from mpc.loop.schedule import Schedule
-from mpc.loop.signals import EffectSignals, sensor_offset
+from mpc.loop.signals import RADIANT, EffectSignals, sensor_offset
 from mpc.scenario.scenario import Scenario
 from thermal._types import FloatArray
 from thermal.components.component import Conditions
+from thermal.components.terminals import Terminals
 from thermal.system.plant import HvacPlant, HvacState
 from thermal.system.system import HvacSystem
 
@@ -77,8 +78,13 @@ class PlantLoop:
         self._outdoor = [float(v) for v in scenario.outdoor]
         self._schedule = Schedule(operation, system, scenario.zones)
         rated = system.by_zone(system.terminals.design_flow)
+        self._terminals = next(iter(system.of_kind(Terminals)))
         self._local = LocalControl(system, zone_response(model, 1e4 * rated))
         self._off = (False,) * len(system.air_handlers)
+        signals = [signal.name for signal in model.network.signals]
+        radiant = [f"{RADIANT}{zone}" for zone in scenario.zones]
+        radiates = "radiant_heat" in system.heating and set(radiant) <= set(signals)
+        self._radiant = [signals.index(name) for name in radiant] if radiates else []
         self._offset = sensor_offset(model)
         self._biased = bool(self._offset.any())
         self._reading = np.zeros(len(scenario.zones))
@@ -145,6 +151,10 @@ class PlantLoop:
         set_back = self._schedule.set_back[k]
         self._state, done = self.hvac.step(self._state, conditions, actions, self._seconds, set_back)
         heat = self.hvac.heat(done)
-        mean, self._reading = self._model.finish(heat, effects.at(k, done.terminals.airflow, heat))
+        signals = effects.at(k, done.results[self._terminals].airflow, heat)
+        if self._radiant:
+            signals = signals.copy()
+            signals[self._radiant] += self.hvac.heat(done, "radiant_heat")
+        mean, self._reading = self._model.finish(heat, signals)
         self._local.learn(self._reading)
         return PlantStep(k, conditions, actions, done, mean, self.air if self._biased else self._reading)

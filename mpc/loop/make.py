@@ -227,7 +227,9 @@ def simulated_plant(
     scenario = given.scenario(building, grid, weather, given.gains)
     built = model_settings(given.parameters, dx=given.dx, effects=given.effects)
     effects = given.effects or chosen(built.effects)
-    extras: tuple[Extension, ...] = (*effects, RadiantGains()) if scenario.heat.radiates else effects
+    system = given.system or size_system(building)
+    radiates = scenario.heat.radiates or "radiant_heat" in system.heating
+    extras: tuple[Extension, ...] = (*effects, RadiantGains()) if radiates else effects
     network = build_network(
         building, dx=built.dx, reach=built.reach, scopes=built.scopes, structure=built.structure, effects=extras
     )
@@ -235,7 +237,7 @@ def simulated_plant(
     theta, step = parameter_vector(given.parameters, network), given.step_seconds
     model = given.building_model(building, SymbolicModel(network), theta, built, extras, step, given.order)
     return SimulatedPlant(
-        scenario, given.system or size_system(building), model, control_steps=given.control_steps, noise=given.noise,
+        scenario, system, model, control_steps=given.control_steps, noise=given.noise,
         forecaster=None if given.horizon is None else Forecaster(scenario, given.horizon),
         warm_up_days=given.warm_up_days, pressures=given.pressures, seed=given.seed,
     )  # fmt: skip

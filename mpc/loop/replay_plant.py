@@ -12,9 +12,9 @@ from mpc.errors import MpcError
 from mpc.loop.sensors import PlantDevices
 from thermal._types import FloatArray
 from thermal.case.points import ZONE_TEMPERATURE
-from thermal.components.air_handler import AirCommand
 from thermal.components.component import Conditions
 from thermal.components.moist_air import WATER_HEAT_CAPACITY
+from thermal.components.streams import AirCommand
 from thermal.components.water_coil import WaterCoil
 from thermal.errors import describe, nearest
 from thermal.system.replay import TerminalReplay, replay_air_handler, replay_loop, replay_terminals
@@ -107,7 +107,13 @@ class Measured:
         self.handling = self.supplied > _LEAST_SHARE * (system.terminals.design_flow @ of_handler)
 
     def power(self, device: str) -> FloatArray:
-        """Electric power of a device, shape (n_time,) [W]."""
+        """Electric power of a device, shape (n_time,) [W].
+
+        Parameters
+        ----------
+        device : str
+            Name.
+        """
         return self._of([device], "electrical_power_sensor")[:, 0]
 
     def _pressure(self, devices: tuple[str, ...], point: str, usual: tuple[float, ...]) -> FloatArray:

@@ -29,7 +29,8 @@ from thermal.units import AIR_HEAT_CAPACITY
 #: Zone, supply air and supply water that design capacities of terminals are counted at [K], those of `Terminals.sized`.
 _ROOM, _SUPPLY, _WATER = 294.15, 285.95, 355.35
 
-_RADIANT = "radiant gains of "
+#: What the signals of heat that radiates in a zone are called, before the name of the zone.
+RADIANT = "radiant gains of "
 
 
 def scenario_inputs(scenario: Scenario, normalisation: Normalisation | None = None) -> InputProvider:
@@ -182,7 +183,7 @@ class RadiantGains:
         for room in graph.anatomy.rooms.values():
             if room.radiant < 0:
                 continue
-            signal = Signal(_RADIANT + room.name, "W", partial(_radiant, zone=room.name), ("radiant_gains",))
+            signal = Signal(RADIANT + room.name, "W", partial(_radiant, zone=room.name), ("radiant_gains",))
             node, share = np.append(room.air, room.radiant), np.append(-room.share, 1.0)
             graph.source("radiant gains", 1.0, node, signal, share)
 
@@ -225,7 +226,7 @@ def check_radiant(network: ThermalNetwork, scenario: Scenario) -> None:
     PlantError
         When there are no signals for the part that radiates.
     """
-    takes = any(signal.name.startswith(_RADIANT) for signal in network.signals)
+    takes = any(signal.name.startswith(RADIANT) for signal in network.signals)
     if scenario.heat.radiates and not takes and (network.kind == "radiant").any():
         advice = "build it with effects=(RadiantGains(),)"
         raise PlantError(describe("building model", "one that takes gains that radiate", "gains to air only", advice))

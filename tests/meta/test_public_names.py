@@ -18,7 +18,11 @@ NUMERIC = re.compile(r"\b(float\d*|floating|FloatArray|ArrayLike)\b")
 PARAMETERS = re.compile(r"^Parameters\n-+\n(.*?)(?=^\S[^\n]*\n-{3,}$|\Z)", re.MULTILINE | re.DOTALL)
 
 # Public callables that take any keyword, with the reason.
-ANY_KEYWORD: dict[str, str] = {}
+ANY_KEYWORD: dict[str, str] = {
+    "thermal.system.system.HvacSystem.actions": "points of its components; an unknown one is refused with the nearest",
+    "thermal.system.system.HvacSystem.having": "names of its components; connections refuse others",
+    "thermal.system.system.HvacSystem.with_group": "ports of the group; connections refuse others",
+}
 
 
 def docstring(p: Any) -> str:

@@ -12,33 +12,12 @@ from thermal.components.fan import Fan
 from thermal.components.heater import Heater
 from thermal.components.moist_air import EVAPORATION_HEAT, enthalpy
 from thermal.components.operations import Operations, Value
-from thermal.components.streams import AirDrawn, Duct, HotWater, SupplyAir, WaterDrawn
+from thermal.components.streams import AirCommand, AirDrawn, Duct, HotWater, SupplyAir, WaterDrawn
 from thermal.components.water_coil import WaterCoil, water_share
 from thermal.errors import ModelError, describe
 from thermal.units import AIR_HEAT_CAPACITY
 
 _LEAST = 1e-9
-
-
-class AirCommand(NamedTuple):
-    """What an air handler is told.
-
-    Parameters
-    ----------
-    supply_air_temperature_setpoint : Value
-        Of the supply air behind the fan [K].
-    supply_air_static_pressure_setpoint : Value
-        In the duct [Pa].
-    fan_running : Value
-        1 while the fans run, else 0 [-].
-    ventilation : Value
-        Share of the minimum of outdoor air that is asked for [-].
-    """
-
-    supply_air_temperature_setpoint: Value
-    supply_air_static_pressure_setpoint: Value
-    fan_running: Value = 1.0
-    ventilation: Value = 1.0
 
 
 class Mixed(NamedTuple):
@@ -126,7 +105,13 @@ class AirHandlerStep(NamedTuple):
     fuel_power: Value
 
     def supply_temperature(self, water: Value) -> Value:
-        """Supply air [K] where the supply water has a temperature [K]."""
+        """Supply air [K].
+
+        Parameters
+        ----------
+        water : Value
+            Temperature of the supply water [K].
+        """
         return self.warmed.offset + self.warmed.slope * water
 
 

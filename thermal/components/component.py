@@ -316,6 +316,30 @@ class Group(Component):
             return super()._checked(where, value, limits)
         return all_in_range(where, value, np.size(self.zone), *limits)
 
+    def likely_heat(self, call: float, zone: FloatArray) -> FloatArray:
+        """Heat that the elements are likely to bring, for local control [W].
+
+        Parameters
+        ----------
+        call : float
+            For heating [-].
+        zone : numpy.ndarray, shape (n_element,)
+            Temperatures of their zones [K].
+        """
+        return np.zeros(len(self))
+
+    def energy(self, conditions: Conditions, done: Any) -> EnergyBalance:
+        """Where the energy of a step went: into the zones.
+
+        Parameters
+        ----------
+        conditions : Conditions
+            Of the step.
+        done : object
+            What `run` returned.
+        """
+        return EnergyBalance(zones=done.heat.sum(axis=-1))
+
     def positions(self, name: str) -> IndexArray:
         """Check a field of positions, one an element.
 

@@ -30,10 +30,24 @@ class Heater(Component):
     electric: bool = False
 
     def heat(self, ops: Operations, wanted: Value) -> Value:
-        """Heat into the air [W] where some is wanted [W]."""
+        """Heat into the air [W].
+
+        Parameters
+        ----------
+        ops : Operations
+            Arithmetic.
+        wanted : Value
+            Heat that is wanted [W].
+        """
         return ops.minimum(wanted, self.capacity, 0.1 * self.capacity)
 
     def power(self, heat: Value) -> tuple[Value, Value]:
-        """Electric and fuel power [W] for a heat [W]."""
+        """Electric and fuel power [W].
+
+        Parameters
+        ----------
+        heat : Value
+            Heat into the air [W].
+        """
         taken = heat / self.efficiency
         return (taken, 0.0) if self.electric else (0.0, taken)

@@ -68,72 +68,190 @@ class Operations:
         return self
 
     def of(self, group: str) -> Operations:
-        """Operations for a group of components, by its name."""
+        """Operations for a group of components, by its name.
+
+        Parameters
+        ----------
+        group : str
+            Name of the group.
+        """
         return self
 
     def maximum(self, a: Value, b: Value, scale: Value = 1.0) -> Value:
-        """Return the larger of two values; `scale` is what the smoothing width is a share of."""
+        """Return the larger of two values; `scale` is what the smoothing width is a share of.
+
+        Parameters
+        ----------
+        a, b : Value
+            Values [any].
+        scale : Value
+            What the smoothing width is a share of [as the values].
+        """
         return 0.5 * (a + b + self.sqrt((a - b) * (a - b) + (self.width * scale) ** 2))
 
     def minimum(self, a: Value, b: Value, scale: Value = 1.0) -> Value:
-        """Return the smaller of two values."""
+        """Return the smaller of two values.
+
+        Parameters
+        ----------
+        a, b : Value
+            Values [any].
+        scale : Value
+            What the smoothing width is a share of [as the values].
+        """
         return 0.5 * (a + b - self.sqrt((a - b) * (a - b) + (self.width * scale) ** 2))
 
     def clip(self, x: Value, lower: Value, upper: Value, scale: Value = 1.0) -> Value:
-        """Hold a value within limits."""
+        """Hold a value within limits.
+
+        Parameters
+        ----------
+        x : Value
+            A value [any].
+        lower, upper : Value
+            Limits [as the value].
+        scale : Value
+            What the smoothing width is a share of [as the values].
+        """
         w2 = (self.width * scale) ** 2
         low, high = x - lower, x - upper
         return 0.5 * (lower + upper + self.sqrt(low * low + w2) - self.sqrt(high * high + w2))
 
     def positive(self, x: Value, scale: Value = 1.0) -> Value:
-        """Return the larger of a value and 0."""
+        """Return the larger of a value and 0.
+
+        Parameters
+        ----------
+        x : Value
+            A value [any].
+        scale : Value
+            What the smoothing width is a share of [as the values].
+        """
         return self.maximum(x, 0.0, scale)
 
     def lesser(self, a: Value, b: Value) -> Value:
-        """Return the smaller of two positive values, positive however smooth."""
+        """Return the smaller of two positive values, positive however smooth.
+
+        Parameters
+        ----------
+        a, b : Value
+            Values [any].
+        """
         w2 = self.width * self.width
         # the other way round of the hyperbola's root: no cancellation where one is far larger
         return 2.0 * (1.0 - w2) * a * b / (a + b + self.sqrt((a - b) * (a - b) + 4.0 * w2 * a * b))
 
     def ordered(self, a: Value, b: Value) -> tuple[Value, Value]:
-        """Return the smaller and the larger of two positive values; their sum is exact however smooth."""
+        """Return the smaller and the larger of two positive values; their sum is exact however smooth.
+
+        Parameters
+        ----------
+        a, b : Value
+            Values [any].
+        """
         least = self.lesser(a, b)
         return least, a + b - least
 
     def capped(self, a: Value, b: Value, scale: Value = 1.0) -> Value:
-        """Return the smaller of two values that are not negative, 0 where one is, however smooth."""
+        """Return the smaller of two values that are not negative, 0 where one is, however smooth.
+
+        Parameters
+        ----------
+        a, b : Value
+            Values [any].
+        scale : Value
+            What the smoothing width is a share of [as the values].
+        """
         return a * b / self.maximum(a, b, scale)
 
     def unit(self, x: Value) -> Value:
-        """Hold a share within 0 and 1."""
+        """Hold a share within 0 and 1.
+
+        Parameters
+        ----------
+        x : Value
+            A value [any].
+        """
         return self.clip(x, 0.0, 1.0)
 
     def step(self, x: Value, scale: Value = 1.0) -> Value:
-        """Return 1 where a value is above 0, else 0."""
+        """Return 1 where a value is above 0, else 0.
+
+        Parameters
+        ----------
+        x : Value
+            A value [any].
+        scale : Value
+            What the smoothing width is a share of [as the values].
+        """
         return 0.5 * (1.0 + x / self.sqrt(x * x + (self.width * scale) ** 2))
 
     def surely_below(self, a: Value, b: Value) -> bool:
-        """Tell whether a value is known not to be above another, so that a limit need not be looked for."""
+        """Tell whether a value is known not to be above another, so that a limit need not be looked for.
+
+        Parameters
+        ----------
+        a, b : Value
+            Values [any].
+        """
         return False
 
     def sums(self, values: Value, members: NDArray[np.float64]) -> Sequence[Value]:
-        """Sum the terminals of each group; `members` is (n_terminal, n_group) of 0 and 1."""
+        """Sum the terminals of each group; `members` is (n_terminal, n_group) of 0 and 1.
+
+        Parameters
+        ----------
+        values : Value
+            Values [any].
+        members : ndarray
+            Shape (n_terminal, n_group), of 0 and 1 [-].
+        """
         raise NotImplementedError
 
     def spread(self, values: Sequence[Value], index: NDArray[np.intp]) -> Value:
-        """Give each terminal its group's value."""
+        """Give each terminal its group's value.
+
+        Parameters
+        ----------
+        values : sequence of Value
+            One a group [any].
+        index : ndarray of int
+            Positions [-].
+        """
         raise NotImplementedError
 
     def pick(self, values: Value, index: NDArray[np.intp]) -> Value:
-        """Give each terminal its zone's value."""
+        """Give each terminal its zone's value.
+
+        Parameters
+        ----------
+        values : Value
+            Values [any].
+        index : ndarray of int
+            Positions [-].
+        """
         raise NotImplementedError
 
     def dot(self, a: Value, b: Value) -> Value:
-        """Sum products over the terminals."""
+        """Sum products over the terminals.
+
+        Parameters
+        ----------
+        a, b : Value
+            Values [any].
+        """
         raise NotImplementedError
 
     def gather(self, values: Value, members: NDArray[np.float64]) -> Value:
-        """Sum the elements of each zone, which see no other zone; `members` is (n_element, n_zone) of 0 and 1."""
+        """Sum the elements of each zone, which see no other zone; `members` is (n_element, n_zone) of 0 and 1.
+
+        Parameters
+        ----------
+        values : Value
+            Values [any].
+        members : ndarray
+            Shape (n_terminal, n_group), of 0 and 1 [-].
+        """
         return values @ members
 
 

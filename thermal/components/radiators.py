@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from thermal._types import FloatArray
-from thermal.components.component import Conditions, EnergyBalance, Given, Group, IndexArray, Port, Range, Run
+from thermal.components.component import Given, Group, IndexArray, Port, Range, Run
 from thermal.components.moist_air import WATER_HEAT_CAPACITY
 from thermal.components.operations import Operations, Value
 from thermal.components.streams import HotWater, SupplyWater, WaterDrawn
@@ -128,6 +128,19 @@ class Radiators(Group):
         transfer = less * self.surface * overtemperature**less / rate
         return rate * overtemperature * (1.0 - (1.0 + transfer) ** (-1.0 / less))
 
+    def likely_heat(self, call: float, zone: FloatArray) -> FloatArray:
+        """Heat at a call with water of the nominal temperature [W].
+
+        Parameters
+        ----------
+        call : float
+            For heating [-].
+        zone : numpy.ndarray, shape (n_radiator,)
+            Temperatures of their zones [K].
+        """
+        over = np.maximum(self.supply_temperature - zone, _LEAST)
+        return np.asarray(self.emitted(call * self.water_flow, over))
+
     def run(self, ops: Operations, given: Given) -> Run:
         """Open valves by the calls, and bring the water's heat into the zones.
 
@@ -148,18 +161,6 @@ class Radiators(Group):
         water: SupplyWater = yield "hot_water"
         heat = conductance * (water.temperature - zone)
         return RadiatorStep(valve_flow, heat, self.radiant_share * heat)
-
-    def energy(self, conditions: Conditions, done: RadiatorStep) -> EnergyBalance:
-        """Where the energy of a step went.
-
-        Parameters
-        ----------
-        conditions : Conditions
-            Of the step.
-        done : RadiatorStep
-            What `run` returned.
-        """
-        return EnergyBalance(zones=done.heat.sum(axis=-1))
 
     def read(self, ops: Operations, given: Given, done: RadiatorStep, water: Value) -> list[Value]:
         """Values of its points, one a radiator each.

@@ -97,3 +97,24 @@ class SupplyWater(NamedTuple):
     """
 
     temperature: Value
+
+
+class AirCommand(NamedTuple):
+    """What an air handler is told.
+
+    Parameters
+    ----------
+    supply_air_temperature_setpoint : Value
+        Of the supply air behind the fan [K].
+    supply_air_static_pressure_setpoint : Value
+        In the duct [Pa].
+    fan_running : Value
+        1 while the fans run, else 0 [-].
+    ventilation : Value
+        Share of the minimum of outdoor air that is asked for [-].
+    """
+
+    supply_air_temperature_setpoint: Value
+    supply_air_static_pressure_setpoint: Value
+    fan_running: Value = 1.0
+    ventilation: Value = 1.0

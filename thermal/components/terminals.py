@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Annotated, NamedTuple
 
 import numpy as np
@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from thermal._types import FloatArray
 from thermal.components.checks import all_in_range, in_range
-from thermal.components.component import Conditions, EnergyBalance, Given, Group, IndexArray, Port, Range, Run
+from thermal.components.component import Given, Group, IndexArray, Port, Range, Run
 from thermal.components.kept import LastValue
 from thermal.components.moist_air import WATER_HEAT_CAPACITY
 from thermal.components.operations import NumpyOperations, Operations, Value
@@ -253,7 +253,6 @@ class Terminals(Group):
         return np.eye(int(self.air_handler.max()) + 1)[self.air_handler]
 
     # constants of each terminal as arrays: NumPy takes half as long for an array as for a float
-
     @cached_property
     def _spans(self) -> tuple[FloatArray, FloatArray]:
         """What calls for cooling, and for heating once the reheat is open, add to the flow [kg/s]."""
@@ -273,18 +272,15 @@ class Terminals(Group):
 
     @cached_property
     def _at_opening(self) -> LastValue:
-        return LastValue(self._array_side)
-
-    def _array_side(self, water: float) -> WaterSide:
-        return self._water_side(NumpyOperations(), water)
+        rate = WATER_HEAT_CAPACITY * self.water_flow
+        return LastValue(partial(water_side, NumpyOperations(), rate, self.water_film))
 
     @cached_property
     def _at_reach(self) -> LastValue:
         return LastValue(self._array_reach)
 
     def _array_reach(self, *reach: float) -> FloatArray:
-        most: FloatArray = self._reached(NumpyOperations(), reach)
-        return most
+        return self.design_flow * (np.array(reach)[self.air_handler] + LEAST_FLOW)
 
     def most_airflow(self, ops: Operations, reach: Sequence[Value]) -> Value:
         """Most air that the ducts' pressures drive through open dampers [kg/s].
@@ -296,9 +292,8 @@ class Terminals(Group):
         reach : sequence of Value
             That over the design flow, one an air handler [-].
         """
-        return self._at_reach(*reach) if type(reach[0]) is float else self._reached(ops, reach)
-
-    def _reached(self, ops: Operations, reach: Sequence[Value]) -> Value:
+        if type(reach[0]) is float:
+            return self._at_reach(*reach)
         return self.design_flow * (ops.spread(reach, self.air_handler) + LEAST_FLOW)
 
     def airflow(self, ops: Operations, heating: Value, cooling: Value, most: Value) -> Value:
@@ -308,10 +303,8 @@ class Terminals(Group):
         ----------
         ops : Operations
             Arithmetic.
-        heating, cooling : Value
-            Calls [-].
-        most : Value
-            That the ducts' pressures drive through open dampers [kg/s].
+        heating, cooling, most : Value
+            Calls [-]; air that the ducts' pressures drive through open dampers [kg/s].
         """
         by_cooling, by_heating = self._spans
         wanted = self.minimum_flow + by_cooling * cooling
@@ -344,9 +337,6 @@ class Terminals(Group):
         if type(water) is float:
             side: WaterSide = self._at_opening(water)
             return side
-        return self._water_side(ops, water)
-
-    def _water_side(self, ops: Operations, water: Value) -> WaterSide:
         return water_side(ops, WATER_HEAT_CAPACITY * self.water_flow, self.water_film, water)
 
     def conductance(self, ops: Operations, airflow: Value, rate: Value, water: WaterSide) -> Value:
@@ -356,10 +346,8 @@ class Terminals(Group):
         ----------
         ops : Operations
             Arithmetic.
-        airflow : Value
-            Air [kg/s], above 0.
-        rate : Value
-            Its heat capacity rate [W/K].
+        airflow, rate : Value
+            Air [kg/s], above 0, and its heat capacity rate [W/K].
         water : WaterSide
             As `open_water` gives it.
         """
@@ -372,10 +360,8 @@ class Terminals(Group):
         ----------
         ops : Operations
             Arithmetic.
-        entering : Value
-            Air that enters the coils [K].
-        water : Value
-            Water that enters the coils [K].
+        entering, water : Value
+            Air and water that enter the coils [K].
         """
         # a difference of nothing leaves valves open for cold water, and closed where nothing is wanted
         return ops.positive(self.discharge_limit - entering) / ops.maximum(water - entering, _LEAST)
@@ -389,10 +375,8 @@ class Terminals(Group):
             Arithmetic.
         call : Value
             Share of the reheat that is called for [-].
-        rate : Value
-            Heat capacity rate of the air [W/K].
-        conductance : Value
-            Of the open coils [W/K].
+        rate, conductance : Value
+            Heat capacity rate of the air, and conductance of the open coils [W/K].
         allowance : Value
             As `allowance` gives it [-].
         """
@@ -401,31 +385,13 @@ class Terminals(Group):
             return ops.capped(call * to_limit, conductance, 2.5)
         return ops.capped(to_limit, call * conductance, 2.5)
 
-    def energy(self, conditions: Conditions, done: TerminalStep) -> EnergyBalance:
-        """Where the energy of a step went.
-
-        Parameters
-        ----------
-        conditions : Conditions
-            Of the step.
-        done : TerminalStep
-            What `run` returned.
-        """
-        return EnergyBalance(zones=done.heat.sum(axis=-1))
-
     def read(self, ops: Operations, given: Given, done: TerminalStep, water: Value) -> list[Value]:
-        """Values of its points, one a terminal each.
+        """Values of its points, one a terminal each; see `Component.read`.
 
         Parameters
         ----------
-        ops : Operations
-            Arithmetic.
-        given : Given
-            As `run` had it.
-        done : TerminalStep
-            What `run` returned.
-        water : Value
-            Supply water at the end of the step [K].
+        ops, given, done, water : as there
+            Water [K].
         """
         seen = given.conditions[:3]
         damper = np.minimum(done.airflow / done.most_airflow, 1.0) * (done.most_airflow > _NO_AIR)

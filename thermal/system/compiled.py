@@ -31,7 +31,7 @@ class Results(Mapping[str, Any]):
     readers : mapping of str to tuple
         Phase of each component, and how its result is read; None for those that are known.
     rows : list of list of float
-        What the phases gave.
+        What the phases gave [any].
     known : dict
         Results that are known.
     """

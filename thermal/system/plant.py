@@ -150,20 +150,22 @@ class HvacPlant:
         done = self._compiled.step(state.values, calls, conditions, chosen, seconds)
         return HvacState(done.state, mode, was), done
 
-    def heat(self, step: HvacStep) -> FloatArray:
+    def heat(self, step: HvacStep, port: str = "heat") -> FloatArray:
         """Heat into the zones in a step.
 
         Parameters
         ----------
         step : HvacStep
             As `step` gives it.
+        port : str
+            All of it, ``heat``, or the part that falls on surfaces, ``radiant_heat``.
 
         Returns
         -------
         numpy.ndarray, shape (n_zone,)
             Heat [W].
         """
-        heat: FloatArray = self.system.at_zones(self._ops, step.results)
+        heat: FloatArray = self.system.at_zones(self._ops, step.results, port)
         return heat
 
     def _check(self, conditions: Conditions, seconds: float) -> Conditions:

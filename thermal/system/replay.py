@@ -11,11 +11,11 @@ from typing import NamedTuple
 import numpy as np
 
 from thermal._types import FloatArray
-from thermal.components.air_handler import AirCommand, AirHandler, Mixed
+from thermal.components.air_handler import AirHandler, Mixed
 from thermal.components.boiler_loop import BoilerLoop
 from thermal.components.component import Conditions
 from thermal.components.operations import FloatOperations, NumpyOperations
-from thermal.components.streams import AirDrawn, WaterDrawn
+from thermal.components.streams import AirCommand, AirDrawn, WaterDrawn
 from thermal.components.terminals import Terminals
 from thermal.components.water_coil import LEAST_FLOW, WaterCoil, heat_share, valve_flow, water_share
 from thermal.units import AIR_HEAT_CAPACITY

@@ -2,13 +2,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thermal.components.air_handler import AirCommand, AirHandler
+from thermal.components.air_handler import AirHandler
 from thermal.components.component import Conditions
 from thermal.components.cooling_coil import CoolingCoil
 from thermal.components.fan import Fan
 from thermal.components.heater import Heater
 from thermal.components.operations import FloatOperations
-from thermal.components.streams import AirDrawn
+from thermal.components.streams import AirCommand, AirDrawn
 from thermal.components.water_coil import WaterCoil
 from thermal.errors import ModelError
 

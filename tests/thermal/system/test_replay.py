@@ -1,9 +1,10 @@
 import numpy as np
 import pytest
 
-from thermal.components.air_handler import AirCommand, AirHandler
+from thermal.components.air_handler import AirHandler
 from thermal.components.boiler_loop import BoilerLoop
 from thermal.components.component import Conditions
+from thermal.components.streams import AirCommand
 from thermal.components.terminals import Terminals
 from thermal.system.plant import HvacPlant
 from thermal.system.points import HvacPoints

@@ -1,0 +1,31 @@
+"""Radiators that a case has are in its closed loop: heat of air and surfaces, points, and a balance that closes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from mpc.loop.make import pilot_weather, simulated_plant
+from thermal.case.building import Device
+from thermal.pilot.building import pilot_building
+
+
+def test_radiators_warm_their_zones_and_energy_closes() -> None:
+    office = pilot_building(1, floor_area=600.0, zones=12, name="office")
+    warm = office.zone_names[:3]
+    more = [Device(name=f"RAD_{zone}", type="radiator", zone=zone) for zone in warm]
+    ends = []
+    for building in (office, replace(office, devices=(*office.devices, *more))):
+        plant = simulated_plant(building, pilot_weather(1, "2023-01-09", 2), "2023-01-09", "2023-01-10", dx=1.0)
+        plant.reset()
+        for _ in range(120):
+            plant.step(plant.default_actions)
+            balance = plant.balance()
+            assert abs(balance.residual) < 1e-9 * balance.turnover
+        ends.append(plant.record().zone_temperature[84:].mean(axis=0))
+    gained = ends[1] - ends[0]
+    assert (gained[:3] > 0.02).all() and gained[:3].min() > np.abs(gained[6:]).max()
+    frame = plant.telemetry()
+    assert (frame[[f"RAD_{zone}/heating_power_sensor" for zone in warm]].max() > 100.0).all()
+    assert plant._loop._radiant  # what falls on surfaces goes there
