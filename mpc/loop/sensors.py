@@ -18,12 +18,11 @@ from thermal.case.building import Building
 from thermal.case.points import DISCHARGE_TEMPERATURE, SUPPLY_FLOW
 from thermal.components.air_handler import AirHandler
 from thermal.components.component import Group
+from thermal.components.moist_air import LEAST_AIR
 from thermal.components.terminals import Terminals
 from thermal.errors import describe
 from thermal.system.points import HvacPoints
 from thermal.system.system import HvacSystem
-
-_LEAST_FLOW = 1e-6  # kg/s: less is none
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,7 +189,7 @@ class Sensors:
         """
         place, zone, conditions, air = self._terminals.zone, step.mean, step.conditions, step.done.terminals
         values = self._points.read(conditions._replace(zone_temperature=zone), step.actions, step.done)
-        flowing = air.airflow > _LEAST_FLOW
+        flowing = air.airflow > LEAST_AIR
         lift = (zone - conditions.zone_temperature)[place]
         values[self._discharge] = np.where(flowing, air.discharge + lift, zone[place])
         values[self._flow] = np.where(flowing, air.airflow, 0.0)

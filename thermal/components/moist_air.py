@@ -8,6 +8,7 @@ WATER_HEAT_CAPACITY = 4186.0  # J/kg/K, liquid at 50 degC within 0.2 % (IAPWS-95
 WATER_DENSITY = 983.0  # kg/m3 at 60 degC (IAPWS-95)
 SUPPLY_AIR_DENSITY = 1.2  # kg/m3: rated flows and pressures of fans are of standard air (ASHRAE Fundamentals 2017)
 EVAPORATION_HEAT = 2.454e6  # J/kg at 20 degC (ASHRAE Fundamentals 2017, ch. 1)
+LEAST_AIR = 1e-6  # kg/s: less air is none, and the dampers of an air handler that is off are shut
 USUAL_HUMIDITY = 0.006  # kg/kg: dew point 6.5 degC, so that coils stay nearly dry where no humidity is given
 _FREEZING = 273.15  # K
 _MOLAR_RATIO = 0.621945  # water to dry air (ASHRAE Fundamentals 2017, ch. 1)

@@ -324,6 +324,10 @@ class StepOperations(NumpyOperations):
         super().__init__(width)
         self._scalar = FloatOperations(width)
 
+    def surely_below(self, a: Value, b: Value) -> bool:
+        """Tell whether no element is above a value."""
+        return bool(a.item(a.argmax()) <= b)
+
     @property
     def scalar(self) -> Operations:
         """Operations on floats."""

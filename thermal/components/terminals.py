@@ -14,7 +14,7 @@ from thermal._types import FloatArray
 from thermal.components.checks import all_in_range, in_range
 from thermal.components.component import Given, Group, IndexArray, Port, Range, Run
 from thermal.components.kept import LastValue
-from thermal.components.moist_air import WATER_HEAT_CAPACITY
+from thermal.components.moist_air import LEAST_AIR, WATER_HEAT_CAPACITY
 from thermal.components.operations import NumpyOperations, Operations, Value
 from thermal.components.streams import AirDrawn, Duct, HotWater, SupplyAir, SupplyWater, WaterDrawn
 from thermal.components.water_coil import (
@@ -30,7 +30,6 @@ from thermal.errors import ModelError, describe
 from thermal.units import AIR_HEAT_CAPACITY
 
 _LEAST = 1e-9  # K, W/K, kg/s: next to nothing
-_NO_AIR = 1e-6  # kg/s: less air is none, and the dampers of an air handler that is off are shut
 
 _Flow = Annotated[FloatArray, Range("kg/s", 1e-9, 1e7)]
 _Film = Annotated[FloatArray, Range("W/K", 1e-9, 1e7)]
@@ -230,12 +229,14 @@ class Terminals(Group):
         given.put("supply_air", AirDrawn(ops.sums(airflow, self.members), ops.sums(airflow * zone, self.members)))
 
         supply: SupplyAir = yield "supply_air"
-        open_water = self.open_water(ops, pipe.opening)
-        open_coil = self.conductance(ops, airflow, rate, open_water)
-        at_warmest = [o + s * pipe.warmest for o, s in zip(*supply, strict=True)]
-        allowance = ops.spread([self.allowance(few, air, pipe.warmest) for air in at_warmest], index)
-        coil = self.throttled(ops, self.reheat_call(ops, heating), rate, open_coil, allowance)
-        valve_flow = water_share(coil, open_coil, open_water.curve)
+        coil = valve_flow = np.zeros(len(self))  # shut, where nobody calls
+        if not ops.surely_below(heating, 0.0):
+            open_water = self.open_water(ops, pipe.opening)
+            open_coil = self.conductance(ops, airflow, rate, open_water)
+            at_warmest = [o + s * pipe.warmest for o, s in zip(*supply, strict=True)]
+            allowance = ops.spread([self.allowance(few, air, pipe.warmest) for air in at_warmest], index)
+            coil = self.throttled(ops, self.reheat_call(ops, heating), rate, open_coil, allowance)
+            valve_flow = water_share(coil, open_coil, open_water.curve)
         # the coils of an air handler's terminals are as one: q = G (T - T_supply), T_supply = offset + slope T
         conductance = source = 0.0
         for total, offset, slope in zip(ops.sums(coil, self.members), *supply, strict=True):
@@ -374,7 +375,7 @@ class Terminals(Group):
         ops : Operations
             Arithmetic.
         call : Value
-            Share of the reheat that is called for [-].
+            Share of the reheat that is called for [-]; where all are 0, it is not asked.
         rate, conductance : Value
             Heat capacity rate of the air, and conductance of the open coils [W/K].
         allowance : Value
@@ -394,6 +395,6 @@ class Terminals(Group):
             Water [K].
         """
         seen = given.conditions[:3]
-        damper = np.minimum(done.airflow / done.most_airflow, 1.0) * (done.most_airflow > _NO_AIR)
+        damper = np.minimum(done.airflow / done.most_airflow, 1.0) * (done.most_airflow > LEAST_AIR)
         valve = valve_position(ops, done.valve_flow, self.rangeability)
         return [*(values[self.zone] for values in seen), done.airflow, done.discharge, damper, valve]

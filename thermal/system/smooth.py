@@ -16,8 +16,8 @@ from thermal._types import FloatArray
 from thermal.components.component import Conditions
 from thermal.components.moist_air import USUAL_HUMIDITY
 from thermal.components.operations import CasadiOperations, Value
-from thermal.system.exchange import advance
 from thermal.system.step import HvacStep
+from thermal.system.symbolic import step_of
 from thermal.system.system import HvacSystem
 
 
@@ -180,16 +180,9 @@ class SmoothHvac:
         return rows
 
     def _advanced(self, ops: _SumOperations, zone: Value, inputs: Value, exogenous: Value) -> HvacStep:
-        system = self.system
         known = {name: exogenous[at] for name, at in self.exogenous.items()}
         known |= {name: inputs[at] for name, at in self.inputs.items()} | {"zone_temperature": zone}
-        conditions = Conditions(*(known[name] for name in Conditions._fields))
-        conditions = conditions._replace(return_humidity=tuple(casadi.vertsplit(known["return_humidity"])))
-        points = [point for point in system.by_point if point in known]
-        actions = system.actions(**{point: tuple(casadi.vertsplit(known[point])) for point in points})
-        state = [known[s.name] for _, s in system.states]
-        calls = system.thermostat.calls(ops, *conditions[:3])
-        return advance(ops, system, state, calls, conditions, actions, known["seconds"])
+        return step_of(ops, self.system, known)
 
     def _jacobian_functions(self, ops: _SumOperations, zone: Value, inputs: Value, exogenous: Value) -> tuple[Any, Any]:
         """All derivatives, and those of the heat by each zone's own temperature alone."""

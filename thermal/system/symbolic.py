@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import casadi
@@ -9,7 +10,30 @@ import casadi
 from thermal.components.component import Conditions
 from thermal.components.operations import CasadiOperations
 from thermal.system.exchange import advance
+from thermal.system.step import HvacStep
 from thermal.system.system import HvacSystem
+
+
+def step_of(ops: CasadiOperations, system: HvacSystem, known: Mapping[str, Any]) -> HvacStep:
+    """Take a system through a step of expressions, its thermostats without memory.
+
+    Parameters
+    ----------
+    ops : CasadiOperations
+        Arithmetic.
+    system : HvacSystem
+        The system.
+    known : mapping of str to casadi.SX
+        States, fields of `Conditions` and ``seconds`` by name, actuators by point; pressures that are not there stay at
+        their design values.
+    """
+    conditions = Conditions(*(known[name] for name in Conditions._fields))
+    conditions = conditions._replace(return_humidity=tuple(casadi.vertsplit(known["return_humidity"])))
+    points = [point for point in system.by_point if point in known]
+    actions = system.actions(**{point: tuple(casadi.vertsplit(known[point])) for point in points})
+    calls = system.thermostat.calls(ops, *conditions[:3])
+    state = [known[s.name] for _, s in system.states]
+    return advance(ops, system, state, calls, conditions, actions, known["seconds"])
 
 
 def hvac_function(system: HvacSystem, width: float = 0.02) -> Any:
@@ -56,11 +80,7 @@ def hvac_function(system: HvacSystem, width: float = 0.02) -> Any:
     sizes |= dict.fromkeys(Conditions._fields[:3], n) | {"return_humidity": n_air}
     sizes |= {point: len(keys) for point, keys in system.by_point.items()} | {"seconds": 1}
     s = {name: casadi.SX.sym(name, size) for name, size in sizes.items()}
-    conditions = Conditions(*(s[name] for name in Conditions._fields))
-    conditions = conditions._replace(return_humidity=tuple(casadi.vertsplit(s["return_humidity"])))
-    actions = system.actions(**{point: tuple(casadi.vertsplit(s[point])) for point in system.by_point})
-    calls = system.thermostat.calls(ops, *conditions[:3])
-    done = advance(ops, system, [s[name] for name in states], calls, conditions, actions, s["seconds"])
+    done = step_of(ops, system, s)
     outputs = {f"{name}_end": value for name, value in zip(states, done.state, strict=True)}
     outputs |= {"heat": system.at_zones(ops, done.results), "electric_power": done.electric_power}
     outputs |= {"fuel_power": done.fuel_power, "supply_temperature": casadi.vertcat(*done.supply_temperature)}
