@@ -14,7 +14,7 @@ from thermal import load_bundled_case
 def run(hours: float = 3.0) -> Kpis:
     """Calibrate the bundled case with the sun through its windows, and control it for the hours of a Monday morning."""
     case = load_bundled_case()
-    fitted = calibrate(case, dx=1.0, effects=["solar_gain"], starts=1)
+    fitted = calibrate(case, settings={"dx": 1.0, "effects": ["solar_gain"], "starts": 1})
     # actions every three steps of 5 minutes, forecasts of 144 steps: 12 hours
     settings = PlantSettings(parameters=fitted, noise=SensorNoise(), control_steps=3, horizon=144)
     plant = simulated_plant(case.building, weather_of_case(case), "2023-03-06T06:00", "2023-03-07", settings)

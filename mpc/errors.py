@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
-from thermal.errors import describe, nearest
-
 
 class MpcError(Exception):
     """Base of every error that `mpc` raises on purpose."""
@@ -26,6 +24,8 @@ class MpcError(Exception):
             What to do about it; empty when that is plain.
         """
         if not valid:
+            from thermal.errors import describe  # the console command imports this module, and starts at once
+
             raise cls(describe(where, expected, str(found), advice))
 
     @classmethod
@@ -42,6 +42,8 @@ class MpcError(Exception):
             What is checked, and what would have been right.
         """
         if value not in options:
+            from thermal.errors import describe, nearest
+
             raise cls(describe(where, expected, repr(value), nearest(value, options)))
 
 

@@ -106,10 +106,8 @@ def test_predictions_know_nothing_of_the_days_after_their_start(name: str) -> No
 def test_a_calibration_knows_nothing_of_held_out_days(tmp_path: Path) -> None:
     """Parameters stay bit for bit, and the constants are written with them, and read back."""
     tuning, held_out = intervals()
-    found = [
-        calibrate(case, tuning, held_out, dx=1.5, horizon="1h", effects=["internal_gains", "infiltration"], starts=1)
-        for case in (counted(), altered(people=True))
-    ]
+    settings = {"dx": 1.5, "horizon": "1h", "effects": ["internal_gains", "infiltration"], "starts": 1}
+    found = [calibrate(case, tuning, held_out, settings=settings) for case in (counted(), altered(people=True))]
     assert np.array_equal(found[0].theta, found[1].theta)
     constants = fit_normalisation(counted(), tuned())
     assert constants.people == 2.0 * 2 + 3.0 * 2 + 4.0 and len(constants.usual) == 5
