@@ -286,9 +286,7 @@ def load_parameters(path: str | Path, network: ThermalNetwork) -> FloatArray:
         raise CalibrationError(f"{path}: expected JSON as `calibrate` writes it, found {error}") from error
     entries = content.get("parameters") if isinstance(content, dict) else None
     if not isinstance(entries, dict) or not entries:
-        raise CalibrationError(
-            f"{path}: expected a key 'parameters' with an entry a parameter, as in calibration.json"
-        )
+        raise CalibrationError(f"{path}: expected a key 'parameters' with an entry a parameter, as in calibration.json")
     scales = {p.name: p.scale for p in network.parameters}
     values: dict[str, float] = {}
     for name, entry in entries.items():

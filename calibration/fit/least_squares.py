@@ -231,11 +231,7 @@ def solve_least_squares(
 
 
 def bounded_step(
-    residual: FloatArray,
-    jacobian: FloatArray,
-    lower: FloatArray,
-    upper: FloatArray,
-    damping: FloatArray | None = None,
+    residual: FloatArray, jacobian: FloatArray, lower: FloatArray, upper: FloatArray, damping: FloatArray | None = None
 ) -> FloatArray:
     """Minimise the linearised residuals ``|r + J s|²`` within bounds of the step s.
 

@@ -260,7 +260,7 @@ def sure(probability: float) -> str:
     Parameters
     ----------
     probability : float
-        In [0, 1] [-].
+        In [0, 1], [-].
 
     Examples
     --------
