@@ -11,6 +11,7 @@ from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import fields, is_dataclass
 from datetime import date
+from html import escape
 from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -59,7 +60,7 @@ class Result(Plain, ABC):
 
     def _repr_html_(self) -> str:
         table = self.to_frame().to_html(float_format="{:.4g}".format, max_rows=30, na_rep="")
-        return f"<p>{type(self).__name__}: {self._summary()}</p>{table}"
+        return f"<p>{type(self).__name__}: {escape(self._summary())}</p>{table}"
 
     def plot(self, axes: Axes | None = None) -> Axes:
         """Draw the main numbers.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
-from typing import Any, NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -13,6 +13,7 @@ import pandas as pd
 from calibration.diagnosis.decide.drift import DriftCurve, drift_of
 from calibration.diagnosis.refit.comparison import Fit, ModelComparison
 from calibration.diagnosis.screen.missing import Missing, at_start, missing_heat
+from calibration.results import Plain
 from thermal._types import BoolArray, FloatArray
 from thermal.case.building import FloorPlans
 from thermal.inputs.provider import InputProvider
@@ -32,7 +33,7 @@ _LEAST = 0.02
 
 
 @dataclass(frozen=True)
-class Share:
+class Share(Plain):
     """Share of the squared error that falls on a part of the predictions.
 
     Parameters
@@ -51,10 +52,7 @@ class Share:
     share: float
     predictions: float
     interval: tuple[float, float]
-
-    def to_dict(self) -> dict[str, Any]:
-        """Entry of ``modes`` and ``groups`` in ``diagnosis.json``."""
-        return {key: value for key, value in vars(self).items() if key != "name"}
+    key: ClassVar[str] = "name"
 
 
 class Outstanding(NamedTuple):
