@@ -10,10 +10,9 @@ from typing import Any
 
 import pandas as pd
 
-from calibration.diagnosis.decide.drift import DriftCurve, drift_of
 from calibration.diagnosis.decide.levels import p_value
 from calibration.diagnosis.decide.verdict import Verdict, gains_of, judge
-from calibration.diagnosis.decide.where import Where, where_it_lies
+from calibration.diagnosis.decide.where import DriftCurve, Where, drift_of, where_it_lies
 from calibration.diagnosis.refit.comparison import Fit, ModelComparison
 from calibration.diagnosis.refit.how_far import Step, how_far
 from calibration.diagnosis.refit.refit import ACCEPTED, elsewhere, held_out
