@@ -11,14 +11,7 @@ import pandas as pd
 from calibration.evaluation.case_model import CHECK_TOLERANCE
 from calibration.fit.result import CalibrationResult, ParameterEstimate
 from calibration.results import Content, check_results_folder, write_results
-from mpc.reports.evaluation import (
-    by_error,
-    evaluation_figures,
-    interval_records,
-    predictions_table,
-    subtitle,
-    unchanged_error,
-)
+from mpc.reports import evaluation
 from mpc.reports.figures.calibration import paper_values, parameter_ranges
 from mpc.reports.figures.errors import error_band, error_growth, median_run
 from mpc.reports.figures.field import spatial_field
@@ -79,7 +72,7 @@ def calibration_files(result: CalibrationResult, case: Case) -> dict[str, Conten
     return {
         "calibration.json": calibration_content(result),
         "evaluation.json": held_out.to_dict(),
-        "predictions.parquet": predictions_table(held_out),
+        "predictions.parquet": evaluation.predictions_table(held_out),
         "report.html": render("calibration", _content(result, case, grid, inputs)),
     }
 
@@ -103,10 +96,10 @@ def calibration_verdict(result: CalibrationResult) -> str:
     result : CalibrationResult
         From `calibrate`.
     """
-    evaluation = result.calibrated["held_out"]
-    before, after = result.uncalibrated["held_out"].metrics.mae, evaluation.metrics.mae
-    rest = unchanged_error(evaluation)
-    ahead = duration(evaluation.steps * evaluation.step_seconds).capitalize()
+    held_out = result.calibrated["held_out"]
+    before, after = result.uncalibrated["held_out"].metrics.mae, held_out.metrics.mae
+    rest = evaluation.unchanged_error(held_out)
+    ahead = duration(held_out.steps * held_out.step_seconds).capitalize()
     sentences = [
         f"{ahead} ahead, on data it was not fitted to, the calibrated model misses the measured zone temperatures by",
         f"{kelvin(after)} K on average. Before calibration it was {kelvin(before)} K" + _change(before, after),
@@ -144,47 +137,37 @@ def _parameter_sentence(parameters: Sequence[ParameterEstimate]) -> str:
 def _content(result: CalibrationResult, case: Case, grid: SymbolicModel, inputs: Inputs) -> dict[str, Any]:
     """Lay out the page."""
     before, after = result.uncalibrated["held_out"], result.calibrated["held_out"]
-    field = None
+    field, chosen = None, result.settings
     if grid.network.n_node <= MOST_VOLUMES and (grid.network.place >= 0).any():
         which, run = median_run(after)
-        start, chosen = after.predictions[which].start[run], result.settings
+        start = after.predictions[which].start[run]
         field = spatial_field(grid, result.theta, inputs, start, after.steps, chosen.dx, chosen.stepping)
-    drawn = evaluation_figures(after, case, before=before, field=field, band=error_band(result.calibrated["tuning"]))
+    drawn = evaluation.evaluation_figures(after, case, before, field, error_band(result.calibrated["tuning"]))
     parts = {name.replace("_", " "): name for name in ("held_out", "tuning")}
     pairs = {title: {"before": result.uncalibrated[k], "after": result.calibrated[k]} for title, k in parts.items()}
     drawn["growth"] = error_growth(pairs)
-    paper = paper_values(result.parameters)
+    paper, objective = paper_values(result.parameters), result.objective
+    flags = f" --scheme {chosen.scheme}" + (f" --objective {objective}" if objective != "multi_step" else "")
+    flags += f" --starts {result.solver.starts} --seed {result.seed}"
     return {
         "result": result,
         "after": after,
-        "subtitle": subtitle(case, after),
+        "subtitle": evaluation.subtitle(case, after),
         "verdict": calibration_verdict(result),
         "fine": result.solver.success and after.metrics.mae < before.metrics.mae,
         "parts": [(title, result.uncalibrated[k].metrics, result.calibrated[k].metrics,
-                   unchanged_error(result.calibrated[k])) for title, k in parts.items()],
+                   evaluation.unchanged_error(result.calibrated[k])) for title, k in parts.items()],
         "figures": drawn,
         "estimated": [p for p in result.parameters if p.standard_error is not None],
         "parameters": [vars(p) | {"title": in_words(p.name), "paper": paper.get(p.name)} for p in result.parameters],
         "parameter_figure": parameter_ranges(result.parameters),
         "told": information_sentences(result.information),
-        "zones": by_error(after.by_zone()),
+        "zones": evaluation.by_error(after.by_zone()),
         "intervals": [record | {"part": title} for title, k in reversed(parts.items())
-                      for record in interval_records(result.calibrated[k])],
+                      for record in evaluation.interval_records(result.calibrated[k])],
         **diagnostics_content(result, grid, inputs),
         "trusted": result.grid_check.max_difference <= CHECK_TOLERANCE,
         "span": (case.stamps[0], case.stamps[-1], case.step),
         "pandas": pd.__version__,
-        "command": _command(result),
+        "command": evaluation.command("calibrate", (result.tuning, result.held_out), result.horizon, chosen.dx, flags),
     }  # fmt: skip
-
-
-def _command(result: CalibrationResult) -> str:
-    """Spell the command that gives these results again."""
-    parts = ["buildingmpc calibrate CASE --out RESULTS"]
-    parts += [f"--tune {i.start.isoformat()}/{i.end.isoformat()}" for i in result.tuning]
-    parts += [f"--hold-out {i.start.isoformat()}/{i.end.isoformat()}" for i in result.held_out]
-    parts += [f"--horizon {result.horizon} --scheme {result.settings.scheme}"]
-    parts += [f"--objective {result.objective}"] if result.objective != "multi_step" else []
-    parts += [f"--starts {result.solver.starts} --seed {result.seed}"]
-    parts += [f"--dx {result.settings.dx:g}"] if result.settings.dx is not None else []
-    return " ".join(parts)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
+from calibration.evaluation.intervals import Interval
 from calibration.evaluation.n_step import Evaluation, spatial_metrics
 from mpc.reports.figures.errors import Band, drift_boxes, error_growth, median_run, series_of_runs, zone_panels
 from mpc.reports.figures.field import Field
@@ -216,6 +217,28 @@ def interval_records(evaluation: Evaluation) -> list[dict[str, Any]]:
 def by_error(errors: Mapping[str, Mapping[str, float]]) -> list[dict[str, Any]]:
     """List the errors of the zones as records, the largest first."""
     return [{"zone": z, **e} for z, e in sorted(errors.items(), key=lambda item: -item[1]["mae"])]
+
+
+def command(name: str, parts: Sequence[Sequence[Interval]], horizon: str, dx: float | None, further: str = "") -> str:
+    """Spell the command that gives a result again.
+
+    Parameters
+    ----------
+    name : str
+        Of the command.
+    parts : sequence of sequence of Interval
+        Those tuned on and those held out.
+    horizon : str
+        Prediction horizon, such as ``6h``.
+    dx : float or None
+        Distance between control volumes of a plan [m].
+    further : str
+        Other options.
+    """
+    words = [f"buildingmpc {name} CASE --out RESULTS"]
+    for option, intervals in zip(("--tune", "--hold-out"), parts, strict=True):
+        words += [f"{option} {'/'.join(i.to_dict().values())}" for i in intervals]
+    return " ".join([*words, f"--horizon {horizon}{further}", *([] if dx is None else [f"--dx {dx:g}"])])
 
 
 def subtitle(case: Case, evaluation: Evaluation) -> str:
