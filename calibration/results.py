@@ -11,6 +11,7 @@ from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import fields, is_dataclass
 from datetime import date
+from html import escape
 from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -59,7 +60,7 @@ class Result(Plain, ABC):
 
     def _repr_html_(self) -> str:
         table = self.to_frame().to_html(float_format="{:.4g}".format, max_rows=30, na_rep="")
-        return f"<p>{type(self).__name__}: {self._summary()}</p>{table}"
+        return f"<p>{type(self).__name__}: {escape(self._summary())}</p>{table}"
 
     def plot(self, axes: Axes | None = None) -> Axes:
         """Draw the main numbers.
@@ -163,7 +164,7 @@ def write_results(out: str | Path, files: Mapping[str, Content], force: bool = F
     folder = check_results_folder(out, force)
     for name in files:
         if PurePath(name).name != name or name in {"", ".", ".."}:
-            raise ResultsExistError(f"{folder}: expected plain file names for results, came {name!r}")
+            raise ResultsExistError(f"{folder}: expected plain file names for results, got {name!r}")
     folder = folder.resolve()
     folder.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix=f".{folder.name}-", dir=folder.parent) as work:
@@ -236,7 +237,7 @@ def _fields(value: Any) -> dict[str, Any]:
 def _write(path: Path, content: Content) -> None:
     if isinstance(content, pd.DataFrame):
         if isinstance(content.index, pd.DatetimeIndex) and content.index.tz is None:
-            raise TypeError(f"{path.name}: expected stamps with a time zone, came an index without one")
+            raise TypeError(f"{path.name}: expected stamps with a time zone, got an index without one")
         content.to_parquet(path)
     elif isinstance(content, bytes):
         path.write_bytes(content)

@@ -5,17 +5,14 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from html import escape
 from importlib.metadata import version
 from typing import Any
 
 import pandas as pd
-from matplotlib.axes import Axes
 
-from calibration.diagnosis.decide.drift import DriftCurve, drift_of
 from calibration.diagnosis.decide.levels import p_value
 from calibration.diagnosis.decide.verdict import Verdict, gains_of, judge
-from calibration.diagnosis.decide.where import Where, where_it_lies
+from calibration.diagnosis.decide.where import DriftCurve, Where, drift_of, where_it_lies
 from calibration.diagnosis.refit.comparison import Fit, ModelComparison
 from calibration.diagnosis.refit.how_far import Step, how_far
 from calibration.diagnosis.refit.refit import ACCEPTED, elsewhere, held_out
@@ -25,6 +22,7 @@ from calibration.evaluation.intervals import Interval
 from calibration.evaluation.n_step import Evaluation, Progress
 from calibration.evaluation.settings import ModelSettings
 from calibration.fit.result import SolverReport, effect_entries
+from calibration.results import Axes, Result, plain
 from thermal.case.case import Case
 from thermal.effects.catalogue import CATALOGUE
 
@@ -34,9 +32,6 @@ SUBSYSTEMS = {
     **dict.fromkeys(("sensor_bias", "sensor_lag", "clock_shift", "wrong_station"), "sensor"),
     **dict.fromkeys(("internal_gains", "latent_load"), "use"),
 }
-
-#: Effects that a notebook shows.
-_SHOWN = 8
 
 
 @dataclass(frozen=True)
@@ -59,7 +54,7 @@ class Replay:
 
 
 @dataclass(frozen=True, repr=False)
-class Diagnosis:
+class Diagnosis(Result):
     """Outcome of `diagnose`.
 
     Parameters
@@ -162,8 +157,8 @@ class Diagnosis:
             "how_far": [s.to_dict() for s in self.steps],
             "rounds": [r.to_dict() | {"worth": gains_of(r)} for r in self.rounds],
             "intervals": {
-                "tuning": [i.to_dict() for i in self.tuned],
-                "held_out": [i.to_dict() for i in self.judged],
+                "tuning": plain(self.tuned),
+                "held_out": plain(self.judged),
                 "mae_of_last_third": self.last_third,
             },
             **{key: getattr(self, key) for key in ("seconds", "case", "version", "seed")},
@@ -181,33 +176,23 @@ class Diagnosis:
 
     def calibration(self) -> dict[str, Any]:
         """Contents of the ``calibration.json`` of the final model."""
-        final, network = self.final, self.final.built.network
-        described = final.describe()
-        found = final.found
-        solver = SolverReport(
-            "gauss_newton", "settled" if found.converged else "evaluations used up", found.converged, found.evaluations,
-            self.seconds, 1, (), found.evaluations, found.converged,
-        )  # fmt: skip
+        final, found = self.final, self.final.found
+        parameters, status = final.describe(), "settled" if found.converged else "evaluations used up"
         intervals = {"tuning": self.tuned, "held_out": self.judged}
         before, after = (
-            {name: fit.evaluate(part, self.horizon).metrics.to_dict() for name, part in intervals.items()}
+            {name: fit.evaluate(part, self.horizon).metrics for name, part in intervals.items()}
             for fit in (at_start(self.rounds[0].before), final)
         )
-        return {
-            "parameters": {p.name: p.to_dict() for p in described},
-            "uncalibrated": before,
-            "calibrated": after,
-            "effects": effect_entries(final.effects, described),
-            "solver": solver.to_dict(),
-            "intervals": {name: [i.to_dict() for i in part] for name, part in intervals.items()},
-            "objective": "multi_step",
-            "horizon": self.horizon,
-            "settings": replace(self.settings, effects=dict(final.effects)).to_dict(),
-            "zones": list(network.zones),
-            "case": self.case,
-            "version": self.version,
-            "seed": self.seed,
-        }
+        content: dict[str, Any] = plain({
+            "parameters": parameters, "uncalibrated": before, "calibrated": after,
+            "effects": effect_entries(final.effects, parameters),
+            "solver": SolverReport("gauss_newton", status, found.converged, found.evaluations, self.seconds, 1,
+                                   evaluations=found.evaluations, settled=found.converged),
+            "intervals": intervals, "objective": "multi_step", "horizon": self.horizon,
+            "settings": replace(self.settings, effects=dict(final.effects)), "zones": final.built.network.zones,
+            "case": self.case, "version": self.version, "seed": self.seed,
+        })  # fmt: skip
+        return content
 
     def to_frame(self) -> pd.DataFrame:
         """Tabulate the effects of the catalogue, the likeliest first.
@@ -221,26 +206,13 @@ class Diagnosis:
         rows = pd.DataFrame([c.to_dict() for c in self.verdict.candidates])
         return rows.set_index("effect").drop(columns="parameters")
 
-    def plot(self, axes: Axes | None = None) -> Axes:
-        """Draw the probability of each effect that the case can tell.
-
-        Parameters
-        ----------
-        axes : Axes, optional
-            Where to draw; axes of a new figure by default.
-        """
-        shown = self.to_frame().query("testable")["probability"][::-1]
-        drawn: Axes = shown.plot.barh(ax=axes, xlim=(0.0, 1.0), xlabel="probability that it is there [-]")
-        return drawn
-
-    def __repr__(self) -> str:
-        """Say case, verdict and errors in a line."""
+    def _summary(self) -> str:
         found = f", with {' + '.join(self.final.effects)} {self.steps[-1].after:.3f} K" if self.steps else ""
-        return f"<Diagnosis: {self.case}, {self.verdict.name}; held-out error {self.gap:.3f} K{found}>"
+        return f"{self.case}, {self.verdict.name}; held-out error {self.gap:.3f} K{found}"
 
-    def _repr_html_(self) -> str:
-        table = self.to_frame()[["probability", "score", "group", "zones"]].head(_SHOWN).round(2)
-        return f"<p>{escape(repr(self))}</p>{table.to_html()}"
+    def _draw(self, axes: Axes) -> None:
+        shown = self.to_frame().query("testable")["probability"][::-1]
+        shown.plot.barh(ax=axes, xlim=(0.0, 1.0), xlabel="probability that it is there [-]")
 
 
 def diagnose(

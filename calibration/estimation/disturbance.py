@@ -65,11 +65,11 @@ class DisturbanceModel:
             object.__setattr__(self, name, np.atleast_1d(np.asarray(getattr(self, name), dtype=float)))
         heat, noise = np.asarray(self.deviation), np.asarray(self.sensor_deviation)
         if heat.ndim > 1 or not (np.isfinite(heat) & (heat >= 0)).all():
-            raise FilterError(f"deviation: expected watts of 0 or more, one or one a zone, came {heat}")
+            raise FilterError(f"deviation: expected watts of 0 or more, one or one a zone, got {heat}")
         if noise.ndim > 1 or not (np.isfinite(noise) & (noise > 0)).all():
-            raise FilterError(f"sensor_deviation: expected positive kelvins, one or one a zone, came {noise}")
+            raise FilterError(f"sensor_deviation: expected positive kelvins, one or one a zone, got {noise}")
         if not self.time_constant > 0:
-            raise FilterError(f"time_constant: expected positive seconds, came {self.time_constant!r}")
+            raise FilterError(f"time_constant: expected positive seconds, got {self.time_constant!r}")
 
     @property
     def random_walk(self) -> bool:
@@ -138,7 +138,7 @@ class DisturbedSpace:
             size = np.size(getattr(self.disturbance, name))
             if size not in (1, self.space.n_zone):
                 raise FilterError(
-                    f"disturbance: expected one {name} or one for each of {self.space.n_zone} zones, came {size}"
+                    f"disturbance: expected one {name} or one for each of {self.space.n_zone} zones, got {size}"
                 )
 
     @property
@@ -237,7 +237,7 @@ class DisturbedSpace:
         blind = ~measured & (self.heat_variance > 0)
         if self.disturbance.random_walk and blind.any():
             raise FilterError(
-                f"disturbance: expected sensors wherever it is a random walk, came none in zones "
+                f"disturbance: expected sensors wherever it is a random walk, got none in zones "
                 f"{np.flatnonzero(blind).tolist()}; give these a deviation of 0, or all a finite time constant"
             )
         # in units of what each state does to the zones, so that the two Gramians are of like size

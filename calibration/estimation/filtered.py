@@ -152,7 +152,7 @@ def prepare(model: SymbolicModel, theta: FloatArray, inputs: Inputs, scheme: Sch
     """
     matrices, airflows = model.matrices(theta), model.network.airflows
     if not matrices.reduced:
-        raise FilterError("filter: expected a reduced model, came the grid; see `thermal.reduced_model`")
+        raise FilterError("filter: expected a reduced model, got the grid; see `thermal.reduced_model`")
     flow = inputs.airflow[inputs.complete].mean(axis=0) if airflows else None
     return _Prepared(
         matrices, state_space(matrices.modal.modes, inputs.step, scheme, airflows=airflows, flow=flow), inputs

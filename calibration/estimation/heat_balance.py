@@ -208,11 +208,7 @@ def _step_balance(
 
 
 def _needed_heat(
-    matrices: Matrices,
-    inputs: Inputs,
-    begin: int,
-    rows: NDArray[np.int64],
-    airflows: tuple[tuple[int, int], ...] = (),
+    matrices: Matrices, inputs: Inputs, begin: int, rows: NDArray[np.int64], airflows: tuple[tuple[int, int], ...] = ()
 ) -> FloatArray:
     """Heat of single steps that holds the zones at their measured temperatures.
 

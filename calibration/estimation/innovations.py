@@ -194,7 +194,7 @@ def tune_disturbance(
         When the model is not reduced, weights do not fit the zones, or there is no interval, or one too short.
     """
     if not intervals:
-        raise FilterError("tune: expected at least one interval, came none")
+        raise FilterError("tune: expected at least one interval, got none")
     chosen = settings or TuningSettings()
     ready = prepare(model, theta, inputs, chosen.scheme)
     parts = [ready.interval(interval, chosen) for interval in intervals]
@@ -321,10 +321,10 @@ def _numbers(zones: Sequence[str], settings: TuningSettings) -> dict[str, Distur
     priors, per_zone = settings.priors, settings.per_zone
     missing = sorted(set(DISTURBANCE_PRIORS) - set(priors))
     if missing:
-        raise FilterError(f"priors: expected {sorted(DISTURBANCE_PRIORS)}, came none for {missing}")
+        raise FilterError(f"priors: expected {sorted(DISTURBANCE_PRIORS)}, got none for {missing}")
     own = {per_zone} if isinstance(per_zone, str) else set(per_zone)
     if not own <= set(_ZONAL):
-        raise FilterError(f"per_zone: expected some of {', '.join(_ZONAL)}, came {sorted(own)}")
+        raise FilterError(f"per_zone: expected some of {', '.join(_ZONAL)}, got {sorted(own)}")
     names = {name: [f"{name}@{zone}" for zone in zones] if name in own else [name] for name in _ZONAL}
     names["time_constant"] = ["time_constant"] if settings.time_constant is None else []
     return {full: priors[name] for name in ("deviation", "time_constant", "sensor_deviation") for full in names[name]}
@@ -334,7 +334,7 @@ def _shares(weights: FloatArray | None, n_zone: int) -> FloatArray:
     """Weights of the zones, one in the mean."""
     given = np.ones(n_zone) if weights is None else np.asarray(weights, dtype=float)
     if given.shape != (n_zone,) or not (np.isfinite(given) & (given >= 0)).all() or given.sum() <= 0:
-        raise FilterError(f"weights: expected {n_zone} numbers of 0 or more, one a zone, came {given}")
+        raise FilterError(f"weights: expected {n_zone} numbers of 0 or more, one a zone, got {given}")
     return np.asarray(given / given.mean())
 
 

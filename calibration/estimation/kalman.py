@@ -132,7 +132,7 @@ class KalmanFilter:
         tolerance: float = TOLERANCE,
     ) -> None:
         if covariance not in get_args(Covariance):
-            raise FilterError(f"covariance: expected one of {', '.join(get_args(Covariance))}, came {covariance!r}")
+            raise FilterError(f"covariance: expected one of {', '.join(get_args(Covariance))}, got {covariance!r}")
         self.space, self.disturbance, self.covariance, self.tolerance = space, disturbance, covariance, tolerance
         self.whole = DisturbedSpace(space, disturbance)
         self._steady: dict[bytes, tuple[FloatArray, FloatArray]] = {}
@@ -179,9 +179,9 @@ class KalmanFilter:
             When there is no row, no sensor in any of them, or a state that is not finite.
         """
         if not 0 <= begin < stop < len(inputs):
-            raise FilterError(f"filter: expected rows with 0 <= begin < stop < {len(inputs)}, came {begin} and {stop}")
+            raise FilterError(f"filter: expected rows with 0 <= begin < stop < {len(inputs)}, got {begin} and {stop}")
         if not np.isfinite(states).all():
-            raise FilterError("filter: expected finite states to start from, came NaN; see `thermal.spin_up`")
+            raise FilterError("filter: expected finite states to start from, got NaN; see `thermal.spin_up`")
         rows = slice(begin + 1, stop + 1)
         measured, known = np.isfinite(inputs.zone[rows]), inputs.complete[rows]
         if not measured.any():

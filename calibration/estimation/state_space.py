@@ -192,7 +192,7 @@ def state_space(
     """
     flow = np.zeros(len(airflows)) if flow is None else np.asarray(flow, dtype=float)
     if flow.shape != (len(airflows),):
-        raise FilterError(f"flow: expected one mean for each of {len(airflows)} airflows, came shape {flow.shape}")
+        raise FilterError(f"flow: expected one mean for each of {len(airflows)} airflows, got shape {flow.shape}")
     push, observe = np.hstack([modes.boundary, modes.heating]), modes.output
     p = modes.propagator(step, scheme)
     if not np.any(flow):

@@ -148,9 +148,9 @@ def whiteness(
     """
     series, step = filtered.standardised, filtered.kalman.space.step
     if len(zones) != series.shape[1]:
-        raise FilterError(f"zones: expected {series.shape[1]} names, came {len(zones)}")
+        raise FilterError(f"zones: expected {series.shape[1]} names, got {len(zones)}")
     if fitted < 0 or not lags or min(lags) <= 0:
-        raise FilterError(f"whiteness: expected positive lags and 0 or more fitted numbers, came {lags} and {fitted}")
+        raise FilterError(f"whiteness: expected positive lags and 0 or more fitted numbers, got {lags} and {fitted}")
     steps = tuple(sorted({max(fitted + 1, round(lag / step)) for lag in lags}))
     exogenous = _exogenous(filtered, inputs, boundaries) if inputs is not None else {}
     found = {}
@@ -166,7 +166,7 @@ def _exogenous(filtered: Filtered, inputs: Inputs, boundaries: Sequence[str]) ->
     if len(boundaries) != inputs.boundary.shape[1] or not inputs.stamps[rows].equals(filtered.stamps):
         raise FilterError(
             f"inputs: expected those that were filtered and names of {inputs.boundary.shape[1]} boundaries, "
-            f"came {len(inputs)} rows and {list(boundaries)}"
+            f"got {len(inputs)} rows and {list(boundaries)}"
         )
     named = {name: (inputs.boundary[rows, i], 0) for i, name in enumerate(boundaries)}
     return {**named, "heat": (inputs.heat[rows], 1)}

@@ -57,7 +57,7 @@ def parse_interval(text: str, case: Case) -> Interval:
     parts = text.split("/")
     if len(parts) != 2:
         raise CalibrationError(
-            f"interval: expected START/END in ISO 8601, came {text!r}; for example 2023-10-02/2023-10-09T12:00"
+            f"interval: expected START/END in ISO 8601, got {text!r}; for example 2023-10-02/2023-10-09T12:00"
         )
     try:
         start, end = (pd.Timestamp(local_timestamp(part.strip(), case.building)) for part in parts)
@@ -169,7 +169,7 @@ def horizon_steps(horizon: str, step: float) -> int:
         day = re.sub(r"d$", "D", horizon.strip())  # pandas is giving up its lower-case day
         seconds = pd.Timedelta(day).total_seconds()
     except ValueError as error:
-        raise HorizonError(f"horizon: expected a duration such as 6h or 90min, came {horizon!r}") from error
+        raise HorizonError(f"horizon: expected a duration such as 6h or 90min, got {horizon!r}") from error
     steps = seconds / step
     if not (np.isfinite(steps) and steps >= 1 and abs(steps - round(steps)) < 1e-9):
         raise HorizonError(f"horizon {horizon!r}: expected a positive multiple of the telemetry's step of {step:g} s")

@@ -171,8 +171,7 @@ class Evaluation(Result):
     def _draw(self, axes: Axes) -> None:
         growth = self.growth()
         axes.plot(growth.index, growth, marker="o" if len(growth) == 1 else "")
-        axes.set_xlabel("time since the start [h]")
-        axes.set_ylabel("MAE [K]")
+        axes.set(xlabel="time since the start [h]", ylabel="MAE [K]")
         axes.set_ylim(0.0)
 
 

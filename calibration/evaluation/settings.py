@@ -74,13 +74,13 @@ class ModelSettings:
 
     def __post_init__(self) -> None:
         if self.scheme not in SCHEMES:
-            raise CalibrationError(f"scheme: expected one of {', '.join(sorted(SCHEMES))}, came {self.scheme!r}")
+            raise CalibrationError(f"scheme: expected one of {', '.join(sorted(SCHEMES))}, got {self.scheme!r}")
         if not LEAST_SPIN_UP <= self.spin_up_seconds < float("inf"):
             raise CalibrationError(
-                f"spin_up_seconds: expected at least {LEAST_SPIN_UP:g} s, came {self.spin_up_seconds}"
+                f"spin_up_seconds: expected at least {LEAST_SPIN_UP:g} s, got {self.spin_up_seconds}"
             )
         if not isinstance(self.structure, Structure):
-            raise CalibrationError(f"structure: expected a Structure, came {self.structure!r}")
+            raise CalibrationError(f"structure: expected a Structure, got {self.structure!r}")
 
     @property
     def stepping(self) -> Scheme:
@@ -156,10 +156,10 @@ class CalibrationSettings(ModelSettings):
         super().__post_init__()
         for name, known in (("loss", get_args(Loss)), ("objective", get_args(Objective))):
             if getattr(self, name) not in known:
-                raise CalibrationError(f"{name}: expected one of {', '.join(known)}, came {getattr(self, name)!r}")
+                raise CalibrationError(f"{name}: expected one of {', '.join(known)}, got {getattr(self, name)!r}")
         for name, least in (("starts", 1), ("seed", 0)):
             if getattr(self, name) < least:
-                raise CalibrationError(f"{name}: expected at least {least}, came {getattr(self, name)}")
+                raise CalibrationError(f"{name}: expected at least {least}, got {getattr(self, name)}")
 
     @property
     def model(self) -> ModelSettings:
@@ -286,9 +286,7 @@ def load_parameters(path: str | Path, network: ThermalNetwork) -> FloatArray:
         raise CalibrationError(f"{path}: expected JSON as `calibrate` writes it, found {error}") from error
     entries = content.get("parameters") if isinstance(content, dict) else None
     if not isinstance(entries, dict) or not entries:
-        raise CalibrationError(
-            f"{path}: expected a key 'parameters' with an entry a parameter, as in calibration.json"
-        )
+        raise CalibrationError(f"{path}: expected a key 'parameters' with an entry a parameter, as in calibration.json")
     scales = {p.name: p.scale for p in network.parameters}
     values: dict[str, float] = {}
     for name, entry in entries.items():

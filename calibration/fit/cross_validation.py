@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from typing import Any, ClassVar, TypeVar
@@ -118,8 +118,7 @@ class CrossValidation(Result):
         table = self.to_frame()
         axes.bar([f"{start:%Y-%m-%d}" for start in table["start"]], table["mae"])
         axes.axhline(self.mae, linestyle="--", color="grey")
-        axes.set_xlabel("days left out, from")
-        axes.set_ylabel("MAE [K]")
+        axes.set(xlabel="days left out, from", ylabel="MAE [K]")
 
 
 def cross_validate(
@@ -175,11 +174,7 @@ def cross_validate(
     chosen = calibration_settings(settings)
     parts = _folds(case, folds, intervals, horizon_steps(chosen.horizon, case.telemetry.step))
     tasks = [(case, held, tuning, chosen) for held, tuning in parts]
-    done: list[Fold] = []
-    for fold in in_order(_fold, tasks, executor):
-        done.append(fold)
-        if progress is not None:
-            progress("cross-validate", len(done), len(tasks))
+    done = in_order(_fold, tasks, executor, "cross-validate", progress)
     good = [fold for fold in done if fold.failure is None]
     if len(good) < 2:
         raise CalibrationError(f"cross-validation: fewer than two folds succeeded; the last said {done[-1].failure}")
@@ -188,8 +183,14 @@ def cross_validate(
     return CrossValidation(tuple(done), float(mae.mean()), error, _spreads(good))
 
 
-def in_order(function: Callable[..., T], tasks: Sequence[tuple[Any, ...]], executor: Executor | None) -> Iterator[T]:
-    """Call a function with each of several arguments; answers come in that order.
+def in_order(
+    function: Callable[..., T],
+    tasks: Sequence[tuple[Any, ...]],
+    executor: Executor | None,
+    stage: str,
+    progress: Progress | None,
+) -> list[T]:
+    """Call a function with each of several arguments; answers stand in that order.
 
     Parameters
     ----------
@@ -199,9 +200,18 @@ def in_order(function: Callable[..., T], tasks: Sequence[tuple[Any, ...]], execu
         Arguments of each call.
     executor : Executor or None
         Where to; None is here, one after the other.
+    stage : str
+        What the progress is called.
+    progress : callable or None
+        Called with stage, done, total after each.
     """
     spread = map if executor is None else executor.map  # which cancels what waits when it is left
-    return spread(function, *zip(*tasks, strict=True))
+    found: list[T] = []
+    for answer in spread(function, *zip(*tasks, strict=True)):
+        found.append(answer)
+        if progress is not None:
+            progress(stage, len(found), len(tasks))
+    return found
 
 
 def run_errors(evaluation: Evaluation) -> pd.Series[float]:
@@ -242,7 +252,7 @@ def _folds(
     of_day = local_days(stamps)
     days = np.unique(of_day[used > 0])
     if not 2 <= count <= days.size:
-        raise CalibrationError(f"folds: expected 2 to {days.size}, the days of telemetry to use, came {count}")
+        raise CalibrationError(f"folds: expected 2 to {days.size}, the days of telemetry to use, got {count}")
     room = steps + round((LEAST_SPIN_UP + 3600.0) / step)  # runs start on the hour
     found = []
     for block in np.array_split(days, count):

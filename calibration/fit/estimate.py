@@ -372,4 +372,3 @@ def solve_starts(
     if best is None:
         raise CalibrationError(f"every start failed: {'; '.join(failures)}")
     return best, failures
-

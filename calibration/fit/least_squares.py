@@ -6,7 +6,7 @@ that is close.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -15,6 +15,7 @@ import numpy as np
 from scipy.optimize import lsq_linear
 
 from thermal._types import FloatArray
+from thermal.callback import ArrayFunction
 
 #: Residuals (m,) and Jacobian (m, p) at a point (p,).
 ResidualFunction = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
@@ -134,24 +135,6 @@ class _Hessian:
         return np.asarray(jacobian.T @ jacobian + self.curvature)
 
 
-class _Callback(ca.Callback):
-    """A function of x (p,) for Ipopt, whose value has a shape of its own."""
-
-    def __init__(self, name: str, function: Callable[[FloatArray], Any], p: int, *shape: int) -> None:
-        ca.Callback.__init__(self)
-        self._function, self._p, self._shape = function, p, shape
-        self.construct(name, {})
-
-    def get_sparsity_in(self, i: int) -> ca.Sparsity:
-        return ca.Sparsity.dense(self._p, 1)
-
-    def get_sparsity_out(self, i: int) -> ca.Sparsity:
-        return ca.Sparsity.dense(*self._shape)
-
-    def eval(self, arg: Sequence[ca.DM]) -> list[ca.DM]:
-        return [ca.DM(self._function(np.array(arg[0], dtype=float).ravel()))]
-
-
 def solve_least_squares(
     function: ResidualFunction,
     start: FloatArray,
@@ -188,9 +171,9 @@ def solve_least_squares(
     inside = np.clip(start, lower, upper)
     cache(inside)
     curved = _Hessian(p)
-    value = _Callback("value", lambda x: 0.5 * float(cache(x)[0] @ cache(x)[0]), p, 1, 1)
-    gradient = _Callback("gradient", lambda x: cache(x)[1].T @ cache(x)[0], p, p, 1)
-    hessian = _Callback("hessian", lambda x: curved(x, *cache(x)), p, p, p)
+    value = ArrayFunction("value", lambda x: 0.5 * (cache(x)[0] @ cache(x)[0]), p, (1, 1))
+    gradient = ArrayFunction("gradient", lambda x: cache(x)[1].T @ cache(x)[0], p, (p, 1))
+    hessian = ArrayFunction("hessian", lambda x: curved(x, *cache(x)), p, (p, p))
     x, scale, empty = ca.MX.sym("x", p), ca.MX.sym("lam_f"), ca.MX.sym("p", 0)
     lagrangian = ca.Function(
         "nlp_hess_l",
@@ -231,11 +214,7 @@ def solve_least_squares(
 
 
 def bounded_step(
-    residual: FloatArray,
-    jacobian: FloatArray,
-    lower: FloatArray,
-    upper: FloatArray,
-    damping: FloatArray | None = None,
+    residual: FloatArray, jacobian: FloatArray, lower: FloatArray, upper: FloatArray, damping: FloatArray | None = None
 ) -> FloatArray:
     """Minimise the linearised residuals ``|r + J s|²`` within bounds of the step s.
 

@@ -242,9 +242,7 @@ class InnovationsProblem(Problem):
         matrices, inputs = model.matrices(theta, slopes), self.inputs
         starts = np.array([white.at])
         states, moved = spin_up(matrices, inputs, white.begin, starts)
-        means, mean_slopes = free_runs(
-            matrices, inputs, starts, white.stop - white.at, states, moved, self.scheme
-        )
+        means, mean_slopes = free_runs(matrices, inputs, starts, white.stop - white.at, states, moved, self.scheme)
         columns = [(means[0] - inputs.zone[white.at + 1 : white.stop + 1])[..., None]]
         if mean_slopes is not None:
             columns.append(mean_slopes[0][..., list(self.free)])

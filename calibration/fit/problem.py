@@ -337,7 +337,7 @@ def tuning_problem(case: Case, tune: Sequence[Interval] = (), settings: ModelSet
     free = tuple(i for i, p in enumerate(network.parameters) if p.name not in chosen.fixed)
     if not free:
         raise CalibrationError(
-            f"fixed: expected a parameter that is left to estimate, came all {len(given)}; evaluate instead"
+            f"fixed: expected a parameter that is left to estimate, got all {len(given)}; evaluate instead"
         )
     steps = horizon_steps(chosen.horizon, inputs.step)
     runs = tuning_runs(inputs, merge(tune) or default_intervals(case)[0], steps, chosen.spin_up_seconds)

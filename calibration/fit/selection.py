@@ -262,14 +262,10 @@ def select_structure(
     >>> select_structure(load_bundled_case(), structures).preferred  # doctest: +SKIP
     """
     if len(structures) < 2:
-        raise CalibrationError(f"structures: expected at least two to choose from, came {list(structures)}")
+        raise CalibrationError(f"structures: expected at least two to choose from, got {list(structures)}")
     parts = tuple(tune), tuple(hold_out)
     tasks = [(case, name, *parts, _settings(settings, own)) for name, own in structures.items()]
-    candidates: list[Candidate] = []
-    for candidate in in_order(_candidate, tasks, executor):
-        candidates.append(candidate)
-        if progress is not None:
-            progress("select", len(candidates), len(tasks))
+    candidates = in_order(_candidate, tasks, executor, "select", progress)
     first = candidates[0]
     for other in candidates[1:]:
         if not first.errors.index.equals(other.errors.index) or first.residuals != other.residuals:

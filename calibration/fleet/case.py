@@ -245,7 +245,7 @@ def split_settings(
     intervals = {name: settings[name] for name in INTERVALS if name in settings}
     for name, value in intervals.items():
         if isinstance(value, str) or not isinstance(value, Sequence):
-            raise CalibrationError(f"settings.{name}: expected a list of intervals START/END, came {value!r}")
+            raise CalibrationError(f"settings.{name}: expected a list of intervals START/END, got {value!r}")
     return intervals, calibration_settings({k: v for k, v in settings.items() if k not in intervals})
 
 
@@ -272,7 +272,7 @@ def check_settings(settings: ModelSettings | Mapping[str, Any] | None) -> dict[s
             spelled[name] = json.loads(to_json({name: value}))[name]
         except TypeError as error:
             raise CalibrationError(
-                f"settings.{name}: expected plain values that a record can hold, came {value!r}"
+                f"settings.{name}: expected plain values that a record can hold, got {value!r}"
             ) from error
     return spelled
 

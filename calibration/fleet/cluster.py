@@ -58,15 +58,10 @@ class ClusterExecutor(Executor):
     """
 
     def __init__(
-        self,
-        scheduler: str,
-        *,
-        timeout: float = 10.0,
-        patience: float = PATIENCE,
-        folders: Sequence[str | Path] = (),
+        self, scheduler: str, *, timeout: float = 10.0, patience: float = PATIENCE, folders: Sequence[str | Path] = ()
     ) -> None:
         if not scheduler.strip():  # dask would start a cluster of its own
-            raise CalibrationError("scheduler: expected an address such as tcp://HOST:8786, came none")
+            raise CalibrationError("scheduler: expected an address such as tcp://HOST:8786, got none")
         self._client = _connected(scheduler, timeout)
         self._address, self._patience = scheduler, patience
         try:

@@ -126,7 +126,7 @@ def calibrate_many(
     spelled = check_settings(settings)
     for name, value, least in (("retries", retries, 0), ("workers", workers, 1)):
         if isinstance(value, int) and value < least:
-            raise CalibrationError(f"{name}: expected at least {least}, came {value}")
+            raise CalibrationError(f"{name}: expected at least {least}, got {value}")
     folder = _absolute(check_results_folder(out, force=True))
     paths = _check_cases(cases, folder)
     if not force:
@@ -154,16 +154,16 @@ def _check_cases(cases: Sequence[str | Path], out: Path) -> list[Path]:
     """Refuse cases whose results would get in each other's way; return their absolute paths."""
     paths = [_absolute(case) for case in cases]
     if not paths:
-        raise CalibrationError("cases: expected at least one case folder, came none")
+        raise CalibrationError("cases: expected at least one case folder, got none")
     for name, count in Counter(path.name for path in paths).items():
         if count > 1:
             both = ", ".join(str(path) for path in paths if path.name == name)
             raise CalibrationError(
-                f"cases: expected each name once, came {both}; both would write to {out / name}: rename one, or "
+                f"cases: expected each name once, got {both}; both would write to {out / name}: rename one, or "
                 "calibrate them into different folders"
             )
         if not name or name.startswith(".") or name == SUMMARY:
-            raise CalibrationError(f"cases: expected folders whose names results can take, came {name!r}; rename it")
+            raise CalibrationError(f"cases: expected folders whose names results can take, got {name!r}; rename it")
     real = out.resolve()
     for path in paths:
         if path.resolve() in (real, *real.parents, (real / path.name).resolve()):

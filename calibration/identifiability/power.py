@@ -138,7 +138,7 @@ def power_of_data(
     'no'
     """
     if draws < 0:
-        raise CalibrationError(f"draws: expected at least 0, came {draws}")
+        raise CalibrationError(f"draws: expected at least 0, got {draws}")
     chosen = calibration_settings(settings)
     problem = tuning_problem(case, tune, chosen)
     spread = _deviations(problem.grid.network.zones, deviation)
@@ -162,7 +162,7 @@ def _deviations(zones: Sequence[str], deviation: float | Mapping[str, float]) ->
         if zone not in zones:
             raise CalibrationError(f"deviation: no zone {zone!r} in the building; {nearest(zone, zones)}")
         if not 0.0 < value < np.inf:
-            raise CalibrationError(f"deviation: expected a positive number of kelvin for {zone}, came {value!r}")
+            raise CalibrationError(f"deviation: expected a positive number of kelvin for {zone}, got {value!r}")
     return {zone: float(given.get(zone, FIRST_DEVIATION)) for zone in zones}
 
 

@@ -122,8 +122,7 @@ class Profile(Result):
         axes.plot(self.values, self.deviance, marker="o")
         for interval in self.intervals:
             axes.axhline(float(chi2.ppf(interval.level, 1)), linestyle="--", color="grey")
-        axes.set_xlabel(f"{self.name} [{self.parameter.unit}]")
-        axes.set_ylabel("deviance [-]")
+        axes.set(xlabel=f"{self.name} [{self.parameter.unit}]", ylabel="deviance [-]")
 
 
 def profile_likelihood(
@@ -170,7 +169,7 @@ def profile_likelihood(
         if name not in known:
             raise CalibrationError(f"profile: {name!r} is not estimated; {nearest(name, known)}")
     if not levels or not all(0.0 < level < 1.0 for level in levels):
-        raise CalibrationError(f"levels: expected confidence levels between 0 and 1, came {list(levels)}")
+        raise CalibrationError(f"levels: expected confidence levels between 0 and 1, got {list(levels)}")
     roots = {float(level): float(np.sqrt(chi2.ppf(level, 1))) for level in levels}
     chosen = list(known if names is None else names)
     sections: list[_Section] = []

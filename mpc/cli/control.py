@@ -88,8 +88,7 @@ def control(
     --end 2023-10-18 --out control
     """
     from calibration.results import check_results_folder
-    from mpc.reports.control import control_summary, write_control
-    from mpc.reports.control_words import control_verdict
+    from mpc.reports.control import control_summary, control_verdict, write_control
     from mpc.studies.controllers import find_controller
     from mpc.studies.run import run_controller
 
@@ -122,8 +121,7 @@ def compare(
     --end 2023-10-18 --out compared
     """
     from calibration.results import check_results_folder
-    from mpc.reports.control import comparison_summary, write_comparison
-    from mpc.reports.control_words import comparison_rows, comparison_verdict
+    from mpc.reports.control import comparison_rows, comparison_summary, comparison_verdict, write_comparison
     from mpc.studies.compare import compare_controllers
     from mpc.studies.controllers import find_controller
 

@@ -46,7 +46,7 @@ def demo(
 
 def _show(found: Demo, out: Path) -> None:
     """Write what came of the error and of the costs to stdout."""
-    from mpc.reports.control_words import comparison_rows
+    from mpc.reports.control import comparison_rows
 
     content = found.to_dict()
     names = {"uncalibrated": "as it was drawn", "calibrated": "calibrated", "with_effects": "with what was found"}

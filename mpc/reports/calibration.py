@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import platform
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -12,19 +11,12 @@ import pandas as pd
 from calibration.evaluation.case_model import CHECK_TOLERANCE
 from calibration.fit.result import CalibrationResult, ParameterEstimate
 from calibration.results import Content, check_results_folder, write_results
-from mpc.reports.evaluation import (
-    evaluation_figures,
-    interval_rows,
-    predictions_table,
-    subtitle,
-    unchanged_error,
-    zone_rows,
-)
+from mpc.reports import evaluation
 from mpc.reports.figures.calibration import paper_values, parameter_ranges
 from mpc.reports.figures.errors import error_band, error_growth, median_run
 from mpc.reports.figures.field import spatial_field
 from mpc.reports.identifiability import in_words, information_content, information_sentences
-from mpc.reports.page import clock, counted, duration, kelvin, plain, render, signed, significant, unit
+from mpc.reports.page import counted, duration, kelvin, render
 from mpc.reports.residuals import diagnostics_content
 from thermal.case.case import Case
 from thermal.model.matrices import SymbolicModel
@@ -80,7 +72,7 @@ def calibration_files(result: CalibrationResult, case: Case) -> dict[str, Conten
     return {
         "calibration.json": calibration_content(result),
         "evaluation.json": held_out.to_dict(),
-        "predictions.parquet": predictions_table(held_out),
+        "predictions.parquet": evaluation.predictions_table(held_out),
         "report.html": render("calibration", _content(result, case, grid, inputs)),
     }
 
@@ -104,10 +96,10 @@ def calibration_verdict(result: CalibrationResult) -> str:
     result : CalibrationResult
         From `calibrate`.
     """
-    evaluation = result.calibrated["held_out"]
-    before, after = result.uncalibrated["held_out"].metrics.mae, evaluation.metrics.mae
-    rest = unchanged_error(evaluation)
-    ahead = duration(evaluation.steps * evaluation.step_seconds).capitalize()
+    held_out = result.calibrated["held_out"]
+    before, after = result.uncalibrated["held_out"].metrics.mae, held_out.metrics.mae
+    rest = evaluation.unchanged_error(held_out)
+    ahead = duration(held_out.steps * held_out.step_seconds).capitalize()
     sentences = [
         f"{ahead} ahead, on data it was not fitted to, the calibrated model misses the measured zone temperatures by",
         f"{kelvin(after)} K on average. Before calibration it was {kelvin(before)} K" + _change(before, after),
@@ -143,121 +135,39 @@ def _parameter_sentence(parameters: Sequence[ParameterEstimate]) -> str:
 
 
 def _content(result: CalibrationResult, case: Case, grid: SymbolicModel, inputs: Inputs) -> dict[str, Any]:
+    """Lay out the page."""
     before, after = result.uncalibrated["held_out"], result.calibrated["held_out"]
-    field = None
+    field, chosen = None, result.settings
     if grid.network.n_node <= MOST_VOLUMES and (grid.network.place >= 0).any():
         which, run = median_run(after)
         start = after.predictions[which].start[run]
-        field = spatial_field(
-            grid, result.theta, inputs, start, after.steps, result.settings.dx, result.settings.stepping
-        )
-    band = error_band(result.calibrated["tuning"])
-    drawn = evaluation_figures(after, case, before=before, field=field, band=band)
-    drawn["growth"] = error_growth(
-        {
-            "held out": {"before": before, "after": after},
-            "tuning": {"before": result.uncalibrated["tuning"], "after": result.calibrated["tuning"]},
-        }
-    )
-    estimated = [p for p in result.parameters if p.standard_error is not None]
-    told = sum(p.identifiable for p in estimated)
+        field = spatial_field(grid, result.theta, inputs, start, after.steps, chosen.dx, chosen.stepping)
+    drawn = evaluation.evaluation_figures(after, case, before, field, error_band(result.calibrated["tuning"]))
+    parts = {name.replace("_", " "): name for name in ("held_out", "tuning")}
+    pairs = {title: {"before": result.uncalibrated[k], "after": result.calibrated[k]} for title, k in parts.items()}
+    drawn["growth"] = error_growth(pairs)
+    paper, objective = paper_values(result.parameters), result.objective
+    flags = f" --scheme {chosen.scheme}" + (f" --objective {objective}" if objective != "multi_step" else "")
+    flags += f" --starts {result.solver.starts} --seed {result.seed}"
     return {
-        "case": result.case,
-        "subtitle": subtitle(case, after),
+        "result": result,
+        "after": after,
+        "subtitle": evaluation.subtitle(case, after),
         "verdict": calibration_verdict(result),
         "fine": result.solver.success and after.metrics.mae < before.metrics.mae,
-        "cards": [
-            (f"{kelvin(after.metrics.mae)} K", "held-out error of the calibrated model"),
-            (f"{kelvin(before.metrics.mae)} K", "before calibration"),
-            (f"{kelvin(unchanged_error(after))} K", "assuming that nothing changes"),
-            (f"{told} of {len(estimated)}", "parameters determined by the data"),
-            (f"{sum(p.at_bound for p in estimated)}", "parameters on a bound"),
-        ],
-        "errors": _error_rows(result),
-        "steps": after.steps,
-        "step": duration(after.step_seconds),
+        "parts": [(title, result.uncalibrated[k].metrics, result.calibrated[k].metrics,
+                   evaluation.unchanged_error(result.calibrated[k])) for title, k in parts.items()],
         "figures": drawn,
-        "parameters": _parameter_rows(result.parameters),
+        "estimated": [p for p in result.parameters if p.standard_error is not None],
+        "parameters": [vars(p) | {"title": in_words(p.name), "paper": paper.get(p.name)} for p in result.parameters],
         "parameter_figure": parameter_ranges(result.parameters),
         "told": information_sentences(result.information),
-        "zones": zone_rows(after.by_zone()),
-        "intervals": [["tuning", *r] for r in interval_rows(result.calibrated["tuning"])]
-        + [["held out", *r] for r in interval_rows(after)],
+        "zones": evaluation.by_error(after.by_zone()),
+        "intervals": [record | {"part": title} for title, k in reversed(parts.items())
+                      for record in evaluation.interval_records(result.calibrated[k])],
         **diagnostics_content(result, grid, inputs),
-        **_solver_content(result),
-        "reproduce": _reproduce(result, case),
-    }
-
-
-def _error_rows(result: CalibrationResult) -> list[list[str]]:
-    rows = []
-    for key, name in (("held_out", "held out"), ("tuning", "tuning")):
-        for model, evaluations in (("before", result.uncalibrated), ("after", result.calibrated)):
-            e = evaluations[key].metrics
-            rows.append([f"{name}, {model} calibration", f"{e.mae:.3f}", signed(e.median), signed(e.bias)])
-        rows.append([f"{name}, nothing changes", f"{unchanged_error(result.calibrated[key]):.3f}", "–", "–"])
-    return rows
-
-
-def _parameter_rows(parameters: Sequence[ParameterEstimate]) -> list[dict[str, str]]:
-    paper = paper_values(parameters)
-    return [_parameter_row(p, paper.get(p.name)) for p in parameters]
-
-
-def _parameter_row(p: ParameterEstimate, paper: float | None) -> dict[str, str]:
-    if p.standard_error is None:
-        told, kind = "not estimated", "soft"
-    elif p.at_bound:
-        told, kind = "on a bound", "bad"
-    else:
-        told, kind = ("yes", "good") if p.identifiable else ("no", "soft")
-    return {
-        "name": in_words(p.name),
-        "value": significant(p.value),
-        "unit": unit(p.unit),
-        "error": significant(p.standard_error, 2),
-        "interval": " to ".join(significant(end) for end in p.interval90) if p.interval90 else "–",
-        "paper": significant(paper),
-        "range": f"{plain(p.lower)} to {plain(p.upper)}" if p.lower is not None and p.upper is not None else "–",
-        "told": told,
-        "kind": kind,
-        "source": p.source,
-    }
-
-
-def _solver_content(result: CalibrationResult) -> dict[str, Any]:
-    solver, check = result.solver, result.grid_check
-    end = "converged" if solver.success else "did not converge"
-    starts = f"the best of {solver.starts} starts" if solver.starts > 1 else "from one start"
-    settled = (
-        "Its rounds of weighing the data and reducing the model ended because nothing moved any more."
-        if solver.settled
-        else "Its rounds of weighing the data and reducing the model were still moving the estimate when they ended."
-    )
-    return {
-        "solver": f"{solver.name.capitalize()} {end} ({solver.status}): {solver.iterations} iterations with "
-        f"{solver.evaluations} evaluations of the errors and their derivatives, {starts}; "
-        f"{solver.seconds:.1f} s in all. {settled}",
-        "failures": solver.failures,
-        "check": check,
-        "trusted": check.max_difference <= CHECK_TOLERANCE,
-    }
-
-
-def _reproduce(result: CalibrationResult, case: Case) -> list[tuple[str, str]]:
-    parts = ["buildingmpc calibrate CASE --out RESULTS"]
-    parts += [f"--tune {i.start.isoformat()}/{i.end.isoformat()}" for i in result.tuning]
-    parts += [f"--hold-out {i.start.isoformat()}/{i.end.isoformat()}" for i in result.held_out]
-    parts += [f"--horizon {result.horizon} --scheme {result.settings.scheme}"]
-    parts += [f"--objective {result.objective}"] if result.objective != "multi_step" else []
-    parts += [f"--starts {result.solver.starts} --seed {result.seed}"]
-    parts += [f"--dx {result.settings.dx:g}"] if result.settings.dx is not None else []
-    return [
-        (
-            "case",
-            f"{result.case}, {clock(case.stamps[0])} to {clock(case.stamps[-1])} every {duration(case.step)}",
-        ),
-        ("version", f"buildingmpc {result.version}, Python {platform.python_version()}, pandas {pd.__version__}"),
-        ("seed", str(result.seed)),
-        ("command", " ".join(parts)),
-    ]
+        "trusted": result.grid_check.max_difference <= CHECK_TOLERANCE,
+        "span": (case.stamps[0], case.stamps[-1], case.step),
+        "pandas": pd.__version__,
+        "command": evaluation.command("calibrate", (result.tuning, result.held_out), result.horizon, chosen.dx, flags),
+    }  # fmt: skip

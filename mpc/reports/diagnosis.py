@@ -16,7 +16,7 @@ from calibration.diagnosis.refit.refit import ACCEPTED
 from calibration.diagnosis.refit.search import Round
 from mpc.reports import diagnosis_words
 from mpc.reports.diagnosis_words import accepted, alike, called, in_zones, rivals
-from mpc.reports.evaluation import predictions_table, subtitle
+from mpc.reports.evaluation import command, predictions_table, subtitle
 from mpc.reports.figures.diagnosis import change_panels, drift_lines, hour_bars, missing_lines
 from mpc.reports.figures.errors import series_of_runs
 from mpc.reports.figures.plan import heat_maps
@@ -147,11 +147,7 @@ def _content(result: Diagnosis, case: Case, replayed: Sequence[Replay]) -> dict[
         else result.verdict.candidates[0],
         "candidates": [_candidate_entry(result, c) for c in _shown(result)],
         "next": _measure_next(result),
-        "untestable": [
-            (called(c.effect).capitalize(), c.reason.replace("_sensor", "").replace("_", " "))
-            for c in result.verdict.candidates
-            if not c.testable
-        ],
+        "untestable": [c for c in result.verdict.candidates if not c.testable],
         **_where(result, case, replayed),
         "waterfall": _waterfall(result),
         "tests": _test_sentences(result),
@@ -159,16 +155,8 @@ def _content(result: Diagnosis, case: Case, replayed: Sequence[Replay]) -> dict[
         **_statistics(result),
         "span": (case.stamps[0], case.stamps[-1], case.step),
         "pandas": pd.__version__,
-        "command": _command(result),
+        "command": command("diagnose", (result.tuned, result.judged), result.horizon, result.settings.dx),
     }
-
-
-def _command(result: Diagnosis) -> str:
-    parts = ["buildingmpc diagnose CASE --out RESULTS"]
-    for option, intervals in (("--tune", result.tuned), ("--hold-out", result.judged)):
-        parts += [f"{option} {'/'.join(i.to_dict().values())}" for i in intervals]
-    dx = "" if result.settings.dx is None else f" --dx {result.settings.dx:g}"
-    return " ".join([*parts, f"--horizon {result.horizon}{dx}"])
 
 
 def _shown(result: Diagnosis) -> list[Candidate]:
@@ -293,29 +281,18 @@ def _where(result: Diagnosis, case: Case, replayed: Sequence[Replay]) -> dict[st
 def _statistics(result: Diagnosis) -> dict[str, Any]:
     """Lay out the fold of the page: rounds, likeness, permutation tests, bounds and what would have been found."""
     first, final = ({p.name: p for p in f.describe()} for f in (result.rounds[0].before, result.final))
-    steps = [vars(s) | {"names": listed([called(e) for e in s.effects])} for s in result.steps]
     nothing = dict.fromkeys(("where", "score", "retained_share"))
     return {
         "limits": (ACCEPTED, GENERIC_GAP),
-        "set90": listed([called(e) for e in result.verdict.set90]) if result.verdict.set90 else "",
         "rounds": [_round(r) for r in result.rounds],
         "effects": [
             vars(c) | {"name": called(c.effect), "where": in_zones(c.zones), "sure": sure(c.probability)}
             | ({} if c.testable else nothing | {"sure": "not testable"})
             for c in result.verdict.candidates
         ],
-        "closed": steps,
-        "parameters": [
-            [p.name.replace("_", " "), unit(p.unit).replace("*", "·"),
-             significant(first[p.name].value) if p.name in first else "absent",
-             significant(p.value) if result.final.effects else "–",
-             " to ".join(map(significant, p.interval90)) if p.interval90 else "–"]
-            for p in final.values() if p.standard_error is not None
-        ],
-        "bounds": [
-            listed([p.name.replace("_", " ") for p in model.values() if p.at_bound] or ["none"])
-            for model in (first, final)
-        ],
+        "closed": [vars(s) | {"names": listed([called(e) for e in s.effects])} for s in result.steps],
+        "parameters": [vars(p) | {"first": first.get(p.name)} for p in final.values() if p.standard_error is not None],
+        "bounds": [[n.replace("_", " ") for n, p in fit.items() if p.at_bound] or ["none"] for fit in (first, final)],
         "alternating": diagnosis_words.alternating_sentence(result),
         "intervals": [
             vars(i) | {"part": name}

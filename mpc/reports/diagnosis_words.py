@@ -6,10 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from calibration.diagnosis.decide.drift import DriftCurve
 from calibration.diagnosis.decide.levels import LARGEST_GROUP
 from calibration.diagnosis.decide.verdict import Candidate, group_of
-from calibration.diagnosis.decide.where import Where
+from calibration.diagnosis.decide.where import DriftCurve, Where
 from calibration.diagnosis.diagnosis import Diagnosis
 from calibration.diagnosis.refit.refit import Refit
 from mpc.reports.page import duration, kelvin, listed, percent, sure, watts

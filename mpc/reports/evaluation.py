@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
+from calibration.evaluation.intervals import Interval
 from calibration.evaluation.n_step import Evaluation, spatial_metrics
 from mpc.reports.figures.errors import Band, drift_boxes, error_growth, median_run, series_of_runs, zone_panels
 from mpc.reports.figures.field import Field
 from mpc.reports.figures.plan import floor_maps, tile_map
 from mpc.reports.figures.style import CELSIUS, Picture
-from mpc.reports.page import clock, counted, duration, kelvin, signed, write_report
+from mpc.reports.page import clock, counted, duration, kelvin, write_report
 from thermal._types import FloatArray
 from thermal.case.building import FloorPlans
 from thermal.case.case import Case
@@ -55,7 +56,7 @@ def write_evaluation(
         "verdict": evaluation_verdict(evaluation),
         "evaluation": evaluation,
         "unchanged": unchanged_error(evaluation),
-        "intervals": [vars(p) | vars(spatial_metrics(p.error)) for p in evaluation.predictions],
+        "intervals": interval_records(evaluation),
         "figures": drawn,
         "zones": by_error(evaluation.by_zone()),
         "parameters": parameters,
@@ -202,23 +203,42 @@ def error_maps(
     return tile_map(zones, areas, error, title)
 
 
-def interval_rows(evaluation: Evaluation) -> list[list[str]]:
-    """Rows of the table of intervals: start, end, runs, skipped, error."""
-    return [
-        [clock(p.interval.start), clock(p.interval.end), str(len(p.start)), str(p.skipped),
-         f"{spatial_metrics(p.error).mae:.3f}"]
-        for p in evaluation.predictions
-    ]  # fmt: skip
+def interval_records(evaluation: Evaluation) -> list[dict[str, Any]]:
+    """Pair the predictions of each interval with their errors, for the table of intervals.
 
-
-def zone_rows(errors: Mapping[str, Mapping[str, float]]) -> list[list[str]]:
-    """Rows of the table of zones, the largest error first."""
-    return [[e["zone"], f"{e['mae']:.3f}", signed(e["bias"])] for e in by_error(errors)]
+    Parameters
+    ----------
+    evaluation : Evaluation
+        From `evaluate_model`.
+    """
+    return [vars(p) | vars(spatial_metrics(p.error)) for p in evaluation.predictions]
 
 
 def by_error(errors: Mapping[str, Mapping[str, float]]) -> list[dict[str, Any]]:
     """List the errors of the zones as records, the largest first."""
     return [{"zone": z, **e} for z, e in sorted(errors.items(), key=lambda item: -item[1]["mae"])]
+
+
+def command(name: str, parts: Sequence[Sequence[Interval]], horizon: str, dx: float | None, further: str = "") -> str:
+    """Spell the command that gives a result again.
+
+    Parameters
+    ----------
+    name : str
+        Of the command.
+    parts : sequence of sequence of Interval
+        Those tuned on and those held out.
+    horizon : str
+        Prediction horizon, such as ``6h``.
+    dx : float or None
+        Distance between control volumes of a plan [m].
+    further : str
+        Other options.
+    """
+    words = [f"buildingmpc {name} CASE --out RESULTS"]
+    for option, intervals in zip(("--tune", "--hold-out"), parts, strict=True):
+        words += [f"{option} {'/'.join(i.to_dict().values())}" for i in intervals]
+    return " ".join([*words, f"--horizon {horizon}{further}", *([] if dx is None else [f"--dx {dx:g}"])])
 
 
 def subtitle(case: Case, evaluation: Evaluation) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -13,7 +13,7 @@ from calibration.fit.selection import LEAST_DAYS, HeldOutDifference, LikelihoodR
 from calibration.identifiability.information import Combination, Information, ParameterInformation
 from calibration.identifiability.power import ParameterPower, Power
 from calibration.identifiability.profile import Profile
-from mpc.reports.page import unit
+from mpc.reports.page import listed, unit
 from thermal.parameters import FACADE_PREFIX, Parameter
 
 #: Relative deviations up to this one are told in per cent, larger ones as a factor [-].
@@ -99,20 +99,6 @@ def combination_words(parameters: Mapping[str, Parameter], exponents: Mapping[st
     kind = "ratio" if len(exponents) == 2 else "combination"
     under = below[0] if len(below) == 1 else f"({' × '.join(below)})"
     return f"{kind} {' × '.join(above) or '1'} / {under}"
-
-
-def listed(words: Iterable[str], last: str = "and") -> str:
-    """Join words as a sentence does.
-
-    Parameters
-    ----------
-    words : iterable of str
-        At least one.
-    last : str
-        What stands before the last.
-    """
-    *first, end = words
-    return f"{', '.join(first)} {last} {end}" if first else end
 
 
 def information_sentences(information: Information) -> tuple[str, ...]:

@@ -17,7 +17,7 @@ from calibration.evaluation.n_step import HORIZONS, Evaluation, EvaluationSettin
 from calibration.evaluation.settings import Objective
 from calibration.fit.result import CalibrationResult
 from mpc.reports.figures.calibration import heat_lines, periodogram_bound, whiteness_panels
-from mpc.reports.page import clock, counted, duration, significant
+from mpc.reports.page import clock, counted, duration, significant, spell
 from thermal._types import FloatArray
 from thermal.model.matrices import SymbolicModel
 from thermal.model.reduce import reduced_model
@@ -96,10 +96,8 @@ def _leftover_sentence(disturbance: DisturbanceModel | None, excess: float, obje
 
 
 def _time(seconds: float) -> str:
-    for name, length in (("d", 86400.0), ("h", 3600.0)):
-        if seconds >= length:
-            return f"{seconds / length:.2g} {name}"
-    return f"{seconds / 60.0:.2g} min"
+    name, length = next((u for u in (("d", 86400.0), ("h", 3600.0)) if seconds >= u[1]), ("min", 60.0))
+    return f"{seconds / length:.2g} {name}"
 
 
 def _innovations(result: CalibrationResult, model: SymbolicModel, inputs: Inputs) -> dict[str, Any]:
@@ -165,12 +163,10 @@ def _shown(ranked: Sequence[str], filtered: Filtered, zones: Sequence[str]) -> d
     return {label: series[:, list(zones).index(zone)] for label, zone in chosen.items()}
 
 
-def _white_row(name: str, found: Whiteness) -> list[str]:
+def _white_row(name: str, found: Whiteness) -> tuple[str, int, float, str, float]:
     zone = found.zones[name]
     p = zone.ljung_box_p[0]
-    shown = "–" if not np.isfinite(p) else "< 0.001" if p < 0.001 else f"{p:.3f}"
-    lag = f"{zone.lag_one:+.2f}".replace("-", "−")
-    return [name, str(zone.count), lag, shown, f"{zone.periodogram_distance:.3f}"]
+    return name, zone.count, zone.lag_one, "< 0.001" if p < 0.001 else spell(p, ".3f"), zone.periodogram_distance
 
 
 def _whiteness_sentence(found: Whiteness) -> str:
@@ -218,29 +214,23 @@ def _heat(result: CalibrationResult, model: SymbolicModel, inputs: Inputs) -> di
     if not np.isfinite(balance.needed).any():
         return {"reason": "The balance of heat is not drawn up: no whole hour has all its inputs and temperatures."}
     building, zones = balance.of_building(), balance.by_zone()
-    worst = sorted(zones, key=lambda z: -(fit.cv_rmse if (fit := zones[z]) is not None else -1.0))
-    measured = [z for z in worst if np.isfinite(balance.needed[:, balance.zones.index(z)]).any()]
+    series = zip(balance.zones, balance.metered.T, balance.needed.T, strict=True)
+    measured = [(z, *heats, zones[z]) for z, *heats in series if np.isfinite(heats[1]).any()]
+    worst = [_heat_row(*row) for row in sorted(measured, key=lambda row: -(row[3].cv_rmse if row[3] else -1.0))]
     return {
         "verdict": _heat_sentence(balance, building),
-        "rows": [_heat_row("whole building", *balance.building(), building)]
-        + [_heat_row(z, *_of(balance, z), zones[z]) for z in measured[:MOST_ROWS]],
+        "rows": [_heat_row("whole building", *balance.building(), building), *worst[:MOST_ROWS]],
         "count": len(measured),
         "limits": (f"{100 * NMBE_LIMIT:.0f}", f"{100 * CV_RMSE_LIMIT:.0f}"),
         "pictures": heat_lines(balance.stamps, *balance.building()),
     }
 
 
-def _of(balance: HeatBalance, zone: str) -> tuple[FloatArray, FloatArray]:
-    column = balance.zones.index(zone)
-    return balance.metered[:, column], balance.needed[:, column]
-
-
-def _heat_row(name: str, metered: FloatArray, needed: FloatArray, fit: HeatFit | None) -> list[str]:
+def _heat_row(name: str, metered: FloatArray, needed: FloatArray, fit: HeatFit | None) -> tuple[Any, ...]:
     known = np.isfinite(metered) & np.isfinite(needed)
-    means = [f"{float(v[known].mean()):.0f}".replace("-", "−") if known.any() else "–" for v in (metered, needed)]
-    if fit is None or abs(fit.mean) < _LEAST_HEAT:
-        return [name, str(int(known.sum())), *means, "–", "–"]
-    return [name, str(fit.count), *means, f"{100 * fit.nmbe:+.1f}".replace("-", "−"), f"{100 * fit.cv_rmse:.1f}"]
+    means = [float(v[known].mean()) if known.any() else None for v in (metered, needed)]
+    ratios = (None, None) if fit is None or abs(fit.mean) < _LEAST_HEAT else (100 * fit.nmbe, 100 * fit.cv_rmse)
+    return name, int(known.sum()), *means, *ratios
 
 
 def _heat_sentence(balance: HeatBalance, building: HeatFit | None) -> str:

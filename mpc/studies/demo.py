@@ -22,8 +22,7 @@ from mpc.errors import ControlError
 from mpc.loop.noise import SensorNoise
 from mpc.reports.calibration import calibration_verdict, write_calibration
 from mpc.reports.case import check_verdict, write_check
-from mpc.reports.control import write_comparison
-from mpc.reports.control_words import comparison_verdict
+from mpc.reports.control import comparison_verdict, write_comparison
 from mpc.reports.demo import render_demo
 from mpc.reports.diagnosis import write_diagnosis
 from mpc.reports.diagnosis_words import diagnosis_verdict

@@ -12,10 +12,7 @@ from calibration.diagnosis.refit.fit import Found, evidence_of, solve
 from calibration.diagnosis.screen.openings import seen_openings
 from calibration.errors import NotEnoughDataError
 from calibration.evaluation import intervals
-from calibration.evaluation.intervals import (
-    Interval,
-    horizon_steps,
-)
+from calibration.evaluation.intervals import Interval, horizon_steps
 from calibration.evaluation.n_step import Evaluation, EvaluationSettings, evaluate_model
 from calibration.evaluation.settings import ModelSettings
 from calibration.fit.problem import Problem, tuning_runs
@@ -233,9 +230,7 @@ class ModelComparison:
     @cached_property
     def drivers(self) -> InputProvider:
         """Sun, sky, wind and schedules of the case, and when windows are seen to stand open."""
-        drivers = telemetry_inputs(
-            self.case, fit_normalisation(self.case, ((i.start, i.end) for i in self.tuned))
-        )
+        drivers = telemetry_inputs(self.case, fit_normalisation(self.case, ((i.start, i.end) for i in self.tuned)))
         drivers.openings = seen_openings(self.case, drivers, self.settings)
         return drivers
 

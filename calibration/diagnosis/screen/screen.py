@@ -11,17 +11,27 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from calibration.diagnosis.refit.comparison import Fit, ModelComparison, is_strength
 from calibration.diagnosis.screen.gains import Gain, choice_of
-from calibration.diagnosis.screen.generic import GENERIC, ZONE_HEAT
 from thermal._types import BoolArray, FloatArray, IntArray
 from thermal.effects.catalogue import CATALOGUE
-from thermal.effects.effect import PAIR, Chosen
+from thermal.effects.effect import CONSTANT, PAIR, Chosen, Effect, EffectBuilder, strength
+from thermal.inputs.provider import InputProvider
+from thermal.inputs.signals import Signal
 from thermal.model.reduce import FEW_SHIFTS, SHIFTS, reduced_model
 from thermal.parameters import Parameter
+
+#: Hours of a bin of the day.
+_BIN = 3
+
+#: Heat that is plausible in a bin [W/m2], and per kelvin of outdoor temperature [W/m2/K].
+_HEAT, _PER_KELVIN = 20.0, 1.0
+
+_SOURCE = "any cause: loads and losses of offices stay within"
 
 #: Sweeps of the quadratic programme, and the change of an estimate in prior deviations that ends them [-].
 _SWEEPS, _TOLERANCE = 200, 1e-6
@@ -37,6 +47,50 @@ _MOST_ZONES = 24
 
 #: Sizes that generic heat may have over its prior's [-]; the likeliest counts (empirical Bayes).
 _TIGHTNESS = (0.003, 0.01, 0.03, 0.1, 0.3)
+
+
+def _hours(drivers: InputProvider, first: int) -> FloatArray:
+    hour = np.asarray(drivers.stamps.hour)
+    return ((hour >= first) & (hour < first + _BIN)).astype(float)
+
+
+def _outdoor(drivers: InputProvider) -> FloatArray:
+    return np.asarray(drivers.outdoor - drivers.outdoor.mean())
+
+
+def _build(builder: EffectBuilder) -> None:
+    outdoor = Signal("outdoor temperature about its mean", "K", _outdoor, ("outdoor",))
+    for room in builder.rooms:
+        for first in range(0, 24, _BIN):
+            signal = Signal(f"{first} to {first + _BIN} h", "1", partial(_hours, first=first))
+            builder.heat_air(room, builder.parameter(f"heat_from_{first:02d}"), signal, room.floor_area)
+        builder.heat_air(room, builder.parameter(ZONE_HEAT, zone=room.name), CONSTANT, room.floor_area)
+        builder.heat_air(room, builder.parameter("heat_by_outdoor", zone=room.name), outdoor, room.floor_area)
+
+
+#: Constant heat of a zone [W/m2], by which the smallest detectable watts are told.
+ZONE_HEAT = "heat_of_zone"
+
+#: Heat at every time of day, and in each zone constantly and with outdoor temperature.
+GENERIC = Effect(
+    id="generic",
+    title="heat of unknown cause",
+    equation="A (Σ_b p_b 1[t in b] + p_z + p_T,z (T_out - mean))",
+    source="generic regressors of an omnibus test",
+    acts_on="air of each zone",
+    confounders=(),
+    separated_by="",
+    parameters=(
+        *(
+            strength(f"heat_from_{first:02d}", "W/m^2", _HEAT, _SOURCE, "generic", -_HEAT)
+            for first in range(0, 24, _BIN)
+        ),
+        strength(ZONE_HEAT, "W/m^2", _HEAT, _SOURCE, "generic", -_HEAT),
+        strength("heat_by_outdoor", "W/m^2/K", _PER_KELVIN, _SOURCE, "generic", -_PER_KELVIN),
+    ),
+    build=_build,
+    zonal=True,
+)
 
 
 class Screening:

@@ -147,8 +147,7 @@ def error_growth(groups: Mapping[str, Mapping[str, Evaluation]]) -> list[Picture
             colour, dashes, label = LINES[name]
             axes.fill_between(hours, low, high, color=colour, alpha=0.18, linewidth=0)
             axes.plot(hours, mean, color=colour, linestyle=dashes, linewidth=1.8, label=label)
-        axes.set_xlim(0, max(c[0][-1] for c in models.values()))
-        axes.set_ylim(0, top)
+        axes.set(xlim=(0, max(c[0][-1] for c in models.values())), ylim=(0, top))
         keys_below(figure, 3)
         ends = "; ".join(f"{name} {curve[1][-1]:.2f} K" for name, curve in models.items())
         pictures.append(picture(figure, f"Mean absolute error over the horizon, {title}: at its end {ends}"))

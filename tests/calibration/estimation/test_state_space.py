@@ -152,7 +152,7 @@ def test_sizes_and_refusals() -> None:
     assert (space.order, space.n_zone, space.n_boundary) == (9, 2, 1)
     assert space.heat_drive.shape == (9, 2)
     assert space.heat_feedthrough.shape == (2, 2)
-    with pytest.raises(FilterError, match=r"one mean for each of 2 airflows, came shape \(1,\)"):
+    with pytest.raises(FilterError, match=r"one mean for each of 2 airflows, got shape \(1,\)"):
         state_space(pencil().modal.modes, 600.0, airflows=AIRFLOWS, flow=np.array([0.1]))
     with pytest.raises(ModelError, match="positive number of seconds"):
         state_space(pencil().modal.modes, 0.0)

@@ -176,7 +176,7 @@ def test_constant_inputs_and_long_lags_are_left_out() -> None:
 
 def test_bad_wishes_are_refused() -> None:
     found, inputs = filtered(simulate(100, 0)), simulate(100, 0)
-    with pytest.raises(FilterError, match="zones: expected 2 names, came 1"):
+    with pytest.raises(FilterError, match="zones: expected 2 names, got 1"):
         whiteness(found, ("a",))
     with pytest.raises(FilterError, match="expected positive lags"):
         whiteness(found, ("a", "b"), lags=(0.0,))

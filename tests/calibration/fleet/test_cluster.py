@@ -103,7 +103,7 @@ def test_no_scheduler(address: str) -> None:
 
 
 def test_no_address() -> None:
-    with pytest.raises(CalibrationError, match="expected an address such as tcp://HOST:8786, came none"):
+    with pytest.raises(CalibrationError, match="expected an address such as tcp://HOST:8786, got none"):
         ClusterExecutor(" ")
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from calibration.fit.result import ParameterEstimate
 from mpc.kpi.kpis import KPIS, Indicator, Kpis
-from mpc.reports.control_words import own_indicators
+from mpc.reports.control import own_indicators
 from mpc.reports.diagnosis_words import called
 from mpc.reports.figures.calibration import parameter_ranges
 from mpc.reports.page import render, spell

@@ -15,8 +15,14 @@ from calibration.errors import ResultsExistError
 from mpc.errors import ControlError, PlantError
 from mpc.loop.make import equip, pilot_weather
 from mpc.loop.noise import SensorNoise
-from mpc.reports.control import comparison_summary, write_comparison, write_control
-from mpc.reports.control_words import comparison_verdict, control_verdict, reason_rows
+from mpc.reports.control import (
+    comparison_summary,
+    comparison_verdict,
+    control_verdict,
+    reason_rows,
+    write_comparison,
+    write_control,
+)
 from mpc.scenario.weather_files import weather_of_case
 from mpc.studies.bound import KnownState
 from mpc.studies.compare import Comparison, compare_controllers

@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from calibration import Interval
-from calibration.diagnosis.decide.drift import DriftCurve, drift_of
+from calibration.diagnosis.decide.where import DriftCurve, drift_of
 from calibration.diagnosis.refit.comparison import ModelComparison
 from calibration.errors import NotEnoughDataError
 from calibration.evaluation.settings import ModelSettings
