@@ -124,8 +124,8 @@ def compare(
     from calibration.results import check_results_folder
     from mpc.reports.control import comparison_summary, write_comparison
     from mpc.reports.control_words import comparison_rows, comparison_verdict
-    from mpc.studies.compare import compare_controllers
     from mpc.studies.controllers import find_controller
+    from mpc.studies.run import compare_controllers
 
     check_results_folder(out, given.force)
     names = [name.strip() for name in controllers.split(",") if name.strip()]

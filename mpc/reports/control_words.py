@@ -9,8 +9,7 @@ import pandas as pd
 
 from mpc.kpi.kpis import Kpis
 from mpc.reports.page import significant, spell
-from mpc.studies.compare import Comparison
-from mpc.studies.run import ControlRun
+from mpc.studies.run import Comparison, ControlRun
 
 _CHANGING = re.compile(r"\d{4}-\d\d-\d\d \d\d:\d\d|\b\d+(\.\d+)?\b")  # times and numbers within a reason
 
