@@ -45,8 +45,8 @@ from mpc.scenario.gains import InternalGains
 from mpc.scenario.grid import StepGrid
 from mpc.scenario.paper import paper_carbon, paper_tariff
 from mpc.scenario.scenario import Scenario, build_scenario
-from mpc.studies.bound import KnownState
 from mpc.studies.controller import default_horizon, make_controller, site_points
+from mpc.studies.controllers import KnownState
 from mpc.studies.model import ORDER, control_model
 from thermal import Building, Case
 from thermal.effects.catalogue import chosen

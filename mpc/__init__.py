@@ -21,18 +21,17 @@ if TYPE_CHECKING:
     from mpc.scenario.scenario import Scenario, build_scenario
     from mpc.scenario.weather import Weather
     from mpc.scenario.weather_files import weather_of_case
-    from mpc.studies.compare import compare_controllers
     from mpc.studies.controller import make_controller
     from mpc.studies.controllers import register_controller
     from mpc.studies.model import control_model
-    from mpc.studies.run import run_controller
+    from mpc.studies.run import compare_controllers, run_controller
     from mpc.studies.study import StudySettings, make_study
 
 #: Modules that have the names; a name is looked for in one after the other, and only when it is used.
 _HOMES = (
     "errors", "plugins", "scenario.scenario", "scenario.weather_files", "kpi.kpis", "loop.plant", "loop.noise",
     "loop.run", "loop.make", "control.problem.horizon", "control.controller.controller", "studies.model",
-    "studies.controller", "studies.controllers", "studies.study", "studies.compare",
+    "studies.controller", "studies.controllers", "studies.study", "studies.run",
 )  # fmt: skip
 
 __all__ = [

@@ -13,15 +13,15 @@ from typing import Annotated, Any, ParamSpec
 
 import typer
 
-from mpc.cli.calibrate import calibrate
+from mpc.cli.calibrate import calibrate, diagnose
 from mpc.cli.check import check
 from mpc.cli.control import compare, control
 from mpc.cli.demo import demo
-from mpc.cli.diagnose import diagnose
 from mpc.cli.doctor import doctor
 from mpc.cli.evaluate import evaluate, simulate
 from mpc.cli.imports import import_devices, import_plan, import_telemetry
 from mpc.cli.label import label
+from mpc.cli.options import switch, value
 from mpc.cli.serve import serve
 from mpc.plugins import load_plugins
 
@@ -54,10 +54,9 @@ def _version(asked: bool) -> None:
 
 @app.callback()
 def options(
-    debug: Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")] = False,
+    debug: Annotated[bool, switch("--debug", "Show the traceback of an error.")] = False,
     plugin: Annotated[
-        list[str] | None,
-        typer.Option(metavar="MODULE", help="Module or .py file that adds controllers, effects, ...; repeatable."),
+        list[str] | None, value("Module or .py file that adds controllers, effects, ...; repeatable.", "MODULE")
     ] = None,
     version: Annotated[
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version and exit.")
@@ -79,11 +78,9 @@ def _guarded(command: Callable[P, int]) -> Callable[P, None]:
             code = command(*args, **kwargs)
         except (typer.Exit, typer.Abort):
             raise
-        except OSError as error:
-            if error.errno == errno.EPIPE:  # the reader of a pipe has gone: nothing to say to anyone
-                raise
-            code = _report(error, command.__name__)
         except Exception as error:
+            if isinstance(error, OSError) and error.errno == errno.EPIPE:  # a pipe's reader has gone: nothing to say
+                raise
             code = _report(error, command.__name__)
         raise typer.Exit(code)
 

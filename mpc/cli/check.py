@@ -26,9 +26,7 @@ def check(
     return answer(json, found.to_dict(), lambda: _show(found), report)
 
 
-def run_check(
-    case: Path, out: Path | None, force: bool, progress: Progress = silent
-) -> tuple[CaseCheck, Path | None]:
+def run_check(case: Path, out: Path | None, force: bool, progress: Progress = silent) -> tuple[CaseCheck, Path | None]:
     """Check a case and write what was found, where a folder is given.
 
     Parameters

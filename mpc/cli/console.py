@@ -134,26 +134,15 @@ def answer(json: bool, content: Mapping[str, Any], show: Callable[[], None], rep
     int
         Exit code: 0.
     """
+    from calibration.results import to_json
+
     if json:
-        write_json(content)
+        typer.echo(to_json(content))
         return 0
     show()
     if report is not None:
         say(f"Report: {report}")
     return 0
-
-
-def write_json(content: Mapping[str, Any]) -> None:
-    """Write JSON to stdout.
-
-    Parameters
-    ----------
-    content : mapping
-        Plain types.
-    """
-    from calibration.results import to_json
-
-    typer.echo(to_json(content))
 
 
 class Waiting:

@@ -8,10 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
 from mpc.cli.console import Waiting, answer, complain, say, show_table
-from mpc.cli.options import CaseFolder, Dx, Force, Json, Parameters, Start, file, folder, number, spread
+from mpc.cli.options import CaseFolder, Dx, Force, Json, Parameters, Start, file, folder, spread, switch, value
 
 if TYPE_CHECKING:
     from mpc.studies.run import ControlRun
@@ -24,29 +22,22 @@ class StudyOptions:
 
     case: CaseFolder
     start: Start
-    end: Annotated[str, typer.Option(metavar="T", help="End; the telemetry must hold the weather until then.")]
+    end: Annotated[str, value("End; the telemetry must hold the weather until then.", "T")]
     parameters: Parameters = None
     controller_parameters: Annotated[
         Path | None,
-        typer.Option(
-            metavar="Q",
-            help="calibration.json that optimal control believes in; default: that of the plant, --parameters.",
-        ),
+        value("calibration.json that optimal control believes in; default: that of the plant, --parameters.", "Q"),
     ] = None
-    plant: Annotated[
-        str, typer.Option(metavar="KIND", help="How the plant's building steps: reduced, grid, random.")
-    ] = "reduced"
+    plant: Annotated[str, value("How the plant's building steps: reduced, grid, random.", "KIND")] = "reduced"
     dx: Dx = None
     comfort_price: Annotated[
-        float, number("Of a zone's kelvin outside of its band for an hour, for optimal control.", "PRICE")
+        float, value("Of a zone's kelvin outside of its band for an hour, for optimal control.", "PRICE")
     ] = 1.0
     tariff: Annotated[
         Path | None, file("Of electricity, from the Utility Rate Database; default: the paper's, as for gas.")
     ] = None
-    exact: Annotated[
-        bool, typer.Option("--exact", help="Sensors without noise and weather forecasts without errors.")
-    ] = False
-    seed: Annotated[int, number("Seed of noise, forecast errors and random shuffle.")] = 0
+    exact: Annotated[bool, switch("--exact", "Sensors without noise and weather forecasts without errors.")] = False
+    seed: Annotated[int, value("Seed of noise, forecast errors and random shuffle.")] = 0
     force: Force = False
     json: Json = False
 
@@ -76,10 +67,7 @@ def control(
     given: StudyOptions,
     out: Annotated[Path, folder("control.json, trajectory.parquet, report.html")],
     controller: Annotated[
-        str,
-        typer.Option(
-            metavar="NAME", help="mpc, schedule, reset, guideline36, bound (perfect knowledge), or one of a plugin."
-        ),
+        str, value("mpc, schedule, reset, guideline36, bound (perfect knowledge), or one of a plugin.", "NAME")
     ] = "mpc",
 ) -> int:
     """Run a building in closed loop with optimal control, or with a rule.
@@ -112,7 +100,7 @@ def compare(
     given: StudyOptions,
     out: Annotated[Path, folder("comparison.json, a trajectory_NAME.parquet a controller, report.html")],
     controllers: Annotated[
-        str, typer.Option(metavar="A,B,...", help="Among schedule, reset, guideline36, mpc, bound, those of plugins.")
+        str, value("Among schedule, reset, guideline36, mpc, bound, those of plugins.", "A,B,...")
     ] = "schedule,reset,guideline36,mpc,bound",
 ) -> int:
     """Run a building with several controllers on the same weather, people and prices, and compare them.
@@ -122,8 +110,8 @@ def compare(
     """
     from calibration.results import check_results_folder
     from mpc.reports.control import comparison_rows, comparison_summary, comparison_verdict, write_comparison
-    from mpc.studies.compare import compare_controllers
     from mpc.studies.controllers import find_controller
+    from mpc.studies.run import compare_controllers
 
     check_results_folder(out, given.force)
     names = [name.strip() for name in controllers.split(",") if name.strip()]

@@ -14,11 +14,7 @@ if TYPE_CHECKING:
 OUT = Path("buildingmpc_demo")
 
 
-def demo(
-    out: Annotated[Path, folder("the results")] = OUT,
-    force: Force = False,
-    json: Json = False,
-) -> int:
+def demo(out: Annotated[Path, folder("the results")] = OUT, force: Force = False, json: Json = False) -> int:
     """Check, calibrate, diagnose, evaluate and control the bundled case, in under two minutes.
 
     Example: buildingmpc demo --out demo_results

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from mpc.cli.console import Waiting, answer, say, show_table
-from mpc.cli.options import Force, Json, file
+from mpc.cli.options import Force, Json, file, value
 
 if TYPE_CHECKING:
     from thermal.plan.assemble import PlanImport
@@ -103,8 +103,7 @@ def import_telemetry(
     out: Annotated[Path, typer.Option(metavar="DIR", help="Case folder to make, with this telemetry.")],
     points: Annotated[Path | None, file("points.csv, corrected by hand; default: matched by name.")] = None,
     unit: Annotated[
-        list[str] | None,
-        typer.Option(metavar="POINT=UNIT", help="Unit in the file, repeatable; default: degC, kg/s, W, %, W/m^2."),
+        list[str] | None, value("Unit in the file, repeatable; default: degC, kg/s, W, %, W/m^2.", "POINT=UNIT")
     ] = None,
     force: Force = False,
     json: Json = False,
@@ -142,12 +141,12 @@ def import_telemetry(
 
 def _units(given: Sequence[str]) -> dict[str, str]:
     """Take options POINT=UNIT apart."""
-    from thermal.errors import PlanError, describe
+    from thermal.errors import PlanError
 
-    for text in given:
-        if not all(text.partition("=")):
-            raise PlanError(describe("--unit", "POINT=UNIT, such as zone_air_temperature_sensor=degF", repr(text)))
-    return {point.strip(): unit.strip() for point, _, unit in (text.partition("=") for text in given)}
+    parts = [text.partition("=") for text in given]
+    for text in ("".join(part) for part in parts if not all(part)):
+        raise PlanError("--unit", "POINT=UNIT, such as zone_air_temperature_sensor=degF", repr(text))
+    return {point.strip(): unit.strip() for point, _, unit in parts}
 
 
 def _plan_content(found: PlanImport) -> dict[str, Any]:

@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from mpc import plugins
-from mpc.cli.calibrate import run_calibration
+from mpc.cli.calibrate import run_calibration, run_diagnosis
 from mpc.cli.check import run_check
 from mpc.cli.console import Progress, Waiting, say
-from mpc.cli.diagnose import run_diagnosis
+from mpc.cli.options import switch, value
 
 if TYPE_CHECKING:
     from multiprocessing.connection import Connection
@@ -37,17 +37,13 @@ def label(
             metavar="CASE|PLAN", help="Case folder, or a drawing, or the YAML list of the floors' drawings."
         ),
     ] = None,
-    out: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Case folder to make of a drawing; default: named after it.")
-    ] = None,
+    out: Annotated[Path | None, value("Case folder to make of a drawing; default: named after it.", "DIR")] = None,
     results: Annotated[
-        list[Path] | None, typer.Option(metavar="DIR", help="Folder of results whose reports are shown; repeatable.")
+        list[Path] | None, value("Folder of results whose reports are shown; repeatable.", "DIR")
     ] = None,
     port: Annotated[int, typer.Option(metavar="N", min=0, max=65535, help="Port; default: any that is free.")] = 0,
-    browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")] = True,
-    take_over: Annotated[
-        bool, typer.Option("--take-over", help="Take the case from a program that has it open.")
-    ] = False,
+    browser: Annotated[bool, switch("--browser/--no-browser", "Open the page in the browser.")] = True,
+    take_over: Annotated[bool, switch("--take-over", "Take the case from a program that has it open.")] = False,
 ) -> int:
     """Turn floor plans and a list of devices into a case, on a page in the browser; show its reports.
 
@@ -79,25 +75,25 @@ def label(
 
 def _case_of(target: Path | None, out: Path | None) -> tuple[Path, Path | None]:
     """Case folder to label, and the drawing or list to begin with."""
-    from thermal.errors import LabelError, describe
+    from thermal.errors import LabelError
 
     if target is None or target.is_dir() or not target.suffix:
         if target is not None and out is not None:
-            raise LabelError(describe("--out", "a drawing beside it", f"the case folder {target}", "drop --out"))
+            raise LabelError("--out", "a drawing beside it", f"the case folder {target}", "drop --out")
         return target or out or _NEW, None
     if not target.is_file():
-        raise LabelError(describe(str(target), "a case folder, a drawing or a list of drawings", "nothing"))
+        raise LabelError(str(target), "a case folder, a drawing or a list of drawings", "nothing")
     return out or target.with_suffix(""), target
 
 
 def _prepare(desk: LabelDesk, drawings: Path) -> None:
     """Put a drawing, or all floors of a list, on the page of a new case."""
-    from thermal.errors import LabelError, describe
+    from thermal.errors import LabelError
     from thermal.plan.page.desk import import_list, import_sheet
 
     if desk.store.draft.floors:
         advice = "open the case itself, and import the drawing on the page"
-        raise LabelError(describe(str(desk.store.folder), "a new case folder", "a case with floors", advice))
+        raise LabelError(str(desk.store.folder), "a new case folder", "a case with floors", advice)
     if drawings.suffix.lower() in _LISTS:
         with Waiting(f"import {drawings.name}") as progress:
             import_list(desk, drawings, progress)
@@ -137,13 +133,9 @@ def _make_apart(kind: str, case: Path, out: Path, progress: Progress) -> None:
 
 def _make(kind: str, case: Path, out: Path, connection: Connection[Any, Any], named: Sequence[str]) -> None:
     """Make a report; what goes wrong is told in a sentence."""
-
-    def progress(stage: str, done: int, total: int) -> None:
-        connection.send((stage, done, total))
-
     try:
         plugins.load_plugins(named)
-        _MAKERS[kind](case, out, True, progress)
+        _MAKERS[kind](case, out, True, lambda *told: connection.send(told))
     except Exception as error:
         connection.send(("error", f"{type(error).__name__}: {error}"))
     finally:

@@ -37,8 +37,8 @@ def file(text: str) -> Any:
     return typer.Option(metavar="FILE", help=text)
 
 
-def number(text: str, metavar: str = "N") -> Any:
-    """Declare the option of a number.
+def value(text: str, metavar: str = "N") -> Any:
+    """Declare an option with a value.
 
     Parameters
     ----------
@@ -50,16 +50,28 @@ def number(text: str, metavar: str = "N") -> Any:
     return typer.Option(metavar=metavar, help=text)
 
 
+def switch(name: str, text: str) -> Any:
+    """Declare an option without a value.
+
+    Parameters
+    ----------
+    name : str
+        As it is written, such as ``--force``.
+    text : str
+        Help.
+    """
+    return typer.Option(name, help=text)
+
+
 CaseFolder = Annotated[Path, typer.Argument(metavar="CASE", help="Case folder.")]
-Json = Annotated[bool, typer.Option("--json", help="Write JSON on stdout, and nothing else.")]
-Force = Annotated[bool, typer.Option("--force", help="Replace earlier results in the folder.")]
-Dx = Annotated[float | None, number("Distance between control volumes of a plan; default its cell size.", "M")]
-Horizon = Annotated[str, typer.Option(metavar="TIME", help="Prediction horizon, such as 6h or 90min.")]
+Json = Annotated[bool, switch("--json", "Write JSON on stdout, and nothing else.")]
+Force = Annotated[bool, switch("--force", "Replace earlier results in the folder.")]
+Dx = Annotated[float | None, value("Distance between control volumes of a plan; default its cell size.", "M")]
+Horizon = Annotated[str, value("Prediction horizon, such as 6h or 90min.", "TIME")]
 Intervals = list[str] | None
 Parameters = Annotated[Path | None, file("calibration.json of this case; default: before calibration.")]
 SchemeName = Annotated[
-    str | None,
-    typer.Option(metavar="NAME", help="implicit_euler or tr_bdf2; default: as calibrated, else implicit_euler."),
+    str | None, value("implicit_euler or tr_bdf2; default: as calibrated, else implicit_euler.", "NAME")
 ]
 Start = Annotated[str, typer.Option(metavar="T", help="Start, ISO 8601; local to the building without an offset.")]
 

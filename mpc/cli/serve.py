@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from mpc.cli.console import Waiting, answer, say, show_table
-from mpc.cli.options import Dx, Json, Parameters, file, number
+from mpc.cli.options import Dx, Json, Parameters, file, switch, value
 
 if TYPE_CHECKING:
     from mpc.adapters.boptest.case import BoptestCase
@@ -27,24 +27,20 @@ def serve(
     cases: Annotated[
         list[Path] | None, typer.Argument(metavar="[CASE]...", help="Case folders; default: the bundled case.")
     ] = None,
-    boptest: Annotated[bool, typer.Option("--boptest", help="Behind BOPTEST's REST API.")] = False,
+    boptest: Annotated[bool, switch("--boptest", "Behind BOPTEST's REST API.")] = False,
     pilot: Annotated[
-        bool, typer.Option("--pilot", help="Serve the generated pilot, too: 'pilot', and 'pilot_12' with 12 zones.")
+        bool, switch("--pilot", "Serve the generated pilot, too: 'pilot', and 'pilot_12' with 12 zones.")
     ] = False,
-    host: Annotated[str, typer.Option(metavar="ADDRESS", help="Where to listen.")] = "127.0.0.1",
-    port: Annotated[int, number("Port; 0 takes a free one.")] = PORT,
-    allow_remote: Annotated[
-        bool, typer.Option("--allow-remote", help="Let other machines in; there is no password.")
-    ] = False,
-    name: Annotated[
-        list[str] | None, typer.Option(metavar="NAME", help="A name that clients call the server by, repeatable.")
-    ] = None,
+    host: Annotated[str, value("Where to listen.", "ADDRESS")] = "127.0.0.1",
+    port: Annotated[int, value("Port; 0 takes a free one.")] = PORT,
+    allow_remote: Annotated[bool, switch("--allow-remote", "Let other machines in; there is no password.")] = False,
+    name: Annotated[list[str] | None, value("A name that clients call the server by, repeatable.", "NAME")] = None,
     parameters: Parameters = None,
     weather: Annotated[Path | None, file("EPW or CSV of a whole year; default: the case's telemetry.")] = None,
-    step: Annotated[float, number("Step of the plants.", "SECONDS")] = 300.0,
+    step: Annotated[float, value("Step of the plants.", "SECONDS")] = 300.0,
     dx: Dx = None,
-    most: Annotated[int, number("Tests that may run at once.")] = 64,
-    idle: Annotated[float, number("A test unused this long is freed.", "SECONDS")] = 900.0,
+    most: Annotated[int, value("Tests that may run at once.")] = 64,
+    idle: Annotated[float, value("A test unused this long is freed.", "SECONDS")] = 900.0,
     json: Json = False,
 ) -> int:
     """Put buildings behind BOPTEST's REST API, so that its controllers run on them; ends with Ctrl-C.

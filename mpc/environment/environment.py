@@ -24,7 +24,6 @@ from mpc.loop.plant import Measurements, Plant
 from mpc.scenario.forecast import Forecaster
 from mpc.scenario.scenario import Scenario
 from thermal._types import FloatArray
-from thermal.errors import describe, nearest
 from thermal.pilot.building import pilot_building
 
 
@@ -115,19 +114,16 @@ class ControlEnvironment(gymnasium.Env[Observation, NDArray[np.float32]]):
         ranges: Mapping[str, tuple[float, float]] | None = None,
     ) -> None:
         self.plants = _checked(plants)
-        if isinstance(reward, str) and reward not in REWARDS:
-            raise MpcError(describe("reward", "a known one", repr(reward), nearest(reward, REWARDS)))
+        if isinstance(reward, str):
+            MpcError.unless_known(reward, REWARDS, "reward", "a known one")
         self.reward = REWARDS[reward] if isinstance(reward, str) else reward
-        if episode_steps is not None and episode_steps < 1:
-            raise MpcError(describe("episode_steps", "1 or more", repr(episode_steps)))
+        MpcError.unless(episode_steps is None or episode_steps >= 1, "episode_steps", "1 or more", episode_steps)
         self.episode_steps = episode_steps
         first = self.plants[0]
         self._courses = [_Course(plant, block_ends) for plant in self.plants]
         self.actions = ActionLayout(first.actuators, actions)
         area, outlook = first.scenario.floor_area, self._courses[0].outlook
-        self.layout = ObservationLayout(
-            first.columns, first.actuators, area, outlook, histograms=histograms, ranges=ranges
-        )
+        self.layout = ObservationLayout(first.columns, first.actuators, area, outlook, histograms, ranges)
         self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (len(self.actions),), np.float32)
         self.observation_space = gymnasium.spaces.Box(-LARGEST, LARGEST, (len(self.layout),), np.float32)
         #: The plant of this episode.
@@ -161,12 +157,10 @@ class ControlEnvironment(gymnasium.Env[Observation, NDArray[np.float32]]):
         drawn = {"plant": int(self.np_random.integers(len(self.plants))),
                  "plant_seed": int(self.np_random.integers(2**31))}  # fmt: skip
         for name in options or {}:
-            if name not in drawn:
-                raise MpcError(describe("options", "a known one", repr(name), nearest(name, drawn)))
+            MpcError.unless_known(name, drawn, "options", "a known one")
         info: dict[str, Any] = {**drawn, **(options or {})}
-        if info["plant"] not in range(len(self.plants)):
-            expected = f"a plant from 0 to {len(self.plants) - 1}"
-            raise MpcError(describe("options: plant", expected, repr(info["plant"])))
+        known, expected = range(len(self.plants)), f"a plant from 0 to {len(self.plants) - 1}"
+        MpcError.unless(info["plant"] in known, "options: plant", expected, repr(info["plant"]))
         self.plant, self._course = self.plants[info["plant"]], self._courses[info["plant"]]
         self._step = self._done = 0
         return self._observe(self.plant.reset(info["plant_seed"])), info
@@ -213,19 +207,16 @@ def _checked(plants: Plant | Sequence[Plant]) -> tuple[ScenarioPlant, ...]:
     """Plants that have scenarios and fit each other."""
     several = tuple(plants) if isinstance(plants, Sequence) else (plants,)
     checked = tuple(plant for plant in several if isinstance(plant, ScenarioPlant))
-    if not several:
-        raise MpcError(describe("environment", "a plant or more", "none"))
-    if len(checked) < len(several):
-        found = ", ".join(type(plant).__name__ for plant in several)
-        raise MpcError(describe("environment", "plants with a scenario", found))
+    MpcError.unless(several, "environment", "a plant or more", "none")
+    kinds = ", ".join(type(plant).__name__ for plant in several)
+    MpcError.unless(len(checked) == len(several), "environment", "plants with a scenario", kinds)
     for k, plant in enumerate(checked):
+        where, step = f"environment: plant {k}", plant.scenario.grid.step
         for what in ("columns", "actuators", "control_step"):
-            if getattr(plant, what) != getattr(checked[0], what):
-                expected = f"the same {what.replace('_', ' ')} as plant 0"
-                raise MpcError(describe(f"environment: plant {k}", expected, "others"))
-        if plant.control_step % plant.scenario.grid.step:
-            expected = f"a control step of whole steps of {plant.scenario.grid.step:g} s"
-            raise MpcError(describe(f"environment: plant {k}", expected, f"{plant.control_step:g} s"))
+            same = getattr(plant, what) == getattr(checked[0], what)
+            MpcError.unless(same, where, f"the same {what.replace('_', ' ')} as plant 0", "others")
+        expected, found = f"a control step of whole steps of {step:g} s", f"{plant.control_step:g} s"
+        MpcError.unless(plant.control_step % step == 0.0, where, expected, found)
     return checked
 
 
@@ -235,8 +226,7 @@ def _last_steps(plant: Any, course: _Course) -> RecentSteps:
         recent: RecentSteps = plant.recent(course.each)
         return recent
     whole = plant.record()
-    if whole.district_heating is not None:
-        raise MpcError(describe("reward: plant", "electricity and gas", "district heating too"))
+    MpcError.unless(whole.district_heating is None, "reward: plant", "electricity and gas", "district heating too")
     n = round(plant.control_step / whole.step)
     gas = np.zeros(n) if whole.gas is None else whole.gas[-n:]
     temperature, electricity = list(whole.zone_temperature[-n - 1 :]), whole.electricity[-n:].tolist()

@@ -20,15 +20,12 @@ from mpc.loop.actuators import Actuator
 from mpc.scenario.forecast import Forecast, Forecaster, column_unit
 from thermal._types import FloatArray
 from thermal.case.points import POINT_TYPES, split_column
-from thermal.errors import describe, nearest
 from thermal.units import QUANTITIES
 
 #: Ends of the range that each point is counted in [library's units], as the file says.
 OBSERVED_RANGES: Mapping[str, tuple[float, float]] = {
     point: (lowest, highest)
-    for point, (lowest, highest) in yaml.safe_load(
-        Path(__file__).with_name("ranges.yaml").read_text(encoding="utf-8")
-    ).items()
+    for point, (lowest, highest) in yaml.safe_load(Path(__file__).with_name("ranges.yaml").read_bytes()).items()
 }
 
 #: Ends of the blocks over which a forecast is averaged, from now on [h]: the horizon of the paper's predictions, six
@@ -99,14 +96,10 @@ def measured_features(
     points = [split_column(column, "plant")[1] for column in columns]
     given = dict(ranges or {})
     for name, (lowest, highest) in given.items():
-        if name not in (known := {*points, *columns, *OBSERVED_RANGES}):
-            advice = nearest(name, known)
-            raise MpcError(describe("ranges", "a point that is observed", repr(name), advice))
-        if not -np.inf < lowest < highest < np.inf:
-            found = repr((lowest, highest))
-            raise MpcError(describe(f"ranges: {name}", "a lower and a higher number", found))
-    if not 0.0 < floor_area < np.inf:
-        raise MpcError(describe("floor area", "a positive number of m2", repr(floor_area)))
+        MpcError.unless_known(name, {*points, *columns, *OBSERVED_RANGES}, "ranges", "a point that is observed")
+        rises = -np.inf < lowest < highest < np.inf
+        MpcError.unless(rises, f"ranges: {name}", "a lower and a higher number", (lowest, highest))
+    MpcError.unless(0.0 < floor_area < np.inf, "floor area", "a positive number of m2", floor_area)
     own = {a.name: (a.lowest, a.highest) for a in actuators if a.required}
     count, kept, features = Counter(points), [], []
     for at, (column, point) in enumerate(zip(columns, points, strict=True)):
@@ -175,14 +168,11 @@ class Outlook:
     ) -> None:
         ends = np.asarray(block_ends, dtype=float) * _HOUR / step
         edges = np.concatenate([[0], np.round(ends).astype(int)])
-        if not len(ends) or (np.diff(edges) < 1).any() or not np.allclose(edges[1:], ends):
-            expected = f"ends that rise, whole numbers of steps of {step:g} s"
-            raise MpcError(describe("outlook: block_ends", expected, repr(tuple(block_ends))))
-        lacking = [f"{zone}/{name}" for name in _OF_ZONES for zone in zones if f"{zone}/{name}" not in columns]
-        if lacking:
-            raise MpcError(
-                describe("outlook", f"forecasts with {lacking[0]!r}", "none", "use a Forecaster")
-            )
+        whole = len(ends) and (np.diff(edges) >= 1).all() and np.allclose(edges[1:], ends)
+        expected = f"ends that rise, whole numbers of steps of {step:g} s"
+        MpcError.unless(whole, "outlook: block_ends", expected, tuple(block_ends))
+        for column in (f"{zone}/{name}" for name in _OF_ZONES for zone in zones):
+            MpcError.unless(column in columns, "outlook", f"forecasts with {column!r}", "none", "use a Forecaster")
         weather = [c for c in columns if "/" not in c and c.endswith("_sensor") and "direction" not in c]
         single = [*weather, *(c for c in _OF_ALL if c in columns)]
         self.columns = (*single, *(f"{zone}/{name}" for name in _OF_ZONES for zone in zones))

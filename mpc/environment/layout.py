@@ -13,7 +13,7 @@ from mpc.errors import MpcError, PlantActionError
 from mpc.loop.actuators import Actuator
 from thermal._types import FloatArray
 from thermal.case.points import split_column
-from thermal.errors import describe, nearest
+from thermal.errors import describe
 
 Observation = NDArray[np.float32]
 
@@ -73,7 +73,6 @@ class ObservationLayout:
         actuators: Sequence[Actuator],
         floor_area: float,
         outlook: Outlook | None = None,
-        *,
         histograms: bool = False,
         ranges: Mapping[str, tuple[float, float]] | None = None,
     ) -> None:
@@ -160,24 +159,17 @@ class ActionLayout:
         known = names | {name.rpartition("/")[2] for name in names}
         groups = []
         for name in chosen:
-            if name not in known:
-                advice = nearest(name, known)
-                raise MpcError(describe("actions", "a setpoint of the plant", repr(name), advice))
+            MpcError.unless_known(name, known, "actions", "a setpoint of the plant")
             groups.append([a for a in actuators if name in (a.name, a.name.rpartition("/")[2])])
         set_by = [a.name for group in groups for a in group]
         missing = [a.name for a in actuators if a.required and a.name not in set_by]
-        if missing or len(set_by) != len(set(set_by)):
-            expected = "every setpoint that is required, each once"
-            found = f"none for {missing[0]}" if missing else "one twice"
-            raise MpcError(describe("actions", expected, found))
+        each_once, found = len(set_by) == len({*set_by}), f"none for {missing[0]}" if missing else "one twice"
+        MpcError.unless(each_once and not missing, "actions", "every setpoint that is required, each once", found)
         self.chosen = tuple(chosen)
         self.lowest = np.array([max(a.lowest for a in group) for group in groups])
         self.highest = np.array([min(a.highest for a in group) for group in groups])
-        spans = (self.highest - self.lowest).tolist()
-        self._groups = [
-            ([a.name for a in group], low, span)
-            for group, low, span in zip(groups, self.lowest.tolist(), spans, strict=True)
-        ]
+        named = [[a.name for a in group] for group in groups]
+        self._groups = list(zip(named, self.lowest.tolist(), (self.highest - self.lowest).tolist(), strict=True))
 
     def __len__(self) -> int:
         return len(self.chosen)
@@ -205,11 +197,9 @@ class ActionLayout:
         if not given or not all(-_LARGEST <= value <= _LARGEST for value in given):  # NaN is in no range
             expected = f"{len(self)} numbers from -1 to 1, for {', '.join(self.chosen)}"
             raise PlantActionError(describe("action", expected, repr(action)))
-        setpoints = {}
+        setpoints: dict[str, float] = {}
         for (names, lowest, span), value in zip(self._groups, given, strict=True):
-            reached = lowest + span * min(max(0.5 * (value + 1.0), 0.0), 1.0)
-            for name in names:
-                setpoints[name] = reached
+            setpoints |= dict.fromkeys(names, lowest + span * min(max(0.5 * (value + 1.0), 0.0), 1.0))
         return setpoints
 
     def action(self, setpoints: Mapping[str, float]) -> FloatArray:

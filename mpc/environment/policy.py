@@ -19,7 +19,7 @@ from mpc.errors import MpcError
 from mpc.loop.plant import Measurements
 from mpc.scenario.forecast import Forecast
 from thermal._types import FloatArray
-from thermal.errors import describe, nearest
+from thermal.errors import describe
 
 #: What a layer applies to its sums.
 Activation = Literal["tanh", "relu"]
@@ -62,16 +62,14 @@ class ActorNetwork:
     about: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        if self.activation not in get_args(Activation):
-            advice = nearest(self.activation, get_args(Activation))
-            raise MpcError(describe("network: activation", "a known one", repr(self.activation), advice))
+        MpcError.unless_known(self.activation, get_args(Activation), "network: activation", "a known one")
         for name in ("weights", "biases"):
             object.__setattr__(self, name, tuple(np.asarray(v, dtype=np.float32) for v in getattr(self, name)))
         shapes = [(w.shape, b.shape) for w, b in zip(self.weights, self.biases, strict=False)]
         fit = len(self.weights) == len(self.biases) > 0 and all(len(w) == 2 and b == (w[0],) for w, b in shapes)
         chained = fit and all(a[0][0] == b[0][1] for a, b in pairwise(shapes))
-        if not chained or not all(np.isfinite(v).all() for v in (*self.weights, *self.biases)):
-            raise MpcError(describe("network", "finite layers that fit each other", repr(shapes)))
+        fine = chained and all(np.isfinite(v).all() for v in (*self.weights, *self.biases))
+        MpcError.unless(fine, "network", "finite layers that fit each other", shapes)
 
     @property
     def inputs(self) -> int:
@@ -154,8 +152,7 @@ class ActorNetwork:
         state = {name: value.detach().cpu().numpy() for name, value in model.policy.state_dict().items()}
         heads = {"PPO": ("mlp_extractor.policy_net", "action_net"), "SAC": ("actor.latent_pi", "actor.mu")}
         kind = type(model).__name__
-        if kind not in heads:
-            raise MpcError(describe("model", "PPO or SAC of Stable-Baselines3", kind))
+        MpcError.unless(kind in heads, "model", "PPO or SAC of Stable-Baselines3", kind)
         body, last = heads[kind]
         numbers = sorted({int(n.split(".")[-2]) for n in state if n.startswith(f"{body}.") and n.endswith("weight")})
         layers = [*(f"{body}.{n}" for n in numbers), last]
@@ -186,9 +183,8 @@ class PolicyController:
 
     def __init__(self, network: ActorNetwork, layout: ObservationLayout, actions: ActionLayout) -> None:
         found = network.inputs, int(network.weights[-1].shape[0])
-        if found != (len(layout), len(actions)):
-            expected = f"{len(layout)} inputs and {len(actions)} actions"
-            raise MpcError(describe("policy", expected, f"{found[0]} and {found[1]}"))
+        expected = f"{len(layout)} inputs and {len(actions)} actions"
+        MpcError.unless(found == (len(layout), len(actions)), "policy", expected, f"{found[0]} and {found[1]}")
         self.network, self.layout, self.actions = network, layout, actions
         self._ahead: FloatArray | None = None
 

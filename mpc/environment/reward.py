@@ -12,7 +12,6 @@ from mpc.kpi.rewards import PaperReward, StageCost
 from mpc.loop.history import RecentSteps
 from mpc.scenario.scenario import Scenario
 from thermal._types import FloatArray
-from thermal.errors import describe
 
 
 class Reward(Protocol):
@@ -102,9 +101,8 @@ def _steps(
 ) -> Iterator[tuple[int, FloatArray, FloatArray, float, float]]:
     """Give step of the scenario, zones before and after, electricity and gas of each of the plant's steps."""
     each = round(scenario.grid.step / done.step)
-    if abs(each * done.step - scenario.grid.step) > 1e-6:
-        expected = f"steps that divide the scenario's {scenario.grid.step:g} s"
-        raise MpcError(describe("reward: plant", expected, f"{done.step:g} s"))
+    length, expected = each * done.step, f"steps that divide the scenario's {scenario.grid.step:g} s"
+    MpcError.unless(abs(length - scenario.grid.step) <= 1e-6, "reward: plant", expected, f"{done.step:g} s")
     steps = zip(pairwise(done.zone_temperature), done.electricity, done.gas, strict=True)
     for k, ((before, after), electricity, gas) in enumerate(steps):
         yield first_step + k // each, before, after, electricity, gas

@@ -16,8 +16,7 @@ from mpc.kpi.kpis import Kpis
 from mpc.reports.figures.control import cost_bars, course, expectations, side_by_side
 from mpc.reports.figures.style import CELSIUS
 from mpc.reports.page import significant, spell, write_report
-from mpc.studies.compare import Comparison
-from mpc.studies.run import ControlRun, prediction_errors
+from mpc.studies.run import Comparison, ControlRun, prediction_errors
 from thermal.case.points import POINT_TYPES, split_column
 from thermal.units import QUANTITIES, from_si
 

@@ -10,7 +10,7 @@ from mpc.reports.figures import style
 from mpc.reports.figures.control import cost_bars
 from mpc.reports.figures.style import Picture, panel, picture, styled
 from mpc.reports.page import render
-from mpc.studies.compare import Comparison
+from mpc.studies.run import Comparison
 
 
 def render_demo(

@@ -69,9 +69,8 @@ def default_horizon(control_step: float = 900.0, hours: float = 12.0) -> Horizon
     >>> len(ahead), ahead.n_block, float(ahead.edges[-1]) / 3600.0
     (56, 10, 12.0)
     """
-    if not (0.0 < control_step <= 1800.0 and hours >= 3.0):
-        found = f"{control_step:g} s and {hours:g} h"
-        raise ControlError(describe("horizon", "a control step of up to 1800 s, 3 hours or more", found))
+    fits, found = 0.0 < control_step <= 1800.0 and hours >= 3.0, f"{control_step:g} s and {hours:g} h"
+    ControlError.unless(fits, "horizon", "a control step of up to 1800 s, 3 hours or more", found)
     fine = MODEL_STEP if control_step % MODEL_STEP == 0.0 else control_step
     early = [0.5, 0.5, 0.5, 0.5, 1.0, 1.0, 1.0, 2.0, 2.0]
     late = [4.0] * int(max(hours - sum(early) - 3.0, 1.0) / 4.0)
@@ -238,16 +237,14 @@ def _channels(actuators: Sequence[Actuator], points: SitePoints) -> tuple[Channe
         named = [a for a in actuators if a.name in {f"{entity}/{quantity}" for entity in entities}]
         if named:
             found.append(Channel(quantity, max(a.lowest for a in named), min(a.highest for a in named)))
-    if not found:
-        expected = f"an actuator {SUPPLY_AIR} or {SUPPLY_WATER} of {[*points.air_handlers, points.boiler]}"
-        raise ControlError(describe("plant", expected, f"{[a.name for a in actuators][:6]}"))
+    expected = f"an actuator {SUPPLY_AIR} or {SUPPLY_WATER} of {[*points.air_handlers, points.boiler]}"
+    ControlError.unless(found, "plant", expected, [a.name for a in actuators][:6])
     return tuple(found)
 
 
 def _check_forecasts(plant: SimulatedPlant, ahead: Horizon) -> None:
     needed = float(ahead.edges[-1])
     known = 0.0 if plant.forecaster is None else plant.forecaster.horizon * plant.scenario.grid.step
-    if known + 1e-6 < needed:
-        found = f"{known / 3600.0:g} h"
-        advice = "make the plant with a longer horizon, or the controller with a shorter one"
-        raise ControlError(describe("forecasts of the plant", f"{needed / 3600.0:g} h, the horizon", found, advice))
+    expected, found = f"{needed / 3600.0:g} h, the horizon", f"{known / 3600.0:g} h"
+    advice = "make the plant with a longer horizon, or the controller with a shorter one"
+    ControlError.unless(known + 1e-6 >= needed, "forecasts of the plant", expected, found, advice)

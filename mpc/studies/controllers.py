@@ -5,16 +5,31 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import numpy as np
+
+from calibration.estimation.disturbance import DisturbanceModel
+from calibration.estimation.kalman import KalmanFilter
 from mpc.baselines.guideline36 import Guideline36
 from mpc.baselines.rules import OutdoorReset, day_schedule
+from mpc.control.controller.observer import Observer
 from mpc.errors import ControlError
 from mpc.loop.actuators import Actuator
 from mpc.loop.plant import Controller
+from mpc.loop.reduced import ReducedBuilding
 from mpc.loop.simulated import SimulatedPlant
-from mpc.studies.bound import knowing_observer
-from mpc.studies.controller import default_horizon, make_controller, site_points
+from mpc.studies.controller import (
+    LASTING,
+    SENSOR_NOISE,
+    UNMEASURED,
+    default_horizon,
+    held_space,
+    make_controller,
+    site_points,
+)
 from mpc.studies.study import HORIZON_HOURS, Study
-from thermal.errors import describe, nearest
+from thermal._types import FloatArray
+from thermal.model.modal import modal_model
+from thermal.model.reduce import ReducedModel
 
 #: Makes a controller for a plant of a study.
 ControllerFactory = Callable[[Study, SimulatedPlant], Controller]
@@ -96,9 +111,7 @@ def find_controller(name: str) -> RegisteredController:
     ControlError
         When there is none of this name; with the nearest one.
     """
-    if name not in REGISTERED:
-        expected = f"one of {', '.join(REGISTERED)}"
-        raise ControlError(describe("controller", expected, repr(name), nearest(name, REGISTERED)))
+    ControlError.unless_known(name, REGISTERED, "controller", f"one of {', '.join(REGISTERED)}")
     return REGISTERED[name]
 
 
@@ -156,3 +169,73 @@ def _bound(study: Study, plant: SimulatedPlant) -> Controller:
         study.truth, plant, settings=study.controller_settings, observer=knowing_observer(study.truth, plant),
         horizon=default_horizon(study.settings.control_step, HORIZON_HOURS),
     )  # fmt: skip
+
+
+#: Unmeasured heat of a plant that is known, but for the random shuffle of its air [W/m2].
+SHUFFLED = 1.0
+
+
+def knowing_observer(model: ReducedModel, plant: SimulatedPlant) -> Observer | DisturbanceModel:
+    """Make the observer of a controller that has the plant's own parameters.
+
+    Parameters
+    ----------
+    model : ReducedModel
+        With the parameters of the plant's building.
+    plant : SimulatedPlant
+        To be controlled.
+
+    Returns
+    -------
+    Observer or DisturbanceModel
+        `KnownState` where the plant's building is such a model; else hardly any unmeasured heat is expected.
+    """
+    if isinstance(plant.model, ReducedBuilding):
+        return KnownState(model, plant)
+    return DisturbanceModel(SHUFFLED * plant.scenario.areas, LASTING, SENSOR_NOISE)
+
+
+class KnownState(Observer):
+    """Reads the state off the plant's building in the place of estimating it; there is no unmeasured heat.
+
+    Parameters
+    ----------
+    model : ReducedModel
+        That the plant's building was made of.
+    plant : SimulatedPlant
+        Whose building is a `ReducedBuilding` of that model.
+    """
+
+    def __init__(self, model: ReducedModel, plant: SimulatedPlant) -> None:
+        modes = modal_model(model.matrices(model.theta))
+        expected = DisturbanceModel(UNMEASURED * plant.scenario.areas, LASTING, SENSOR_NOISE)
+        super().__init__(KalmanFilter(held_space(modes, plant.control_step), expected), modes)
+        self._plant = plant
+
+    def start(self, zone: FloatArray, boundary: FloatArray) -> None:
+        """Take the state.
+
+        Parameters
+        ----------
+        zone, boundary : ndarray
+            Without effect [K].
+        """
+        building = self._plant.model
+        if isinstance(building, ReducedBuilding):
+            self.state[: self.order] = building.modal_state
+
+    def update(self, zone: FloatArray, heat: FloatArray, boundary: FloatArray) -> FloatArray:
+        """Take the state.
+
+        Parameters
+        ----------
+        zone, heat, boundary : ndarray
+            Without effect [K], [W], [K].
+
+        Returns
+        -------
+        ndarray, shape (n_zone,)
+            Innovations: none [K].
+        """
+        self.start(zone, boundary)
+        return np.zeros(len(zone))

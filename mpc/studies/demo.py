@@ -29,13 +29,11 @@ from mpc.reports.diagnosis_words import diagnosis_verdict
 from mpc.reports.evaluation import evaluation_verdict, write_evaluation
 from mpc.scenario.forecast import DAY_AHEAD_ERRORS
 from mpc.scenario.weather_files import weather_of_case
-from mpc.studies.compare import Comparison, compare_controllers
-from mpc.studies.run import Progress
+from mpc.studies.run import Comparison, Progress, compare_controllers
 from mpc.studies.study import StudySettings, make_study
 from thermal.case.case import Case
 from thermal.case.check import CaseCheck, describe_case
 from thermal.data import load_bundled_case
-from thermal.errors import describe
 
 #: Controllers of the day, rules first.
 CONTROLLERS = ("schedule", "reset", "guideline36", "mpc")
@@ -202,9 +200,8 @@ def _working_day(case: Case, interval: Interval) -> tuple[str, str]:
     zone = case.building.location.timezone
     days = pd.date_range(interval.start.tz_convert(zone).ceil("D"), interval.end.tz_convert(zone), freq="D")
     whole = [day for day in days[:-1] if day.weekday() < 5]
-    if not whole:
-        span = f"{interval.start.isoformat()} to {interval.end.isoformat()}"
-        raise ControlError(describe("day to control", "a whole working day of held-out telemetry", span))
+    span = f"{interval.start.isoformat()} to {interval.end.isoformat()}"
+    ControlError.unless(whole, "day to control", "a whole working day of held-out telemetry", span)
     return whole[-1].isoformat(), (whole[-1] + pd.DateOffset(days=1)).isoformat()
 
 

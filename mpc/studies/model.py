@@ -12,7 +12,6 @@ from mpc.errors import ControlError
 from thermal._types import FloatArray
 from thermal.case.building import Building
 from thermal.effects.effect import Chosen
-from thermal.errors import describe
 from thermal.model.matrices import SymbolicModel
 from thermal.model.reduce import ReducedModel, reduced_model
 from thermal.network.network import ThermalNetwork
@@ -70,10 +69,7 @@ def control_model(
 
 
 def model_settings(
-    parameters: BuildingParameters | None = None,
-    *,
-    dx: float | None = None,
-    effects: tuple[Chosen, ...] = (),
+    parameters: BuildingParameters | None = None, *, dx: float | None = None, effects: tuple[Chosen, ...] = ()
 ) -> ModelSettings:
     """Tell how a model is built: as its file of parameters says, or as given; arguments as those of `control_model`.
 
@@ -88,8 +84,7 @@ def model_settings(
     """
     if parameters is None or isinstance(parameters, Mapping):
         return ModelSettings(dx=dx, effects={c.effect.id: c.zones for c in effects})
-    if effects:
-        raise ControlError(describe("effects", "none beside a file of parameters", f"{len(effects)} of them"))
+    ControlError.unless(not effects, "effects", "none beside a file of parameters", f"{len(effects)} of them")
     if isinstance(parameters, CalibrationResult):
         built = parameters.settings
     else:

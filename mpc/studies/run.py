@@ -1,9 +1,9 @@
-"""A study run with one controller: what it did, why, and what came of it."""
+"""A study run with one controller, and with several side by side on the same weather, people, prices and noise."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -13,6 +13,7 @@ import pandas as pd
 from mpc.control.controller.action import Action
 from mpc.control.controller.controller import MpcController
 from mpc.control.predictor.predictor import Predictor
+from mpc.errors import ControlError
 from mpc.kpi.kpis import Kpis, measure_kpis
 from mpc.loop.plant import Controller, Measurements
 from mpc.loop.run import ClosedLoopRun, run_closed_loop
@@ -136,9 +137,8 @@ def run_controller(study: Study, name: str, progress: Progress | None = None) ->
     watched = _Watched(entry.make(study, plant))
     count = int(study.steps * MODEL_STEP / step)
     report = None if progress is None else (lambda done, _: progress(name, done, count))
-    loop = run_closed_loop(
-        plant, watched, steps=count, seed=study.settings.seed, forecasts=entry.predictive, progress=report
-    )  # fmt: skip
+    seed, ahead = study.settings.seed, entry.predictive
+    loop = run_closed_loop(plant, watched, steps=count, seed=seed, forecasts=ahead, progress=report)
     kpis = measure_kpis(loop.record, plant.scenario, control_step=step)
     return ControlRun(entry, study, loop, kpis, tuple(watched.decisions), plant)
 
@@ -214,3 +214,86 @@ def compared_decisions(run: ControlRun) -> list[tuple[int, Decision]]:
     rows = ((round((d.stamp - start).total_seconds() / step), d) for d in run.decisions)
     last = run.loop.record.n_steps - round(AHEAD / step)
     return [(first, d) for first, d in rows if first <= last and np.isfinite(d.zone).all()]
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """Runs of several controllers on one study.
+
+    Parameters
+    ----------
+    study : Study
+        What they were run on.
+    runs : tuple of ControlRun
+        In the order asked for.
+    """
+
+    study: Study
+    runs: tuple[ControlRun, ...]
+
+    def of(self, controller: str) -> ControlRun | None:
+        """Give the run of a controller, where there is one.
+
+        Parameters
+        ----------
+        controller : str
+            Its name.
+        """
+        return next((run for run in self.runs if run.controller == controller), None)
+
+    @property
+    def best_rule(self) -> ControlRun | None:
+        """The rule that costs least with its discomfort, where there is one."""
+        rules = [run for run in self.runs if not run.entry.predictive]
+        return min(rules, key=lambda run: run.objective) if rules else None
+
+    def saving(self, run: ControlRun) -> float | None:
+        """Share of the best rule's cost, with discomfort, that a run saves [-]; None without a rule.
+
+        Parameters
+        ----------
+        run : ControlRun
+            One of the runs.
+        """
+        best = self.best_rule
+        return None if best is None or best.objective <= 0.0 else 1.0 - run.objective / best.objective
+
+    def way_to_bound(self, run: ControlRun) -> float | None:
+        """Share of the way from the best rule to the perfect bound, cost with discomfort [-].
+
+        Parameters
+        ----------
+        run : ControlRun
+            One of the runs.
+
+        Returns
+        -------
+        float or None
+            None without a rule or a bound, or where the bound is no better than the rule.
+        """
+        best, bound = self.best_rule, self.of("bound")
+        if best is None or bound is None or best.objective <= bound.objective:
+            return None
+        return (best.objective - run.objective) / (best.objective - bound.objective)
+
+
+def compare_controllers(study: Study, names: Sequence[str], progress: Progress | None = None) -> Comparison:
+    """Run several controllers on a study, one after the other.
+
+    Parameters
+    ----------
+    study : Study
+        What they are run on.
+    names : sequence of str
+        Such as ``("guideline36", "mpc", "bound")``.
+    progress : callable, optional
+        Called with stage, done, total.
+
+    Raises
+    ------
+    ControlError
+        When a controller is not known, or named twice, or none is.
+    """
+    known = [find_controller(name).name for name in names]
+    ControlError.unless(known and len(set(known)) == len(known), "controllers", "some, each once", list(names))
+    return Comparison(study, tuple(run_controller(study, name, progress) for name in known))

@@ -25,7 +25,6 @@ from mpc.studies.controller import MODEL_STEP
 from mpc.studies.model import ORDER, BuildingParameters, model_settings, reduced
 from thermal.case.building import Building
 from thermal.effects.catalogue import chosen
-from thermal.errors import describe
 from thermal.model.reduce import ReducedModel
 from thermal.pilot.sizing import size_system
 from thermal.system.system import HvacSystem
@@ -130,8 +129,8 @@ class Study:
             When the control step is none.
         """
         count = round(control_step / MODEL_STEP)
-        if count < 1 or abs(count * MODEL_STEP - control_step) > 1e-6:
-            raise PlantError(describe("control step", f"a multiple of {MODEL_STEP:g} s", f"{control_step:g} s"))
+        fits = count >= 1 and abs(count * MODEL_STEP - control_step) <= 1e-6
+        PlantError.unless(fits, "control step", f"a multiple of {MODEL_STEP:g} s", f"{control_step:g} s")
         ahead = round(HORIZON_HOURS * 3600.0 / MODEL_STEP)
         forecaster = Forecaster(
             self.scenario, ahead, {} if bound else self.settings.errors,
@@ -199,9 +198,8 @@ def _prolonged(weather: Weather, run: StepGrid, whole: StepGrid) -> Weather:
     known, last = weather.stamps, whole.stamps[-1]
     if weather.typical or known[-1] >= last:
         return weather
-    if known[-1] < run.stamps[-1]:
-        expected = f"values until {run.stamps[-1]}"
-        raise PlantError(describe("weather", expected, f"until {known[-1]}", "end the run earlier"))
+    expected, found = f"values until {run.stamps[-1]}", f"until {known[-1]}"
+    PlantError.unless(known[-1] >= run.stamps[-1], "weather", expected, found, "end the run earlier")
     day = weather.frame.loc[known > known[-1] - _DAY]
     count = int(np.ceil((last - known[-1]) / _DAY))
     parts = [weather.frame, *(day.set_axis(day.index + (k + 1) * _DAY) for k in range(count))]

@@ -37,7 +37,7 @@ def test_diagnose_writes_what_it_says(tmp_path: Path) -> None:
 
 def test_the_terminal_has_verdict_candidates_and_how_far(capsys: pytest.CaptureFixture[str]) -> None:
     from calibration.diagnosis.diagnosis import diagnose
-    from mpc.cli.diagnose import _show
+    from mpc.cli.calibrate import _show_diagnosis as _show
     from mpc.reports.diagnosis_words import diagnosis_verdict, where_sentence
     from thermal import load_bundled_case
 

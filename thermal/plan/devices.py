@@ -11,7 +11,7 @@ from pathlib import Path
 from thermal.case.building import DEVICE_TYPES, Device
 from thermal.case.migration import certain_feeders
 from thermal.errors import PlanError, nearest
-from thermal.plan.guard import vocabulary
+from thermal.plan.guard import reading, vocabulary
 
 _COLUMNS = {
     "name": ("name", "device", "device_name", "equipment", "equip", "id", "tag", "asset"),
@@ -190,23 +190,15 @@ def words_of(name: str) -> list[str]:
 
 def read_rows(file: Path) -> list[dict[str, str]]:
     """Rows of a CSV by what their columns are for."""
-    try:
-        text = file.read_text(encoding="utf-8-sig")
-        head = text.partition("\n")[0]
-        sign = max(",;\t", key=head.count)
-        rows = [
-            row for row in csv.reader(text.splitlines(), delimiter=sign, strict=True) if any(x.strip() for x in row)
-        ]
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise PlanError(file.name, "a CSV in UTF-8 with a header", str(error)) from error
+    with reading(file, "a CSV in UTF-8 with a header", csv.Error):
+        lines = file.read_text(encoding="utf-8-sig").splitlines() or [""]
+        sign = max(",;\t", key=lines[0].count)
+        rows = [row for row in csv.reader(lines, delimiter=sign, strict=True) if any(x.strip() for x in row)]
     if not rows:
         raise PlanError(file.name, "a header and a row a device", "an empty file")
     header = ["_".join(words_of(cell)) for cell in rows[0]]
-    found: dict[str, int] = {}
-    for use, names in _COLUMNS.items():
-        places = [header.index(name) for name in names if name in header]
-        if places:
-            found[use] = places[0]
+    named = {use: [header.index(name) for name in names if name in header] for use, names in _COLUMNS.items()}
+    found = {use: places[0] for use, places in named.items() if places}
     if "name" not in found:
         advice = nearest(header[0], _COLUMNS["name"])
         raise PlanError(f"{file.name}: header", "a column 'name'", ", ".join(header[:6]), advice)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import importlib
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -15,13 +17,17 @@ from thermal.case.load import file_inside
 from thermal.errors import MissingExtraError, OversizedFileError, PlanError
 
 
-def extra(module: str) -> Any:
-    """Import a module of the extra ``[plan]``.
+def extra(module: str, of: str = "plan", needed_by: str = "plan import") -> Any:
+    """Import a module of an extra of the installation.
 
     Parameters
     ----------
     module : str
         Its full name.
+    of : str
+        The extra.
+    needed_by : str
+        What needs it, for the message.
 
     Returns
     -------
@@ -36,8 +42,8 @@ def extra(module: str) -> Any:
     try:
         return importlib.import_module(module)
     except ImportError as error:
-        advice = 'run: pip install "buildingmpc[plan]"'
-        raise MissingExtraError("plan import", f"the package {module!r}", str(error), advice) from error
+        advice = f'run: pip install "buildingmpc[{of}]"'
+        raise MissingExtraError(needed_by, f"the package {module!r}", str(error), advice) from error
 
 
 #: Largest file that is opened [bytes]: a scan of a large sheet has some 20 MB.
@@ -101,7 +107,7 @@ def checked_file(path: Path, kinds: tuple[str, ...]) -> Path:
     if suffix not in kinds:
         advice = "unpack it first" if suffix == ".zip" else ""
         raise PlanError(path.name, f"a file that ends in {', '.join(kinds)}", repr(suffix or path.name), advice)
-    try:
+    with reading(path, "a file that can be read"):
         if not path.is_file():
             raise PlanError(str(path), "a file", "a folder" if path.is_dir() else "nothing")
         size = path.stat().st_size
@@ -110,8 +116,6 @@ def checked_file(path: Path, kinds: tuple[str, ...]) -> Path:
             raise OversizedFileError(path.name, f"at most {MOST_BYTES / 1e6:.0f} MB", found, "export it anew")
         with path.open("rb") as stream:
             start = stream.read(1024)
-    except (OSError, ValueError) as error:  # ValueError: a NUL in the name
-        raise PlanError(path.name, "a file that can be read", str(error)) from error
     known = _SIGNATURES.get(suffix)
     # A PDF may have some bytes before its signature (ISO 32000-1, annex H, note 13).
     fits = known is None or (known[0] in start if suffix == ".pdf" else start.startswith(known))
@@ -119,6 +123,32 @@ def checked_file(path: Path, kinds: tuple[str, ...]) -> Path:
         found = f"a file that begins with {start[:8]!r}" if start else "an empty file"
         raise PlanError(path.name, f"a {suffix[1:].upper()} file", found, "export the drawing anew")
     return path.absolute()
+
+
+@contextmanager
+def reading(file: Path, expected: str, *kinds: type[Exception]) -> Iterator[None]:
+    """Raise what goes wrong while a file is read as an error that names the file.
+
+    Parameters
+    ----------
+    file : Path
+        File.
+    expected : str
+        What it should be, for the message.
+    *kinds : type of Exception
+        What its reader raises beside `OSError` and `ValueError`.
+
+    Raises
+    ------
+    PlanError
+        The file cannot be read as that.
+    """
+    caught: tuple[type[Exception], ...] = (OSError, ValueError, *kinds)
+    try:
+        yield
+    except caught as error:
+        found = " ".join(str(error).replace(str(file), file.name).split())[:200]
+        raise PlanError(file.name, expected, found or type(error).__name__) from error
 
 
 def check_pixels(columns: float, rows: float, where: str) -> None:

@@ -15,7 +15,7 @@ from thermal.errors import PlanError
 from thermal.plan.assemble import PlanImport, Progress, assemble_plans
 from thermal.plan.cells import ZonedFloor, propose_zones
 from thermal.plan.drawing import DOTS_PER_INCH, RASTER_KINDS, DrawingScale, Finite, Point, read_drawing
-from thermal.plan.guard import checked_file, first_fault, inside_folder
+from thermal.plan.guard import checked_file, first_fault, inside_folder, reading
 from thermal.plan.rooms import find_rooms
 from thermal.plan.survey import CODE_KINDS, FloorSurvey, PlanSettings, read_codes
 from thermal.plan.vector import VECTOR_KINDS, read_dxf
@@ -131,13 +131,11 @@ def read_drawing_list(path: str | PathLike[str]) -> DrawingList:
     file = checked_file(Path(path), (".yaml", ".yml"))
     if file.stat().st_size > _MOST_YAML:
         raise PlanError(file.name, f"at most {_MOST_YAML} bytes", f"{file.stat().st_size}")
-    try:
+    with reading(file, "YAML in UTF-8", yaml.YAMLError, RecursionError):
         text = file.read_text(encoding="utf-8-sig")
         if any(isinstance(event, yaml.AliasEvent) for event in yaml.parse(text, Loader=yaml.SafeLoader)):
             raise PlanError(file.name, "YAML without aliases ('*')", "one", "write it out")
         content: Any = yaml.safe_load(text)
-    except (OSError, UnicodeDecodeError, yaml.YAMLError, ValueError, RecursionError) as error:
-        raise PlanError(file.name, "YAML in UTF-8", " ".join(str(error).split())) from error
     try:
         return DrawingList.model_validate(content)
     except ValidationError as error:

@@ -16,7 +16,7 @@ from thermal.case.points import POINT_TYPES, point_type
 from thermal.case.telemetry import INDEX, check_units, read_telemetry
 from thermal.errors import PlanError
 from thermal.plan.devices import ListedPoint, key, words_of
-from thermal.plan.guard import checked_file, vocabulary
+from thermal.plan.guard import checked_file, reading, vocabulary
 from thermal.units import QUANTITIES
 
 _LEAST = 0.5  # -, of the confidence of a match that is offered
@@ -176,14 +176,10 @@ def _point(words: Sequence[str], kind: str) -> tuple[str, float]:
         return "", 0.0
     if kind == "zone":
         meant |= {"zone"}  # of a room's temperature nobody says that it is the room's
-    best, share = "", 0.0
-    for point in POINT_TYPES:
-        wanted = set(words_of(point))
-        both, either = _weight(meant & wanted), _weight(meant) + _weight(wanted)
-        ratio = 2.0 * both / either
-        if ratio > share:
-            best, share = point, ratio
-    return best, share
+    names = {point: {*words_of(point)} for point in POINT_TYPES}
+    ratios = {p: 2.0 * _weight(meant & words) / (_weight(meant) + _weight(words)) for p, words in names.items()}
+    best = max(ratios, key=lambda point: ratios[point])
+    return (best, ratios[best]) if ratios[best] > 0.0 else ("", 0.0)
 
 
 def _weight(words: set[str]) -> float:
@@ -212,7 +208,7 @@ def read_columns(path: str | PathLike[str]) -> tuple[str, ...]:
         The file is missing or neither.
     """
     file = checked_file(Path(path), (".csv", ".parquet"))
-    try:
+    with reading(file, "telemetry with one column a point", csv.Error):
         if file.suffix.lower() == ".csv":
             with file.open(encoding="utf-8-sig", newline="") as stream:
                 names = next(csv.reader(stream, strict=True), [])[1:]
@@ -220,8 +216,6 @@ def read_columns(path: str | PathLike[str]) -> tuple[str, ...]:
             from pyarrow import parquet
 
             names = [str(name) for name in parquet.read_schema(file).names]
-    except (OSError, UnicodeDecodeError, ValueError, csv.Error) as error:
-        raise PlanError(file.name, "telemetry with one column a point", " ".join(str(error).split())[:200]) from error
     return tuple(name for name in names if name not in (INDEX, "__index_level_0__"))
 
 
@@ -269,12 +263,9 @@ def read_matches(path: str | PathLike[str]) -> tuple[PointMatch, ...]:
         A column of it is missing, or a row names a column without a name.
     """
     file = checked_file(Path(path), (".csv",))
-    try:
-        with file.open(encoding="utf-8-sig", newline="") as stream:
-            reader = csv.DictReader(stream, strict=True)
-            rows, header = list(reader), tuple(reader.fieldnames or ())
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise PlanError(file.name, "a CSV in UTF-8", " ".join(str(error).split())[:200]) from error
+    with reading(file, "a CSV in UTF-8", csv.Error), file.open(encoding="utf-8-sig", newline="") as stream:
+        reader = csv.DictReader(stream, strict=True)
+        rows, header = list(reader), tuple(reader.fieldnames or ())
     if not {*_HEADER[:3]} <= {*header}:
         raise PlanError(file.name, f"columns {', '.join(_HEADER[:3])}", ", ".join(header) or "none")
     matches = []

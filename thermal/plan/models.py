@@ -12,7 +12,7 @@ from typing import Any
 
 from thermal.errors import PlanError
 from thermal.plan.devices import DeviceImport, ListedPoint, device_type, import_devices, key, read_rows
-from thermal.plan.guard import checked_file, extra, vocabulary
+from thermal.plan.guard import checked_file, extra, reading, vocabulary
 
 _BRICK, _REF = "https://brickschema.org/schema/Brick#", "https://brickschema.org/schema/Brick/ref#"
 
@@ -77,10 +77,8 @@ def read_brick(file: Path, zones: Sequence[str]) -> DeviceImport:
     """
     rdf = extra("rdflib")
     graph = rdf.Graph()
-    try:
+    with reading(file, "a Brick model in Turtle", Exception):  # rdflib's parser raises its own, and plain ones
         graph.parse(data=file.read_text(encoding="utf-8"), format="turtle")
-    except Exception as error:  # rdflib's parser raises BadSyntax, which is no ValueError, and plain exceptions
-        raise PlanError(file.name, "a Brick model in Turtle", " ".join(str(error).split())[:200]) from error
     model = _Model(graph, rdf)
     keys = {key(zone) for zone in zones}
     rows, points, fed_by = [], [], {}
@@ -271,10 +269,8 @@ def _point(entity: Entity, kind: str) -> str:
 
 
 def _read_json(file: Path) -> list[Entity]:
-    try:
+    with reading(file, "JSON", RecursionError):
         content = json.loads(file.read_text(encoding="utf-8-sig"))
-    except (OSError, UnicodeDecodeError, ValueError, RecursionError) as error:
-        raise PlanError(file.name, "JSON", " ".join(str(error).split())[:200]) from error
     rows = content.get("rows") if isinstance(content, dict) else content
     if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
         raise PlanError(file.name, "a Haystack grid with 'rows'", type(content).__name__)
@@ -298,10 +294,8 @@ def _json_value(value: Any) -> str:
 
 
 def _read_zinc(file: Path) -> list[Entity]:
-    try:
+    with reading(file, "Zinc in UTF-8"):
         lines = file.read_text(encoding="utf-8-sig").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise PlanError(file.name, "Zinc in UTF-8", str(error)) from error
     if len(lines) < 2 or not lines[0].startswith("ver:"):
         raise PlanError(file.name, "Zinc, which begins with 'ver:'", repr("".join(lines[:1])[:40]))
     tags = [re.match(r"\s*(\w*)", cell)[1] for cell in _cells(lines[1])]  # type: ignore[index]

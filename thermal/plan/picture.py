@@ -11,6 +11,7 @@ from importlib.resources import files
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import ndimage
 
 from thermal.case.building import Device
@@ -130,13 +131,35 @@ def _ground(floor: ZonedFloor, rows: slice, columns: slice) -> str:
     picture[(labels == WALL_LABEL) & ~exterior] = _INTERIOR
     picture[exterior] = _EXTERIOR
     picture = picture[rows, columns]
-    step = max(1, -(-max(picture.shape[:2]) // _WIDEST))
+    return "data:image/png;base64," + base64.b64encode(png_of(picture, _WIDEST, colours=256)).decode("ascii")
+
+
+def png_of(picture: NDArray[np.uint8], widest: int, colours: int | None = None) -> bytes:
+    """Write a picture as PNG, made smaller where it is too wide.
+
+    Parameters
+    ----------
+    picture : ndarray of uint8, shape (n_row, n_col) or (n_row, n_col, 3)
+        In grey or in colour.
+    widest : int
+        Longer side that is kept [px].
+    colours : int, optional
+        Number of colours that it is brought to.
+
+    Returns
+    -------
+    bytes
+        PNG.
+    """
+    step = max(1, -(-max(picture.shape[:2]) // widest))
     image = extra("PIL.Image").fromarray(np.ascontiguousarray(picture))
     if step > 1:
         image = image.reduce(step)
+    if colours is not None:
+        image = image.quantize(colors=colours)
     stream = io.BytesIO()
-    image.quantize(colors=256).save(stream, format="PNG", optimize=True)
-    return "data:image/png;base64," + base64.b64encode(stream.getvalue()).decode("ascii")
+    image.save(stream, format="PNG", optimize=colours is not None)
+    return stream.getvalue()
 
 
 def _pastel(number: int) -> tuple[int, int, int]:

@@ -15,7 +15,7 @@ from scipy import ndimage
 
 from thermal._types import BoolArray, FloatArray, Int32Array
 from thermal.errors import OversizedFileError, PlanError
-from thermal.plan.guard import MOST_BYTES, check_pixels, checked_file, checked_number
+from thermal.plan.guard import MOST_BYTES, check_pixels, checked_file, checked_number, reading
 
 #: Labels of what is no room.
 OUTSIDE_LABEL, WALL_LABEL = -1, 0
@@ -60,9 +60,8 @@ class PlanSettings:
         checked_number(self.smallest_room, "smallest_room", 0.1, 50.0, "m2")
         checked_number(self.smallest_zone, "smallest_zone", 0.0, 100.0, "m2")
         if self.thinnest_wall >= self.thickest_wall:
-            raise PlanError(
-                f"thinnest_wall: expected less than thickest_wall ({self.thickest_wall} m), found {self.thinnest_wall}"
-            )
+            expected = f"less than thickest_wall ({self.thickest_wall} m)"
+            raise PlanError("thinnest_wall", expected, f"{self.thinnest_wall}")
 
 
 @dataclass(frozen=True)
@@ -322,23 +321,20 @@ def _check_closed(labels: NDArray[np.int32], source: str) -> None:
 
 
 def _read_csv(file: Path) -> NDArray[Any]:
-    try:
-        with file.open(encoding="utf-8-sig", newline="") as stream:
-            rows = [row for row in csv.reader(stream, strict=True) if any(cell.strip() for cell in row)]
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise PlanError(file.name, "a CSV of codes in UTF-8", str(error)) from error
+    expected = "a CSV of codes in UTF-8"
+    with reading(file, expected, csv.Error), file.open(encoding="utf-8-sig", newline="") as stream:
+        rows = [row for row in csv.reader(stream, strict=True) if any(cell.strip() for cell in row)]
     for number, row in enumerate(rows, start=1):
         if len(row) != len(rows[0]):
             raise PlanError(f"{file.name}: row {number}", f"{len(rows[0])} cells as in row 1", f"{len(row)} cells")
-    try:
-        return np.array(rows, dtype=float)
-    except ValueError as error:
-        raise PlanError(file.name, "codes 0, 1 and 2", " ".join(str(error).split())) from error
+    with reading(file, "codes 0, 1 and 2"):
+        codes = np.array(rows, dtype=float)
+    return codes
 
 
 def _read_numpy(file: Path) -> NDArray[Any]:
     """Read an array, never an object that runs code, and nothing that unpacks to more than a plan."""
-    try:
+    with reading(file, "a NumPy array of codes", EOFError, KeyError, zipfile.BadZipFile):
         if file.suffix.lower() == ".npz":
             with zipfile.ZipFile(file) as archive:
                 unpacked = sum(entry.file_size for entry in archive.infolist())
@@ -349,9 +345,7 @@ def _read_numpy(file: Path) -> NDArray[Any]:
             if len(names) != 1:
                 raise PlanError(file.name, "one array", ", ".join(names[:5]) or "none")
             with np.load(file, allow_pickle=False) as arrays:
-                return np.asarray(arrays[arrays.files[0]])
-        mapped = np.load(file, mmap_mode="r", allow_pickle=False)
-        return np.asarray(mapped)
-    except (OSError, ValueError, EOFError, KeyError, zipfile.BadZipFile) as error:
-        found = " ".join(str(error).replace(str(file), file.name).split())
-        raise PlanError(file.name, "a NumPy array of codes", found) from error
+                codes = np.asarray(arrays[arrays.files[0]])
+        else:
+            codes = np.asarray(np.load(file, mmap_mode="r", allow_pickle=False))
+    return codes

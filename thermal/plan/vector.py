@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from thermal._types import FloatArray
 from thermal.errors import OversizedFileError, PlanError
-from thermal.plan.guard import check_pixels, checked_file, checked_number, extra
+from thermal.plan.guard import check_pixels, checked_file, checked_number, extra, reading
 from thermal.plan.ink import FINE, Ink
 from thermal.plan.rooms import survey_ink
 from thermal.plan.survey import FloorSurvey, PlanSettings, rooms_of
@@ -100,11 +100,9 @@ def read_dxf(
 
 def _open(file: Path) -> Any:
     ezdxf = extra("ezdxf")
-    try:
-        return ezdxf.readfile(file)
-    except (OSError, ezdxf.DXFError, ValueError, TypeError, LookupError, StopIteration, RecursionError) as error:
-        found = " ".join(str(error).replace(str(file), file.name).split())[:200]
-        raise PlanError(file.name, "a DXF drawing", found or type(error).__name__) from error
+    with reading(file, "a DXF drawing", ezdxf.DXFError, TypeError, LookupError, StopIteration, RecursionError):
+        document = ezdxf.readfile(file)
+    return document
 
 
 def _unit(document: Any, unit: float | None, where: str) -> float:

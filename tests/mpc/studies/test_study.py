@@ -24,11 +24,9 @@ from mpc.reports.control import (
     write_control,
 )
 from mpc.scenario.weather_files import weather_of_case
-from mpc.studies.bound import KnownState
-from mpc.studies.compare import Comparison, compare_controllers
 from mpc.studies.controller import make_controller
-from mpc.studies.controllers import find_controller
-from mpc.studies.run import prediction_errors, run_controller
+from mpc.studies.controllers import KnownState, find_controller
+from mpc.studies.run import Comparison, compare_controllers, prediction_errors, run_controller
 from mpc.studies.study import Study, StudySettings, make_study
 from thermal import Building, load_bundled_case
 

@@ -8,8 +8,8 @@ from pathlib import Path
 from threading import RLock
 from typing import Any
 
-from thermal.errors import PlanError, SessionHeldError
-from thermal.plan.guard import inside_folder
+from thermal.errors import SessionHeldError
+from thermal.plan.guard import inside_folder, reading
 from thermal.plan.list import read_drawing_list
 from thermal.plan.page.draft import Draft, Site, parse_draft
 from thermal.plan.page.drawings import DRAWING_KINDS, Progress, add_floors, checked_name, look_at
@@ -176,7 +176,5 @@ def import_list(desk: LabelDesk, path: Path, progress: Progress) -> None:
 
 
 def _copy(source: Path, target: Path) -> None:
-    try:
+    with reading(source, "a file that can be copied"):
         write_whole(target, source.read_bytes())
-    except OSError as error:
-        raise PlanError(source.name, "a file that can be copied", str(error)) from error

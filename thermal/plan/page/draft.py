@@ -19,7 +19,6 @@ from thermal.case.building import (
     FloorPlans,
     GeometryQuality,
     Location,
-    ZoneTable,
 )
 from thermal.errors import LabelError
 from thermal.plan.drawing import Finite
@@ -287,10 +286,10 @@ def draft_of(building: Building) -> Draft:
     LabelError
         It has a zone table.
     """
-    if isinstance(building.geometry, ZoneTable):
+    plans = building.geometry
+    if not isinstance(plans, FloorPlans):
         advice = "a zone table is edited as text: see the case format"
         raise LabelError(building.name, "a case with floor plans", "a zone table", advice)
-    plans = building.geometry
     return Draft(
         site=Site(**building.location.model_dump()),
         cell_size=plans.cell_size,

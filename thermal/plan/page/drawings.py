@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -18,17 +17,19 @@ from thermal.errors import OversizedFileError, PlanError
 from thermal.plan.assemble import align_floors, assemble_plans
 from thermal.plan.cells import ZonedFloor, draw_cells
 from thermal.plan.drawing import RASTER_KINDS, read_drawing
-from thermal.plan.guard import MOST_BYTES, checked_file, extra, inside_folder
+from thermal.plan.guard import MOST_BYTES, checked_file, inside_folder
 from thermal.plan.list import FloorEntry, read_floor
 from thermal.plan.page.draft import BASIC, Draft, DraftFloor, Picture, encode_floor
 from thermal.plan.page.store import write_whole
+from thermal.plan.picture import png_of
 from thermal.plan.survey import CODE_KINDS, OUTSIDE_LABEL, WALL_LABEL, FloorSurvey, read_codes
 from thermal.plan.vector import VECTOR_KINDS
 
 DRAWING_KINDS = (*RASTER_KINDS, *VECTOR_KINDS, *CODE_KINDS)
 DEVICE_KINDS = (".csv", ".ttl", ".json", ".zinc")
 
-_WIDEST_PICTURE = 3000  # px of what lies under the plan
+#: Longer side of what lies under the plan [px].
+WIDEST_PICTURE = 3000
 _TRIAL_CELL = 0.5  # m: codes are read once at any size to see that they are codes
 
 
@@ -203,28 +204,6 @@ def look_at(path: Path, page: int = 1, dots_per_inch: float = 150.0) -> _Sheet:
     return _Sheet(file.name, "vector")
 
 
-def picture_of(grey: NDArray[np.uint8]) -> bytes:
-    """Make a PNG of a drawing, at a size that browsers show at once.
-
-    Parameters
-    ----------
-    grey : ndarray of uint8, shape (n_row, n_col)
-        0 black, 255 white.
-
-    Returns
-    -------
-    bytes
-        PNG.
-    """
-    step = max(1, -(-max(grey.shape) // _WIDEST_PICTURE))
-    image = extra("PIL.Image").fromarray(np.ascontiguousarray(grey))
-    if step > 1:
-        image = image.reduce(step)
-    stream = io.BytesIO()
-    image.save(stream, format="PNG")
-    return stream.getvalue()
-
-
 Progress = Callable[[str, int, int], None]
 
 _INK, _WALL, _PAPER = 90, 150, 255  # greys of the picture of a drawing that is no image
@@ -373,7 +352,7 @@ def _picture(entry: FloorEntry, floor: ZonedFloor, corner: tuple[float, float], 
         if survey.ink is not None:
             grey[survey.ink] = _INK
     name = f"{Path(entry.file).stem}_{entry.page}.png"
-    write_whole(own / "pictures" / name, picture_of(grey))
+    write_whole(own / "pictures" / name, png_of(grey, WIDEST_PICTURE))
     height, width = grey.shape
     a, c, e, b, d, f = (float(x) for x in matrix[:2].ravel())
     return Picture(file=name, width=width, height=height, matrix=(a, b, c, d, e, f))

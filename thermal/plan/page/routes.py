@@ -13,23 +13,16 @@ from fastapi.exceptions import RequestValidationError
 from fastapi.responses import FileResponse, JSONResponse, Response
 from pydantic import TypeAdapter, ValidationError
 
-from thermal.errors import (
-    LabelError,
-    OversizedFileError,
-    PlanError,
-    ReportError,
-    SessionHeldError,
-    ThermalError,
-    describe,
-)
+from thermal.errors import LabelError, OversizedFileError, PlanError, ReportError, SessionHeldError, ThermalError
 from thermal.plan.drawing import DOTS_PER_INCH, RASTER_KINDS, read_drawing
 from thermal.plan.guard import first_fault, inside_folder
 from thermal.plan.list import FloorEntry
 from thermal.plan.models import read_devices
 from thermal.plan.page.desk import LabelDesk
 from thermal.plan.page.draft import zones_of
-from thermal.plan.page.drawings import DEVICE_KINDS, DRAWING_KINDS, Upload, add_floors, look_at, picture_of
+from thermal.plan.page.drawings import DEVICE_KINDS, DRAWING_KINDS, WIDEST_PICTURE, Upload, add_floors, look_at
 from thermal.plan.page.reports import Progress
+from thermal.plan.picture import png_of
 
 #: What a report may do: its own script in a box without access to the page.
 _REPORT_POLICY = (
@@ -149,7 +142,7 @@ def _add_drawings(app: FastAPI, desk: LabelDesk) -> None:
         if file.suffix.lower() not in RASTER_KINDS:
             raise PlanError(file.name, "a raster drawing", repr(file.suffix))
         sheet = look_at(file, page, dots_per_inch)
-        picture = picture_of(read_drawing(file, page=page, dots_per_inch=dots_per_inch).grey)
+        picture = png_of(read_drawing(file, page=page, dots_per_inch=dots_per_inch).grey, WIDEST_PICTURE)
         size = {"x-width": f"{sheet.width:.0f}", "x-height": f"{sheet.height:.0f}"}
         return Response(picture, media_type="image/png", headers=size)
 
@@ -254,8 +247,8 @@ async def _named(request: Request, error: Exception) -> Response:
 async def _malformed(request: Request, error: Exception) -> Response:
     first = error.errors()[0] if isinstance(error, RequestValidationError) else {}
     where = ".".join(str(part) for part in first.get("loc", ("request",)))
-    message = describe(where, str(first.get("msg", "a valid value")), repr(first.get("input"))[:80])
-    return JSONResponse({"error": LabelError.__name__, "message": message}, 400)
+    found = repr(first.get("input"))[:80]
+    return await _named(request, LabelError(where, str(first.get("msg", "a valid value")), found))
 
 
 def _parse_json(body: bytes) -> Any:

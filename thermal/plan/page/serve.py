@@ -11,7 +11,8 @@ import time
 from collections.abc import Awaitable, Callable, MutableMapping
 from typing import Any
 
-from thermal.errors import LabelError, MissingExtraError, describe
+from thermal.errors import LabelError, describe
+from thermal.plan.guard import extra
 from thermal.plan.page.desk import LabelDesk
 
 Scope = MutableMapping[str, Any]
@@ -71,8 +72,7 @@ class Gate:
             await _refuse(send, *trouble)
             return
         first, _, rest = scope["path"].lstrip("/").partition("/")
-        inner = {**scope, "path": f"/{rest}", "raw_path": f"/{rest}".encode()}
-        inner["token"] = first
+        inner = {**scope, "path": f"/{rest}", "raw_path": f"/{rest}".encode(), "token": first}
 
         async def guarded(message: Message) -> None:
             if message["type"] == "http.response.start":
@@ -128,20 +128,14 @@ def serve_page(desk: LabelDesk, *, port: int = 0, ready: Callable[[str], None] |
     MissingExtraError
         The extra ``[pages]`` is not installed.
     """
-    try:
-        import uvicorn
-    except ImportError as error:
-        advice = 'run: pip install "buildingmpc[pages]"'
-        raise MissingExtraError("labelling page", "uvicorn", str(error), advice) from error
+    uvicorn = extra("uvicorn", "pages", "labelling page")
     token = secrets.token_urlsafe(24)
     try:
         app = create_app(desk, token)
         listener = _listen(port)
         address = f"http://{HOST}:{listener.getsockname()[1]}/{token}/"
-        config = uvicorn.Config(
-            app, log_level="critical", access_log=False, lifespan="off", timeout_graceful_shutdown=2
-        )
-        server = uvicorn.Server(config)
+        quiet: dict[str, Any] = {"log_level": "critical", "access_log": False, "lifespan": "off"}
+        server = uvicorn.Server(uvicorn.Config(app, timeout_graceful_shutdown=2, **quiet))
         if ready is not None:
             threading.Thread(target=_when_ready, args=(server, ready, address), daemon=True).start()
         server.run(sockets=[listener])
@@ -171,11 +165,9 @@ def create_app(desk: LabelDesk, token: str) -> Application:
     MissingExtraError
         The extra ``[pages]`` is not installed.
     """
-    try:
-        from thermal.plan.page.routes import routes_of
-    except ImportError as error:
-        advice = 'run: pip install "buildingmpc[pages]"'
-        raise MissingExtraError("labelling page", "FastAPI", str(error), advice) from error
+    extra("fastapi", "pages", "labelling page")
+    from thermal.plan.page.routes import routes_of
+
     return Gate(routes_of(desk), token)
 
 
