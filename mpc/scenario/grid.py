@@ -17,7 +17,6 @@ from mpc.errors import ScenarioError
 from thermal._types import FloatArray
 from thermal.case.building import Building
 from thermal.case.case import local_timestamp
-from thermal.errors import describe
 
 #: Local clocks, schedules and tariffs change on multiples of this [s]; offsets of time zones are whole quarter hours.
 RESOLUTION = 300
@@ -166,7 +165,7 @@ def regular_steps(
     """
     if not isinstance(index, pd.DatetimeIndex) or index.tz is None or len(index) < 1 + (not step):
         found = f"{len(index)} of {index.dtype}"
-        raise error(describe(where, "at least two stamps with a time zone", found))
+        raise error(where, "at least two stamps with a time zone", found)
     gaps = np.diff(index_seconds(index)) if len(index) > 1 else np.array([int(step)])
     uneven = (gaps != (step or gaps[0])) | (gaps <= 0) | (gaps > max(longest, step))
     if uneven.any():
@@ -175,7 +174,7 @@ def regular_steps(
             "one step" + (f" of up to {longest:g} s" if np.isfinite(longest) else ""),
         )
         found, advice = f"{index[row + 1]} after {index[row]}", "fill the gap, and sort the stamps"
-        raise error(describe(where, expected, found, advice))
+        raise error(where, expected, found, advice)
     return float(gaps[0])
 
 

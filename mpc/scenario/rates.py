@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike
 from mpc.errors import ScenarioError
 from mpc.scenario.grid import Calendar, StepGrid, by_clock, index_seconds, means_of_steps, regular_steps, require_cover
 from thermal._types import FloatArray
-from thermal.errors import describe
 
 #: Energy of a kilowatt-hour [J].
 KILOWATT_HOUR = 3.6e6
@@ -168,9 +167,8 @@ class SeriesRate:
         ScenarioError.unless_known(self.stamped, ("start", "end"), "series: stamped", "'start' or 'end'")
         regular_steps(index, "series", ScenarioError)
         empty = self.series.isna().to_numpy()
-        if empty.any():
-            found = f"{empty.sum()} missing of {len(empty)}, first {index[int(np.argmax(empty))]}"
-            raise ScenarioError(describe("series", "a value at each stamp", found))
+        found = f"{empty.sum()} missing of {len(empty)}, first {index[int(np.argmax(empty))]}"
+        ScenarioError.unless(not empty.any(), "series", "a value at each stamp", found)
 
     def on(self, grid: StepGrid) -> FloatArray:
         """Average over each step of a grid, shape (n_steps,) [per kWh].

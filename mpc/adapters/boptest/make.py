@@ -18,7 +18,6 @@ from mpc.scenario.weather_files import read_epw, read_tmy3, read_weather_csv, we
 from thermal._types import FloatArray
 from thermal.case.building import Building, Device
 from thermal.case.case import Case
-from thermal.errors import describe
 from thermal.model.matrices import SymbolicModel
 from thermal.model.reduce import reduced_model
 from thermal.network.build import build_network
@@ -183,7 +182,7 @@ def _weather(path: Path, building: Building) -> Weather:
     if path.suffix.lower() == ".epw":
         return read_epw(path)
     if path.suffix.lower() != ".csv":
-        raise BoptestError(describe(f"weather file {path.name}", "an ending .epw or .csv", repr(path.suffix)))
+        raise BoptestError(f"weather file {path.name}", "an ending .epw or .csv", repr(path.suffix))
     try:
         with path.open(encoding="utf-8", errors="replace") as lines:
             second = [next(lines, ""), next(lines, "")][1]

@@ -20,7 +20,6 @@ from mpc.errors import EnergyPlusError
 from mpc.loop.sensors import PlantDevices
 from mpc.scenario.weather_files import read_epw
 from thermal.case.building import Building, Device, Layer, Surface, ZoneEntry, ZoneTable
-from thermal.errors import describe
 
 _METER = re.compile(r"^Output:Meter,([^,]+),", re.M)
 _DAY = date(2023, 1, 2)  # any: sizes come from design days
@@ -90,9 +89,8 @@ class EnergyPlusBuilding:
         """
         begin, whose = _plain(description), component.upper()
         found = [v for (c, d), v in self.sizes.items() if c == whose and _plain(d).startswith(begin)]
-        if not found:
-            known = sorted(d for c, d in self.sizes if c == whose)
-            raise EnergyPlusError(describe(f"sizes of {component!r}", repr(description), ", ".join(known) or "none"))
+        known = sorted(d for c, d in self.sizes if c == whose)
+        EnergyPlusError.unless(found, f"sizes of {component!r}", repr(description), ", ".join(known) or "none")
         return found[0]
 
     @property

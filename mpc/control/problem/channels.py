@@ -17,7 +17,6 @@ from mpc.loop.actuators import (
     SUPPLY_WATER,
 )
 from thermal.components.registry import setpoints
-from thermal.errors import describe, nearest
 from thermal.system.smooth import SmoothHvac
 
 _WORDS = {
@@ -58,12 +57,10 @@ class Channel:
     zones: tuple[int, ...] | None = None
 
     def __post_init__(self) -> None:
-        if self.quantity not in setpoints():
-            advice = nearest(self.quantity, setpoints())
-            raise ControlError(describe("channel: quantity", "a setpoint of the plant", repr(self.quantity), advice))
+        ControlError.unless_known(self.quantity, setpoints(), "channel: quantity", "a setpoint of the plant")
         if not (-np.inf < self.lower < self.upper < np.inf and self.rate > 0.0):
             found = f"{self.lower!r} to {self.upper!r}, {self.rate!r} an hour"
-            raise ControlError(describe(f"channel {self.quantity}", "a range, and a positive rate", found))
+            raise ControlError(f"channel {self.quantity}", "a range, and a positive rate", found)
 
     @property
     def unit(self) -> str:
@@ -99,12 +96,12 @@ class Channel:
         if at is None:
             kind = "pressures" if self.unit == "Pa" else "setpoints"
             advice = f"make the plant's functions with SmoothHvac(system, {kind}=True)"
-            raise ControlError(describe(f"channel {self.quantity}", f"a plant whose {kind} can be set", "none", advice))
+            raise ControlError(f"channel {self.quantity}", f"a plant whose {kind} can be set", "none", advice)
         count, given = at.stop - at.start, self.zones if self.of_zones else self.air_handlers
         chosen = tuple(range(count)) if given is None or count == 1 else given
         if not chosen or not set(chosen) <= set(range(count)):
             expected = f"{'zones' if self.of_zones else 'air handlers'} from 0 to {count - 1}"
-            raise ControlError(describe(f"channel {self.quantity}", expected, repr(given)))
+            raise ControlError(f"channel {self.quantity}", expected, repr(given))
         return np.arange(at.start, at.stop, dtype=np.intp)[list(chosen)]
 
 

@@ -17,7 +17,6 @@ from mpc.control.solvers.solution import Solution, Solver, Status
 from mpc.errors import ControlError
 from mpc.scenario.rates import KILOWATT_HOUR
 from thermal._types import FloatArray
-from thermal.errors import describe
 from thermal.units import REFERENCE_TEMPERATURE
 
 #: Clarabel (interior point) or OSQP (operator splitting, polished).
@@ -118,7 +117,7 @@ class LinearSolver(Solver):
     def __init__(self, problem: ControlProblem) -> None:
         if not isinstance(problem.predictor, HeatPredictor):
             found = type(problem.predictor).__name__
-            raise ControlError(describe("linear solver", "a problem of a HeatPredictor", found))
+            raise ControlError("linear solver", "a problem of a HeatPredictor", found)
         self.problem, self.predictor = problem, problem.predictor
         self._built: dict[tuple[int, int], _Programme] = {}
 
