@@ -144,10 +144,7 @@ class Forecast:
         return {str(column): column_unit(str(column)) for column in self.table.columns}
 
     def values(
-        self,
-        columns: Sequence[str],
-        stamps: pd.DatetimeIndex | None = None,
-        fill: Literal["hold"] | None = None,
+        self, columns: Sequence[str], stamps: pd.DatetimeIndex | None = None, fill: Literal["hold"] | None = None
     ) -> FloatArray:
         """Take columns out, whole.
 

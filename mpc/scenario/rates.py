@@ -14,8 +14,8 @@ from mpc.errors import ScenarioError
 from mpc.scenario.grid import Calendar, StepGrid, by_clock, index_seconds, means_of_steps, regular_steps, require_cover
 from thermal._types import FloatArray
 
-#: Energy of a kilowatt-hour [J].
-KILOWATT_HOUR = 3.6e6
+#: Energy of a kilowatt-hour [J], and length of an hour [s].
+KILOWATT_HOUR, HOUR = 3.6e6, 3600.0
 
 #: Energy of the units that gas is sold by [kWh]: 10^5 and 10^6 Btu (IT); a thousand cubic feet at 1,036 Btu each,
 #: upper heating value (U.S. EIA, Monthly Energy Review, table A4, 2023).

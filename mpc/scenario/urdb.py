@@ -25,11 +25,7 @@ _REFUSED = {
 
 
 def read_urdb(
-    source: str | Path | Mapping[str, Any],
-    gas: Rate,
-    *,
-    tier: int | None = None,
-    calendar: Calendar | None = None,
+    source: str | Path | Mapping[str, Any], gas: Rate, *, tier: int | None = None, calendar: Calendar | None = None
 ) -> Tariff:
     """Read an electricity tariff of the U.S. Utility Rate Database.
 

@@ -27,13 +27,7 @@ _WATER_DENSITY = 983.0  # kg/m3, as `thermal.components` has it
 
 Kind = Literal["wall", "floor", "ceiling"]
 
-_KINDS: Mapping[str, Kind] = {
-    "Wall": "wall",
-    "Door": "wall",
-    "Internal Mass": "wall",
-    "Floor": "floor",
-    "Roof": "ceiling",
-}
+_KINDS: dict[str, Kind] = {"Wall": "wall", "Door": "wall", "Internal Mass": "wall", "Floor": "floor", "Roof": "ceiling"}
 _GLASS = ("Window", "Glass Door")
 _OUTDOOR, _GROUND = "outdoor", "ground"
 _THIN = 0.01  # m, of a layer that has a resistance only
@@ -205,11 +199,7 @@ def _devices(layout: PlantLayout) -> tuple[Device, ...]:
 
 
 def _surface(
-    face: _Face,
-    faces: Mapping[int, _Face],
-    zones: Mapping[int, _Zone],
-    source: InputFile,
-    served: set[str],
+    face: _Face, faces: Mapping[int, _Face], zones: Mapping[int, _Zone], source: InputFile, served: set[str]
 ) -> Surface | None:
     """Make a surface of the zone table; None for what is not a zone's, or has been counted from the other side."""
     zone = zones[face.zone]

@@ -205,10 +205,7 @@ class InputFile:
         content = {k: copy.deepcopy(dict(v)) for k, v in self.content.items() if k not in (*_REPORTS, *_CLOCK)}
         content["Timestep"] = {"Timestep 1": {"number_of_timesteps_per_hour": steps_per_hour}}
         control: dict[str, Any] = dict(next(iter(content.get("SimulationControl", {"": {}}).values())))
-        control |= {
-            "run_simulation_for_sizing_periods": "No",
-            "run_simulation_for_weather_file_run_periods": "Yes",
-        }
+        control |= {"run_simulation_for_sizing_periods": "No", "run_simulation_for_weather_file_run_periods": "Yes"}
         content["SimulationControl"] = {"SimulationControl 1": control}
         content["RunPeriod"] = {
             "run": {

@@ -198,9 +198,8 @@ def past_steps(telemetry: pd.DataFrame, points: SitePoints, control_step: float)
     if not len(index) or step > length or index[-1] - index[0] + step < length:
         raise ControlError("start-up: telemetry", f"a control step, {length}, or more", f"{len(index)} rows")
     means = telemetry.resample(length, closed="right", label="right", origin=index[-1]).mean()
-    outdoor = (
-        means.reindex(columns=[f"{points.weather_station}/{OUTDOOR_TEMPERATURE}"]).ffill().bfill().to_numpy()[:, 0]
-    )
+    column = f"{points.weather_station}/{OUTDOOR_TEMPERATURE}"
+    outdoor = means.reindex(columns=[column]).ffill().bfill().to_numpy()[:, 0]
     if np.isnan(outdoor).any():
         raise ControlError("start-up: telemetry", "an outdoor temperature", "none", str(points.weather_station))
     gains = means.reindex(columns=[f"{zone}/internal_gain" for zone in points.zones]).fillna(0.0).to_numpy()

@@ -8,22 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mpc.errors import ControlError
-from mpc.loop.actuators import (
-    COOLING_SETPOINT,
-    DIFFERENTIAL_PRESSURE,
-    HEATING_SETPOINT,
-    STATIC_PRESSURE,
-    SUPPLY_AIR,
-    SUPPLY_WATER,
-)
+from mpc.loop.actuators import COOLING_SETPOINT, HEATING_SETPOINT, STATIC_PRESSURE, SUPPLY_AIR, SUPPLY_WATER
 from thermal.components.registry import setpoints
 from thermal.system.smooth import SmoothHvac
 
-_WORDS = {
-    SUPPLY_AIR: "supply air temperature", SUPPLY_WATER: "supply water temperature", STATIC_PRESSURE: "static pressure",
-    DIFFERENTIAL_PRESSURE: "differential pressure", HEATING_SETPOINT: "heating setpoint",
-    COOLING_SETPOINT: "cooling setpoint",
-}  # fmt: skip
+_WORD = {STATIC_PRESSURE: "static pressure", HEATING_SETPOINT: "heating setpoint", COOLING_SETPOINT: "cooling setpoint"}
 
 
 @dataclass(frozen=True)
@@ -72,7 +61,7 @@ class Channel:
         """In words, for reports."""
         which = "" if self.air_handlers is None else f" of air handlers {', '.join(map(str, self.air_handlers))}"
         where = "" if self.zones is None else f" of zones {', '.join(map(str, self.zones))}"
-        return _WORDS.get(self.quantity, self.quantity.replace("_", " ")) + which + where
+        return _WORD.get(self.quantity, self.quantity.removesuffix("_setpoint").replace("_", " ")) + which + where
 
     @property
     def of_zones(self) -> bool:
@@ -120,7 +109,4 @@ def supply_channels(
     air_rate, water_rate : float
         Most change in an hour [K/h].
     """
-    return (
-        Channel(SUPPLY_AIR, *air, air_rate),
-        Channel(SUPPLY_WATER, *water, water_rate),
-    )
+    return Channel(SUPPLY_AIR, *air, air_rate), Channel(SUPPLY_WATER, *water, water_rate)

@@ -12,7 +12,7 @@ import scipy.sparse as sp
 
 from mpc.control.predictor.heat import HeatPredictor
 from mpc.control.problem.horizon import HorizonData
-from mpc.control.problem.problem import ControlProblem
+from mpc.control.problem.problem import KILOWATT, ControlProblem
 from mpc.control.solvers.solution import Solution, Solver, Status
 from mpc.errors import ControlError
 from mpc.scenario.rates import KILOWATT_HOUR
@@ -90,7 +90,6 @@ def solve_quadratic(
     return QuadraticResult(x, Status.of(word) is Status.CONVERGED and bool(np.isfinite(x).all()), word)
 
 
-_KILOWATT = 1000.0  # W
 
 
 class LinearSolver(Solver):
@@ -177,7 +176,7 @@ class _Programme:
         limited = np.flatnonzero(np.isfinite(problem.most_change))
         if limited.size:
             rules.append(cp.abs(change[limited]) <= problem.most_change[limited])
-        power, fuel = predictor.electric_per_channel / _KILOWATT, predictor.fuel_per_channel / _KILOWATT
+        power, fuel = predictor.electric_per_channel / KILOWATT, predictor.fuel_per_channel / KILOWATT
         electric = heat @ (span * power) + float(least @ power)
         cost = given["electricity"] @ electric + given["gas"] @ (heat @ (span * fuel)) - given["end"] @ x[count]
         cost += cp.sum(cp.multiply(given["weight"], cp.square(bent) / (2.0 * problem.softness) + straight))
@@ -202,8 +201,8 @@ class _Programme:
         }  # fmt: skip
         if peaks.offset.size:
             values |= {
-                "windows": peaks.weights, "used": peaks.offset / _KILOWATT, "rate": peaks.rate,
-                "owner": np.eye(peaks.rate.size)[peaks.bucket], "so_far": peaks.so_far / _KILOWATT,
+                "windows": peaks.weights, "used": peaks.offset / KILOWATT, "rate": peaks.rate,
+                "owner": np.eye(peaks.rate.size)[peaks.bucket], "so_far": peaks.so_far / KILOWATT,
             }  # fmt: skip
         return values
 
