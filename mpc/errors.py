@@ -6,7 +6,13 @@ from collections.abc import Collection
 
 
 class MpcError(Exception):
-    """Base of every error that `mpc` raises on purpose."""
+    """Base of every error that `mpc` raises on purpose: a message, or the parts of one as `describe` takes them."""
+
+    def __str__(self) -> str:
+        """Message: the one that was given, or `describe` of its parts."""
+        from thermal.errors import describe  # here, since the console command imports this module and starts at once
+
+        return describe(*self.args) if len(self.args) > 1 else super().__str__()
 
     @classmethod
     def unless(cls, valid: object, where: str, expected: str, found: object, advice: str = "") -> None:
@@ -24,9 +30,7 @@ class MpcError(Exception):
             What to do about it; empty when that is plain.
         """
         if not valid:
-            from thermal.errors import describe  # the console command imports this module, and starts at once
-
-            raise cls(describe(where, expected, str(found), advice))
+            raise cls(where, expected, str(found), advice)
 
     @classmethod
     def unless_known(cls, value: object, options: Collection[object], where: str, expected: str) -> None:
@@ -42,9 +46,9 @@ class MpcError(Exception):
             What is checked, and what would have been right.
         """
         if value not in options:
-            from thermal.errors import describe, nearest
+            from thermal.errors import nearest
 
-            raise cls(describe(where, expected, repr(value), nearest(value, options)))
+            raise cls(where, expected, repr(value), nearest(value, options))
 
 
 class ScenarioError(MpcError):

@@ -17,7 +17,7 @@ from mpc.loop.conversion import SIGNAL_UNITS, Conversion, conversion
 from mpc.loop.plant import Measurements, PointLayout
 from thermal._types import FloatArray
 from thermal.case.points import POINT_TYPES, split_column
-from thermal.errors import CaseError, describe
+from thermal.errors import CaseError
 
 
 @dataclass(frozen=True)
@@ -50,8 +50,7 @@ class ForeignSignals:
     _kind, _error = "a variable", PlantError
 
     def __post_init__(self) -> None:
-        if not self.zones:
-            raise self._error(describe("signals", f"{self._kind} for the temperature of a zone at least", "none"))
+        self._error.unless(self.zones, "signals", f"{self._kind} for the temperature of a zone at least", "none")
         for column in self.measurements:
             try:
                 split_column(column, "signals")

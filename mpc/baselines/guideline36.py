@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
 
 from mpc.control.controller.reading import SitePoints, values_of
 from mpc.errors import ControlError
-from mpc.loop.actuators import Actuator
+from mpc.loop.actuators import COOLING_SETPOINT, HEATING_SETPOINT, SUPPLY_AIR, SUPPLY_WATER, Actuator
 from mpc.loop.plant import Measurements
 from mpc.scenario.forecast import Forecast
 from thermal._types import FloatArray, IntArray
@@ -204,10 +204,9 @@ class SuppressedRequests:
         return np.where(self._quiet > 0.0, 0.0, distance)
 
 
-_AIR, _WATER = "supply_air_temperature_setpoint", "supply_water_temperature_setpoint"
 _OF_TERMINALS = (
-    ZONE_TEMPERATURE, "zone_air_heating_temperature_setpoint", "zone_air_cooling_temperature_setpoint",
-    "discharge_air_temperature_sensor", "heating_water_valve_percentage_command",
+    ZONE_TEMPERATURE, HEATING_SETPOINT, COOLING_SETPOINT, "discharge_air_temperature_sensor",
+    "heating_water_valve_percentage_command",
 )  # fmt: skip
 
 
@@ -245,12 +244,10 @@ class Guideline36Settings:
         heating loop.
     """
 
-    air: TrimRespond = field(default_factory=lambda: TrimRespond(291.15, 285.15, 291.15, 0.1, -0.2, -0.6))
+    air: TrimRespond = TrimRespond(291.15, 285.15, 291.15, 0.1, -0.2, -0.6)
     coldest_air: float = 285.15
     outdoor: tuple[float, float] = (289.15, 294.15)
-    water: TrimRespond = field(
-        default_factory=lambda: TrimRespond(353.15, 305.37, 353.15, -1.1, 1.7, 3.9, time_step=300.0)
-    )
+    water: TrimRespond = TrimRespond(353.15, 305.37, 353.15, -1.1, 1.7, 3.9, time_step=300.0)
     two_cooling: float = 2.0
     three_cooling: float = 3.0
     cooling_lasting: float = 120.0
@@ -325,9 +322,9 @@ class Guideline36:
         for k, name in enumerate(self.points.air_handlers):
             on = not values_of(measurements, [name], "supply_fan_power_sensor")[0] <= 0.0
             warmest = self._air[k].advance(on, int(cooling[self._serving == k].sum()), seconds)
-            chosen[f"{name}/{_AIR}"] = self._by_outdoor(warmest, float(outdoor))
+            chosen[f"{name}/{SUPPLY_AIR}"] = self._by_outdoor(warmest, float(outdoor))
         on = not values_of(measurements, [self.points.boiler], "pump_power_sensor")[0] <= 0.0
-        chosen[f"{self.points.boiler}/{_WATER}"] = self._water.advance(on, int(heating.sum()), seconds)
+        chosen[f"{self.points.boiler}/{SUPPLY_WATER}"] = self._water.advance(on, int(heating.sum()), seconds)
         held = {name: self._range[name] for name in chosen if name in self._range}
         return {name: float(np.clip(chosen[name], *ends)) for name, ends in held.items()}
 
@@ -345,7 +342,7 @@ class Guideline36:
         zone, low, high, discharge, valve = (values_of(measurements, terminals, point) for point in _OF_TERMINALS)
         excess = self._suppressed.distance(zone - high, high, seconds)
         cooling = self._cooling.count((zone - high) / s.throttling_range, excess, seconds)
-        supply = values_of(measurements, self.points.air_handlers, "supply_air_temperature_setpoint")[self._serving]
+        supply = values_of(measurements, self.points.air_handlers, SUPPLY_AIR)[self._serving]
         call = np.clip((low - zone) / s.throttling_range, 0.0, 1.0)
         wanted = supply + np.minimum(2.0 * call, 1.0) * np.maximum(low + s.discharge_rise - supply, 0.0)
         heating = self._heating.count(valve, np.where(call > 0.0, wanted - discharge, 0.0), seconds)

@@ -8,13 +8,13 @@ from mpc.baselines.guideline36 import Guideline36
 from mpc.control.controller.action import ResetRule
 from mpc.control.controller.reading import SitePoints, values_of
 from mpc.control.problem.channels import Channel
-from mpc.loop.actuators import Actuator
+from mpc.loop.actuators import SUPPLY_AIR, SUPPLY_WATER, Actuator
 from mpc.loop.plant import Controller
 from mpc.loop.run import FixedSetpoints
 from mpc.scenario.forecast import Forecast
 from thermal.case.points import OUTDOOR_TEMPERATURE
 
-_AIR, _WATER = "supply_air_temperature_setpoint", "supply_water_temperature_setpoint"
+_SUPPLY = (SUPPLY_AIR, SUPPLY_WATER)
 
 
 def day_schedule(
@@ -51,10 +51,10 @@ def day_schedule(
     >>> [schedule.at_hour(hour)[boiler.name] for hour in (3.0, 12.0, 22.0)]
     [333.15, 355.0, 333.15]
     """
-    used = tuple(a for a in actuators if a.name.rpartition("/")[2] in (_AIR, _WATER))
+    used = tuple(a for a in actuators if a.name.rpartition("/")[2] in _SUPPLY)
 
     def of(water_now: float) -> dict[str, float]:
-        wanted = {_AIR: air, _WATER: water_now}
+        wanted = {SUPPLY_AIR: air, SUPPLY_WATER: water_now}
         return {a.name: min(max(wanted[a.name.rpartition("/")[2]], a.lowest), a.highest) for a in used}
 
     return FixedSetpoints(of(night_water), used, {day[0]: of(water), day[1]: of(night_water)})
@@ -83,7 +83,7 @@ class OutdoorReset:
     def __init__(self, actuators: Sequence[Actuator], weather_station: str, rule: ResetRule | None = None) -> None:
         self.rule, self._outdoor = rule or ResetRule(), f"{weather_station}/{OUTDOOR_TEMPERATURE}"
         named = [(a, a.name.rpartition("/")[2]) for a in actuators]
-        self._channels = {a.name: Channel(kind, a.lowest, a.highest) for a, kind in named if kind in (_AIR, _WATER)}
+        self._channels = {a.name: Channel(kind, a.lowest, a.highest) for a, kind in named if kind in _SUPPLY}
 
     def step(self, measurements: Mapping[str, float], forecast: Forecast | None) -> dict[str, float]:
         """Choose setpoints [K].

@@ -12,7 +12,7 @@ import pandas as pd
 
 from mpc.errors import MpcError
 from mpc.kpi.record import PlantRecord, excess
-from mpc.scenario.rates import KILOWATT_HOUR
+from mpc.scenario.rates import HOUR, KILOWATT_HOUR
 from mpc.scenario.scenario import Scenario
 from mpc.scenario.tariff import window_means
 from thermal._types import FloatArray, IntArray
@@ -20,7 +20,6 @@ from thermal._types import FloatArray, IntArray
 #: Length of the mean whose highest value is a peak [s], as in BOPTEST.
 PEAK_WINDOW = 900.0
 
-_HOUR = 3600.0  # s
 
 
 @dataclass(frozen=True)
@@ -112,7 +111,7 @@ class MeasuredRun:
         """Comfort of each zone."""
         start, end = self.record.zone_temperature[:-1], self.record.zone_temperature[1:]
         lower, upper = self.scenario.lower[self.rows], self.scenario.upper[self.rows]
-        occupied, hours = self.scenario.occupancy[self.rows] > 0.0, self.record.step / _HOUR
+        occupied, hours = self.scenario.occupancy[self.rows] > 0.0, self.record.step / HOUR
         sides = [(lower - start, lower - end), (start - upper, end - upper)]
         means, shares = zip(*(excess(*ends) for ends in sides), strict=True)
         columns = [mean.sum(0) * hours for mean in means]
@@ -180,7 +179,7 @@ def _air(run: MeasuredRun) -> float | None:
     if co2 is None or limit is None:
         return None
     mean, _ = excess(co2[:-1] - limit, co2[1:] - limit)
-    return float(mean.sum(0).mean() * run.record.step / _HOUR * 1e6)
+    return float(mean.sum(0).mean() * run.record.step / HOUR * 1e6)
 
 
 def _cost(run: MeasuredRun) -> float:
@@ -374,5 +373,5 @@ def measure_kpis(
     own = {name: values.pop(name) for name in tuple(values) if name not in Kpis.__dataclass_fields__}
     return Kpis(
         **values, currency=scenario.currency, carbon_kind=scenario.carbon_kind, floor_area=scenario.floor_area,
-        hours=record.n_steps * record.step / _HOUR, zones=run.zones, own=own,
+        hours=record.n_steps * record.step / HOUR, zones=run.zones, own=own,
     )  # fmt: skip

@@ -10,7 +10,6 @@ import pandas as pd
 
 from mpc.errors import MpcError
 from thermal._types import FloatArray
-from thermal.errors import describe
 
 _OF_ZONES, _OF_STEPS = ("zone_temperature", "co2"), ("electricity", "gas", "district_heating")
 
@@ -79,7 +78,7 @@ class PlantRecord:
         temperature = np.asarray(self.zone_temperature, dtype=float)
         if temperature.ndim != 2 or len(temperature) < 2 or not self.step > 0:
             found = f"shape {temperature.shape}, a step of {self.step} s"
-            raise MpcError(describe("record: zone_temperature", "(n + 1, n_zone) over n positive steps", found))
+            raise MpcError("record: zone_temperature", "(n + 1, n_zone) over n positive steps", found)
         shapes = dict.fromkeys(_OF_STEPS, (len(temperature) - 1,)) | {"co2": temperature.shape}
         for name in ("zone_temperature", *shapes, "controller_seconds"):
             given = getattr(self, name)
@@ -90,7 +89,7 @@ class PlantRecord:
             MpcError.unless(values.shape == shape, f"record: {name}", f"shape {shape}", f"shape {values.shape}")
             if not np.isfinite(values).all():
                 at = int(np.argmax(~np.isfinite(values).reshape(len(values), -1).all(axis=1)))
-                raise MpcError(describe(f"record: {name}", "finite numbers", f"{values[at]} in row {at}"))
+                raise MpcError(f"record: {name}", "finite numbers", f"{values[at]} in row {at}")
             object.__setattr__(self, name, values)
 
     @property
@@ -139,7 +138,7 @@ class PlantRecord:
         of_zones = {of: [c for c in table if str(c).endswith(f"/{of}")] for of in _OF_ZONES}
         if len(steps) != 1 or not of_zones["zone_temperature"] or "electricity" not in table:
             expected, found = "regular edges, zone temperatures, electricity", f"{[*table][:6]}, {len(table)} rows"
-            raise MpcError(describe("record: table", expected, found))
+            raise MpcError("record: table", expected, found)
         values = {of: table[columns].to_numpy(dtype=float) for of, columns in of_zones.items() if columns}
         values |= {of: table[of].to_numpy(dtype=float)[1:] for of in _OF_STEPS if of in table}
         return cls(step=float(steps[0] / np.timedelta64(1, "s")), **values)

@@ -11,11 +11,10 @@ from scipy.special import expit
 
 from mpc.errors import MpcError
 from mpc.kpi.record import excess
-from mpc.scenario.rates import KILOWATT_HOUR
+from mpc.scenario.rates import HOUR, KILOWATT_HOUR
 from mpc.scenario.scenario import Scenario
 from thermal._types import FloatArray
 
-_HOUR = 3600.0  # s
 Pair = tuple[ArrayLike, ArrayLike]  # lower and upper edge, or electricity and gas
 Factors = tuple[float, float]  # of electricity and of gas
 
@@ -241,4 +240,4 @@ class StageCost:
         if (np.minimum(first, last) >= lower).all() and (np.maximum(first, last) <= upper).all():
             return np.asarray(energy)
         discomfort = excess(lower - first, lower - last)[0] + excess(first - upper, last - upper)[0]
-        return np.asarray(energy + self.discomfort_price * discomfort.sum(axis=-1) * step / _HOUR)
+        return np.asarray(energy + self.discomfort_price * discomfort.sum(axis=-1) * step / HOUR)

@@ -16,7 +16,7 @@ from mpc.scenario.scenario import Scenario
 from mpc.scenario.weather import SKY, SUN_POINTS
 from thermal._types import FloatArray
 from thermal.case.points import OUTDOOR_TEMPERATURE, POINT_TYPES
-from thermal.errors import CaseError, describe, nearest
+from thermal.errors import CaseError, nearest
 from thermal.units import QUANTITIES, to_si
 
 #: Columns of a forecast that are no points of the case format, with their unit; those of a zone are ``ZONE/name``.
@@ -57,7 +57,7 @@ def column_unit(column: str) -> str:
     if name in POINT_TYPES:
         return QUANTITIES[POINT_TYPES[name].quantity].unit
     advice = nearest(name, [*FORECAST_UNITS, *POINT_TYPES])
-    raise ScenarioError(describe("forecast: column", "a name that forecasts have", repr(column), advice))
+    raise ScenarioError("forecast: column", "a name that forecasts have", repr(column), advice)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -81,9 +81,9 @@ class Forecast:
     def __post_init__(self) -> None:
         index = self.table.index
         if not isinstance(index, pd.DatetimeIndex) or index.tz is None or not len(index):
-            raise ScenarioError(describe("forecast", "stamps with a time zone", f"an index of {index.dtype}"))
+            raise ScenarioError("forecast", "stamps with a time zone", f"an index of {index.dtype}")
         if not index.is_monotonic_increasing or not index.is_unique:
-            raise ScenarioError(describe("forecast", "stamps that rise", f"{index[0]} to {index[-1]}, out of order"))
+            raise ScenarioError("forecast", "stamps that rise", f"{index[0]} to {index[-1]}, out of order")
         for column in self.table.columns:
             column_unit(str(column))
 
@@ -144,10 +144,7 @@ class Forecast:
         return {str(column): column_unit(str(column)) for column in self.table.columns}
 
     def values(
-        self,
-        columns: Sequence[str],
-        stamps: pd.DatetimeIndex | None = None,
-        fill: Literal["hold"] | None = None,
+        self, columns: Sequence[str], stamps: pd.DatetimeIndex | None = None, fill: Literal["hold"] | None = None
     ) -> FloatArray:
         """Take columns out, whole.
 
@@ -338,7 +335,7 @@ class Forecaster:
         """
         if not 0 <= k <= len(self._truth) - self.horizon:
             expected = f"a step from 0 to {len(self._truth) - self.horizon}, so that the scenario covers the horizon"
-            raise ScenarioError(describe("forecast", expected, repr(k), "make the scenario's grid longer"))
+            raise ScenarioError("forecast", expected, repr(k), "make the scenario's grid longer")
         truth = self._truth[k : k + self.horizon]
         if not self.errors:
             return truth

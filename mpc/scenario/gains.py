@@ -63,7 +63,9 @@ class InternalGains:
             possible = np.isfinite(value) and 0 <= value <= (1.0 if name.startswith(("idle", "radiant")) else np.inf)
             ScenarioError.unless(possible, f"gains: {name}", "0 or more, shares up to 1", value)
 
-    def heat(self, occupancy: ArrayLike, people: ArrayLike, areas: ArrayLike) -> FloatArray:
+    def heat(
+        self, occupancy: ArrayLike, people: ArrayLike, areas: ArrayLike, *, radiant: bool = False
+    ) -> FloatArray:
         """Sensible heat given to each zone.
 
         Parameters
@@ -74,25 +76,8 @@ class InternalGains:
             People assigned to each zone [-].
         areas : array_like, shape (n_zone,)
             Floor areas [m2].
-
-        Returns
-        -------
-        ndarray, shape (n_time, n_zone)
-            Positive into the zone [W].
-        """
-        return self._weighed(occupancy, people, areas, (1.0, 1.0, 1.0))
-
-    def radiant_heat(self, occupancy: ArrayLike, people: ArrayLike, areas: ArrayLike) -> FloatArray:
-        """Heat that radiates to the surfaces, a part of `heat`.
-
-        Parameters
-        ----------
-        occupancy : array_like, shape (n_time, n_zone)
-            People in each zone [-].
-        people : array_like, shape (n_zone,)
-            People assigned to each zone [-].
-        areas : array_like, shape (n_zone,)
-            Floor areas [m2].
+        radiant : bool
+            Whether only the part that radiates to the surfaces is counted.
 
         Returns
         -------
@@ -102,10 +87,15 @@ class InternalGains:
         Examples
         --------
         >>> office = InternalGains(**RADIANT_SHARES)
-        >>> office.radiant_heat([[1.0]], people=[1.0], areas=[18.58]).round(1).tolist()
+        >>> office.heat([[1.0]], people=[1.0], areas=[18.58], radiant=True).round(1).tolist()
         [[180.9]]
         """
-        return self._weighed(occupancy, people, areas, self._radiant)
+        count, all_in = np.asarray(occupancy, dtype=float), np.asarray(people, dtype=float)
+        share = np.divide(count, all_in, out=np.zeros_like(count), where=all_in > 0)
+        of_people, of_equipment, of_lights = self._radiant if radiant else (1.0, 1.0, 1.0)
+        density = of_equipment * self.equipment * (self.idle_equipment + (1.0 - self.idle_equipment) * share)
+        density += of_lights * self.lights * (self.idle_lights + (1.0 - self.idle_lights) * share)
+        return np.asarray(of_people * count * self.sensible + density * np.asarray(areas, dtype=float))
 
     @property
     def radiates(self) -> bool:
@@ -115,22 +105,6 @@ class InternalGains:
     @property
     def _radiant(self) -> tuple[float, float, float]:
         return self.radiant_people, self.radiant_equipment, self.radiant_lights
-
-    def _weighed(
-        self, occupancy: ArrayLike, people: ArrayLike, areas: ArrayLike, weights: tuple[float, float, float]
-    ) -> FloatArray:
-        """Add up heat of people, equipment and lights, each by its weight [W]."""
-        count, all_in = np.asarray(occupancy, dtype=float), np.asarray(people, dtype=float)
-        share = np.divide(count, all_in, out=np.zeros_like(count), where=all_in > 0)
-        of_people, of_equipment, of_lights = weights
-        density = sum(
-            weight * power * (idle + (1.0 - idle) * share)
-            for weight, power, idle in (
-                (of_equipment, self.equipment, self.idle_equipment),
-                (of_lights, self.lights, self.idle_lights),
-            )
-        )
-        return np.asarray(of_people * count * self.sensible + density * np.asarray(areas, dtype=float))
 
     def moisture_heat(self, occupancy: ArrayLike) -> FloatArray:
         """Latent heat of the people in each zone.

@@ -13,10 +13,9 @@ from numpy.typing import ArrayLike
 from mpc.errors import ScenarioError
 from mpc.scenario.grid import Calendar, StepGrid, by_clock, index_seconds, means_of_steps, regular_steps, require_cover
 from thermal._types import FloatArray
-from thermal.errors import describe
 
-#: Energy of a kilowatt-hour [J].
-KILOWATT_HOUR = 3.6e6
+#: Energy of a kilowatt-hour [J], and length of an hour [s].
+KILOWATT_HOUR, HOUR = 3.6e6, 3600.0
 
 #: Energy of the units that gas is sold by [kWh]: 10^5 and 10^6 Btu (IT); a thousand cubic feet at 1,036 Btu each,
 #: upper heating value (U.S. EIA, Monthly Energy Review, table A4, 2023).
@@ -168,9 +167,8 @@ class SeriesRate:
         ScenarioError.unless_known(self.stamped, ("start", "end"), "series: stamped", "'start' or 'end'")
         regular_steps(index, "series", ScenarioError)
         empty = self.series.isna().to_numpy()
-        if empty.any():
-            found = f"{empty.sum()} missing of {len(empty)}, first {index[int(np.argmax(empty))]}"
-            raise ScenarioError(describe("series", "a value at each stamp", found))
+        found = f"{empty.sum()} missing of {len(empty)}, first {index[int(np.argmax(empty))]}"
+        ScenarioError.unless(not empty.any(), "series", "a value at each stamp", found)
 
     def on(self, grid: StepGrid) -> FloatArray:
         """Average over each step of a grid, shape (n_steps,) [per kWh].

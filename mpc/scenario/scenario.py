@@ -101,7 +101,7 @@ class Scenario:
     @cached_property
     def radiant_gains(self) -> FloatArray:
         """Part of the gains that radiates to the surfaces, shape (n_steps, n_zone) [W]."""
-        return self.heat.radiant_heat(self.occupancy, self.assigned, self.areas)
+        return self.heat.heat(self.occupancy, self.assigned, self.areas, radiant=True)
 
     @property
     def latent(self) -> FloatArray:

@@ -14,7 +14,6 @@ from mpc.scenario.grid import Calendar
 from mpc.scenario.rates import HourlyRate, Rate
 from mpc.scenario.tariff import DemandCharge, Tariff
 from thermal._types import FloatArray, IntArray
-from thermal.errors import describe
 
 # Parts of a tariff that change its bill and are not modelled.
 _REFUSED = {
@@ -26,11 +25,7 @@ _REFUSED = {
 
 
 def read_urdb(
-    source: str | Path | Mapping[str, Any],
-    gas: Rate,
-    *,
-    tier: int | None = None,
-    calendar: Calendar | None = None,
+    source: str | Path | Mapping[str, Any], gas: Rate, *, tier: int | None = None, calendar: Calendar | None = None
 ) -> Tariff:
     """Read an electricity tariff of the U.S. Utility Rate Database.
 
@@ -82,11 +77,11 @@ def _found(source: str | Path | Mapping[str, Any], tier: int | None) -> _Item:
         try:
             content = json.loads(Path(source).read_text(encoding="utf-8"))
         except (OSError, ValueError) as error:
-            raise ScenarioError(describe(where, "a JSON file of the Utility Rate Database", str(error))) from error
+            raise ScenarioError(where, "a JSON file of the Utility Rate Database", str(error)) from error
     items = content.get("items", [content]) if isinstance(content, Mapping) else content
     if not isinstance(items, Sequence) or len(items) != 1 or not isinstance(items[0], Mapping):
         found = f"{len(items)} items" if isinstance(items, Sequence) else type(items).__name__
-        raise ScenarioError(describe(where, "one tariff", found, "pass the item that is meant"))
+        raise ScenarioError(where, "one tariff", found, "pass the item that is meant")
     return _Item(items[0], where, tier)
 
 
@@ -115,7 +110,7 @@ class _Item(NamedTuple):
         """Price of each period of a structure."""
         structure, tier, prices = self.parts.get(key), self.tier, []
         if not isinstance(structure, Sequence) or not structure or not all(structure):
-            raise ScenarioError(describe(f"{self.where}: {key}", "periods of tiers", repr(structure)[:60]))
+            raise ScenarioError(f"{self.where}: {key}", "periods of tiers", repr(structure)[:60])
         ScenarioError.unless((tier or 0) >= 0, "tier", "0 or more", repr(tier))
         for number, tiers in enumerate(structure):
             at, found = f"{self.where}: {key}[{number}]", f"{len(tiers)}, the first up to {tiers[0].get('max')} {unit}"
@@ -126,7 +121,7 @@ class _Item(NamedTuple):
             try:
                 prices.append(float(chosen.get("rate") or 0.0) + float(chosen.get("adj") or 0.0))
             except (TypeError, ValueError) as error:
-                raise ScenarioError(describe(f"{at}: rate", "a number", repr(chosen))) from error
+                raise ScenarioError(f"{at}: rate", "a number", repr(chosen)) from error
         return np.array(prices)
 
     def schedules(self, of: str, periods: int) -> list[IntArray]:
@@ -140,7 +135,7 @@ class _Item(NamedTuple):
         try:
             table = np.asarray(given, dtype=float)
         except (TypeError, ValueError) as error:
-            raise ScenarioError(describe(where, expected, repr(given)[:60])) from error
+            raise ScenarioError(where, expected, repr(given)[:60]) from error
         found = "nothing" if given is None else f"shape {table.shape}, values {np.unique(table)[:8].tolist()}"
         fit = table.shape == shape and bool(np.isin(table, np.arange(periods)).all())
         ScenarioError.unless(fit, where, expected, found)

@@ -15,7 +15,7 @@ from thermal._types import FloatArray
 from thermal.case.building import Location
 from thermal.case.case import Case
 from thermal.case.points import OUTDOOR_TEMPERATURE, POINT_TYPES
-from thermal.errors import CaseError, describe, nearest
+from thermal.errors import CaseError, nearest
 from thermal.units import QUANTITIES, to_si
 
 _STEFAN_BOLTZMANN = 5.670374419e-8  # W/m2/K4, CODATA 2018
@@ -113,7 +113,7 @@ def _typical(read: Any, path: str | Path, complete: Callable[[pd.DataFrame], pd.
         data = complete(raw)
     except Exception as error:  # pvlib lets whatever its parser stumbles on through
         found = " ".join(str(error).split()) or type(error).__name__
-        raise WeatherError(describe(str(path), f"a file that pvlib's {read.__name__} reads", found)) from error
+        raise WeatherError(str(path), f"a file that pvlib's {read.__name__} reads", found) from error
     hours = float(meta["TZ"])
     place = {"latitude": meta["latitude"], "longitude": meta["longitude"], "elevation": meta["altitude"]}
     # Etc/GMT+8 is 8 hours behind UTC; zones off the full hour have no such name and keep UTC's.
@@ -189,7 +189,7 @@ def _stamps(column: pd.Series, location: Location, path: str | Path) -> pd.Datet
         local = times.tz_convert(location.timezone) if with_offset else times.tz_localize(location.timezone)
     except Exception as error:  # pandas and zoneinfo raise a dozen kinds for times that do not exist
         advice = "write stamps with their offset"
-        raise WeatherError(describe(f"{path}: stamps", "ISO 8601", " ".join(str(error).split()), advice)) from error
+        raise WeatherError(f"{path}: stamps", "ISO 8601", " ".join(str(error).split()), advice) from error
     return pd.DatetimeIndex(local.as_unit("us"), name="timestamp")
 
 
@@ -217,7 +217,7 @@ def weather_of_case(case: Case, longest_gap: float = 3600.0) -> Weather:
     frame = frame[[point for point in WEATHER_POINTS if point in frame]].copy()
     frame[OUTDOOR_TEMPERATURE] = case.boundary_temperatures()["outdoor"]
     if frame[OUTDOOR_TEMPERATURE].isna().all():
-        raise WeatherError(describe("telemetry", f"a column of {OUTDOOR_TEMPERATURE}", "none"))
+        raise WeatherError("telemetry", f"a column of {OUTDOOR_TEMPERATURE}", "none")
     steps = int(longest_gap // case.step)
     filled = frame.interpolate(limit_area="inside")
     for point in frame:

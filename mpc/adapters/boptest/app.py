@@ -25,7 +25,6 @@ from mpc.adapters.boptest.case import BoptestCase
 from mpc.adapters.boptest.requests import LONGEST_BODY, Answer, read_body
 from mpc.adapters.boptest.test import REQUESTS, BoptestTest
 from mpc.errors import BoptestError, BoptestRequestError, MpcError
-from thermal.errors import describe
 
 #: Version of BOPTEST whose API this is.
 API_VERSION = "1.0.0"
@@ -96,10 +95,10 @@ class HeldTests:
         self.cases = {case.name: case for case in cases}
         if not cases or len(self.cases) < len(cases):
             found = ", ".join(case.name for case in cases) or "none"
-            raise BoptestError(describe("cases", "one or more, each with a name of its own", found))
+            raise BoptestError("cases", "one or more, each with a name of its own", found)
         if not (most >= 1 and idle_seconds > 0):
             found = f"{most} and {idle_seconds} s"
-            raise BoptestError(describe("server", "one test at least, and a positive idle time", found))
+            raise BoptestError("server", "one test at least, and a positive idle time", found)
         self.most, self.idle_seconds, self.clock = most, idle_seconds, clock
         self._held: dict[str, HeldTest] = {}
 

@@ -28,7 +28,6 @@ from mpc.scenario.weather import Weather
 from thermal._types import FloatArray
 from thermal.case.building import Building
 from thermal.case.points import OUTDOOR_TEMPERATURE
-from thermal.errors import describe
 from thermal.system.system import HvacSystem
 
 _MINUTE = 60.0
@@ -166,11 +165,9 @@ class BoptestCase:
 
     def __post_init__(self) -> None:
         if not (self.step >= _MINUTE and (self.step / _MINUTE).is_integer()):
-            raise PlantError(describe("step", "a whole number of minutes, in seconds", repr(self.step)))
-        if not self.longest_days > 0:
-            raise PlantError(describe("longest_days", "more than 0", repr(self.longest_days)))
-        if len(self.daily) < 3:
-            raise PlantError(describe("weather", "three whole days at least", f"{len(self.daily)}"))
+            raise PlantError("step", "a whole number of minutes, in seconds", repr(self.step))
+        PlantError.unless(self.longest_days > 0, "longest_days", "more than 0", repr(self.longest_days))
+        PlantError.unless(len(self.daily) >= 3, "weather", "three whole days at least", f"{len(self.daily)}")
 
     @cached_property
     def clock(self) -> YearClock:

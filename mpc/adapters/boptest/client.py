@@ -13,7 +13,6 @@ import numpy as np
 from mpc.adapters.boptest.requests import Answer
 from mpc.errors import BoptestError, BoptestTimeoutError
 from thermal._types import FloatArray
-from thermal.errors import describe
 
 if TYPE_CHECKING:
     import httpx
@@ -54,10 +53,9 @@ class BoptestClient:
         except ModuleNotFoundError as error:
             raise BoptestError('a client needs httpx: pip install "buildingmpc[boptest]"') from error
         if not re.fullmatch(r"https?://[^/\s]+(/.*)?", url):
-            raise BoptestError(describe("url", "such as 'http://127.0.0.1:8000'", repr(url)))
-        if not (timeout > 0 and repeats >= 0):
-            found = f"{timeout} s and {repeats}"
-            raise BoptestError(describe("client", "a positive timeout, and 0 or more repeats", found))
+            raise BoptestError("url", "such as 'http://127.0.0.1:8000'", repr(url))
+        found = f"{timeout} s and {repeats}"
+        BoptestError.unless(timeout > 0 and repeats >= 0, "client", "a positive timeout, and 0 or more repeats", found)
         self.url, self.timeout, self.repeats = url.rstrip("/"), timeout, repeats
         limits = httpx.Limits(keepalive_expiry=_KEEP)
         wait = httpx.Timeout(timeout, connect=min(_CONNECT, timeout))
@@ -90,7 +88,7 @@ class BoptestClient:
         content = self.plain(method, path, body, repeat=repeat)
         if not isinstance(content, dict) or "payload" not in content:
             found = _short(content)
-            raise BoptestError(describe(f"{method} /{path}", "an object with status, message, payload", found))
+            raise BoptestError(f"{method} /{path}", "an object with status, message, payload", found)
         message, status = str(content.get("message", "")), content.get("status", 200)
         if status != 200:
             raise BoptestError(f"{method} /{path}: the server refuses with status {status}: {message[:500]}")
@@ -117,7 +115,7 @@ class BoptestClient:
             said = content.get("message") or content.get("errors") if isinstance(content, dict) else response.text
             raise BoptestError(f"{method} /{path}: status {response.status_code}: {_short(said)}")
         if content is None:
-            raise BoptestError(describe(f"{method} /{path}", "JSON", _short(response.text)))
+            raise BoptestError(f"{method} /{path}", "JSON", _short(response.text))
         return content
 
     def check_version(self) -> str:
@@ -132,9 +130,8 @@ class BoptestClient:
         text = payload.get("version") if isinstance(payload, dict) else None
         found = re.match(r"v?(\d+)\.(\d+)", str(text))
         number = (int(found[1]), int(found[2])) if found else (0, 0)
-        if not OLDEST_VERSION <= number < NEXT_VERSION:
-            expected = f"version {'.'.join(map(str, OLDEST_VERSION))} or later, below {NEXT_VERSION[0]}"
-            raise BoptestError(describe(f"BOPTEST server {self.url}", expected, repr(text)))
+        expected = f"version {'.'.join(map(str, OLDEST_VERSION))} or later, below {NEXT_VERSION[0]}"
+        BoptestError.unless(OLDEST_VERSION <= number < NEXT_VERSION, f"BOPTEST server {self.url}", expected, repr(text))
         return str(text)
 
     def stop(self, testid: str) -> None:
@@ -195,7 +192,7 @@ def time_of(values: Any, what: str) -> float:
     """
     time = values.get("time") if isinstance(values, dict) else None
     if isinstance(time, bool) or not isinstance(time, int | float) or not math.isfinite(time):
-        raise BoptestError(describe(f"measurements of {what}", "their time", repr(values)[:200]))
+        raise BoptestError(f"measurements of {what}", "their time", repr(values)[:200])
     return float(time)
 
 
@@ -220,7 +217,7 @@ def check_step(sent: Mapping[str, float], message: str, values: Any, expected: f
     """
     time = time_of(values, "a step")
     if abs(time - expected) > 1e-3:
-        raise BoptestError(describe("time of the test", f"{expected:g} s", f"{time:g} s", "does another use it?"))
+        raise BoptestError("time of the test", f"{expected:g} s", f"{time:g} s", "does another use it?")
     for name, value in sent.items():
         used = values.get(name)
         if isinstance(used, int | float) and abs(used - value) > _SAME * max(abs(value), 1.0):
@@ -252,7 +249,7 @@ def regular(payload: Any, points: list[str]) -> tuple[FloatArray, dict[str, Floa
     lists = {name: payload.get(name) if isinstance(payload, dict) else None for name in ("time", *points)}
     counts = {len(values) if isinstance(values, list) else -1 for values in lists.values()}
     if len(counts) > 1 or max(counts) < 2:
-        raise BoptestError(describe("results", "two or more values of each point", repr(sorted(counts))))
+        raise BoptestError("results", "two or more values of each point", repr(sorted(counts)))
     columns = {name: np.array(values, dtype=float) for name, values in lists.items()}
     times, first = np.unique(columns.pop("time"), return_index=True)
     columns = {name: values[first] for name, values in columns.items()}

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
+
+import pandas as pd
 
 from calibration.evaluation.case_model import case_model
 from mpc.adapters.boptest.case import BoptestCase
@@ -18,7 +20,6 @@ from mpc.scenario.weather_files import read_epw, read_tmy3, read_weather_csv, we
 from thermal._types import FloatArray
 from thermal.case.building import Building, Device
 from thermal.case.case import Case
-from thermal.errors import describe
 from thermal.model.matrices import SymbolicModel
 from thermal.model.reduce import reduced_model
 from thermal.network.build import build_network
@@ -69,15 +70,8 @@ def case_to_serve(
     building = with_plant(case.building)
     boundaries = case.boundary_temperatures()
     beside = {name: boundaries[name] for name in settled.grid.network.boundaries[1:]}
-    return BoptestCase(
-        _plain_name(name or building.name),
-        building,
-        weather_of_case(case) if weather is None else _weather(Path(weather), building),
-        _maker(settled.grid, settled.theta, step_seconds),
-        size_system(building),
-        step_seconds,
-        boundaries=beside,
-    )
+    source = weather_of_case(case) if weather is None else _weather(Path(weather), building)
+    return _served(name or building.name, building, source, settled.grid, settled.theta, step_seconds, beside)
 
 
 def pilot_to_serve(
@@ -123,14 +117,8 @@ def pilot_to_serve(
     """
     building = pilot_building(seed, floor_area=floor_area, zones=zones, floors=floors)
     network = build_network(building, dx=dx)
-    return BoptestCase(
-        _plain_name(name),
-        building,
-        pilot_weather(seed, _PILOT_START, days, _PILOT_STEP),
-        _maker(SymbolicModel(network), network.start(), step_seconds),
-        size_system(building),
-        step_seconds,
-    )
+    weather, grid = pilot_weather(seed, _PILOT_START, days, _PILOT_STEP), SymbolicModel(network)
+    return _served(name, building, weather, grid, network.start(), step_seconds, {})
 
 
 def with_plant(building: Building) -> Building:
@@ -172,10 +160,17 @@ def _plain_name(name: str) -> str:
     return re.sub(r"[^A-Za-z0-9_.-]+", "_", name).strip("_") or "building"
 
 
-def _maker(grid: SymbolicModel, theta: FloatArray, step: float) -> Callable[[], BuildingModel]:
-    """Reduce a building to its modes once, for all the tests that get one of their own."""
-    reduced = reduced_model(grid, [theta])
-    return lambda: ReducedBuilding(reduced, theta, step)
+def _served(
+    name: str, building: Building, weather: Weather, grid: SymbolicModel, theta: FloatArray, step: float,
+    boundaries: Mapping[str, pd.Series],
+) -> BoptestCase:  # fmt: skip
+    """Join the parts of a case, whose plants each get a reduced model of their own."""
+    reduced, hvac = reduced_model(grid, [theta]), size_system(building)
+
+    def make_model() -> BuildingModel:
+        return ReducedBuilding(reduced, theta, step)
+
+    return BoptestCase(_plain_name(name), building, weather, make_model, hvac, step, boundaries=boundaries)
 
 
 def _weather(path: Path, building: Building) -> Weather:
@@ -183,7 +178,7 @@ def _weather(path: Path, building: Building) -> Weather:
     if path.suffix.lower() == ".epw":
         return read_epw(path)
     if path.suffix.lower() != ".csv":
-        raise BoptestError(describe(f"weather file {path.name}", "an ending .epw or .csv", repr(path.suffix)))
+        raise BoptestError(f"weather file {path.name}", "an ending .epw or .csv", repr(path.suffix))
     try:
         with path.open(encoding="utf-8", errors="replace") as lines:
             second = [next(lines, ""), next(lines, "")][1]

@@ -16,7 +16,6 @@ from mpc.adapters.foreign import ForeignSignals
 from mpc.errors import BoptestError
 from mpc.scenario.forecast import Forecast
 from thermal._types import FloatArray
-from thermal.errors import describe, nearest
 
 _COLUMN = re.compile(r"([^/:]+/[a-z0-9_]+): ")
 _ZONE = re.compile(r"Air temperature of zone (.+) at this time, ")
@@ -77,8 +76,7 @@ class BoptestSignals(ForeignSignals):
         """
         known = [(name, outputs) for name in (*self.measurements.values(), *self.recorded)]
         for name, there in [*known, *((name, inputs) for name in self.actuators.values())]:
-            if name not in there:
-                raise BoptestError(describe("signals", "one of the test case", repr(name), nearest(name, there)))
+            BoptestError.unless_known(name, there, "signals", "one of the test case")
 
 
 def own_signals(inputs: Metadata, outputs: Metadata) -> BoptestSignals:
@@ -96,9 +94,8 @@ def own_signals(inputs: Metadata, outputs: Metadata) -> BoptestSignals:
     """
     measurements = _described(outputs, _COLUMN)
     zones = _described(outputs, _ZONE)
-    if not zones:
-        advice = "this is no server of buildingmpc: say which signals are which with `signals`"
-        raise BoptestError(describe("test case", "outputs described by points of the case format", "others", advice))
+    advice = "this is no server of buildingmpc: say which signals are which with `signals`"
+    BoptestError.unless(zones, "test case", "outputs described by points of the case format", "others", advice)
     electricity, gas = (tuple(n for n in (name,) if n in outputs) for name in (ELECTRICITY_OUTPUT, GAS_OUTPUT))
     return BoptestSignals(measurements, _described(inputs, _COLUMN), zones, electricity, gas, means=True)
 
@@ -172,7 +169,7 @@ def as_forecast(payload: object, sources: Mapping[str, _Source], stamps: pd.Date
         listed = payload.get(source.point) if isinstance(payload, dict) else None
         if not isinstance(listed, list) or len(listed) != count + 1:
             found = f"{len(listed)}" if isinstance(listed, list) else "none"
-            raise BoptestError(describe(f"forecast point {source.point}", f"{count + 1} values", found))
+            raise BoptestError(f"forecast point {source.point}", f"{count + 1} values", found)
         values: FloatArray = np.array(listed, dtype=float) / source.divisor  # null becomes NaN
         columns[column] = 0.5 * (values[:-1] + values[1:]) if source.weather and not means else values[:-1]
     return Forecast(pd.DataFrame(columns, index=stamps))

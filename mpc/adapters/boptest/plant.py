@@ -21,7 +21,6 @@ from mpc.kpi.record import PlantRecord
 from mpc.loop.actuators import checked_actions
 from mpc.loop.plant import Measurements, need_running
 from mpc.scenario.forecast import Forecast
-from thermal.errors import describe, nearest
 
 
 @dataclass(frozen=True)
@@ -77,11 +76,8 @@ class BoptestSettings:
     repeats: int = 2
 
     def __post_init__(self) -> None:
-        price = self.electricity_price
-        if price not in PRICE_POINTS:
-            raise BoptestError(describe("electricity_price", "a known one", repr(price), nearest(price, PRICE_POINTS)))
-        if self.horizon < 1:
-            raise BoptestError(describe("horizon", "a control step or more", repr(self.horizon)))
+        BoptestError.unless_known(self.electricity_price, PRICE_POINTS, "electricity_price", "a known one")
+        BoptestError.unless(self.horizon >= 1, "horizon", "a control step or more", repr(self.horizon))
 
 
 class BoptestPlant(SignalPlant):
@@ -126,8 +122,7 @@ class BoptestPlant(SignalPlant):
         *,
         signals: BoptestSignals | None = None,
     ) -> None:
-        if not control_step > 0:
-            raise BoptestError(describe("plant", "a positive control step", repr(control_step)))
+        BoptestError.unless(control_step > 0, "plant", "a positive control step", repr(control_step))
         self._period, self._settings, self._seed = period, settings, 0
         self._client = BoptestClient(url, settings.timeout, settings.repeats)
         self._testid = ""
@@ -209,11 +204,9 @@ class BoptestPlant(SignalPlant):
         """
         need_running(not math.isnan(self._time))
         given = checked_actions(actions, self._by_name)
-        if self._broken:
-            raise PlantError(describe("plant", "a reset after a step went wrong", self._broken))
-        if self.finished:
-            left = self._end - self._time
-            raise PlantError(describe("test", f"{self.control_step:g} s more", f"{left:g} s", "reset the plant"))
+        PlantError.unless(not self._broken, "plant", "a reset after a step went wrong", self._broken)
+        left = self._end - self._time
+        PlantError.unless(not self.finished, "test", f"{self.control_step:g} s more", f"{left:g} s", "reset the plant")
         sent = self._sent(given)
         sent |= {activation(signal): 1.0 for signal in sent}
         try:
@@ -254,7 +247,7 @@ class BoptestPlant(SignalPlant):
             When there was no step yet.
         """
         if math.isnan(self._time) or self._time <= self._start:
-            raise PlantError(describe("run", "a step at least", "none since the reset"))
+            raise PlantError("run", "a step at least", "none since the reset")
         points = self.signals.recorded
         body = {"point_names": points, "start_time": self._start, "final_time": self._time}
         times, columns = regular(self._ask("PUT", "results", body).payload, points)
@@ -272,12 +265,11 @@ class BoptestPlant(SignalPlant):
             When one is neither a number nor null.
         """
         payload = self._ask("GET", "kpi").payload
-        if not isinstance(payload, dict):
-            raise BoptestError(describe("indicators", "a number or null each", repr(payload)[:100]))
+        BoptestError.unless(isinstance(payload, dict), "indicators", "a number or null each", repr(payload)[:100])
         found = {name: payload.get(name) for name in KPI_NAMES}
         for name, value in found.items():
             if value is not None and (isinstance(value, bool) or not isinstance(value, int | float)):
-                raise BoptestError(describe(f"indicator {name}", "a number or null", repr(value)[:100]))
+                raise BoptestError(f"indicator {name}", "a number or null", repr(value)[:100])
         return {name: None if value is None else float(value) for name, value in found.items()}
 
     def _ask(self, method: str, what: str, body: dict[str, Any] | None = None, *, repeat: bool = True) -> Any:
@@ -288,7 +280,7 @@ class BoptestPlant(SignalPlant):
         answer = self._client.plain("POST", path, {}, repeat=False)
         testid = answer.get("testid") if isinstance(answer, dict) else None
         if not isinstance(testid, str) or not testid:
-            raise BoptestError(describe(f"POST /{path}", "a testid", repr(answer)[:200]))
+            raise BoptestError(f"POST /{path}", "a testid", repr(answer)[:200])
         return quote(testid, safe="")
 
     def _look_around(self, signals: BoptestSignals | None) -> None:
@@ -297,7 +289,7 @@ class BoptestPlant(SignalPlant):
             self._ask("GET", what).payload for what in ("inputs", "measurements", "forecast_points")
         )
         if not all(isinstance(found, dict) for found in (inputs, outputs, points)):
-            raise BoptestError(describe("test case", "signals by name", "something else"))
+            raise BoptestError("test case", "signals by name", "something else")
         self.signals = own_signals(inputs, outputs) if signals is None else signals
         self.signals.check(inputs, outputs)
         about, chosen = self._ask("GET", "name").payload or {}, self._settings
@@ -310,7 +302,7 @@ class BoptestPlant(SignalPlant):
         self._ask("PUT", "step", {"step": control_step})
         found = self._ask("GET", "step").payload
         if not isinstance(found, int | float) or abs(found - control_step) > 1e-6:
-            raise BoptestError(describe("control step", f"{control_step:g} s", repr(found)))
+            raise BoptestError("control step", f"{control_step:g} s", repr(found))
         return float(found)
 
     def _find_end(self) -> float:

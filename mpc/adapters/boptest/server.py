@@ -12,7 +12,6 @@ from typing import Self
 
 from mpc.adapters.boptest.case import BoptestCase
 from mpc.errors import BoptestError
-from thermal.errors import describe
 
 _KEEP_ALIVE = 75  # s: a controller that thinks for a while finds its connection open
 _MOST_CONNECTIONS = 512
@@ -99,7 +98,7 @@ class BoptestServer:
             if self._server.started:
                 return self
             time.sleep(0.01)
-        raise BoptestError(describe("server", f"a start within {_START:g} s", "none"))
+        raise BoptestError("server", f"a start within {_START:g} s", "none")
 
     def __exit__(self, *error: object) -> None:
         self._server.should_exit = True
@@ -109,8 +108,7 @@ class BoptestServer:
 
 
 def _listen(host: str, port: int) -> socket.socket:
-    if not 0 <= port <= 65535:
-        raise BoptestError(describe("port", "a number from 0 to 65535", repr(port)))
+    BoptestError.unless(0 <= port <= 65535, "port", "a number from 0 to 65535", repr(port))
     try:
         family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
         listening = socket.socket(family, kind, protocol)  # TCP by name: asyncio then sends without delay
@@ -147,4 +145,4 @@ def check_host(host: str, allow_remote: bool) -> None:
         own = host.lower() == "localhost"
     if not (allow_remote or own):
         advice = "whoever reaches the server may use it: to let other machines in, say --allow-remote"
-        raise BoptestError(describe("host", "an address of this machine's own, such as 127.0.0.1", repr(host), advice))
+        raise BoptestError("host", "an address of this machine's own, such as 127.0.0.1", repr(host), advice)

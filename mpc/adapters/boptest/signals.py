@@ -11,10 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mpc.adapters.boptest.scenario import PRICE_POINTS
-from mpc.loop.actuators import (
-    DIFFERENTIAL_PRESSURE,
-    STATIC_PRESSURE,
-)
+from mpc.loop.actuators import DIFFERENTIAL_PRESSURE, STATIC_PRESSURE
 from mpc.loop.conversion import SIGNAL_UNITS
 from mpc.loop.history import PlantStep
 from mpc.loop.simulated import SimulatedPlant
@@ -150,8 +147,7 @@ class PlantSignals:
         setters = _signal_names(actuator.name for actuator in plant.actuators)
         self.inputs = {f"{setters[actuator.name]}_u": actuator for actuator in plant.actuators}
         self.input_names = tuple(name for u in self.inputs for name in (u, activation(u)))
-        self._reads = [_reader(a.name, plant.system, plant.zone_names)
-                       for a in plant.actuators]  # fmt: skip
+        self._reads = [_reader(a.name, plant.system, plant.zone_names) for a in plant.actuators]
 
     def measurement_metadata(self) -> Metadata:
         """Describe each output with its unit, as `GET /measurements` does."""
@@ -270,18 +266,8 @@ class BoundaryConditions:
     def __init__(self, scenario: Scenario, prices: Mapping[str, Rate]) -> None:
         self._scenario, grid = scenario, scenario.grid
         self.prices = {kind: np.asarray(rate.on(grid), dtype=float) for kind, rate in prices.items()}
-        self._single = {PRICE_POINTS[kind]: values for kind, values in self.prices.items()} | {
-            "PriceGasPower": scenario.gas_price,
-            "EmissionsElectricPower": scenario.electricity_carbon,
-            "EmissionsGasPower": scenario.gas_carbon,
-        }
-        self._of_zones = {
-            "LowerSetp": scenario.lower,
-            "UpperSetp": scenario.upper,
-            "Occupancy": scenario.expected_occupancy,
-            "InternalGainsCon": scenario.expected_gains,
-            "InternalGainsLat": scenario.heat.moisture_heat(scenario.expected_occupancy),
-        }
+        self._known = scenario.to_frame(expected=True)
+        self._known[[PRICE_POINTS[kind] for kind in self.prices]] = np.column_stack([*self.prices.values()])
 
     def series(self, name: str) -> FloatArray:
         """Values over the steps of the scenario, shape (n_steps,) [unit of the point].
@@ -291,8 +277,6 @@ class BoundaryConditions:
         name : str
             A forecast point of the case.
         """
-        if name in self._single:
-            return self._single[name]
         if name in WEATHER_NAMES:
             _, point, factor, _ = WEATHER_NAMES[name]
             weather = self._scenario.weather
@@ -300,7 +284,11 @@ class BoundaryConditions:
                 return np.asarray(getattr(weather.sun, _SUN[point]), dtype=float)
             return factor * weather.values(point)
         kind, _, zone = name.removesuffix("]").partition("[")
-        return np.asarray(self._of_zones[kind][:, self._scenario.zones.index(zone)], dtype=float)
+        if kind == "InternalGainsLat":
+            people = self._known[f"{zone}/{ZONE_NAMES['Occupancy'][1]}"].to_numpy(dtype=float)
+            return self._scenario.heat.moisture_heat(people)
+        column = f"{zone}/{ZONE_NAMES[kind][1]}" if zone else SITE_NAMES[name][1] if name in SITE_NAMES else name
+        return self._known[column].to_numpy(dtype=float)
 
     def rows(self, seconds: FloatArray) -> tuple[NDArray[np.int64], bool]:
         """Find the steps that hold at some times; beyond the scenario those of the same hour of its last day.

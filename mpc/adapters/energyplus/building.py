@@ -20,7 +20,6 @@ from mpc.errors import EnergyPlusError
 from mpc.loop.sensors import PlantDevices
 from mpc.scenario.weather_files import read_epw
 from thermal.case.building import Building, Device, Layer, Surface, ZoneEntry, ZoneTable
-from thermal.errors import describe
 
 _METER = re.compile(r"^Output:Meter,([^,]+),", re.M)
 _DAY = date(2023, 1, 2)  # any: sizes come from design days
@@ -28,13 +27,7 @@ _WATER_DENSITY = 983.0  # kg/m3, as `thermal.components` has it
 
 Kind = Literal["wall", "floor", "ceiling"]
 
-_KINDS: Mapping[str, Kind] = {
-    "Wall": "wall",
-    "Door": "wall",
-    "Internal Mass": "wall",
-    "Floor": "floor",
-    "Roof": "ceiling",
-}
+_KINDS: dict[str, Kind] = {"Wall": "wall", "Door": "wall", "Internal Mass": "wall", "Floor": "floor", "Roof": "ceiling"}
 _GLASS = ("Window", "Glass Door")
 _OUTDOOR, _GROUND = "outdoor", "ground"
 _THIN = 0.01  # m, of a layer that has a resistance only
@@ -90,9 +83,8 @@ class EnergyPlusBuilding:
         """
         begin, whose = _plain(description), component.upper()
         found = [v for (c, d), v in self.sizes.items() if c == whose and _plain(d).startswith(begin)]
-        if not found:
-            known = sorted(d for c, d in self.sizes if c == whose)
-            raise EnergyPlusError(describe(f"sizes of {component!r}", repr(description), ", ".join(known) or "none"))
+        known = sorted(d for c, d in self.sizes if c == whose)
+        EnergyPlusError.unless(found, f"sizes of {component!r}", repr(description), ", ".join(known) or "none")
         return found[0]
 
     @property
@@ -207,11 +199,7 @@ def _devices(layout: PlantLayout) -> tuple[Device, ...]:
 
 
 def _surface(
-    face: _Face,
-    faces: Mapping[int, _Face],
-    zones: Mapping[int, _Zone],
-    source: InputFile,
-    served: set[str],
+    face: _Face, faces: Mapping[int, _Face], zones: Mapping[int, _Zone], source: InputFile, served: set[str]
 ) -> Surface | None:
     """Make a surface of the zone table; None for what is not a zone's, or has been counted from the other side."""
     zone = zones[face.zone]

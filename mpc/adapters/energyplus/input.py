@@ -14,7 +14,7 @@ from typing import Any
 
 from mpc.adapters.energyplus.process import Job, data_folder, run_energyplus
 from mpc.errors import EnergyPlusError
-from thermal.errors import describe, nearest
+from thermal.errors import nearest
 
 #: Weather that the reference buildings were sized for.
 CHICAGO = "USA_IL_Chicago-OHare.Intl.AP.725300_TMY3"
@@ -95,11 +95,9 @@ def _path(name: str | Path, folder: str, ending: str, what: str) -> Path:
     if given.suffix.lower() == ending:
         if given.is_file():
             return given.resolve()
-        raise EnergyPlusError(describe(what, f"a file {ending}", f"none at {given}"))
+        raise EnergyPlusError(what, f"a file {ending}", f"none at {given}")
     known = _brought(folder, ending)
-    if str(name) not in known:
-        expected = f"a file {ending} or one that EnergyPlus brings"
-        raise EnergyPlusError(describe(what, expected, repr(str(name)), nearest(str(name), known)))
+    EnergyPlusError.unless_known(str(name), known, what, f"a file {ending} or one that EnergyPlus brings")
     return known[str(name)]
 
 
@@ -154,7 +152,7 @@ class InputFile:
         objects = self.of_type(kind)
         found = objects.get(name) or next((v for k, v in objects.items() if k.lower() == name.lower()), None)
         if found is None:
-            raise EnergyPlusError(describe(f"{self.name}: {kind}", repr(name), "none", nearest(name, objects)))
+            raise EnergyPlusError(f"{self.name}: {kind}", repr(name), "none", nearest(name, objects))
         return found
 
     def begins(self, prefix: str) -> Iterator[tuple[str, str, Mapping[str, Any]]]:
@@ -207,10 +205,7 @@ class InputFile:
         content = {k: copy.deepcopy(dict(v)) for k, v in self.content.items() if k not in (*_REPORTS, *_CLOCK)}
         content["Timestep"] = {"Timestep 1": {"number_of_timesteps_per_hour": steps_per_hour}}
         control: dict[str, Any] = dict(next(iter(content.get("SimulationControl", {"": {}}).values())))
-        control |= {
-            "run_simulation_for_sizing_periods": "No",
-            "run_simulation_for_weather_file_run_periods": "Yes",
-        }
+        control |= {"run_simulation_for_sizing_periods": "No", "run_simulation_for_weather_file_run_periods": "Yes"}
         content["SimulationControl"] = {"SimulationControl 1": control}
         content["RunPeriod"] = {
             "run": {
@@ -269,7 +264,7 @@ def holidays(source: InputFile, years: Iterable[int]) -> frozenset[date]:
             first = _first_day(str(fields["start_date"]).strip(), year)
             if first is None:
                 expected = "a date such as 'July 4', '7/4' or '1st Monday in September'"
-                raise EnergyPlusError(describe(f"{source.name}: {name}", expected, repr(fields["start_date"])))
+                raise EnergyPlusError(f"{source.name}: {name}", expected, repr(fields["start_date"]))
             found |= {first + timedelta(days=k) for k in range(length)}
     return frozenset(found)
 

@@ -8,7 +8,6 @@ from typing import Any
 
 from mpc.adapters.energyplus.input import InputFile
 from mpc.errors import EnergyPlusError
-from thermal.errors import describe
 
 _TERMINALS = ("AirTerminal:SingleDuct:VAV:Reheat", "AirTerminal:SingleDuct:VAV:NoReheat")
 _SCHEDULED = "SetpointManager:Scheduled"
@@ -154,13 +153,11 @@ def find_layout(source: InputFile) -> PlantLayout:
         expected = "an air loop with VAV terminals and a scheduled supply temperature"
         kinds = sorted({kind for kind, _, _ in source.begins("SetpointManager:")} | {
             kind for kind, _, _ in source.begins("AirTerminal:")})  # fmt: skip
-        raise EnergyPlusError(describe(source.name, expected, ", ".join(kinds) or "none"))
+        raise EnergyPlusError(source.name, expected, ", ".join(kinds) or "none")
     zones = tuple(dict.fromkeys(t.zone for loop in loops for t in loop.terminals))
     others = tuple(zone for zone in source.of_type("Zone") if zone not in zones)
     water = tuple(w for name in source.of_type("PlantLoop") if (w := _water_loop(source, name)) is not None)
-    wet = any(t.water_node for loop in loops for t in loop.terminals) or any(
-        loop.of_kind("Coil:Heating:Water") for loop in loops
-    )
+    wet = any(loop.of_kind("Coil:Heating:Water") or any(t.water_node for t in loop.terminals) for loop in loops)
     chillers = tuple(name for kind, name, _ in source.begins("Chiller:"))
     return PlantLayout(loops, water if wet else (), zones, others, chillers)
 

@@ -25,7 +25,6 @@ from mpc.scenario.scenario import Scenario
 from thermal._types import FloatArray
 from thermal.case.case import Case
 from thermal.case.telemetry import Telemetry
-from thermal.errors import describe
 
 _DAY, _HOUR = 86_400, 3_600  # s
 
@@ -184,9 +183,8 @@ class EnergyPlusPlant(ForeignPlant):
         """
         need_running(self._number >= 0)
         given = checked_actions(actions, self._by_name)
-        if self.finished:
-            found = f"{self.steps - self._number} of its {self.steps}"
-            raise PlantError(describe("run", f"{self.control_steps} more steps", found, "make it longer"))
+        found = f"{self.steps - self._number} of its {self.steps}"
+        PlantError.unless(not self.finished, "run", f"{self.control_steps} more steps", found, "make it longer")
         rows, ends, energy = self._ask(self.control_steps, given)
         fresh = self._read(rows, self._number)
         self._rows.append(fresh)
@@ -207,7 +205,7 @@ class EnergyPlusPlant(ForeignPlant):
             When the plant has no forecaster.
         """
         if self.forecaster is None:
-            raise PlantError(describe("forecast", "a plant with a forecaster", "none", "pass `forecaster`"))
+            raise PlantError("forecast", "a plant with a forecaster", "none", "pass `forecaster`")
         return self.forecaster.table(self.now)
 
     def record(self) -> PlantRecord:
@@ -279,8 +277,7 @@ class EnergyPlusPlant(ForeignPlant):
         self._rooms: list[FloatArray] = []
 
     def _kept(self, parts: list[FloatArray]) -> list[FloatArray]:
-        if not parts:
-            raise PlantError(describe("run", "a step at least", "none since the reset"))
+        PlantError.unless(parts, "run", "a step at least", "none since the reset")
         return parts
 
     def _ask(self, steps: int, given: Mapping[str, float]) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -308,15 +305,15 @@ class EnergyPlusPlant(ForeignPlant):
         grid, step = self.scenario.grid, self.scenario.grid.step
         if self.scenario.zones != self.source.building.zone_names:
             expected = f"a scenario of the {len(self.source.building.zone_names)} zones of {self.source.building.name}"
-            raise PlantError(describe("plant", expected, f"one of {len(self.scenario.zones)} zones"))
+            raise PlantError("plant", expected, f"one of {len(self.scenario.zones)} zones")
         if grid.start.tz_convert(self.source.building.location.timezone).time() != pd.Timestamp(0).time():
-            raise PlantError(describe("scenario", "a start at midnight", str(grid.start)))
+            raise PlantError("scenario", "a start at midnight", str(grid.start))
         if _HOUR % step or not 60.0 <= step <= 3600.0:
-            raise PlantError(describe("scenario", "a step of an hour divided by 1 to 60", f"{step:g} s"))
+            raise PlantError("scenario", "a step of an hour divided by 1 to 60", f"{step:g} s")
         lead = self.settings.lead_days
         if self._days < 1 or lead < 1 or self._days * _DAY > grid.n_steps * step:
             found = f"{self._days} and {lead} days on a grid of {grid.n_steps * step / _DAY:g}"
-            raise PlantError(describe("plant", "days that the scenario covers", found))
+            raise PlantError("plant", "days that the scenario covers", found)
         if self.control_steps < 1 or round(self._days * _DAY / step) % self.control_steps:
             expected = "control steps of which the run has a whole number"
-            raise PlantError(describe("control_steps", expected, repr(self.control_steps)))
+            raise PlantError("control_steps", expected, repr(self.control_steps))

@@ -15,7 +15,6 @@ from mpc.errors import EnergyPlusError, PlantError
 from mpc.loop.actuators import ACTION_LIMITS, COOLING_SETPOINT, HEATING_SETPOINT, SUPPLY_AIR, SUPPLY_WATER, Actuator
 from mpc.loop.conversion import conversion
 from thermal._types import FloatArray
-from thermal.errors import describe, nearest
 
 #: Name and key of an output variable.
 Output = tuple[str, str]
@@ -211,9 +210,8 @@ def _supplies(source: EnergyPlusBuilding) -> list[_Supply]:
     for point, loops in ((SUPPLY_AIR, layout.air_loops), (SUPPLY_WATER, layout.water_loops)):
         for loop in loops:
             named = {file.find(_SCHEDULED, m)["schedule_name"].lower() for m in loop.managers}
-            if len(named) > 1:
-                expected = f"one schedule for the setpoint managers of {loop.name!r}"
-                raise EnergyPlusError(describe(file.name, expected, ", ".join(sorted(named))))
+            expected = f"one schedule for the setpoint managers of {loop.name!r}"
+            EnergyPlusError.unless(len(named) <= 1, file.name, expected, ", ".join(sorted(named)))
             kind, schedule = _schedule(file, named.pop())
             own = f"{schedule} of {loop.name}"
             found.append(_Supply(f"{entity(loop.name)}/{point}", loop.managers, kind, schedule, own))
@@ -225,7 +223,7 @@ def _schedule(source: InputFile, name: str) -> tuple[str, str]:
     for kind, title, _ in source.begins("Schedule:"):
         if title.lower() == name:
             return kind, title
-    raise EnergyPlusError(describe(source.name, f"a schedule {name!r}", "none"))
+    raise EnergyPlusError(source.name, f"a schedule {name!r}", "none")
 
 
 def prepared(source: EnergyPlusBuilding, start: date, days: int, steps_per_hour: int) -> dict[str, Any]:
@@ -275,8 +273,7 @@ def actuators_of(
         When a device's setpoint managers follow several schedules.
     """
     for kind in limits:
-        if kind not in ACTION_LIMITS:
-            raise PlantError(describe("limits", "a kind of action", repr(kind), nearest(kind, ACTION_LIMITS)))
+        PlantError.unless_known(kind, ACTION_LIMITS, "limits", "a kind of action")
     bounds = {**ACTION_LIMITS, **_LIMITS, **limits}
     names = {(s.kind, "Schedule Value", s.own): s.actuator for s in _supplies(source)}
     for point, control in ((HEATING_SETPOINT, "Heating Setpoint"), (COOLING_SETPOINT, "Cooling Setpoint")):

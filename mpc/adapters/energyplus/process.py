@@ -20,7 +20,6 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from mpc.errors import EnergyPlusError
-from thermal.errors import describe
 
 _WORKER = Path(__file__).with_name("worker.py")
 _SEVERE = re.compile(r"(\d+) Severe Errors")
@@ -40,7 +39,7 @@ def data_folder() -> Path:
     spec = find_spec("pyenergyplus")
     if spec is None or spec.origin is None:
         advice = "pip install 'buildingmpc[energyplus]'"
-        raise EnergyPlusError(describe("EnergyPlus", "the package pyenergyplus-lbnl", "none", advice))
+        raise EnergyPlusError("EnergyPlus", "the package pyenergyplus-lbnl", "none", advice)
     return Path(spec.origin).parent / "data"
 
 
@@ -181,7 +180,7 @@ class EnergyPlusProcess:
         if not line and time.monotonic() - began >= self._patience:
             self.close()
             expected = f"an answer within {self._patience:g} s"
-            raise EnergyPlusError(describe("EnergyPlus", expected, "none", "its process was ended"))
+            raise EnergyPlusError("EnergyPlus", expected, "none", "its process was ended")
         message: dict[str, Any] = json.loads(line or "{}")
         if kind not in message:
             self._fail(_reason(message))
@@ -190,7 +189,7 @@ class EnergyPlusProcess:
     def _fail(self, found: str) -> None:
         errors = _errors(self.output / "eplusout.err", self.folder / "log.txt")
         self.close()
-        raise EnergyPlusError(describe("EnergyPlus", "a run without severe errors", f"{found}{errors}"))
+        raise EnergyPlusError("EnergyPlus", "a run without severe errors", f"{found}{errors}")
 
 
 def run_energyplus(job: Job, read: Sequence[str]) -> dict[str, bytes]:

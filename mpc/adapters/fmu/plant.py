@@ -21,7 +21,7 @@ from mpc.loop.plant import Measurements, need_running
 from mpc.scenario.forecast import Forecast
 from thermal._types import FloatArray
 from thermal.case.points import ZONE_TEMPERATURE
-from thermal.errors import describe, nearest
+from thermal.errors import nearest
 
 _READABLE = ("output", "local", "input", "calculatedParameter", "parameter")
 
@@ -62,9 +62,7 @@ class FmuSignals(ForeignSignals):
         for name, pair in self.limits.items():
             if name not in self.actuators or not -math.inf < pair[0] < pair[1] < math.inf:
                 advice = nearest(name, self.actuators)
-                raise PlantError(
-                    describe(f"limits: {name}", "a lower and a higher number of an actuator", repr(pair), advice)
-                )
+                raise PlantError(f"limits: {name}", "a lower and a higher number of an actuator", repr(pair), advice)
 
 
 @dataclass(frozen=True)
@@ -97,8 +95,7 @@ class FmuTime:
     warm_up: float = 0.0
 
     def __post_init__(self) -> None:
-        if self.start.tzinfo is None:
-            raise PlantError(describe("start", "a time with a time zone", str(self.start)))
+        PlantError.unless(self.start.tzinfo is not None, "start", "a time with a time zone", str(self.start))
 
 
 class FmuPlant(SignalPlant):
@@ -147,7 +144,7 @@ class FmuPlant(SignalPlant):
         steps = time.communication_steps
         if not (control_step > 0 and time.duration >= control_step and steps >= 1 and time.warm_up >= 0):
             found = f"{control_step} s, {time.duration} s, {steps} and {time.warm_up} s"
-            raise PlantError(describe("plant", "a positive control step within the duration, 1 step or more", found))
+            raise PlantError("plant", "a positive control step within the duration, 1 step or more", found)
         self.control_step, self.signals, self._time = float(control_step), signals, time
         self._step = control_step / steps
         self._actions, self._warm = int(time.duration / control_step + 1e-9), int(time.warm_up / self._step + 1e-9)
@@ -219,7 +216,7 @@ class FmuPlant(SignalPlant):
         need_running(self._number >= 0)
         given = checked_actions(actions, self._by_name)
         if self.finished:
-            raise PlantError(describe("FMU", f"a step of {self._actions}", "none left", "make the duration longer"))
+            raise PlantError("FMU", f"a step of {self._actions}", "none left", "make the duration longer")
         number, steps = self._number, self._time.communication_steps
         self._number = -1  # until the step is done: a unit that failed within it is of no use
         self._unit.set(self._sent(given))
@@ -239,7 +236,7 @@ class FmuPlant(SignalPlant):
         PlantError
             Always.
         """
-        raise PlantError(describe("forecast", "a plant with a forecaster", "an FMU", "run the loop without forecasts"))
+        raise PlantError("forecast", "a plant with a forecaster", "an FMU", "run the loop without forecasts")
 
     def record(self) -> PlantRecord:
         """Give the run since the reset on the communication steps, for indicators and rewards.
@@ -249,8 +246,7 @@ class FmuPlant(SignalPlant):
         PlantError
             When there was no step yet.
         """
-        if len(self._rows) < 2:
-            raise PlantError(describe("run", "a step at least", "none since the reset"))
+        PlantError.unless(len(self._rows) >= 2, "run", "a step at least", "none since the reset")
         table = np.array(self._rows)
         count = len(self.zone_names)
         powers = {kind: table[1:, count + k] for k, kind in enumerate(self.signals.powers)}
@@ -265,13 +261,12 @@ class FmuPlant(SignalPlant):
         for name, values in self._drivers.items():
             unit.real(name, ("input",), "driver")
             if values.shape != needed or not np.isfinite(values).all():
-                raise PlantError(describe(f"driver {name}", f"{needed[0]} finite values", f"shape {values.shape}"))
+                raise PlantError(f"driver {name}", f"{needed[0]} finite values", f"shape {values.shape}")
         zones = [unit.real(name, _READABLE, "zone") for name in signals.zones.values()]
         self._zones = [(v.name, conversion(ZONE_TEMPERATURE, v.name, v.unit)) for v in zones]
         for name in (n for names in signals.powers.values() for n in names):
             variable = unit.real(name, _READABLE, "power")
-            if variable.unit not in (None, "", "W"):
-                raise PlantError(describe(f"power {name}", "watts", repr(variable.unit)))
+            PlantError.unless(variable.unit in (None, "", "W"), f"power {name}", "watts", repr(variable.unit))
 
         def input_of(name: str) -> Declared:
             v = unit.real(name, ("input", "parameter"), "actuator")

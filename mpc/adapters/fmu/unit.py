@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from mpc.errors import PlantError
-from thermal.errors import describe, nearest
+from thermal.errors import nearest
 
 
 class Unit:
@@ -32,8 +32,7 @@ class Unit:
             import fmpy
         except ModuleNotFoundError as error:
             raise PlantError(f'an FMU needs {error.name}: pip install "buildingmpc[fmu]"') from error
-        if not path.is_file():
-            raise PlantError(describe(f"FMU {path.name}", "a file", "none"))
+        PlantError.unless(path.is_file(), f"FMU {path.name}", "a file", "none")
         try:
             # makers of units are lax: what is needed of a description is checked by name
             self._description = fmpy.read_model_description(str(path), validate=False)
@@ -43,10 +42,10 @@ class Unit:
         if d.fmiVersion != "2.0" or d.coSimulation is None:
             kind = "co-simulation" if d.coSimulation is not None else "model exchange"
             found = f"{kind} of FMI {d.fmiVersion}"
-            raise PlantError(describe(f"FMU {path.name}", "co-simulation of FMI 2.0", found))
+            raise PlantError(f"FMU {path.name}", "co-simulation of FMI 2.0", found)
         if fmpy.platform not in fmpy.supported_platforms(str(path)):
             found = ", ".join(fmpy.supported_platforms(str(path))) or "none"
-            raise PlantError(describe(f"FMU {path.name}", f"a library for {fmpy.platform}", found))
+            raise PlantError(f"FMU {path.name}", f"a library for {fmpy.platform}", found)
         self.name = path.name
         self.variables: Mapping[str, Any] = {v.name: v for v in d.modelVariables}
         self._fmpy, self._slave = fmpy, None
@@ -74,12 +73,10 @@ class Unit:
         """
         found = self.variables.get(name)
         if found is None:
-            raise PlantError(
-                describe(f"FMU {self.name}: {what}", "a variable", repr(name), nearest(name, self.variables))
-            )
+            raise PlantError(f"FMU {self.name}: {what}", "a variable", repr(name), nearest(name, self.variables))
         if found.type != "Real" or found.causality not in kinds:
             expected = f"a real {' or '.join(kinds)}"
-            raise PlantError(describe(f"FMU {self.name}: {what} {name!r}", expected, f"{found.type} {found.causality}"))
+            raise PlantError(f"FMU {self.name}: {what} {name!r}", expected, f"{found.type} {found.causality}")
         return found
 
     def start(self, time: float, values: Mapping[str, float]) -> None:

@@ -11,7 +11,6 @@ from mpc.control.solvers.convex import solve_quadratic
 from mpc.control.solvers.solution import Status
 from mpc.errors import ControlError
 from thermal._types import BoolArray, FloatArray
-from thermal.errors import describe
 from thermal.model.modal import ModalModel
 from thermal.units import REFERENCE_TEMPERATURE
 
@@ -195,7 +194,7 @@ class MovingHorizonObserver(Observer):
         self.lower, self.upper = (np.broadcast_to(np.asarray(b, dtype=float), (zones,)) for b in (lower, upper))
         if steps < 1 or not (self.lower < self.upper).all():
             found = f"{steps} steps, bounds from {self.lower.max():g} to {self.upper.min():g} W"
-            raise ControlError(describe("moving horizon", "a step or more, and lower bounds below upper ones", found))
+            raise ControlError("moving horizon", "a step or more, and lower bounds below upper ones", found)
         self.steps = steps
         #: How the last estimate was found.
         self.status = Status.CONVERGED

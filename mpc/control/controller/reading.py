@@ -15,7 +15,6 @@ from mpc.loop.actuators import STATIC_PRESSURE, SUPPLY_AIR
 from mpc.scenario.forecast import Forecast
 from thermal._types import FloatArray
 from thermal.case.points import OUTDOOR_TEMPERATURE, ZONE_TEMPERATURE
-from thermal.errors import describe
 from thermal.system.smooth import SmoothHvac
 from thermal.system.system import HvacSystem
 from thermal.units import AIR_HEAT_CAPACITY
@@ -193,19 +192,16 @@ def past_steps(telemetry: pd.DataFrame, points: SitePoints, control_step: float)
     """
     index = telemetry.index
     if not isinstance(index, pd.DatetimeIndex) or index.tz is None or not index.is_monotonic_increasing:
-        raise ControlError(describe("start-up: telemetry", "stamps with a time zone that rise", f"{index.dtype}"))
+        raise ControlError("start-up: telemetry", "stamps with a time zone that rise", f"{index.dtype}")
     length = pd.Timedelta(seconds=control_step)
     step = index[1] - index[0] if len(index) > 1 else length
     if not len(index) or step > length or index[-1] - index[0] + step < length:
-        raise ControlError(describe("start-up: telemetry", f"a control step, {length}, or more", f"{len(index)} rows"))
+        raise ControlError("start-up: telemetry", f"a control step, {length}, or more", f"{len(index)} rows")
     means = telemetry.resample(length, closed="right", label="right", origin=index[-1]).mean()
-    outdoor = (
-        means.reindex(columns=[f"{points.weather_station}/{OUTDOOR_TEMPERATURE}"]).ffill().bfill().to_numpy()[:, 0]
-    )
+    column = f"{points.weather_station}/{OUTDOOR_TEMPERATURE}"
+    outdoor = means.reindex(columns=[column]).ffill().bfill().to_numpy()[:, 0]
     if np.isnan(outdoor).any():
-        raise ControlError(
-            describe("start-up: telemetry", "an outdoor temperature", "none", str(points.weather_station))
-        )
+        raise ControlError("start-up: telemetry", "an outdoor temperature", "none", str(points.weather_station))
     gains = means.reindex(columns=[f"{zone}/internal_gain" for zone in points.zones]).fillna(0.0).to_numpy()
     rows = zip(means.index, means.to_dict("records"), outdoor, gains, strict=True)
     return [(stamp, {str(k): v for k, v in row.items()}, float(air), heat) for stamp, row, air, heat in rows]

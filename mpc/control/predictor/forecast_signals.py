@@ -13,7 +13,6 @@ from mpc.scenario.forecast import Forecast
 from thermal._types import FloatArray
 from thermal.case.building import Building
 from thermal.case.points import OUTDOOR_TEMPERATURE
-from thermal.errors import describe
 from thermal.inputs.normalisation import OCCUPANCY, WIND, Normalisation, filled, usual_temperatures
 from thermal.inputs.provider import HVAC_INPUTS, InputProvider
 from thermal.network.network import ThermalNetwork
@@ -55,7 +54,7 @@ class ForecastSignals:
         given = boundaries or {}
         for name in network.boundaries[1:]:
             if name not in given:
-                raise ControlError(describe(f"boundary {name!r}", "its temperature", "none", "pass it in `boundaries`"))
+                raise ControlError(f"boundary {name!r}", "its temperature", "none", "pass it in `boundaries`")
         self._others = np.array([given[name] for name in network.boundaries[1:]], dtype=float)
         self.left_out: tuple[str, ...] = ()
         self._past = pd.DataFrame()

@@ -13,7 +13,6 @@ from mpc.control.problem.channels import Channel
 from mpc.control.problem.horizon import Horizon, HorizonData
 from mpc.errors import ControlError
 from thermal._types import FloatArray
-from thermal.errors import describe
 from thermal.model.modal import ModalModel
 from thermal.model.step import IMPLICIT_EULER, Scheme
 from thermal.units import REFERENCE_TEMPERATURE
@@ -110,10 +109,10 @@ class HeatPredictor(Predictor):
         places, n_zone = [(c.quantity, c.zone) for c in channels], modes.output.shape[0]
         if not places or len(set(places)) != len(places) or max(zone for _, zone in places) >= n_zone:
             expected = f"channels of zones 0 to {n_zone - 1}, each once"
-            raise ControlError(describe("heat predictor", expected, f"{places}"))
+            raise ControlError("heat predictor", expected, f"{places}")
         if not (efficiency > 0.0 and performance > 0.0):
             found = f"{efficiency!r} and {performance!r}"
-            raise ControlError(describe("heat predictor", "a positive efficiency and performance", found))
+            raise ControlError("heat predictor", "a positive efficiency and performance", found)
         self.channels = cast("tuple[Channel, ...]", tuple(channels))  # of problems: range, rate, name and unit
         self.efficiency, self.performance = efficiency, performance
         self._prepare(modes, horizon, disturbance_time, scheme)

@@ -8,23 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mpc.errors import ControlError
-from mpc.loop.actuators import (
-    COOLING_SETPOINT,
-    DIFFERENTIAL_PRESSURE,
-    HEATING_SETPOINT,
-    STATIC_PRESSURE,
-    SUPPLY_AIR,
-    SUPPLY_WATER,
-)
+from mpc.loop.actuators import COOLING_SETPOINT, HEATING_SETPOINT, STATIC_PRESSURE, SUPPLY_AIR, SUPPLY_WATER
 from thermal.components.registry import setpoints
-from thermal.errors import describe, nearest
 from thermal.system.smooth import SmoothHvac
 
-_WORDS = {
-    SUPPLY_AIR: "supply air temperature", SUPPLY_WATER: "supply water temperature", STATIC_PRESSURE: "static pressure",
-    DIFFERENTIAL_PRESSURE: "differential pressure", HEATING_SETPOINT: "heating setpoint",
-    COOLING_SETPOINT: "cooling setpoint",
-}  # fmt: skip
+_WORD = {STATIC_PRESSURE: "static pressure", HEATING_SETPOINT: "heating setpoint", COOLING_SETPOINT: "cooling setpoint"}
 
 
 @dataclass(frozen=True)
@@ -58,12 +46,10 @@ class Channel:
     zones: tuple[int, ...] | None = None
 
     def __post_init__(self) -> None:
-        if self.quantity not in setpoints():
-            advice = nearest(self.quantity, setpoints())
-            raise ControlError(describe("channel: quantity", "a setpoint of the plant", repr(self.quantity), advice))
+        ControlError.unless_known(self.quantity, setpoints(), "channel: quantity", "a setpoint of the plant")
         if not (-np.inf < self.lower < self.upper < np.inf and self.rate > 0.0):
             found = f"{self.lower!r} to {self.upper!r}, {self.rate!r} an hour"
-            raise ControlError(describe(f"channel {self.quantity}", "a range, and a positive rate", found))
+            raise ControlError(f"channel {self.quantity}", "a range, and a positive rate", found)
 
     @property
     def unit(self) -> str:
@@ -75,7 +61,7 @@ class Channel:
         """In words, for reports."""
         which = "" if self.air_handlers is None else f" of air handlers {', '.join(map(str, self.air_handlers))}"
         where = "" if self.zones is None else f" of zones {', '.join(map(str, self.zones))}"
-        return _WORDS.get(self.quantity, self.quantity.replace("_", " ")) + which + where
+        return _WORD.get(self.quantity, self.quantity.removesuffix("_setpoint").replace("_", " ")) + which + where
 
     @property
     def of_zones(self) -> bool:
@@ -99,12 +85,12 @@ class Channel:
         if at is None:
             kind = "pressures" if self.unit == "Pa" else "setpoints"
             advice = f"make the plant's functions with SmoothHvac(system, {kind}=True)"
-            raise ControlError(describe(f"channel {self.quantity}", f"a plant whose {kind} can be set", "none", advice))
+            raise ControlError(f"channel {self.quantity}", f"a plant whose {kind} can be set", "none", advice)
         count, given = at.stop - at.start, self.zones if self.of_zones else self.air_handlers
         chosen = tuple(range(count)) if given is None or count == 1 else given
         if not chosen or not set(chosen) <= set(range(count)):
             expected = f"{'zones' if self.of_zones else 'air handlers'} from 0 to {count - 1}"
-            raise ControlError(describe(f"channel {self.quantity}", expected, repr(given)))
+            raise ControlError(f"channel {self.quantity}", expected, repr(given))
         return np.arange(at.start, at.stop, dtype=np.intp)[list(chosen)]
 
 
@@ -123,7 +109,4 @@ def supply_channels(
     air_rate, water_rate : float
         Most change in an hour [K/h].
     """
-    return (
-        Channel(SUPPLY_AIR, *air, air_rate),
-        Channel(SUPPLY_WATER, *water, water_rate),
-    )
+    return Channel(SUPPLY_AIR, *air, air_rate), Channel(SUPPLY_WATER, *water, water_rate)

@@ -11,11 +11,10 @@ import numpy as np
 from mpc.control.predictor.predictor import Predictor, Rollout, Sensitivity
 from mpc.control.problem.horizon import HorizonData
 from mpc.errors import ControlError
-from mpc.scenario.rates import KILOWATT_HOUR
+from mpc.scenario.rates import HOUR, KILOWATT_HOUR
 from thermal._types import FloatArray, IntArray
 
-_HOUR = 3600.0  # s
-_KILOWATT = 1000.0  # W
+KILOWATT = 1000.0  # W
 
 
 class CostTerms(NamedTuple):
@@ -160,7 +159,7 @@ class ControlProblem:
     def most_change(self) -> FloatArray:
         """Largest change between blocks, shape (D,) [-]; infinite where there is no limit."""
         horizon, most = self.predictor.horizon, np.empty(self.shape)
-        hours = np.concatenate([[horizon.control_step], np.diff(horizon.block_starts)]) / _HOUR
+        hours = np.concatenate([[horizon.control_step], np.diff(horizon.block_starts)]) / HOUR
         for path in self._paths:
             most[path] = np.outer(hours, [c.rate for c in self.predictor.channels])
         return most.ravel() / self.span
@@ -195,12 +194,12 @@ class ControlProblem:
     @cached_property
     def hours(self) -> FloatArray:
         """Length of each step, shape (N,) [h]."""
-        return self.predictor.horizon.steps / _HOUR
+        return self.predictor.horizon.steps / HOUR
 
     @cached_property
     def _comfort_hours(self) -> FloatArray:
         hours = self.hours.copy()
-        hours[-1] += self.terminal_time / _HOUR
+        hours[-1] += self.terminal_time / HOUR
         return hours[:, None]
 
     def penalty(self, data: HorizonData, zone: FloatArray) -> Penalty:
@@ -234,9 +233,9 @@ class ControlProblem:
         rise = peaks.peaks(rollout.electric) - peaks.so_far
         changes = self.differences @ self.shares(rollout.plan) - self.standing(data)
         return CostTerms(
-            electricity=float(data.electricity_price * self.hours @ rollout.electric) / _KILOWATT,
-            gas=float(data.gas_price * self.hours @ rollout.fuel) / _KILOWATT,
-            demand=float(peaks.rate @ rise) / _KILOWATT,
+            electricity=float(data.electricity_price * self.hours @ rollout.electric) / KILOWATT,
+            gas=float(data.gas_price * self.hours @ rollout.fuel) / KILOWATT,
+            demand=float(peaks.rate @ rise) / KILOWATT,
             comfort=float(self.penalty(data, rollout.zone[1:]).value.sum()),
             moves=self.move_weight * float(changes @ changes),
             storage=-data.heat_value * self.predictor.heat_content(rollout.end_state) / KILOWATT_HOUR,
@@ -252,8 +251,8 @@ class ControlProblem:
         sensitivity : Sensitivity
             Of the roll-out.
         """
-        by_plan = (data.electricity_price * self.hours) @ sensitivity.electric / _KILOWATT
-        by_plan += (data.gas_price * self.hours) @ sensitivity.fuel / _KILOWATT
+        by_plan = (data.electricity_price * self.hours) @ sensitivity.electric / KILOWATT
+        by_plan += (data.gas_price * self.hours) @ sensitivity.fuel / KILOWATT
         if data.heat_value:
             by_plan -= data.heat_value / KILOWATT_HOUR * (self.predictor.heat_row @ sensitivity.end_state)
         return np.asarray(by_plan * self.span)

@@ -12,12 +12,11 @@ import scipy.sparse as sp
 
 from mpc.control.predictor.heat import HeatPredictor
 from mpc.control.problem.horizon import HorizonData
-from mpc.control.problem.problem import ControlProblem
+from mpc.control.problem.problem import KILOWATT, ControlProblem
 from mpc.control.solvers.solution import Solution, Solver, Status
 from mpc.errors import ControlError
 from mpc.scenario.rates import KILOWATT_HOUR
 from thermal._types import FloatArray
-from thermal.errors import describe
 from thermal.units import REFERENCE_TEMPERATURE
 
 #: Clarabel (interior point) or OSQP (operator splitting, polished).
@@ -91,7 +90,6 @@ def solve_quadratic(
     return QuadraticResult(x, Status.of(word) is Status.CONVERGED and bool(np.isfinite(x).all()), word)
 
 
-_KILOWATT = 1000.0  # W
 
 
 class LinearSolver(Solver):
@@ -118,7 +116,7 @@ class LinearSolver(Solver):
     def __init__(self, problem: ControlProblem) -> None:
         if not isinstance(problem.predictor, HeatPredictor):
             found = type(problem.predictor).__name__
-            raise ControlError(describe("linear solver", "a problem of a HeatPredictor", found))
+            raise ControlError("linear solver", "a problem of a HeatPredictor", found)
         self.problem, self.predictor = problem, problem.predictor
         self._built: dict[tuple[int, int], _Programme] = {}
 
@@ -178,7 +176,7 @@ class _Programme:
         limited = np.flatnonzero(np.isfinite(problem.most_change))
         if limited.size:
             rules.append(cp.abs(change[limited]) <= problem.most_change[limited])
-        power, fuel = predictor.electric_per_channel / _KILOWATT, predictor.fuel_per_channel / _KILOWATT
+        power, fuel = predictor.electric_per_channel / KILOWATT, predictor.fuel_per_channel / KILOWATT
         electric = heat @ (span * power) + float(least @ power)
         cost = given["electricity"] @ electric + given["gas"] @ (heat @ (span * fuel)) - given["end"] @ x[count]
         cost += cp.sum(cp.multiply(given["weight"], cp.square(bent) / (2.0 * problem.softness) + straight))
@@ -203,8 +201,8 @@ class _Programme:
         }  # fmt: skip
         if peaks.offset.size:
             values |= {
-                "windows": peaks.weights, "used": peaks.offset / _KILOWATT, "rate": peaks.rate,
-                "owner": np.eye(peaks.rate.size)[peaks.bucket], "so_far": peaks.so_far / _KILOWATT,
+                "windows": peaks.weights, "used": peaks.offset / KILOWATT, "rate": peaks.rate,
+                "owner": np.eye(peaks.rate.size)[peaks.bucket], "so_far": peaks.so_far / KILOWATT,
             }  # fmt: skip
         return values
 

@@ -11,12 +11,11 @@ import numpy as np
 
 from mpc.control.predictor.predictor import Rollout
 from mpc.control.problem.horizon import HorizonData
-from mpc.control.problem.problem import ControlProblem
+from mpc.control.problem.problem import KILOWATT, ControlProblem
 from mpc.control.solvers.solution import Solution, Solver, Status
 from mpc.errors import MpcError
 from thermal._types import FloatArray
 
-_KILOWATT = 1000.0  # W
 _QUIET = {
     "print_time": False,
     "ipopt.print_level": 0,
@@ -64,13 +63,13 @@ class _Evaluation:
         terms = self.problem.terms(self.data, rollout)
         if np.isfinite(terms.total) and (self.best is None or terms.total < self.best[0]):
             self.best = (terms.total, shares.copy(), rollout)
-        return np.concatenate([[terms.total - terms.demand], self.data.peaks.means(rollout.electric) / _KILOWATT])
+        return np.concatenate([[terms.total - terms.demand], self.data.peaks.means(rollout.electric) / KILOWATT])
 
     def jacobian(self, shares: FloatArray) -> FloatArray:
         """Their derivatives, shape (1 + n_window, D)."""
         rollout = self.rollout(shares)
         by_plan = self.problem.predictor.sensitivity(self.data, rollout)
-        means = self.data.peaks.weights @ by_plan.electric * self.problem.span / _KILOWATT
+        means = self.data.peaks.weights @ by_plan.electric * self.problem.span / KILOWATT
         return np.vstack([self.problem.gradient(self.data, rollout, by_plan), means])
 
     def guarded(self, of: Callable[[FloatArray], FloatArray], shares: FloatArray) -> FloatArray:
@@ -170,7 +169,7 @@ class IpoptSolver(Solver):
         solver = self._solver(n_window, n_peak, tuned)
         limited = np.flatnonzero(np.isfinite(problem.most_change))
         most, before = problem.most_change[limited], problem.standing(data)[limited]
-        peaks, found = data.peaks.so_far / _KILOWATT, None
+        peaks, found = data.peaks.so_far / KILOWATT, None
         try:
             found = solver(
                 x0=np.concatenate([shares, peaks]),

@@ -10,12 +10,11 @@ import numpy as np
 
 from mpc.control.predictor.predictor import Rollout, Sensitivity
 from mpc.control.problem.horizon import HorizonData
-from mpc.control.problem.problem import ControlProblem, CostTerms
+from mpc.control.problem.problem import KILOWATT, ControlProblem, CostTerms
 from mpc.control.solvers.convex import QuadraticSolver, solve_quadratic
 from mpc.control.solvers.solution import Solution, Solver, Status
 from thermal._types import FloatArray
 
-_KILOWATT = 1000.0  # W
 _INNER = 12  # most quadratic programmes of one step; three are usual
 _SHORTEST = 1.0 / 256.0  # of a step, when the line search gives up
 _SUFFICIENT = 0.1  # share of the predicted decrease that a step must bring (Armijo)
@@ -219,7 +218,7 @@ class SequentialSolver(Solver):
         highest = data.peaks.so_far.copy()
         np.maximum.at(highest, data.peaks.bucket, model.means + model.mean_jacobian @ step)
         comfort = float(self.problem.penalty(data, model.zone_at(step)).value.sum())
-        peaks = float(data.peaks.rate @ highest) / _KILOWATT
+        peaks = float(data.peaks.rate @ highest) / KILOWATT
         return float(model.gradient @ step + 0.5 * step @ model.hessian @ step) + comfort + peaks
 
     def _step(self, data: HorizonData, point: _Point, model: _Model, reach: float) -> tuple[FloatArray, float, bool]:
@@ -262,18 +261,18 @@ class SequentialSolver(Solver):
         n, n_peak, problem = point.shares.size, data.peaks.rate.size, self.problem
         limited = np.flatnonzero(np.isfinite(problem.most_change))
         change = (problem.differences @ point.shares - problem.standing(data))[limited]
-        most, means = problem.most_change[limited], model.means / _KILOWATT
+        most, means = problem.most_change[limited], model.means / KILOWATT
         rows = np.block([
             [np.eye(n), np.zeros((n, n_peak))],
             [problem.differences[limited], np.zeros((limited.size, n_peak))],
-            [model.mean_jacobian / _KILOWATT, -np.eye(n_peak)[data.peaks.bucket]],
+            [model.mean_jacobian / KILOWATT, -np.eye(n_peak)[data.peaks.bucket]],
             [np.zeros((n_peak, n)), np.eye(n_peak)],
         ])  # fmt: skip
         parts = (
             (np.maximum(-point.shares, -reach), np.minimum(1.0 - point.shares, reach)),
             (-most - change, most - change),
             (np.full(means.size, -np.inf), -means),
-            (data.peaks.so_far / _KILOWATT, np.full(n_peak, np.inf)),
+            (data.peaks.so_far / KILOWATT, np.full(n_peak, np.inf)),
         )
         lower, upper = (np.concatenate(ends) for ends in zip(*parts, strict=True))
         return rows, np.minimum(lower, upper), upper

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any, Literal, NamedTuple, get_args
 
 import casadi as ca
@@ -113,15 +113,9 @@ class StageProblem:
         return np.vstack([data.start, np.array(followed).T])
 
     @cached_property
-    def _made(self) -> dict[int, _Along]:
-        return {}
-
-    def _along(self, count: int) -> _Along:
-        """Functions of a whole horizon, made once for a number of steps."""
-        if count not in self._made:
-            course = self.step.mapaccum("course", count)
-            self._made[count] = _Along(course, self.step.map(count), self.end.map(count + 1))
-        return self._made[count]
+    def _along(self) -> Callable[[int], _Along]:
+        """Functions of whole courses, by their number of steps."""
+        return cache(lambda n: _Along(self.step.mapaccum("course", n), self.step.map(n), self.end.map(n + 1)))
 
 
 class _Along(NamedTuple):

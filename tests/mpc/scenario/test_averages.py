@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from mpc.scenario.grid import means_by_shape, means_of_means, means_of_readings
+from mpc.scenario.weather import means_by_shape, means_of_means, means_of_readings
 
 VALUES = arrays(float, 12, elements=st.floats(0.0, 1000.0).map(lambda value: round(value, 6)))
 
