@@ -1,7 +1,8 @@
 """do-mpc as the solver of the receding horizon: the model in its modes, as do-mpc's documentation has one write it.
 
 States are the modes of the reduced model and the supply water, inputs the two setpoints. What the thermostats go by
-and the heat of the zones are algebraic states, since terminals go by the end of a step as in `mpc.control.Predictor`;
+and the heat of the zones are algebraic states, since terminals go by the end of a step as in
+`mpc.control.predictor.predictor.Predictor`;
 heat and powers are the library's own equations (`hvac_function`), at the same smoothing. Comfort is a
 soft constraint with do-mpc's linear price, changes of setpoints have its quadratic one. do-mpc knows steps of one
 length and an input for each, so the horizon is regular and its blocks are its steps.
@@ -52,7 +53,7 @@ def _quiet() -> Iterator[None]:
 
 
 class DoMpcSolver:
-    """do-mpc in the place of a solver of ours; see `mpc.control.Solver`.
+    """do-mpc in the place of a solver of ours; see `mpc.control.solvers.solution.Solver`.
 
     Parameters
     ----------
@@ -165,7 +166,7 @@ class DoMpcSolver:
         """Nothing is kept between solves."""
 
     def solve(self, data: HorizonData, plan: np.ndarray, time_limit: float | None = None) -> Solution:
-        """Solve for one horizon; see `mpc.control.Solver`. There is no limit of time: iterations are limited."""
+        """Solve for one horizon, as a `Solver`. There is no limit of time: iterations are limited."""
         del time_limit
         begin, predictor = time.perf_counter(), self.problem.predictor
         first = predictor.rollout(data, plan)

@@ -32,7 +32,7 @@ class Site(ABC):
     block_ends : tuple of float
         Blocks of the forecast that a policy sees [h].
     actions : tuple of str
-        What all set, as in `mpc.environment.ActionLayout`.
+        What all set, as in `mpc.environment.layout.ActionLayout`.
     discomfort_price : float
         Of a kelvin hour of a zone, of training and of the stage cost that all are judged by [currency/K/h].
     reward_scale : float

@@ -5,7 +5,7 @@ moved by up to 1 K, supply air by up to 3 K, three hours at a time) and sensor n
 these and diagnosed; then four controllers run the week after, on the same weather:
 
 - *own*: the building's schedules, 12.8 degC of supply air and 82.2 degC of water all year;
-- *reset*: supply air (and water) by the outdoor temperature, `mpc.baselines.OutdoorReset`;
+- *reset*: supply air (and water) by the outdoor temperature, `mpc.baselines.rules.OutdoorReset`;
 - *MPC before*, *MPC after*: optimal control with the calibrated baseline, and with the effects of the diagnosis.
 
 Optimal control decides the supply air of each air handler, and in the Large Office the hot water. It is given

@@ -1,6 +1,7 @@
 """Do the intervals of calibrated parameters hold the truth? Coverage on twins, whose parameters are known.
 
-A twin a seed (`thermal.pilot.generate_twin`): an office of its own, θ drawn from the priors within their ranges, the
+A twin a seed (`thermal.pilot.twin.generate_twin`): an office of its own, θ drawn from the priors within their ranges,
+the
 grid model under thermostats, unmeasured heat and sensor noise of strengths drawn anew. `calibration.calibrate` sees the
 telemetry only. Its intervals are normal on the estimation scale (log or logit), value ± quantile times standard error;
 the 90 % interval that the result itself gives, cut at the range, takes their place. As θ comes from the prior that

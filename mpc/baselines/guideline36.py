@@ -237,7 +237,8 @@ class Guideline36Settings:
     throttling_range : float
         Distance from the setpoint at which a zone's loop counts as at its end [K]. The guideline's loops are integral
         and hold a zone at its setpoint until then; a proportional one lets it drift. The default is half of the
-        thermostats' range, by which setpoints lie inside of the comfort band (`mpc.loop.scheduled_operation`): zones
+        thermostats' range, by which setpoints lie inside of the comfort band
+        (`mpc.loop.operation.scheduled_operation`): zones
         ask when they reach the band's edge, and not half a kelvin beyond it.
     discharge_rise : float
         Warmest discharge air above the zone's heating setpoint [K] (5.6.5); the reheat reaches it at half of the

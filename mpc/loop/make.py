@@ -63,7 +63,7 @@ class SimulationSettings:
     kind : {"reduced", "grid", "random"}
         How the building steps: reduced to its modes, on the grid with the mean of the shuffle, or with the random one.
     system : HvacSystem, optional
-        Its HVAC system; sized by `thermal.pilot.size_system` by default.
+        Its HVAC system; sized by `thermal.pilot.sizing.size_system` by default.
     tariff : Tariff
         Prices; those of the paper's simulator by default.
     carbon : CarbonIntensity
@@ -169,7 +169,8 @@ class PlantSettings(SimulationSettings):
     Parameters
     ----------
     effects : tuple of Chosen
-        What the building has and the baseline lacks, `thermal.effects.chosen`; with a calibration they are its own.
+        What the building has and the baseline lacks, `thermal.effects.catalogue.chosen`; with a calibration they are
+        its own.
     order : int, optional
         Largest number of states of a reduced building.
     gains : InternalGains, optional
@@ -303,7 +304,7 @@ def pilot_weather(seed: int, start: str, days: float, step_seconds: float = 300.
     Returns
     -------
     Weather
-        Of `thermal.pilot.generate_weather`.
+        Of `thermal.pilot.weather.generate_weather`.
     """
     frame = generate_weather(seed, start=start, days=days, step_seconds=step_seconds)
     return Weather(frame.rename(columns=lambda column: column.rpartition("/")[2]), MOUNTAIN_VIEW)

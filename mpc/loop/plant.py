@@ -48,7 +48,8 @@ class PointLayout:
 class Measurements(Mapping[str, float]):
     """What a building's sensors and meters say of a control step that has ended: means over it, by ``ENTITY/POINT``.
 
-    Values are in the library's units, those of `thermal.case.Telemetry`; `in_file_units` gives those of case folders.
+    Values are in the library's units, those of `thermal.case.telemetry.Telemetry`; `in_file_units` gives those of
+    case folders.
 
     Parameters
     ----------

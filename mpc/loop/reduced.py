@@ -183,7 +183,8 @@ def reduced_building(
     dx : float, optional
         Distance between control volumes of a plan [m].
     effects : sequence of Extension
-        What is added to the baseline, `thermal.effects.chosen` or `RadiantGains`; strengths are among the parameters.
+        What is added to the baseline, `thermal.effects.catalogue.chosen` or `RadiantGains`; strengths are among the
+        parameters.
     order : int, optional
         Largest number of states.
     tolerance : float, optional

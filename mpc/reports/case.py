@@ -26,7 +26,7 @@ def write_check(check: CaseCheck, out: str | Path, *, force: bool = False) -> Pa
     Parameters
     ----------
     check : CaseCheck
-        From `thermal.case.check_case`.
+        From `thermal.case.check.check_case`.
     out : str or Path
         Folder, made if need be.
     force : bool
@@ -65,7 +65,7 @@ def check_verdict(check: CaseCheck) -> str:
     Parameters
     ----------
     check : CaseCheck
-        From `thermal.case.check_case`.
+        From `thermal.case.check.check_case`.
     """
     measured = sum(bool(z.measured_by) for z in check.zones)
     usable = 1.0 - float(np.mean([c.unusable_share for c in check.quality.columns]))
@@ -90,7 +90,7 @@ def quality_rows(check: CaseCheck) -> list[list[str]]:
     Parameters
     ----------
     check : CaseCheck
-        From `thermal.case.check_case`.
+        From `thermal.case.check.check_case`.
     """
     kinds = ("gap", "impossible", "flat", "spike", "constant")
     flawed = sorted((c for c in check.quality.columns if c.findings), key=lambda c: -c.unusable_share)
@@ -107,7 +107,7 @@ def simulation_summary(simulation: Simulation, case: Case, parameters: str = "un
     Parameters
     ----------
     simulation : Simulation
-        From `thermal.model.simulate`.
+        From `thermal.model.simulation.simulate`.
     case : Case
         The case that was replayed.
     parameters : str
@@ -139,7 +139,7 @@ def write_simulation(
     Parameters
     ----------
     simulation : Simulation
-        From `thermal.model.simulate`.
+        From `thermal.model.simulation.simulate`.
     case : Case
         The case that was replayed.
     out : str or Path

@@ -43,7 +43,7 @@ def control_model(
     dx : float, optional
         Distance between control volumes of a plan [m]; that of the calibration, or the plan's.
     effects : tuple of Chosen
-        What is added to the baseline, `thermal.effects.chosen`; with a calibration they are its own.
+        What is added to the baseline, `thermal.effects.catalogue.chosen`; with a calibration they are its own.
     order : int, optional
         Largest number of states; None keeps all that the reduction finds.
 

@@ -86,7 +86,7 @@ class Simulator:
     scopes : mapping of str to {"global", "zone"}, optional
         Parameters with one value a zone, as they were calibrated.
     effects : sequence of Extension
-        What is added to the baseline: effects of the catalogue, `thermal.effects.chosen`.
+        What is added to the baseline: effects of the catalogue, `thermal.effects.catalogue.chosen`.
 
     Raises
     ------

@@ -73,7 +73,7 @@ def build_network(
     structure : Structure
         What the model is made of beside its geometry: furniture, slabs, nodes of a wall, radiant node.
     effects : sequence of Extension
-        What is added to the baseline: effects of the catalogue, `thermal.effects.chosen`.
+        What is added to the baseline: effects of the catalogue, `thermal.effects.catalogue.chosen`.
 
     Returns
     -------

@@ -62,7 +62,7 @@ SITE_NAMES: Mapping[str, tuple[str, str, str]] = {
     "EmissionsGasPower": ("kgCO2/kWh", "gas_carbon_intensity", "Emissions of gas"),
 }
 
-# Irradiances, and what `thermal.inputs.Sun` calls them.
+# Irradiances, and what `thermal.inputs.sun.Sun` calls them.
 _SUN = {
     "global_horizontal_irradiance_sensor": "horizontal",
     "direct_normal_irradiance_sensor": "normal",

@@ -123,7 +123,8 @@ class MpcController:
         ----------
         telemetry : DataFrame, shape (n_time, n_column)
             Means over steps that end at the stamps, which have a time zone; by ``ENTITY/POINT`` in the library's units,
-            as `thermal.case.Telemetry` has them; ``ZONE/internal_gain`` [W] is expected heat of people, lights and
+            as `thermal.case.telemetry.Telemetry` has them; ``ZONE/internal_gain`` [W] is expected heat of people,
+            lights and
             equipment, none where absent. NaN is missing.
 
         Raises

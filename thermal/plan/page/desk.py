@@ -145,7 +145,7 @@ def import_list(desk: LabelDesk, path: Path, progress: Progress) -> None:
     desk : LabelDesk
         Of a new case.
     path : Path
-        YAML file of a `thermal.plan.DrawingList`; drawings lie in its folder.
+        YAML file of a `thermal.plan.list.DrawingList`; drawings lie in its folder.
     progress : callable
         Told stage, steps done and all steps.
 
