@@ -249,7 +249,7 @@ class HorizonData:
     heating_setpoint, cooling_setpoint : ndarray, shape (N, n_zone)
         Of the local thermostats [K].
     running, ventilation : ndarray, shape (N, n_air_handler)
-        As in `thermal.hvac.Actions` [-].
+        As in `thermal.system.system.HvacSystem.actions` [-].
     boiler : ndarray, shape (N,)
         As there [-].
     electricity_price, gas_price : ndarray, shape (N,)
