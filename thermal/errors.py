@@ -1,4 +1,4 @@
-"""The error family of the package: every refusal has a name, and says where, what was expected, and what came."""
+"""The error family of the package: every refusal has a name, and says where, what was expected, and what it got."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def nearest(word: object, options: Iterable[object]) -> str:
     Parameters
     ----------
     word
-        What came.
+        What was given.
     options
         What would have been valid.
 

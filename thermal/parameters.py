@@ -70,14 +70,11 @@ class Parameter:
         else:
             expected, ordered = "0 < lower < start < upper", 0.0 < self.lower < self.start < self.upper
         if not ordered:
-            raise ValueError(
-                f"parameter {self.name}: expected {expected}, got {self.lower}, {self.start}, {self.upper}"
-            )
+            found = f"{self.lower}, {self.start}, {self.upper}"
+            raise ValueError(f"parameter {self.name}: expected {expected}, got {found}")
         if (self.scope == "global") != (self.member is None):
-            raise ValueError(
-                f"parameter {self.name}: expected a member with the scopes facade and zone only, "
-                f"got scope {self.scope!r} with member {self.member!r}"
-            )
+            expected, found = "a member with the scopes facade and zone only", f"scope {self.scope!r}"
+            raise ValueError(f"parameter {self.name}: expected {expected}, got {found} with member {self.member!r}")
 
     @property
     def base(self) -> str:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from thermal.errors import CaseError, describe
+from thermal.errors import CaseError
 
 
 @dataclass(frozen=True)
@@ -189,9 +189,14 @@ def _registry() -> Any:
 @cache
 def _line(unit: str, quantity: str, elevation: float, where: str) -> tuple[float, float]:
     """Scale and offset that take a unit to the library's: every conversion here is a straight line."""
-    target = QUANTITIES[quantity]
-    parsed = _parse(unit, target, where)
-    registry = _registry()
+    target, registry, text = QUANTITIES[quantity], _registry(), unit.strip()
+    try:
+        if not text:
+            raise ValueError("blank")
+        parsed = registry.parse_units("dimensionless" if text in {"-", "1"} else text)
+    except Exception as error:  # pint lets its parser's AssertionError, TypeError, ValueError and others through
+        expected = f"a unit that pint knows, of {target.name}"
+        raise CaseError(where, expected, repr(unit), f"use one of {target.examples}") from error
     if "delta_" in str(parsed):
         raise CaseError(where, f"{target.name} ({target.examples})", repr(unit), "this is a difference")
     if quantity == "air_flow" and parsed.dimensionality == registry.parse_units("m^3/s").dimensionality:
@@ -202,16 +207,3 @@ def _line(unit: str, quantity: str, elevation: float, where: str) -> tuple[float
         raise CaseError(where, f"a unit of {target.name}", repr(unit), hint)
     zero, one = (float(registry.Quantity(x, parsed).to(target.unit).magnitude) for x in (0.0, 1.0))
     return one - zero, zero
-
-
-def _parse(unit: str, target: _Quantity, where: str) -> Any:
-    text = "dimensionless" if unit.strip() in {"-", "1"} else unit.strip()
-    try:
-        if not text:
-            raise ValueError("blank")
-        return _registry().parse_units(text)
-    except Exception as error:  # pint lets its parser's AssertionError, TypeError, ValueError and others through
-        message = describe(
-            where, f"a unit that pint knows, of {target.name}", repr(unit), f"use one of {target.examples}"
-        )
-        raise CaseError(message) from error

@@ -37,8 +37,7 @@ from thermal.errors import describe, nearest
 from thermal.model.matrices import SymbolicModel
 from thermal.model.reduce import reduced_model
 from thermal.model.simulator import Shuffle, Simulator
-from thermal.network.assembly import Extension
-from thermal.network.build import build_network
+from thermal.network.build import Extension, build_network
 from thermal.network.structure import BASELINE
 from thermal.pilot.building import pilot_building
 from thermal.pilot.sizing import size_system

@@ -16,8 +16,7 @@ from thermal.model.matrices import SymbolicModel
 from thermal.model.modal import ModalModel, modal_model
 from thermal.model.reduce import ReducedModel, reduced_model
 from thermal.model.step import IMPLICIT_EULER
-from thermal.network.assembly import Extension
-from thermal.network.build import build_network
+from thermal.network.build import Extension, build_network
 from thermal.units import REFERENCE_TEMPERATURE
 
 

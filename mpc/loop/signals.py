@@ -19,7 +19,7 @@ from thermal.errors import describe
 from thermal.inputs.normalisation import WIND, Normalisation, usual_temperatures
 from thermal.inputs.provider import HVAC_INPUTS, InputProvider, LiveInputs
 from thermal.inputs.signals import Signal
-from thermal.network.assembly import Extension
+from thermal.network.build import Extension
 from thermal.network.graph import GraphBuilder
 from thermal.network.network import ThermalNetwork
 from thermal.system.replay import replay_reheat

@@ -12,8 +12,7 @@ import yaml
 from pydantic import BaseModel
 
 from thermal.case import building as schema
-from thermal.case.load import load_case
-from thermal.case.migration import FORMAT, certain_feeders, migrate
+from thermal.case.load import FORMAT, certain_feeders, load_case, migrate
 from thermal.case.points import POINT_TYPES
 from thermal.case.save import save_case
 from thermal.case.validation import check_building

@@ -189,7 +189,7 @@ class BuildingFile(Entry):
     Parameters
     ----------
     format
-        Number of the case format; 1 and 2 are migrated when read (`thermal.case.migration`).
+        Number of the case format; 1 and 2 are migrated when read (`thermal.case.load`).
     name
         Of the case.
     location

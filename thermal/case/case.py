@@ -58,10 +58,6 @@ def local_timestamp(time: str | datetime, building: Building) -> pd.Timestamp:
         raise CaseError("time", "ISO 8601, such as 2023-07-06T07:10", repr(time)) from error
     if stamp.tzinfo is not None:
         return stamp.tz_convert(zone)
-    return _localised(stamp, zone)
-
-
-def _localised(stamp: pd.Timestamp, zone: str) -> pd.Timestamp:
     naive = stamp.to_pydatetime()
     first, second = (naive.replace(tzinfo=ZoneInfo(zone), fold=fold).utcoffset() for fold in (0, 1))
     if first != second:
@@ -223,9 +219,8 @@ class Case:
         """
         frame = self.usable
         station = f"{self.building.weather_station}/{OUTDOOR_TEMPERATURE}"
-        outdoor = [c for c in frame.columns if c == station] or [
-            c for c in frame.columns if c.endswith(f"/{OUTDOOR_TEMPERATURE}")
-        ]
+        others = [column for column in frame.columns if column.endswith(f"/{OUTDOOR_TEMPERATURE}")]
+        outdoor = [station] if station in frame else others
         columns = {OUTDOOR: frame[outdoor].mean(axis=1)}
         for boundary in self.building.measured_boundaries:
             columns[boundary] = frame[f"{boundary}/{ZONE_TEMPERATURE}"]

@@ -126,10 +126,8 @@ def flat_lines(
     found = []
     for run in np.flatnonzero(seconds >= longest):
         first, last = int(starts[run]), int(ends[run])
-        jumps = np.abs(
-            [series[first] - series[max(first - 1, 0)], series[last] - series[min(last + 1, series.size - 1)]]
-        )
-        jumped = bool(np.max(jumps) > FLAT_JUMP * resolution)
+        jumps = [series[first] - series[max(first - 1, 0)], series[last] - series[min(last + 1, series.size - 1)]]
+        jumped = bool(np.max(np.abs(jumps)) > FLAT_JUMP * resolution)
         moved = reference is None or _moved(reference[present[first] : present[last] + 1])
         certain = seconds[run] >= CERTAIN_FLAT_SECONDS and not is_input
         if moved and (jumped or certain or not needs_jump):

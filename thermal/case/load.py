@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable
+from collections.abc import Hashable, Mapping
 from dataclasses import fields
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 from zoneinfo import ZoneInfo, available_timezones
 
 import yaml
@@ -16,22 +16,85 @@ from pydantic_core import ErrorDetails
 from thermal.case import building as schema
 from thermal.case.building import Building, BuildingFile, FloorPlan, FloorPlans, ZoneTable
 from thermal.case.case import Case
-from thermal.case.migration import migrate
 from thermal.case.plan import read_plan
 from thermal.case.telemetry import check_units, read_telemetry
 from thermal.case.validation import check_building, check_columns
 from thermal.errors import CaseError, ThermalError, describe, nearest
 
 NAME = "building.yaml"
-_ENTRIES: dict[str, type[BaseModel]] = {
-    "location": schema.Location,
-    "devices": schema.Device,
-    "airflows": schema.Airflow,
-    "floors": schema.FloorEntry,
-    "zones": schema.ZoneEntry,
-    "surfaces": schema.Surface,
-    "constructions": schema.Layer,
-}
+FORMAT = 3
+"""Number of the case format that is written."""
+#: Types of device that the only one of a type feeds for certain: an air handler its terminals, a boiler its radiators.
+_FED_BY_THE_ONLY = {"ahu": ("vav", "supply_air_terminal"), "boiler": ("radiator",)}
+
+
+def certain_feeders(types: Mapping[str, str]) -> dict[str, tuple[str, ...]]:
+    """Feeders that follow from the types of a building's devices alone.
+
+    Parameters
+    ----------
+    types
+        Type by device.
+
+    Returns
+    -------
+    dict
+        Feeders by device, of those devices only of which they are certain.
+
+    Examples
+    --------
+    >>> certain_feeders({"VAV_1": "vav", "AHU": "ahu", "BOILER": "boiler"})
+    {'VAV_1': ('AHU',)}
+    """
+    fed: dict[str, tuple[str, ...]] = {}
+    for kind, terminals in _FED_BY_THE_ONLY.items():
+        feeders = tuple(name for name, type_ in types.items() if type_ == kind)
+        if len(feeders) == 1:
+            fed |= {name: feeders for name, type_ in types.items() if type_ in terminals}
+    return fed
+
+
+def migrate(content: Mapping[str, Any], file: str) -> dict[str, Any]:
+    """Bring the content of a `building.yaml` to the present format.
+
+    Parameters
+    ----------
+    content
+        As parsed; what is malformed stays so, for the schema to refuse.
+    file
+        Name for messages.
+
+    Returns
+    -------
+    dict
+        Content of format 3; the argument is left alone.
+
+    Raises
+    ------
+    CaseError
+        The format is missing or unknown, or a key is of a later format than the file's.
+    """
+    if "format" not in content:
+        raise CaseError(f"{file}: format", "1, 2 or 3", "no such key", f"add 'format: {FORMAT}'")
+    number = content["format"]
+    if type(number) is not int or not 1 <= number <= FORMAT:
+        advice = "use a library that reads this format, or migrate the case"
+        raise CaseError(f"{file}: format", "1, 2 or 3", repr(number), advice)
+    if number == FORMAT:
+        return dict(content)
+    # Format 2 has four more points, of pressures; format 3 has feeders of devices and the quality of the geometry.
+    listed = content.get("devices")
+    devices = listed if isinstance(listed, list) and all(isinstance(device, dict) for device in listed) else []
+    later = ["geometry_quality"] if "geometry_quality" in content else []
+    later += [f"devices[{i}].fed_by" for i, device in enumerate(devices) if "fed_by" in device]
+    if later:
+        expected, advice = "a key of the file's own format", f"write 'format: {FORMAT}'"
+        raise CaseError(f"{file}: {later[0]}", expected, repr(later[0].rpartition(".")[2]), advice)
+    fed = certain_feeders({str(device.get("name")): str(device.get("type")) for device in devices})
+    if fed:
+        new = [d | ({"fed_by": [*fed[str(d["name"])]]} if str(d.get("name")) in fed else {}) for d in devices]
+        content = {**content, "devices": new}
+    return {**content, "format": FORMAT}
 
 
 class _Loader(yaml.SafeLoader):
@@ -123,13 +186,20 @@ def _named(error: ValidationError) -> CaseError:
     where, found = f"{NAME}: {path}", repr(first["input"])
     if first["type"] == "extra_forbidden":
         key = first["loc"][-1]
-        model = schema.BuildingFile if len(first["loc"]) == 1 else _ENTRIES[str(first["loc"][0])]
+        fields_ = schema.BuildingFile.model_fields
+        model = schema.BuildingFile if len(first["loc"]) == 1 else _models(fields_[str(first["loc"][0])].annotation)[0]
         keys = [field.alias or name for name, field in model.model_fields.items()]
         return CaseError(describe(where, "a key of the format", repr(key), nearest(key, keys)) + more)
     if first["type"] == "missing":
         return CaseError(describe(where, "a value", "no such key") + more)
     found = found if len(found) <= 80 else found[:77] + "..."
     return CaseError(describe(where, _expected(first), found, _advice(first)) + more)
+
+
+def _models(annotation: Any) -> list[type[BaseModel]]:
+    """List the models that stand in the annotation of a field."""
+    inner = [model for part in get_args(annotation) for model in _models(part)]
+    return inner or ([annotation] if isinstance(annotation, type) and issubclass(annotation, BaseModel) else [])
 
 
 def _expected(detail: ErrorDetails) -> str:
@@ -174,22 +244,17 @@ def load_case(path: str | PathLike[str]) -> Case:
     """
     folder = Path(path)
     try:
-        return _load(folder)
+        parsed = read_building_file(folder)
+        check_units(parsed.units)
+        building = _building(parsed, folder)
+        check_building(building, {floor.name: floor.plan for floor in parsed.floors or ()})
+        file = _file(folder, parsed.telemetry, "telemetry")
+        telemetry = read_telemetry(file, parsed.units, parsed.location)
+        check_columns(building, list(telemetry.frame.columns), file.name)
     except CaseError as error:
         error.args = (f"{folder}: {error}",)
         raise
-
-
-def _load(folder: Path) -> Case:
-    parsed = read_building_file(folder)
-    check_units(parsed.units)
-    building = _building(parsed, folder)
-    plan_files = {floor.name: floor.plan for floor in parsed.floors or ()}
-    check_building(building, plan_files)
-    file = _file(folder, parsed.telemetry, "telemetry")
-    telemetry = read_telemetry(file, parsed.units, parsed.location)
-    check_columns(building, list(telemetry.frame.columns), file.name)
-    return Case(building=building, telemetry=telemetry, path=folder)
+    return Case(building, telemetry, folder)
 
 
 def _building(parsed: BuildingFile, folder: Path) -> Building:

@@ -18,14 +18,15 @@ from pydantic import BaseModel
 
 from thermal.case.building import Building, FloorPlans
 from thermal.case.case import Case
-from thermal.case.load import NAME, load_case
-from thermal.case.migration import FORMAT
+from thermal.case.load import FORMAT, NAME, load_case
 from thermal.case.points import POINT_TYPES, split_column
 from thermal.case.telemetry import Telemetry
 from thermal.errors import CaseError
 from thermal.units import QUANTITIES, from_si
 
 TELEMETRY_FILE = "telemetry.parquet"
+# Keys of the file that are fields of the building: before its geometry, and after it.
+_WHOLE, _PARTS = ("name", "location", "orientation", "geometry_quality"), ("devices", "airflows", "weather_station")
 
 
 def save_case(case: Case, path: str | PathLike[str], *, overwrite: bool = False) -> Path:
@@ -63,7 +64,7 @@ def save_case(case: Case, path: str | PathLike[str], *, overwrite: bool = False)
     PosixPath('cases/pilot')
     """
     target = Path(path)
-    _check_target(target, overwrite)
+    check_target(target, overwrite)
     telemetry = Telemetry.from_frame(case.telemetry.frame)
     reported = telemetry.frame.drop(index=pd.Index(case.telemetry.missing_rows))
     target.parent.mkdir(parents=True, exist_ok=True)
@@ -88,7 +89,21 @@ def _move_in(new: Path, target: Path, old: Path) -> None:
         raise
 
 
-def _check_target(target: Path, overwrite: bool) -> None:
+def check_target(target: Path, overwrite: bool) -> None:
+    """Refuse a place where no case can be saved.
+
+    Parameters
+    ----------
+    target
+        Folder to make.
+    overwrite
+        Whether a case that is there already may be replaced.
+
+    Raises
+    ------
+    CaseError
+        There is a file, or a folder that holds something and may not, or no case, to be replaced.
+    """
     if not target.exists():
         return
     if not target.is_dir():
@@ -118,19 +133,16 @@ def _write(building: Building, frame: pd.DataFrame, folder: Path) -> None:
 
 def _content(building: Building, frame: pd.DataFrame) -> dict[str, Any]:
     points = dict.fromkeys(split_column(str(column), TELEMETRY_FILE)[1] for column in frame.columns)
-    return {
-        "format": FORMAT,
-        "name": building.name,
-        "location": building.location,
-        "orientation": building.orientation,
-        "geometry_quality": building.geometry_quality,
-        **_geometry(building),
-        "devices": building.devices,
-        "airflows": building.airflows,
-        "weather_station": building.weather_station,
-        "telemetry": TELEMETRY_FILE,
-        "units": {point: QUANTITIES[POINT_TYPES[point].quantity].file_unit for point in points},
-    }
+    units = {point: QUANTITIES[POINT_TYPES[point].quantity].file_unit for point in points}
+    whole, parts = ({key: getattr(building, key) for key in keys} for keys in (_WHOLE, _PARTS))
+    geometry = building.geometry
+    if isinstance(geometry, FloorPlans):
+        files = zip(geometry.floors, _plan_files(geometry), strict=True)
+        floors = [{"name": floor.name, "height": floor.height, "plan": file} for floor, file in files]
+        shape = {"cell_size": geometry.cell_size, "floors": floors, "glazing": geometry.glazing}
+    else:
+        shape = {key: getattr(geometry, key) for key in ("zones", "surfaces", "constructions")}
+    return {"format": FORMAT, **whole, **shape, **parts, "telemetry": TELEMETRY_FILE, "units": units}
 
 
 def _plain(content: Any) -> Any:
@@ -142,21 +154,6 @@ def _plain(content: Any) -> Any:
     if isinstance(content, list | tuple):
         return [_plain(value) for value in content]
     return str(content) if isinstance(content, str) else content.item() if isinstance(content, np.generic) else content
-
-
-def _geometry(building: Building) -> dict[str, Any]:
-    geometry = building.geometry
-    if isinstance(geometry, FloorPlans):
-        files = _plan_files(geometry)
-        return {
-            "cell_size": geometry.cell_size,
-            "floors": [
-                {"name": floor.name, "height": floor.height, "plan": file}
-                for floor, file in zip(geometry.floors, files, strict=True)
-            ],
-            "glazing": geometry.glazing,
-        }
-    return {key: getattr(geometry, key) for key in ("zones", "surfaces", "constructions")}
 
 
 def _plan_files(plans: FloorPlans) -> list[str]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from decimal import Decimal
 from pathlib import Path
@@ -88,15 +88,12 @@ class Telemetry:
 
 
 def _as_numbers(frame: pd.DataFrame, where: str) -> pd.DataFrame:
-    try:
-        return frame.astype(float)
-    except (TypeError, ValueError):
-        for column in frame.columns:
-            try:
-                frame[column].astype(float)
-            except (TypeError, ValueError) as error:
-                raise CaseError(f"{where}: column {str(column)!r}", "numbers", " ".join(str(error).split())) from error
-        raise
+    for column in frame.columns:
+        try:
+            frame[column].astype(float)
+        except (TypeError, ValueError) as error:
+            raise CaseError(f"{where}: column {str(column)!r}", "numbers", " ".join(str(error).split())) from error
+    return frame.astype(float)
 
 
 def _checked_index(index: pd.Index, where: str) -> pd.DatetimeIndex:
@@ -243,23 +240,16 @@ def _read_csv(path: Path) -> pd.DataFrame:
     columns = dict(enumerate(zip(*rows, strict=True))) if rows else dict.fromkeys(range(len(header)), ())
     stamps = _parse_stamps(columns.pop(header.index(INDEX)), path.name)
     names = [header[position] for position in columns]
-    values = [
-        _parse_numbers(texts, stamps, f"{path.name}: column {name!r}")
-        for name, texts in zip(names, columns.values(), strict=True)
-    ]
-    frame = pd.DataFrame(dict(enumerate(values)), index=stamps, columns=range(len(names)))
+    frame = pd.DataFrame({k: [_cell(text) for text in texts] for k, texts in columns.items()}, index=stamps)
     return frame.set_axis(names, axis=1)
 
 
-def _parse_numbers(texts: Sequence[str], stamps: pd.DatetimeIndex, where: str) -> NDArray[np.float64]:
-    values = np.full(len(texts), np.nan)
-    for position, text in enumerate(texts):
-        try:
-            if text.strip().casefold() not in MISSING:
-                values[position] = float(text)
-        except ValueError as error:
-            raise _not_numeric(where, stamps[position], text) from error
-    return values
+def _cell(text: str) -> float | str:
+    """Return the number in a cell of a CSV, NaN where it is missing, and the text where it is no number."""
+    try:
+        return np.nan if text.strip().casefold() in MISSING else float(text)
+    except ValueError:
+        return text
 
 
 def _parse_stamps(texts: Iterable[str], file: str) -> pd.DatetimeIndex:
@@ -278,19 +268,12 @@ def _parse_stamps(texts: Iterable[str], file: str) -> pd.DatetimeIndex:
 
 
 def _numbers(column: pd.Series, where: str) -> NDArray[np.float64]:
-    if pd.api.types.is_numeric_dtype(column.dtype) and not (
-        pd.api.types.is_bool_dtype(column.dtype) or pd.api.types.is_complex_dtype(column.dtype)
-    ):
+    if column.dtype.kind in "iuf":
         return column.to_numpy(dtype=float, na_value=np.nan)
     values = np.full(len(column), np.nan)
     for position, (stamp, value) in enumerate(column.items()):
         if isinstance(value, int | float | Decimal) and not isinstance(value, bool):
             values[position] = float(value)
         elif value is not None and value is not pd.NA and value is not pd.NaT:
-            raise _not_numeric(where, stamp, value)
+            raise CaseError(f"{where}, stamp {stamp}", "a number", repr(value), "leave a missing value blank or NaN")
     return values
-
-
-def _not_numeric(where: str, stamp: object, value: object) -> CaseError:
-    advice = "leave a missing value blank or NaN"
-    return CaseError(f"{where}, stamp {stamp}", "a number", repr(value), advice)

@@ -8,6 +8,7 @@ from graphlib import CycleError, TopologicalSorter
 import numpy as np
 from scipy import ndimage
 
+from thermal.case import points
 from thermal.case.building import (
     DEVICE_TYPES,
     FACADES,
@@ -23,20 +24,13 @@ from thermal.case.building import (
     ZoneTable,
 )
 from thermal.case.plan import check_plan, facade_areas
-from thermal.case.points import (
-    DISCHARGE_TEMPERATURE,
-    HEATING_POWER,
-    OUTDOOR_TEMPERATURE,
-    SUPPLY_FLOW,
-    ZONE_TEMPERATURE,
-    split_column,
-)
 from thermal.case.telemetry import Telemetry
 from thermal.errors import CaseError, check_known, nearest
 
 _ZONE, _DEVICE = ("a zone of the building", CaseError), ("a device of the building", CaseError)
 RESERVED = frozenset({OUTDOOR, GROUND, *PLAN_TOKENS})
 GLAZING_TOLERANCE = 1.01  # drawings are rounded: a facade may be overdrawn by 1 %
+_OF_DEVICES = (points.SUPPLY_FLOW, points.DISCHARGE_TEMPERATURE, points.HEATING_POWER)
 _LAYERED = frozenset({"wall", "floor", "ceiling"})
 _PROPERTIES: dict[str, frozenset[str]] = {  # what a kind needs; what another kind needs it must not have
     **dict.fromkeys(_LAYERED, frozenset({"construction"})),
@@ -103,7 +97,7 @@ def check_columns(building: Building, columns: Collection[str], file: str) -> No
     zones, boundaries = building.zone_names, building.measured_boundaries
     if isinstance(building.geometry, ZoneTable):
         for index, surface in enumerate(building.geometry.surfaces):
-            column = f"{surface.other}/{ZONE_TEMPERATURE}"
+            column = f"{surface.other}/{points.ZONE_TEMPERATURE}"
             if surface.other in boundaries and column not in columns:
                 where = f"building.yaml: surfaces[{index}] ({surface.name}): other"
                 expected = f"a zone, outdoor, ground, or a boundary with the column {column!r} in {file}"
@@ -111,7 +105,7 @@ def check_columns(building: Building, columns: Collection[str], file: str) -> No
     entities = [*(device.name for device in building.devices), *zones, *boundaries, building.weather_station]
     for column in columns:
         expected = "a device, a zone, a measured boundary or the weather station before the slash"
-        check_known(split_column(column, file)[0], entities, f"{file}: column {column!r}", expected, CaseError)
+        check_known(points.split_column(column, file)[0], entities, f"{file}: column {column!r}", expected, CaseError)
 
 
 def _check_zones(building: Building, file: str) -> None:
@@ -286,15 +280,15 @@ def _on_devices(building: Building, columns: set[str]) -> Iterator[str]:
     for name, kind in unknown_device_types(building).items():
         yield f"device {name!r} has the unknown type {kind!r} ({nearest(kind, DEVICE_TYPES)})"
     for device in building.devices:
-        has = {p for p in (SUPPLY_FLOW, DISCHARGE_TEMPERATURE, HEATING_POWER) if f"{device.name}/{p}" in columns}
+        has = {point for point in _OF_DEVICES if f"{device.name}/{point}" in columns}
         if not any(column.startswith(f"{device.name}/") for column in columns):
             yield f"device {device.name!r} has no telemetry"
         if device.zone is None:
-            if device.type in TERMINAL_TYPES or has & {HEATING_POWER, DISCHARGE_TEMPERATURE}:
+            if device.type in TERMINAL_TYPES or has & {points.HEATING_POWER, points.DISCHARGE_TEMPERATURE}:
                 yield f"device {device.name!r} ({device.type}) serves no zone: its heat is not counted"
-        elif has == {DISCHARGE_TEMPERATURE} or (device.type in TERMINAL_TYPES and not has):
+        elif has == {points.DISCHARGE_TEMPERATURE} or (device.type in TERMINAL_TYPES and not has):
             yield f"device {device.name!r} reports neither flow nor power: the heat of zone {device.zone!r} is unknown"
-        elif SUPPLY_FLOW in has and DISCHARGE_TEMPERATURE not in has:
+        elif points.SUPPLY_FLOW in has and points.DISCHARGE_TEMPERATURE not in has:
             zone = f"the heat of zone {device.zone!r} is unknown while air flows"
             yield f"device {device.name!r} reports a flow without a discharge temperature: {zone}"
 
@@ -302,7 +296,7 @@ def _on_devices(building: Building, columns: set[str]) -> Iterator[str]:
 def _on_airflows(building: Building, columns: set[str]) -> Iterator[str]:
     zone_of = {device.name: device.zone for device in building.devices}
     for name in dict.fromkeys(airflow.device for airflow in building.airflows):
-        if f"{name}/{SUPPLY_FLOW}" not in columns:
+        if f"{name}/{points.SUPPLY_FLOW}" not in columns:
             yield f"airflows: device {name!r} reports no flow: the air that goes on is unknown"
         surplus: dict[str, float] = {}
         for airflow in building.airflows:
@@ -317,12 +311,12 @@ def _on_airflows(building: Building, columns: set[str]) -> Iterator[str]:
 def _on_temperatures(building: Building, columns: set[str]) -> Iterator[str]:
     for zone in building.zone_names:
         entities = [zone, *(device.name for device in building.devices_of(zone))]
-        if not any(f"{entity}/{ZONE_TEMPERATURE}" in columns for entity in entities):
+        if not any(f"{entity}/{points.ZONE_TEMPERATURE}" in columns for entity in entities):
             yield f"nothing measures the temperature of zone {zone!r}"
-    if f"{building.weather_station}/{OUTDOOR_TEMPERATURE}" not in columns:
-        others = sorted(column for column in columns if column.endswith(f"/{OUTDOOR_TEMPERATURE}"))
+    if f"{building.weather_station}/{points.OUTDOOR_TEMPERATURE}" not in columns:
+        others = sorted(column for column in columns if column.endswith(f"/{points.OUTDOOR_TEMPERATURE}"))
         source = f"{', '.join(others)} stands in" if others else "nothing measures the outdoors"
-        yield f"the weather station {building.weather_station!r} has no {OUTDOOR_TEMPERATURE}: {source}"
+        yield f"the weather station {building.weather_station!r} has no {points.OUTDOOR_TEMPERATURE}: {source}"
 
 
 def _on_entities(building: Building, columns: set[str]) -> Iterator[str]:
@@ -330,7 +324,7 @@ def _on_entities(building: Building, columns: set[str]) -> Iterator[str]:
     devices = {device.name: device for device in building.devices}
     for column in sorted(columns):
         entity, _, point = column.rpartition("/")
-        if entity in places and point in {SUPPLY_FLOW, DISCHARGE_TEMPERATURE, HEATING_POWER}:
+        if entity in places and point in _OF_DEVICES:
             yield f"column {column!r} is not of a device: it is not used"
-        if entity in devices and point == ZONE_TEMPERATURE and devices[entity].zone is None:
+        if entity in devices and point == points.ZONE_TEMPERATURE and devices[entity].zone is None:
             yield f"column {column!r} is of a device that serves no zone: it is not used"

@@ -16,8 +16,7 @@ from thermal.errors import ModelError
 from thermal.model.matrices import Matrices, SymbolicModel
 from thermal.model.replay import LEAST_SPIN_UP, SPIN_UP, replay_inputs, spin_up
 from thermal.model.step import SCHEMES, Stepper
-from thermal.network.assembly import Extension
-from thermal.network.build import build_network
+from thermal.network.build import Extension, build_network
 from thermal.network.structure import SHUFFLE_STEP
 from thermal.parameters import Scope
 from thermal.shuffle.random import RandomShuffle

@@ -3,25 +3,83 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
+import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from thermal._types import FloatArray
+from thermal._types import FloatArray, IntArray
 from thermal.case.building import Building, FloorPlans, ZoneTable
 from thermal.case.plan import facade_areas, zone_floor_areas
 from thermal.errors import ModelError
-from thermal.network.assembly import Blueprint, Extension
 from thermal.network.floor import Floor, Zone
 from thermal.network.graph import GraphBuilder
 from thermal.network.grid import floor_grid
 from thermal.network.network import ThermalNetwork
 from thermal.network.structure import BASELINE, Structure
-from thermal.network.table import table_blueprint
+from thermal.network.table import add_table
 from thermal.network.topology import UNKNOWN_GLAZING, VERTICAL, Pane, azimuth_of, partition_areas, stacked_areas
 from thermal.network.walls import Walls
 from thermal.parameters import Scope
 from thermal.units import AIR_HEAT_CAPACITY, air_density
+
+
+class Extension(Protocol):
+    """An effect, as the builders of a network see it."""
+
+    def extend(self, graph: GraphBuilder) -> None:
+        """Add its volumes, faces, sources and parameters to a graph whose baseline is complete.
+
+        Parameters
+        ----------
+        graph : GraphBuilder
+            With its anatomy.
+        """
+
+
+@dataclass(frozen=True)
+class Blueprint:
+    """A building's baseline, from which its networks with one set of effects after another are made.
+
+    Parameters
+    ----------
+    graph : GraphBuilder
+        Complete but for effects.
+    air, zone : ndarray of int, shape (n_air,)
+        Air volumes and the numbers of their zones.
+    mean, share : ndarray, shape (n_air,)
+        Weight of each volume in the mean of its zone, and share of the zone's heat that it gets [-].
+    spacing : float, optional
+        Distance between the volumes of a plan [m].
+    floor_shapes : tuple of (int, int)
+        Rows and columns of each floor's grid.
+    """
+
+    graph: GraphBuilder
+    air: IntArray
+    zone: IntArray
+    mean: FloatArray
+    share: FloatArray
+    spacing: float | None = None
+    floor_shapes: tuple[tuple[int, int], ...] = ()
+
+    def network(self, effects: Sequence[Extension] = ()) -> ThermalNetwork:
+        """Make the network with effects.
+
+        Parameters
+        ----------
+        effects : sequence of Extension
+            What is added to the baseline.
+        """
+        graph = self.graph.copy()
+        for effect in effects:
+            effect.extend(graph)
+        shape = (graph.size, len(graph.zones))
+        heating = sp.csr_matrix((self.share, (self.air, self.zone)), shape=shape)
+        observation = sp.csr_matrix((self.mean, (self.zone, self.air)), shape=shape[::-1])
+        return graph.finish(observation, heating, graph.anatomy.airflows, self.spacing, self.floor_shapes)
 
 
 def _remember(
@@ -142,7 +200,8 @@ def blueprint(
     place = graph.zones.index
     graph.anatomy.airflows = tuple((place(a.source), place(a.target)) for a in building.airflows)
     if isinstance(plans, ZoneTable):
-        return table_blueprint(graph, plans)
+        air, ones = add_table(graph, plans), np.ones(len(graph.zones))
+        return Blueprint(graph, air, np.arange(len(graph.zones)), ones, ones)
     unknown = sorted(set(diffusers or {}) - set(building.zone_names))
     if unknown:
         raise ModelError(f"diffusers: zones {unknown} are not of this building; it has {list(building.zone_names)}")

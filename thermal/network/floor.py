@@ -301,10 +301,8 @@ class Floor:
         cells = grid.tokens == name
         if mask is not None:
             if np.shape(mask) != self.plan.tokens.shape:
-                raise ModelError(
-                    f"diffusers of {name}: expected a mask of the plan's shape {self.plan.tokens.shape}, "
-                    f"got {np.shape(mask)}"
-                )
+                expected = f"a mask of the plan's shape {self.plan.tokens.shape}"
+                raise ModelError(f"diffusers of {name}", expected, f"{np.shape(mask)}")
             if not (mask & (np.asarray(self.plan.tokens) == name)).any():
                 raise ModelError(f"diffusers of {name}: expected at least one cell of the zone, got none")
             cells &= np.pad(np.repeat(np.repeat(mask, split, axis=0), split, axis=1), 1)

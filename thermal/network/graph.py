@@ -179,9 +179,8 @@ class GraphBuilder:
         weight : float or ndarray, shape (n,)
             Geometry, so that κ times weight is in [W/K].
         """
-        first, second, weight = np.broadcast_arrays(
-            np.atleast_1d(first), np.atleast_1d(second), np.asarray(weight, float)
-        )
+        ends = np.atleast_1d(first), np.atleast_1d(second)
+        first, second, weight = np.broadcast_arrays(*ends, np.asarray(weight, float))
         self._faces.setdefault(key, (ca.SX(value), []))[1].append((first, second, weight))
 
     def source(self, key: str, value: Any, node: Any, signal: Signal, weight: Any) -> None:
@@ -332,13 +331,10 @@ class GraphBuilder:
             if scope == "global" or any(p.base == name and p.scope == scope for p in made):
                 continue
             if not any(p.base == name for p in made):
-                raise ModelError(
-                    f"scopes: {name} is no parameter of this building with {self.structure}; "
-                    f"it has {sorted({p.base for p in made})}"
-                )
-            fitting = (
-                "the scopes global and facade fit" if name in ENVELOPE_PARAMETERS else "only the global scope fits"
-            )
+                place = f"this building with {self.structure}; it has {sorted({p.base for p in made})}"
+                raise ModelError(f"scopes: {name} is no parameter of {place}")
+            outer = name in ENVELOPE_PARAMETERS
+            fitting = "the scopes global and facade fit" if outer else "only the global scope fits"
             raise ModelError(f"scopes: {name} belongs to no single {scope} of this building; {fitting} it")
 
 
@@ -352,9 +348,8 @@ def _check_scopes(scopes: Mapping[str, Scope], zones: tuple[str, ...]) -> None:
         raise ModelError(f"scopes: expected one of {get_args(Scope)} for each parameter, got {odd}")
     inner = sorted(name for name, scope in scopes.items() if scope == "facade" and name not in ENVELOPE_PARAMETERS)
     if inner:
-        raise ModelError(
-            f"scopes: {inner} belong to no facade; these may have one value a facade: {list(ENVELOPE_PARAMETERS)}"
-        )
+        fitting = list(ENVELOPE_PARAMETERS)
+        raise ModelError(f"scopes: {inner} belong to no facade; these may have one value a facade: {fitting}")
     confused = sorted(zone for zone in zones if zone.startswith(FACADE_PREFIX))
     if confused and any(scope != "global" for scope in scopes.values()):
         raise ModelError(f"scopes: zones {confused} are named as the facades of parameters are; rename them")

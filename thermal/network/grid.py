@@ -94,11 +94,8 @@ def _resolution(cell_size: float, dx: float | None) -> tuple[int, Fraction]:
     ratio = Fraction(cell_size / dx).limit_denominator(1000)
     if ratio > 1:
         if ratio.denominator != 1:
-            split = max(2, round(cell_size / dx))
-            raise ModelError(
-                f"cell size {dx} m does not divide the plan's cells of {cell_size} m; "
-                f"nearest that does: {cell_size / split:g} m"
-            )
+            near = f"nearest that does: {cell_size / max(2, round(cell_size / dx)):g} m"
+            raise ModelError(f"cell size {dx} m does not divide the plan's cells of {cell_size} m; {near}")
         return int(ratio), Fraction(1)
     return 1, 1 / ratio
 
@@ -168,11 +165,9 @@ def _refuse_swallowed_zones(plan: FloorPlan, tokens: NDArray[np.str_], merge: fl
         rows, columns = np.nonzero(tokens == zone)
         extent = min(np.ptp(rows), np.ptp(columns)) + 1
         if extent + 1 < merge:
-            raise ModelError(
-                f"cell size {merge * cell_size:g} m on floor {plan.name}: zone {zone} is only "
-                f"{extent * cell_size:g} m wide and would merge with its neighbour; "
-                f"use at most {(extent + 1) * cell_size:g} m"
-            )
+            where, advice = f"cell size on floor {plan.name}", "wider ones merge the zone with its neighbour"
+            expected = f"at most {(extent + 1) * cell_size:g} m, as zone {zone} is {extent * cell_size:g} m wide"
+            raise ModelError(where, expected, f"{merge * cell_size:g} m", advice)
 
 
 def wall_facades(grid: FloorGrid) -> dict[str, NDArray[np.float64]]:

@@ -184,9 +184,8 @@ class ThermalNetwork:
         names = [p.name for p in self.parameters]
         fixed = sorted(set(given) & set(self.nominal))
         if fixed:
-            raise ModelError(
-                f"{fixed} are nominal: only their product with the heat capacity counts, so give that instead"
-            )
+            advice = "only their product with the heat capacity counts, so give that instead"
+            raise ModelError(f"{fixed} are nominal: {advice}")
         unknown = sorted(set(given) - set(names))
         if unknown:
             raise ModelError(f"parameters {unknown} are not of this building; it has {names}")

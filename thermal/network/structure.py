@@ -121,9 +121,8 @@ class Structure:
             if name == "wall_nodes" and value is None:
                 continue
             if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= MOST_NODES:
-                raise ModelError(
-                    f"structure.{name}: expected a whole number from {least} to {MOST_NODES}, got {value!r}"
-                )
+                expected = f"a whole number from {least} to {MOST_NODES}"
+                raise ModelError(f"structure.{name}: expected {expected}, got {value!r}")
 
     @classmethod
     def paper(cls) -> Structure:

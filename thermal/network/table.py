@@ -8,10 +8,9 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
-from thermal._types import FloatArray
+from thermal._types import FloatArray, IntArray
 from thermal.case.building import Layer, Surface, ZoneTable
 from thermal.errors import ModelError
-from thermal.network.assembly import Blueprint
 from thermal.network.floor import Zone
 from thermal.network.graph import GraphBuilder
 from thermal.network.structure import (
@@ -105,8 +104,10 @@ _COMPASS = ("north", "east", "south", "west")
 _HORIZONTAL = {"ceiling": "roof", "floor": "floor"}
 
 
-def table_blueprint(graph: GraphBuilder, table: ZoneTable) -> Blueprint:
-    """Build the baseline of a building given by a zone table.
+def add_table(graph: GraphBuilder, table: ZoneTable) -> IntArray:
+    """Add the baseline of a building given by a zone table; boundaries are ``outdoor`` and the measured ones.
+
+    Surfaces to ``ground`` are adiabatic at their back (``ground_exchange`` is an effect of the catalogue).
 
     Parameters
     ----------
@@ -117,9 +118,8 @@ def table_blueprint(graph: GraphBuilder, table: ZoneTable) -> Blueprint:
 
     Returns
     -------
-    Blueprint
-        Boundaries ``outdoor`` and the measured ones. Surfaces to ``ground`` are adiabatic at their back
-        (``ground_exchange`` is an effect of the catalogue).
+    ndarray of int, shape (n_zone,)
+        Air volume of each zone [-].
     """
     zones: dict[str, Zone] = {}
     for entry in table.zones:
@@ -131,8 +131,7 @@ def table_blueprint(graph: GraphBuilder, table: ZoneTable) -> Blueprint:
         _add_surface(graph, zones, surface, table)
     for entry in table.zones:
         zones[entry.name].room(entry.floor_area, entry.volume)
-    air, ones = np.concatenate([zones[z].air for z in graph.zones]), np.ones(len(zones))
-    return Blueprint(graph, air, np.arange(len(zones)), ones, ones)
+    return np.concatenate([zones[z].air for z in graph.zones])
 
 
 def _add_surface(graph: GraphBuilder, zones: Mapping[str, Zone], surface: Surface, table: ZoneTable) -> None:

@@ -24,8 +24,8 @@ from thermal.case.building import (
 )
 from thermal.case.case import Case
 from thermal.case.load import load_case
-from thermal.case.save import save_case
-from thermal.errors import CaseError, ThermalError
+from thermal.case.save import check_target, save_case
+from thermal.errors import ThermalError
 from thermal.model.simulator import Simulator
 from thermal.pilot.outline import Mask, draw_outline, exterior_ring
 from thermal.pilot.partition import Region, partition
@@ -96,7 +96,16 @@ def generate_office(
     low, high = window_to_wall_ratio
     if seed < 0:
         raise ThermalError(f"seed: expected 0 or more, found {seed}")
-    _check_size(floor_area, zones, floors, cell_size, height, min_zone_area)
+    given = {"floor_area": floor_area, "cell_size": cell_size, "height": height, "min_zone_area": min_zone_area}
+    for name, value in given.items():
+        if not (np.isfinite(value) and value > 0.0):
+            raise ThermalError(name, "a positive number", f"{value}")
+    if floors < 1 or zones < floors:
+        raise ThermalError(f"zones: expected at least one a floor on one or more floors, found {zones} on {floors}")
+    most = int(floor_area / (_MEAN_OVER_SMALLEST * min_zone_area))
+    if zones > most:
+        mean = f"{_MEAN_OVER_SMALLEST} times min_zone_area ({min_zone_area} m2) on average"
+        raise ThermalError("zones", f"at most {most} on {floor_area} m2, so that they have {mean}", f"{zones}")
     if not 0.0 <= low <= high <= 1.0:
         raise ThermalError(f"window_to_wall_ratio: expected (smallest, largest) between 0 and 1, found {low, high}")
     counts = [zones // floors + (floor < zones % floors) for floor in range(floors)]
@@ -112,11 +121,9 @@ def generate_office(
             storeys.append(FloorPlan(f"F{number}", height, _tokens(f"F{number}", mask, regions)))
         if len(storeys) == floors:
             return FloorPlans(cell_size, tuple(storeys), _glazing(rng, storeys, cell_size, window_to_wall_ratio))
-    raise ThermalError(
-        f"zones: expected a number that fits {floor_area} m2 on {floors} floor(s), each {min_zone_area} m2 or more, "
-        f"found {zones}, for which {_OUTLINES} outlines gave no plan; ask for fewer zones, or a smaller cell_size than "
-        f"{cell_size} m"
-    )
+    expected = f"a number that fits {floor_area} m2 on {floors} floor(s), each {min_zone_area} m2 or more"
+    found = f"{zones}, for which {_OUTLINES} outlines gave no plan"
+    raise ThermalError("zones", expected, found, f"ask for fewer zones, or a smaller cell_size than {cell_size} m")
 
 
 def devices(plans: FloorPlans) -> tuple[Device, ...]:
@@ -134,16 +141,10 @@ def devices(plans: FloorPlans) -> tuple[Device, ...]:
     tuple of Device
         Terminals in the order of the zones, named ``VAV_<zone>``, then ``AHU_<floor>``, ``BOILER``, ``CHILLER``.
     """
-    return (
-        *(
-            Device(name=f"VAV_{zone}", type="vav", zone=zone, fed_by=(f"AHU_{floor.name}", "BOILER"))
-            for floor in plans.floors
-            for zone in floor.zone_names
-        ),
-        *(Device(name=f"AHU_{floor.name}", type="ahu", fed_by=("BOILER", "CHILLER")) for floor in plans.floors),
-        Device(name="BOILER", type="boiler"),
-        Device(name="CHILLER", type="chiller"),
-    )
+    zones = [(zone, f"AHU_{floor.name}") for floor in plans.floors for zone in floor.zone_names]
+    terminals = (Device(name=f"VAV_{zone}", type="vav", zone=zone, fed_by=(ahu, "BOILER")) for zone, ahu in zones)
+    handlers = (Device(name=f"AHU_{floor.name}", type="ahu", fed_by=("BOILER", "CHILLER")) for floor in plans.floors)
+    return (*terminals, *handlers, Device(name="BOILER", type="boiler"), Device(name="CHILLER", type="chiller"))
 
 
 def _tokens(floor: str, mask: Mask, regions: list[Region]) -> npt.NDArray[np.str_]:
@@ -168,11 +169,8 @@ def _glazing(
     for storey in storeys:
         exposed = {side: _exposed_cells(storey, turns) for turns, side in enumerate(FACADES)}
         for zone in storey.zone_names:
-            areas = {
-                side: round(cells[zone] * cell_size * storey.height * rng.uniform(*ratio), _GLAZING_DECIMALS)
-                for side, cells in exposed.items()
-                if zone in cells
-            }
+            walls = [(side, of[zone] * cell_size * storey.height) for side, of in exposed.items() if zone in of]
+            areas = {side: round(wall * rng.uniform(*ratio), _GLAZING_DECIMALS) for side, wall in walls}
             if areas:
                 glazing[zone] = MappingProxyType(areas)
     return MappingProxyType(glazing)
@@ -184,24 +182,6 @@ def _exposed_cells(storey: FloorPlan, turns: int) -> dict[str, int]:
     beside = tokens[1:][tokens[:-1] == EXTERIOR_WALL]
     names, cells = np.unique(beside, return_counts=True)
     return dict(zip(names.tolist(), cells.tolist(), strict=True))
-
-
-def _check_size(
-    floor_area: float, zones: int, floors: int, cell_size: float, height: float, min_zone_area: float
-) -> None:
-    """Refuse sizes that are no building."""
-    given = {"floor_area": floor_area, "cell_size": cell_size, "height": height, "min_zone_area": min_zone_area}
-    for name, value in given.items():
-        if not (np.isfinite(value) and value > 0.0):
-            raise ThermalError(f"{name}: expected a positive number, found {value}")
-    if floors < 1 or zones < floors:
-        raise ThermalError(f"zones: expected at least one a floor on one or more floors, found {zones} on {floors}")
-    most = int(floor_area / (_MEAN_OVER_SMALLEST * min_zone_area))
-    if zones > most:
-        raise ThermalError(
-            f"zones: expected at most {most} on {floor_area} m2, so that they have {_MEAN_OVER_SMALLEST} times "
-            f"min_zone_area ({min_zone_area} m2) on average, found {zones}"
-        )
 
 
 def pilot_building(
@@ -323,9 +303,7 @@ def generate_pilot(
         When a length is out of range or the plant does not fit the building.
     """
     at, target = settings or PilotSettings(), Path(path)
-    if target.exists() and not overwrite and (not target.is_dir() or any(target.iterdir())):  # before the long part
-        advice = "choose another folder or pass overwrite=True"
-        raise CaseError(str(target), "no folder or an empty one", "something there", advice)
+    check_target(target, overwrite)  # before the long part
     plans = generate_office(seed, floor_area=at.floor_area, zones=at.zones, floors=at.floors, cell_size=at.cell_size)
     building = Building(at.name, at.location, at.orientation, plans, devices(plans))
     weather = at.weather(seed, at.location, building.weather_station)

@@ -56,10 +56,8 @@ def draw_outline(rng: np.random.Generator, floor_area: float, cell_size: float, 
         mask = _nearest_area(float(aspect), (), floor_area, cell_size)
         if mask is not None:
             return mask
-    raise ThermalError(
-        f"floor area: expected one that whole cells of {cell_size} m come within {AREA_TOLERANCE:.1%} of, "
-        f"found {floor_area:.1f} m2 a floor; pass a smaller cell_size"
-    )
+    expected = f"one that whole cells of {cell_size} m come within {AREA_TOLERANCE:.1%} of"
+    raise ThermalError("floor area", expected, f"{floor_area:.1f} m2 a floor", "pass a smaller cell_size")
 
 
 def exterior_ring(mask: Mask) -> Mask:
@@ -169,11 +167,8 @@ def _nearest_area(aspect: float, notches: tuple[Notch, ...], floor_area: float, 
     cells = floor_area / cell_size**2
     free = 1.0 - sum(width * height for _, _, width, height in notches)
     depth = np.sqrt(cells / (aspect * free))
-    sizes = [
-        (round(depth) + more_rows, round(aspect * depth) + more_columns)
-        for more_rows in range(-3, 4)
-        for more_columns in range(-3, 4)
-    ]
+    near = range(-3, 4)
+    sizes = [(round(depth) + rows, round(aspect * depth) + columns) for rows in near for columns in near]
     masks = [(abs(_area(*size, notches) - cells), size) for size in sizes if min(size) > 0]
     if not masks or min(masks)[0] > AREA_TOLERANCE * cells:
         return None

@@ -68,13 +68,6 @@ def parts(kind: Kind, side: int, cells: Mask, exposed: Mask, share: float) -> li
         In row-major order; empty without cells.
     """
     labels, _ = ndimage.label(cells)
-    return _labelled(kind, side, labels, exposed, share)
-
-
-def _labelled(
-    kind: Kind, side: int, labels: npt.NDArray[np.signedinteger], exposed: Mask, share: float
-) -> list[Region]:
-    """Make a region of each label above 0."""
     regions = []
     for number, box in enumerate(ndimage.find_objects(labels), start=1):
         mask = labels[box] == number
@@ -156,7 +149,7 @@ def cut(
         before, behind = (labels[np.roll(wall, step, axis)] for step in (-1, 1))
         if np.any(before == behind):
             continue  # some of it would part nothing
-        pieces = _labelled(region.kind, region.side, labels, region.exposed, region.share)
+        pieces = parts(region.kind, region.side, region.mask & ~wall, region.exposed, region.share)
         if 2 <= len(pieces) <= most and all(is_habitable(piece, cell_size, min_zone_area) for piece in pieces):
             score = _quality(pieces) + 0.3 * rng.random()
             best = max(best, (score, pieces), key=lambda scored: scored[0])

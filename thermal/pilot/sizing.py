@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from thermal._types import FloatArray
-from thermal.case.building import Building, Device, FloorPlans, ZoneTable
+from thermal.case.building import Building, FloorPlans, ZoneTable
 from thermal.case.plan import zone_floor_areas
 from thermal.components.air_handler import AirHandler
 from thermal.components.boiler_loop import BoilerLoop
@@ -129,7 +128,10 @@ def size_system(
     density = air_density(building.location.elevation)
     handlers = tuple(_air_handler(float(flow[serving == k].sum()), at, density) for k in range(serving.max() + 1))
     coils = [h.heating for h in handlers if isinstance(h.heating, WaterCoil)]
-    emitters = {kind: _emitters(building, kind, devices, loss) for kind, devices in graph.emitters.items()}
+    emitters: dict[str, Group] = {}  # those of a zone share the heat that it loses
+    for kind, devices in graph.emitters.items():
+        zone = np.array([building.zone_names.index(str(device.zone)) for device in devices], dtype=np.intp)
+        emitters[kind] = COMPONENTS[kind].sized(loss[zone] / np.bincount(zone)[zone], zone)  # type: ignore[attr-defined]
     wet = [*coils, *emitters.values()]
     pump = Pump(float(terminals.water_flow.sum() + sum(np.sum(getattr(part, "water_flow", 0.0)) for part in wet)))
     capacity = float(reheat.sum()) + sum(c.air_flow * AIR_HEAT_CAPACITY * 12.0 for c in coils)
@@ -145,20 +147,12 @@ def size_system(
     return system
 
 
-def _emitters(building: Building, kind: str, devices: Sequence[Device], loss: FloatArray) -> Group:
-    """Size devices of a type for the heat that their zones lose, which those of a zone share."""
-    zone = np.array([building.zone_names.index(str(device.zone)) for device in devices], dtype=np.intp)
-    made: Group = COMPONENTS[kind].sized(loss[zone] / np.bincount(zone)[zone], zone)  # type: ignore[attr-defined]
-    return made
-
-
 def _air_handler(flow: float, at: DesignConditions, density: float) -> AirHandler:
     """Size an air handler for the flow of its terminals: fans, cooling, and heating of the winter's mixed air."""
     supplied = _DIVERSITY * flow
     cooling = 1.3 * AIR_HEAT_CAPACITY * supplied * (at.cooling + 1.0 - at.supply_air)  # a quarter is latent
-    heating = WaterCoil.sized(
-        12.0 * AIR_HEAT_CAPACITY * supplied, supplied, at.supply_air - 4.0, water_temperature=at.supply_water
-    )
+    power, mixed = 12.0 * AIR_HEAT_CAPACITY * supplied, at.supply_air - 4.0
+    heating = WaterCoil.sized(power, supplied, mixed, water_temperature=at.supply_water)
     supply, exhaust = (Fan(supplied, 1000.0, 250.0, air_density=density),
                        Fan(supplied, 300.0, 100.0, air_density=density))  # fmt: skip
     return AirHandler(supply, exhaust, CoolingCoil(cooling), heating, enthalpy_limit=64_000.0)

@@ -103,10 +103,8 @@ class TelemetrySettings:
 
     def __post_init__(self) -> None:
         if min(self.seed, self.spin_up_days, self.noise, self.resolution) < 0.0:
-            raise ThermalError(
-                "telemetry: expected seed, spin_up_days, noise and resolution of 0 or more, "
-                f"found {self.seed}, {self.spin_up_days} d, {self.noise} K and {self.resolution} K"
-            )
+            found = f"{self.seed}, {self.spin_up_days} d, {self.noise} K and {self.resolution} K"
+            raise ThermalError("telemetry", "seed, spin_up_days, noise and resolution of 0 or more", found)
 
 
 def generate_telemetry(
@@ -176,11 +174,8 @@ def generate_telemetry(
         HEATING_SETPOINT: setpoints[0],
         COOLING_SETPOINT: setpoints[1],
     }
-    columns = {
-        f"VAV_{zone}/{point}": values[:, number]
-        for number, zone in enumerate(plant.zone_names)
-        for point, values in points.items()
-    }
+    names = [(k, zone, point) for k, zone in enumerate(plant.zone_names) for point in points]
+    columns = {f"VAV_{zone}/{point}": points[point][:, k] for k, zone, point in names}
     frame = pd.concat([weather, pd.DataFrame(columns, index=index)], axis=1)
     return Telemetry.from_frame(frame.iloc[skipped:], where="generated telemetry")
 
@@ -218,10 +213,8 @@ def _temperatures(values: FloatArray, n_zone: int, where: str) -> FloatArray:
     """Refuse what a plant returns when it is not one temperature a zone."""
     zone = np.asarray(values, dtype=float)
     if zone.shape != (n_zone,) or not np.isfinite(zone).all():
-        raise ThermalError(
-            f"plant: expected {n_zone} finite temperatures from {where}, found shape {zone.shape} with "
-            f"{int((~np.isfinite(zone)).sum())} that are not finite"
-        )
+        found = f"shape {zone.shape} with {int((~np.isfinite(zone)).sum())} that are not finite"
+        raise ThermalError("plant", f"{n_zone} finite temperatures from {where}", found)
     return zone
 
 

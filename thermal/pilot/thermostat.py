@@ -198,10 +198,9 @@ def size_terminals(seed: int, floor_area: FloatArray, heat_flux: float = 60.0, m
         When an argument is out of its range.
     """
     if seed < 0 or not np.all(floor_area > 0.0) or not heat_flux > 0.0 or not 0.0 < minimum_share <= 1.0:
-        raise ThermalError(
-            "terminals: expected a seed of 0 or more, areas and heat_flux above 0 and minimum_share in (0, 1], "
-            f"found {seed}, {np.min(floor_area)} m2, {heat_flux} W/m2 and {minimum_share}"
-        )
+        expected = "a seed of 0 or more, areas and heat_flux above 0 and minimum_share in (0, 1]"
+        found = f"{seed}, {np.min(floor_area)} m2, {heat_flux} W/m2 and {minimum_share}"
+        raise ThermalError("terminals", expected, found)
     scatter = np.random.default_rng(seed).uniform(0.85, 1.15, len(floor_area))
     design_heat = heat_flux * scatter * floor_area
     design_flow = design_heat / (AIR_HEAT_CAPACITY * 14.0)
@@ -284,6 +283,5 @@ def draw_prbs_thermostats(seed: int, n_zone: int) -> PrbsThermostats:
     base = draw_thermostats(seed, n_zone)
     rng = np.random.default_rng([seed, _STREAM])
     clock = 900 * np.round(4.0 * rng.uniform(*_CLOCK, n_zone)).astype(np.int64)
-    return PrbsThermostats(
-        **vars(base), clock=clock, phase=rng.integers(2**_BITS - 1, size=n_zone), amplitude=_AMPLITUDE
-    )
+    phase = rng.integers(2**_BITS - 1, size=n_zone)
+    return PrbsThermostats(**vars(base), clock=clock, phase=phase, amplitude=_AMPLITUDE)

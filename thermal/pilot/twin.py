@@ -15,7 +15,7 @@ from thermal.case.case import Case
 from thermal.case.plan import zone_floor_areas
 from thermal.case.points import DISCHARGE_TEMPERATURE, OUTDOOR_TEMPERATURE, SUPPLY_FLOW, ZONE_TEMPERATURE
 from thermal.case.telemetry import Telemetry
-from thermal.errors import ThermalError, nearest
+from thermal.errors import ThermalError, check_known
 from thermal.model.simulator import Simulator
 from thermal.network.build import build_network
 from thermal.parameters import Parameter, Scope
@@ -55,9 +55,8 @@ class TwinRanges:
         for name, (low, high) in vars(self).items():
             positive = low > 0.0 or (low == high == 0.0 and name != "disturbance_time")
             if not (positive and low <= high < np.inf):
-                raise ThermalError(
-                    f"ranges: {name}: expected two positive numbers in order (or twice 0 for none), found {low}, {high}"
-                )
+                expected = "two positive numbers in order (or twice 0 for none)"
+                raise ThermalError(f"ranges: {name}", expected, f"{low}, {high}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,9 +171,7 @@ class TwinSettings(Period):
 
     def __post_init__(self) -> None:
         for name, options in (("excitation", get_args(Excitation)), ("meter", get_args(Meter))):
-            word = getattr(self, name)
-            if word not in options:
-                raise ThermalError(name, f"one of {', '.join(options)}", repr(word), nearest(word, options))
+            check_known(getattr(self, name), options, name, f"one of {', '.join(options)}", ThermalError)
 
 
 class _DisturbedPlant:
@@ -182,18 +179,10 @@ class _DisturbedPlant:
 
     def __init__(self, simulator: Simulator, disturbance: FloatArray, outdoor_at_start: float, skipped: int) -> None:
         self._simulator, self._disturbance, self._outdoor = simulator, disturbance, outdoor_at_start
-        self._skipped = skipped
+        self._skipped, self.step_seconds, self.zone_names = skipped, simulator.step_seconds, simulator.zone_names
         self.heat: list[FloatArray] = []
         self.temperatures: list[FloatArray] = []
         self.states: FloatArray = np.empty(0)
-
-    @property
-    def step_seconds(self) -> float:
-        return self._simulator.step_seconds
-
-    @property
-    def zone_names(self) -> tuple[str, ...]:
-        return self._simulator.zone_names
 
     def reset(self, zone_temperatures: FloatArray, /) -> FloatArray:
         # walls between the zones and the season's outdoor air, not as warm as the zones all through
@@ -282,9 +271,8 @@ def generate_twin(
     plant = _DisturbedPlant(simulator, disturbance, float(outdoor), skipped)
     draw = draw_prbs_thermostats if at.excitation == "prbs" else draw_thermostats
     sensors = TelemetrySettings(seed, at.spin_up_days, station, noise, at.resolution)
-    telemetry = generate_telemetry(
-        plant, plans, weather, sensors, thermostats=draw(seed, len(areas)), progress=progress
-    )
+    thermostats = draw(seed, len(areas))
+    telemetry = generate_telemetry(plant, plans, weather, sensors, thermostats=thermostats, progress=progress)
     heat = np.array(plant.heat[skipped:])
     truth = TwinTruth(
         seed=seed,
@@ -299,9 +287,8 @@ def generate_twin(
         disturbance=disturbance[skipped:],
         states=plant.states,
     )
-    return Case(
-        twin, telemetry if at.meter == "sensors" else _metered_exactly(telemetry, plant.zone_names, heat)
-    ), truth
+    metered = telemetry if at.meter == "sensors" else _metered_exactly(telemetry, plant.zone_names, heat)
+    return Case(twin, metered), truth
 
 
 def _draw_values(seed: int, parameters: tuple[Parameter, ...]) -> dict[str, float]:
@@ -320,10 +307,9 @@ def _draw_conditions(seed: int, ranges: TwinRanges) -> tuple[float, float, float
     """Draw deviation [W/m2] and correlation time [s] of the unmeasured heat, and the sensors' noise [K]."""
     limits = (ranges.disturbance_deviation, ranges.disturbance_time, ranges.noise)
     shares = np.random.default_rng([seed, _CONDITIONS]).uniform(size=len(limits))
-    drawn = [
-        low if low == high else low * (high / low) ** share for (low, high), share in zip(limits, shares, strict=True)
-    ]
-    return float(drawn[0]), float(drawn[1]), float(drawn[2])
+    pairs = zip(limits, shares, strict=True)
+    first, second, third = (low if low == high else low * (high / low) ** share for (low, high), share in pairs)
+    return float(first), float(second), float(third)
 
 
 def _metered_exactly(telemetry: Telemetry, zones: tuple[str, ...], heat: FloatArray) -> Telemetry:

@@ -48,10 +48,9 @@ def draw_disturbance(
     (288, 2)
     """
     if seed < 0 or n_time < 1 or not np.all(np.asarray(deviation) >= 0.0) or min(time_constant, step_seconds) <= 0.0:
-        raise ThermalError(
-            "disturbance: expected a seed of 0 or more, a step, deviations of 0 or more and positive times, found "
-            f"{seed}, {n_time} steps, {np.min(deviation)} W, {time_constant} s and {step_seconds} s"
-        )
+        expected = "a seed of 0 or more, a step, deviations of 0 or more and positive times"
+        found = f"{seed}, {n_time} steps, {np.min(deviation)} W, {time_constant} s and {step_seconds} s"
+        raise ThermalError("disturbance", expected, found)
     keep = np.exp(-step_seconds / time_constant)
     drive = np.random.default_rng([seed, _STREAM]).standard_normal((n_time, len(deviation)))
     drive[1:] *= np.sqrt(1.0 - keep**2)
@@ -164,10 +163,8 @@ def generate_weather(
     """
     n_time = round(days * _DAY / step_seconds) if step_seconds > 0.0 else 0
     if seed < 0 or n_time < 2 or step_seconds > 3600.0:
-        raise ThermalError(
-            "weather: expected a seed of 0 or more and at least two steps of up to 3600 s, "
-            f"found seed {seed}, {days} days in steps of {step_seconds} s"
-        )
+        found = f"seed {seed}, {days} days in steps of {step_seconds} s"
+        raise ThermalError("weather", "a seed of 0 or more and at least two steps of up to 3600 s", found)
     step = pd.Timedelta(seconds=step_seconds)
     index = pd.date_range(pd.Timestamp(start, tz=location.timezone) + step, periods=n_time, freq=step, name="timestamp")
     middle = index - step / 2
@@ -231,9 +228,8 @@ def _wind(rng: np.random.Generator, middle: pd.DatetimeIndex, step: float) -> di
 
 def _sun(middle: pd.DatetimeIndex, location: Location, cloud: FloatArray) -> dict[str, FloatArray]:
     """Direct normal, diffuse horizontal and global horizontal irradiance [W/m2] in the middle of each interval."""
-    position = pvlib.solarposition.get_solarposition(
-        middle, location.latitude, location.longitude, altitude=location.elevation
-    )
+    place = (location.latitude, location.longitude, location.elevation)
+    position = pvlib.solarposition.get_solarposition(middle, *place)
     pressure = pvlib.atmosphere.alt2pres(location.elevation)
     extra = pvlib.irradiance.get_extra_radiation(middle.day_of_year.to_numpy())
     elevation = position["apparent_elevation"]

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from thermal.case.building import DEVICE_TYPES, Device
-from thermal.case.migration import certain_feeders
+from thermal.case.load import certain_feeders
 from thermal.errors import PlanError, nearest
 from thermal.plan.guard import reading, vocabulary
 

@@ -363,15 +363,13 @@ def _checked_zones(zone_cells: Sequence[npt.ArrayLike], points: FloatArray) -> l
         if cells.ndim != 1 or not np.issubdtype(cells.dtype, np.integer):
             raise ModelError(f"expected the cells of zone {zone} as a list of integers, got {cells!r}")
         if cells.min() < 0 or cells.max() >= len(points):
-            raise ModelError(
-                f"expected the cells of zone {zone} in [0, {len(points)}), got {cells.min()} to {cells.max()}"
-            )
+            found = f"{cells.min()} to {cells.max()}"
+            raise ModelError(f"expected the cells of zone {zone} in [0, {len(points)}), got {found}")
         if np.unique(cells).size < cells.size:
             raise ModelError(f"expected each cell once in zone {zone}, got repeated cells")
         if taken[cells].any():
-            raise ModelError(
-                f"expected each cell in one zone, cell {cells[taken[cells]][0]} of zone {zone} is in another"
-            )
+            cell = cells[taken[cells]][0]
+            raise ModelError(f"expected each cell in one zone, cell {cell} of zone {zone} is in another")
         if not np.isfinite(points[cells]).all():
             raise ModelError(f"expected finite positions [m] of the cells of zone {zone}, got NaN or infinity")
         taken[cells] = True

@@ -25,8 +25,7 @@ from thermal.inputs.provider import InputProvider, telemetry_inputs
 from thermal.model.matrices import SymbolicModel
 from thermal.model.reduce import ReducedModel
 from thermal.model.replay import Inputs, replay_inputs
-from thermal.network.assembly import Blueprint, Extension
-from thermal.network.build import blueprint
+from thermal.network.build import Blueprint, Extension, blueprint
 from thermal.network.network import ThermalNetwork
 from thermal.network.topology import Anatomy
 

@@ -14,8 +14,7 @@ from typing import Any
 import yaml
 
 from thermal.case.building import BuildingFile
-from thermal.case.load import NAME, load_case, read_building_file
-from thermal.case.migration import migrate
+from thermal.case.load import NAME, load_case, migrate, read_building_file
 from thermal.case.telemetry import check_units, read_telemetry
 from thermal.errors import CaseError, LabelError, SessionHeldError, ThermalError
 from thermal.plan.folder import DRAFT, OWN_FOLDER, save_plan_case
