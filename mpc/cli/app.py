@@ -14,11 +14,10 @@ from typing import Annotated, Any, ParamSpec
 import typer
 
 from mpc.cli.calibrate import calibrate, diagnose
-from mpc.cli.check import check
 from mpc.cli.control import compare, control
 from mpc.cli.demo import demo
 from mpc.cli.doctor import doctor
-from mpc.cli.evaluate import evaluate, simulate
+from mpc.cli.evaluate import check, evaluate, simulate
 from mpc.cli.imports import import_devices, import_plan, import_telemetry
 from mpc.cli.label import label
 from mpc.cli.options import switch, value

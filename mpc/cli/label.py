@@ -13,8 +13,8 @@ import typer
 
 from mpc import plugins
 from mpc.cli.calibrate import run_calibration, run_diagnosis
-from mpc.cli.check import run_check
 from mpc.cli.console import Progress, Waiting, say
+from mpc.cli.evaluate import run_check
 from mpc.cli.options import switch, value
 
 if TYPE_CHECKING:

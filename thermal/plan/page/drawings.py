@@ -17,11 +17,11 @@ from thermal.errors import OversizedFileError, PlanError
 from thermal.plan.assemble import align_floors, assemble_plans
 from thermal.plan.cells import ZonedFloor, draw_cells
 from thermal.plan.drawing import RASTER_KINDS, read_drawing
+from thermal.plan.folder import png_of
 from thermal.plan.guard import MOST_BYTES, checked_file, inside_folder
 from thermal.plan.list import FloorEntry, read_floor
 from thermal.plan.page.draft import BASIC, Draft, DraftFloor, Picture, encode_floor
 from thermal.plan.page.store import write_whole
-from thermal.plan.picture import png_of
 from thermal.plan.survey import CODE_KINDS, OUTSIDE_LABEL, WALL_LABEL, FloorSurvey, read_codes
 from thermal.plan.vector import VECTOR_KINDS
 

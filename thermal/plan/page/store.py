@@ -71,7 +71,7 @@ class CaseStore:
         self.folder = Path(path).absolute()
         if self.folder.exists() and not self.folder.is_dir():
             raise LabelError(str(path), "a case folder", "a file")
-        own = self.folder / OWN_FOLDER
+        own = self.own = self.folder / OWN_FOLDER
         is_case = (self.folder / NAME).is_file()
         if self.folder.is_dir() and any(self.folder.iterdir()) and not is_case and not own.is_dir():
             advice = "choose another folder"
@@ -88,11 +88,6 @@ class CaseStore:
         self._seen: tuple[str, int, str] | None = None
         self.findings: tuple[DraftFinding, ...] = ()
         self._find_faults()
-
-    @property
-    def own(self) -> Path:
-        """Folder of the page's own files."""
-        return self.folder / OWN_FOLDER
 
     def _look_at_telemetry(self) -> None:
         """Read the telemetry when it has changed: somebody may put it there while the page is open."""
