@@ -214,22 +214,12 @@ def _is_newer(folder: Path, file: Path) -> bool:
 
 def _with_positions(fresh: Draft, draft: Draft) -> Draft:
     """Take from the page's own file what a case does not hold: drawings, places of devices, time spent."""
-    floors = {floor.name: floor for floor in draft.floors}
-    kept = []
-    for floor in fresh.floors:
-        old = floors.get(floor.name)
-        same = old is not None and (old.rows, old.columns) == (floor.rows, floor.columns)
-        known = {"drawing": old.drawing, "picture": old.picture} if old is not None and same else {}
-        kept.append(floor.model_copy(update=known))
-    places = {device.name: device for device in draft.devices}
-    devices = [
-        device.model_copy(update={k: getattr(places[device.name], k) for k in ("room", "floor", "x", "y")})
-        if device.name in places and places[device.name].zone == device.zone
-        else device
-        for device in fresh.devices
-    ]
-    update = {"floors": tuple(kept), "devices": tuple(devices), "seconds": draft.seconds, "revision": draft.revision}
-    return fresh.model_copy(update=update)
+    drawn = {(f.name, f.rows, f.columns): {"drawing": f.drawing, "picture": f.picture} for f in draft.floors}
+    floors = tuple(f.model_copy(update=drawn.get((f.name, f.rows, f.columns), {})) for f in fresh.floors)
+    placed = {(d.name, d.zone): d.model_dump(include={"room", "floor", "x", "y"}) for d in draft.devices}
+    devices = tuple(d.model_copy(update=placed.get((d.name, d.zone), {})) for d in fresh.devices)
+    kept = {"floors": floors, "devices": devices, "seconds": draft.seconds, "revision": draft.revision}
+    return fresh.model_copy(update=kept)
 
 
 _LOCK = "open.json"
