@@ -25,8 +25,6 @@ if TYPE_CHECKING:
     from mpc.adapters.boptest.server import BoptestServer
     from thermal.plan.page.desk import LabelDesk
 
-PORT = 8000
-
 #: A pilot of a size that many tests at once are quick with: floor area [m2], zones, distance of control volumes [m].
 SMALL_PILOT: dict[str, Any] = {"floor_area": 600.0, "zones": 12, "dx": 1.0, "name": "pilot_12"}
 
@@ -40,7 +38,7 @@ def serve(
         bool, switch("--pilot", "Serve the generated pilot, too: 'pilot', and 'pilot_12' with 12 zones.")
     ] = False,
     host: Annotated[str, value("Where to listen.", "ADDRESS")] = "127.0.0.1",
-    port: Annotated[int, value("Port; 0 takes a free one.")] = PORT,
+    port: Annotated[int, value("Port; 0 takes a free one.")] = 8000,
     allow_remote: Annotated[bool, switch("--allow-remote", "Let other machines in; there is no password.")] = False,
     name: Annotated[list[str] | None, value("A name that clients call the server by, repeatable.", "NAME")] = None,
     parameters: Parameters = None,
@@ -111,12 +109,9 @@ def _covered(case: BoptestCase) -> str:
     return "a typical year" if case.weather.typical else f"{first:%Y-%m-%d %H:%M} to {last:%Y-%m-%d %H:%M}"
 
 
-#: Folder of a new case, where the command names none.
-_NEW = Path("case")
 _MAKERS: dict[str, Callable[[Path, Path, bool, Progress], Any]] = {
     "check": run_check, "calibrate": run_calibration, "diagnose": run_diagnosis,
 }  # fmt: skip
-_LISTS = (".yaml", ".yml")
 
 
 def label(
@@ -169,7 +164,7 @@ def _case_of(target: Path | None, out: Path | None) -> tuple[Path, Path | None]:
     if target is None or target.is_dir() or not target.suffix:
         if target is not None and out is not None:
             raise LabelError("--out", "a drawing beside it", f"the case folder {target}", "drop --out")
-        return target or out or _NEW, None
+        return target or out or Path("case"), None
     if not target.is_file():
         raise LabelError(str(target), "a case folder, a drawing or a list of drawings", "nothing")
     return out or target.with_suffix(""), target
@@ -183,7 +178,7 @@ def _prepare(desk: LabelDesk, drawings: Path) -> None:
     if desk.store.draft.floors:
         advice = "open the case itself, and import the drawing on the page"
         raise LabelError(str(desk.store.folder), "a new case folder", "a case with floors", advice)
-    if drawings.suffix.lower() in _LISTS:
+    if drawings.suffix.lower() in (".yaml", ".yml"):
         with Waiting(f"import {drawings.name}") as progress:
             import_list(desk, drawings, progress)
     else:
