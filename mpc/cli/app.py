@@ -14,15 +14,12 @@ from typing import Annotated, Any, ParamSpec
 import typer
 
 from mpc.cli.calibrate import calibrate, diagnose
-from mpc.cli.check import check
-from mpc.cli.control import compare, control
-from mpc.cli.demo import demo
+from mpc.cli.control import compare, control, demo
 from mpc.cli.doctor import doctor
-from mpc.cli.evaluate import evaluate, simulate
+from mpc.cli.evaluate import check, evaluate, simulate
 from mpc.cli.imports import import_devices, import_plan, import_telemetry
-from mpc.cli.label import label
 from mpc.cli.options import switch, value
-from mpc.cli.serve import serve
+from mpc.cli.serve import label, serve
 from mpc.plugins import load_plugins
 
 P = ParamSpec("P")

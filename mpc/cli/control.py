@@ -1,4 +1,4 @@
-"""``buildingmpc control`` and ``buildingmpc compare``."""
+"""``buildingmpc control``, ``compare``, and ``demo``, which ends with them."""
 
 from __future__ import annotations
 
@@ -12,8 +12,11 @@ from mpc.cli.console import Waiting, answer, complain, say, show_table
 from mpc.cli.options import CaseFolder, Dx, Force, Json, Parameters, Start, file, folder, spread, switch, value
 
 if TYPE_CHECKING:
+    from mpc.studies.demo import Demo
     from mpc.studies.run import ControlRun
     from mpc.studies.study import Study
+
+OUT = Path("buildingmpc_demo")
 
 
 @dataclass(frozen=True)
@@ -149,3 +152,44 @@ def _exit_code(runs: Sequence[ControlRun]) -> int:
     if failed:
         complain(f"error: no solve of {', '.join(failed)} gave a plan; the log in the results says why")
     return 1 if failed else 0
+
+
+def demo(out: Annotated[Path, folder("the results")] = OUT, force: Force = False, json: Json = False) -> int:
+    """Check, calibrate, diagnose, evaluate and control the bundled case, in under two minutes.
+
+    Example: buildingmpc demo --out demo_results
+    """
+    from calibration.results import check_results_folder
+    from mpc.studies.demo import run_demo
+    from thermal.data import load_bundled_case
+
+    check_results_folder(out, force)
+    case = load_bundled_case()
+    if not json:
+        say(f"The bundled case: {case.path}")
+    with Waiting("demo") as progress:
+
+        def told(step: str, verdict: str) -> None:
+            if not json:
+                progress.say(f"{step}: {verdict}")
+
+        found = run_demo(out, case=case, force=force, progress=progress, told=told)
+    answer(json, found.to_dict(), lambda: _show_demo(found, out))
+    if not found.fine:
+        complain("error: the calibration did not converge, or optimal control never had a plan; the reports say which")
+    return 0 if found.fine else 1
+
+
+def _show_demo(found: Demo, out: Path) -> None:
+    """Write what came of the error and of the costs to stdout."""
+    from mpc.reports.control_words import comparison_rows
+
+    content = found.to_dict()
+    names = {"uncalibrated": "as it was drawn", "calibrated": "calibrated", "with_effects": "with what was found"}
+    errors = [(names[key], mae) for key, mae in content["held_out_mae"].items()]
+    show_table("Held-out error 6h ahead", {"model": "", "MAE [K]": ".3f"}, errors)
+    columns = {"controller": "", "cost": ".2f", "discomfort [K h]": ".3f", "energy [kWh/m2]": ".3f"}
+    rows = [(row[0], row[1], row[4], row[6]) for row in comparison_rows(found.comparison)]
+    show_table(f"Controllers, {content['control']['start'][:10]}", columns, rows)
+    say(f"Report: {out / 'report.html'}")
+    say("Next: buildingmpc label, for a case of your own")

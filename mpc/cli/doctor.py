@@ -70,14 +70,10 @@ def _installed_packages() -> list[dict[str, Any]]:
         here = [e for e in ("", *known) if need.marker is None or need.marker.evaluate({"extra": e})]
         if not here:
             continue  # not for this platform or Python
-        try:
-            version: str | None = metadata.version(need.name)
-        except metadata.PackageNotFoundError:
-            version = None
+        version = next((package.version for package in metadata.distributions(name=need.name)), None)
         fine = version is not None and need.specifier.contains(version, prereleases=True)
-        found.append(
-            {"name": need.name, "wanted": str(need.specifier), "extra": here[0], "found": version, "fine": fine}
-        )
+        named = {"name": need.name, "wanted": str(need.specifier), "extra": here[0]}
+        found.append(named | {"found": version, "fine": fine})
     return found
 
 

@@ -29,10 +29,9 @@ def import_plan(
 
     Example: buildingmpc import-plan plans/plans.yaml --devices plans/devices.csv --out cases/office
     """
-    from thermal.plan.folder import building_of, check_nothing_lost, held_work, save_plan_case
+    from thermal.plan.folder import building_of, check_nothing_lost, held_work, import_page, save_plan_case
     from thermal.plan.list import import_drawings, read_drawing_list
     from thermal.plan.models import read_devices
-    from thermal.plan.picture import import_page
 
     if not force:
         check_nothing_lost(out)

@@ -1,8 +1,10 @@
-"""``buildingmpc serve``."""
+"""``buildingmpc label`` and ``buildingmpc serve``."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import multiprocessing
+import webbrowser
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
@@ -10,14 +12,18 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from mpc.cli.console import Waiting, answer, say, show_table
+from mpc import plugins
+from mpc.cli.calibrate import run_calibration, run_diagnosis
+from mpc.cli.console import Progress, Waiting, answer, say, show_table
+from mpc.cli.evaluate import run_check
 from mpc.cli.options import Dx, Json, Parameters, file, switch, value
 
 if TYPE_CHECKING:
+    from multiprocessing.connection import Connection
+
     from mpc.adapters.boptest.case import BoptestCase
     from mpc.adapters.boptest.server import BoptestServer
-
-PORT = 8000
+    from thermal.plan.page.desk import LabelDesk
 
 #: A pilot of a size that many tests at once are quick with: floor area [m2], zones, distance of control volumes [m].
 SMALL_PILOT: dict[str, Any] = {"floor_area": 600.0, "zones": 12, "dx": 1.0, "name": "pilot_12"}
@@ -32,7 +38,7 @@ def serve(
         bool, switch("--pilot", "Serve the generated pilot, too: 'pilot', and 'pilot_12' with 12 zones.")
     ] = False,
     host: Annotated[str, value("Where to listen.", "ADDRESS")] = "127.0.0.1",
-    port: Annotated[int, value("Port; 0 takes a free one.")] = PORT,
+    port: Annotated[int, value("Port; 0 takes a free one.")] = 8000,
     allow_remote: Annotated[bool, switch("--allow-remote", "Let other machines in; there is no password.")] = False,
     name: Annotated[list[str] | None, value("A name that clients call the server by, repeatable.", "NAME")] = None,
     parameters: Parameters = None,
@@ -101,3 +107,120 @@ def _announce(server: BoptestServer, made: list[BoptestCase], json: bool) -> Non
 def _covered(case: BoptestCase) -> str:
     first, last = (case.clock.stamp(time) for time in case.covered)
     return "a typical year" if case.weather.typical else f"{first:%Y-%m-%d %H:%M} to {last:%Y-%m-%d %H:%M}"
+
+
+_MAKERS: dict[str, Callable[[Path, Path, bool, Progress], Any]] = {
+    "check": run_check, "calibrate": run_calibration, "diagnose": run_diagnosis,
+}  # fmt: skip
+
+
+def label(
+    target: Annotated[
+        Path | None,
+        typer.Argument(
+            metavar="CASE|PLAN", help="Case folder, or a drawing, or the YAML list of the floors' drawings."
+        ),
+    ] = None,
+    out: Annotated[Path | None, value("Case folder to make of a drawing; default: named after it.", "DIR")] = None,
+    results: Annotated[
+        list[Path] | None, value("Folder of results whose reports are shown; repeatable.", "DIR")
+    ] = None,
+    port: Annotated[int, typer.Option(metavar="N", min=0, max=65535, help="Port; default: any that is free.")] = 0,
+    browser: Annotated[bool, switch("--browser/--no-browser", "Open the page in the browser.")] = True,
+    take_over: Annotated[bool, switch("--take-over", "Take the case from a program that has it open.")] = False,
+) -> int:
+    """Turn floor plans and a list of devices into a case, on a page in the browser; show its reports.
+
+    Example: buildingmpc label cases/office
+    """
+    from thermal.plan.page.desk import LabelDesk
+    from thermal.plan.page.serve import serve_page
+
+    case, drawings = _case_of(target, out)
+    makers = {name: partial(_make_apart, name) for name in _MAKERS}
+    desk = LabelDesk(case, reports=results or (), makers=makers, take_over=take_over)
+    try:
+        if drawings is not None:
+            _prepare(desk, drawings)
+    except BaseException:
+        desk.end()
+        raise
+
+    def ready(address: str) -> None:
+        say(f"Labelling {case}   Ctrl-C ends it, everything is saved")
+        say(address)
+        if browser and not webbrowser.open(address):
+            say("No browser could be opened: open this address in one on this machine.")
+
+    serve_page(desk, port=port, ready=ready)
+    say(f"Case: {case}   Next: buildingmpc check {case}")
+    return 0
+
+
+def _case_of(target: Path | None, out: Path | None) -> tuple[Path, Path | None]:
+    """Case folder to label, and the drawing or list to begin with."""
+    from thermal.errors import LabelError
+
+    if target is None or target.is_dir() or not target.suffix:
+        if target is not None and out is not None:
+            raise LabelError("--out", "a drawing beside it", f"the case folder {target}", "drop --out")
+        return target or out or Path("case"), None
+    if not target.is_file():
+        raise LabelError(str(target), "a case folder, a drawing or a list of drawings", "nothing")
+    return out or target.with_suffix(""), target
+
+
+def _prepare(desk: LabelDesk, drawings: Path) -> None:
+    """Put a drawing, or all floors of a list, on the page of a new case."""
+    from thermal.errors import LabelError
+    from thermal.plan.page.desk import import_list, import_sheet
+
+    if desk.store.draft.floors:
+        advice = "open the case itself, and import the drawing on the page"
+        raise LabelError(str(desk.store.folder), "a new case folder", "a case with floors", advice)
+    if drawings.suffix.lower() in (".yaml", ".yml"):
+        with Waiting(f"import {drawings.name}") as progress:
+            import_list(desk, drawings, progress)
+    else:
+        import_sheet(desk, drawings)
+
+
+def _make_apart(kind: str, case: Path, out: Path, progress: Progress) -> None:
+    """Make a report in a process of its own, so that the page stays quick, and stop it with the job."""
+    from mpc.errors import MpcError
+
+    context = multiprocessing.get_context("spawn")
+    here, there = context.Pipe(duplex=False)
+    process = context.Process(target=_make, args=(kind, case, out, there, plugins.loaded), daemon=True)
+    process.start()
+    there.close()
+    try:
+        last: tuple[str, int, int] = ("", 0, 0)
+        while True:
+            if here.poll(0.5):
+                try:
+                    message = here.recv()
+                except EOFError:
+                    break
+                if message[0] == "error":
+                    raise MpcError(message[1])
+                last = message
+            progress(*last)
+        process.join()
+    finally:
+        if process.is_alive():
+            process.terminate()
+        process.join()
+    if process.exitcode:
+        raise MpcError(f"the process that makes the report ended with code {process.exitcode}")
+
+
+def _make(kind: str, case: Path, out: Path, connection: Connection[Any, Any], named: Sequence[str]) -> None:
+    """Make a report; what goes wrong is told in a sentence."""
+    try:
+        plugins.load_plugins(named)
+        _MAKERS[kind](case, out, True, lambda *told: connection.send(told))
+    except Exception as error:
+        connection.send(("error", f"{type(error).__name__}: {error}"))
+    finally:
+        connection.close()

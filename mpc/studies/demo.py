@@ -151,7 +151,7 @@ def run_demo(
     ControlError
         When no whole working day is left to control.
     """
-    folder, done = check_results_folder(out, force), progress or _silent
+    folder, done = check_results_folder(out, force), progress or (lambda *_: None)
     case = case or load_bundled_case()
     judged = default_intervals(case)[1]
     first, last = _working_day(case, judged[-1])
@@ -208,7 +208,3 @@ def _working_day(case: Case, interval: Interval) -> tuple[str, str]:
 def _staged(progress: Progress, step: str) -> Progress:
     """Say which step the stage belongs to."""
     return lambda stage, done, total: progress(f"{step}: {stage}", done, total)
-
-
-def _silent(stage: str, done: int, total: int) -> None:
-    """Tell nobody."""

@@ -93,10 +93,7 @@ def model_settings(
 
 
 def reduced(
-    settings: ModelSettings,
-    building: Building,
-    parameters: BuildingParameters | None = None,
-    order: int | None = ORDER,
+    settings: ModelSettings, building: Building, parameters: BuildingParameters | None = None, order: int | None = ORDER
 ) -> ReducedModel:
     """Build and reduce a model; arguments as those of `control_model`.
 

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from mpc.cli import label as _label
+from mpc.cli import serve as _label
 from mpc.cli.app import app
 
 pytest.importorskip("fastapi", reason="needs the extra [pages]")

@@ -214,7 +214,7 @@ def checked_number(value: object, name: str, lowest: float, highest: float, unit
     Parameters
     ----------
     value : object
-        What came.
+        What was given.
     name : str
         Of the setting, for the message.
     lowest, highest : float

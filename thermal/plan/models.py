@@ -141,11 +141,8 @@ class _Model:
         parts += [part for space in fed for part in graph.subjects(brick.isPartOf, space)]
         there = [*graph.objects(subject, brick.hasLocation), *graph.subjects(brick.isLocationOf, subject)]
         spaces = [s for s in (*fed, *parts, *there) if not self._is_equipment(s)]
-        for space in spaces:
-            for text in (self.name(space), _local(space)):
-                if key(text) in keys:
-                    return text
-        return self.name(spaces[0]) if spaces else ""
+        texts = (text for space in spaces for text in (self.name(space), _local(space)))
+        return next((text for text in texts if key(text) in keys), self.name(spaces[0]) if spaces else "")
 
     def _is_equipment(self, subject: Any) -> bool:
         return any(self._meaning(kind, _BRICK_EQUIPMENT) for kind in self.graph.objects(subject, self.rdf.RDF.type))
@@ -165,13 +162,10 @@ class _Model:
     def _series(self, point: Any) -> str:
         """Find the identifier of a point's series, in the ways of Brick 1.2 and 1.3; else its name."""
         ref = self.rdf.Namespace(_REF)
-        for link in (ref.hasExternalReference, self.brick.timeseries):
-            for reference in self.graph.objects(point, link):
-                for identifier in (ref.hasTimeseriesId, self.brick.hasTimeseriesId):
-                    value = self.graph.value(reference, identifier)
-                    if value is not None:
-                        return str(value)
-        return self.name(point)
+        ways, ids = (ref.hasExternalReference, self.brick.timeseries), (ref.hasTimeseriesId, self.brick.hasTimeseriesId)
+        references = (reference for way in ways for reference in self.graph.objects(point, way))
+        series = (self.graph.value(reference, name) for reference in references for name in ids)
+        return next((str(value) for value in series if value is not None), self.name(point))
 
 
 def _local(subject: Any) -> str:

@@ -269,10 +269,8 @@ def _doubts(labels: Int32Array, ink: Ink, settings: PlanSettings) -> list[str]:
     walled = labels >= WALL_LABEL
     around = np.ones_like(walled)
     for axis in (0, 1):
-        for way in (1, -1):
-            ahead = np.flip(walled, axis) if way < 0 else walled
-            seen = np.logical_or.accumulate(ahead, axis=axis)
-            around &= np.flip(seen, axis) if way < 0 else seen
+        before, after = (np.logical_or.accumulate(w, axis=axis) for w in (walled, np.flip(walled, axis)))
+        around &= before & np.flip(after, axis)
     area = float(np.count_nonzero(around & (labels == OUTSIDE_LABEL))) * ink.pixel**2
     built = float(np.count_nonzero(walled)) * ink.pixel**2
     if area > max(4.0, _OPEN * built):

@@ -143,15 +143,10 @@ def _collect(document: Any, metres: float, walls: str, rooms: str, where: str, w
             layers = ", ".join(sorted({layer for _, layer, _ in found})[:12])
             raise PlanError(where, f"lines on layers like {walls!r}", f"layers {layers or 'without any'}")
         on_walls = found
-    content = _Content([], [], [], texts)
-    for kind, _, entity in on_walls:
-        target = content.solids if kind in ("HATCH", "SOLID") else content.lines
-        target.extend(line for line in _lines(entity, kind, metres) if len(line) > 1)
-    for kind, _, entity in outlines:
-        content.rooms.extend(
-            line for line in _lines(entity, kind, metres) if len(line) > 3 and np.allclose(line[0], line[-1])
-        )
-    return content
+    drawn = [(kind, line) for kind, _, entity in on_walls for line in _lines(entity, kind, metres) if len(line) > 1]
+    lines, solids = ([line for kind, line in drawn if (kind in ("HATCH", "SOLID")) == solid] for solid in (False, True))
+    closed = (line for kind, _, entity in outlines for line in _lines(entity, kind, metres) if len(line) > 3)
+    return _Content(lines, solids, [line for line in closed if np.allclose(line[0], line[-1])], texts)
 
 
 def _lines(entity: Any, kind: str, metres: float) -> Iterator[FloatArray]:

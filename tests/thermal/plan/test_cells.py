@@ -16,9 +16,8 @@ from thermal.errors import LostRoomError, PlanError
 from thermal.pilot.building import devices, generate_office
 from thermal.plan.assemble import assemble_plans
 from thermal.plan.cells import propose_zones
-from thermal.plan.folder import building_of, save_plan_case
+from thermal.plan.folder import building_of, draw_floor, save_plan_case
 from thermal.plan.models import read_devices
-from thermal.plan.picture import draw_floor
 from thermal.plan.survey import read_codes, survey_codes
 
 SITE = Location(latitude=37.4, longitude=-122.1, elevation=20.0, timezone="America/Los_Angeles")

@@ -9,17 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, ValidationError
 
-from thermal.case.building import (
-    PLAN_TOKENS,
-    Airflow,
-    Building,
-    Device,
-    Entry,
-    FloorPlan,
-    FloorPlans,
-    GeometryQuality,
-    Location,
-)
+from thermal.case.building import PLAN_TOKENS as BASIC
+from thermal.case.building import Airflow, Building, Device, Entry, FloorPlan, FloorPlans, GeometryQuality, Location
 from thermal.errors import LabelError
 from thermal.plan.drawing import Finite
 from thermal.plan.guard import first_fault
@@ -27,8 +18,6 @@ from thermal.plan.list import FloorEntry
 
 Name = Annotated[str, Field(max_length=200)]
 
-#: The first tokens of every legend: outside, exterior wall, interior wall.
-BASIC = PLAN_TOKENS
 
 _MOST_FLOORS, _MOST_DEVICES = 200, 20_000
 

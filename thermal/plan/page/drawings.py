@@ -12,16 +12,16 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal.case.building import OUTSIDE
+from thermal.case.building import OUTSIDE, PLAN_TOKENS
 from thermal.errors import OversizedFileError, PlanError
 from thermal.plan.assemble import align_floors, assemble_plans
 from thermal.plan.cells import ZonedFloor, draw_cells
 from thermal.plan.drawing import RASTER_KINDS, read_drawing
+from thermal.plan.folder import png_of
 from thermal.plan.guard import MOST_BYTES, checked_file, inside_folder
 from thermal.plan.list import FloorEntry, read_floor
-from thermal.plan.page.draft import BASIC, Draft, DraftFloor, Picture, encode_floor
+from thermal.plan.page.draft import Draft, DraftFloor, Picture, encode_floor
 from thermal.plan.page.store import write_whole
-from thermal.plan.picture import png_of
 from thermal.plan.survey import CODE_KINDS, OUTSIDE_LABEL, WALL_LABEL, FloorSurvey, read_codes
 from thermal.plan.vector import VECTOR_KINDS
 
@@ -123,7 +123,7 @@ class Upload:
         Parameters
         ----------
         chunk : bytes
-            What came.
+            What was given.
 
         Raises
         ------
@@ -315,7 +315,7 @@ def _beside(draft: Draft, entries: Sequence[FloorEntry], zoned: Sequence[ZonedFl
 
 def _as_surveyed(floor: DraftFloor, cell_size: float) -> ZonedFloor:
     """See a plan of cells as a drawing of one element a cell, to bring others above it."""
-    zones = np.where(np.isin(floor.tokens, BASIC[:2]), 0, 1).astype(np.int32)
+    zones = np.where(np.isin(floor.tokens, PLAN_TOKENS[:2]), 0, 1).astype(np.int32)
     labels = np.where(floor.tokens == OUTSIDE, OUTSIDE_LABEL, zones).astype(np.int32)
     return ZonedFloor(floor.name, floor.height, FloorSurvey(floor.name, labels, cell_size, ()), zones, ("all",))
 

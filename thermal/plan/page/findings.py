@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 from scipy import ndimage
 
-from thermal.case.building import DEVICE_TYPES, INTERIOR_WALL, FloorPlan, FloorPlans, Location
+from thermal.case.building import DEVICE_TYPES, INTERIOR_WALL, PLAN_TOKENS, FloorPlan, FloorPlans, Location
 from thermal.case.plan import check_plan, facade_areas, zone_floor_areas
 from thermal.case.validation import GLAZING_TOLERANCE, RESERVED, TERMINAL_TYPES, check_building, check_columns
 from thermal.errors import CaseError, nearest
-from thermal.plan.page.draft import BASIC, Draft, DraftFloor, building_of_draft, zones_of
+from thermal.plan.page.draft import Draft, DraftFloor, building_of_draft, zones_of
 
 _PLACE = re.compile(r"(?<!')\b(row|column) (\d+)")  # of a cell, not in the name of a zone
 
@@ -136,7 +136,7 @@ def _on_floors(draft: Draft) -> Iterator[DraftFinding]:
         if not floor.height > 0.0:
             text = f"clear height: expected a positive number of metres, found {floor.height:g}"
             yield _error("floor", floor.name, text)
-        if not any(number >= len(BASIC) for number in floor.runs[::2]):
+        if not any(number >= len(PLAN_TOKENS) for number in floor.runs[::2]):
             yield _error("floor", floor.name, "the floor has no zone: draw walls around one")
 
 
@@ -178,12 +178,12 @@ def _faulty_zones(floor: DraftFloor) -> Iterator[tuple[str, str]]:
     numbers = np.unique(tokens, return_inverse=True)
     cells: NDArray[np.int64] = numbers[1].reshape(tokens.shape) + 1
     for token, where in zip(numbers[0].tolist(), ndimage.find_objects(cells), strict=True):
-        if token in BASIC or where is None:
+        if token in PLAN_TOKENS or where is None:
             continue
         part = tuple(slice(max(0, s.start - 1), s.stop + 1) for s in where)
         alone = tokens[part]
         try:
-            check_plan(np.where(np.isin(alone, [*BASIC, token]), alone, INTERIOR_WALL), f"floor {floor.name!r}")
+            check_plan(np.where(np.isin(alone, [*PLAN_TOKENS, token]), alone, INTERIOR_WALL), f"floor {floor.name!r}")
         except CaseError as error:
             yield token, _shifted(str(error), part)
 

@@ -15,6 +15,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from thermal.errors import LabelError, OversizedFileError, PlanError, ReportError, SessionHeldError, ThermalError
 from thermal.plan.drawing import DOTS_PER_INCH, RASTER_KINDS, read_drawing
+from thermal.plan.folder import png_of
 from thermal.plan.guard import first_fault, inside_folder
 from thermal.plan.list import FloorEntry
 from thermal.plan.models import read_devices
@@ -22,7 +23,6 @@ from thermal.plan.page.desk import LabelDesk
 from thermal.plan.page.draft import zones_of
 from thermal.plan.page.drawings import DEVICE_KINDS, DRAWING_KINDS, WIDEST_PICTURE, Upload, add_floors, look_at
 from thermal.plan.page.reports import Progress
-from thermal.plan.picture import png_of
 
 #: What a report may do: its own script in a box without access to the page.
 _REPORT_POLICY = (

@@ -8,18 +8,15 @@ import secrets
 import socket
 import threading
 import time
-from collections.abc import Awaitable, Callable, MutableMapping
-from typing import Any
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
 from thermal.errors import LabelError, describe
 from thermal.plan.guard import extra
 from thermal.plan.page.desk import LabelDesk
 
-Scope = MutableMapping[str, Any]
-Message = MutableMapping[str, Any]
-Receive = Callable[[], Awaitable[Message]]
-Send = Callable[[Message], Awaitable[None]]
-Application = Callable[[Scope, Receive, Send], Awaitable[None]]
+if TYPE_CHECKING:
+    from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 _HOSTS = ("127.0.0.1", "localhost", "[::1]")
 _READING = ("GET", "HEAD")
@@ -55,7 +52,7 @@ class Gate:
         First part of every path.
     """
 
-    def __init__(self, inner: Application, token: str) -> None:
+    def __init__(self, inner: ASGIApp, token: str) -> None:
         self._inner = inner
         self._token = token.encode("ascii")
 
@@ -145,7 +142,7 @@ def serve_page(desk: LabelDesk, *, port: int = 0, ready: Callable[[str], None] |
         desk.end()
 
 
-def create_app(desk: LabelDesk, token: str) -> Application:
+def create_app(desk: LabelDesk, token: str) -> ASGIApp:
     """Make the server of a labelling page.
 
     Parameters

@@ -70,7 +70,7 @@ class CaseStore:
         self.folder = Path(path).absolute()
         if self.folder.exists() and not self.folder.is_dir():
             raise LabelError(str(path), "a case folder", "a file")
-        own = self.folder / OWN_FOLDER
+        own = self.own = self.folder / OWN_FOLDER
         is_case = (self.folder / NAME).is_file()
         if self.folder.is_dir() and any(self.folder.iterdir()) and not is_case and not own.is_dir():
             advice = "choose another folder"
@@ -87,11 +87,6 @@ class CaseStore:
         self._seen: tuple[str, int, str] | None = None
         self.findings: tuple[DraftFinding, ...] = ()
         self._find_faults()
-
-    @property
-    def own(self) -> Path:
-        """Folder of the page's own files."""
-        return self.folder / OWN_FOLDER
 
     def _look_at_telemetry(self) -> None:
         """Read the telemetry when it has changed: somebody may put it there while the page is open."""
@@ -218,22 +213,12 @@ def _is_newer(folder: Path, file: Path) -> bool:
 
 def _with_positions(fresh: Draft, draft: Draft) -> Draft:
     """Take from the page's own file what a case does not hold: drawings, places of devices, time spent."""
-    floors = {floor.name: floor for floor in draft.floors}
-    kept = []
-    for floor in fresh.floors:
-        old = floors.get(floor.name)
-        same = old is not None and (old.rows, old.columns) == (floor.rows, floor.columns)
-        known = {"drawing": old.drawing, "picture": old.picture} if old is not None and same else {}
-        kept.append(floor.model_copy(update=known))
-    places = {device.name: device for device in draft.devices}
-    devices = [
-        device.model_copy(update={k: getattr(places[device.name], k) for k in ("room", "floor", "x", "y")})
-        if device.name in places and places[device.name].zone == device.zone
-        else device
-        for device in fresh.devices
-    ]
-    update = {"floors": tuple(kept), "devices": tuple(devices), "seconds": draft.seconds, "revision": draft.revision}
-    return fresh.model_copy(update=update)
+    drawn = {(f.name, f.rows, f.columns): {"drawing": f.drawing, "picture": f.picture} for f in draft.floors}
+    floors = tuple(f.model_copy(update=drawn.get((f.name, f.rows, f.columns), {})) for f in fresh.floors)
+    placed = {(d.name, d.zone): d.model_dump(include={"room", "floor", "x", "y"}) for d in draft.devices}
+    devices = tuple(d.model_copy(update=placed.get((d.name, d.zone), {})) for d in fresh.devices)
+    kept = {"floors": floors, "devices": devices, "seconds": draft.seconds, "revision": draft.revision}
+    return fresh.model_copy(update=kept)
 
 
 _LOCK = "open.json"
