@@ -63,9 +63,7 @@ class InternalGains:
             possible = np.isfinite(value) and 0 <= value <= (1.0 if name.startswith(("idle", "radiant")) else np.inf)
             ScenarioError.unless(possible, f"gains: {name}", "0 or more, shares up to 1", value)
 
-    def heat(
-        self, occupancy: ArrayLike, people: ArrayLike, areas: ArrayLike, *, radiant: bool = False
-    ) -> FloatArray:
+    def heat(self, occupancy: ArrayLike, people: ArrayLike, areas: ArrayLike, *, radiant: bool = False) -> FloatArray:
         """Sensible heat given to each zone.
 
         Parameters
