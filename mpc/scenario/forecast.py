@@ -342,8 +342,7 @@ class Forecaster:
         begin = int(self.scenario.grid.edges[k])
         issue = int(begin // self.issue_every)
         since = int((begin - issue * self.issue_every) // self.scenario.grid.step)
-        paths = self._paths(issue)
-        for name, path in paths.items():
+        for name, path in self._paths(issue).items():
             at, error = self._wrong[name], path[since : since + self.horizon, None]
             if name == "sun":
                 values[:, at] *= np.maximum(1.0 + error, 0.0)

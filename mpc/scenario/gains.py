@@ -90,7 +90,8 @@ class InternalGains:
         """
         count, all_in = np.asarray(occupancy, dtype=float), np.asarray(people, dtype=float)
         share = np.divide(count, all_in, out=np.zeros_like(count), where=all_in > 0)
-        of_people, of_equipment, of_lights = self._radiant if radiant else (1.0, 1.0, 1.0)
+        radiating = self.radiant_people, self.radiant_equipment, self.radiant_lights
+        of_people, of_equipment, of_lights = radiating if radiant else (1.0, 1.0, 1.0)
         density = of_equipment * self.equipment * (self.idle_equipment + (1.0 - self.idle_equipment) * share)
         density += of_lights * self.lights * (self.idle_lights + (1.0 - self.idle_lights) * share)
         return np.asarray(of_people * count * self.sensible + density * np.asarray(areas, dtype=float))
@@ -98,11 +99,7 @@ class InternalGains:
     @property
     def radiates(self) -> bool:
         """Whether any of the heat radiates."""
-        return any(self._radiant)
-
-    @property
-    def _radiant(self) -> tuple[float, float, float]:
-        return self.radiant_people, self.radiant_equipment, self.radiant_lights
+        return any((self.radiant_people, self.radiant_equipment, self.radiant_lights))
 
     def moisture_heat(self, occupancy: ArrayLike) -> FloatArray:
         """Latent heat of the people in each zone.
