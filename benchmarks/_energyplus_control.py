@@ -12,8 +12,8 @@ from _energyplus_offices import CONTROL_STEPS, ELECTRICITY, GAS, STEP
 
 from mpc.adapters.energyplus.plant import EnergyPlusPlant
 from mpc.adapters.energyplus.system import controller_system
-from mpc.control.controller.action import Action, ControllerSettings
 from mpc.control.controller.controller import MpcController
+from mpc.control.controller.site import Action, ControllerSettings
 from mpc.control.problem.assembly import ComfortOperation
 from mpc.control.problem.channels import Channel
 from mpc.control.problem.horizon import Horizon

@@ -27,8 +27,8 @@ from calibration import CalibrationSettings, calibrate
 from calibration.diagnosis.diagnosis import diagnose
 from mpc.baselines.guideline36 import Guideline36
 from mpc.baselines.rules import OutdoorReset, day_schedule
-from mpc.control.controller.action import ControllerSettings
 from mpc.control.controller.controller import MpcController
+from mpc.control.controller.site import ControllerSettings
 from mpc.control.problem.horizon import Horizon
 from mpc.control.solvers.uncertainty import Margin
 from mpc.environment.environment import ScenarioPlant
@@ -43,8 +43,9 @@ from mpc.reports.diagnosis import write_diagnosis
 from mpc.scenario.forecast import DAY_AHEAD_ERRORS, Forecaster
 from mpc.scenario.gains import InternalGains
 from mpc.scenario.grid import StepGrid
-from mpc.scenario.paper import paper_carbon, paper_tariff
 from mpc.scenario.scenario import Scenario, build_scenario
+from mpc.scenario.tariff import paper_carbon, paper_tariff
+from mpc.studies.bound import KnownState
 from mpc.studies.controller import default_horizon, make_controller, site_points
 from mpc.studies.controllers import KnownState
 from mpc.studies.model import ORDER, control_model

@@ -32,7 +32,7 @@ from _do_mpc_peer import SETTINGS, DoMpc
 from _table import markdown, publish, write
 from simulator_speed import pilot
 
-from mpc.control.controller.action import ResetRule
+from mpc.control.controller.site import ResetRule
 from mpc.control.predictor.predictor import Predictor
 from mpc.control.problem.channels import supply_channels
 from mpc.control.problem.horizon import Horizon, HorizonData, PeakData

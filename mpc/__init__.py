@@ -7,8 +7,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from mpc.control.controller.action import ControllerSettings
     from mpc.control.controller.controller import MpcController
+    from mpc.control.controller.site import ControllerSettings
     from mpc.control.problem.horizon import Horizon
     from mpc.errors import MpcError
     from mpc.kpi.kpis import Kpis, measure_kpis

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from mpc.control.controller.reading import SitePoints, values_of
+from mpc.control.controller.site import SitePoints, values_of
 from mpc.errors import ControlError
 from mpc.loop.actuators import COOLING_SETPOINT, HEATING_SETPOINT, SUPPLY_AIR, SUPPLY_WATER, Actuator
 from mpc.loop.plant import Measurements

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 
 from mpc.baselines.guideline36 import Guideline36
-from mpc.control.controller.action import ResetRule
-from mpc.control.controller.reading import SitePoints, values_of
+from mpc.control.controller.site import ResetRule, SitePoints, values_of
 from mpc.control.problem.channels import Channel
 from mpc.loop.actuators import SUPPLY_AIR, SUPPLY_WATER, Actuator
 from mpc.loop.plant import Controller

@@ -48,7 +48,7 @@ class StudyOptions:
         """Put together what controllers run on."""
         from mpc.loop.noise import SensorNoise
         from mpc.scenario.forecast import DAY_AHEAD_ERRORS
-        from mpc.scenario.paper import paper_tariff
+        from mpc.scenario.tariff import paper_tariff
         from mpc.scenario.urdb import read_urdb
         from mpc.scenario.weather_files import weather_of_case
         from mpc.studies.study import StudySettings, make_study

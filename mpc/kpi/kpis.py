@@ -21,7 +21,6 @@ from thermal._types import FloatArray, IntArray
 PEAK_WINDOW = 900.0
 
 
-
 @dataclass(frozen=True)
 class ZoneComfort:
     """Comfort of a zone over a run.

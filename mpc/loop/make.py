@@ -21,9 +21,8 @@ from mpc.scenario.forecast import Forecaster
 from mpc.scenario.gains import InternalGains
 from mpc.scenario.grid import StepGrid
 from mpc.scenario.occupancy import ComfortBand, Occupancy
-from mpc.scenario.paper import paper_carbon, paper_tariff
 from mpc.scenario.scenario import Scenario, build_scenario
-from mpc.scenario.tariff import CarbonIntensity, Tariff
+from mpc.scenario.tariff import CarbonIntensity, Tariff, paper_carbon, paper_tariff
 from mpc.scenario.weather import Weather
 from mpc.studies.model import BuildingParameters, model_settings, parameter_vector
 from thermal._types import FloatArray

@@ -29,8 +29,7 @@ FORECAST_UNITS = {
     "comfort_lower_temperature": "K",
     "comfort_upper_temperature": "K",
 }
-_QUANTITY = {"internal_gain": "power", "comfort_lower_temperature": "temperature",
-             "comfort_upper_temperature": "temperature"}  # fmt: skip
+_QUANTITY = {"W": "power", "K": "temperature"}  # of these units, converted from others
 
 
 def column_unit(column: str) -> str:
@@ -120,7 +119,7 @@ class Forecast:
             where, name = f"forecast: column {column!r}", column.rpartition("/")[2]
             ScenarioError.unless(column in units, where, "a unit", "none", "add it to `units`")
             wanted, unit = column_unit(column), units[column]
-            quantity = _QUANTITY.get(name) or (POINT_TYPES[name].quantity if name in POINT_TYPES else None)
+            quantity = _QUANTITY.get(wanted) if name in FORECAST_UNITS else POINT_TYPES[name].quantity
             if quantity is None:
                 ScenarioError.unless(unit == wanted, where, f"the unit {wanted!r}", repr(unit))
                 continue
@@ -343,8 +342,7 @@ class Forecaster:
         begin = int(self.scenario.grid.edges[k])
         issue = int(begin // self.issue_every)
         since = int((begin - issue * self.issue_every) // self.scenario.grid.step)
-        paths = self._paths(issue)
-        for name, path in paths.items():
+        for name, path in self._paths(issue).items():
             at, error = self._wrong[name], path[since : since + self.horizon, None]
             if name == "sun":
                 values[:, at] *= np.maximum(1.0 + error, 0.0)

@@ -63,9 +63,7 @@ class InternalGains:
             possible = np.isfinite(value) and 0 <= value <= (1.0 if name.startswith(("idle", "radiant")) else np.inf)
             ScenarioError.unless(possible, f"gains: {name}", "0 or more, shares up to 1", value)
 
-    def heat(
-        self, occupancy: ArrayLike, people: ArrayLike, areas: ArrayLike, *, radiant: bool = False
-    ) -> FloatArray:
+    def heat(self, occupancy: ArrayLike, people: ArrayLike, areas: ArrayLike, *, radiant: bool = False) -> FloatArray:
         """Sensible heat given to each zone.
 
         Parameters
@@ -92,7 +90,8 @@ class InternalGains:
         """
         count, all_in = np.asarray(occupancy, dtype=float), np.asarray(people, dtype=float)
         share = np.divide(count, all_in, out=np.zeros_like(count), where=all_in > 0)
-        of_people, of_equipment, of_lights = self._radiant if radiant else (1.0, 1.0, 1.0)
+        radiating = self.radiant_people, self.radiant_equipment, self.radiant_lights
+        of_people, of_equipment, of_lights = radiating if radiant else (1.0, 1.0, 1.0)
         density = of_equipment * self.equipment * (self.idle_equipment + (1.0 - self.idle_equipment) * share)
         density += of_lights * self.lights * (self.idle_lights + (1.0 - self.idle_lights) * share)
         return np.asarray(of_people * count * self.sensible + density * np.asarray(areas, dtype=float))
@@ -100,11 +99,7 @@ class InternalGains:
     @property
     def radiates(self) -> bool:
         """Whether any of the heat radiates."""
-        return any(self._radiant)
-
-    @property
-    def _radiant(self) -> tuple[float, float, float]:
-        return self.radiant_people, self.radiant_equipment, self.radiant_lights
+        return any((self.radiant_people, self.radiant_equipment, self.radiant_lights))
 
     def moisture_heat(self, occupancy: ArrayLike) -> FloatArray:
         """Latent heat of the people in each zone.

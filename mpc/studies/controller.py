@@ -10,10 +10,9 @@ import numpy as np
 from calibration.estimation.disturbance import DisturbanceModel
 from calibration.estimation.kalman import KalmanFilter
 from calibration.estimation.state_space import StateSpace, state_space
-from mpc.control.controller.action import ControllerSettings
 from mpc.control.controller.controller import MpcController
 from mpc.control.controller.observer import Observer
-from mpc.control.controller.reading import SitePoints
+from mpc.control.controller.site import ControllerSettings, SitePoints
 from mpc.control.predictor.forecast_signals import ForecastSignals
 from mpc.control.predictor.predictor import Predictor
 from mpc.control.problem.channels import Channel

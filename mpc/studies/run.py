@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from mpc.control.controller.action import Action
 from mpc.control.controller.controller import MpcController
+from mpc.control.controller.site import Action
 from mpc.control.predictor.predictor import Predictor
 from mpc.errors import ControlError
 from mpc.kpi.kpis import Kpis, measure_kpis

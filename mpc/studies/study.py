@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from calibration.evaluation.settings import ModelSettings
-from mpc.control.controller.action import ControllerSettings
+from mpc.control.controller.site import ControllerSettings
 from mpc.errors import PlantError
 from mpc.kpi.rewards import DISCOMFORT_PRICE
 from mpc.loop.building import BuildingModel

@@ -20,10 +20,9 @@ from mpc.loop.noise import SensorNoise
 from mpc.loop.operation import Operation, scheduled_operation
 from mpc.scenario.grid import StepGrid
 from mpc.scenario.occupancy import ComfortBand, Occupancy
-from mpc.scenario.paper import paper_carbon, paper_tariff
 from mpc.scenario.rates import Rate
 from mpc.scenario.scenario import Scenario, build_scenario
-from mpc.scenario.tariff import CarbonIntensity, Tariff
+from mpc.scenario.tariff import CarbonIntensity, Tariff, paper_carbon, paper_tariff
 from mpc.scenario.weather import Weather
 from thermal._types import FloatArray
 from thermal.case.building import Building

@@ -14,9 +14,8 @@ from mpc.scenario.forecast import Forecaster
 from mpc.scenario.gains import InternalGains
 from mpc.scenario.grid import Calendar, StepGrid
 from mpc.scenario.occupancy import ComfortBand
-from mpc.scenario.paper import paper_tariff
 from mpc.scenario.scenario import Scenario, build_scenario
-from mpc.scenario.tariff import CarbonIntensity, Tariff
+from mpc.scenario.tariff import CarbonIntensity, Tariff, paper_tariff
 from mpc.scenario.weather_files import read_epw
 
 #: Thermostats of the reference offices, 21 and 24 degC while they run, half a kelvin wider; an hour to get there.

@@ -9,9 +9,8 @@ from typing import Any, Literal
 import numpy as np
 import pandas as pd
 
-from mpc.control.controller.action import Action, ControllerSettings, Source
 from mpc.control.controller.observer import Observer
-from mpc.control.controller.reading import Reading, SitePoints, past_forecast, past_steps
+from mpc.control.controller.site import Action, ControllerSettings, Reading, SitePoints, Source
 from mpc.control.controller.watch import FarFromModel, StuckSensors, explain_comfort
 from mpc.control.problem.assembly import DemandCount, Expected, expect
 from mpc.control.problem.horizon import HorizonData
@@ -136,11 +135,11 @@ class MpcController:
         --------
         >>> controller.start_up(case.telemetry.frame.loc["2023-01-09":"2023-01-11"])  # doctest: +SKIP
         """
-        steps = past_steps(telemetry, self.points, self._horizon.control_step)
+        steps = self.points.past_steps(telemetry, self._horizon.control_step)
         others = np.zeros((len(steps), 0))
         if self.signals is not None:
             stamps = pd.DatetimeIndex([stamp for stamp, *_ in steps])
-            others = self.signals(past_forecast(telemetry, self.points), stamps)
+            others = self.signals(self.points.past_forecast(telemetry), stamps)
         started = False
         for (stamp, measured, outdoor, gains), other in zip(steps, others, strict=True):
             read = self.points.read(measured, self._system)

@@ -90,8 +90,6 @@ def solve_quadratic(
     return QuadraticResult(x, Status.of(word) is Status.CONVERGED and bool(np.isfinite(x).all()), word)
 
 
-
-
 class LinearSolver(Solver):
     """The control problem of a `HeatPredictor` as one convex programme, by cvxpy and Clarabel.
 

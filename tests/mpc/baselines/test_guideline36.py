@@ -8,7 +8,7 @@ import pytest
 
 from mpc.baselines.guideline36 import Guideline36, Guideline36Settings, HysteresisRequests, SuppressedRequests
 from mpc.baselines.rules import BASELINES, OutdoorReset
-from mpc.control.controller.reading import SitePoints
+from mpc.control.controller.site import SitePoints
 from mpc.errors import ControlError
 from mpc.loop.actuators import Actuator
 

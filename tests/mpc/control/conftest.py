@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from mpc.control.controller.reading import SitePoints
+from mpc.control.controller.site import SitePoints
 from mpc.control.predictor.predictor import Predictor
 from mpc.control.problem.channels import Channel, supply_channels
 from mpc.control.problem.horizon import Horizon, HorizonData, PeakData

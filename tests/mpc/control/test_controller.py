@@ -8,10 +8,9 @@ import pytest
 
 from calibration import DisturbanceModel, KalmanFilter
 from calibration.estimation.state_space import state_space
-from mpc.control.controller.action import ControllerSettings, Source
 from mpc.control.controller.controller import MpcController
 from mpc.control.controller.observer import Observer
-from mpc.control.controller.reading import SitePoints
+from mpc.control.controller.site import ControllerSettings, SitePoints, Source
 from mpc.control.problem.horizon import HorizonData
 from mpc.control.solvers.sequential import SequentialSolver
 from mpc.errors import ControlError

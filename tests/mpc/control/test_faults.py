@@ -12,10 +12,9 @@ import pytest
 
 from calibration import DisturbanceModel, KalmanFilter
 from calibration.estimation.state_space import state_space
-from mpc.control.controller.action import Action, ControllerSettings, Source
 from mpc.control.controller.controller import MpcController
 from mpc.control.controller.observer import Observer
-from mpc.control.controller.reading import SitePoints
+from mpc.control.controller.site import Action, ControllerSettings, SitePoints, Source
 from mpc.control.predictor.predictor import Predictor
 from mpc.control.problem.channels import supply_channels
 from mpc.control.problem.horizon import Horizon

@@ -14,8 +14,8 @@ from mpc.loop.reduced import ReducedBuilding, reduced_building
 from mpc.loop.simulated import SimulatedPlant
 from mpc.scenario.gains import InternalGains
 from mpc.scenario.grid import StepGrid
-from mpc.scenario.paper import paper_carbon, paper_tariff
 from mpc.scenario.scenario import Scenario, build_scenario
+from mpc.scenario.tariff import paper_carbon, paper_tariff
 from thermal import Building
 from thermal.pilot.building import pilot_building
 from thermal.pilot.sizing import size_system

@@ -11,8 +11,8 @@ import pytest
 from mpc.errors import ScenarioError
 from mpc.scenario.forecast import DAY_AHEAD_ERRORS, ErrorGrowth, Forecaster
 from mpc.scenario.occupancy import RandomOccupancy
-from mpc.scenario.paper import paper_tariff
 from mpc.scenario.scenario import Scenario, build_scenario
+from mpc.scenario.tariff import paper_tariff
 from mpc.scenario.weather import Weather
 from thermal import Building
 

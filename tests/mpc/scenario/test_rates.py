@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 
 from mpc.errors import ScenarioError
 from mpc.scenario.grid import Calendar, StepGrid
-from mpc.scenario.paper import paper_carbon, paper_tariff
 from mpc.scenario.rates import GAS_UNITS, ConstantRate, HourlyRate, SeriesRate, gas_price, monthly_rate
+from mpc.scenario.tariff import paper_carbon, paper_tariff
 
 ZONE = "America/Los_Angeles"
 BY_HOUR = [float(hour) for hour in range(24)]

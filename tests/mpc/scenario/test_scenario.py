@@ -13,8 +13,8 @@ from mpc.loop.signals import scenario_inputs
 from mpc.scenario.gains import InternalGains
 from mpc.scenario.grid import StepGrid
 from mpc.scenario.occupancy import ComfortBand, RandomOccupancy
-from mpc.scenario.paper import paper_carbon, paper_tariff
 from mpc.scenario.scenario import Scenario, build_scenario, zone_areas
+from mpc.scenario.tariff import paper_carbon, paper_tariff
 from mpc.scenario.weather import Weather
 from mpc.scenario.weather_files import weather_of_case
 from thermal import Building, load_bundled_case

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from calibration.estimation.state_space import state_space
-from mpc.control.controller.action import Source
+from mpc.control.controller.site import Source
 from mpc.errors import ControlError
 from mpc.kpi.kpis import measure_kpis
 from mpc.loop.run import FixedSetpoints, run_closed_loop
