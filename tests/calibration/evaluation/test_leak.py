@@ -106,8 +106,9 @@ def test_predictions_know_nothing_of_the_days_after_their_start(name: str) -> No
 def test_a_calibration_knows_nothing_of_held_out_days(tmp_path: Path) -> None:
     """Parameters stay bit for bit, and the constants are written with them, and read back."""
     tuning, held_out = intervals()
+    settings = {"dx": 1.5, "horizon": "1h", "effects": ["internal_gains", "infiltration"], "starts": 1}
     found = [
-        calibrate(case, tuning, held_out, dx=1.5, horizon="1h", effects=["internal_gains", "infiltration"], starts=1)
+        calibrate(case, tuning, held_out, settings=settings)
         for case in (counted(), altered(people=True))
     ]
     assert np.array_equal(found[0].theta, found[1].theta)
