@@ -70,18 +70,14 @@ def check_verdict(check: CaseCheck) -> str:
     measured = sum(bool(z.measured_by) for z in check.zones)
     usable = 1.0 - float(np.mean([c.unusable_share for c in check.quality.columns]))
     flawed = sum(c.unusable_share > 0 for c in check.quality.columns)
+    days = ((check.end - check.start).total_seconds() + check.step) / 86400.0
     parts = [
         f"The case is valid: {counted(len(check.zones), 'zone')} on {significant(check.floor_area)} m², {measured}",
-        f"of them measured, {counted(len(check.devices), 'device')}, {_days(check):.3g} days of telemetry every",
+        f"of them measured, {counted(len(check.devices), 'device')}, {days:.3g} days of telemetry every",
         f"{duration(check.step)}. {100 * usable:.1f} % of its values can be used",
     ]
     text = " ".join(parts) + (f"; {flawed} of {len(check.quality.columns)} columns lack some." if flawed else ".")
     return text + (f" {counted(len(check.remarks), 'remark').capitalize()}." if check.remarks else "")
-
-
-def _days(check: CaseCheck) -> float:
-    """Length of the telemetry [days]."""
-    return float((check.end - check.start).total_seconds() + check.step) / 86400.0
 
 
 def quality_rows(check: CaseCheck) -> list[list[str]]:

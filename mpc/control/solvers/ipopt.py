@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import casadi as ca
@@ -15,6 +16,7 @@ from mpc.control.problem.problem import KILOWATT, ControlProblem
 from mpc.control.solvers.solution import Solution, Solver, Status
 from mpc.errors import MpcError
 from thermal._types import FloatArray
+from thermal.callback import ArrayFunction
 
 _QUIET = {
     "print_time": False,
@@ -79,36 +81,6 @@ class _Evaluation:
         except BaseException as error:
             self.error = error
             raise
-
-
-class _Callback(ca.Callback):
-    """The evaluation as CasADi sees it: values, or their Jacobian."""
-
-    def __init__(self, evaluation: _Evaluation, n_window: int, order: int = 0) -> None:
-        ca.Callback.__init__(self)
-        self._evaluation, self._n, self._m, self._order = evaluation, evaluation.problem.span.size, 1 + n_window, order
-        self._kept: list[ca.Callback] = []  # CasADi holds no reference to the derivatives it is handed
-        self.construct(f"control_{order}", {})
-
-    def get_n_in(self) -> int:
-        return 1 + self._order
-
-    def get_sparsity_in(self, i: int) -> ca.Sparsity:
-        return ca.Sparsity.dense(self._n, 1) if i == 0 else ca.Sparsity(self._m, 1)
-
-    def get_sparsity_out(self, i: int) -> ca.Sparsity:
-        return ca.Sparsity.dense(self._m, self._n if self._order else 1)
-
-    def eval(self, arg: Sequence[ca.DM]) -> list[ca.DM]:
-        of = self._evaluation.jacobian if self._order else self._evaluation.values
-        return [ca.DM(self._evaluation.guarded(of, np.array(arg[0], dtype=float).ravel()))]
-
-    def has_jacobian(self) -> bool:
-        return self._order == 0
-
-    def get_jacobian(self, *_: object) -> ca.Function:
-        self._kept.append(_Callback(self._evaluation, self._m - 1, 1))
-        return self._kept[-1]
 
 
 class IpoptSolver(Solver):
@@ -198,17 +170,19 @@ class IpoptSolver(Solver):
         key = (n_window, n_peak, tuned)
         if key not in self._built:
             problem, n = self.problem, self.problem.span.size
-            callback = _Callback(self._evaluation, n_window)
+            of = self._evaluation
+            values, jacobian = (partial(of.guarded, f) for f in (of.values, of.jacobian))
+            callback = ArrayFunction("control", values, n, (1 + n_window, 1), jacobian)
             x, p = ca.MX.sym("x", n + n_peak), ca.MX.sym("p", n_peak + n_window)
-            values = callback(x[:n])
+            outputs = callback(x[:n])
             # a product with 0 and 1 picks the peak of each window, so that which belongs where is a parameter too
             owners = [ca.sum1((p[n_peak + j] == ca.DM(range(n_peak))) * x[n:]) for j in range(n_window)]
-            above = [values[1 + j] - owner for j, owner in enumerate(owners)]
+            above = [outputs[1 + j] - owner for j, owner in enumerate(owners)]
             limited = np.flatnonzero(np.isfinite(problem.most_change))
             nlp: Any = {
                 "x": x,
                 "p": p,
-                "f": values[0] + ca.dot(p[:n_peak], x[n:]),
+                "f": outputs[0] + ca.dot(p[:n_peak], x[n:]),
                 "g": ca.vertcat(*above, ca.mtimes(ca.DM(problem.differences[limited]), x[:n])),
             }
             options: Any = {"ipopt.tol": self.tolerance, "ipopt.max_iter": self.iterations, **_QUIET}
