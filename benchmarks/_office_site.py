@@ -45,7 +45,6 @@ from mpc.scenario.gains import InternalGains
 from mpc.scenario.grid import StepGrid
 from mpc.scenario.scenario import Scenario, build_scenario
 from mpc.scenario.tariff import paper_carbon, paper_tariff
-from mpc.studies.bound import KnownState
 from mpc.studies.controller import default_horizon, make_controller, site_points
 from mpc.studies.controllers import KnownState
 from mpc.studies.model import ORDER, control_model

@@ -182,7 +182,7 @@ def demo(out: Annotated[Path, folder("the results")] = OUT, force: Force = False
 
 def _show_demo(found: Demo, out: Path) -> None:
     """Write what came of the error and of the costs to stdout."""
-    from mpc.reports.control_words import comparison_rows
+    from mpc.reports.control import comparison_rows
 
     content = found.to_dict()
     names = {"uncalibrated": "as it was drawn", "calibrated": "calibrated", "with_effects": "with what was found"}
