@@ -1,7 +1,5 @@
 """The error family of the package."""
 
-from __future__ import annotations
-
 
 class CalibrationError(Exception):
     """Base of every error that `calibration` raises on purpose."""

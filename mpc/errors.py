@@ -1,7 +1,5 @@
 """The error family of the package."""
 
-from __future__ import annotations
-
 from collections.abc import Collection
 
 

@@ -4,8 +4,6 @@ An installed package names its modules in the entry-point groups of `GROUPS`; a 
 named on the command line, ``buildingmpc --plugin my_controller.py compare ...``.
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Iterable
 from importlib import import_module

@@ -1,7 +1,5 @@
 """Functions of NumPy arrays as CasADi calls them, with their Jacobian."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from typing import cast
 

@@ -1,7 +1,5 @@
 """The error family of the package: every refusal has a name, and says where, what was expected, and what it got."""
 
-from __future__ import annotations
-
 import difflib
 from collections.abc import Iterable
 

@@ -5,8 +5,6 @@ shares (``%``, ``ppm``) are plain fractions. The one exception is the angle, whi
 library, as azimuths are in building science.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cache
 from typing import Any

@@ -1,7 +1,5 @@
 """Diagnosis of a case: where model and building disagree, which effect causes it, how far the gap shrinks with it."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace

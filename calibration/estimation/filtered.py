@@ -3,8 +3,6 @@
 A filter starts with what a spin-up leaves unknown of walls, slabs and furniture.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Gains of a filter: one for each step whose sensors or covariance differ from those of the step before."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import Literal
 

@@ -1,7 +1,5 @@
 """Heat that a model needs to follow the measured zone temperatures, against the heat that was metered."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Tuning of the disturbance by maximum likelihood of the innovations, with exact derivatives."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 

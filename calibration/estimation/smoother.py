@@ -1,7 +1,5 @@
 """Smoother: unmeasured heat of every zone with its band, and derivatives of the likelihood, by one pass backwards."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A reduced model as a discrete state space: decoupled modes where they decouple, dense where air moves one way."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

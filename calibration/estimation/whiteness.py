@@ -1,7 +1,5 @@
 """Residual tests: whether innovations are white, zone by zone, and what past inputs still explain of them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any

@@ -1,7 +1,5 @@
 """A case with its model and parameters, ready to run: what calibration, evaluation and replay have in common."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path

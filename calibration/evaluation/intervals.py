@@ -1,7 +1,5 @@
 """Tuning and held-out intervals, and the runs that start in them."""
 
-from __future__ import annotations
-
 import itertools
 import re
 from collections.abc import Sequence

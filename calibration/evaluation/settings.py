@@ -1,7 +1,5 @@
 """How a case's model is built, run and calibrated, and what a file of parameters says of it."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace

@@ -1,7 +1,5 @@
 """Calibration of a case: from telemetry to parameters, with errors before and after, tuned on and held out."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import replace

@@ -4,8 +4,6 @@ By Ipopt, Gauss-Newton with a secant term for the residuals' curvature; and by d
 that is close.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any

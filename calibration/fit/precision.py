@@ -8,8 +8,6 @@ www3.stat.sinica.edu.tw/statistica/j21n1/j21n17/j21n17.html; Ribatet, Cooley and
 covariance with prior precision Λ is ``H^-1 (w⁴M + Λ) H^-1``, H = w²B + Λ (Godambe 1960, doi:10.1214/aoms/1177705693).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What a calibration found: parameters with what is known of them, errors before and after, solver status."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar

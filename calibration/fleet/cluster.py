@@ -1,7 +1,5 @@
 """Workers of a `dask.distributed` cluster (extra ``[cluster]``)."""
 
-from __future__ import annotations
-
 import pickle
 import sys
 import time

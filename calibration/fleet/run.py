@@ -1,7 +1,5 @@
 """Calibration of many cases at once, on any executor, so that nothing that is finished is ever lost."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import time

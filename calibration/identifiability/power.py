@@ -1,7 +1,5 @@
 """Power of the data before fitting: what they will tell of each parameter, from the inputs alone."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import ClassVar, Literal

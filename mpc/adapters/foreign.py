@@ -1,7 +1,5 @@
 """Plants behind another program: its signals under the names of the case format, their units and ranges."""
 
-from __future__ import annotations
-
 import sys
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping

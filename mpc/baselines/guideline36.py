@@ -1,7 +1,5 @@
 """ASHRAE Guideline 36-2021: supply air and hot water by the requests of zones and reheat valves."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 

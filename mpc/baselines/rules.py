@@ -1,7 +1,5 @@
 """Baselines by rule: a fixed schedule, outdoor reset, and all of them by name."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 
 from mpc.baselines.guideline36 import Guideline36

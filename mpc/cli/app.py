@@ -1,7 +1,5 @@
 """The subcommands of ``buildingmpc``, their help, and how an error becomes an exit code."""
 
-from __future__ import annotations
-
 import errno
 import os
 import sys

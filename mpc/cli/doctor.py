@@ -1,7 +1,5 @@
 """``buildingmpc doctor``: works where half of the packages are missing, so it imports them one by one."""
 
-from __future__ import annotations
-
 import platform
 import time
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """The closed loop as a Gymnasium environment, and that of an office in one call."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property

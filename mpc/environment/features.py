@@ -1,7 +1,5 @@
 """Entries of an observation, each with a fixed physical range: measurements, forecast and clock."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Mapping, Sequence

@@ -1,7 +1,5 @@
 """Observations and actions of an agent: vectors of fixed length, scaled by ranges known before the first step."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 

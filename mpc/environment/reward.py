@@ -1,7 +1,5 @@
 """Rewards of a control step, from what the plant did on its own steps."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """Key performance indicators of a closed loop: BOPTEST's names and formulas, and those that users register."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field
 from functools import cached_property

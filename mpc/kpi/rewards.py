@@ -1,7 +1,5 @@
 """Rewards of a step: the paper's weighted regret, and minus the cost of the step."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 

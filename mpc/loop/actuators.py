@@ -1,7 +1,5 @@
 """What a controller may set, and the check of what it sets."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The building of a plant: what it is asked for, and the one on the grid."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np

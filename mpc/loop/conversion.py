@@ -1,7 +1,5 @@
 """Units of signals that others name, to and from those of the library."""
 
-from __future__ import annotations
-
 import re
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """What a plant did, step by step: the telemetry, the record for indicators and the balance of a run."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 

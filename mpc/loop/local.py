@@ -9,8 +9,6 @@ with T_free what the zone would reach without supply air, R its response to heat
 terminals, which falls as T rises. q is taken as lines between the ends of the thermostat's ranges.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

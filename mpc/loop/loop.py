@@ -1,7 +1,5 @@
 """The loop of a plant, step by step: schedules, thermostats, devices and building, each with the state that it has."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 

@@ -1,7 +1,5 @@
 """Plants from a building and its weather in one call, and the pilot building as a case folder."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from os import PathLike

@@ -1,7 +1,5 @@
 """Errors of sensors and meters: white, drawn from seed and step alone."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, fields
 from functools import cached_property
 

@@ -1,7 +1,5 @@
 """When the plant runs, and what the thermostats are set to: schedules of a building's own automation."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What every plant gives and takes: ours, EnergyPlus and BOPTEST behind the same few methods."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property

@@ -1,7 +1,5 @@
 """A building reduced to its modes, as a plant steps it."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

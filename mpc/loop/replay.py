@@ -5,8 +5,6 @@ their commands, supply air and water; air handlers by the air that comes back; t
 took; zones by the metered heat.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

@@ -1,7 +1,5 @@
 """Terminals, air handlers and hot water, each replayed by what telemetry says of its surroundings."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """A closed loop: a controller on a plant, and what came of it."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace

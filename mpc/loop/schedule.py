@@ -1,7 +1,5 @@
 """The schedules of a building's automation as a plant steps through them, with its night cycle."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import Any

@@ -1,7 +1,5 @@
 """What the sensors of a plant say: its signals under the names of the case format, with noise."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 

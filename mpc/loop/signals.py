@@ -1,7 +1,5 @@
 """What drives a plant's building: boundaries, and signals of its effects, in advance or as the loop runs."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial

@@ -1,7 +1,5 @@
 """Our plant: air handlers, hot water and terminals on a building model, driven by a scenario."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any

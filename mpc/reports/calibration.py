@@ -1,7 +1,5 @@
 """What a calibration leaves behind: its numbers as JSON, its predictions as a table, and a page to read."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any

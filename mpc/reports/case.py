@@ -1,7 +1,5 @@
 """Pages about a case itself: what a check found, and what a replay gave."""
 
-from __future__ import annotations
-
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any

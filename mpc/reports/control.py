@@ -1,7 +1,5 @@
 """What a run or a comparison leaves behind: numbers as JSON, the course as a table, and a page in plain words."""
 
-from __future__ import annotations
-
 import re
 from collections import Counter
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """The page that leads to the reports of the main job: each step in a sentence, and what matters in two pictures."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 from calibration.evaluation.n_step import Evaluation

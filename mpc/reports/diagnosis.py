@@ -1,7 +1,5 @@
 """What a diagnosis leaves behind: its numbers, the final model, and a page for those who run the building."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any

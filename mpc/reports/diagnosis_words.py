@@ -1,7 +1,5 @@
 """A diagnosis in plain words: the verdict, effects and where they are, and what would tell them apart."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What an evaluation leaves behind, and the figures that it shares with a calibration."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any

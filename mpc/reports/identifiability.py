@@ -1,7 +1,5 @@
 """What the data determine and prefer, in words: on the estimation scale these are products, ratios, odds."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Pages of reports: one way from contents to a page, and how numbers, times and lists read in them."""
 
-from __future__ import annotations
-
 import math
 import platform
 from collections.abc import Callable, Iterable, Mapping, Sequence

@@ -1,7 +1,5 @@
 """What a calibration's page says of what the model leaves: unmeasured heat, innovations, and the balance of heat."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Heat that people, light and equipment give to the zones."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Who is in and when: schedules, people who come and go at random, and the comfort bands of occupied hours."""
 
-from __future__ import annotations
-
 import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field

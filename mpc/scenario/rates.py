@@ -1,7 +1,5 @@
 """What a kilowatt-hour costs or emits: constant, by the local hour, or as a series of published values."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Literal, Protocol

@@ -1,7 +1,5 @@
 """What energy costs and emits: prices, charges for the highest demand of a month, carbon."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal

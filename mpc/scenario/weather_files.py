@@ -1,7 +1,5 @@
 """Weather from files of the trade (EPW, TMY3), from CSV, and from a case's telemetry."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Optimal control for a plant in one call: model, predictor, problem, observer and controller put together."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """Controllers by name: three rules, optimal control, the perfect bound, and those that others register."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

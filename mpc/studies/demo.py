@@ -1,7 +1,5 @@
 """The main job from beginning to end: check, calibrate, evaluate, diagnose and control a case, with a page a step."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from importlib.metadata import version

@@ -1,7 +1,5 @@
 """The model that a controller predicts with: a building, calibrated or not, reduced to few states."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A study run with one controller, and with several side by side on the same weather, people, prices and noise."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass

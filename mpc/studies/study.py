@@ -1,7 +1,5 @@
 """What controllers are compared on: a building with its plant, a stretch of time, weather, people and prices."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 

@@ -1,7 +1,5 @@
 """What a building is: the entries of its file, and the site, geometry and devices that the library sees."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property

@@ -1,7 +1,5 @@
 """Check of a case: what the library understood of it, summaries of its zones, devices and points."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from os import PathLike
 from typing import Any

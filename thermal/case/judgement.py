@@ -1,7 +1,5 @@
 """Judging one signal: impossible values, flat lines, spikes. Numbers in, stretches out."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -1,7 +1,5 @@
 """Loading a case folder: all of it, checked, or a named error."""
 
-from __future__ import annotations
-
 from collections.abc import Hashable, Mapping
 from dataclasses import fields
 from os import PathLike

@@ -1,7 +1,5 @@
 """Floor plans of tokens: reading, what a plan must keep to, and the areas and volumes of its zones."""
 
-from __future__ import annotations
-
 import csv
 from pathlib import Path
 

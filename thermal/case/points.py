@@ -1,7 +1,5 @@
 """The point types of the case format: what each measures, and which values a sensor of it can report at all."""
 
-from __future__ import annotations
-
 import csv
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Saving a case folder: whole or not at all."""
 
-from __future__ import annotations
-
 import csv
 import os
 import re

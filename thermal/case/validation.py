@@ -1,7 +1,5 @@
 """What must hold between the parts of a building, and what is worth a remark."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from graphlib import CycleError, TopologicalSorter
 

@@ -1,7 +1,5 @@
 """Air handlers: economiser, cooling and heating coil, fans."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Annotated, NamedTuple
 

@@ -1,7 +1,5 @@
 """The hot-water loop: boiler, water and pipes, with its pump."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Annotated, NamedTuple
 

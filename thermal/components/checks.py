@@ -1,7 +1,5 @@
 """What parameters and actions must satisfy, refused by name."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

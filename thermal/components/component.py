@@ -6,8 +6,6 @@ and CasADi expressions. It is a generator: ``message = yield "hot_water"`` waits
 where sums over many elements are cut, is the business of `thermal.system`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Generator, Mapping
 from functools import cache, cached_property
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple, get_args, get_origin, get_type_hints

@@ -1,7 +1,5 @@
 """Performance curves of equipment, with the buildings and documents that they are from."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

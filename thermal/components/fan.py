@@ -1,7 +1,5 @@
 """Fans: power by flow and pressure, and the heat that it becomes."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Annotated

@@ -1,7 +1,5 @@
 """Heaters of air that burn gas or take electricity."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Annotated
 

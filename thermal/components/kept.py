@@ -1,7 +1,5 @@
 """What stays the same from step to step as long as its arguments do."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Moist air and water: constants, saturation, wet bulb, in closed forms that differentiate."""
 
-from __future__ import annotations
-
 from thermal.components.operations import Operations, Value
 
 WATER_HEAT_CAPACITY = 4186.0  # J/kg/K, liquid at 50 degC within 0.2 % (IAPWS-95)

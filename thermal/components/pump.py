@@ -1,7 +1,5 @@
 """Pumps: power by flow and differential pressure."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Annotated
 

@@ -1,7 +1,5 @@
 """Which component a device of a case is, by its type; one's own are added with `register_component`."""
 
-from __future__ import annotations
-
 from thermal.components.air_handler import AirHandler
 from thermal.components.boiler_loop import BoilerLoop
 from thermal.components.component import Actuator, Component

@@ -5,8 +5,6 @@ it can bring, hears what is drawn, and says how warm the water is at the end of 
 temperature does so linearly, so that a loop is solved exactly.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from thermal.components.operations import Value

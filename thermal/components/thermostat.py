@@ -1,7 +1,5 @@
 """Thermostats: from a zone's temperature and setpoints to calls for heating and cooling."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import Annotated

@@ -1,7 +1,5 @@
 """The bundled case: one floor, five zones, ten days at five minutes, from EnergyPlus."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from thermal.case.case import Case

@@ -1,7 +1,5 @@
 """Air that comes from outdoor or from the next zone: infiltration, thermal bridges, open windows, mixing."""
 
-from __future__ import annotations
-
 from functools import partial
 
 import casadi as ca

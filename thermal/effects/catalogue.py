@@ -1,7 +1,5 @@
 """The catalogue of effects: what a building may have and the baseline does not, each a term of the model."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 
 from thermal.effects.air import INFILTRATION, THERMAL_BRIDGE, WINDOW_OPENING, ZONE_MIXING

@@ -1,7 +1,5 @@
 """What an effect of the catalogue is, and how it joins a building's network."""
 
-from __future__ import annotations
-
 import tomllib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """What sensors, meters and terminals get wrong: bias, lag, flow gain, duct loss, limits and leaks."""
 
-from __future__ import annotations
-
 from functools import partial
 
 import casadi as ca

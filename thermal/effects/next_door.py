@@ -1,7 +1,5 @@
 """Heat from and to what the baseline takes for adiabatic: other floors, ground, roof, the neighbour; more mass."""
 
-from __future__ import annotations
-
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray

@@ -1,7 +1,5 @@
 """Cold sky, wind on the outside film, and weather that is measured elsewhere."""
 
-from __future__ import annotations
-
 from functools import partial
 from operator import attrgetter
 

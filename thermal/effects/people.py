@@ -1,7 +1,5 @@
 """People and what they bring: gains, latent load, clocks that are wrong."""
 
-from __future__ import annotations
-
 from functools import partial
 from operator import attrgetter
 

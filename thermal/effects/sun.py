@@ -1,7 +1,5 @@
 """Sun through glass, blinds, and sun on opaque walls."""
 
-from __future__ import annotations
-
 from functools import partial
 
 import casadi as ca

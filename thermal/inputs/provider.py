@@ -4,8 +4,6 @@ Values stand for the step that ends at their stamp. A source says what it can gi
 of a model what it is made of (`Signal.inputs`), so that nobody has to try.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from functools import cached_property
 

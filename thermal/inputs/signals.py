@@ -1,7 +1,5 @@
 """Signals: time series that drive the sources of a network, made of inputs."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 

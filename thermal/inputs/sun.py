@@ -1,7 +1,5 @@
 """Sun's place and irradiance on tilted planes, by pvlib, at the middle of each step."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Certificate of a reduced model: two days under thermostats on the grid, and the same heat replayed in its modes."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

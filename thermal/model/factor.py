@@ -1,7 +1,5 @@
 """Matrices of a model at one θ, and factors of that of a step: lean for many solves, ordered once for few."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial

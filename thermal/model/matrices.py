@@ -1,7 +1,5 @@
 """The symbolic model: class conductances κ(θ) and capacities c(θ), their derivatives, and the matrices they make."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

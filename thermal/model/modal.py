@@ -1,7 +1,5 @@
 """The modes of a reduced model: decoupled states, stepped exactly or as a scheme would, and their derivatives."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any

@@ -5,8 +5,6 @@ With ``S = (K + s C)^-1 C`` a step is ``x' = f(S) x + g(S) (K + s C)^-1 b``, and
 ``(dC - d(K + s C) c) ∘ f[c_i, c_j]`` (`divided_differences`).
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cached_property
 

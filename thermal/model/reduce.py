@@ -1,7 +1,5 @@
 """Galerkin reduction by rational block-Krylov subspaces: few states, still affine in the classes, and certified."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from functools import cached_property
 from typing import Any

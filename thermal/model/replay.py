@@ -1,7 +1,5 @@
 """Replay of a case's telemetry: inputs, spin-up with the zones held at their measured temperatures, and free runs."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """Roll-outs as CasADi functions of θ: fully symbolic, and sparse behind a Callback, with one signature."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Literal
 

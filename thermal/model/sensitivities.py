@@ -7,8 +7,6 @@ The sensitivities to every parameter are sums over past steps, ``Σ_k a_i^(n-1-k
 a_i. What does not depend on the parameter, ``Σ_k a_i^(n-1-k) w_l[k]``, is summed once for all of them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Replay of an interval of telemetry through the model: the simulated zones beside the measured ones."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any

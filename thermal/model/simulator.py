@@ -1,7 +1,5 @@
 """The stepping simulator: the plant of closed-loop tests, with the paper's random shuffle or its mean."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial

@@ -3,8 +3,6 @@
 Every stage solves ``(C + a Δt K) T = C (Σ_i w_i T_i) + a Δt (flow-in of the inputs) - b Δt K T_0 ...``; see `Stage`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property

@@ -1,7 +1,5 @@
 """Building of the network of a plan or a zone table."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol

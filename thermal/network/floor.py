@@ -1,7 +1,5 @@
 """Floor of a plan and the zones of a network: air, films, radiant node, slabs, furniture."""
 
-from __future__ import annotations
-
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray

@@ -1,7 +1,5 @@
 """A floor plan at a chosen cell size: refined by splitting cells, coarsened by merging like cells."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from fractions import Fraction
 

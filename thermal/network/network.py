@@ -1,7 +1,5 @@
 """Control volumes and faces of a building as data: what plans and zone tables both become."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property

@@ -1,7 +1,5 @@
 """Walls of a floor's grid: faces to rooms and outdoors, mass, windows, and nodes through exterior walls."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Generated office: plans, devices, building, and a case of the size of the paper's pilot."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from os import PathLike

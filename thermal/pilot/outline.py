@@ -1,7 +1,5 @@
 """Outlines of office floors: a rectangle, or one with notches, of a given area, as a mask of cells."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

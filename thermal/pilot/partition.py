@@ -1,7 +1,5 @@
 """Partition of an outline into zones."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Literal

@@ -1,7 +1,5 @@
 """Sizes of a building's plant from its loads: terminals, air handlers, boiler, as a designer takes them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Telemetry of a building that nobody measured: a plant under thermostats, through the eyes of its sensors."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol

@@ -1,7 +1,5 @@
 """Thermostats and terminal units of a generated office, with schedules or pseudo-random binary set-points."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

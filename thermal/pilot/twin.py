@@ -1,7 +1,5 @@
 """Twin: a case made by the library's own model, with the truth beside it."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal, get_args

@@ -1,7 +1,5 @@
 """Weather and disturbances of a generated office: random processes drawn from a seed."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Assembly of floors: alignment one above the other, and the grid that keeps their areas."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 

@@ -4,8 +4,6 @@ The plan's walls run along the middle of the drawing's interior walls and along 
 as a ``+`` cell counts half to each side and a ``#`` cell to nobody.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """Devices from lists: names, types and zones of a CSV, and what all such lists have in common."""
 
-from __future__ import annotations
-
 import csv
 import re
 from collections.abc import Iterable, Mapping, Sequence

@@ -1,7 +1,5 @@
 """Drawings as grey pixels, and their scale."""
 
-from __future__ import annotations
-
 import math
 import re
 import subprocess

@@ -1,7 +1,5 @@
 """Case folder of an import, what a folder holds that must not be lost, and pictures of what was understood."""
 
-from __future__ import annotations
-
 import base64
 import colorsys
 import io

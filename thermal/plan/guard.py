@@ -1,7 +1,5 @@
 """Guards of the import: files, numbers and packages that it is given."""
 
-from __future__ import annotations
-
 import importlib
 import math
 from collections.abc import Iterator

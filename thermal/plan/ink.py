@@ -1,7 +1,5 @@
 """Ink of a drawing, and the walls among it."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """A list of drawings: one YAML file that says which drawing is which floor, and at which scale."""
 
-from __future__ import annotations
-
 from dataclasses import fields
 from os import PathLike
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Matching of telemetry columns to devices and points, and the list of matches."""
 
-from __future__ import annotations
-
 import csv
 import difflib
 from collections.abc import Mapping, Sequence

@@ -1,7 +1,5 @@
 """Device models: lists as CSV, Brick (Turtle) and Project Haystack (JSON, Zinc)."""
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Mapping, Sequence

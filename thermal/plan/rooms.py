@@ -6,8 +6,6 @@ widens again right behind it on both sides, and when on one side at least it end
 narrow corridor between the doors of two rows of rooms stays in one piece.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

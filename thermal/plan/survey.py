@@ -1,7 +1,5 @@
 """Survey of a floor: settings, rooms and doors, and surveys from arrays of codes."""
 
-from __future__ import annotations
-
 import csv
 import zipfile
 from dataclasses import dataclass

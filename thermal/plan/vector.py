@@ -1,7 +1,5 @@
 """Vector drawings: walls, doors, texts and rooms of a DXF file."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """The mean of the random shuffle: an effective diffusivity, or a mixing rate, for everything that needs a gradient."""
 
-from __future__ import annotations
-
 from typing import Any, Literal, TypeVar
 
 import casadi

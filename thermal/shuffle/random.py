@@ -1,7 +1,5 @@
 """Random shuffle of the paper: air cells of a zone swap places."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The graph of a case's devices: what each is, which zone it is in, and what feeds it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

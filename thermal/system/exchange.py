@@ -1,7 +1,5 @@
 """Runs the functions of components that wait for each other, until each has given its result."""
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from types import GeneratorType

@@ -1,7 +1,5 @@
 """A system in closed loop: steps of NumPy, with its states, its checks and its meters."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 

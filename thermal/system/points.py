@@ -1,7 +1,5 @@
 """A system's signals under the point names of the case format, as its components declare and read them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

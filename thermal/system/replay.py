@@ -4,8 +4,6 @@ Each function takes time series of one sub-system's surroundings and gives what 
 at once.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What a step of a system gives."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 

@@ -1,7 +1,5 @@
 """A system as a CasADi function, smooth for a controller."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Levels of the verdict: what null cases and trials of known causes say of gains; see `benchmarks/blind_trials.py`."""
 
-from __future__ import annotations
-
 import json
 from importlib.resources import files
 from typing import Any

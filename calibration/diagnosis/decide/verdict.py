@@ -1,7 +1,5 @@
 """Which effect: evidence of each, probabilities, groups that cannot be told apart, and the verdict."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple

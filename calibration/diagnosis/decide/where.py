@@ -3,8 +3,6 @@
 Drift is how the error of a free run grows with time; its slope on logarithmic axes says of what cause it is.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property

@@ -1,7 +1,5 @@
 """Comparison of models of one case: with some effects of the catalogue each, fitted to the same telemetry."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property

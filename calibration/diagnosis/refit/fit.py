@@ -5,8 +5,6 @@ enough. Errors count as one a day and zone, with the deviation that they have: t
 ``n/2 log(mean e²) + ½ |Λ^½ (z - z_0)|²``.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

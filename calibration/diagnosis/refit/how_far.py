@@ -1,7 +1,5 @@
 """How far the gap shrinks: held-out errors before and after each effect, the floor, permutation test, runner-up."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace

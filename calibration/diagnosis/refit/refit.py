@@ -4,8 +4,6 @@ When a window stood open is guessed before anything is fitted, and a poor guess 
 at like times. What is seen with that effect's parameters, and without its heat, is the guess of a calibrated building.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 

@@ -4,8 +4,6 @@ Two effects may hide each other, and what is none of them may look like their su
 signatures at once, so that every pair is weighed before any model is run.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations

@@ -1,7 +1,5 @@
 """What an effect could explain of the errors of a model that lacks it, and the price of having chosen where."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Heat that a fitted model lacks in every zone, hour by hour, with its band."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

@@ -6,8 +6,6 @@ which was metered; a hidden Markov model of two states says when the difference 
 model has every parameter at its start first, for calibration without windows would hide part of it.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 

@@ -1,7 +1,5 @@
 """BOPTEST's REST API over the tests that a server holds, and who may use it."""
 
-from __future__ import annotations
-
 import asyncio
 import ipaddress
 import json

@@ -1,7 +1,5 @@
 """Test cases of a user's building, and of the generated pilot."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from dataclasses import replace

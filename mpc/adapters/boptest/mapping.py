@@ -1,7 +1,5 @@
 """Which signals and forecast points of a BOPTEST server are which points of a plant of ours."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field

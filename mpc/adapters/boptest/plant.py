@@ -1,7 +1,5 @@
 """A plant behind BOPTEST's REST API, as a plant of ours."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field

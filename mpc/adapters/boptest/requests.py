@@ -1,7 +1,5 @@
 """Requests of clients, as they come over the wire: bodies, numbers, names and overwritten inputs, each checked."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Iterable, Mapping

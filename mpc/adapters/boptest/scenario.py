@@ -1,7 +1,5 @@
 """BOPTEST's scenarios: the clock of a year, the time periods of a served building, and three electricity prices."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property

@@ -1,7 +1,5 @@
 """A server that runs: uvicorn on a socket of its own, in the foreground or in a thread."""
 
-from __future__ import annotations
-
 import ipaddress
 import logging
 import socket

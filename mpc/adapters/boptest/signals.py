@@ -1,7 +1,5 @@
 """Signals of a plant by BOPTEST's conventions: names, units, ranges, values after a step, and forecast points."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from itertools import chain, count

@@ -1,7 +1,5 @@
 """A reference building: its plant, its zone table and its sizes, from the input file and a day that EnergyPlus ran."""
 
-from __future__ import annotations
-
 import json
 import re
 import sqlite3

@@ -1,7 +1,5 @@
 """Input files as EnergyPlus' own JSON: named fields, looked up as EnergyPlus does, without regard to case."""
 
-from __future__ import annotations
-
 import calendar
 import copy
 import json

@@ -1,7 +1,5 @@
 """What a building's input file says of its plant: air loops, terminals and hot water, found by object type."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """EnergyPlus as a plant in one call."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """EnergyPlus as a plant: setpoints in, measurements out, by its runtime interface in a process of its own."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field

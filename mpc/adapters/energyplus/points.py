@@ -1,7 +1,5 @@
 """What is measured and set: columns of the case format as sums of EnergyPlus' output variables, and its setpoints."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from datetime import date
 from typing import Any, NamedTuple

@@ -1,7 +1,5 @@
 """A run of EnergyPlus in a process of its own, from the side of who started it."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 import os

@@ -4,8 +4,6 @@ Cooling coils of chilled water have a constant coefficient of performance. Elect
 loses nothing, with coils that give whatever the discharge temperature asks for: its "fuel" stands for electricity.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from mpc.adapters.energyplus.building import EnergyPlusBuilding

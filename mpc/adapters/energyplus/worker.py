@@ -5,8 +5,6 @@ is imported. A thread holds EnergyPlus, whose callbacks wait at a queue; the mai
 JSON each, from standard input. When that ends the parent is gone or done: EnergyPlus is stopped and the process leaves.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import queue

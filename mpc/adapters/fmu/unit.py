@@ -1,7 +1,5 @@
 """A functional mock-up unit that runs: its library, its variables, its clock."""
 
-from __future__ import annotations
-
 import os
 import shutil
 from collections.abc import Iterable, Mapping, Sequence

@@ -1,7 +1,5 @@
 """The receding-horizon controller: measures, estimates, solves, and falls back where it must."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal

@@ -1,7 +1,5 @@
 """State and unmeasured heat between two actions: a Kalman filter, or a moving horizon with bounds."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

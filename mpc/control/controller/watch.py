@@ -1,7 +1,5 @@
 """What a controller notices: sensors that stand still, a building far from its model, comfort out of reach."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

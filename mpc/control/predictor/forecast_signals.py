@@ -1,7 +1,5 @@
 """What drives the effects of a controller's model, from a forecast: sun, sky, wind and people."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Heat itself as the decision: the building in its modes, with a plant that gives each zone what is asked for."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, cast, get_args

@@ -1,7 +1,5 @@
 """Building and plant over a horizon, thermostats and terminals inside: roll-outs and their exact slopes."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """What a controller decides: setpoints, each with its range and how fast it may move."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The problem: cost of a plan and its derivatives, its bounds and its limits on changes."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """Convex programmes: dense quadratic ones, and linear predictive control of zone heat."""
 
-from __future__ import annotations
-
 import importlib
 import time
 import warnings

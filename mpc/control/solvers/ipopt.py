@@ -1,7 +1,5 @@
 """The reference: the same single shooting by Ipopt, with exact gradients and a limited-memory Hessian."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from functools import partial

@@ -1,7 +1,5 @@
 """Sequential quadratic programming on the single shooting: exact gradients, piecewise comfort, cost by BFGS."""
 
-from __future__ import annotations
-
 import time
 from dataclasses import dataclass
 from typing import NamedTuple

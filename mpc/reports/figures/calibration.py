@@ -1,7 +1,5 @@
 """Figures of a calibration: parameters in their ranges, innovations beside white ones, needed beside metered heat."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any

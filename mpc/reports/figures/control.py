@@ -1,7 +1,5 @@
 """Figures of closed loops: what was done, what it was done for, and what was realised."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import count
 

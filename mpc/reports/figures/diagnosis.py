@@ -1,7 +1,5 @@
 """Figures of a diagnosis: error by hour and its growth, missing heat over time, and zones before and after."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np

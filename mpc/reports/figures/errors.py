@@ -1,7 +1,5 @@
 """Figures of the runs of an evaluation: drift over one run, growth of the error, and the zones over time."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 

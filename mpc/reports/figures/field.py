@@ -1,7 +1,5 @@
 """The temperature of every control volume at the end of one run."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Figures of a case: plans, or tiles as large as zones, with errors or missing heat; quality of its telemetry."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np

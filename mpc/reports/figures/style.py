@@ -1,7 +1,5 @@
 """How every figure looks, and how it becomes a picture of a page."""
 
-from __future__ import annotations
-
 import base64
 import io
 import warnings

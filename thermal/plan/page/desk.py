@@ -1,7 +1,5 @@
 """Desk of the labelling page: the draft of one case, its jobs, sessions and reports."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path

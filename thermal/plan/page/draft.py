@@ -1,7 +1,5 @@
 """Draft of the labelling page, and its translation from and to buildings."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Literal
 

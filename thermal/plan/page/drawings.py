@@ -1,7 +1,5 @@
 """Uploaded drawings, and the floors that are read from them."""
 
-from __future__ import annotations
-
 import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

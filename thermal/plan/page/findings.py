@@ -1,7 +1,5 @@
 """What is wrong with a draft, object by object: the library's own checks of a case, told beside what they are about."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Reports beside a case, and the jobs that make them."""
 
-from __future__ import annotations
-
 import hashlib
 import html
 import re

@@ -1,7 +1,5 @@
 """The addresses of the labelling page."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import asdict
 from importlib.resources import files

@@ -1,7 +1,5 @@
 """Case folder behind the labelling page, and who has it open."""
 
-from __future__ import annotations
-
 import json
 import os
 import tempfile
