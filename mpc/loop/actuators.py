@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from mpc.errors import PlantActionError
 from thermal.components.registry import setpoints
-from thermal.errors import describe, nearest
+from thermal.errors import describe
 
 SUPPLY_AIR = "supply_air_temperature_setpoint"
 SUPPLY_WATER = "supply_water_temperature_setpoint"
@@ -70,10 +70,9 @@ def actuators_of(
         When a limit is for no kind of action, or the lower is not below the upper.
     """
     for kind, pair in (limits or {}).items():
-        if kind not in ACTION_LIMITS:
-            raise PlantActionError(describe("limits", "a kind of action", repr(kind), nearest(kind, ACTION_LIMITS)))
-        if not -math.inf < pair[0] < pair[1] < math.inf:
-            raise PlantActionError(describe(f"limits: {kind}", "a lower and a higher number", repr(pair)))
+        PlantActionError.unless_known(kind, ACTION_LIMITS, "limits", "a kind of action")
+        finite = -math.inf < pair[0] < pair[1] < math.inf
+        PlantActionError.unless(finite, f"limits: {kind}", "a lower and a higher number", repr(pair))
     bounds = {**ACTION_LIMITS, **(limits or {})}
     kinds = (
         (SUPPLY_AIR, air_handlers, True),
@@ -112,9 +111,8 @@ def checked_actions(actions: Mapping[str, float], actuators: Mapping[str, Actuat
     """
     given: dict[str, float] = {}
     for name, value in actions.items():
-        actuator = actuators.get(name)
-        if actuator is None:
-            raise PlantActionError(describe("action", "an actuator of the plant", repr(name), nearest(name, actuators)))
+        PlantActionError.unless_known(name, actuators, "action", "an actuator of the plant")
+        actuator = actuators[name]
         try:
             number = float(value)
         except (TypeError, ValueError):

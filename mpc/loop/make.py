@@ -30,7 +30,6 @@ from thermal.case.load import load_case
 from thermal.case.save import save_case
 from thermal.effects.catalogue import chosen
 from thermal.effects.effect import Chosen
-from thermal.errors import describe, nearest
 from thermal.model.matrices import SymbolicModel
 from thermal.model.reduce import reduced_model
 from thermal.model.simulator import Shuffle, Simulator
@@ -92,9 +91,7 @@ class SimulationSettings:
 
     def __post_init__(self) -> None:
         known = get_args(PlantKind)
-        if self.kind not in known:
-            advice = nearest(self.kind, known)
-            raise PlantError(describe("plant", f"one of {', '.join(known)}", repr(self.kind), advice))
+        PlantError.unless_known(self.kind, known, "plant", f"one of {', '.join(known)}")
 
     def scenario(
         self, building: Building, grid: StepGrid, weather: Weather, gains: InternalGains | None = None
@@ -147,9 +144,8 @@ class SimulationSettings:
         """
         if self.kind == "reduced":
             return ReducedBuilding(reduced_model(grid, [theta], order=order), theta, step_seconds)
-        if built.structure != BASELINE:
-            expected = "the usual structure of the model"
-            raise PlantError(describe("plant on the grid", expected, "another", "take kind='reduced'"))
+        usual, advice = built.structure == BASELINE, "take kind='reduced'"
+        PlantError.unless(usual, "plant on the grid", "the usual structure of the model", "another", advice)
         values = {p.name: float(v) for p, v in zip(grid.network.parameters, theta, strict=True)}
         shuffle = Shuffle("random" if self.kind == "random" else "mean", reach=built.reach, seed=self.seed)
         simulator = Simulator(

@@ -1,6 +1,6 @@
 """Errors of sensors and meters: white, drawn from seed and step alone."""
 
-from dataclasses import dataclass, fields
+from dataclasses import asdict, dataclass
 from functools import cached_property
 
 import numpy as np
@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from mpc.errors import PlantError
 from mpc.loop.plant import PointLayout
 from thermal._types import FloatArray
-from thermal.errors import describe
 
 _STREAM = 7  # of random numbers of a seed, apart from those of people, forecasts and the shuffle
 _BLOCK = 64  # steps whose noise is drawn together
@@ -48,10 +47,8 @@ class SensorNoise:
     pressure: float = 0.01
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            value = getattr(self, field.name)
-            if not 0.0 <= value < np.inf:
-                raise PlantError(describe(f"sensor noise: {field.name}", "0 or more", repr(value)))
+        for name, value in asdict(self).items():
+            PlantError.unless(0.0 <= value < np.inf, f"sensor noise: {name}", "0 or more", repr(value))
 
 
 class NoiseSource:

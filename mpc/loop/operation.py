@@ -48,14 +48,14 @@ class Operation:
                   "ventilation": (len(self.heating),)}  # fmt: skip
         for name, shape in shapes.items():
             values = getattr(self, name)
-            if values.shape != shape or not np.isfinite(values).all():
-                found = f"shape {values.shape}, {int((~np.isfinite(values)).sum())} not finite"
-                raise PlantError(describe(f"operation: {name}", f"finite values of shape {shape}", found))
+            missing = int((~np.isfinite(values)).sum())
+            found, valid = f"shape {values.shape}, {missing} not finite", values.shape == shape and not missing
+            PlantError.unless(valid, f"operation: {name}", f"finite values of shape {shape}", found)
         if not (self.heating <= self.cooling).all():
             row = int(np.argmax((self.heating > self.cooling).any(axis=1)))
             raise PlantError(describe("operation", "heating setpoints not above cooling ones", f"others in row {row}"))
-        if self.night_cycle is not None and not 0.0 < self.night_cycle < 20.0:
-            raise PlantError(describe("operation: night_cycle", "0 to 20 K, or None", repr(self.night_cycle)))
+        valid = self.night_cycle is None or 0.0 < self.night_cycle < 20.0
+        PlantError.unless(valid, "operation: night_cycle", "0 to 20 K, or None", repr(self.night_cycle))
 
     def __len__(self) -> int:
         return len(self.heating)
@@ -74,9 +74,8 @@ class Operation:
             When they have another shape.
         """
         shapes = (*self.heating.shape, self.running.shape[1])
-        if shapes != (n_steps, n_zone, n_air_handler):
-            wanted = f"{n_steps} steps, {n_zone} zones, {n_air_handler} air handlers"
-            raise PlantError(describe("operation", wanted, "{} steps, {} zones, {} air handlers".format(*shapes)))
+        found, wanted = "{} steps, {} zones, {} air handlers", (n_steps, n_zone, n_air_handler)
+        PlantError.unless(shapes == wanted, "operation", found.format(*wanted), found.format(*shapes))
 
 
 def scheduled_operation(

@@ -58,7 +58,7 @@ class Replayed(NamedTuple):
     error: FloatArray
     heat: FloatArray
     handled: FloatArray
-    hourly: bool
+    hourly: bool = False
 
 
 class Measured:
@@ -162,8 +162,8 @@ def replay_plant(
     if devices.chiller is not None:
         measured = seen.power(devices.chiller)
         error = compressors - measured
-        found.append(Replayed(Gap("air handler", devices.chiller, "refrigeration power", "W"), error, error, measured,
-                              False))  # fmt: skip
+        power = Gap("air handler", devices.chiller, "refrigeration power", "W")
+        found.append(Replayed(power, error, error, measured))
     reheat = AIR_HEAT_CAPACITY * seen.flow * np.maximum(seen.discharge - seen.entering, 0.0)
     return found + _hot_water(seen, system, devices.boiler, reheat.sum(axis=1) + heating, drawn, room)
 
@@ -177,11 +177,9 @@ def _terminals(seen: Measured, replayed: TerminalReplay, devices: PlantDevices) 
         flow = np.where(on, replayed.airflow[:, k] - seen.flow[:, k], np.nan)
         warm = np.where(on, replayed.discharge[:, k] - seen.discharge[:, k], np.nan)
         handled = np.where(on, moved[:, k], np.nan)
-        found += [
-            Replayed(Gap("terminal", name, "air flow", "kg/s"), flow, AIR_HEAT_CAPACITY * flow * lift[:, k], handled,
-                     False),
-            Replayed(Gap("terminal", name, "discharge temperature", "K"), warm, rate[:, k] * warm, handled, False),
-        ]  # fmt: skip
+        of_flow, of_air = Gap("terminal", name, "air flow", "kg/s"), Gap("terminal", name, "discharge temperature", "K")
+        found.append(Replayed(of_flow, flow, AIR_HEAT_CAPACITY * flow * lift[:, k], handled))
+        found.append(Replayed(of_air, warm, rate[:, k] * warm, handled))
     return found
 
 
@@ -200,14 +198,9 @@ def _air_handler(
     closed = replace(handler, economizer=False, minimum_outdoor_share=0.0, minimum_outdoor_flow=0.0, exhaust_fan=None)
     coils = replay_air_handler(closed, flow, mixed, conditions, command._replace(ventilation=1.0), seen.water)
 
-    def gap(
-        signal: str, model: FloatArray, real: FloatArray, scale: FloatArray | float, handled: FloatArray
-    ) -> Replayed:
-        error = np.where(on, model - real, np.nan)
-        unit = "W" if isinstance(scale, float) else "K"
-        return Replayed(
-            Gap("air handler", name, signal, unit), error, scale * error, np.where(on, handled, np.nan), False
-        )
+    def gap(signal: str, model: FloatArray, real: FloatArray, scale: FloatArray | float, most: FloatArray) -> Replayed:
+        error, unit = np.where(on, model - real, np.nan), "W" if isinstance(scale, float) else "K"
+        return Replayed(Gap("air handler", name, signal, unit), error, scale * error, np.where(on, most, np.nan))
 
     mixing = rate * np.maximum(np.abs(seen.returning[:, k] - outdoor), 1.0)
     warming = rate * np.maximum(np.abs(seen.supply[:, k] - mixed), 1.0)
@@ -233,23 +226,15 @@ def _hot_water(
     """Supply temperature and gas of the boiler under the heat that coils took."""
     loop, on = system.loop, seen.handling.any(axis=1)
     flow = np.where(on, np.maximum(drawn, 1e-9), 0.0)
-    replayed = replay_loop(
-        loop,
-        np.where(on, load, 0.0),
-        flow,
-        seen.water_setpoint,
-        seen.step,
-        float(seen.water[0]),
-        room,
-        seen.differential,
-    )
+    heat, first = np.where(on, load, 0.0), float(seen.water[0])
+    replayed = replay_loop(loop, heat, flow, seen.water_setpoint, seen.step, first, room, seen.differential)
     pumped = np.maximum(flow, loop.pump.minimum_share * loop.pump.design_flow)
     warm = np.where(on, replayed.supply_temperature - seen.water, np.nan)
+    water = Gap("hot water", boiler, "supply water temperature", "K")
     gas = np.where(on, replayed.fuel_power - seen.gas, np.nan)
     handled = np.where(on, np.maximum(load, seen.gas), np.nan)
     # a temperature counts as the heat that the circulating water carries by it
     return [
-        Replayed(Gap("hot water", boiler, "supply water temperature", "K"), warm, WATER_HEAT_CAPACITY * pumped * warm,
-                 handled, False),
-        Replayed(Gap("hot water", boiler, "gas power", "W"), gas, gas, handled, False),
-    ]  # fmt: skip
+        Replayed(water, warm, WATER_HEAT_CAPACITY * pumped * warm, handled),
+        Replayed(Gap("hot water", boiler, "gas power", "W"), gas, gas, handled),
+    ]

@@ -1,4 +1,4 @@
-"""A closed loop: a controller on a plant, and what came of it."""
+"""A closed loop: a controller on a plant, and its record."""
 
 import time
 from collections.abc import Callable, Mapping
@@ -14,11 +14,10 @@ from mpc.loop.actuators import Actuator
 from mpc.loop.plant import Controller, Measurements, Plant
 from mpc.scenario.forecast import Forecast
 from thermal._types import FloatArray
-from thermal.errors import describe, nearest
 
 
 class ClosedLoopRun(NamedTuple):
-    """What came of a closed loop.
+    """Record of a closed loop.
 
     Parameters
     ----------
@@ -70,11 +69,9 @@ class FixedSetpoints:
         known = names | {name.rpartition("/")[2] for name in names}
         hours = self.by_hour or {}
         for name in (n for part in (self.setpoints, *hours.values()) for n in part):
-            if name not in known:
-                raise PlantError(describe("setpoints", "an actuator of the plant", repr(name), nearest(name, known)))
+            PlantError.unless_known(name, known, "setpoints", "an actuator of the plant")
         for hour in hours:
-            if not 0.0 <= hour < 24.0:
-                raise PlantError(describe("setpoints: by_hour", "hours from 0 to 24", repr(hour)))
+            PlantError.unless(0.0 <= hour < 24.0, "setpoints: by_hour", "hours from 0 to 24", repr(hour))
 
     def at_hour(self, hour: float) -> dict[str, float]:
         """Give the setpoints of a local hour.
@@ -162,8 +159,7 @@ def run_closed_loop(
         chosen.append(actions)
         if progress is not None:
             progress(len(rows), steps or 0)
-    if not rows:
-        raise PlantError(describe("closed loop", "a plant with a control step left", "none"))
+    PlantError.unless(rows, "closed loop", "a plant with a control step left", "none")
     index = pd.DatetimeIndex(stamps, name="timestamp")
     record = replace(plant.record(), controller_seconds=np.array(seconds))
     return ClosedLoopRun(

@@ -95,9 +95,8 @@ def plant_devices(building: Building, system: HvacSystem) -> PlantDevices:
             found[kind] = _of_zones(building, kind, [zones[k] for k in component.zone])
         elif kind not in found:
             found[kind] = tuple(d.name for d in building.devices if d.type == kind)
-            wanted = len(system.of_kind(type(component)))
-            if len(found[kind]) != wanted:
-                raise PlantError(describe(f"devices of type {kind!r}", str(wanted), f"{len(found[kind])}"))
+            wanted, count = len(system.of_kind(type(component))), len(found[kind])
+            PlantError.unless(count == wanted, f"devices of type {kind!r}", str(wanted), count)
     found["chiller"] = tuple(d.name for d in building.devices if d.type == "chiller")
     if len(found["chiller"]) > 1:
         raise PlantError(describe("devices of type 'chiller'", "one or none", f"{len(found['chiller'])}"))
@@ -109,9 +108,8 @@ def _of_zones(building: Building, kind: str, zones: Sequence[str]) -> tuple[str,
     waiting = {z: [d.name for d in building.devices_of(z) if d.type == kind][::-1] for z in building.zone_names}
     names = []
     for zone in zones:
-        if not waiting[zone]:
-            label = "terminal" if kind == "vav" else kind
-            raise PlantError(describe(f"zone {zone!r}", f"a device of type {kind!r} for each {label}", "too few"))
+        expected = f"a device of type {kind!r} for each {'terminal' if kind == 'vav' else kind}"
+        PlantError.unless(waiting[zone], f"zone {zone!r}", expected, "too few")
         names.append(waiting[zone].pop())
     spare = [name for left in waiting.values() for name in left]
     if spare:

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 import pandas as pd
@@ -16,7 +15,7 @@ from thermal.effects.effect import Chosen
 from thermal.errors import describe
 from thermal.inputs.normalisation import WIND, Normalisation, usual_temperatures
 from thermal.inputs.provider import HVAC_INPUTS, InputProvider, LiveInputs
-from thermal.inputs.signals import Signal
+from thermal.inputs.signals import Signal, zone_signal
 from thermal.network.build import Extension
 from thermal.network.graph import GraphBuilder
 from thermal.network.network import ThermalNetwork
@@ -104,11 +103,10 @@ class EffectSignals:
             if HVAC_INPUTS.isdisjoint(signal.inputs):
                 self._ahead.need(*signal.inputs)
                 self._values[:, k] = signal.of(self._ahead)
-            elif lacking := self._now.lacks(signal.inputs):
-                found = f"{signal.name!r}, which is made of {', '.join(lacking)}"
-                expected = "signals of a step, its air and its heat"
-                raise PlantError(describe("effects of the plant", expected, found, "leave that effect out"))
             else:
+                lacking, expected = self._now.lacks(signal.inputs), "signals of a step, its air and its heat"
+                found = f"{signal.name!r}, which is made of {', '.join(lacking)}"
+                PlantError.unless(not lacking, "effects of the plant", expected, found, "leave that effect out")
                 self._live.append((k, signal))
 
     def _put(self, k: int, flow: FloatArray, heat: FloatArray) -> None:
@@ -150,10 +148,6 @@ class EffectSignals:
         return row
 
 
-def _radiant(inputs: InputProvider, zone: str) -> FloatArray:
-    return np.asarray(inputs.radiant_gains[:, inputs.zones.index(zone)])
-
-
 class RadiantGains:
     """Lets the radiant part of a scenario's gains fall on the surfaces of the zones, and not into their air.
 
@@ -181,7 +175,7 @@ class RadiantGains:
         for room in graph.anatomy.rooms.values():
             if room.radiant < 0:
                 continue
-            signal = Signal(RADIANT + room.name, "W", partial(_radiant, zone=room.name), ("radiant_gains",))
+            signal = zone_signal(RADIANT + room.name, "W", "radiant_gains", room.name)
             node, share = np.append(room.air, room.radiant), np.append(-room.share, 1.0)
             graph.source("radiant gains", 1.0, node, signal, share)
 
@@ -203,10 +197,8 @@ def check_extras(effects: Sequence[Extension], network: ThermalNetwork) -> None:
     """
     for chosen in effects:
         if isinstance(chosen, Chosen) and chosen.effect.applies is not None:
-            why = chosen.effect.applies(network.anatomy)
-            if why is not None:
-                expected = "one that the building can have"
-                raise PlantError(describe(f"effect {chosen.effect.id}", expected, why, "leave that effect out"))
+            why, expected = chosen.effect.applies(network.anatomy), "one that the building can have"
+            PlantError.unless(why is None, f"effect {chosen.effect.id}", expected, why, "leave that effect out")
 
 
 def check_radiant(network: ThermalNetwork, scenario: Scenario) -> None:
@@ -247,18 +239,15 @@ def check_parts(scenario: Scenario, model: BuildingModel, control_steps: int, wa
     PlantError
         Which part does not fit.
     """
-    if model.network.zones != scenario.zones:
-        found = f"{len(model.network.zones)} others"
-        raise PlantError(describe("building model", f"the scenario's {len(scenario.zones)} zones", found))
-    if model.step_seconds != scenario.grid.step:
-        found = f"{model.step_seconds:g} s"
-        raise PlantError(describe("building model", f"the scenario's step of {scenario.grid.step:g} s", found))
-    if model.network.airflows:
-        raise PlantError(describe("building", "one without airflows from zone to zone", "some"))
-    check_radiant(model.network, scenario)
-    if not (isinstance(control_steps, int) and control_steps >= 1 and warm_up_days >= 0 and seed >= 0):
-        found = f"{control_steps}, {warm_up_days} and {seed}"
-        raise PlantError(describe("plant", "control_steps from 1, warm_up_days and seed from 0 on", found))
+    network, grid, counts = model.network, scenario.grid, (control_steps, warm_up_days, seed)
+    own, step = f"the scenario's {len(scenario.zones)} zones", f"the scenario's step of {grid.step:g} s"
+    PlantError.unless(network.zones == scenario.zones, "building model", own, f"{len(network.zones)} others")
+    PlantError.unless(model.step_seconds == grid.step, "building model", step, f"{model.step_seconds:g} s")
+    PlantError.unless(not network.airflows, "building", "one without airflows from zone to zone", "some")
+    check_radiant(network, scenario)
+    valid = isinstance(control_steps, int) and control_steps >= 1 and warm_up_days >= 0 and seed >= 0
+    expected = "control_steps from 1, warm_up_days and seed from 0 on"
+    PlantError.unless(valid, "plant", expected, "{}, {} and {}".format(*counts))
 
 
 def boundary_series(scenario: Scenario, model: BuildingModel, given: Mapping[str, float | FloatArray]) -> FloatArray:
@@ -276,8 +265,7 @@ def boundary_series(scenario: Scenario, model: BuildingModel, given: Mapping[str
     names, n_steps = model.network.boundaries, scenario.grid.n_steps
     columns = [scenario.outdoor]
     for name in names[1:]:
-        if name not in given:
-            raise PlantError(describe(f"boundary {name!r}", "its temperature", "none", "pass it in `boundaries`"))
+        PlantError.unless(name in given, f"boundary {name!r}", "its temperature", "none", "pass it in `boundaries`")
         columns.append(np.broadcast_to(np.asarray(given[name], dtype=float), (n_steps,)))
     strange = sorted(set(given) - set(names[1:]))
     if strange:

@@ -61,7 +61,7 @@ def test_names_of_parameters_are_one_effects_own() -> None:
     [
         (["solar_gains"], "'solar_gains': not in the catalogue; the nearest valid one is 'solar_gain'"),
         (["blinds"], "effect blinds: modifies solar_gain; add that too"),
-        ({"sensor_bias": "A"}, "effect sensor_bias: expected a sequence of zones, came 'A'"),
+        ({"sensor_bias": "A"}, "effect sensor_bias: expected a sequence of zones, got 'A'"),
     ],
 )
 def test_what_cannot_be_chosen(effects: object, message: str) -> None:
@@ -73,7 +73,7 @@ def test_what_cannot_be_chosen(effects: object, message: str) -> None:
     ("effects", "message"),
     [
         ({"sensor_bias": ["A", "Z"]}, r"effect sensor_bias: zones \['Z'\] are not of this building"),
-        ({"infiltration": ["A"]}, r"effect infiltration: acts on the whole building, came zones \['A'\]"),
+        ({"infiltration": ["A"]}, r"effect infiltration: acts on the whole building, got zones \['A'\]"),
     ],
 )
 def test_where_an_effect_cannot_be(lively_case: CaseOf, effects: dict[str, list[str]], message: str) -> None:

@@ -156,7 +156,7 @@ def test_the_simulator_has_the_effects(lively_case: CaseOf, kind: str) -> None:
     means, _ = trajectories(SymbolicModel(network), inputs, theta)
     assert plant.signal_names == tuple(s.name for s in network.signals)
     assert np.abs(np.array(zones) - means[0]).max() < 1e-9
-    with pytest.raises(ModelError, match=rf"signals: expected shape \({len(network.signals)},\), came \(0,\)"):
+    with pytest.raises(ModelError, match=rf"signals: expected shape \({len(network.signals)},\), got \(0,\)"):
         plant.step(inputs.heat[101], inputs.boundary[101, : len(network.boundaries)], inputs.airflow[101])
 
 

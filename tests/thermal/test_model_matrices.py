@@ -173,7 +173,7 @@ def test_matrices_without_slopes_have_none() -> None:
 
 
 def test_theta_of_another_length_is_refused_with_the_names() -> None:
-    with pytest.raises(ModelError, match=r"expected shape .*interior_film_coefficient.*came \(3,\)"):
+    with pytest.raises(ModelError, match=r"expected shape .*interior_film_coefficient.*got \(3,\)"):
         model_of("plan").matrices(np.ones(3))
 
 

@@ -288,11 +288,11 @@ def test_steps_after_reset_from_are_the_free_run(scheme: str) -> None:
 
 def test_reset_from_refuses_another_step_and_rows_that_are_not_there() -> None:
     case = load_bundled_case()
-    with pytest.raises(ModelError, match=r"600 s, came 300 s"):
+    with pytest.raises(ModelError, match=r"600 s, got 300 s"):
         Simulator(case.building, dx=1.5, step_seconds=600.0).reset_from(case, 300)
     plant = Simulator(case.building, dx=1.5)
     for stamp in (0, -5, len(case.stamps)):
-        with pytest.raises(ModelError, match=f"came {stamp}"):
+        with pytest.raises(ModelError, match=f"got {stamp}"):
             plant.reset_from(case, stamp)
 
 
@@ -333,7 +333,7 @@ def started() -> Simulator:
 
 
 BAD_STEPS: dict[str, tuple[tuple[Any, ...], str]] = {
-    "heat of one zone": ((np.zeros(1), np.full(2, 280.0)), r"zone_heat: expected shape \(2,\), came \(1,\)"),
+    "heat of one zone": ((np.zeros(1), np.full(2, 280.0)), r"zone_heat: expected shape \(2,\), got \(1,\)"),
     "heat as a column": ((np.zeros((2, 1)), np.full(2, 280.0)), "zone_heat"),
     "heat missing": ((np.array([0.0, np.nan]), np.full(2, 280.0)), r"zone_heat\[1\].*nan"),
     "boundary of one": ((np.zeros(2), np.full(1, 280.0)), "boundary_temperatures: expected shape"),

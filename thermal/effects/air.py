@@ -1,14 +1,12 @@
 """Air that comes from outdoor or from the next zone: infiltration, thermal bridges, open windows, mixing."""
 
-from functools import partial
 
-import casadi as ca
 import numpy as np
 
 from thermal._types import FloatArray
 from thermal.effects.effect import PAIR, EffectBuilder, described, lacking, paired, without_facades
 from thermal.inputs.provider import InputProvider
-from thermal.inputs.signals import Signal
+from thermal.inputs.signals import Signal, of_zone
 from thermal.network.topology import Room
 
 #: Wind speed [m/s], root of temperature difference [K^0.5] and presence [-] at which a varying exchange is part of K;
@@ -23,7 +21,7 @@ _OUT = ("outdoor", "usual")
 
 
 def _out(inputs: InputProvider, zone: str) -> FloatArray:
-    return np.asarray(inputs.outdoor - inputs.usual[:, inputs.zones.index(zone)])
+    return np.asarray(inputs.outdoor - of_zone(inputs, "usual", zone))
 
 
 def _by_wind(inputs: InputProvider, zone: str) -> FloatArray:
@@ -43,13 +41,12 @@ def _by_opening(inputs: InputProvider, zone: str) -> FloatArray:
 
 
 def _by_hand(inputs: InputProvider, zone: str) -> FloatArray:
-    k = inputs.zones.index(zone)
-    return np.asarray(inputs.openings[:, k] * inputs.through_windows[:, k])
+    return np.asarray(of_zone(inputs, "openings", zone) * of_zone(inputs, "through_windows", zone))
 
 
 def _by_presence(inputs: InputProvider, first: str, second: str) -> FloatArray:
-    usual = [inputs.usual[:, inputs.zones.index(z)] for z in (first, second)]
-    return np.asarray((inputs.occupancy - _PRESENCE) * (usual[1] - usual[0]))
+    difference = of_zone(inputs, "usual", second) - of_zone(inputs, "usual", first)
+    return np.asarray((inputs.occupancy - _PRESENCE) * difference)
 
 
 def _exposed(builder: EffectBuilder) -> list[Room]:
@@ -59,23 +56,19 @@ def _exposed(builder: EffectBuilder) -> list[Room]:
     return rooms or list(builder.rooms)
 
 
-def _exchange(builder: EffectBuilder, room: Room, rate: ca.SX, mean: float, varying: Signal | None) -> None:
-    """Exchange a zone's air with outdoor at ``rate m(t)`` [1/h]: its mean by K, the rest as heat."""
-    heat = builder.anatomy.air_heat_capacity * room.volume / 3600.0
-    builder.air_to(room, rate, builder.graph.boundary("outdoor"), mean * heat)
-    if varying is not None:
-        builder.heat_air(room, rate, varying, heat)
-
-
 def _build_infiltration(builder: EffectBuilder) -> None:
+    """Exchange the zones' air with outdoor at rates times what varies: its mean by K, the rest as heat."""
     names = ("infiltration_rate", "infiltration_by_wind", "infiltration_by_stack")
     constant, wind, stack = (builder.parameter(n) for n in names)
+    terms = ((wind, _WIND, "wind", "K*m/s", _by_wind), (stack, _ROOT, "stack", "K^1.5", _by_stack))
+    outdoor = builder.graph.boundary("outdoor")
     for room in _exposed(builder):
-        _exchange(builder, room, constant, 1.0, None)
-        by_wind = Signal(f"wind and cold in {room.name}", "K*m/s", partial(_by_wind, zone=room.name), _OUT)
-        _exchange(builder, room, wind, _WIND, by_wind)
-        by_stack = Signal(f"stack and cold in {room.name}", "K^1.5", partial(_by_stack, zone=room.name), _OUT)
-        _exchange(builder, room, stack, _ROOT, by_stack)
+        heat = builder.anatomy.air_heat_capacity * room.volume / 3600.0
+        builder.air_to(room, constant, outdoor, heat)
+        for rate, mean, name, unit, of in terms:
+            builder.air_to(room, rate, outdoor, mean * heat)
+            varying = Signal.made(f"{name} and cold in {room.name}", unit, of, *_OUT, given={"zone": room.name})
+            builder.heat_air(room, rate, varying, heat)
 
 
 def _build_bridge(builder: EffectBuilder) -> None:
@@ -88,11 +81,10 @@ def _build_bridge(builder: EffectBuilder) -> None:
 def _build_opening(builder: EffectBuilder) -> None:
     rate, heat = builder.parameter("window_opening_rate"), builder.anatomy.air_heat_capacity
     for room in _exposed(builder):
-        when = partial(_by_opening, zone=room.name)
-        varying = Signal(f"open windows of {room.name}", "K", when, (*_OUT, "occupancy"))
+        name, seen_open = f"open windows of {room.name}", f"windows seen open in {room.name}"
+        varying = Signal.made(name, "K", _by_opening, *_OUT, "occupancy", given={"zone": room.name})
         builder.heat_air(room, rate, varying, heat * room.volume / 3600.0)
-        by_hand, made_of = partial(_by_hand, zone=room.name), ("openings", "through_windows")
-        seen = Signal(f"windows seen open in {room.name}", "K*m/s", by_hand, made_of)
+        seen = Signal.made(seen_open, "K*m/s", _by_hand, "openings", "through_windows", given={"zone": room.name})
         builder.heat_air(room, builder.parameter("opened_window_area", zone=room.name), seen, heat)
 
 
@@ -105,8 +97,8 @@ def _build_mixing(builder: EffectBuilder) -> None:
         constant, scheduled = (builder.parameter(n, zone=pair) for n in ("door_airflow", "occupied_door_airflow"))
         near, far, share = paired((a.air, a.share), (b.air, b.share))
         builder.graph.face(f"zone_mixing {pair}", constant + _PRESENCE * scheduled, near, far, heat * share)
-        present = partial(_by_presence, first=first, second=second)
-        signal = Signal(f"presence and difference {pair}", "K", present, ("occupancy", "usual"))
+        name = f"presence and difference {pair}"
+        signal = Signal.made(name, "K", _by_presence, "occupancy", "usual", given={"first": first, "second": second})
         builder.heat_air(a, scheduled, signal, heat)
         builder.heat_air(b, scheduled, signal, -heat)
 

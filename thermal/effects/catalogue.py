@@ -2,24 +2,20 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 
-from thermal.effects.air import INFILTRATION, THERMAL_BRIDGE, WINDOW_OPENING, ZONE_MIXING
+from thermal.effects import air, envelope, gains, metering
 from thermal.effects.effect import Chosen, Effect
-from thermal.effects.metering import CAPACITY_LIMIT, DUCT_LOSS, FLOW_GAIN, SENSOR_BIAS, SENSOR_LAG, VALVE_LEAK
-from thermal.effects.next_door import GROUND_EXCHANGE, HIDDEN_MASS, INTERFLOOR_EXCHANGE, NEIGHBOUR, ROOF_EXCHANGE
-from thermal.effects.outside import LONGWAVE_SKY, WIND_FILM, WRONG_STATION
-from thermal.effects.people import CLOCK_SHIFT, INTERNAL_GAINS, LATENT_LOAD
-from thermal.effects.sun import BLINDS, SOLAR_GAIN, SOLAR_OPAQUE
-from thermal.errors import EffectError, describe, nearest
+from thermal.errors import EffectError, nearest
 from thermal.parameters import PARAMETERS
 
 #: Effects by id, in the order in which they join a network: what others look at comes first, sensors come last.
 CATALOGUE: dict[str, Effect] = {
     e.id: e
     for e in (
-        ROOF_EXCHANGE, SOLAR_GAIN, BLINDS, SOLAR_OPAQUE, LONGWAVE_SKY, WIND_FILM, INFILTRATION, THERMAL_BRIDGE,
-        WINDOW_OPENING, INTERNAL_GAINS, LATENT_LOAD, INTERFLOOR_EXCHANGE, GROUND_EXCHANGE, NEIGHBOUR, HIDDEN_MASS,
-        ZONE_MIXING, WRONG_STATION, CLOCK_SHIFT, FLOW_GAIN, DUCT_LOSS, CAPACITY_LIMIT, VALVE_LEAK, SENSOR_BIAS,
-        SENSOR_LAG,
+        envelope.ROOF_EXCHANGE, gains.SOLAR_GAIN, gains.BLINDS, gains.SOLAR_OPAQUE, envelope.LONGWAVE_SKY,
+        envelope.WIND_FILM, air.INFILTRATION, air.THERMAL_BRIDGE, air.WINDOW_OPENING, gains.INTERNAL_GAINS,
+        gains.LATENT_LOAD, envelope.INTERFLOOR_EXCHANGE, envelope.GROUND_EXCHANGE, envelope.NEIGHBOUR,
+        envelope.HIDDEN_MASS, air.ZONE_MIXING, envelope.WRONG_STATION, metering.CLOCK_SHIFT, metering.FLOW_GAIN,
+        metering.DUCT_LOSS, metering.CAPACITY_LIMIT, metering.VALVE_LEAK, metering.SENSOR_BIAS, metering.SENSOR_LAG,
     )
 }  # fmt: skip
 
@@ -41,12 +37,12 @@ def register_effect(effect: Effect) -> None:
     names = [p.name for p in effect.parameters]
     clashes = [effect.id] if effect.id in CATALOGUE else [name for name in names if name in taken]
     if clashes:
-        raise EffectError(describe(f"effect {effect.id}", "a name of its own", repr(clashes[0]), "call it otherwise"))
+        raise EffectError(f"effect {effect.id}", "a name of its own", repr(clashes[0]), "call it otherwise")
     if absent := [r for r in effect.requires if r not in CATALOGUE]:
-        raise EffectError(describe(f"effect {effect.id}: requires", "effects of the catalogue", repr(absent[0])))
+        raise EffectError(f"effect {effect.id}: requires", "effects of the catalogue", repr(absent[0]))
     if not names or effect.parameters[0].start != 0.0 or any(p.effect != effect.id for p in effect.parameters):
         expected = "a strength that starts at 0 first, all with this effect's id"
-        raise EffectError(describe(f"effect {effect.id}: parameters", expected, f"{names}"))
+        raise EffectError(f"effect {effect.id}: parameters", expected, f"{names}")
     CATALOGUE[effect.id] = effect
 
 
@@ -71,7 +67,7 @@ def chosen(effects: Iterable[str] | Mapping[str, Sequence[str]]) -> tuple[Chosen
     zones = dict(effects) if isinstance(effects, Mapping) else {name: () for name in effects}
     for name, where in zones.items():
         if isinstance(where, str):
-            raise EffectError(f"effect {name}: expected a sequence of zones, came {where!r}")
+            raise EffectError(f"effect {name}: expected a sequence of zones, got {where!r}")
     for name in zones:
         if name not in CATALOGUE:
             raise EffectError(f"effect {name!r}: not in the catalogue; {nearest(name, CATALOGUE)}")

@@ -135,9 +135,8 @@ class Chosen:
             known = nearest(unknown[0], graph.zones)
             raise EffectError(f"effect {self.effect.id}: zones {unknown} are not of this building; {known}")
         if self.zones and not self.effect.zonal:
-            raise EffectError(
-                f"effect {self.effect.id}: acts on the whole building, came zones {list(self.zones)}; leave them out"
-            )
+            found = f"zones {list(self.zones)}; leave them out"
+            raise EffectError(f"effect {self.effect.id}: acts on the whole building, got {found}")
         self.effect.build(EffectBuilder(graph, self.effect, self.zones or graph.zones))
 
 
@@ -332,12 +331,15 @@ def hat(value: ca.SX, knots: Sequence[float], number: int, signed: bool = False)
     return ca.fmax(0.0, ca.fmin(rise, fall))
 
 
-def _one(inputs: InputProvider) -> FloatArray:
-    return np.ones(len(inputs.stamps))
+def _always(inputs: InputProvider, value: float) -> FloatArray:
+    return np.full(len(inputs.stamps), value)
 
 
 #: A signal that is 1 throughout.
-CONSTANT = Signal("constant", "1", _one)
+CONSTANT = Signal.made("constant", "1", _always, given={"value": 1.0})
+
+#: A temperature that stays at the reference; what differs from it acts as heat.
+STEADY = Signal.made("constant temperature", "K", _always, given={"value": 0.0})
 
 
 def lacking(part: str, reason: str) -> Callable[[Anatomy], str | None]:

@@ -1,6 +1,6 @@
-"""What sensors, meters and terminals get wrong: bias, lag, flow gain, duct loss, limits and leaks."""
+"""What sensors, meters and terminals get wrong: bias, lag, flow gain, duct loss, limits, leaks and clocks."""
 
-from functools import partial
+from operator import attrgetter
 
 import casadi as ca
 import numpy as np
@@ -8,7 +8,7 @@ import numpy as np
 from thermal._types import FloatArray
 from thermal.effects.effect import CONSTANT, EffectBuilder, described, hat
 from thermal.inputs.provider import InputProvider
-from thermal.inputs.signals import Signal
+from thermal.inputs.signals import Signal, of_zone, zone_signal
 from thermal.units import AIR_HEAT_CAPACITY
 
 #: Heat that a sensor takes up in a minute over that of the zone's air [-]: too little to cool the zone, and enough for
@@ -22,17 +22,13 @@ _NTU = 0.1
 _LOST = (0.0, 0.1, 0.2, 0.35, 0.5, 0.7)
 
 
-def _of_zone(inputs: InputProvider, name: str, zone: str, factor: float = 1.0) -> FloatArray:
-    return np.asarray(factor * inputs.values(name)[:, inputs.zones.index(zone)])
-
-
 def _passing(inputs: InputProvider, number: int) -> FloatArray:
     return np.asarray(AIR_HEAT_CAPACITY * inputs.airflow[:, number])
 
 
 def _duct(inputs: InputProvider, zone: str, exponent: float) -> FloatArray:
     """Heat lost per unit of NTU at the largest flow; NTU grows as flow falls, to a power."""
-    flow, heat = (_of_zone(inputs, name, zone) for name in ("supply_flow", "supply_heat"))
+    flow, heat = (of_zone(inputs, name, zone) for name in ("supply_flow", "supply_heat"))
     most = inputs.normalisation.flow.get(zone, 0.0)
     running = flow > 1e-3 * max(most, 1e-9)
     ntu = _NTU * (most / np.where(running, flow, 1.0)) ** exponent
@@ -40,13 +36,13 @@ def _duct(inputs: InputProvider, zone: str, exponent: float) -> FloatArray:
 
 
 def _over(inputs: InputProvider, zone: str, lost: float) -> FloatArray:
-    heat, most = _of_zone(inputs, "heat", zone), inputs.normalisation.heat.get(zone, 0.0)
+    heat, most = of_zone(inputs, "heat", zone), inputs.normalisation.heat.get(zone, 0.0)
     return np.asarray(np.sign(heat) * np.maximum(np.abs(heat) - (1.0 - lost) * most, 0.0))
 
 
 def _running(inputs: InputProvider, zone: str) -> FloatArray:
     most = inputs.normalisation.peak_flow.get(zone, 0.0)
-    return (_of_zone(inputs, "supply_flow", zone) > 0.02 * max(most, 1e-9)).astype(float)
+    return (of_zone(inputs, "supply_flow", zone) > 0.02 * max(most, 1e-9)).astype(float)
 
 
 def _build_bias(builder: EffectBuilder) -> None:
@@ -58,13 +54,13 @@ def _build_bias(builder: EffectBuilder) -> None:
             beyond = far >= 0
             if beyond.any():
                 builder.graph.source(builder.key(room.name), -bias * value, far[beyond], CONSTANT, weight[beyond])
-        flow = partial(_of_zone, name="supply_flow", zone=room.name, factor=AIR_HEAT_CAPACITY)
-        builder.heat_air(room, bias, Signal(f"supply air of {room.name}", "W/K", flow, ("supply_flow",)), 1.0)
+        supply = zone_signal(f"supply air of {room.name}", "W/K", "supply_flow", room.name, AIR_HEAT_CAPACITY)
+        builder.heat_air(room, bias, supply, 1.0)
         for number, (source, target) in enumerate(builder.anatomy.airflows):
             # air that passes from zone to zone brings what its sensors make of it, and not the bias
             if room.number in (source, target):
                 entered = builder.anatomy.rooms[builder.graph.zones[target]]
-                signal = Signal(f"passing air {number}", "W/K", partial(_passing, number=number), ("airflow",))
+                signal = Signal.made(f"passing air {number}", "W/K", _passing, "airflow", given={"number": number})
                 builder.heat_air(entered, bias if room.number == target else -bias, signal, 1.0)
 
 
@@ -79,7 +75,7 @@ def _build_lag(builder: EffectBuilder) -> None:
 
 def _build_gain(builder: EffectBuilder) -> None:
     for room in builder.rooms:
-        signal = Signal(f"heat of {room.name}", "W", partial(_of_zone, name="heat", zone=room.name), ("heat",))
+        signal = zone_signal(f"heat of {room.name}", "W", "heat", room.name)
         builder.heat_air(room, builder.parameter("flow_gain", zone=room.name), signal, 1.0)
 
 
@@ -89,8 +85,8 @@ def _build_duct(builder: EffectBuilder) -> None:
         lost = builder.parameter("duct_ntu", zone=room.name)
         for share, exponent in ((1.0 - by_flow, 0.0), (by_flow, 1.0)):
             name = f"heat in the ducts of {room.name}, flow to the power {exponent:g}"
-            lossy = partial(_duct, zone=room.name, exponent=exponent)
-            signal = Signal(name, "W", lossy, ("supply_flow", "supply_heat"))
+            given = {"zone": room.name, "exponent": exponent}
+            signal = Signal.made(name, "W", _duct, "supply_flow", "supply_heat", given=given)
             builder.heat_air(room, -lost * share, signal, 1.0)
 
 
@@ -98,16 +94,25 @@ def _build_limit(builder: EffectBuilder) -> None:
     for room in builder.rooms:
         lost = builder.parameter("capacity_lost", zone=room.name)
         for number, knot in enumerate(_LOST[1:], 1):
-            beyond = partial(_over, zone=room.name, lost=knot)
-            signal = Signal(f"heat of {room.name} over {1.0 - knot:.0%}", "W", beyond, ("heat",))
+            name = f"heat of {room.name} over {1.0 - knot:.0%}"
+            signal = Signal.made(name, "W", _over, "heat", given={"zone": room.name, "lost": knot})
             builder.heat_air(room, -hat(lost, _LOST, number, signed=True), signal, 1.0)
 
 
 def _build_leak(builder: EffectBuilder) -> None:
     for room in builder.rooms:
-        running = partial(_running, zone=room.name)
-        signal = Signal(f"air flows into {room.name}", "1", running, ("supply_flow",))
+        signal = Signal.made(f"air flows into {room.name}", "1", _running, "supply_flow", given={"zone": room.name})
         builder.heat_air(room, builder.parameter("valve_leak", zone=room.name), signal, room.floor_area)
+
+
+def _build_shift(builder: EffectBuilder) -> None:
+    heat, weather = builder.parameter("heat_clock_shift"), builder.parameter("weather_clock_shift")
+    for room in builder.rooms:
+        signal = zone_signal(f"change of heat in {room.name}", "W/h", "heat_rate", room.name)
+        builder.heat_air(room, heat, signal, -1.0)
+    outdoor = Signal("change of outdoor temperature", "K/h", attrgetter("outdoor_rate"), ("outdoor_rate",))
+    for value, _, node, weight in builder.graph.touching(np.array([builder.graph.boundary("outdoor")])):
+        builder.graph.source(builder.key(), -weather * value, node, outdoor, weight)
 
 
 SENSOR_BIAS = described("sensor_bias", _build_bias)
@@ -116,3 +121,4 @@ FLOW_GAIN = described("flow_gain", _build_gain)
 DUCT_LOSS = described("duct_loss", _build_duct)
 CAPACITY_LIMIT = described("capacity_limit", _build_limit)
 VALVE_LEAK = described("valve_leak", _build_leak)
+CLOCK_SHIFT = described("clock_shift", _build_shift)

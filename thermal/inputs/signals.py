@@ -1,7 +1,10 @@
 """Signals: time series that drive the sources of a network, made of inputs."""
 
-from collections.abc import Callable, Sequence
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -29,6 +32,55 @@ class Signal:
     unit: str
     of: Callable[[InputProvider], FloatArray]
     inputs: tuple[str, ...] = ()
+
+    @classmethod
+    def made(
+        cls, name: str, unit: str, of: Callable[..., FloatArray], *inputs: str, given: Mapping[str, object]
+    ) -> Signal:
+        """Signal that is made of inputs and of what stays the same, such as a zone's name.
+
+        Parameters
+        ----------
+        name, unit : str
+            As above.
+        of : callable
+            Makes it from the inputs and what is given, shape (n_time,) [unit].
+        *inputs : str
+            What it is made of.
+        given : mapping
+            What is passed on to ``of``, by name.
+        """
+        return cls(name, unit, partial(of, **given), inputs)
+
+
+def of_zone(inputs: InputProvider, name: str, zone: str, factor: float = 1.0) -> FloatArray:
+    """One zone's column of an input, shape (n_time,).
+
+    Parameters
+    ----------
+    inputs : InputProvider
+        Source of the input.
+    name, zone : str
+        Input and zone.
+    factor : float
+        What it is multiplied by [-].
+    """
+    return np.asarray(factor * inputs.values(name)[:, inputs.zones.index(zone)])
+
+
+def zone_signal(name: str, unit: str, of: str, zone: str, factor: float = 1.0) -> Signal:
+    """Signal that is one zone's column of an input.
+
+    Parameters
+    ----------
+    name, unit : str
+        Of the signal.
+    of, zone : str
+        Input and zone.
+    factor : float
+        What it is multiplied by [-].
+    """
+    return Signal.made(name, unit, of_zone, of, given={"name": of, "zone": zone, "factor": factor})
 
 
 def signal_values(signals: Sequence[Signal], inputs: InputProvider) -> FloatArray:

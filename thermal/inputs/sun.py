@@ -140,18 +140,14 @@ def sun_of(location: Location, stamps: pd.DatetimeIndex, step: float, weather: p
     place = solarposition.get_solarposition(middle, location.latitude, location.longitude, location.elevation)
     altitude = place["elevation"].to_numpy(dtype=float)
     rise = np.sin(np.radians(altitude))
-    seen: dict[str, FloatArray] = {
-        name: np.maximum(weather[name].fillna(0.0).to_numpy(dtype=float), 0.0) for name in _irradiances(weather)
-    }
+    known = _irradiances(weather)
+    seen = {name: np.maximum(weather[name].fillna(0.0).to_numpy(dtype=float), 0.0) for name in known}
     up = altitude > _LOWEST
     normal, diffuse, total = seen.get(_NORMAL), seen.get(_DIFFUSE), seen.get(_GLOBAL)
     if normal is not None and diffuse is not None:
         total = normal * np.maximum(rise, 0.0) + diffuse if total is None else total
     elif total is None:
-        raise EffectError(
-            "weather station: expected global_horizontal_irradiance_sensor, or direct_normal_irradiance_sensor and "
-            f"diffuse_horizontal_irradiance_sensor, came {sorted(seen) or 'none'}"
-        )
+        raise EffectError("weather station", f"{_GLOBAL}, or {_NORMAL} and {_DIFFUSE}", f"{sorted(seen) or 'none'}")
     elif normal is not None:
         diffuse = np.maximum(total - normal * np.maximum(rise, 0.0), 0.0)
     elif diffuse is not None:

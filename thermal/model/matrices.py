@@ -1,17 +1,17 @@
 """The symbolic model: class conductances κ(θ) and capacities c(θ), their derivatives, and the matrices they make."""
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import casadi as ca
 import numpy as np
 import scipy.sparse as sp
 
-from thermal._types import FloatArray, IntArray
+from thermal._types import FloatArray
 from thermal.errors import ModelError
 from thermal.model.factor import Elimination, Matrix, Pencil
 from thermal.model.modal_runs import ModalRuns
-from thermal.network.network import ConductanceClass, ThermalNetwork
+from thermal.network.network import CapacityClass, ConductanceClass, ThermalNetwork
 
 
 @dataclass(frozen=True)
@@ -70,32 +70,27 @@ class SymbolicModel:
         jacobians = [ca.densify(ca.jacobian(e, theta)) for e in (kappa, heat)]
         self.classes = ca.Function("classes", [theta], [kappa, heat], ["theta"], ["conductance", "capacity"])
         self._jacobians = ca.Function("jacobians", [theta], jacobians)
-        self._heating: Matrix = network.heating
-        self._observation: Matrix = network.observation
-        self._reading: Matrix = network.reading if network.readings else None
-        self._uniform = np.ones(network.n_node)
-        self._faces = faces
-        self.sources = _Sources(network, sources, projection)
-        self.elimination = Elimination()
+        self._faces, self.sources, self.elimination = faces, _Sources(network, sources, projection), Elimination()
+        heating, observation, uniform = network.heating, network.observation, np.ones(network.n_node)
+        reading: Matrix = network.reading if network.readings else None
         self.class_flows: list[Matrix]
         self.class_masses: list[Matrix]
         if projection is None:
             self.class_flows = [_class_laplacian(network, c) for c in faces]
-            self.class_masses = [_class_mass(network, k) for k in range(len(network.capacities))]
+            self.class_masses = [_class_mass(network.n_node, c) for c in network.capacities]
         else:
-            self._project(projection)
+            v, padded = projection, np.vstack([projection, np.zeros((network.n_boundary, projection.shape[1]))])
+            self.class_flows = [_projected_class(c, padded, network.n_boundary) for c in faces]
+            self.class_masses = [congruent(v[c.node], c.weight) for c in network.capacities]
+            heating, observation, uniform = v.T @ heating.toarray(), observation @ v, v.T @ uniform
+            reading = None if reading is None else reading @ v
+        self.n_state = uniform.size
+        outside = partial(Matrices, n_signal=len(network.signals), airflows=network.airflows)
+        self._at_any = partial(outside, heating=heating, observation=observation, uniform=uniform, reading=reading)
 
     def __repr__(self) -> str:
-        n, network = self._uniform.size, self.network
+        n, network = self.n_state, self.network
         return f"{type(self).__name__}({n} states, {len(network.zones)} zones, {len(network.parameters)} parameters)"
-
-    def _project(self, v: FloatArray) -> None:
-        self.class_flows = [_projected_class(c, v, self.network.n_boundary) for c in self._faces]
-        self.class_masses = [congruent(v[c.node], c.weight) for c in self.network.capacities]
-        self._uniform = v.T @ np.ones(self.network.n_node)
-        self._heating = v.T @ self.network.heating.toarray()
-        self._observation = self.network.observation @ v
-        self._reading = self.network.reading @ v if self.network.readings else None
 
     def matrices(self, theta: FloatArray, sensitivities: bool = False) -> Matrices:
         """Assemble the model at θ.
@@ -115,17 +110,12 @@ class SymbolicModel:
         theta = np.asarray(theta, dtype=float)
         names = [p.name for p in self.network.parameters]
         if theta.shape != (len(names),):
-            raise ModelError(f"theta: expected shape ({len(names)},) for {names}, came {theta.shape}")
-        bad = [
-            p.name
-            for p, t in zip(self.network.parameters, theta, strict=True)
-            if not np.isfinite(t) or (t <= 0 and p.scale != "linear")
-        ]
-        if bad:
-            raise ModelError(f"theta: expected positive finite values, came {theta[names.index(bad[0])]} for {bad[0]}")
+            raise ModelError(f"theta: expected shape ({len(names)},) for {names}, got {theta.shape}")
         for p, t in zip(self.network.parameters, theta, strict=True):
+            if not np.isfinite(t) or (t <= 0 and p.scale != "linear"):
+                raise ModelError(f"theta: expected positive finite values, got {t} for {p.name}")
             if p.scale == "logit" and t > 1:
-                raise ModelError(f"theta: expected a probability of at most 1, came {t} for {p.name}")
+                raise ModelError(f"theta: expected a probability of at most 1, got {t} for {p.name}")
         kappa, heat = (np.array(v).ravel() for v in self.classes(theta))
         kappa[(kappa < 0.0) & (kappa > -_RELAXED)] = 0.0
         negative = [c.name for c, k in zip(self._faces, kappa, strict=False) if not (np.isfinite(k) and k >= 0)]
@@ -139,17 +129,11 @@ class SymbolicModel:
             d_kappa, d_heat = (np.asarray(v) for v in self._jacobians(theta))
             flow_sensitivities = [self._flow(d_kappa[:, j]) for j in range(theta.size)]
             capacity_sensitivities = [_weighted(self.class_masses, d_heat[:, j]) for j in range(theta.size)]
-        return Matrices(
+        return self._at_any(
             capacity=_weighted(self.class_masses, heat),
             flow=self._flow(kappa),
-            heating=self._heating,
-            observation=self._observation,
-            uniform=self._uniform,
             capacity_sensitivities=capacity_sensitivities,
             flow_sensitivities=flow_sensitivities,
-            reading=self._reading,
-            n_signal=len(self.network.signals),
-            airflows=self.network.airflows,
         )
 
     def source_sensitivities(self, theta: FloatArray) -> Matrix:
@@ -243,14 +227,14 @@ def _weighted(terms: list[Matrix], weights: FloatArray) -> Matrix:
 _FACES = 8192
 
 
-def _projected_class(c: ConductanceClass, v: FloatArray, n_boundary: int) -> FloatArray:
-    """Rows of a class's graph Laplacian at κ = 1 on a basis, from its faces, shape (r, r + n_boundary)."""
-    n, r = v.shape
+def _projected_class(c: ConductanceClass, padded: FloatArray, n_boundary: int) -> FloatArray:
+    """Rows of a class's graph Laplacian at κ = 1 on a basis, zero at boundaries, by faces: (r, r + n_boundary)."""
+    n, r = len(padded) - n_boundary, padded.shape[1]
     total = np.zeros((r, r + n_boundary))
     for begin in range(0, c.weight.size, _FACES):
         part = slice(begin, begin + _FACES)
         ends, weight = (c.first[part], c.second[part]), c.weight[part]
-        drop = _at(v, ends[0]) - _at(v, ends[1])
+        drop = padded[ends[0]] - padded[ends[1]]
         total[:, :r] += congruent(drop, weight)
         for sign, end in zip((1.0, -1.0), ends, strict=True):
             out = np.flatnonzero(end >= n)
@@ -258,16 +242,6 @@ def _projected_class(c: ConductanceClass, v: FloatArray, n_boundary: int) -> Flo
                 faces = out[end[out] == boundary]
                 total[:, r + boundary - n] += sign * (weight[faces] @ drop[faces])
     return total
-
-
-def _at(v: FloatArray, end: IntArray) -> FloatArray:
-    """Rows of a basis at the ends of faces; zero at boundaries."""
-    within = end < len(v)
-    if within.all():
-        return v[end]
-    rows = np.zeros((end.size, v.shape[1]))
-    rows[within] = v[end[within]]
-    return rows
 
 
 def congruent(rows: FloatArray, weight: FloatArray) -> FloatArray:
@@ -293,8 +267,6 @@ def _class_laplacian(network: ThermalNetwork, c: ConductanceClass) -> sp.csr_mat
     return sp.csr_matrix((values, (rows, columns)), shape=(total, total))[:n]
 
 
-def _class_mass(network: ThermalNetwork, k: int) -> sp.csr_matrix:
-    """Diagonal matrix of capacity class ``k`` at unit heat capacity, shape (n_node, n_node)."""
-    c = network.capacities[k]
-    n = network.n_node
+def _class_mass(n: int, c: CapacityClass) -> sp.csr_matrix:
+    """Diagonal matrix of a capacity class at unit heat capacity, shape (n_node, n_node)."""
     return sp.csr_matrix(sp.diags(np.bincount(c.node, c.weight, minlength=n)))

@@ -127,11 +127,8 @@ class ModalModel:
             When the step is not positive.
         """
         if not step > 0.0:
-            raise ModelError(f"step: expected a positive number of seconds, came {step!r}")
-        end, end_gain, mean, mean_gain = (
-            np.asarray(f(self.capacity), dtype=float) for f in propagator_functions(step, scheme)
-        )
-        return Propagator(end, end_gain, mean, mean_gain)
+            raise ModelError(f"step: expected a positive number of seconds, got {step!r}")
+        return Propagator(*(np.asarray(f(self.capacity), dtype=float) for f in propagator_functions(step, scheme)))
 
     def to_control(self, inputs: list[str], outputs: list[str], step: float | None = None) -> Any:
         """Make a `control.StateSpace`, ``dξ/dt = -(k/c) ξ + [B H]/c [u; q]``, ``y = O ξ``.
@@ -177,7 +174,7 @@ def modal_model(matrices: Pencil) -> ModalModel:
         When they are not positive definite.
     """
     if not matrices.reduced:
-        raise ModelError("modes: expected a reduced model, came the grid; see `thermal.reduced_model`")
+        raise ModelError("modes: expected a reduced model, got the grid; see `thermal.reduced_model`")
     n = matrices.n
     capacity = 0.5 * (matrices.capacity + matrices.capacity.T)
     stiffness = matrices.flow[:, :n] + SHIFT * capacity

@@ -283,7 +283,7 @@ class ModalRuns:
             if len(boundary) == 1:  # one step: what drives is turned, not every matrix
                 out[:, stack.parameters] += factor * (gain @ (stack.values @ drive[0]))[:, :, None]
                 continue
-            turned = stack.times(factor * gain)
+            turned = np.tensordot(factor * gain, stack.values, axes=1)
             for rows in rows_of(stay.size, len(path) * ends.size):
                 out[rows, stack.parameters] += turned[rows] @ all_convolution_sums(stay[rows], drive, ends)
         sums = all_convolution_sums(stay, boundary, ends).reshape(-1, ends.size)

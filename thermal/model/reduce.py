@@ -1,6 +1,7 @@
 """Galerkin reduction by rational block-Krylov subspaces: few states, still affine in the classes, and certified."""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
@@ -59,7 +60,7 @@ class ReducedModel(SymbolicModel):
     @property
     def order(self) -> int:
         """Number of states."""
-        return int(self.class_flows[0].shape[0])
+        return self.n_state
 
     def to_control(self, theta: FloatArray | None = None, step: float | None = None) -> Any:
         """Make a `control.StateSpace` of the model: poles, responses and whatever else python-control does with it.
@@ -273,9 +274,9 @@ def reduced_model(
     True
     """
     if order is not None and tolerance is not None:
-        raise ModelError("reduced model: expected an order or a tolerance, came both")
+        raise ModelError("reduced model: expected an order or a tolerance, got both")
     if order is not None and order < 2:
-        raise ModelError(f"order: expected at least 2 states, came {order}")
+        raise ModelError(f"order: expected at least 2 states, got {order}")
     inputs = len(model.network.zones) + len(model.network.boundaries)
     chosen = shifts or (SHIFTS if inputs < _MANY_INPUTS else FEW_SHIFTS)
     whole = [model.matrices(t) for t in thetas]
@@ -319,16 +320,14 @@ def _gramians(m: Matrices, root: FloatArray) -> FloatArray:
 
 def _turned(m: Matrices, turn: FloatArray) -> Matrices:
     """Project a model on orthonormal columns."""
-    return Matrices(
+    return replace(
+        m,
         capacity=turn.T @ (m.capacity @ turn),
         flow=np.hstack([turn.T @ (m.flow[:, : m.n] @ turn), _dense(turn.T @ m.flow[:, m.n :])]),
         heating=_dense(turn.T @ m.heating),
         observation=_dense(m.observation @ turn),
         uniform=turn.T @ m.uniform,
-        capacity_sensitivities=[],
-        flow_sensitivities=[],
         reading=None if m.reading is None else _dense(m.reading @ turn),
-        n_signal=m.n_signal,
     )
 
 
@@ -340,10 +339,8 @@ def _least(m: Matrices, tolerance: float, replay: Replay) -> FloatArray:
     """Fewest directions whose replay is within the tolerance, by bisection."""
     least = differences(m, replay)[1]
     if least > tolerance:
-        raise ModelError(
-            f"tolerance: expected at least {least:.2g} K, the error of all {m.n} states of the basis, "
-            f"came {tolerance:g}; add shifts"
-        )
+        expected = f"at least {least:.2g} K, the error of all {m.n} states of the basis"
+        raise ModelError("tolerance", expected, f"{tolerance:g}", "add shifts")
     ranked = _ranked([m])
     low, high = 1, ranked.shape[1]
     while high - low > max(1, high // 50):

@@ -17,7 +17,7 @@ from thermal.model.matrices import Matrices
 from thermal.model.modal import run_along
 from thermal.model.step import IMPLICIT_EULER, Scheme, Stepper
 from thermal.network.network import ThermalNetwork
-from thermal.units import REFERENCE_TEMPERATURE
+from thermal.units import REFERENCE_TEMPERATURE as _REFERENCE
 
 #: Longest gap of an input that is bridged by a straight line [s] (results contract: 30 minutes).
 LONGEST_BRIDGE = 1800.0
@@ -27,10 +27,6 @@ SPIN_UP = 3 * 86400.0
 
 #: The least spin-up that is accepted [s] (results contract: 12 hours).
 LEAST_SPIN_UP = 12 * 3600.0
-
-#: Temperatures are stepped as differences from this one [K]: rows of ``[K, -B]`` sum to zero but for signals,
-#: which are counted from it, so nothing changes but round-off.
-_REFERENCE = REFERENCE_TEMPERATURE
 
 #: One long implicit step towards the steady state that a spin-up starts from [s].
 _STEADY_STEP = 10 * 86400.0
@@ -127,14 +123,10 @@ def replay_inputs(case: Case, network: ThermalNetwork, provider: InputProvider |
     zone = case.zone_temperatures()
     boundary = case.boundary_temperatures()
     if zone.isna().all(axis=None):
-        raise ModelError(
-            "telemetry: expected a zone_air_temperature_sensor of at least one zone, found none that is usable"
-        )
+        raise ModelError("telemetry", "a zone_air_temperature_sensor of at least one zone", "none that is usable")
     missing = [str(c) for c in boundary.columns if boundary[c].isna().all()]
     if missing:
-        raise ModelError(
-            f"telemetry: expected temperatures of the boundaries, found none that is usable for {missing}"
-        )
+        raise ModelError("telemetry", "temperatures of the boundaries", f"none that is usable for {missing}")
     frames = [case.zone_heat(), boundary, case.airflow_rates()]
     limit = int(LONGEST_BRIDGE // step)
     bridged = [_bridge(f, limit) for f in frames]
@@ -146,7 +138,7 @@ def replay_inputs(case: Case, network: ThermalNetwork, provider: InputProvider |
     signals = np.empty((len(index), 0))
     if network.signals:
         source = provider or telemetry_inputs(case, network.normalisation)
-        signals = REFERENCE_TEMPERATURE + signal_values(network.signals, source)
+        signals = _REFERENCE + signal_values(network.signals, source)
     return Inputs(
         stamps=index,
         step=step,
@@ -217,6 +209,8 @@ def spin_up(
     # a day, or what lies before the first start: a state may know nothing of what comes after it
     first = slice(begin, min(begin + max(1, int(86400.0 / inputs.step)), int(at[0]) + 1))
     rows = np.arange(begin, int(at[-1]) + 1)
+    # Temperatures are stepped as differences from the reference: rows of ``[K, -B]`` sum to zero but for signals, which
+    # are counted from it, so nothing changes but round-off.
     held, boundary = inputs.held - _REFERENCE, inputs.boundary - _REFERENCE
     states = float(np.nanmean(held[first].mean(axis=0))) * matrices.uniform[:, None]
     sensitivities = np.zeros((matrices.n, p)) if p else None

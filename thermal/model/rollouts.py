@@ -51,23 +51,17 @@ class RolloutData:
         Raises
         ------
         ModelError
-            Naming the array, what was expected and what came.
+            Naming the array, what was expected and what it got.
         """
         network = model.network
-        n = network.n_node if model.projection is None else model.projection.shape[1]
-        steps = self.boundary.shape[0]
-        wanted = {
-            "initial": (n,),
-            "boundary": (steps, network.n_boundary),
-            "heat": (steps, len(network.zones)),
-            "airflow": (steps, len(network.airflows)),
-        }
-        for name, shape in wanted.items():
+        columns = {"boundary": network.n_boundary, "heat": len(network.zones), "airflow": len(network.airflows)}
+        shapes = {name: (len(self.boundary), count) for name, count in columns.items()}
+        for name, shape in {"initial": (model.n_state,), **shapes}.items():
             value = getattr(self, name)
             if value.shape != shape:
-                raise ModelError(f"{name}: expected shape {shape}, came {value.shape}")
+                raise ModelError(f"{name}: expected shape {shape}, got {value.shape}")
             if not np.isfinite(value).all():
-                raise ModelError(f"{name}: expected finite values, came {value[~np.isfinite(value)][0]}")
+                raise ModelError(f"{name}: expected finite values, got {value[~np.isfinite(value)][0]}")
 
 
 def rollout(
@@ -108,14 +102,12 @@ def rollout(
     if executor == "sparse":
         return _sparse_rollout(model, data, step, scheme)
     if executor != "symbolic":
-        raise ModelError(f"executor: expected 'symbolic' or 'sparse', came {executor!r}")
+        raise ModelError(f"executor: expected 'symbolic' or 'sparse', got {executor!r}")
     if model.projection is not None:
-        raise ModelError("symbolic executor: expected a grid model, came a reduced one; use executor='sparse'")
+        raise ModelError("symbolic executor: expected a grid model, got a reduced one; use executor='sparse'")
     if model.network.n_node > LARGEST_SYMBOLIC:
-        raise ModelError(
-            f"symbolic executor: expected at most {LARGEST_SYMBOLIC} volumes, came {model.network.n_node}; "
-            "use executor='sparse'"
-        )
+        most, count = f"at most {LARGEST_SYMBOLIC} volumes", str(model.network.n_node)
+        raise ModelError("symbolic executor", most, count, "use executor='sparse'")
     return _symbolic_rollout(model, data, step, scheme)
 
 

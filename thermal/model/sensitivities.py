@@ -106,16 +106,6 @@ class _Stack:
     parameters: IntArray
     values: FloatArray
 
-    def times(self, factor: FloatArray) -> FloatArray:
-        """Multiply every matrix by another from the left, shape (n, n_stack, r).
-
-        Parameters
-        ----------
-        factor : ndarray, shape (n, r)
-            The other.
-        """
-        return np.asarray(np.tensordot(factor, self.values, axes=1))
-
 
 @dataclass(frozen=True)
 class _Columns:

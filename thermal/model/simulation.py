@@ -100,10 +100,8 @@ def simulate(
     stamps = inputs.stamps
     first, last = int(stamps.searchsorted(start)), int(stamps.searchsorted(end, side="right")) - 1
     if not (start < end and first < last and stamps[0] <= start and end <= stamps[-1]):
-        raise ModelError(
-            f"interval {start} to {end}: expected two times in order within the telemetry, "
-            f"which goes from {stamps[0]} to {stamps[-1]}"
-        )
+        within = f"the telemetry, which goes from {stamps[0]} to {stamps[-1]}"
+        raise ModelError(f"interval {start} to {end}: expected two times in order within {within}")
     begin = max(0, first - round(spin_up_seconds / inputs.step))
     if (first - begin) * inputs.step < LEAST_SPIN_UP:
         earliest = stamps[0] + pd.Timedelta(seconds=LEAST_SPIN_UP)

@@ -58,9 +58,9 @@ class Shuffle:
 
     def __post_init__(self) -> None:
         if self.probability is not None and not 0.0 <= self.probability <= 1.0:
-            raise ModelError(f"probability: expected a number from 0 to 1, came {self.probability}")
+            raise ModelError(f"probability: expected a number from 0 to 1, got {self.probability}")
         if self.kind not in ("mean", "random"):
-            raise ModelError(f"shuffle: expected 'mean' or 'random', came {self.kind!r}")
+            raise ModelError(f"shuffle: expected 'mean' or 'random', got {self.kind!r}")
 
 
 class Simulator:
@@ -112,9 +112,9 @@ class Simulator:
         effects: Sequence[Extension] = (),
     ) -> None:
         if scheme not in SCHEMES:
-            raise ModelError(f"scheme: expected one of {sorted(SCHEMES)}, came {scheme!r}")
+            raise ModelError(f"scheme: expected one of {sorted(SCHEMES)}, got {scheme!r}")
         if not (np.isfinite(step_seconds) and step_seconds > 0):
-            raise ModelError(f"step_seconds: expected a positive number of seconds, came {step_seconds}")
+            raise ModelError(f"step_seconds: expected a positive number of seconds, got {step_seconds}")
         mixing = shuffle if isinstance(shuffle, Shuffle) else Shuffle(shuffle)
         probability, random = mixing.probability, mixing.kind == "random"
         build = partial(build_network, building, dx=dx, reach=mixing.reach, scopes=scopes, effects=effects)
@@ -229,13 +229,12 @@ class Simulator:
         """
         inputs = replay_inputs(case, self._start_model.network)
         if inputs.step != self.step_seconds:
-            raise ModelError(f"telemetry: expected a step of {self.step_seconds:g} s, came {inputs.step:g} s")
+            raise ModelError(f"telemetry: expected a step of {self.step_seconds:g} s, got {inputs.step:g} s")
         if not 0 < stamp < len(inputs):
-            raise ModelError(f"stamp: expected a row from 1 to {len(inputs) - 1}, came {stamp}")
+            raise ModelError(f"stamp: expected a row from 1 to {len(inputs) - 1}, got {stamp}")
         if not LEAST_SPIN_UP <= spin_up_seconds < np.inf or stamp * inputs.step < LEAST_SPIN_UP:
-            raise ModelError(
-                f"spin-up: expected at least 12 h before the stamp, came {spin_up_seconds} s before row {stamp}"
-            )
+            found = f"{spin_up_seconds} s before row {stamp}"
+            raise ModelError("spin-up", "at least 12 h before the stamp", found)
         begin = max(0, stamp - round(spin_up_seconds / inputs.step))
         states, _ = spin_up(self._start_matrices(), inputs, begin, np.array([stamp]))
         self._states, self._stepped, self._elapsed = self._without_stars(states), None, 0.0
@@ -309,7 +308,7 @@ class Simulator:
         place = self.network.place
         mine = place[:, 0] == floor
         if floor < 0 or not mine.any():
-            raise ModelError(f"floor: expected a floor of a plan, came {floor}")
+            raise ModelError(f"floor: expected a floor of a plan, got {floor}")
         out = np.full(self.network.floor_shapes[floor], np.nan)
         for shown in (mine & (self.network.kind != "air"), mine & (self.network.kind == "air")):
             out[place[shown, 1], place[shown, 2]] = self._current()[shown, 0]
@@ -327,11 +326,8 @@ class Simulator:
 
     def save_state(self) -> dict[str, Any]:
         """Everything that the next steps depend on, for `restore_state`."""
-        return {
-            "states": self.states,
-            "shuffle": None if self._shuffle is None else self._shuffle.state,
-            "elapsed": self._elapsed,
-        }
+        shuffle = None if self._shuffle is None else self._shuffle.state
+        return {"states": self.states, "shuffle": shuffle, "elapsed": self._elapsed}
 
     def restore_state(self, saved: Mapping[str, Any]) -> None:
         """Return to a saved state; what follows is bit for bit what followed then.
@@ -348,9 +344,7 @@ class Simulator:
         """
         states = np.array(saved["states"], dtype=float)
         if states.shape != (self.network.n_node,):
-            raise ModelError(
-                f"state: expected {self.network.n_node} temperatures of this building, came {states.shape}"
-            )
+            raise ModelError("state", f"{self.network.n_node} temperatures of this building", str(states.shape))
         self._states, self._stepped = states[:, None], None
         self._elapsed = float(saved["elapsed"])
         if self._shuffle is not None:
@@ -373,7 +367,7 @@ class Simulator:
     def _checked(name: str, value: FloatArray, n: int, limits: tuple[float, float] | None = None) -> FloatArray:
         array = np.asarray(value, dtype=float)
         if array.shape != (n,):
-            raise ModelError(f"{name}: expected shape ({n},), came {array.shape}")
+            raise ModelError(f"{name}: expected shape ({n},), got {array.shape}")
         bad = ~np.isfinite(array)
         if limits is not None:
             bad |= (array < limits[0]) | (array > limits[1])
@@ -382,5 +376,5 @@ class Simulator:
             wanted = "finite values"
             if limits is not None:
                 wanted = f"kelvin from {limits[0]} to {limits[1]}" if limits == PLAUSIBLE else "a flow of zero or more"
-            raise ModelError(f"{name}[{where}]: expected {wanted}, came {array[where]}")
+            raise ModelError(f"{name}[{where}]: expected {wanted}, got {array[where]}")
         return array

@@ -209,7 +209,7 @@ class Stepper:
         """
         m = self.matrices
         if self.scheme.implicit != 1.0:
-            raise ModelError(f"hold: expected a stepper with scheme implicit_euler, came {self.scheme.name}")
+            raise ModelError(f"hold: expected a stepper with scheme implicit_euler, got {self.scheme.name}")
         held = np.isfinite(zone[:, 0])
         rhs = m.capacity @ states - self.step * (self._exchange @ boundary)
         if heat is not None and not held.all():

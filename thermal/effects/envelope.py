@@ -1,24 +1,19 @@
-"""Heat from and to what the baseline takes for adiabatic: other floors, ground, roof, the neighbour; more mass."""
+"""Heat through what bounds zones: other floors, ground, roof, neighbour; sky and wind on the outside; hidden mass."""
+
+from operator import attrgetter
 
 import casadi as ca
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from thermal._types import FloatArray
-from thermal.effects.effect import CONSTANT, EffectBuilder, described, lacking, paired, without_facades
+from thermal.effects.effect import CONSTANT, STEADY, EffectBuilder, described, lacking, paired, without_facades
 from thermal.inputs.provider import InputProvider
 from thermal.inputs.signals import Signal
 from thermal.network.structure import RATED_OUTSIDE_FILM
 from thermal.network.topology import UPWARD, Anatomy, OuterFaces, Outlook, Room
 from thermal.units import REFERENCE_TEMPERATURE
-
-
-def _zero(inputs: InputProvider) -> FloatArray:
-    return np.zeros(len(inputs.stamps))
-
-
-#: A temperature that stays at the reference; what differs from it acts as heat.
-_STEADY = Signal("constant temperature", "K", _zero)
 
 
 def _back(room: Room, slab: tuple[int, ...]) -> tuple[NDArray[np.int64], FloatArray]:
@@ -49,7 +44,7 @@ def _build_ground(builder: EffectBuilder) -> None:
 
     def to_ground(key: str, conductance: ca.SX, parts: list[tuple[NDArray[np.int64], FloatArray]]) -> None:
         node, weight = (np.concatenate([p[k] for p in parts]) for k in (0, 1))
-        builder.graph.face(key, conductance, node, builder.graph.signal(_STEADY), weight)
+        builder.graph.face(key, conductance, node, builder.graph.signal(STEADY), weight)
         builder.graph.source(key, conductance * (ground - REFERENCE_TEMPERATURE), node, CONSTANT, weight)
 
     rooms = builder.anatomy.rooms
@@ -75,7 +70,7 @@ def _build_neighbour(builder: EffectBuilder) -> None:
         if azimuth not in party:
             continue
         room, value = builder.anatomy.rooms[zone], builder.parameter("neighbour_u_value", facade=f"{azimuth:g} deg")
-        builder.air_to(room, value, builder.graph.signal(_STEADY), area)
+        builder.air_to(room, value, builder.graph.signal(STEADY), area)
         builder.heat_air(room, value * (other - REFERENCE_TEMPERATURE), CONSTANT, area)
 
 
@@ -89,6 +84,45 @@ def _build_mass(builder: EffectBuilder) -> None:
             builder.graph.face("hidden_mass", coupling, room.mean, node, room.floor_area)
         else:
             builder.air_to(room, coupling, int(node[0]), room.floor_area)
+
+
+def _wind(inputs: InputProvider, zone: str | None) -> FloatArray:
+    inside = inputs.usual.mean(axis=1) if zone is None else inputs.usual[:, inputs.zones.index(zone)]
+    return np.asarray((inputs.wind - (inputs.normalisation.wind or 0.0)) * (inputs.outdoor - inside))
+
+
+def _build_sky(builder: EffectBuilder) -> None:
+    emitted = builder.parameter("sky_exchange_factor")
+    signal = Signal("sky deficit", "W/m^2", attrgetter("sky"), ("sky",))
+    for faces in builder.anatomy.outer:
+        view = (1.0 + np.cos(np.radians(faces.outlook.tilt))) / 2.0
+        if view > 1e-9:
+            value = emitted * faces.value / faces.outlook.film
+            builder.graph.source(builder.key(), value, faces.node, signal, view * faces.area)
+
+
+def _build_film(builder: EffectBuilder) -> None:
+    slope = builder.parameter("wind_film_slope")
+    for faces in builder.anatomy.outer:
+        name = f"wind on films of {faces.zone or 'walls'}"
+        signal = Signal.made(name, "K*m/s", _wind, "wind", "outdoor", "usual", given={"zone": faces.zone})
+        value = slope * (faces.value / faces.outlook.film) ** 2
+        builder.graph.source(builder.key(), value, faces.node, signal, faces.area)
+
+
+def _swing(inputs: InputProvider) -> FloatArray:
+    """Outdoor temperature about its mean over the day around each step [K]."""
+    day = max(1, round(86400.0 / inputs.step))
+    outdoor = pd.Series(inputs.outdoor)
+    return np.asarray(outdoor - outdoor.rolling(day, center=True, min_periods=1).mean())
+
+
+def _build_station(builder: EffectBuilder) -> None:
+    offset, swing = builder.parameter("station_offset"), builder.parameter("station_swing")
+    daily = Signal("outdoor temperature about its day's mean", "K", _swing, ("outdoor",))
+    for value, _, node, weight in builder.graph.touching(np.array([builder.graph.boundary("outdoor")])):
+        builder.graph.source(builder.key(), -offset * value, node, CONSTANT, weight)
+        builder.graph.source(builder.key(), -swing * value, node, daily, weight)
 
 
 def _no_party_side(anatomy: Anatomy) -> str | None:
@@ -106,3 +140,7 @@ ROOF_EXCHANGE = described("roof_exchange", _build_roof, _no_roof)
 GROUND_EXCHANGE = described("ground_exchange", _build_ground, _no_ground)
 NEIGHBOUR = described("neighbour", _build_neighbour, _no_party_side)
 HIDDEN_MASS = described("hidden_mass", _build_mass)
+_no_faces = lacking("outer", "the building has no surfaces to outdoor")
+LONGWAVE_SKY = described("longwave_sky", _build_sky, _no_faces)
+WIND_FILM = described("wind_film", _build_film, _no_faces)
+WRONG_STATION = described("wrong_station", _build_station, _no_faces)

@@ -1,12 +1,13 @@
-"""Sun through glass, blinds, and sun on opaque walls."""
+"""Heat of sun and people: sun through glass and on opaque walls, blinds, gains of people, latent load."""
 
-from functools import partial
+from collections.abc import Callable
+from operator import attrgetter
 
 import casadi as ca
 import numpy as np
 
 from thermal._types import FloatArray
-from thermal.effects.effect import EffectBuilder, described, hat, lacking
+from thermal.effects.effect import CONSTANT, EffectBuilder, described, hat, lacking
 from thermal.inputs.provider import InputProvider
 from thermal.inputs.signals import Signal
 from thermal.network.topology import Anatomy
@@ -17,30 +18,31 @@ _USUAL_TRANSMITTANCE = 0.6
 #: Irradiance on a facade at which blinds may be drawn [W/m2]: knots of the interpolation in between.
 _DRAWN_AT = (100.0, 200.0, 300.0, 400.0)
 
-
-def _through(inputs: InputProvider, azimuth: float, tilt: float) -> FloatArray:
-    return inputs.sun.through_glass(azimuth, tilt)
-
-
-def _through_when_bright(inputs: InputProvider, azimuth: float, tilt: float, threshold: float) -> FloatArray:
-    beam, diffuse = inputs.sun.plane(azimuth, tilt)
-    return np.where(beam + diffuse > threshold, inputs.sun.through_glass(azimuth, tilt), 0.0)
+PRESENCE = Signal("presence", "1", attrgetter("occupancy"), ("occupancy",))
 
 
 def _on_plane(inputs: InputProvider, azimuth: float, tilt: float) -> FloatArray:
     return np.asarray(sum(inputs.sun.plane(azimuth, tilt)))
 
 
-def _panes(builder: EffectBuilder, value: ca.SX, signal_of: partial[FloatArray], name: str) -> None:
+def _through(inputs: InputProvider, azimuth: float, tilt: float, threshold: float = -1.0) -> FloatArray:
+    """Sun through glass while more than a threshold falls on it; by default always."""
+    return np.where(_on_plane(inputs, azimuth, tilt) > threshold, inputs.sun.through_glass(azimuth, tilt), 0.0)
+
+
+def _of_sun(name: str, of: Callable[..., FloatArray], azimuth: float, tilt: float, **given: float) -> Signal:
+    """Signal of the sun on a plane."""
+    where = f"{name} at {azimuth:g} deg, tilt {tilt:g}"
+    return Signal.made(where, "W/m^2", of, "sun", given={"azimuth": azimuth, "tilt": tilt, **given})
+
+
+def _panes(builder: EffectBuilder, value: ca.SX, name: str, **given: float) -> None:
     """Bring sun through every pane: a share to the floor or furniture, the rest to the other surfaces."""
     share = builder.graph.own(SOLAR_GAIN.parameters[1])
     to_mass, to_surfaces = value * share, value * (1.0 - share)
     for pane in builder.anatomy.panes:
         room = builder.anatomy.rooms[pane.zone]
-        signal = Signal(
-            f"{name} at {pane.azimuth:g} deg, tilt {pane.tilt:g}", "W/m^2",
-            partial(signal_of, azimuth=pane.azimuth, tilt=pane.tilt), ("sun",),
-        )  # fmt: skip
+        signal = _of_sun(name, _through, pane.azimuth, pane.tilt, **given)
         known = 1.0 if pane.transmittance is None else pane.transmittance / _USUAL_TRANSMITTANCE
         mass = room.floor[0] if room.floor else room.furniture
         if mass < 0:
@@ -51,14 +53,14 @@ def _panes(builder: EffectBuilder, value: ca.SX, signal_of: partial[FloatArray],
 
 
 def _build_gain(builder: EffectBuilder) -> None:
-    _panes(builder, builder.graph.own(SOLAR_GAIN.parameters[0]), partial(_through), "sun through glass")
+    _panes(builder, builder.graph.own(SOLAR_GAIN.parameters[0]), "sun through glass")
 
 
 def _build_blinds(builder: EffectBuilder) -> None:
     drawn, threshold = builder.parameter("blind_shading"), builder.parameter("blind_irradiance")
     for number, knot in enumerate(_DRAWN_AT):
         value = -builder.graph.own(SOLAR_GAIN.parameters[0]) * drawn * hat(threshold, _DRAWN_AT, number)
-        _panes(builder, value, partial(_through_when_bright, threshold=knot), f"sun through glass over {knot:g} W/m2")
+        _panes(builder, value, f"sun through glass over {knot:g} W/m2", threshold=knot)
 
 
 def _build_opaque(builder: EffectBuilder) -> None:
@@ -67,11 +69,23 @@ def _build_opaque(builder: EffectBuilder) -> None:
         look = faces.outlook
         if look.glass or look.tilt > 90.0:
             continue
-        signal = Signal(
-            f"sun at {look.azimuth:g} deg, tilt {look.tilt:g}", "W/m^2",
-            partial(_on_plane, azimuth=look.azimuth, tilt=look.tilt), ("sun",),
-        )  # fmt: skip
+        signal = _of_sun("sun", _on_plane, look.azimuth, look.tilt)
         builder.graph.source(builder.key(), absorptance * faces.value / look.film, faces.node, signal, faces.area)
+
+
+def _build_people(builder: EffectBuilder) -> None:
+    peak, shift, base = (builder.parameter(n) for n in ("internal_gain", "internal_gain_delay", "base_load"))
+    arrival = Signal("coming and going", "1/h", attrgetter("occupancy_rate"), ("occupancy_rate",))
+    for value, signal in ((peak, PRESENCE), (-peak * shift, arrival), (base, CONSTANT)):
+        for room in builder.rooms:
+            builder.heat_air(room, value, signal, 0.5 * room.floor_area)
+            builder.heat_surfaces(room, value, signal, 0.5 * room.floor_area)
+
+
+def _build_latent(builder: EffectBuilder) -> None:
+    load = builder.parameter("latent_load")
+    for room in builder.rooms:
+        builder.heat_air(room, load, PRESENCE, -room.floor_area)
 
 
 def _no_walls(anatomy: Anatomy) -> str | None:
@@ -83,3 +97,5 @@ _no_panes = lacking("panes", "the building has no windows to outdoor")
 SOLAR_GAIN = described("solar_gain", _build_gain, _no_panes)
 BLINDS = described("blinds", _build_blinds, _no_panes)
 SOLAR_OPAQUE = described("solar_opaque", _build_opaque, _no_walls)
+INTERNAL_GAINS = described("internal_gains", _build_people)
+LATENT_LOAD = described("latent_load", _build_latent)
