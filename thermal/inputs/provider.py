@@ -4,6 +4,8 @@ Values stand for the step that ends at their stamp. A source says what it can gi
 of a model what it is made of (`Signal.inputs`), so that nobody has to try.
 """
 
+from __future__ import annotations
+
 from collections.abc import Iterable, Mapping
 from functools import cached_property
 
@@ -51,6 +53,20 @@ _SERIES: dict[str, tuple[str, ...]] = {
     "wind": (WIND,), "sky": (INFRARED, "outdoor"), "sun": (IRRADIANCE,), "through_windows": ("outdoor",),
     "occupancy": (), "usual": (), "openings": (),
 }  # fmt: skip
+
+
+def _input(name: str, meaning: str) -> cached_property[FloatArray]:
+    """Input as its source gives it; a rate of change by central differences."""
+
+    def read(provider: InputProvider) -> FloatArray:
+        provider.need(name)
+        if name.endswith("_rate"):
+            changing = getattr(provider, name.removesuffix("_rate"))
+            return np.asarray(np.gradient(changing, provider.step / 3600.0, axis=0))
+        return provider.series[name]
+
+    read.__doc__ = meaning
+    return cached_property(read)
 
 
 class InputProvider:
@@ -121,7 +137,7 @@ class InputProvider:
             When there is no such input.
         """
         if name not in INPUTS:
-            raise EffectError(describe("input", "a name of `INPUTS`", repr(name), nearest(name, INPUTS)))
+            raise EffectError("input", "a name of `INPUTS`", repr(name), nearest(name, INPUTS))
         if name.endswith("_rate"):
             return len(self.stamps) > 1 and self.gives(name.removesuffix("_rate"))
         if name in ("usual", "through_windows") and not self.normalisation.usual:
@@ -162,13 +178,13 @@ class InputProvider:
         """
         self.need(name)
         if unit not in ("", INPUTS[name]):
-            raise EffectError(describe(f"input {name}", f"unit {INPUTS[name]}", repr(unit)))
+            raise EffectError(f"input {name}", f"unit {INPUTS[name]}", repr(unit))
         found = self.sun.horizontal if name == "sun" else np.asarray(getattr(self, name))
         if at is None:
             return found
         rows = self.stamps.get_indexer(at)
         if (rows < 0).any():
-            raise EffectError(describe(f"input {name}", f"stamps of the {self.source}", f"{at[rows < 0][0]}"))
+            raise EffectError(f"input {name}", f"stamps of the {self.source}", f"{at[rows < 0][0]}")
         return np.asarray(found[rows])
 
     def why_not(self, name: str) -> str:
@@ -205,45 +221,18 @@ class InputProvider:
         for name in self.lacks(names):
             raise EffectError(self.why_not(name))
 
-    def _given(self, name: str) -> FloatArray:
-        self.need(name)
-        return self.series[name]
-
     @cached_property
     def weather(self) -> pd.DataFrame:
         """Points of the weather station, shape (n_time, n_point) [library's units]."""
         points = {name: values for name, values in self.series.items() if name.endswith("_sensor")}
         return pd.DataFrame(points, index=self.stamps)
 
-    @cached_property
-    def outdoor(self) -> FloatArray:
-        """Outdoor temperature, shape (n_time,) [K]."""
-        return self._given("outdoor")
-
-    @cached_property
-    def heat(self) -> FloatArray:
-        """Metered heat of the zones, shape (n_time, n_zone) [W]."""
-        return self._given("heat")
-
-    @cached_property
-    def airflow(self) -> FloatArray:
-        """Directed airflows from zone to zone, shape (n_time, n_airflow) [kg/s]."""
-        return self._given("airflow")
-
-    @cached_property
-    def supply_flow(self) -> FloatArray:
-        """Supply air of the zones, shape (n_time, n_zone) [kg/s]."""
-        return self._given("supply_flow")
-
-    @cached_property
-    def supply_heat(self) -> FloatArray:
-        """Heat of the supply air above the zone's own temperature, shape (n_time, n_zone) [W]."""
-        return self._given("supply_heat")
-
-    @cached_property
-    def radiant_gains(self) -> FloatArray:
-        """Part of the gains of the zones that radiates, shape (n_time, n_zone) [W]."""
-        return self._given("radiant_gains")
+    outdoor = _input("outdoor", "Outdoor temperature, shape (n_time,) [K].")
+    heat = _input("heat", "Metered heat of the zones, shape (n_time, n_zone) [W].")
+    airflow = _input("airflow", "Directed airflows from zone to zone, shape (n_time, n_airflow) [kg/s].")
+    supply_flow = _input("supply_flow", "Supply air of the zones, shape (n_time, n_zone) [kg/s].")
+    supply_heat = _input("supply_heat", "Heat of supply air above the zone's temperature, shape (n_time, n_zone) [W].")
+    radiant_gains = _input("radiant_gains", "Part of the gains of the zones that radiates, shape (n_time, n_zone) [W].")
 
     @cached_property
     def wind(self) -> FloatArray:
@@ -270,7 +259,7 @@ class InputProvider:
         slot = 24 * (self.stamps.day_of_week < 5) + np.asarray(self.stamps.hour)
         profile = self.normalisation.usual
         if lacking := [zone for zone in self.zones if zone not in profile]:
-            raise EffectError(describe("usual temperatures", f"zone {lacking[0]!r}", nearest(lacking[0], profile)))
+            raise EffectError("usual temperatures", f"zone {lacking[0]!r}", nearest(lacking[0], profile))
         return np.asarray(np.array([profile[zone] for zone in self.zones]).T[slot])
 
     @cached_property
@@ -298,25 +287,9 @@ class InputProvider:
         speed = 0.5 * np.sqrt(0.001 * wind[:, None] ** 2 + 0.0035 * np.abs(difference) + 0.01)
         return np.asarray(speed * difference)
 
-    @cached_property
-    def outdoor_rate(self) -> FloatArray:
-        """Change of the outdoor temperature, shape (n_time,) [K/h]."""
-        return self._rate("outdoor")
-
-    @cached_property
-    def occupancy_rate(self) -> FloatArray:
-        """Change of the presence of people, shape (n_time,) [1/h]."""
-        return self._rate("occupancy")
-
-    @cached_property
-    def heat_rate(self) -> FloatArray:
-        """Change of the metered heat of the zones, shape (n_time, n_zone) [W/h]."""
-        return self._rate("heat")
-
-    def _rate(self, name: str) -> FloatArray:
-        """Rate of change by central differences [1/h]."""
-        self.need(f"{name}_rate")
-        return np.asarray(np.gradient(getattr(self, name), self.step / 3600.0, axis=0))
+    outdoor_rate = _input("outdoor_rate", "Change of the outdoor temperature, shape (n_time,) [K/h].")
+    occupancy_rate = _input("occupancy_rate", "Change of the presence of people, shape (n_time,) [1/h].")
+    heat_rate = _input("heat_rate", "Change of the metered heat of the zones, shape (n_time, n_zone) [W/h].")
 
 
 class LiveInputs(InputProvider):
