@@ -66,7 +66,7 @@ REGISTERED: dict[str, RegisteredController] = {}
 def register_controller(
     name: str, *, title: str = "", about: str = "", predictive: bool = False, perfect: bool = False
 ) -> Callable[[ControllerFactory], ControllerFactory]:
-    """Register a function that makes a controller, as a decorator; a name that is taken gets the new one.
+    """Register a function that makes a controller, as a decorator with a name.
 
     Parameters
     ----------
@@ -79,6 +79,11 @@ def register_controller(
     perfect : bool
         Whether its sensors are exact and its forecasts know weather and people.
 
+    Raises
+    ------
+    ControlError
+        When the name is none, or another function has it; the same function may be registered again.
+
     Examples
     --------
     >>> @register_controller("still", title="setpoints that stand still")
@@ -88,8 +93,11 @@ def register_controller(
     'setpoints that stand still'
     >>> del REGISTERED["still"]
     """
+    ControlError.unless(str(name).isidentifier(), "controller", "@register_controller('name')", repr(name))
 
     def register(make: ControllerFactory) -> ControllerFactory:
+        taken = name in REGISTERED and REGISTERED[name].make.__qualname__ != make.__qualname__
+        ControlError.unless(not taken, "controller", f"a name beside {', '.join(REGISTERED)}", repr(name))
         REGISTERED[name] = RegisteredController(name, make, title or name, about, predictive, perfect)
         return make
 

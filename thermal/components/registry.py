@@ -31,7 +31,8 @@ def register_component(kind: type[Component]) -> type[Component]:
         The class names no type of device, or one that another class has.
     """
     known = COMPONENTS.get(kind.device)
-    if not kind.device or (known is not None and known.__qualname__ != kind.__qualname__):
+    named = (kind.__module__, kind.__qualname__)
+    if not kind.device or (known is not None and (known.__module__, known.__qualname__) != named):
         expected = f"a type of device beside {', '.join(sorted(COMPONENTS))}"
         raise ModelError(describe(f"component {kind.__name__}: device", expected, repr(kind.device)))
     COMPONENTS[kind.device] = kind
@@ -39,6 +40,7 @@ def register_component(kind: type[Component]) -> type[Component]:
 
 
 def setpoints() -> dict[str, Actuator]:
-    """Give the setpoints that a supervisory controller may decide, by type of the point."""
+    """Give the setpoints that a supervisory controller may decide, by type of the point; whose was first keeps it."""
     kinds: list[type[Component]] = [*COMPONENTS.values(), Thermostat]
-    return {a.point: a for kind in kinds for a in kind.actuators if a.usual is not None}
+    usual = [(a.point, a) for kind in kinds for a in kind.actuators if a.usual is not None]
+    return dict(reversed(dict(reversed(usual)).items()))

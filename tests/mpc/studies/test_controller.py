@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -11,6 +13,7 @@ from mpc.errors import ControlError
 from mpc.kpi.kpis import measure_kpis
 from mpc.loop.run import FixedSetpoints, run_closed_loop
 from mpc.studies.controller import default_horizon, held_space, make_controller
+from mpc.studies.controllers import find_controller, register_controller
 from mpc.studies.model import control_model
 from thermal.effects.catalogue import chosen
 from thermal.model.modal import modal_model
@@ -92,3 +95,14 @@ def test_what_is_missing_is_named(model, make_plant) -> None:
         make_controller(model, Strange())
     with pytest.raises(ControlError, match="none beside a file"):
         control_model(make_plant().scenario.building, "calibration.json", effects=chosen(["solar_gain"]))
+
+
+def test_a_name_is_registered_once_and_is_a_name() -> None:
+    def make(study: Any, plant: Any) -> Any: ...
+
+    with pytest.raises(ControlError, match="found 'mpc'"):
+        register_controller("mpc")(make)
+    for wrong in ("", "a,b", make):
+        with pytest.raises(ControlError, match="register_controller"):
+            register_controller(wrong)  # type: ignore[arg-type]
+    assert find_controller("mpc").title == "optimal control"
