@@ -56,7 +56,7 @@ def inherited(p: Any) -> dict[str, tuple[str, str]]:
 
 def is_numeric(annotation: Any, kind: str) -> bool:
     """Whether a parameter is a physical number: its annotation or its documented type names floats."""
-    text = annotation if isinstance(annotation, str) else repr(annotation)
+    text = (annotation if isinstance(annotation, str) else repr(annotation)).removeprefix("collections.abc.")
     return not text.startswith(("Callable", "type[")) and bool(NUMERIC.search(text) or re.search(r"\bfloat\b", kind))
 
 
