@@ -132,7 +132,7 @@ class Reader:
     Parameters
     ----------
     columns : mapping
-        Of `columns_of`.
+        Of `columns_of`, with factors to the units of the columns [unit of the point].
     layout : PlantLayout
         Plant of the building.
 
