@@ -45,6 +45,8 @@ class Parameter:
         Whether the value is the building's, or a facade's or a zone's own.
     member : str or None
         The facade or the zone it is of; None for a global one.
+    deviation : float or None
+        Standard deviation of the prior on the estimation scale [-], where it is not that of the physical range.
 
     Raises
     ------
@@ -62,6 +64,7 @@ class Parameter:
     effect: str | None = None
     scope: Scope = "global"
     member: str | None = None
+    deviation: float | None = None
 
     def __post_init__(self) -> None:
         if self.scale == "linear":
@@ -96,6 +99,8 @@ class Parameter:
         Where the range begins at the start, as that of a strength that is absent at first, the prior is the half of a
         normal distribution.
         """
+        if self.deviation is not None:
+            return self.deviation
         ends = (self.transform(self.lower), self.transform(self.upper))
         if self.scale == "linear":
             centre = self.transform(self.start)

@@ -231,9 +231,7 @@ def air_volumes(network: ThermalNetwork) -> FloatArray:
     network : ThermalNetwork
         Control volumes and faces.
     """
-    air = next(c for c in network.capacities if c.name == "air")
-    volumes = np.bincount(network.zone[air.node], air.weight, minlength=len(network.zones))
-    return np.asarray(volumes, dtype=float)
+    return np.array([network.anatomy.rooms[zone].volume for zone in network.zones])
 
 
 #: Row at which the filter of an interval starts, its last row, and what it starts from.

@@ -158,6 +158,7 @@ class _Rounds:
         self.excess, self.retune = 1.0, True
         self.last: LeastSquaresResult | None = None
         self.known: Precision | None = None  # at the θ of the last solve
+        self.most = replace(problem, effective=None).effective_size() if problem.capped else np.inf
         self.large = problem.inputs.zone.shape[1] > _MOST_ZONES
 
     def whiten(self, theta: FloatArray) -> None:
@@ -204,12 +205,13 @@ class _Rounds:
         deviation = max(_LEAST_DEVIATION, self.problem.spread(error))
         self.problem = replace(self.problem, deviation=deviation, shrinkage=_shrinkage(self.problem, z, self.last))
         if self.tuner is not None and (still or self.disturbance is not None):
-            if self.disturbance is None:
-                self.disturbance = self.tuner(self.problem, self.model, theta)
+            if self.disturbance is None or (self.retune and not self.problem.capped):
+                tuned = self.tuner(self.problem, self.model, theta)
+                self.retune = self.disturbance is None or not tuned.near(self.disturbance, _SAME_DISTURBANCE)
+                self.disturbance = tuned
             self.excess = max(1.0, unexplained(self.problem, self.model, theta, self.disturbance))
             self.known = precision(self.problem, self.model, theta, self.disturbance)
-            most = replace(self.problem, effective=None).effective_size()
-            size = min(most, self.known.effective(deviation) / self.excess)
+            size = min(self.most, self.known.effective(deviation) / self.excess)
             self.problem = replace(self.problem, effective=size)
             still = still and abs(self.problem.effective_size() - before) < _SIZE_TOLERANCE * before
         self.settled = bool(still)
@@ -249,7 +251,7 @@ def _shrinkage(problem: Problem, z: FloatArray, solve: LeastSquaresResult | None
         n = len(members)
         centre = np.eye(n) - 1.0 / n
         still_open = np.trace(centre @ covariance[np.ix_(members, members)] @ centre)
-        found[base] = float(np.sqrt(np.clip((own @ own + still_open) / max(1, n - 1), 0.02**2, 1.0)))
+        found[base] = float(np.sqrt(np.clip((own @ own + still_open) / max(1, n - 1), 0.02**2, 9.0)))
     return found
 
 

@@ -36,6 +36,9 @@ _MEDIAN_SIZE = 0.6744897501960817
 #: First spread of a group's members about their common value on the estimation scale [-]: a third.
 SHRINKAGE = 0.3
 
+#: That of a lumped model's multipliers [-]: what drawings know of single zones and pairs is within a factor of seven.
+_LUMPED_SHRINKAGE = 1.0
+
 
 @dataclass(frozen=True)
 class Problem:
@@ -66,6 +69,9 @@ class Problem:
     shrinkage : mapping of str to float
         Spread of a group's members (one parameter of several facades or zones) about their common value on the
         estimation scale [-], by the group's base name; 0.3 where it says nothing.
+    capped : bool
+        Whether errors never count for more than one a day and zone, as they may not where what the model lacks is
+        common to them; a lumped model lacks little, and its errors count as their own correlation says.
     """
 
     grid: SymbolicModel
@@ -79,6 +85,7 @@ class Problem:
     effective: float | None = None
     loss: Loss = "linear"
     shrinkage: Mapping[str, float] = field(default_factory=dict)
+    capped: bool = True
 
     @property
     def parameters(self) -> list[Parameter]:
@@ -341,7 +348,11 @@ def tuning_problem(case: Case, tune: Sequence[Interval] = (), settings: ModelSet
         )
     steps = horizon_steps(chosen.horizon, inputs.step)
     runs = tuning_runs(inputs, merge(tune) or default_intervals(case)[0], steps, chosen.spin_up_seconds)
-    return Problem(SymbolicModel(network), inputs, runs, steps, free, given, chosen.stepping, loss=chosen.loss)
+    return Problem(
+        SymbolicModel(network), inputs, runs, steps, free, given, chosen.stepping, loss=chosen.loss,
+        shrinkage=dict.fromkeys(network.groups, _LUMPED_SHRINKAGE) if chosen.structure.lumped else {},
+        capped=not chosen.structure.lumped,
+    )  # fmt: skip
 
 
 def tuning_runs(inputs: Inputs, intervals: Sequence[Interval], steps: int, spin_up: float) -> tuple[Runs, ...]:

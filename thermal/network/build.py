@@ -1,7 +1,7 @@
 """Building of the network of a plan or a zone table."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -15,6 +15,7 @@ from thermal.errors import ModelError
 from thermal.network.floor import Floor, Zone
 from thermal.network.graph import GraphBuilder
 from thermal.network.grid import floor_grid
+from thermal.network.lumped import lump
 from thermal.network.network import ThermalNetwork
 from thermal.network.structure import BASELINE, Structure
 from thermal.network.table import add_table
@@ -154,6 +155,14 @@ def build_network(
     return blueprint(building, dx, reach, scopes, diffusers, mean_shuffle, structure).network(effects)
 
 
+def _lumped(building: Building, dx: float | None, structure: Structure) -> Blueprint:
+    """Lump a building into two nodes a zone."""
+    detailed = build_network(building, dx, structure=replace(structure, lumped=False, sun=False))
+    graph, air = lump(detailed, building.geometry_quality, structure)
+    ones = np.ones(air.size)
+    return Blueprint(graph, air, np.arange(air.size), ones, ones)
+
+
 def blueprint(
     building: Building,
     dx: float | None = None,
@@ -192,6 +201,8 @@ def blueprint(
     >>> len(baseline.network().signals), len(baseline.network(chosen({"solar_gain": ()})).signals) > 0
     (0, True)
     """
+    if structure.lumped:
+        return _lumped(building, dx, structure)
     boundaries = ("outdoor", *building.measured_boundaries)
     graph, plans = GraphBuilder(building.zone_names, boundaries, scopes or {}, structure), building.geometry
     graph.anatomy.air_heat_capacity = air_density(building.location.elevation) * AIR_HEAT_CAPACITY

@@ -95,6 +95,10 @@ class Structure:
         exactly; 1 to 100. None is one in a plan's cell, and as many in a zone table as resolve half an hour.
     radiant : bool
         A radiant node a zone, with convection and radiation apart; else one combined film between air and surface.
+    lumped : bool
+        Air and one mass a zone, with a multiplier for every conductance and capacity of the drawing.
+    sun : bool
+        Of a lumped model: an aperture for the sun a zone and direction, which takes measured irradiance.
 
     Raises
     ------
@@ -111,9 +115,11 @@ class Structure:
     slab_nodes: int = 2
     wall_nodes: int | None = None
     radiant: bool = True
+    lumped: bool = False
+    sun: bool = False
 
     def __post_init__(self) -> None:
-        for name in ("furniture", "radiant"):
+        for name in ("furniture", "radiant", "lumped", "sun"):
             if not isinstance(getattr(self, name), bool):
                 raise ModelError(f"structure.{name}: expected true or false, got {getattr(self, name)!r}")
         for name, least in (("slab_nodes", 0), ("wall_nodes", 1)):

@@ -1,0 +1,192 @@
+"""A building lumped into air and mass a zone: the drawing's conductances and capacities, each with a factor of its own.
+
+Where a drawing cannot be trusted, what is fitted is what a zone exchanges with each other zone and with each boundary,
+and how much heat it holds. The model stays that of the drawing in its sums: every conductance and capacity is the
+detailed network's at its start, times a multiplier whose prior is as wide as the quality of the geometry leaves it.
+(Bacher and Madsen 2011, doi:10.1016/j.enbuild.2011.02.005, for one zone.)
+"""
+
+from dataclasses import dataclass, replace
+
+import casadi as ca
+import numpy as np
+import scipy.sparse as sp
+import scipy.sparse.linalg as sla
+
+from thermal._types import FloatArray, IntArray
+from thermal.case.building import GeometryQuality
+from thermal.inputs.provider import InputProvider
+from thermal.inputs.signals import Signal
+from thermal.network.graph import GraphBuilder
+from thermal.network.network import ThermalNetwork
+from thermal.network.structure import Structure
+from thermal.network.topology import Pane, Room
+from thermal.parameters import PARAMETERS
+
+#: Factor that the drawing's sums are within, 95 times in a hundred [-]: what surveys, drawings and guesses are off by.
+_WITHIN: dict[GeometryQuality, float] = {"surveyed": 3.0, "approximate": 6.0, "generic": 30.0}
+
+#: Factor that a multiplier may go to either side [-]: the prior draws it, not its bounds.
+_RANGE = 30.0
+
+#: Least conductance of a pair of zones and of a zone and a boundary per floor area [W/m2/K], so that a multiplier can
+#: find what no drawing shows, such as an open door: a twentieth of a door's in a room of 15 m2.
+_LEAST = 0.1
+
+#: Directions that the sun is taken from [deg]: azimuth and tilt of the compass's points and of a roof.
+_PLANES = {"north": (0.0, 90.0), "east": (90.0, 90.0), "south": (180.0, 90.0), "west": (270.0, 90.0), "roof": (0.0, 0.0)}
+
+#: Solar transmittance of a pane that nothing tells [-]: double glazing (EN 410).
+_TRANSMITTANCE = 0.6
+
+
+@dataclass(frozen=True)
+class _Drawn:
+    """What the drawing makes of every zone.
+
+    Parameters
+    ----------
+    direct, slow : ndarray, shape (n_zone, n_boundary)
+        Conductances to the boundaries past the masses and through them [W/K].
+    pairs : ndarray, shape (n_zone, n_zone)
+        Conductances between the zones in a steady state [W/K].
+    inner : ndarray, shape (n_zone,)
+        Conductances from the air to what is not air [W/K].
+    air, mass : ndarray, shape (n_zone,)
+        Heat capacities of the air and of the rest, as far as it follows the zone's temperature [J/K].
+    """
+
+    direct: FloatArray
+    slow: FloatArray
+    pairs: FloatArray
+    inner: FloatArray
+    air: FloatArray
+    mass: FloatArray
+
+
+def lump(network: ThermalNetwork, quality: GeometryQuality, structure: Structure) -> tuple[GraphBuilder, IntArray]:
+    """Lump a building into two nodes a zone.
+
+    Parameters
+    ----------
+    network : ThermalNetwork
+        The building as drawn.
+    quality : {"surveyed", "approximate", "generic"}
+        How its geometry was come by, which sets how far a multiplier may go and which zones may be neighbours.
+    structure : Structure
+        Says whether the sun is a part of it: an aperture a zone and direction.
+
+    Returns
+    -------
+    tuple
+        What effects may be added to, and the air volume of each zone, shape (n_zone,).
+    """
+    drawn, old = _drawn(network), network.anatomy
+    graph = GraphBuilder(network.zones, network.boundaries, {}, structure)
+    graph.anatomy = replace(old.copy(), outer=[], ground_faces=[], rooms={})
+    count, deviation = len(network.zones), float(np.log(_WITHIN[quality])) / 2.0
+    area = np.array([old.rooms[z].floor_area for z in network.zones])
+    air, mass = graph.volumes("air", np.arange(count)), graph.volumes("mass", np.arange(count))
+
+    def multiplier(name: str, member: str) -> ca.SX:
+        own = PARAMETERS[name]
+        own = replace(own, lower=own.start / _RANGE, upper=own.start * _RANGE, deviation=deviation)
+        return graph.own(own.of("zone", member))
+
+    for i, zone in enumerate(network.zones):
+        graph.capacity(f"air {zone}", multiplier("air_capacity_multiplier", zone), air[i], drawn.air[i])
+        graph.capacity(f"mass {zone}", multiplier("mass_capacity_multiplier", zone), mass[i], drawn.mass[i])
+        value = multiplier("mass_coupling_multiplier", zone)
+        graph.face(f"air-mass {zone}", value, air[i], mass[i], drawn.inner[i])
+        least = _LEAST * area[i]
+        for j, name in enumerate(network.boundaries):
+            if quality != "generic" and drawn.direct[i, j] + drawn.slow[i, j] < least:
+                continue
+            for kind, node, table in (("air", air, drawn.direct), ("mass", mass, drawn.slow)):
+                value = multiplier(f"{kind}_boundary_multiplier", f"{zone} to {name}")
+                weight = max(least, table[i, j])
+                graph.face(f"{kind}-boundary {zone} to {name}", value, node[i], graph.boundary(name), weight)
+        for j in range(i):
+            least = _LEAST * min(area[i], area[j])
+            if quality == "generic" or drawn.pairs[i, j] >= least:
+                value = multiplier("zone_coupling_multiplier", f"{network.zones[j]} + {zone}")
+                graph.face(f"zones {j} {i}", value, air[i], air[j], max(least, drawn.pairs[i, j]))
+        room = old.rooms[zone]
+        graph.anatomy.rooms[zone] = Room(
+            zone, i, air[i : i + 1], np.ones(1), int(air[i]), -1, (), (), int(mass[i]), room.floor_area, room.volume
+        )
+        _add_gains(graph, graph.anatomy.rooms[zone], [p for p in old.panes if p.zone == zone], quality, structure.sun)
+    return graph, air
+
+
+def _add_gains(graph: GraphBuilder, room: Room, panes: list[Pane], quality: GeometryQuality, sun: bool) -> None:
+    """Add heat that is always there, and the sun from each direction."""
+    steady = graph.own(PARAMETERS["constant_gain"].of("zone", room.name))
+    always = Signal("constant", "1", _always)
+    graph.source(f"constant gain {room.name}", steady, int(room.air[0]), always, room.floor_area)
+    for name, (azimuth, tilt) in _PLANES.items() if sun else ():
+        looking = [p for p in panes if _nearest(p) == name]
+        glass = sum(p.area * (p.transmittance or _TRANSMITTANCE) for p in looking) / room.floor_area
+        own = PARAMETERS["solar_aperture"]
+        if quality != "generic":
+            own = replace(own, start=max(own.start / 4.0, min(0.6 * glass, own.upper / 2.0)))
+        value = graph.own(own.of("zone", f"{room.name} from {name}"))
+        signal = Signal.made(f"sun from {name}", "W/m^2", _on_plane, "sun", given={"azimuth": azimuth, "tilt": tilt})
+        graph.source(f"sun {room.name} from {name}", value, int(room.air[0]), signal, room.floor_area)
+
+
+def _nearest(pane: Pane) -> str:
+    """Direction that a pane looks to."""
+    if pane.tilt < 45.0:
+        return "roof"
+    return ("north", "east", "south", "west")[int((pane.azimuth + 45.0) % 360.0 // 90.0) % 4]
+
+
+def _on_plane(inputs: InputProvider, azimuth: float, tilt: float) -> FloatArray:
+    return np.asarray(sum(inputs.sun.plane(azimuth, tilt)))
+
+
+def _always(inputs: InputProvider) -> FloatArray:
+    return np.ones(len(inputs.stamps))
+
+
+def _drawn(network: ThermalNetwork) -> _Drawn:
+    """Sum the detailed network up, at the start of its parameters."""
+    n, count, theta = network.n_node, len(network.zones), network.start()
+    faces = [c for c in network.conductances if not c.source]
+    kappa, heat = (
+        np.array(ca.Function("values", [network.symbols], [ca.vertcat(*[c.value for c in parts])])(theta)).ravel()
+        for parts in (faces, network.capacities)
+    )
+    first, second = (np.concatenate([getattr(c, end) for c in faces]) for end in ("first", "second"))
+    weight = np.concatenate([k * c.weight for k, c in zip(kappa, faces, strict=True)])
+    total = n + len(network.boundaries)
+    joined = sp.coo_matrix((weight, (first, second)), shape=(total, total)).tocsr()
+    joined = joined + joined.T
+    capacity = np.zeros(n)
+    for value, c in zip(heat, network.capacities, strict=True):
+        np.add.at(capacity, c.node, value * c.weight)
+    # the air of a zone is one node
+    observed = sp.csr_matrix(network.observation != 0)
+    in_air = np.asarray(observed.sum(axis=0)).ravel() > 0
+    rest = np.flatnonzero(~in_air)
+    member = observed.astype(float)
+    laplacian = sp.diags(np.asarray(joined.sum(axis=1)).ravel()[:n]) - joined[:n, :n]
+    to_rest = (member @ joined[:n][:, rest]).toarray()
+    direct = (member @ joined[:n][:, n:]).toarray()
+    beside = (member @ joined[:n, :n] @ member.T).toarray()
+    inner = laplacian[rest][:, rest] + 1e-9 * sp.eye(rest.size)
+    outer = joined[:n][rest][:, n:].toarray()
+    follows = sla.splu(inner.tocsc()).solve(np.hstack([to_rest.T, outer]))
+    steady = to_rest @ follows
+    pairs = beside + steady[:, :count]
+    np.fill_diagonal(pairs, 0.0)
+    shares = follows[:, :count]
+    return _Drawn(
+        direct=direct,
+        slow=steady[:, count:],
+        pairs=pairs,
+        inner=to_rest.sum(axis=1),
+        air=member @ capacity,
+        mass=shares.T @ capacity[rest],
+    )
