@@ -23,6 +23,9 @@ from thermal.parameters import Parameter
 #: A bound counts as hit within this share of the range, on the estimation scale [-].
 BOUND_SHARE = 0.01
 
+#: Factor beyond which a lumped model is said to disagree with the drawing [-]: half as much again.
+_FAR = 1.5
+
 #: Tails of a 90 % interval [-].
 _TAILS = (0.05, 0.95)
 
@@ -63,6 +66,33 @@ class ParameterEstimate(Plain):
     source: str
     interval90: tuple[float, float] | None = None
     key: ClassVar[str] = "name"
+
+    @property
+    def base(self) -> str:
+        """Name that the members of one group share."""
+        return self.name.partition("@")[0]
+
+
+@dataclass(frozen=True)
+class Rung(Plain):
+    """A structure that a calibration chose from.
+
+    Parameters
+    ----------
+    name : {"drawn", "lumped"}
+        Which.
+    left_out_mae : float
+        Mean absolute error on tuning days that a fit has not seen [K]; NaN where there are too few days.
+    parameters : int
+        How many were estimated [-].
+    chosen : bool
+        Whether the result is that of this one.
+    """
+
+    name: str
+    left_out_mae: float
+    parameters: int
+    chosen: bool
 
 
 @dataclass(frozen=True)
@@ -139,6 +169,8 @@ class CalibrationResult(Result):
         Of the library.
     objective : {"multi_step", "innovations"}
         What was minimised.
+    rungs : tuple of Rung
+        Structures that days left out chose from; empty where there was no choice.
     """
 
     case: str
@@ -159,6 +191,7 @@ class CalibrationResult(Result):
     seed: int
     version: str = field(default="")
     objective: Objective = "multi_step"
+    rungs: tuple[Rung, ...] = ()
 
     def effects(self) -> list[dict[str, Any]]:
         """Effects in the model with their zones and parameters, an entry of ``calibration.json`` each."""
@@ -176,8 +209,22 @@ class CalibrationResult(Result):
         intervals = {"tuning": self.tuning, "held_out": self.held_out}
         about = ("objective", "horizon", "settings", "case", "version", "seed")
         content |= {k: getattr(self, k) for k in names} | {"intervals": intervals}
+        content |= {"rungs": self.rungs, "against_drawing": self.against_drawing()}
         found: dict[str, Any] = plain(content | {k: getattr(self, k) for k in about})
         return found
+
+    def against_drawing(self) -> list[dict[str, Any]]:
+        """Conductances and capacities that a lumped model finds to be far from the drawing's, the farthest first.
+
+        Those whose 90 % interval of the factor [-] lies beyond a factor of 1.5 to either side.
+        """
+        found = [
+            {"what": p.name, "factor": p.value / p.start, "interval90": [end / p.start for end in p.interval90]}
+            for p in self.parameters
+            if p.base.endswith("_multiplier") and self.settings.structure.lumped and p.interval90 is not None
+        ]
+        far = [f for f in found if f["interval90"][0] > _FAR or f["interval90"][1] < 1.0 / _FAR]
+        return sorted(far, key=lambda f: -abs(np.log(f["factor"])))
 
     def to_frame(self) -> pd.DataFrame:
         """Parameters with their ranges, standard errors and 90 % intervals [parameter units]."""
