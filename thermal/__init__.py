@@ -7,9 +7,9 @@ from thermal.case.save import save_case
 from thermal.case.telemetry import Telemetry
 from thermal.data import load_bundled_case
 from thermal.errors import CaseError, ModelError, PlanError, ThermalError
+from thermal.model.case_replay import Inputs, free_runs, replay_inputs, spin_up
 from thermal.model.matrices import SymbolicModel
 from thermal.model.reduce import reduced_model
-from thermal.model.replay import Inputs, free_runs, replay_inputs, spin_up
 from thermal.model.simulation import simulate
 from thermal.model.simulator import Simulator
 from thermal.network.build import build_network

@@ -16,9 +16,40 @@ class CaseError(ThermalError):
     """Something is wrong with a case folder, or with what a case is asked for."""
 
 
-# The model
 class ModelError(ThermalError):
     """Something is wrong with a thermal model, or with what it is asked for."""
+
+
+class EffectError(ModelError):
+    """An effect is unknown, or asked for where it cannot be."""
+
+
+class PlanError(ThermalError):
+    """Something is wrong with a drawing or a list of devices, or with what it is asked for."""
+
+
+class MissingExtraError(ThermalError, ImportError):
+    """A package that only an extra of the installation brings."""
+
+
+class OversizedFileError(PlanError):
+    """A file, or what it unpacks to, is larger than any real plan."""
+
+
+class LostRoomError(PlanError):
+    """A room that the cells of a plan are too coarse for."""
+
+
+class LabelError(ThermalError):
+    """Something is wrong with what the labelling page is asked for."""
+
+
+class SessionHeldError(LabelError):
+    """The case is being labelled elsewhere, or somebody else has taken over."""
+
+
+class ReportError(LabelError):
+    """A report that is not there, or could not be made."""
 
 
 def describe(where: str, expected: str, found: str, advice: str = "") -> str:
@@ -86,37 +117,3 @@ def check_known(word: str, options: Iterable[str], where: str, expected: str, ki
     known = list(options)
     if word not in known:
         raise kind(where, expected, repr(word), nearest(word, known))
-
-
-class EffectError(ModelError):
-    """An effect is unknown, or asked for where it cannot be."""
-
-
-# Plans and devices from other files
-class PlanError(ThermalError):
-    """Something is wrong with a drawing or a list of devices, or with what it is asked for."""
-
-
-class MissingExtraError(ThermalError, ImportError):
-    """A package that only an extra of the installation brings."""
-
-
-class OversizedFileError(PlanError):
-    """A file, or what it unpacks to, is larger than any real plan."""
-
-
-class LostRoomError(PlanError):
-    """A room that the cells of a plan are too coarse for."""
-
-
-# The labelling page
-class LabelError(ThermalError):
-    """Something is wrong with what the labelling page is asked for."""
-
-
-class SessionHeldError(LabelError):
-    """The case is being labelled elsewhere, or somebody else has taken over."""
-
-
-class ReportError(LabelError):
-    """A report that is not there, or could not be made."""

@@ -16,9 +16,9 @@ from calibration.estimation.state_space import StateSpace, state_space
 from calibration.evaluation.intervals import Interval
 from calibration.evaluation.n_step import Evaluation, EvaluationSettings, Progress, Wanted, evaluate_runs
 from thermal._types import BoolArray, FloatArray
+from thermal.model.case_replay import LEAST_SPIN_UP, SPIN_UP, Inputs, spin_up
 from thermal.model.matrices import Matrices, SymbolicModel
 from thermal.model.modal import ModalModel
-from thermal.model.replay import LEAST_SPIN_UP, SPIN_UP, Inputs, spin_up
 from thermal.model.step import IMPLICIT_EULER, Scheme
 
 #: How far the mean temperatures of the weeks before the telemetry may be from those of its first day [K], standard

@@ -16,8 +16,8 @@ from calibration.evaluation.intervals import Interval
 from calibration.evaluation.n_step import Progress
 from calibration.results import Plain
 from thermal._types import FloatArray
+from thermal.model.case_replay import Inputs
 from thermal.model.matrices import SymbolicModel
-from thermal.model.replay import Inputs
 from thermal.network.network import ThermalNetwork
 
 

@@ -14,7 +14,7 @@ from calibration.estimation.disturbance import DisturbanceModel, DisturbedSpace
 from calibration.estimation.gains import TOLERANCE, Covariance, Gain, exact_gains, steady_gains
 from calibration.estimation.state_space import REFERENCE, StateSpace
 from thermal._types import BoolArray, FloatArray
-from thermal.model.replay import Inputs
+from thermal.model.case_replay import Inputs
 
 
 @dataclass(frozen=True)
@@ -110,7 +110,7 @@ class KalmanFilter:
     >>> from calibration.estimation.state_space import state_space
     >>> from thermal.data import load_bundled_case
     >>> from thermal.model.reduce import reduced_model
-    >>> from thermal.model.replay import replay_inputs, spin_up
+    >>> from thermal.model.case_replay import replay_inputs, spin_up
     >>> from thermal.model.matrices import SymbolicModel
     >>> from thermal.network.build import build_network
     >>> case = load_bundled_case()

@@ -79,7 +79,7 @@ def smooth(filtered: Filtered) -> Smoothed:
     >>> from calibration.evaluation.intervals import Interval
     >>> from thermal.data import load_bundled_case
     >>> from thermal.model.reduce import reduced_model
-    >>> from thermal.model.replay import replay_inputs
+    >>> from thermal.model.case_replay import replay_inputs
     >>> from thermal.model.matrices import SymbolicModel
     >>> from thermal.network.build import build_network
     >>> grid = SymbolicModel(build_network(load_bundled_case().building, dx=1.0))
@@ -198,7 +198,7 @@ def averaged_deviation(filtered: Filtered, steps: int) -> FloatArray:
     >>> from calibration.evaluation.intervals import Interval
     >>> from thermal.data import load_bundled_case
     >>> from thermal.model.reduce import reduced_model
-    >>> from thermal.model.replay import replay_inputs
+    >>> from thermal.model.case_replay import replay_inputs
     >>> from thermal.model.matrices import SymbolicModel
     >>> from thermal.network.build import build_network
     >>> grid = SymbolicModel(build_network(load_bundled_case().building, dx=1.0))

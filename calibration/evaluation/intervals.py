@@ -13,7 +13,7 @@ from calibration.results import Plain
 from thermal._types import IntArray
 from thermal.case.case import Case, local_timestamp
 from thermal.errors import CaseError
-from thermal.model.replay import LEAST_SPIN_UP, SPIN_UP, Inputs
+from thermal.model.case_replay import LEAST_SPIN_UP, SPIN_UP, Inputs
 
 #: Days that tune before one that is held out, where they alternate, and fewest such turns.
 _TUNING_DAYS, _TURNS = 2, 3

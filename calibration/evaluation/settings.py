@@ -14,7 +14,7 @@ from thermal.case.building import Building
 from thermal.effects.catalogue import CATALOGUE, chosen
 from thermal.errors import ModelError, nearest
 from thermal.inputs.normalisation import Normalisation
-from thermal.model.replay import LEAST_SPIN_UP, SPIN_UP
+from thermal.model.case_replay import LEAST_SPIN_UP, SPIN_UP
 from thermal.model.step import SCHEMES, Scheme
 from thermal.network.build import build_network
 from thermal.network.network import ThermalNetwork

@@ -21,7 +21,7 @@ from calibration.fit.result import ParameterEstimate
 from calibration.results import Axes, Plain, Result
 from thermal.case.case import Case
 from thermal.errors import ThermalError
-from thermal.model.replay import LEAST_SPIN_UP
+from thermal.model.case_replay import LEAST_SPIN_UP
 from thermal.parameters import PARAMETERS
 
 T = TypeVar("T")

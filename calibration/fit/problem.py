@@ -15,8 +15,8 @@ from calibration.evaluation.intervals import Interval, Runs, default_intervals, 
 from calibration.evaluation.settings import Loss, ModelSettings, calibration_settings
 from thermal._types import FloatArray
 from thermal.case.case import Case
+from thermal.model.case_replay import LEAST_SPIN_UP, Inputs, free_runs, replay_inputs, spin_up
 from thermal.model.matrices import SymbolicModel
-from thermal.model.replay import LEAST_SPIN_UP, Inputs, free_runs, replay_inputs, spin_up
 from thermal.model.step import IMPLICIT_EULER, Scheme
 from thermal.parameters import Parameter
 

@@ -19,7 +19,7 @@ from thermal.inputs.signals import Signal, zone_signal
 from thermal.network.build import Extension
 from thermal.network.graph import GraphBuilder
 from thermal.network.network import ThermalNetwork
-from thermal.system.replay import replay_reheat
+from thermal.system.component_replay import replay_reheat
 from thermal.system.system import HvacSystem
 from thermal.units import AIR_HEAT_CAPACITY
 

@@ -17,8 +17,8 @@ from mpc.loop.plant import Controller, Measurements
 from mpc.loop.run import ClosedLoopRun, run_closed_loop
 from mpc.loop.simulated import SimulatedPlant
 from mpc.scenario.forecast import Forecast
-from mpc.studies.controller import MODEL_STEP
-from mpc.studies.controllers import RegisteredController, find_controller
+from mpc.studies.optimal_control import MODEL_STEP
+from mpc.studies.registry import RegisteredController, find_controller
 from mpc.studies.study import Study
 from thermal._types import FloatArray
 

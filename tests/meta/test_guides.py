@@ -45,7 +45,7 @@ def kept(registry: dict[str, Any]) -> Iterator[None]:
 
 
 def test_a_controller_of_ones_own(tmp_path: Path) -> None:
-    from mpc.studies.controllers import REGISTERED
+    from mpc.studies.registry import REGISTERED
 
     with kept(REGISTERED):
         out = follow("own_controller.md", tmp_path)

@@ -14,7 +14,15 @@ def test_importing_mpc_alone_loads_nothing_heavy() -> None:
 
 def test_a_name_is_the_one_of_its_module() -> None:
     import mpc
-    from mpc.studies.controller import make_controller
+    from mpc.studies.optimal_control import make_controller
 
     assert mpc.make_controller is make_controller
     assert {"MpcController", "make_controller", "run_closed_loop", "compare_controllers"} <= set(mpc.__all__)
+
+
+def test_every_name_is_looked_up_where_it_is_defined() -> None:
+    import mpc
+
+    assert sorted(mpc.__all__) == sorted(mpc._MODULES)
+    for name, module in mpc._MODULES.items():
+        assert getattr(mpc, name).__module__ == f"mpc.{module}", name

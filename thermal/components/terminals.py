@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from thermal._types import FloatArray
 from thermal.components.checks import all_in_range, in_range
 from thermal.components.component import Given, Group, IndexArray, Port, Range, Run
-from thermal.components.kept import LastValue
+from thermal.components.last_value import LastValue
 from thermal.components.moist_air import LEAST_AIR, WATER_HEAT_CAPACITY
 from thermal.components.operations import NumpyOperations, Operations, Value
 from thermal.components.streams import AirDrawn, Duct, HotWater, SupplyAir, SupplyWater, WaterDrawn

@@ -11,8 +11,8 @@ from thermal._types import FloatArray
 from thermal.case.building import Building
 from thermal.case.case import Case
 from thermal.errors import ModelError
+from thermal.model.case_replay import LEAST_SPIN_UP, SPIN_UP, replay_inputs, spin_up
 from thermal.model.matrices import Matrices, SymbolicModel
-from thermal.model.replay import LEAST_SPIN_UP, SPIN_UP, replay_inputs, spin_up
 from thermal.model.step import SCHEMES, Stepper
 from thermal.network.build import Extension, build_network
 from thermal.network.structure import SHUFFLE_STEP

@@ -23,7 +23,7 @@ from calibration.evaluation.intervals import (
 )
 from calibration.fit.problem import tuning_runs
 from thermal import Case, Inputs, Telemetry, build_network, load_bundled_case, replay_inputs
-from thermal.model.replay import SPIN_UP
+from thermal.model.case_replay import SPIN_UP
 
 
 def inputs_of(days: float = 6.0, step: float = 300.0, start: str = "2023-03-01T00:05:00-05:00", **given: Any) -> Inputs:

@@ -24,8 +24,8 @@ from mpc.reports.control import (
     write_control,
 )
 from mpc.scenario.weather_files import weather_of_case
-from mpc.studies.controller import make_controller
-from mpc.studies.controllers import KnownState, find_controller
+from mpc.studies.optimal_control import make_controller
+from mpc.studies.registry import KnownState, find_controller
 from mpc.studies.run import Comparison, compare_controllers, prediction_errors, run_controller
 from mpc.studies.study import Study, StudySettings, make_study
 from thermal import Building, load_bundled_case

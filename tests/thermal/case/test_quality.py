@@ -10,10 +10,10 @@ import pandas as pd
 import pytest
 
 from thermal.case.case import Case
-from thermal.case.judgement import flat_lines, impossible_values, runs, spikes
 from thermal.case.load import load_case
 from thermal.case.points import POINT_TYPES
 from thermal.case.quality import assess, usable
+from thermal.case.signal_faults import flat_lines, impossible_values, runs, spikes
 from thermal.case.telemetry import Telemetry
 
 DAY = 288  # samples at 5 minutes

@@ -20,7 +20,7 @@ from thermal.network.network import ThermalNetwork
 
 FloatArray = NDArray[np.float64]
 
-REFERENCE = Path(__file__).parents[2].parent / "shared" / "data" / "sbsim_uniform.npz"
+REFERENCE = Path(__file__).parents[3].parent / "shared" / "data" / "sbsim_uniform.npz"
 STEP = 300.0
 SIDE = 0.5
 

@@ -22,7 +22,7 @@ from thermal.parameters import PARAMETERS, Parameter
 CaseOf = Callable[[str], Case]
 UNITS = pint.UnitRegistry()
 DIFFUSE, GLOBAL = "diffuse_horizontal_irradiance_sensor", "global_horizontal_irradiance_sensor"
-DOCS = Path(__file__).parents[2] / "docs"
+DOCS = Path(__file__).parents[3] / "docs"
 
 # Fixed for all who read or write a diagnosis.
 IDS = (

@@ -1,6 +1,6 @@
 import pickle
 
-from thermal.components.kept import LastValue
+from thermal.components.last_value import LastValue
 from thermal.components.operations import FloatOperations
 from thermal.components.water_coil import WaterCoil
 

@@ -14,16 +14,16 @@ import pandas as pd
 from calibration.estimation.heat_balance import heat_balance
 from calibration.evaluation.intervals import Interval
 from mpc.errors import MpcError
+from mpc.loop.hvac_replay import Gap, Measured, Replayed, replay_plant
 from mpc.loop.noise import SensorNoise
-from mpc.loop.replay_plant import Gap, Measured, Replayed, replay_plant
 from mpc.loop.sensors import plant_devices
 from thermal._types import FloatArray
 from thermal.case.case import Case
 from thermal.case.points import POINT_TYPES, split_column
 from thermal.case.telemetry import Telemetry
 from thermal.errors import describe
+from thermal.model.case_replay import LEAST_SPIN_UP, SPIN_UP, replay_inputs
 from thermal.model.matrices import SymbolicModel
-from thermal.model.replay import LEAST_SPIN_UP, SPIN_UP, replay_inputs
 from thermal.system.system import HvacSystem
 
 _HOUR = 3600.0

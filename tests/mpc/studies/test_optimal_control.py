@@ -12,9 +12,9 @@ from mpc.control.controller.site import Source
 from mpc.errors import ControlError
 from mpc.kpi.kpis import measure_kpis
 from mpc.loop.run import FixedSetpoints, run_closed_loop
-from mpc.studies.controller import default_horizon, held_space, make_controller
-from mpc.studies.controllers import find_controller, register_controller
-from mpc.studies.model import control_model
+from mpc.model import control_model
+from mpc.studies.optimal_control import default_horizon, held_space, make_controller
+from mpc.studies.registry import find_controller, register_controller
 from thermal.effects.catalogue import chosen
 from thermal.model.modal import modal_model
 

@@ -15,7 +15,7 @@ from mpc.loop.actuators import Actuator
 from mpc.loop.plant import Controller
 from mpc.loop.reduced import ReducedBuilding
 from mpc.loop.simulated import SimulatedPlant
-from mpc.studies.controller import (
+from mpc.studies.optimal_control import (
     LASTING,
     SENSOR_NOISE,
     UNMEASURED,

@@ -20,7 +20,7 @@ from thermal.errors import CaseError
 from thermal.pilot.building import pilot_building
 from thermal.units import QUANTITIES
 
-PAGE = Path(__file__).parents[2] / "docs" / "case-format.md"
+PAGE = Path(__file__).parents[3] / "docs" / "case-format.md"
 
 
 @pytest.mark.parametrize("number", [1, 2])

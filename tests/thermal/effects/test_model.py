@@ -24,7 +24,7 @@ from thermal.effects.catalogue import CATALOGUE, chosen
 from thermal.errors import ModelError
 from thermal.inputs.provider import telemetry_inputs
 from thermal.inputs.signals import signal_values
-from thermal.model.replay import Inputs
+from thermal.model.case_replay import Inputs
 from thermal.model.rollouts import RolloutData, rollout
 from thermal.model.step import IMPLICIT_EULER, TR_BDF2, Scheme
 from thermal.units import REFERENCE_TEMPERATURE

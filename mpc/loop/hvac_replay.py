@@ -15,7 +15,7 @@ from thermal.components.moist_air import WATER_HEAT_CAPACITY
 from thermal.components.streams import AirCommand
 from thermal.components.water_coil import WaterCoil
 from thermal.errors import describe, nearest
-from thermal.system.replay import TerminalReplay, replay_air_handler, replay_loop, replay_terminals
+from thermal.system.component_replay import TerminalReplay, replay_air_handler, replay_loop, replay_terminals
 from thermal.system.system import HvacSystem
 from thermal.units import AIR_HEAT_CAPACITY
 

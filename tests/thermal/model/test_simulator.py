@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from thermal import Building, FloorPlan, FloorPlans, Simulator, SymbolicModel, ZoneTable, load_bundled_case
 from thermal.case.building import Airflow, Layer, Location, Surface, ZoneEntry
 from thermal.errors import ModelError, ThermalError
-from thermal.model.replay import free_runs, replay_inputs, spin_up
+from thermal.model.case_replay import free_runs, replay_inputs, spin_up
 from thermal.model.simulator import Shuffle
 from thermal.model.step import TR_BDF2
 from thermal.units import AIR_HEAT_CAPACITY

@@ -9,8 +9,8 @@ from thermal import Building, Simulator, load_bundled_case
 from thermal.components.component import Conditions
 from thermal.errors import ModelError
 from thermal.pilot.building import pilot_building
-from thermal.pilot.sizing import DesignConditions, size_system
 from thermal.system.plant import HvacPlant
+from thermal.system.sizing import DesignConditions, size_system
 from thermal.units import AIR_HEAT_CAPACITY
 
 

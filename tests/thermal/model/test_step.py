@@ -31,7 +31,7 @@ from thermal.model.step import IMPLICIT_EULER, SCHEMES, TR_BDF2, Scheme, Stepper
 FloatArray = NDArray[np.float64]
 
 SITE = Location(latitude=48.0, longitude=12.0, elevation=690.0, timezone="Etc/GMT-1")
-SHARED_CASES = Path(__file__).parents[2].parent / "shared" / "cases"
+SHARED_CASES = Path(__file__).parents[3].parent / "shared" / "cases"
 GAMMA = 2.0 - np.sqrt(2.0)
 
 

@@ -12,8 +12,8 @@ import pytest
 from mpc.errors import MpcError
 from mpc.loop.noise import SensorNoise
 from mpc.loop.reduced import ReducedBuilding, reduced_building
-from mpc.loop.replay import SubsystemReplay, replay_subsystems
 from mpc.loop.simulated import SimulatedPlant
+from mpc.loop.subsystem_replay import SubsystemReplay, replay_subsystems
 from mpc.scenario.gains import InternalGains
 from mpc.scenario.scenario import Scenario
 from thermal import Building, Case, SymbolicModel, Telemetry, build_network, reduced_model
