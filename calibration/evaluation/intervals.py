@@ -170,7 +170,10 @@ def horizon_steps(horizon: str, step: float) -> int:
         raise HorizonError(f"horizon: expected a duration such as 6h or 90min, got {horizon!r}") from error
     steps = seconds / step
     if not (np.isfinite(steps) and steps >= 1 and abs(steps - round(steps)) < 1e-9):
-        raise HorizonError(f"horizon {horizon!r}: expected a positive multiple of the telemetry's step of {step:g} s")
+        raise HorizonError(
+            f"horizon {horizon!r}: expected a positive multiple of the telemetry's step of {step:g} s, "
+            f"got {seconds:g} s, {steps:.4g} steps"
+        )
     return round(steps)
 
 

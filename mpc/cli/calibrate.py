@@ -164,13 +164,15 @@ def _calibrate_many(
     """Calibrate each case into a folder of its name; one that fails is reported beside the others."""
     from calibration.fleet.cluster import ClusterExecutor
     from calibration.fleet.run import calibrate_many
+    from mpc import plugins
     from mpc.reports.calibration import calibration_files
 
+    files = plugins.WithPlugins(calibration_files, plugins.loaded)
     cluster = nullcontext() if scheduler is None else ClusterExecutor(scheduler, folders=[cases[0].parent])
     try:
         with Waiting("calibrate cases") as waiting, cluster as executor:
             outcomes = calibrate_many(
-                cases, out, settings, files=calibration_files, workers=executor or workers, force=force,
+                cases, out, settings, files=files, workers=executor or workers, force=force,
                 progress=lambda _, done, total: waiting(f"{done} of {total}", done, total),
             )  # fmt: skip
     except KeyboardInterrupt:

@@ -67,6 +67,11 @@ def test_horizons_that_are_no_positive_multiple_of_the_step_are_refused(horizon:
         horizon_steps(horizon, 300.0)
 
 
+def test_a_horizon_that_does_not_fit_is_told_in_steps() -> None:
+    with pytest.raises(HorizonError, match=r"step of 300 s, got 420 s, 1\.4 steps"):
+        horizon_steps("7min", 300.0)
+
+
 # Runs
 
 
