@@ -9,10 +9,8 @@ import numpy as np
 
 from thermal._types import FloatArray
 from thermal.case.building import Building
-from thermal.case.case import Case
 from thermal.errors import ModelError
-from thermal.model.case_replay import LEAST_SPIN_UP, SPIN_UP, replay_inputs, spin_up
-from thermal.model.matrices import Matrices, SymbolicModel
+from thermal.model.matrices import SymbolicModel
 from thermal.model.step import SCHEMES, Stepper
 from thermal.network.build import Extension, build_network
 from thermal.network.structure import SHUFFLE_STEP
@@ -149,16 +147,6 @@ class Simulator:
         return self.network.zones
 
     @property
-    def boundary_names(self) -> tuple[str, ...]:
-        """Boundaries, ``outdoor`` first."""
-        return self.network.boundaries
-
-    @property
-    def signal_names(self) -> tuple[str, ...]:
-        """Signals that drive the effects, the order of the signals' axis; none in the baseline."""
-        return tuple(s.name for s in self.network.signals)
-
-    @property
     def states(self) -> FloatArray:
         """Temperatures of all control volumes, shape (n_node,) [K]; a copy."""
         return self._current()[:, 0].copy()
@@ -199,53 +187,13 @@ class Simulator:
         if boundary_temperatures is None:
             boundary_temperatures = np.full(len(self.network.boundaries), zone.mean())
         outside, zero = self._outside(boundary_temperatures, signals), self._reference
-        matrices = self._start_matrices()
+        matrices = self._start_model.matrices(self._start_theta)
         start = (zone.mean() - zero) * matrices.uniform[:, None]
         states, _, _ = Stepper(matrices, _STEADY_STEP).hold(start, outside, zone[:, None] - zero)
-        self._states, self._stepped, self._elapsed = self._without_stars(states) + zero, None, 0.0
+        if self._shuffle is not None:  # the star nodes stand for the mean of the shuffle, which this simulator has not
+            states = states[self._start_model.network.kind != "mixing"]
+        self._states, self._stepped, self._elapsed = states + zero, None, 0.0
         return self.zone_temperatures
-
-    def reset_from(self, case: Case, stamp: int, spin_up_seconds: float = SPIN_UP) -> FloatArray:
-        """Start from telemetry: zones matched at a stamp, everything else from a spin-up over what precedes it.
-
-        Parameters
-        ----------
-        case : Case
-            Telemetry of this building at the simulator's step.
-        stamp : int
-            Row of the telemetry.
-        spin_up_seconds : float
-            Length of the spin-up [s].
-
-        Returns
-        -------
-        ndarray, shape (n_zone,)
-            Zone means [K].
-
-        Raises
-        ------
-        ModelError
-            When the telemetry has another step, or no such row.
-        """
-        inputs = replay_inputs(case, self._start_model.network)
-        if inputs.step != self.step_seconds:
-            raise ModelError(f"telemetry: expected a step of {self.step_seconds:g} s, got {inputs.step:g} s")
-        if not 0 < stamp < len(inputs):
-            raise ModelError(f"stamp: expected a row from 1 to {len(inputs) - 1}, got {stamp}")
-        if not LEAST_SPIN_UP <= spin_up_seconds < np.inf or stamp * inputs.step < LEAST_SPIN_UP:
-            found = f"{spin_up_seconds} s before row {stamp}"
-            raise ModelError("spin-up", "at least 12 h before the stamp", found)
-        begin = max(0, stamp - round(spin_up_seconds / inputs.step))
-        states, _ = spin_up(self._start_matrices(), inputs, begin, np.array([stamp]))
-        self._states, self._stepped, self._elapsed = self._without_stars(states), None, 0.0
-        return self.zone_temperatures
-
-    def _start_matrices(self) -> Matrices:
-        return self._start_model.matrices(self._start_theta)
-
-    def _without_stars(self, states: FloatArray) -> FloatArray:
-        """Drop the star nodes that stand for the mean of the shuffle where this simulator has none."""
-        return states if self._shuffle is None else states[self._start_model.network.kind != "mixing"]
 
     def _outside(self, boundary_temperatures: FloatArray, signals: FloatArray | None) -> FloatArray:
         """Boundary temperatures, counted from the reference, then signals, shape (n_boundary, 1)."""

@@ -148,13 +148,14 @@ def test_the_simulator_has_the_effects(lively_case: CaseOf, kind: str) -> None:
     values = dict(zip([p.name for p in network.parameters], theta, strict=True))
     plant = Simulator(case.building, values, step_seconds=case.step, effects=chosen(EFFECTS))
     inputs, signals = replay_inputs(case, network), signal_values(network.signals, telemetry_inputs(case))
-    plant.reset_from(case, 100)
+    plant.reset(inputs.zone[100], inputs.boundary[100, : len(network.boundaries)], signals[100])
+    states = plant.states[:, None]
     zones = [
         plant.step(inputs.heat[k], inputs.boundary[k, : len(network.boundaries)], inputs.airflow[k], signals[k])
         for k in range(101, 101 + STEPS)
     ]
-    means, _ = trajectories(SymbolicModel(network), inputs, theta)
-    assert plant.signal_names == tuple(s.name for s in network.signals)
+    means, _ = free_runs(SymbolicModel(network).matrices(theta), inputs, np.array([100]), STEPS, states)
+    assert [s.name for s in plant.network.signals] == [s.name for s in network.signals]
     assert np.abs(np.array(zones) - means[0]).max() < 1e-9
     with pytest.raises(ModelError, match=rf"signals: expected shape \({len(network.signals)},\), got \(0,\)"):
         plant.step(inputs.heat[101], inputs.boundary[101, : len(network.boundaries)], inputs.airflow[101])
@@ -166,7 +167,9 @@ def test_the_simulator_rests_where_effects_and_heat_balance(lively_case: CaseOf)
     plant = Simulator(
         case.building, {"ground_u_value": 1.0, "ground_temperature": 283.15}, effects=chosen(["ground_exchange"])
     )
-    signals = np.array([0.0 if name == "constant temperature" else 1.0 for name in plant.signal_names])
+    signals = np.array(
+        [0.0 if name == "constant temperature" else 1.0 for name in (s.name for s in plant.network.signals)]
+    )
     cold = np.full(2, 283.15)
     assert plant.reset(cold, cold, signals) == pytest.approx(cold, abs=1e-9)
     assert plant.step(np.zeros(2), cold, np.zeros(1), signals) == pytest.approx(cold, abs=1e-9)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from thermal import Building, FloorPlan, FloorPlans, Simulator, SymbolicModel, ZoneTable, load_bundled_case
 from thermal.case.building import Airflow, Layer, Location, Surface, ZoneEntry
 from thermal.errors import ModelError, ThermalError
-from thermal.model.case_replay import free_runs, replay_inputs, spin_up
+from thermal.model.case_replay import free_runs, replay_inputs
 from thermal.model.simulator import Shuffle
 from thermal.model.step import TR_BDF2
 from thermal.units import AIR_HEAT_CAPACITY
@@ -43,7 +43,7 @@ def table_building() -> Building:
 def drive(plant: Simulator, steps: int, seed: int = 3) -> FloatArray:
     """Step with heat and weather that move; zone means over the steps."""
     rng = np.random.default_rng(seed)
-    n_zone, n_boundary = len(plant.zone_names), len(plant.boundary_names)
+    n_zone, n_boundary = len(plant.zone_names), len(plant.network.boundaries)
     return np.array(
         [plant.step(2000.0 * rng.random(n_zone), 275.0 + 5.0 * rng.random(n_boundary)) for _ in range(steps)]
     )
@@ -56,7 +56,7 @@ def drive(plant: Simulator, steps: int, seed: int = 3) -> FloatArray:
 def test_reset_holds_the_zones_and_returns_them(building: Callable[[], Building]) -> None:
     plant = Simulator(building())
     wanted = np.array([294.0, 291.5])
-    boundary = np.full(len(plant.boundary_names), 275.0)
+    boundary = np.full(len(plant.network.boundaries), 275.0)
     np.testing.assert_allclose(plant.reset(wanted, boundary), wanted, atol=1e-8)
     np.testing.assert_allclose(plant.zone_temperatures, wanted, atol=1e-8)
     assert plant.states.shape == (plant.network.n_node,)
@@ -261,39 +261,19 @@ def test_zone_table_has_nothing_to_shuffle() -> None:
 # Telemetry
 
 
-def test_reset_from_telemetry_matches_the_measured_zones() -> None:
-    case = load_bundled_case()
-    measured = case.zone_temperatures().to_numpy()
-    for shuffle in ("mean", "random"):
-        plant = Simulator(case.building, dx=1.5, shuffle=shuffle)  # type: ignore[arg-type]
-        found = plant.reset_from(case, 600, spin_up_seconds=86400.0)
-        np.testing.assert_allclose(found, measured[600], atol=1e-8)
-        np.testing.assert_allclose(plant.zone_temperatures, measured[600], atol=1e-8)
-
-
 @pytest.mark.parametrize("scheme", ["implicit_euler", "tr_bdf2"])
-def test_steps_after_reset_from_are_the_free_run(scheme: str) -> None:
+def test_steps_are_the_free_run_of_the_telemetry(scheme: str) -> None:
     case, start = load_bundled_case(), 500
     plant = Simulator(case.building, {"slab_coupling": 20.0}, dx=1.5, scheme=scheme)
-    plant.reset_from(case, start, spin_up_seconds=86400.0)
     model = SymbolicModel(plant.network)
     inputs = replay_inputs(case, plant.network)
     matrices = model.matrices(plant.network.values({"slab_coupling": 20.0}))
-    states, _ = spin_up(matrices, inputs, start - 288, np.array([start]))
+    np.testing.assert_allclose(plant.reset(inputs.zone[start], inputs.boundary[start]), inputs.zone[start], atol=1e-8)
+    states = plant.states[:, None]
     options = {"scheme": TR_BDF2} if scheme == "tr_bdf2" else {}
     wanted = free_runs(matrices, inputs, np.array([start]), 36, states, **options)[0][0]
     found = [plant.step(inputs.heat[start + k], inputs.boundary[start + k]) for k in range(1, 37)]
     np.testing.assert_allclose(np.array(found), wanted, rtol=0, atol=1e-9)
-
-
-def test_reset_from_refuses_another_step_and_rows_that_are_not_there() -> None:
-    case = load_bundled_case()
-    with pytest.raises(ModelError, match=r"600 s, got 300 s"):
-        Simulator(case.building, dx=1.5, step_seconds=600.0).reset_from(case, 300)
-    plant = Simulator(case.building, dx=1.5)
-    for stamp in (0, -5, len(case.stamps)):
-        with pytest.raises(ModelError, match=f"got {stamp}"):
-            plant.reset_from(case, stamp)
 
 
 # Fields
