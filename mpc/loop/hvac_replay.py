@@ -14,7 +14,7 @@ from thermal.components.component import Conditions
 from thermal.components.moist_air import WATER_HEAT_CAPACITY
 from thermal.components.streams import AirCommand
 from thermal.components.water_coil import WaterCoil
-from thermal.errors import describe, nearest
+from thermal.errors import nearest
 from thermal.system.component_replay import TerminalReplay, replay_air_handler, replay_loop, replay_terminals
 from thermal.system.system import HvacSystem
 from thermal.units import AIR_HEAT_CAPACITY
@@ -125,7 +125,7 @@ class Measured:
         for column in columns:
             if column not in self._frame or self._frame[column].isna().all():
                 advice = nearest(column, [c for c in self._frame.columns if str(c).endswith(point)])
-                raise MpcError(describe("replay: telemetry", f"a usable column {column!r}", "none", advice))
+                raise MpcError("replay: telemetry", f"a usable column {column!r}", "none", advice)
         return self._frame[columns].ffill().bfill().to_numpy(dtype=float)
 
 

@@ -21,7 +21,6 @@ from thermal._types import FloatArray
 from thermal.case.case import Case
 from thermal.case.points import POINT_TYPES, split_column
 from thermal.case.telemetry import Telemetry
-from thermal.errors import describe
 from thermal.model.case_replay import LEAST_SPIN_UP, SPIN_UP, replay_inputs
 from thermal.model.matrices import SymbolicModel
 from thermal.system.system import HvacSystem
@@ -161,9 +160,9 @@ def replay_subsystems(
         When a point is missing, or the telemetry is shorter than a day.
     """
     if not 0.0 <= tolerance <= 1.0:
-        raise MpcError(describe("replay: tolerance", "a share from 0 to 1", repr(tolerance)))
+        raise MpcError("replay: tolerance", "a share from 0 to 1", repr(tolerance))
     if len(case.stamps) * case.step < 2.0 * LEAST_SPIN_UP:
-        raise MpcError(describe("replay", "a day of telemetry or more", f"{len(case.stamps)} steps"))
+        raise MpcError("replay", "a day of telemetry or more", f"{len(case.stamps)} steps")
     devices = plant_devices(case.building, system)
 
     def parts(of: Case) -> list[Replayed]:

@@ -25,7 +25,6 @@ from mpc.loop.sensors import PlantDevices
 from mpc.loop.simulated import SimulatedPlant
 from mpc.scenario.scenario import zone_areas
 from thermal.case.building import Building
-from thermal.errors import describe
 from thermal.model.modal import ModalModel, modal_model
 from thermal.model.reduce import ReducedModel
 from thermal.model.step import IMPLICIT_EULER
@@ -172,7 +171,7 @@ def make_controller(
         site = site or Site(ours.scenario.building, ours.system, ours.devices)
     if site is None:
         found = "none; they are known of a SimulatedPlant only"
-        raise ControlError(describe("controller", "`system` and `points` of this plant in a `site`", found))
+        raise ControlError("controller", "`system` and `points` of this plant in a `site`", found)
     ahead, points = horizon or default_horizon(plant.control_step), site.points
     if ours is not None:
         _check_forecasts(ours, ahead)
