@@ -4,12 +4,53 @@ import difflib
 from collections.abc import Iterable
 
 
-class ThermalError(Exception):
-    """Base of every error that `thermal` raises on purpose: a message, or the parts of one as `describe` takes them."""
+class Described:
+    """What the families of errors share: a message, or the parts of one as `describe` takes them."""
+
+    args: tuple[str, ...]
 
     def __str__(self) -> str:
         """Message: the one that was given, or `describe` of its parts."""
         return describe(*self.args) if len(self.args) > 1 else super().__str__()
+
+    @classmethod
+    def unless(cls, valid: object, where: str, expected: str, found: object, advice: str = "") -> None:
+        """Refuse what is not valid, in the words of `describe`.
+
+        Parameters
+        ----------
+        valid : bool
+            Whether all is well.
+        where, expected : str
+            What is checked, and what would have been right.
+        found : object
+            What stood there, in words.
+        advice : str
+            What to do about it; empty when that is plain.
+        """
+        if not valid:
+            raise cls(where, expected, str(found), advice)  # type: ignore[call-arg, misc]
+
+    @classmethod
+    def unless_known(cls, value: object, options: Iterable[object], where: str, expected: str) -> None:
+        """Refuse an option that is not known, and name the nearest one.
+
+        Parameters
+        ----------
+        value : object
+            What was asked for.
+        options : iterable
+            What there is.
+        where, expected : str
+            What is checked, and what would have been right.
+        """
+        known = list(options)
+        if value not in known:
+            cls.unless(False, where, expected, repr(value), nearest(value, known))
+
+
+class ThermalError(Described, Exception):
+    """Base of every error that `thermal` raises on purpose."""
 
 
 class CaseError(ThermalError):
@@ -98,22 +139,3 @@ def nearest(word: object, options: Iterable[object]) -> str:
         return "there is none to choose from"
     shown = ", ".join(names[:8])
     return f"valid: {shown}" + (f" and {len(names) - 8} more" if len(names) > 8 else "")
-
-
-def check_known(word: str, options: Iterable[str], where: str, expected: str, kind: type[ThermalError]) -> None:
-    """Refuse a name that is none of the known ones, and name the nearest of them.
-
-    Parameters
-    ----------
-    word
-        What was given.
-    options
-        What would have been valid.
-    where, expected
-        As `describe` takes them.
-    kind
-        Error to raise.
-    """
-    known = list(options)
-    if word not in known:
-        raise kind(where, expected, repr(word), nearest(word, known))

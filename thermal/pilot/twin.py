@@ -13,7 +13,7 @@ from thermal.case.case import Case
 from thermal.case.plan import zone_floor_areas
 from thermal.case.points import DISCHARGE_TEMPERATURE, OUTDOOR_TEMPERATURE, SUPPLY_FLOW, ZONE_TEMPERATURE
 from thermal.case.telemetry import Telemetry
-from thermal.errors import ThermalError, check_known
+from thermal.errors import ThermalError
 from thermal.model.simulator import Simulator
 from thermal.network.build import build_network
 from thermal.parameters import Parameter, Scope
@@ -169,7 +169,7 @@ class TwinSettings(Period):
 
     def __post_init__(self) -> None:
         for name, options in (("excitation", get_args(Excitation)), ("meter", get_args(Meter))):
-            check_known(getattr(self, name), options, name, f"one of {', '.join(options)}", ThermalError)
+            ThermalError.unless_known(getattr(self, name), options, name, "a known one")
 
 
 class _DisturbedPlant:
