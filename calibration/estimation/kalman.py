@@ -184,8 +184,7 @@ class KalmanFilter:
             raise FilterError("filter: expected finite states to start from, got NaN; see `thermal.spin_up`")
         rows = slice(begin + 1, stop + 1)
         measured, known = np.isfinite(inputs.zone[rows]), inputs.complete[rows]
-        if not measured.any():
-            raise FilterError(f"filter: expected zone temperatures in rows {begin + 1} to {stop}, found none")
+        FilterError.unless(measured.any(), "filter", f"zone temperatures in rows {begin + 1} to {stop}", "none")
         unknown = inputs.heat[inputs.complete].std(axis=0)
         ever = np.asarray(measured.any(axis=0))
         if self.covariance == "steady":

@@ -50,8 +50,7 @@ class Smoothed:
         FilterError
             When the level is not between 0 and 1.
         """
-        if not 0.0 < level < 1.0:
-            raise FilterError(f"level: expected a probability between 0 and 1, got {level}")
+        FilterError.unless(0.0 < level < 1.0, "level", "a probability between 0 and 1", level)
         half = float(ndtri(0.5 * (1.0 + level))) * self.disturbance_deviation
         return self.disturbance - half, self.disturbance + half
 

@@ -53,10 +53,8 @@ def parse_interval(text: str, case: Case) -> Interval:
         When it is not two ordered times, or holds no telemetry.
     """
     parts = text.split("/")
-    if len(parts) != 2:
-        raise CalibrationError(
-            f"interval: expected START/END in ISO 8601, got {text!r}; for example 2023-10-02/2023-10-09T12:00"
-        )
+    advice = "for example 2023-10-02/2023-10-09T12:00"
+    CalibrationError.unless(len(parts) == 2, "interval", "START/END in ISO 8601", repr(text), advice)
     try:
         start, end = (pd.Timestamp(local_timestamp(part.strip(), case.building)) for part in parts)
     except CaseError as error:
@@ -125,10 +123,8 @@ def alternating_intervals(case: Case) -> tuple[list[Interval], list[Interval]]:
     midnight, turn = start.normalize(), _TUNING_DAYS + 1
     days = ((end + step).tz_localize(None) - midnight.tz_localize(None)) / pd.Timedelta(days=1)
     turns = int(days) // turn
-    if turns < _TURNS:
-        raise NotEnoughDataError(
-            f"alternating intervals: expected {_TURNS * turn} days of telemetry or more, found {days:.1f}"
-        )
+    expected = f"{_TURNS * turn} days of telemetry or more"
+    NotEnoughDataError.unless(turns >= _TURNS, "alternating intervals", expected, f"{days:.1f}")
     begins = [midnight + pd.DateOffset(days=k * turn) for k in range(turns + 1)]
     tuned = [Interval(max(b, start), b + pd.DateOffset(days=_TUNING_DAYS)) for b in begins[:-1]]
     judged = [Interval(i.end + step, b - step) for i, b in zip(tuned, begins[1:], strict=True)]

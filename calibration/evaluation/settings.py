@@ -77,8 +77,7 @@ class ModelSettings:
             raise CalibrationError(
                 f"spin_up_seconds: expected at least {LEAST_SPIN_UP:g} s, got {self.spin_up_seconds}"
             )
-        if not isinstance(self.structure, Structure):
-            raise CalibrationError(f"structure: expected a Structure, got {self.structure!r}")
+        CalibrationError.unless(isinstance(self.structure, Structure), "structure", "a Structure", repr(self.structure))
 
     @property
     def stepping(self) -> Scheme:

@@ -57,8 +57,7 @@ def serve(
     from mpc.adapters.boptest.server import BoptestServer, check_host
     from mpc.errors import BoptestError
 
-    if not boptest:
-        raise BoptestError("serve: expected what to serve as, found nothing; say --boptest")
+    BoptestError.unless(boptest, "serve", "what to serve as", "nothing", "say --boptest")
     if parameters is not None and len(cases or ()) > 1:
         raise BoptestError("--parameters: expected one case that they belong to, found several; serve it alone")
     check_host(host, allow_remote)  # before the minutes that a large building takes
@@ -165,8 +164,7 @@ def _case_of(target: Path | None, out: Path | None) -> tuple[Path, Path | None]:
         if target is not None and out is not None:
             raise LabelError("--out", "a drawing beside it", f"the case folder {target}", "drop --out")
         return target or out or Path("case"), None
-    if not target.is_file():
-        raise LabelError(str(target), "a case folder, a drawing or a list of drawings", "nothing")
+    LabelError.unless(target.is_file(), str(target), "a case folder, a drawing or a list of drawings", "nothing")
     return out or target.with_suffix(""), target
 
 
@@ -175,9 +173,8 @@ def _prepare(desk: LabelDesk, drawings: Path) -> None:
     from thermal.errors import LabelError
     from thermal.plan.page.desk import import_list, import_sheet
 
-    if desk.store.draft.floors:
-        advice = "open the case itself, and import the drawing on the page"
-        raise LabelError(str(desk.store.folder), "a new case folder", "a case with floors", advice)
+    advice, where = "open the case itself, and import the drawing on the page", str(desk.store.folder)
+    LabelError.unless(not desk.store.draft.floors, where, "a new case folder", "a case with floors", advice)
     if drawings.suffix.lower() in (".yaml", ".yml"):
         with Waiting(f"import {drawings.name}") as progress:
             import_list(desk, drawings, progress)

@@ -159,8 +159,7 @@ def replay_subsystems(
     MpcError
         When a point is missing, or the telemetry is shorter than a day.
     """
-    if not 0.0 <= tolerance <= 1.0:
-        raise MpcError("replay: tolerance", "a share from 0 to 1", repr(tolerance))
+    MpcError.unless(0.0 <= tolerance <= 1.0, "replay: tolerance", "a share from 0 to 1", repr(tolerance))
     if len(case.stamps) * case.step < 2.0 * LEAST_SPIN_UP:
         raise MpcError("replay", "a day of telemetry or more", f"{len(case.stamps)} steps")
     devices = plant_devices(case.building, system)

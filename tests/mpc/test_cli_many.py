@@ -151,7 +151,7 @@ def test_a_solver_that_does_not_converge_fails_the_run_and_keeps_the_results(
     ("options", "message"),
     [
         (("--workers", "2", "--scheduler", "tcp://127.0.0.1:9"), "CalibrationError: --workers and --scheduler"),
-        (("--workers", "0"), "CalibrationError: workers: expected at least 1, got 0"),
+        (("--workers", "0"), "CalibrationError: workers: expected at least 1, found 0"),
         (("--scheduler", "nonsense://x"), "CalibrationError: scheduler 'nonsense://x': expected an answer within 10 s"),
     ],
 )

@@ -72,12 +72,10 @@ def migrate(content: Mapping[str, Any], file: str) -> dict[str, Any]:
     CaseError
         The format is missing or unknown, or a key is of a later format than the file's.
     """
-    if "format" not in content:
-        raise CaseError(f"{file}: format", "1, 2 or 3", "no such key", f"add 'format: {FORMAT}'")
+    CaseError.unless("format" in content, f"{file}: format", "1, 2 or 3", "no such key", f"add 'format: {FORMAT}'")
     number = content["format"]
-    if type(number) is not int or not 1 <= number <= FORMAT:
-        advice = "use a library that reads this format, or migrate the case"
-        raise CaseError(f"{file}: format", "1, 2 or 3", repr(number), advice)
+    advice, where = "use a library that reads this format, or migrate the case", f"{file}: format"
+    CaseError.unless(type(number) is int and 1 <= number <= FORMAT, where, "1, 2 or 3", repr(number), advice)
     if number == FORMAT:
         return dict(content)
     # Format 2 has four more points, of pressures; format 3 has feeders of devices and the quality of the geometry.
@@ -141,8 +139,7 @@ def _read_yaml(folder: Path) -> dict[str, Any]:
         found = "a file" if folder.exists() else "nothing"
         raise CaseError("path", "a case folder", found, f"give the folder that holds {NAME}")
     path = folder / NAME
-    if not path.is_file():
-        raise CaseError(NAME, "the description of the building", "no such file")
+    CaseError.unless(path.is_file(), NAME, "the description of the building", "no such file")
     try:
         content = yaml.load(path.read_text(encoding="utf-8-sig"), Loader=_Loader)
     except (OSError, UnicodeDecodeError) as error:
@@ -167,13 +164,11 @@ def _check_geometry_choice(parsed: schema.BuildingFile) -> None:
     table = [key for key in ("zones", "surfaces", "constructions") if getattr(parsed, key) is not None]
     if plans and table:
         raise CaseError(NAME, "floor plans or a zone table", f"keys of both: {', '.join(plans + table)}", "drop one")
-    if not plans and not table:
-        raise CaseError(NAME, "'floors' (plans) or 'zones' (a zone table)", "neither", "add one")
+    CaseError.unless(plans or table, NAME, "'floors' (plans) or 'zones' (a zone table)", "neither", "add one")
     for key in ("cell_size", "floors") if plans else ("zones",):
         if getattr(parsed, key) is None:
             raise CaseError(f"{NAME}: {key}", "a value", "no such key", f"needed beside {plans + table}")
-        if getattr(parsed, key) == ():
-            raise CaseError(f"{NAME}: {key}", "at least one entry", "none")
+        CaseError.unless(getattr(parsed, key) != (), f"{NAME}: {key}", "at least one entry", "none")
 
 
 def _named(error: ValidationError) -> CaseError:

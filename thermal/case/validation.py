@@ -149,8 +149,7 @@ def _check_feeders(devices: Sequence[Device], file: str) -> None:
     for i, device in enumerate(devices):
         where = f"{file}: devices[{i}] ({device.name}): fed_by"
         for feeder in device.fed_by:
-            if feeder == device.name:
-                raise CaseError(where, "other devices", f"{feeder!r}, the device itself", "drop it")
+            CaseError.unless(feeder != device.name, where, "other devices", f"{feeder!r}, the device itself", "drop it")
             CaseError.unless_known(feeder, [name for name in fed_by if name != device.name], where, _DEVICE)
         if len({*device.fed_by}) < len(device.fed_by):
             raise CaseError(where, "each feeder once", ", ".join(device.fed_by), "drop one")
@@ -190,8 +189,7 @@ def _check_surfaces(table: ZoneTable, file: str) -> None:
     zones = [zone.name for zone in table.zones]
     _check_unique({f"surfaces[{i}]": surface.name for i, surface in enumerate(table.surfaces)}, file)
     for name, layers in table.constructions.items():
-        if not layers:
-            raise CaseError(f"{file}: constructions.{name}", "at least one layer", "none")
+        CaseError.unless(layers, f"{file}: constructions.{name}", "at least one layer", "none")
     for i, surface in enumerate(table.surfaces):
         where = f"{file}: surfaces[{i}] ({surface.name})"
         CaseError.unless_known(surface.zone, zones, f"{where}: zone", _ZONE)
@@ -205,8 +203,7 @@ def _check_kind(surface: Surface, zones: Collection[str], where: str) -> None:
     needed = _PROPERTIES[surface.kind]
     for key in ("construction", "u_value", "solar_transmittance"):
         given = getattr(surface, key) is not None
-        if key in needed and not given:
-            raise CaseError(f"{where}: {key}", f"a value, for a {surface.kind}", "none")
+        CaseError.unless(key not in needed or given, f"{where}: {key}", f"a value, for a {surface.kind}", "none")
         if given and key not in needed:
             advice = f"of kind {surface.kind}: {', '.join(sorted(needed)) or 'only an area'}"
             raise CaseError(f"{where}: {key}", "no such key", repr(getattr(surface, key)), advice)

@@ -125,8 +125,7 @@ def replay_inputs(case: Case, network: ThermalNetwork, provider: InputProvider |
     if zone.isna().all(axis=None):
         raise ModelError("telemetry", "a zone_air_temperature_sensor of at least one zone", "none that is usable")
     missing = [str(c) for c in boundary.columns if boundary[c].isna().all()]
-    if missing:
-        raise ModelError("telemetry", "temperatures of the boundaries", f"none that is usable for {missing}")
+    ModelError.unless(not missing, "telemetry", "temperatures of the boundaries", f"none that is usable for {missing}")
     frames = [case.zone_heat(), boundary, case.airflow_rates()]
     limit = int(LONGEST_BRIDGE // step)
     bridged = [_bridge(f, limit) for f in frames]

@@ -57,8 +57,7 @@ class Shuffle:
     def __post_init__(self) -> None:
         if self.probability is not None and not 0.0 <= self.probability <= 1.0:
             raise ModelError(f"probability: expected a number from 0 to 1, got {self.probability}")
-        if self.kind not in ("mean", "random"):
-            raise ModelError(f"shuffle: expected 'mean' or 'random', got {self.kind!r}")
+        ModelError.unless(self.kind in ("mean", "random"), "shuffle", "'mean' or 'random'", repr(self.kind))
 
 
 class Simulator:
@@ -109,8 +108,7 @@ class Simulator:
         scopes: Mapping[str, Scope] | None = None,
         effects: Sequence[Extension] = (),
     ) -> None:
-        if scheme not in SCHEMES:
-            raise ModelError(f"scheme: expected one of {sorted(SCHEMES)}, got {scheme!r}")
+        ModelError.unless(scheme in SCHEMES, "scheme", f"one of {sorted(SCHEMES)}", repr(scheme))
         if not (np.isfinite(step_seconds) and step_seconds > 0):
             raise ModelError(f"step_seconds: expected a positive number of seconds, got {step_seconds}")
         mixing = shuffle if isinstance(shuffle, Shuffle) else Shuffle(shuffle)
@@ -255,8 +253,7 @@ class Simulator:
         """
         place = self.network.place
         mine = place[:, 0] == floor
-        if floor < 0 or not mine.any():
-            raise ModelError(f"floor: expected a floor of a plan, got {floor}")
+        ModelError.unless(floor >= 0 and mine.any(), "floor", "a floor of a plan", floor)
         out = np.full(self.network.floor_shapes[floor], np.nan)
         for shown in (mine & (self.network.kind != "air"), mine & (self.network.kind == "air")):
             out[place[shown, 1], place[shown, 2]] = self._current()[shown, 0]

@@ -92,12 +92,10 @@ def generate_office(
     [6, 6]
     """
     low, high = window_to_wall_ratio
-    if seed < 0:
-        raise ThermalError(f"seed: expected 0 or more, found {seed}")
+    ThermalError.unless(seed >= 0, "seed", "0 or more", seed)
     given = {"floor_area": floor_area, "cell_size": cell_size, "height": height, "min_zone_area": min_zone_area}
     for name, value in given.items():
-        if not (np.isfinite(value) and value > 0.0):
-            raise ThermalError(name, "a positive number", f"{value}")
+        ThermalError.unless(np.isfinite(value) and value > 0.0, name, "a positive number", f"{value}")
     if floors < 1 or zones < floors:
         raise ThermalError(f"zones: expected at least one a floor on one or more floors, found {zones} on {floors}")
     most = int(floor_area / (_MEAN_OVER_SMALLEST * min_zone_area))

@@ -228,8 +228,7 @@ def _check(plant: Plant, plans: FloorPlans, weather: pd.DataFrame, settings: Tel
     """Refuse what does not fit; return the steps of the spin-up."""
     zones = {zone for floor in plans.floors for zone in floor.zone_names}
     strange = sorted(zones.symmetric_difference(plant.zone_names))
-    if strange:
-        raise ThermalError(f"plant: expected the zones of the plans, found a difference in {', '.join(strange[:5])}")
+    ThermalError.unless(not strange, "plant", "the zones of the plans", f"a difference in {', '.join(strange[:5])}")
     column = f"{settings.station}/{OUTDOOR_TEMPERATURE}"
     if column not in weather or not isinstance(weather.index, pd.DatetimeIndex) or weather.index.tz is None:
         raise ThermalError(f"weather: expected a column {column!r} on a tz-aware index, found {list(weather)[:3]}")

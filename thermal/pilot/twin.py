@@ -52,9 +52,8 @@ class TwinRanges:
     def __post_init__(self) -> None:
         for name, (low, high) in vars(self).items():
             positive = low > 0.0 or (low == high == 0.0 and name != "disturbance_time")
-            if not (positive and low <= high < np.inf):
-                expected = "two positive numbers in order (or twice 0 for none)"
-                raise ThermalError(f"ranges: {name}", expected, f"{low}, {high}")
+            expected = "two positive numbers in order (or twice 0 for none)"
+            ThermalError.unless(positive and low <= high < np.inf, f"ranges: {name}", expected, f"{low}, {high}")
 
 
 @dataclass(frozen=True, eq=False)

@@ -269,8 +269,7 @@ def read_matches(path: str | PathLike[str]) -> tuple[PointMatch, ...]:
     matches = []
     for number, row in enumerate(rows, start=2):
         column, entity, point = ((row[name] or "").strip() for name in _HEADER[:3])
-        if not column:
-            raise PlanError(f"{file.name}: line {number}", "the name of a column", "none")
+        PlanError.unless(column, f"{file.name}: line {number}", "the name of a column", "none")
         remark = (row.get("remark") or "").strip() or ("" if entity and point else "left out")
         matches.append(PointMatch(column, entity, point, 1.0, remark))
     return tuple(matches)
@@ -310,8 +309,7 @@ def with_telemetry(
     case = load_case(path)
     source = checked_file(Path(file), (".csv", ".parquet"))
     names = {match.column: f"{match.entity}/{match.point}" for match in matches if match.point and not match.remark}
-    if not names:
-        raise PlanError(source.name, "a column that is matched to a point", "none", "see points.csv")
+    PlanError.unless(names, source.name, "a column that is matched to a point", "none", "see points.csv")
     lacking = sorted(names.keys() - {*read_columns(source)})
     if lacking:
         found = f"no {lacking[0]!r}" + (f" and {len(lacking) - 1} more" if len(lacking) > 1 else "")

@@ -215,7 +215,7 @@ def test_cases_that_cannot_go_together_are_refused(cases: Path, tmp_path: Path) 
         assert not (tmp_path / "out").exists()
 
     office = cases / "office 0"
-    with pytest.raises(CalibrationError, match="at least one case folder, got none"):
+    with pytest.raises(CalibrationError, match="at least one case folder, found none"):
         calibrate_many(case_folders(tmp_path), tmp_path / "out")
     refused("expected each name once", [office, office])
     refused("expected each name once", [office, tmp_path / "office 0"])

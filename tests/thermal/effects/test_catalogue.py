@@ -61,7 +61,7 @@ def test_names_of_parameters_are_one_effects_own() -> None:
     [
         (["solar_gains"], "'solar_gains': not in the catalogue; the nearest valid one is 'solar_gain'"),
         (["blinds"], "effect blinds: modifies solar_gain; add that too"),
-        ({"sensor_bias": "A"}, "effect sensor_bias: expected a sequence of zones, got 'A'"),
+        ({"sensor_bias": "A"}, "effect sensor_bias: expected a sequence of zones, found 'A'"),
     ],
 )
 def test_what_cannot_be_chosen(effects: object, message: str) -> None:

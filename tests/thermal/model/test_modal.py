@@ -142,7 +142,7 @@ def grid() -> SymbolicModel:
 
 def test_bad_wishes_are_refused() -> None:
     theta = grid().network.start()
-    with pytest.raises(ModelError, match="got the grid"):
+    with pytest.raises(ModelError, match="found the grid"):
         modal_model(grid().matrices(theta))
-    with pytest.raises(ModelError, match="positive number of seconds, got 0"):
+    with pytest.raises(ModelError, match="positive number of seconds, found 0"):
         modal_model(reduced_model(grid(), [theta]).matrices(theta)).propagator(0.0)

@@ -123,9 +123,9 @@ def test_drift_grows_as_theta_moves_away() -> None:
 
 def test_impossible_wishes_are_refused() -> None:
     theta = draw()
-    with pytest.raises(ModelError, match="order or a tolerance, got both"):
+    with pytest.raises(ModelError, match="order or a tolerance, found both"):
         reduced_model(grid(), [theta], order=10, tolerance=0.1)
-    with pytest.raises(ModelError, match="at least 2 states, got 1"):
+    with pytest.raises(ModelError, match="at least 2 states, found 1"):
         reduced_model(grid(), [theta], order=1)
     with pytest.raises(ModelError, match="add shifts"):
         reduced_model(grid(), [theta], tolerance=1e-9)

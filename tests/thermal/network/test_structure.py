@@ -314,5 +314,5 @@ def test_settings_that_nobody_wrote_are_refused(tmp_path: Path, settings: dict[s
 
 
 def test_settings_take_a_structure_only() -> None:
-    with pytest.raises(CalibrationError, match="structure: expected a Structure, got 'paper'"):
+    with pytest.raises(CalibrationError, match="structure: expected a Structure, found 'paper'"):
         ModelSettings(structure="paper")  # type: ignore[arg-type]
