@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from calibration.errors import CalibrationError
+from mpc import plugins
 from mpc.cli import options
 from mpc.cli.console import Progress, Waiting, answer, complain, say, show_table
 
@@ -60,7 +62,6 @@ def calibrate(
     Example: buildingmpc calibrate cases/office --tune 2023-10-02/2023-10-16
     --hold-out 2023-10-16T00:05/2023-10-23 --out results
     """
-    from calibration.errors import CalibrationError
     from calibration.fleet.run import case_folders
 
     settings = {
@@ -164,7 +165,6 @@ def _calibrate_many(
     """Calibrate each case into a folder of its name; one that fails is reported beside the others."""
     from calibration.fleet.cluster import ClusterExecutor
     from calibration.fleet.run import calibrate_many
-    from mpc import plugins
     from mpc.reports.calibration import calibration_files
 
     files = plugins.WithPlugins(calibration_files, plugins.loaded)

@@ -11,6 +11,7 @@ import typer
 
 from mpc.cli.console import Waiting, answer, say, show_table
 from mpc.cli.options import Force, Json, file, value
+from thermal.errors import PlanError
 
 if TYPE_CHECKING:
     from thermal.plan.assemble import PlanImport
@@ -140,8 +141,6 @@ def import_telemetry(
 
 def _units(given: Sequence[str]) -> dict[str, str]:
     """Take options POINT=UNIT apart."""
-    from thermal.errors import PlanError
-
     parts = [text.partition("=") for text in given]
     for text in ("".join(part) for part in parts if not all(part)):
         raise PlanError("--unit", "POINT=UNIT, such as zone_air_temperature_sensor=degF", repr(text))

@@ -222,22 +222,22 @@ def clock(stamp: pd.Timestamp) -> str:
     return f"{stamp:%Y-%m-%d %H:%M}"
 
 
-def counted(number: int, noun: str, plural: str = "") -> str:
+def counted(number: int, noun: str) -> str:
     """Spell a count.
 
     Parameters
     ----------
     number : int
         How many.
-    noun, plural : str
-        Of what; by default the plural has an s.
+    noun : str
+        Of what; its plural has an s.
 
     Examples
     --------
     >>> counted(1, "zone"), counted(0, "zone")
     ('1 zone', 'no zones')
     """
-    return f"{number or 'no'} {noun if number == 1 else plural or noun + 's'}"
+    return f"{number or 'no'} {noun if number == 1 else noun + 's'}"
 
 
 def percent(value: float) -> str:

@@ -225,7 +225,7 @@ def test_cases_that_cannot_go_together_are_refused(cases: Path, tmp_path: Path) 
     refused("would land in the case", [office], office / "results")
     refused("found a file", [office], office / "building.yaml")
     refused("can be written to", [office], office / "building.yaml" / "out")
-    refused("retries: expected at least 0, got -1", [office], retries=-1)
+    refused("retries: expected at least 0, found -1", [office], retries=-1)
     refused("workers: expected at least 1, got 0", [office], workers=0)
 
 
