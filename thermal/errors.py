@@ -33,7 +33,7 @@ class Described:
 
     @classmethod
     def unless_known(cls, value: object, options: Iterable[object], where: str, expected: str) -> None:
-        """Refuse an option that is not known, and name the nearest one.
+        """Refuse an option that is not known, and name the nearest one, or all that `expected` does not list.
 
         Parameters
         ----------
@@ -45,8 +45,9 @@ class Described:
             What is checked, and what would have been right.
         """
         known = list(options)
-        if value not in known:
-            cls.unless(False, where, expected, repr(value), nearest(value, known))
+        advice = "" if value in known else nearest(value, known)
+        told = advice.startswith("valid") and all(str(option) in expected for option in known)
+        cls.unless(value in known, where, expected, repr(value), "" if told else advice)
 
 
 class ThermalError(Described, Exception):

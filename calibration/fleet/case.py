@@ -221,7 +221,8 @@ def _calibrate_one(task: CaseTask) -> CaseOutcome:
         "outcome": asdict(outcome),
     }
     task.check_running()  # a cluster cannot stop what it has begun when a run is interrupted
-    write_results(task.out, {**contents, RECORD: record}, task.force)
+    work = None if task.out.is_symlink() else task.running  # the run clears it away, also after a killed worker
+    write_results(task.out, {**contents, RECORD: record}, task.force, work)
     return outcome
 
 

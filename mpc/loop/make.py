@@ -90,7 +90,8 @@ class SimulationSettings:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        PlantError.unless_known(self.kind, get_args(PlantKind), "plant", "a known one")
+        known = get_args(PlantKind)
+        PlantError.unless_known(self.kind, known, "plant", f"one of {', '.join(known)}")
 
     def scenario(
         self, building: Building, grid: StepGrid, weather: Weather, gains: InternalGains | None = None

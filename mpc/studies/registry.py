@@ -117,7 +117,7 @@ def find_controller(name: str) -> RegisteredController:
     ControlError
         When there is none of this name; with the nearest one.
     """
-    ControlError.unless_known(name, REGISTERED, "controller", "a known one")
+    ControlError.unless_known(name, REGISTERED, "controller", f"one of {', '.join(REGISTERED)}")
     return REGISTERED[name]
 
 

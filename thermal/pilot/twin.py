@@ -168,7 +168,7 @@ class TwinSettings(Period):
 
     def __post_init__(self) -> None:
         for name, options in (("excitation", get_args(Excitation)), ("meter", get_args(Meter))):
-            ThermalError.unless_known(getattr(self, name), options, name, "a known one")
+            ThermalError.unless_known(getattr(self, name), options, name, f"one of {', '.join(options)}")
 
 
 class _DisturbedPlant:

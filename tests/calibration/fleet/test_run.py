@@ -226,7 +226,7 @@ def test_cases_that_cannot_go_together_are_refused(cases: Path, tmp_path: Path) 
     refused("found a file", [office], office / "building.yaml")
     refused("can be written to", [office], office / "building.yaml" / "out")
     refused("retries: expected at least 0, found -1", [office], retries=-1)
-    refused("workers: expected at least 1, got 0", [office], workers=0)
+    refused("workers: expected at least 1, found 0", [office], workers=0)
 
 
 def test_a_folder_of_something_else_is_refused(cases: Path, tmp_path: Path) -> None:
