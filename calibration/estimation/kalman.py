@@ -131,8 +131,8 @@ class KalmanFilter:
         covariance: Covariance = "exact",
         tolerance: float = TOLERANCE,
     ) -> None:
-        if covariance not in get_args(Covariance):
-            raise FilterError(f"covariance: expected one of {', '.join(get_args(Covariance))}, got {covariance!r}")
+        known = get_args(Covariance)
+        FilterError.unless_known(covariance, known, "covariance", f"one of {', '.join(known)}")
         self.space, self.disturbance, self.covariance, self.tolerance = space, disturbance, covariance, tolerance
         self.whole = DisturbedSpace(space, disturbance)
         self._steady: dict[bytes, tuple[FloatArray, FloatArray]] = {}

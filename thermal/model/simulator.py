@@ -108,7 +108,7 @@ class Simulator:
         scopes: Mapping[str, Scope] | None = None,
         effects: Sequence[Extension] = (),
     ) -> None:
-        ModelError.unless(scheme in SCHEMES, "scheme", f"one of {sorted(SCHEMES)}", repr(scheme))
+        ModelError.unless_known(scheme, SCHEMES, "scheme", f"one of {', '.join(sorted(SCHEMES))}")
         if not (np.isfinite(step_seconds) and step_seconds > 0):
             raise ModelError(f"step_seconds: expected a positive number of seconds, got {step_seconds}")
         mixing = shuffle if isinstance(shuffle, Shuffle) else Shuffle(shuffle)

@@ -99,9 +99,8 @@ def generate_office(
     if floors < 1 or zones < floors:
         raise ThermalError(f"zones: expected at least one a floor on one or more floors, found {zones} on {floors}")
     most = int(floor_area / (_MEAN_OVER_SMALLEST * min_zone_area))
-    if zones > most:
-        mean = f"{_MEAN_OVER_SMALLEST} times min_zone_area ({min_zone_area} m2) on average"
-        raise ThermalError("zones", f"at most {most} on {floor_area} m2, so that they have {mean}", f"{zones}")
+    fits, mean = zones <= most, f"{_MEAN_OVER_SMALLEST} times min_zone_area ({min_zone_area} m2) on average"
+    ThermalError.unless(fits, "zones", f"at most {most} on {floor_area} m2, so that they have {mean}", f"{zones}")
     if not 0.0 <= low <= high <= 1.0:
         raise ThermalError(f"window_to_wall_ratio: expected (smallest, largest) between 0 and 1, found {low, high}")
     counts = [zones // floors + (floor < zones % floors) for floor in range(floors)]
