@@ -297,7 +297,7 @@ class Simulator:
 
     def _current(self) -> FloatArray:
         if self._states is None:
-            raise ModelError("simulator: call reset() or reset_from() before the first step")
+            raise ModelError("simulator: call reset() before the first step")
         return self._states
 
     def _random_shuffle(self, mixing: Shuffle) -> RandomShuffle:
