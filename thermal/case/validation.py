@@ -73,9 +73,7 @@ def check_building(
         _check_surfaces(building.geometry, file)
 
 
-def check_columns(
-    building: Building, columns: Collection[str], file: str, *, check_boundaries: bool = True
-) -> None:
+def check_columns(building: Building, columns: Collection[str], file: str, *, check_boundaries: bool = True) -> None:
     """Refuse telemetry columns of nothing, and boundaries that nothing measures.
 
     Parameters

@@ -33,8 +33,9 @@ BRIGHTEST, SLACK, CONTRADICTION = 1.3, 10.0, 50.0
 #: Light that is too little: under the thickest cloud a twentieth of that of a clear sky is left.
 DARKEST = 0.05
 
-#: Contradictions a change of the clock must explain [h], and a day [h]. One hour of error makes 0.6 to 1.9 hours of them a
-#: day, which a change explains; of those of a sound clock it explains 0.02 (six buildings, `docs/real_data.md`).
+#: Contradictions a change of the clock must explain [h], and a day [h]. One hour of error makes 0.6 to 1.9 hours of
+#: them a day, which a change explains; of those of a sound clock it explains 0.02 (six buildings,
+#: `docs/real_data.md`).
 LEAST_EXPLAINED, LEAST_EXPLAINED_DAILY = 2.5, 0.35
 
 
