@@ -107,13 +107,15 @@ class _Loader(yaml.SafeLoader):
         return super().construct_mapping(node, deep=deep)
 
 
-def read_building_file(folder: Path) -> schema.BuildingFile:
+def read_building_file(folder: Path, *, with_telemetry: bool = True) -> schema.BuildingFile:
     """Read and check `building.yaml` by itself, without the files it names.
 
     Parameters
     ----------
     folder
         Case folder.
+    with_telemetry
+        Whether it must name its telemetry and units; a building that is to get some may not have them yet.
 
     Returns
     -------
@@ -126,7 +128,10 @@ def read_building_file(folder: Path) -> schema.BuildingFile:
         One of its family: the file is missing, no YAML, of another format, or holds a key or value that does not fit.
     """
     try:
-        parsed = schema.BuildingFile.model_validate(migrate(_read_yaml(folder), NAME))
+        content = migrate(_read_yaml(folder), NAME)
+        if not with_telemetry:
+            content |= {"telemetry": content.get("telemetry") or "telemetry.parquet", "units": {}}
+        parsed = schema.BuildingFile.model_validate(content)
     except ValidationError as error:
         raise _named(error) from error
     _check_geometry_choice(parsed)
@@ -248,6 +253,36 @@ def load_case(path: str | PathLike[str]) -> Case:
         error.args = (f"{folder}: {error}",)
         raise
     return Case(building, telemetry, folder)
+
+
+def load_building(path: str | PathLike[str]) -> Building:
+    """Load the building of a case folder, whether it has telemetry or not.
+
+    Parameters
+    ----------
+    path
+        Folder that holds ``building.yaml`` and the plans it names, or that file.
+
+    Returns
+    -------
+    Building
+        Checked like that of a case.
+
+    Raises
+    ------
+    CaseError
+        One of its family, for the first thing that does not fit.
+    """
+    given = Path(path)
+    folder = given.parent if given.name == NAME else given
+    try:
+        parsed = read_building_file(folder, with_telemetry=False)
+        building = _building(parsed, folder)
+        check_building(building, {floor.name: floor.plan for floor in parsed.floors or ()})
+    except CaseError as error:
+        error.args = (f"{folder}: {error}",)
+        raise
+    return building
 
 
 def _building(parsed: BuildingFile, folder: Path) -> Building:

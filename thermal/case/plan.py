@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from thermal.case.building import EXTERIOR_WALL, INTERIOR_WALL, OUTSIDE, PLAN_TOKENS, FloorPlan, FloorPlans
+from thermal.case.building import EXTERIOR_WALL, INTERIOR_WALL, OUTSIDE, PLAN_TOKENS, Building, FloorPlan, FloorPlans
 from thermal.errors import CaseError
 
 
@@ -182,6 +182,26 @@ def zone_volumes(plans: FloorPlans) -> dict[str, float]:
     """
     areas = zone_floor_areas(plans)
     return {zone: areas[zone] * floor.height for floor in plans.floors for zone in floor.zone_names}
+
+
+def zone_sizes(building: Building) -> dict[str, tuple[float, float]]:
+    """Floor area and volume of each zone.
+
+    Parameters
+    ----------
+    building
+        With plans or a zone table.
+
+    Returns
+    -------
+    dict
+        Area [m2] and volume [m3] by zone, in the building's order.
+    """
+    geometry = building.geometry
+    if not isinstance(geometry, FloorPlans):
+        return {zone.name: (zone.floor_area, zone.volume) for zone in geometry.zones}
+    areas, volumes = zone_floor_areas(geometry), zone_volumes(geometry)
+    return {zone: (areas[zone], volumes[zone]) for zone in building.zone_names}
 
 
 def facade_areas(plans: FloorPlans) -> dict[str, dict[str, float]]:

@@ -19,7 +19,7 @@ from thermal.errors import CaseError
 from thermal.units import check_unit, to_si
 
 INDEX = "timestamp"
-LONGEST_STEP = 3600.0  # s: "steps of up to 60 minutes are valid" (case format)
+LONGEST_STEP = 7200.0  # s
 FILL_LIMIT = 20  # missing rows a given one: more than that is a wrong stamp rather than a gap
 
 

@@ -73,7 +73,7 @@ def check_building(
         _check_surfaces(building.geometry, file)
 
 
-def check_columns(building: Building, columns: Collection[str], file: str) -> None:
+def check_columns(building: Building, columns: Collection[str], file: str, *, check_boundaries: bool = True) -> None:
     """Refuse telemetry columns of nothing, and boundaries that nothing measures.
 
     Parameters
@@ -84,6 +84,8 @@ def check_columns(building: Building, columns: Collection[str], file: str) -> No
         Names of the telemetry's columns.
     file
         Telemetry file, for messages.
+    check_boundaries
+        Whether each boundary must be measured.
 
     Raises
     ------
@@ -96,7 +98,7 @@ def check_columns(building: Building, columns: Collection[str], file: str) -> No
     if isinstance(building.geometry, ZoneTable):
         for index, surface in enumerate(building.geometry.surfaces):
             column = f"{surface.other}/{points.ZONE_TEMPERATURE}"
-            if surface.other in boundaries and column not in columns:
+            if check_boundaries and surface.other in boundaries and column not in columns:
                 where = f"building.yaml: surfaces[{index}] ({surface.name}): other"
                 expected = f"a zone, outdoor, ground, or a boundary with the column {column!r} in {file}"
                 CaseError.unless_known(surface.other, [*zones, OUTDOOR, GROUND], where, expected)

@@ -205,15 +205,15 @@ def test_a_stamp_of_another_decade_is_no_gap(plan_draft: Any) -> None:
     refused(plan_draft, CaseError, "data row 48: expected telemetry without years of gaps")
 
 
-@pytest.mark.parametrize(("step", "seconds"), [("10min", 600.0), ("15min", 900.0), ("60min", 3600.0)])
-def test_steps_up_to_an_hour(plan_draft: Any, step: str, seconds: float) -> None:
+@pytest.mark.parametrize(("step", "seconds"), [("10min", 600.0), ("15min", 900.0), ("60min", 3600.0), ("2h", 7200.0)])
+def test_steps_up_to_two_hours(plan_draft: Any, step: str, seconds: float) -> None:
     plan_draft.frame.index = pd.date_range(plan_draft.frame.index[0], periods=48, freq=step, name="timestamp")
     assert load_case(plan_draft.write()).step == seconds
 
 
-def test_steps_above_an_hour(plan_draft: Any) -> None:
-    plan_draft.frame.index = pd.date_range(plan_draft.frame.index[0], periods=48, freq="2h", name="timestamp")
-    refused(plan_draft, CaseError, "expected steps of up to 3600 s, found 7200 s")
+def test_steps_above_two_hours(plan_draft: Any) -> None:
+    plan_draft.frame.index = pd.date_range(plan_draft.frame.index[0], periods=48, freq="3h", name="timestamp")
+    refused(plan_draft, CaseError, "expected steps of up to 7200 s, found 10800 s")
 
 
 @pytest.mark.parametrize("n_time", [0, 1])
