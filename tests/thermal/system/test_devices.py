@@ -13,9 +13,9 @@ from thermal.components.component import Conditions
 from thermal.components.radiators import Radiators
 from thermal.errors import ModelError
 from thermal.pilot.building import pilot_building
-from thermal.pilot.sizing import size_system
 from thermal.system.devices import device_graph
 from thermal.system.plant import HvacPlant
+from thermal.system.sizing import size_system
 
 
 @dataclass(frozen=True)
