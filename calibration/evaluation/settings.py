@@ -132,6 +132,9 @@ class CalibrationSettings(ModelSettings):
         The best is kept, and a start that fails costs that start only.
     seed : int
         Seed of the draws.
+    climb : bool
+        Whether the building is also fitted lumped, and what predicts left-out tuning days better is kept; see
+        `calibration.fit.ladder`.
 
     Raises
     ------
@@ -145,6 +148,7 @@ class CalibrationSettings(ModelSettings):
     loss: Loss = "linear"
     starts: int = 3
     seed: int = 0
+    climb: bool = False
 
     def __post_init__(self) -> None:
         super().__post_init__()

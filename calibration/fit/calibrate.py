@@ -2,23 +2,15 @@
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from importlib.metadata import version
 from typing import Any
 
-from calibration.errors import CalibrationError
-from calibration.evaluation.case_model import CaseModel, GridCheck
-from calibration.evaluation.intervals import Interval, default_intervals, horizon_steps, select_runs
-from calibration.evaluation.n_step import HORIZONS, Evaluation, EvaluationSettings, Progress
-from calibration.evaluation.settings import CalibrationSettings, ModelSettings, calibration_settings
-from calibration.fit.estimate import Estimate, solve_starts
-from calibration.fit.likelihood import InnovationsProblem
-from calibration.fit.problem import tuning_problem
-from calibration.fit.result import CalibrationResult, SolverReport, describe
-from calibration.identifiability.information import information_of
+from calibration.evaluation.intervals import Interval
+from calibration.evaluation.n_step import Progress
+from calibration.evaluation.settings import ModelSettings, calibration_settings
+from calibration.fit.fitted_case import fit_case
+from calibration.fit.ladder import climb
+from calibration.fit.result import CalibrationResult
 from thermal.case.case import Case
-from thermal.inputs.normalisation import fit_normalisation
-from thermal.model.reduce import ReducedModel, reduced_model
 
 
 def calibrate(
@@ -66,144 +58,5 @@ def calibrate(
     True
     """
     began, chosen = time.perf_counter(), calibration_settings(settings)
-    return fit_case(case, tune, hold_out, chosen, progress).result(began, progress)
-
-
-@dataclass(frozen=True)
-class FittedCase:
-    """A case whose parameters are estimated.
-
-    Parameters
-    ----------
-    model : CaseModel
-        As drawn, at the start of the parameters.
-    reduced : ReducedModel
-        Of it.
-    best : Estimate
-        Over the starts.
-    failures : tuple of str
-        What was wrong with the starts that failed.
-    tuned, judged : tuple of Interval
-        Where it was fitted, and where it is judged.
-    settings : CalibrationSettings
-        Model and fit.
-    """
-
-    model: CaseModel
-    reduced: ReducedModel
-    best: Estimate
-    failures: tuple[str, ...]
-    tuned: tuple[Interval, ...]
-    judged: tuple[Interval, ...]
-    settings: CalibrationSettings
-
-    def result(self, began: float, progress: Progress | None = None) -> CalibrationResult:
-        """Judge the estimate on the grid and on the held-out intervals.
-
-        Parameters
-        ----------
-        began : float
-            When the calibration began, by `time.perf_counter` [s].
-        progress : callable, optional
-            Called with stage, done, total.
-        """
-        before, best, chosen = self.model, self.best, self.settings
-        after = replace(before, theta=best.theta, source="estimate")
-        calibrated, check = self._evaluated(after, best.model, progress)
-        seconds, solve = time.perf_counter() - began, best.solve
-        network, information = before.grid.network, information_of(best)
-        return CalibrationResult(
-            case=before.case.building.name,
-            zones=network.zones,
-            parameters=describe(best, information, network.nominal),
-            theta=best.theta,
-            tuning=self.tuned,
-            held_out=self.judged,
-            uncalibrated=self.uncalibrated(progress),
-            calibrated=calibrated,
-            solver=SolverReport(
-                "ipopt", solve.status, solve.success, best.iterations, seconds, chosen.starts, self.failures,
-                best.evaluations, best.settled,
-            ),
-            disturbance=best.disturbance,
-            excess=best.excess,
-            information=information,
-            grid_check=check,
-            objective=chosen.objective,
-            horizon=chosen.horizon,
-            settings=chosen.model,
-            seed=chosen.seed,
-            version=version("buildingmpc"),
-        )  # fmt: skip
-
-    def uncalibrated(self, progress: Progress | None = None) -> dict[str, Evaluation]:
-        """Errors at the start of the parameters.
-
-        Parameters
-        ----------
-        progress : callable, optional
-            Called with stage, done, total.
-        """
-        return self._evaluated(self.model, self.reduced, progress)[0]
-
-    def _evaluated(
-        self, model: CaseModel, reduced: ReducedModel, progress: Progress | None
-    ) -> tuple[dict[str, Evaluation], GridCheck]:
-        """Errors on both kinds of interval, at other horizons too where held out, and the check of the reduced one."""
-        horizon = self.settings.horizon
-        quick, check = model.certified(self.judged[0], horizon_steps(horizon, model.inputs.step), reduced)
-        errors = {}
-        for name, part in (("tuning", self.tuned), ("held_out", self.judged)):
-            settings = EvaluationSettings(horizon, True, HORIZONS if name == "held_out" else ())
-            errors[name] = model.evaluate(quick, part, settings, progress)
-        return errors, check
-
-
-def fit_case(
-    case: Case,
-    tune: Sequence[Interval],
-    hold_out: Sequence[Interval],
-    settings: CalibrationSettings,
-    progress: Progress | None = None,
-) -> FittedCase:
-    """Estimate the parameters of a case; `FittedCase.result` judges them.
-
-    Parameters
-    ----------
-    case, tune, hold_out, progress
-        As `calibrate` takes them.
-    settings : CalibrationSettings
-        Model and fit.
-
-    Raises
-    ------
-    CalibrationError
-        As `calibrate` does.
-    """
-    tuned, judged = default_intervals(case, tune, hold_out)
-    if settings.effects:
-        settings = replace(settings, normalisation=fit_normalisation(case, ((i.start, i.end) for i in tuned)))
-    _refuse_overlap(tuned, judged)
-    problem = tuning_problem(case, tuned, settings)
-    grid, inputs, given = problem.grid, problem.inputs, problem.start
-    for interval in judged:  # refused now rather than after the solve
-        select_runs(inputs, interval, problem.steps, spin_up=settings.spin_up_seconds)
-    first = reduced_model(grid, [given])
-    if settings.objective == "innovations":
-        problem = InnovationsProblem(
-            grid, inputs, problem.runs, problem.steps, problem.free, given, problem.scheme, loss=settings.loss,
-            intervals=tuple(tuned), spin_up_seconds=settings.spin_up_seconds,
-        ).at(first, given)  # fmt: skip
-    best, failures = solve_starts(problem, first, settings.starts, settings.seed, progress)
-    before = CaseModel(case, settings.model, grid, inputs, given, "start")
-    return FittedCase(before, first, best, tuple(failures), tuple(tuned), tuple(judged), settings)
-
-
-def _refuse_overlap(tuning: Sequence[Interval], held_out: Sequence[Interval]) -> None:
-    for a in tuning:
-        for b in held_out:
-            if a.start <= b.end and b.start <= a.end:
-                raise CalibrationError(
-                    f"intervals: tuning {a.start}/{a.end} and held-out {b.start}/{b.end} overlap; "
-                    "a held-out target may not be tuned on"
-                )
+    fitted = fit_case(case, tune, hold_out, chosen, progress)
+    return climb(fitted, began, progress) if chosen.climb else fitted.result(began, progress)

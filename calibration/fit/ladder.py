@@ -1,9 +1,9 @@
 """Ladder of structures: as drawn, and lumped with factors of its own for every zone and pair; days left out choose."""
 
-import time
-from collections.abc import Mapping, Sequence
+import itertools
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
+from functools import partial
 
 import numpy as np
 import pandas as pd
@@ -11,9 +11,9 @@ import pandas as pd
 from calibration.errors import NotEnoughDataError
 from calibration.evaluation.intervals import Interval, Runs, select_runs
 from calibration.evaluation.n_step import Progress, spatial_metrics
-from calibration.evaluation.settings import CalibrationSettings, ModelSettings, calibration_settings
-from calibration.fit.calibrate import FittedCase, fit_case
+from calibration.evaluation.settings import CalibrationSettings
 from calibration.fit.estimate import Estimate
+from calibration.fit.fitted_case import FittedCase, fit_case
 from calibration.fit.least_squares import solve_least_squares
 from calibration.fit.result import CalibrationResult, Rung
 from thermal.case.case import Case
@@ -27,58 +27,41 @@ _FOLDS, _LEAST_DAYS = 4, 1.0
 _MOST_ZONES = 40
 
 
-def climb(
-    case: Case,
-    tune: Sequence[Interval] = (),
-    hold_out: Sequence[Interval] = (),
-    *,
-    settings: ModelSettings | Mapping[str, Any] | None = None,
-    progress: Progress | None = None,
-) -> CalibrationResult:
-    """Calibrate the building as drawn and lumped, and keep what predicts tuning days better that a fit has not seen.
+def climb(drawn: FittedCase, began: float, progress: Progress | None = None) -> CalibrationResult:
+    """Fit a building lumped too, and keep what predicts tuning days better that a fit has not seen.
 
-    A structure, effects or values a facade that somebody asked for are kept; so is the drawing in a building of more
-    than 40 zones, where the tuning intervals are shorter than two days, and where the lumped structure cannot be
-    fitted. Held-out intervals have no part in the choice.
+    Effects or values a facade that somebody asked for are kept; so is the drawing in a building of more than 40 zones.
+    Held-out intervals have no part in the choice.
 
     Parameters
     ----------
-    case, tune, hold_out, settings, progress
-        As `calibration.calibrate` takes them.
+    drawn : FittedCase
+        The building as drawn.
+    began : float
+        When the calibration began, by `time.perf_counter` [s].
+    progress : callable, optional
+        Called with stage, done, total.
 
     Returns
     -------
     CalibrationResult
         With ``rungs``, the drawing's first; empty where there was no choice.
-
-    Raises
-    ------
-    CalibrationError
-        As `calibration.calibrate` does.
-
-    Examples
-    --------
-    >>> from thermal.data import load_bundled_case
-    >>> result = climb(load_bundled_case(), settings={"dx": 1.0, "starts": 1})
-    >>> [rung.name for rung in result.rungs]
-    ['drawn', 'lumped']
     """
-    began, chosen = time.perf_counter(), calibration_settings(settings)
-    drawn = fit_case(case, tune, hold_out, chosen, progress)
+    chosen = drawn.settings
     asked = chosen.effects or chosen.scopes or chosen.fixed or chosen.structure != BASELINE
-    if asked or chosen.objective != "multi_step" or len(case.building.zone_names) > _MOST_ZONES:
+    many = len(drawn.model.grid.network.zones) > _MOST_ZONES
+    if asked or many or chosen.objective != "multi_step":
         return drawn.result(began, progress)
-    fitted = [drawn, fit_lumped(case, drawn.tuned, drawn.judged, chosen, progress)]
+    fitted = [drawn, fit_lumped(drawn.model.case, drawn.tuned, drawn.judged, chosen, progress)]
     errors = [left_out(f.best, drawn.tuned, chosen.spin_up_seconds) for f in fitted]
-    best = 1 if errors[1] < errors[0] else 0
+    best = int(errors[1] < errors[0])
     rungs = tuple(
         Rung(name, error, len(f.best.problem.free), number == best)
         for number, (name, error, f) in enumerate(zip(("drawn", "lumped"), errors, fitted, strict=True))
     )
-    result = fitted[best].result(began, progress)
-    if best:  # before is what the drawing says
-        result = replace(result, uncalibrated=drawn.uncalibrated(progress))
-    return replace(result, rungs=rungs)
+    result = replace(fitted[best].result(began, progress), rungs=rungs)
+    # before is what the drawing says
+    return replace(result, uncalibrated=drawn.uncalibrated(progress)) if best else result
 
 
 def fit_lumped(
@@ -132,9 +115,8 @@ def left_out(best: Estimate, tuned: Sequence[Interval], spin_up_seconds: float) 
             continue
         share = sum(r.starts.size for r in rest) / sum(r.starts.size for r in problem.runs)
         fold = replace(problem, runs=rest, effective=share * problem.effective_size())
-        found = solve_least_squares(
-            lambda z, fold=fold: fold.weighted(best.model, z), best.point, *problem.bounds, tolerance=1e-2
-        )
+        weighted = partial(fold.weighted, best.model)
+        found = solve_least_squares(weighted, best.point, *problem.bounds, tolerance=1e-2)
         error, _ = fold.errors(best.model, fold.theta(found.x), left, slopes=False)
         errors.append(error[:, -1])
     return spatial_metrics(np.concatenate(errors)).mae if len(errors) > 1 else float("nan")
@@ -150,11 +132,11 @@ def _parts(tuned: Sequence[Interval]) -> list[Interval]:
     for interval in tuned:
         own = max(1, round(count * ((interval.end - interval.start) / length)))
         cuts = pd.date_range(interval.start, interval.end, periods=own + 1)
-        parts += [Interval(a, b) for a, b in zip(cuts[:-1], cuts[1:], strict=True)]
+        parts += [Interval(a, b) for a, b in itertools.pairwise(cuts)]
     return parts
 
 
 def _outside(stamps: pd.DatetimeIndex, runs: Runs, steps: int, part: Interval) -> Runs:
-    """Runs that share no step with an interval."""
+    """Keep the runs that share no step with an interval."""
     clear = (stamps[runs.starts + steps] < part.start) | (stamps[runs.starts] > part.end)
     return replace(runs, starts=runs.starts[np.asarray(clear)])

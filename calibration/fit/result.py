@@ -218,13 +218,16 @@ class CalibrationResult(Result):
 
         Those whose 90 % interval of the factor [-] lies beyond a factor of 1.5 to either side.
         """
-        found = [
-            {"what": p.name, "factor": p.value / p.start, "interval90": [end / p.start for end in p.interval90]}
+        far = [
+            (p.value / p.start, p.name, [end / p.start for end in p.interval90])
             for p in self.parameters
-            if p.base.endswith("_multiplier") and self.settings.structure.lumped and p.interval90 is not None
+            if self.settings.structure.lumped
+            and p.base.endswith("_multiplier")
+            and p.interval90 is not None
+            and not p.interval90[0] / _FAR < p.start < p.interval90[1] * _FAR
         ]
-        far = [f for f in found if f["interval90"][0] > _FAR or f["interval90"][1] < 1.0 / _FAR]
-        return sorted(far, key=lambda f: -abs(np.log(f["factor"])))
+        ranked = sorted(far, key=lambda f: -abs(np.log(f[0])))
+        return [{"what": name, "factor": factor, "interval90": ends} for factor, name, ends in ranked]
 
     def to_frame(self) -> pd.DataFrame:
         """Parameters with their ranges, standard errors and 90 % intervals [parameter units]."""

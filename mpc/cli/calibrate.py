@@ -37,6 +37,10 @@ def calibrate(
     tune: Annotated[options.Intervals, options.interval("Tuning", "the first two thirds")] = None,
     hold_out: Annotated[options.Intervals, options.interval("Held-out", "the last third")] = None,
     dx: options.Dx = None,
+    structure: Annotated[
+        str,
+        options.value("drawn; lumped, free a zone and a pair; chosen: which predicts left-out days better.", "NAME"),
+    ] = "chosen",
     effects: Annotated[str, options.value("Effects that are known to be there, in the whole building.", "ID,...")] = "",
     horizon: options.Horizon = "6h",
     scheme: options.SchemeName = None,
@@ -68,7 +72,9 @@ def calibrate(
         "tune": tune or [], "hold_out": hold_out or [], "dx": dx, "horizon": horizon,
         "scheme": scheme or "implicit_euler", "objective": objective, "loss": loss, "starts": starts, "seed": seed,
         "effects": [name.strip() for name in effects.split(",") if name.strip()],
+        "climb": structure == "chosen", "structure": {"lumped": True, "sun": True} if structure == "lumped" else {},
     }  # fmt: skip
+    CalibrationError.unless_known(structure, ("chosen", "drawn", "lumped"), "--structure", "chosen, drawn or lumped")
     if workers is not None and scheduler is not None:
         raise CalibrationError("--workers and --scheduler: expected one of them; a cluster has workers of its own")
     if not (case / _BUILDING).exists() and (cases := case_folders(case)):

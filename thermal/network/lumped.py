@@ -34,7 +34,13 @@ _RANGE = 30.0
 _LEAST = 0.1
 
 #: Directions that the sun is taken from [deg]: azimuth and tilt of the compass's points and of a roof.
-_PLANES = {"north": (0.0, 90.0), "east": (90.0, 90.0), "south": (180.0, 90.0), "west": (270.0, 90.0), "roof": (0.0, 0.0)}
+_PLANES = {
+    "north": (0.0, 90.0),
+    "east": (90.0, 90.0),
+    "south": (180.0, 90.0),
+    "west": (270.0, 90.0),
+    "roof": (0.0, 0.0),
+}
 
 #: Solar transmittance of a pane that nothing tells [-]: double glazing (EN 410).
 _TRANSMITTANCE = 0.6
@@ -139,7 +145,7 @@ def _nearest(pane: Pane) -> str:
     """Direction that a pane looks to."""
     if pane.tilt < 45.0:
         return "roof"
-    return ("north", "east", "south", "west")[int((pane.azimuth + 45.0) % 360.0 // 90.0) % 4]
+    return _COMPASS[int((pane.azimuth + 45.0) % 360.0 // 90.0) % 4]
 
 
 def _on_plane(inputs: InputProvider, azimuth: float, tilt: float) -> FloatArray:
