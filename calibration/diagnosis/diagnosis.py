@@ -19,7 +19,9 @@ from calibration.diagnosis.screen.missing import Missing, at_start, missing_heat
 from calibration.evaluation.intervals import Interval
 from calibration.evaluation.n_step import Evaluation, Progress
 from calibration.evaluation.settings import ModelSettings
-from calibration.fit.result import SolverReport, effect_entries
+from calibration.fit.fitted_case import FittedCase
+from calibration.fit.ladder import beside_lumped, is_large
+from calibration.fit.result import CalibrationResult, Rung, SolverReport, effect_entries
 from calibration.results import Axes, Result, plain
 from thermal.case.case import Case
 from thermal.effects.catalogue import CATALOGUE
@@ -88,6 +90,10 @@ class Diagnosis(Result):
     last_third : float or None
         Held-out mean absolute error of a baseline tuned on the first two thirds [K], where that was so large that
         tuning and held-out days alternate instead.
+    rungs : tuple of Rung
+        The final model and the lumped one by their errors on left-out tuning days; empty where there was no choice.
+    lumped : CalibrationResult or None
+        The lumped model, where it predicts those days better.
     """
 
     case: str
@@ -107,6 +113,8 @@ class Diagnosis(Result):
     settings: ModelSettings = field(default_factory=ModelSettings)
     horizon: str = "6h"
     last_third: float | None = None
+    rungs: tuple[Rung, ...] = ()
+    lumped: CalibrationResult | None = None
 
     @property
     def final(self) -> Fit:
@@ -154,6 +162,7 @@ class Diagnosis(Result):
             "combinations": [{"effects": list(e), "probability": p} for e, p in self.verdict.combinations.items()],
             "how_far": [s.to_dict() for s in self.steps],
             "rounds": [r.to_dict() | {"worth": gains_of(r)} for r in self.rounds],
+            "prediction": {"rungs": plain(self.rungs), "held_out_mae": self.predicts},
             "intervals": {
                 "tuning": plain(self.tuned),
                 "held_out": plain(self.judged),
@@ -161,6 +170,13 @@ class Diagnosis(Result):
             },
             **{key: getattr(self, key) for key in ("seconds", "case", "version", "seed")},
         }  # fmt: skip
+
+    @property
+    def predicts(self) -> float:
+        """Held-out mean absolute error of the model that is handed on: `final`, or the lumped one [K]."""
+        if self.lumped is not None:
+            return self.lumped.calibrated["held_out"].metrics.mae
+        return self.steps[-1].after if self.steps else self.gap
 
     def replays(self) -> list[Replay]:
         """Replay the calibrated baseline on the held-out intervals, and the final model where it has an effect."""
@@ -173,7 +189,9 @@ class Diagnosis(Result):
         ]
 
     def calibration(self) -> dict[str, Any]:
-        """Contents of the ``calibration.json`` of the final model."""
+        """Contents of the ``calibration.json`` of the final model, or of the lumped one where that predicts better."""
+        if self.lumped is not None:
+            return self.lumped.to_dict()
         final, found = self.final, self.final.found
         parameters, status = final.describe(), "settled" if found.converged else "evaluations used up"
         intervals = {"tuning": self.tuned, "held_out": self.judged}
@@ -267,6 +285,7 @@ def diagnose(
     steps, floor = how_far(models, rounds)
     areas = {name: room.floor_area for name, room in models.anatomy.rooms.items()}
     watts = rounds[0].screening.detectable(ACCEPTED)
+    rungs, lumped = _beside_lumped(models, rounds[-1].after, progress)
     return Diagnosis(
         case=case.building.name,
         verdict=judge(rounds, untestable),
@@ -284,7 +303,19 @@ def diagnose(
         settings=replace(models.settings, normalisation=models.drivers.normalisation),
         horizon=horizon,
         last_third=first.mae if turns else None,
+        rungs=rungs,
+        lumped=None if lumped is None else replace(lumped.result(began, progress), rungs=rungs),
     )
+
+
+def _beside_lumped(
+    models: ModelComparison, final: Fit, progress: Progress | None
+) -> tuple[tuple[Rung, ...], FittedCase | None]:
+    """Fit the building lumped, beside the final model."""
+    if is_large(final.built.network.zones):
+        return (), None
+    name = "named" if final.effects else "drawn"
+    return beside_lumped(name, final.problem, final.model, final.found.point, models, progress)
 
 
 def baseline_gap(

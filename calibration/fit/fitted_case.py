@@ -48,6 +48,16 @@ class FittedCase:
     judged: tuple[Interval, ...]
     settings: CalibrationSettings
 
+    @property
+    def case(self) -> Case:
+        """Building and telemetry."""
+        return self.model.case
+
+    @property
+    def calibration(self) -> CalibrationSettings:
+        """Settings of the fit."""
+        return self.settings
+
     def result(self, began: float, progress: Progress | None = None) -> CalibrationResult:
         """Judge the estimate on the grid and on the held-out intervals.
 

@@ -4,6 +4,7 @@ import itertools
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
+from typing import Protocol
 
 import numpy as np
 import pandas as pd
@@ -12,12 +13,14 @@ from calibration.errors import NotEnoughDataError
 from calibration.evaluation.intervals import Interval, Runs, select_runs
 from calibration.evaluation.n_step import Progress, spatial_metrics
 from calibration.evaluation.settings import CalibrationSettings
-from calibration.fit.estimate import Estimate
 from calibration.fit.fitted_case import FittedCase, fit_case
 from calibration.fit.least_squares import solve_least_squares
+from calibration.fit.problem import Problem
 from calibration.fit.result import CalibrationResult, Rung
+from thermal._types import FloatArray
 from thermal.case.case import Case
 from thermal.inputs.provider import telemetry_inputs
+from thermal.model.reduce import ReducedModel
 from thermal.network.structure import BASELINE, Structure
 
 #: Parts that tuning days are cut into, each left out once, and the least length of one [days].
@@ -49,61 +52,116 @@ def climb(drawn: FittedCase, began: float, progress: Progress | None = None) -> 
     """
     chosen = drawn.settings
     asked = chosen.effects or chosen.scopes or chosen.fixed or chosen.structure != BASELINE
-    many = len(drawn.model.grid.network.zones) > _MOST_ZONES
-    if asked or many or chosen.objective != "multi_step":
+    if asked or is_large(drawn.model.grid.network.zones) or chosen.objective != "multi_step":
         return drawn.result(began, progress)
-    fitted = [drawn, fit_lumped(drawn.model.case, drawn.tuned, drawn.judged, chosen, progress)]
-    errors = [left_out(f.best, drawn.tuned, chosen.spin_up_seconds) for f in fitted]
-    best = int(errors[1] < errors[0])
-    rungs = tuple(
-        Rung(name, error, len(f.best.problem.free), number == best)
-        for number, (name, error, f) in enumerate(zip(("drawn", "lumped"), errors, fitted, strict=True))
-    )
-    result = replace(fitted[best].result(began, progress), rungs=rungs)
+    best = drawn.best
+    rungs, lumped = beside_lumped("drawn", best.problem, best.model, best.point, drawn, progress)
+    if lumped is None:
+        return replace(drawn.result(began, progress), rungs=rungs)
     # before is what the drawing says
-    return replace(result, uncalibrated=drawn.uncalibrated(progress)) if best else result
+    return replace(lumped.result(began, progress), rungs=rungs, uncalibrated=drawn.uncalibrated(progress))
 
 
-def fit_lumped(
-    case: Case,
-    tuned: Sequence[Interval],
-    judged: Sequence[Interval],
-    settings: CalibrationSettings,
-    progress: Progress | None = None,
-) -> FittedCase:
-    """Fit the lumped structure, from the drawing alone; with the sun where irradiance is measured.
+def is_large(zones: Sequence[str]) -> bool:
+    """Whether a building has too many zones to be fitted lumped.
 
     Parameters
     ----------
-    case : Case
-        Building and telemetry.
-    tuned, judged : sequence of Interval
-        Where it is fitted, and where it will be judged.
-    settings : CalibrationSettings
-        Of the fit as drawn.
+    zones : sequence of str
+        Their names.
+    """
+    return len(zones) > _MOST_ZONES
+
+
+class Tuned(Protocol):
+    """A case with the days that tune, those that judge, and the settings of a fit."""
+
+    @property
+    def case(self) -> Case:
+        """Building and telemetry."""
+
+    @property
+    def tuned(self) -> Sequence[Interval]:
+        """Where it is fitted."""
+
+    @property
+    def judged(self) -> Sequence[Interval]:
+        """Where it will be judged."""
+
+    @property
+    def calibration(self) -> CalibrationSettings:
+        """Of the fit as drawn."""
+
+
+def beside_lumped(
+    name: str,
+    problem: Problem,
+    model: ReducedModel,
+    point: FloatArray,
+    given: Tuned,
+    progress: Progress | None = None,
+) -> tuple[tuple[Rung, ...], FittedCase | None]:
+    """Fit the lumped structure beside a fitted model; it is returned where it predicts left-out days better.
+
+    The sun is a part of it where irradiance is measured.
+
+    Parameters
+    ----------
+    name : str
+        Of the fitted model.
+    problem : Problem
+        That it solves.
+    model : ReducedModel
+        Accurate at its estimate.
+    point : ndarray, shape (n_free,)
+        Its estimate on the estimation scale [-].
+    given : Tuned
+        The case and its days.
     progress : callable, optional
         Called with stage, done, total.
+
+    Returns
+    -------
+    tuple
+        Both rungs, and the lumped model or None.
     """
-    structure = Structure(lumped=True, sun=telemetry_inputs(case).gives("sun"))
+    settings = given.calibration
+    structure = Structure(lumped=True, sun=telemetry_inputs(given.case).gives("sun"))
     # its priors hold it so well that further starts find the same
-    return fit_case(case, tuned, judged, replace(settings, structure=structure, starts=1), progress)
+    settings = replace(settings, structure=structure, starts=1)
+    lumped = fit_case(given.case, given.tuned, given.judged, settings, progress)
+    own = lumped.best
+    models = ((problem, model, point), (own.problem, own.model, own.point))
+    errors = [left_out(*fitted, given.tuned, settings.spin_up_seconds) for fitted in models]
+    better = errors[1] < errors[0]
+    rungs = (
+        Rung(name, errors[0], len(problem.free), not better),
+        Rung("lumped", errors[1], len(own.problem.free), better),
+    )
+    return rungs, lumped if better else None
 
 
-def left_out(best: Estimate, tuned: Sequence[Interval], spin_up_seconds: float) -> float:
+def left_out(
+    problem: Problem, model: ReducedModel, point: FloatArray, tuned: Sequence[Interval], spin_up_seconds: float
+) -> float:
     """Mean absolute error on tuning days that are left out in turn, fitted anew from the others [K].
 
     Weights and the reduced model stay those of the fit of all days.
 
     Parameters
     ----------
-    best : Estimate
+    problem : Problem
         Fitted on all tuning days.
+    model : ReducedModel
+        Accurate at the estimate.
+    point : ndarray, shape (n_free,)
+        The estimate on the estimation scale [-].
     tuned : sequence of Interval
-        These.
+        The tuning days.
     spin_up_seconds : float
         Length of the spin-up before an interval [s].
     """
-    problem, errors = best.problem, []
+    errors = []
     for part in _parts(tuned):
         kept = [_outside(problem.inputs.stamps, runs, problem.steps, part) for runs in problem.runs]
         try:
@@ -115,9 +173,9 @@ def left_out(best: Estimate, tuned: Sequence[Interval], spin_up_seconds: float) 
             continue
         share = sum(r.starts.size for r in rest) / sum(r.starts.size for r in problem.runs)
         fold = replace(problem, runs=rest, effective=share * problem.effective_size())
-        weighted = partial(fold.weighted, best.model)
-        found = solve_least_squares(weighted, best.point, *problem.bounds, tolerance=1e-2)
-        error, _ = fold.errors(best.model, fold.theta(found.x), left, slopes=False)
+        weighted = partial(fold.weighted, model)
+        found = solve_least_squares(weighted, point, *problem.bounds, tolerance=1e-2)
+        error, _ = fold.errors(model, fold.theta(found.x), left, slopes=False)
         errors.append(error[:, -1])
     return spatial_metrics(np.concatenate(errors)).mae if len(errors) > 1 else float("nan")
 

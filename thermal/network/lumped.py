@@ -20,7 +20,7 @@ from thermal.inputs.signals import Signal
 from thermal.network.graph import GraphBuilder
 from thermal.network.network import ThermalNetwork
 from thermal.network.structure import Structure
-from thermal.network.topology import Pane, Room
+from thermal.network.topology import UPWARD, VERTICAL, Pane, Room
 from thermal.parameters import PARAMETERS
 
 #: Factor that the drawing's sums are within, 95 times in a hundred [-]: what surveys, drawings and guesses are off by.
@@ -34,13 +34,8 @@ _RANGE = 30.0
 _LEAST = 0.1
 
 #: Directions that the sun is taken from [deg]: azimuth and tilt of the compass's points and of a roof.
-_PLANES = {
-    "north": (0.0, 90.0),
-    "east": (90.0, 90.0),
-    "south": (180.0, 90.0),
-    "west": (270.0, 90.0),
-    "roof": (0.0, 0.0),
-}
+_COMPASS = ("north", "east", "south", "west")
+_PLANES = {**{name: (90.0 * number, VERTICAL) for number, name in enumerate(_COMPASS)}, "roof": (0.0, UPWARD)}
 
 #: Solar transmittance of a pane that nothing tells [-]: double glazing (EN 410).
 _TRANSMITTANCE = 0.6

@@ -12,7 +12,7 @@ from calibration.errors import NotEnoughDataError
 from calibration.evaluation import intervals
 from calibration.evaluation.intervals import Interval, horizon_steps
 from calibration.evaluation.n_step import Evaluation, EvaluationSettings, evaluate_model
-from calibration.evaluation.settings import ModelSettings
+from calibration.evaluation.settings import CalibrationSettings, ModelSettings, calibration_settings
 from calibration.fit.problem import Problem, tuning_runs
 from calibration.fit.result import ParameterEstimate, describe_parameters
 from thermal._types import FloatArray
@@ -200,6 +200,11 @@ class ModelComparison:
 
     def __post_init__(self) -> None:
         self.tuned, self.judged = intervals.default_intervals(self.case, self.tune, self.hold_out)
+
+    @property
+    def calibration(self) -> CalibrationSettings:
+        """Settings of a calibration of the baseline."""
+        return calibration_settings(self.settings, {"horizon": self.horizon})
 
     def alternate(self, inputs: Inputs) -> bool:
         """Let tuning and held-out days take turns where no intervals were given; whether they do now.
