@@ -109,7 +109,9 @@ def precision(problem: Problem, model: SymbolicModel, theta: FloatArray, disturb
     curvature, score, errors = np.zeros((p, p)), np.zeros((p, p)), 0
     reach = np.zeros((len(inputs), n_zone, p))
     held: NDArray[np.bool_] = np.asarray(np.isfinite(inputs.held).all(axis=0))
-    unknown = np.concatenate([[_swing(inputs.boundary[:, :1], inputs)[0]], _swing(inputs.held[:, held], inputs)])
+    last = max(int(runs.starts[-1]) for runs in problem.runs) + problem.steps + 1  # nothing of what comes after
+    seen = np.hstack([inputs.boundary[:last, :1], inputs.held[:last, held]])
+    unknown = _swing(seen, inputs)
     for runs in problem.runs:
         error, slopes = problem.errors(model, theta, runs, slopes=True)
         jacobian = np.where(np.isfinite(error)[..., None], np.asarray(slopes) * scale, 0.0)

@@ -30,14 +30,11 @@ FIRST_DEVIATION = 0.3
 #: normal (Huber 1981, Robust Statistics, ch. 4).
 _OUTLYING = 1.345
 
-#: Median of the size of a standard normal [-].
-_MEDIAN_SIZE = 0.6744897501960817
+_MEDIAN_SIZE = 0.6744897501960817  #: Median of the size of a standard normal [-].
 
-#: First spread of a group's members about their common value on the estimation scale [-]: a third.
-SHRINKAGE = 0.3
-
-#: That of a lumped model's multipliers [-]: what drawings know of single zones and pairs is within a factor of seven.
-_LUMPED_SHRINKAGE = 1.0
+#: First spread of a group's members about their common value on the estimation scale [-]: a third, and of a lumped
+#: model's multipliers, where drawings know little of single zones and pairs, a factor of seven in 95 %.
+SHRINKAGE, _LUMPED_SHRINKAGE = 0.3, 1.0
 
 
 @dataclass(frozen=True)
@@ -70,8 +67,7 @@ class Problem:
         Spread of a group's members (one parameter of several facades or zones) about their common value on the
         estimation scale [-], by the group's base name; 0.3 where it says nothing.
     capped : bool
-        Whether errors never count for more than one a day and zone, as they may not where what the model lacks is
-        common to them; a lumped model lacks little, and its errors count as their own correlation says.
+        Whether errors never count for more than one a day and zone, as where what the model lacks is common to them.
     """
 
     grid: SymbolicModel
@@ -346,11 +342,10 @@ def tuning_problem(case: Case, tune: Sequence[Interval] = (), settings: ModelSet
     CalibrationError.unless(free, "fixed", expected, f"all {len(given)}", "evaluate instead")
     steps = horizon_steps(chosen.horizon, inputs.step)
     runs = tuning_runs(inputs, merge(tune) or default_intervals(case)[0], steps, chosen.spin_up_seconds)
-    return Problem(
-        SymbolicModel(network), inputs, runs, steps, free, given, chosen.stepping, loss=chosen.loss,
-        shrinkage=dict.fromkeys(network.groups, _LUMPED_SHRINKAGE) if chosen.structure.lumped else {},
-        capped=not chosen.structure.lumped,
-    )  # fmt: skip
+    lumped = chosen.structure.lumped
+    shrinkage = dict.fromkeys(network.groups if lumped else (), _LUMPED_SHRINKAGE)
+    problem = Problem(SymbolicModel(network), inputs, runs, steps, free, given, chosen.stepping)
+    return replace(problem, loss=chosen.loss, shrinkage=shrinkage, capped=not lumped)
 
 
 def tuning_runs(inputs: Inputs, intervals: Sequence[Interval], steps: int, spin_up: float) -> tuple[Runs, ...]:

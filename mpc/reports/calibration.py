@@ -103,12 +103,33 @@ def calibration_verdict(result: CalibrationResult) -> str:
         f"{kelvin(after)} K on average. Before calibration it was {kelvin(before)} K" + _change(before, after),
         f"Assuming that nothing changes misses by {kelvin(rest)} K"
         + ("." if rest > after else ", less than the model."),
+        *_structure_sentences(result),
         _parameter_sentence(result.parameters),
     ]
     if not result.solver.success:
         status = result.solver.status
         sentences.insert(0, f"The solver stopped before it converged ({status}): do not rely on these numbers.")
     return " ".join(sentences)
+
+
+#: Conductances and capacities that a verdict says to be far from the drawing's; the data have them all.
+_MOST_FAR = 3
+
+
+def _structure_sentences(result: CalibrationResult) -> list[str]:
+    """Which structure was kept and why, and what it says of the drawing."""
+    if not result.rungs:
+        return []
+    kept = next(rung for rung in result.rungs if rung.chosen)
+    errors = ", ".join(f"{rung.name} {kelvin(rung.left_out_mae)} K" for rung in result.rungs)
+    what = "lumped into air and mass a zone" if kept.name == "lumped" else f"as {kept.name}"
+    sentences = [f"The building is taken {what}, which predicts tuning days best that were left out ({errors})."]
+    far = result.against_drawing()
+    named = [f"{in_words(f['what'].replace('@', ' of '))} {f['factor']:.2g}" for f in far[:_MOST_FAR]]
+    if named:
+        rest = f" and {len(far) - len(named)} more" if len(far) > len(named) else ""
+        sentences.append(f"Farthest from the drawing, as factors on it: {', '.join(named)}{rest}.")
+    return sentences
 
 
 def _change(before: float, after: float) -> str:

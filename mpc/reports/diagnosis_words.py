@@ -36,6 +36,20 @@ def diagnosis_verdict(result: Diagnosis) -> str:
     result : Diagnosis
         From `diagnose`.
     """
+    text = _verdict(result)
+    if result.lumped is None:
+        return text
+    beside = next(rung.left_out_mae for rung in result.rungs if not rung.chosen)
+    own = next(rung.left_out_mae for rung in result.rungs if rung.chosen)
+    return (
+        f"{text} For prediction and control take the lumped model that calibration.json holds: it misses tuning days "
+        f"that were left out by {kelvin(own)} K, this one by {kelvin(beside)} K; and held-out days by "
+        f"{kelvin(result.predicts)} K."
+    )
+
+
+def _verdict(result: Diagnosis) -> str:
+    """Say which effect is missing, and how far the error falls with it."""
     if result.verdict.name == "no_gap":
         return _no_gap(result)
     if result.verdict.name == "unexplained":

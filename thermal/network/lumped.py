@@ -33,6 +33,9 @@ _RANGE = 30.0
 #: find what no drawing shows, such as an open door: a twentieth of a door's in a room of 15 m2.
 _LEAST = 0.1
 
+#: Share of it that is enough where the drawing tells which zones lie outside [-].
+_KNOWN = 0.1
+
 #: Directions that the sun is taken from [deg]: azimuth and tilt of the compass's points and of a roof.
 _COMPASS = ("north", "east", "south", "west")
 _PLANES = {**{name: (90.0 * number, VERTICAL) for number, name in enumerate(_COMPASS)}, "roof": (0.0, UPWARD)}
@@ -48,7 +51,7 @@ class _Drawn:
     Parameters
     ----------
     direct, slow : ndarray, shape (n_zone, n_boundary)
-        Conductances to the boundaries past the masses and through them [W/K].
+        Conductances to the boundaries from the air, past the masses, and from the mass [W/K].
     pairs : ndarray, shape (n_zone, n_zone)
         Conductances between the zones in a steady state [W/K].
     inner : ndarray, shape (n_zone,)
@@ -99,7 +102,7 @@ def lump(network: ThermalNetwork, quality: GeometryQuality, structure: Structure
         graph.capacity(f"mass {zone}", multiplier("mass_capacity_multiplier", zone), mass[i], drawn.mass[i])
         value = multiplier("mass_coupling_multiplier", zone)
         graph.face(f"air-mass {zone}", value, air[i], mass[i], drawn.inner[i])
-        least = _LEAST * area[i]
+        least = (1.0 if quality == "generic" else _KNOWN) * _LEAST * area[i]
         for j, name in enumerate(network.boundaries):
             if quality != "generic" and drawn.direct[i, j] + drawn.slow[i, j] < least:
                 continue
@@ -182,12 +185,14 @@ def _drawn(network: ThermalNetwork) -> _Drawn:
     steady = to_rest @ follows
     pairs = beside + steady[:, :count]
     np.fill_diagonal(pairs, 0.0)
-    shares = follows[:, :count]
+    shares, coupled, through = follows[:, :count], to_rest.sum(axis=1), steady[:, count:]
+    # behind the coupling of air and mass, so that both in series are the drawing's
+    behind = coupled / np.maximum(coupled - through.sum(axis=1), 0.1 * coupled)
     return _Drawn(
         direct=direct,
-        slow=steady[:, count:],
+        slow=through * behind[:, None],
         pairs=pairs,
-        inner=to_rest.sum(axis=1),
+        inner=coupled,
         air=member @ capacity,
         mass=shares.T @ capacity[rest],
     )
