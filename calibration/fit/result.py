@@ -26,6 +26,12 @@ BOUND_SHARE = 0.01
 #: Factor beyond which a lumped model is said to disagree with the drawing [-]: half as much again.
 _FAR = 1.5
 
+#: Multipliers that would be 1 if the drawing were right; more than its air follows a zone's air within minutes.
+DRAWN_SUMS = (
+    "mass_capacity_multiplier", "mass_coupling_multiplier", "air_boundary_multiplier", "mass_boundary_multiplier",
+    "zone_coupling_multiplier",
+)  # fmt: skip
+
 #: Tails of a 90 % interval [-].
 _TAILS = (0.05, 0.95)
 
@@ -219,15 +225,14 @@ class CalibrationResult(Result):
         Those whose 90 % interval of the factor [-] lies beyond a factor of 1.5 to either side.
         """
         far = [
-            (p.value / p.start, p.name, [end / p.start for end in p.interval90])
+            {"what": p.name, "factor": p.value, "interval90": p.interval90}
             for p in self.parameters
             if self.settings.structure.lumped
-            and p.base.endswith("_multiplier")
+            and p.base in DRAWN_SUMS
             and p.interval90 is not None
-            and not p.interval90[0] / _FAR < p.start < p.interval90[1] * _FAR
+            and not p.interval90[0] / _FAR < 1.0 < p.interval90[1] * _FAR
         ]
-        ranked = sorted(far, key=lambda f: -abs(np.log(f[0])))
-        return [{"what": name, "factor": factor, "interval90": ends} for factor, name, ends in ranked]
+        return sorted(far, key=lambda entry: -abs(np.log(entry["factor"])))
 
     def to_frame(self) -> pd.DataFrame:
         """Parameters with their ranges, standard errors and 90 % intervals [parameter units]."""

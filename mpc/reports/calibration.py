@@ -141,11 +141,14 @@ def _change(before: float, after: float) -> str:
 def _parameter_sentence(parameters: Sequence[ParameterEstimate]) -> str:
     estimated = [p for p in parameters if p.standard_error is not None]
     told = sum(p.identifiable for p in estimated)
-    bound = [in_words(p.name) for p in estimated if p.at_bound]
-    free = len(estimated) - told - len(bound)
+    absent = [p for p in estimated if p.at_bound and p.base == "solar_aperture" and p.value < p.start]
+    bound = [in_words(p.name) for p in estimated if p.at_bound and p not in absent]
+    free = len(estimated) - told - len(bound) - len(absent)
     parts = [f"Of {counted(len(estimated), 'estimated parameter')} the data determine {told or 'none'}"]
     if free:
         parts.append(f"{free} stay{'s' if free == 1 else ''} open within the physical range")
+    if absent:
+        parts.append(f"{len(absent)} say that no sun enters from there")
     if not bound:
         return "; ".join([*parts, "none lies on a bound."])
     names = f" ({', '.join(bound)})" if len(bound) < 4 else ""
