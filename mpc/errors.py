@@ -83,5 +83,3 @@ class BoptestTimeoutError(BoptestError):
 
 class EnergyPlusError(PlantError):
     """EnergyPlus is missing, has no such building, or a run of it failed."""
-
-

@@ -136,6 +136,8 @@ class CalibrationSettings(ModelSettings):
         The best is kept, and a start that fails costs that start only.
     seed : int
         Seed of the draws.
+    yardsticks : bool
+        Whether simple models are fitted too, whose errors stand beside the model's.
 
     Raises
     ------
@@ -149,6 +151,7 @@ class CalibrationSettings(ModelSettings):
     loss: Loss = "linear"
     starts: int = 3
     seed: int = 0
+    yardsticks: bool = True
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -11,6 +11,7 @@ from calibration.evaluation.case_model import CaseModel, GridCheck
 from calibration.evaluation.intervals import Interval, default_intervals, horizon_steps, select_runs
 from calibration.evaluation.n_step import HORIZONS, Evaluation, EvaluationSettings, Progress
 from calibration.evaluation.settings import ModelSettings, calibration_settings
+from calibration.evaluation.simple_models import with_yardsticks
 from calibration.fit.estimate import solve_starts
 from calibration.fit.likelihood import InnovationsProblem
 from calibration.fit.problem import tuning_problem
@@ -86,6 +87,12 @@ def calibrate(
     intervals = {"tuning": tuned, "held_out": judged}
     uncalibrated, _ = _evaluated(before, first, intervals, chosen.horizon, progress)
     calibrated, check = _evaluated(after, best.model, intervals, chosen.horizon, progress)
+    if chosen.yardsticks:
+        judge = calibrated["held_out"]
+        anatomy, spin_up = grid.network.anatomy, chosen.spin_up_seconds
+        calibrated["held_out"] = with_yardsticks(judge, case, inputs, anatomy, tuned, spin_up)
+        same = calibrated["held_out"].yardsticks
+        uncalibrated["held_out"] = replace(uncalibrated["held_out"], yardsticks=same)
     seconds = time.perf_counter() - began
     information = information_of(best)
     solve = best.solve

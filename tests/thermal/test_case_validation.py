@@ -35,10 +35,16 @@ def test_unknown_zone_of_a_device_in_a_zone_table(table_draft: Any) -> None:
 @pytest.mark.parametrize(
     ("fed_by", "message"),
     [
-        (["AHUU"], r"devices\[0\] \(VAV_A\): fed_by: expected a device of the building, found 'AHUU'; the nearest valid one is 'AHU'"),
+        (
+            ["AHUU"],
+            r"devices\[0\] \(VAV_A\): fed_by: expected a device of the building, found 'AHUU'; the nearest valid one is 'AHU'",
+        ),
         (["AHU", "VAV_A"], r"devices\[0\] \(VAV_A\): fed_by: expected other devices, found 'VAV_A', the device itself"),
         (["AHU", "AHU"], r"devices\[0\] \(VAV_A\): fed_by: expected each feeder once, found AHU, AHU"),
-        (["RAD_B"], r"fed_by: expected feeders without a circle, found (VAV_A <- RAD_B <- VAV_A|RAD_B <- VAV_A <- RAD_B)"),
+        (
+            ["RAD_B"],
+            r"fed_by: expected feeders without a circle, found (VAV_A <- RAD_B <- VAV_A|RAD_B <- VAV_A <- RAD_B)",
+        ),
         ("AHU", r"devices\[0\]\.fed_by: expected a list, found 'AHU'"),
         ([""], r"devices\[0\]\.fed_by\[0\]: "),
     ],
@@ -120,7 +126,9 @@ def test_plan_files_that_are_missing_or_elsewhere(plan_draft: Any, plan: str) ->
     (plan_draft.folder.parent / "plan_F1.csv").write_text("#\n")
     plan_draft.content["floors"][0]["plan"] = plan
     outside = plan.startswith(("..", "/", "sub"))
-    expected = "a file inside" if outside else "a file of the case folder" if plan else "String should have at least 1 char"
+    expected = (
+        "a file inside" if outside else "a file of the case folder" if plan else "String should have at least 1 char"
+    )
     with pytest.raises(CaseError, match=rf"floors\[0\]\.plan: expected {expected}"):
         load_case(plan_draft.write())
 
@@ -198,9 +206,7 @@ def test_surface_of_an_unknown_zone(table_draft: Any) -> None:
 
 def test_surface_of_an_unknown_construction(table_draft: Any) -> None:
     surface(table_draft, 0, construction="bricks")
-    refused(
-        table_draft, CaseError, r"surfaces\[0\] \(W1\): construction: .*nearest valid one is 'brick'"
-    )
+    refused(table_draft, CaseError, r"surfaces\[0\] \(W1\): construction: .*nearest valid one is 'brick'")
 
 
 @pytest.mark.parametrize("other", ["atic", "outdoors", "cellar"])

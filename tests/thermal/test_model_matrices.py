@@ -153,7 +153,10 @@ def test_slopes_of_the_matrices_are_those_of_finite_differences(name: str) -> No
     for j in range(theta.size):
         flow = central(lambda t: model.matrices(t).flow.toarray(), theta, j)
         capacity = central(lambda t: model.matrices(t).capacity.toarray(), theta, j)
-        for found, wanted, whole in ((m.flow_sensitivities[j], flow, m.flow), (m.capacity_sensitivities[j], capacity, m.capacity)):
+        for found, wanted, whole in (
+            (m.flow_sensitivities[j], flow, m.flow),
+            (m.capacity_sensitivities[j], capacity, m.capacity),
+        ):
             assert np.abs(found.toarray() - wanted).max() < 1e-6 * np.abs(whole.toarray()).max() / theta[j]
             strong = np.abs(wanted) > 1e-3 * np.abs(whole.toarray()) / theta[j]
             np.testing.assert_allclose(found.toarray()[strong], wanted[strong], rtol=1e-6)

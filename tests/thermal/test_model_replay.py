@@ -234,9 +234,7 @@ def test_slopes_of_spin_up_and_free_run_are_those_of_finite_differences(name: st
 
     matrices = model.matrices(theta, sensitivities=True)
     states, moved = spin_up(matrices, inputs, 0, starts)
-    found, slopes = free_runs(
-        matrices, inputs, starts, keep, states, moved, scheme=SCHEMES[scheme]
-    )
+    found, slopes = free_runs(matrices, inputs, starts, keep, states, moved, scheme=SCHEMES[scheme])
     np.testing.assert_allclose(found, means(theta), rtol=0, atol=1e-10)
     assert slopes is not None
     assert slopes.shape == (2, 2, 2, theta.size)

@@ -100,7 +100,10 @@ def test_equal_values_are_the_global_model(name: str, nodes: int | None) -> None
     for network, names in ((one, [parameter]), (own, members)):
         m = SymbolicModel(network).matrices(network.start(), sensitivities=True)
         at = [[p.name for p in network.parameters].index(n) for n in names]
-        slopes += [sum(m.flow_sensitivities[i].toarray() for i in at), sum(m.capacity_sensitivities[i].toarray() for i in at)]
+        slopes += [
+            sum(m.flow_sensitivities[i].toarray() for i in at),
+            sum(m.capacity_sensitivities[i].toarray() for i in at),
+        ]
     np.testing.assert_allclose(slopes[0], slopes[2], atol=1e-9 * max(1.0, np.abs(slopes[0]).max()))
     np.testing.assert_allclose(slopes[1], slopes[3], atol=1e-9 * max(1.0, np.abs(slopes[1]).max()))
 

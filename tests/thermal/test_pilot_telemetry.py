@@ -61,7 +61,9 @@ def weather() -> pd.DataFrame:
 @pytest.fixture(scope="module")
 def exact(plans: FloorPlans, weather: pd.DataFrame) -> tuple[TwoNodePlant, Telemetry]:
     plant = TwoNodePlant(plans)
-    return plant, generate_telemetry(plant, plans, weather, TelemetrySettings(seed=5, spin_up_days=1.0, noise=0.0, resolution=0.0))
+    return plant, generate_telemetry(
+        plant, plans, weather, TelemetrySettings(seed=5, spin_up_days=1.0, noise=0.0, resolution=0.0)
+    )
 
 
 @pytest.fixture(scope="module")
@@ -178,7 +180,9 @@ def test_the_loop_is_stable_on_air_alone(plans: FloorPlans, weather: pd.DataFram
 
 def test_same_seed_same_telemetry(plans: FloorPlans, weather: pd.DataFrame) -> None:
     day = weather.iloc[:288]
-    runs = [generate_telemetry(TwoNodePlant(plans), plans, day, TelemetrySettings(seed=seed)).frame for seed in (1, 1, 2)]
+    runs = [
+        generate_telemetry(TwoNodePlant(plans), plans, day, TelemetrySettings(seed=seed)).frame for seed in (1, 1, 2)
+    ]
     pd.testing.assert_frame_equal(runs[0], runs[1])
     assert not runs[0].equals(runs[2])
 

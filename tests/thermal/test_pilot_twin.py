@@ -88,7 +88,9 @@ def test_without_disturbance_and_noise_the_true_model_replays_it(quiet: Twin) ->
 def test_after_a_long_hold_it_replays_without_the_true_states(building: Building) -> None:
     """Light walls and slabs forget their start within four days of zones held at their temperatures."""
     fixed = {"exterior_wall_heat_capacity": 200.0, "interior_wall_heat_capacity": 200.0, "slab_heat_capacity": 3e4}
-    case, truth = generate(building, 2, TwinSettings(days=5.0, spin_up_days=1.0, dx=1.5, ranges=QUIET, meter="exact", fixed=fixed))
+    case, truth = generate(
+        building, 2, TwinSettings(days=5.0, spin_up_days=1.0, dx=1.5, ranges=QUIET, meter="exact", fixed=fixed)
+    )
     network = build_network(case.building, dx=1.5)
     matrices, inputs = SymbolicModel(network).matrices(truth.theta), replay_inputs(case, network)
     starts = np.array([4 * 288 + 12 * hour for hour in (2, 4, 13, 15)])
@@ -197,7 +199,9 @@ def test_noise_is_white_and_of_its_deviation(sensed: Twin) -> None:
 
 def test_the_disturbance_is_as_large_as_said(building: Building) -> None:
     areas = np.array(list(zone_floor_areas(building.geometry).values()))  # type: ignore[arg-type]
-    per_area = [generate(building, seed, TwinSettings(ranges=LOUD, days=1.0, spin_up_days=1.0, dx=1.5))[1] for seed in range(8)]
+    per_area = [
+        generate(building, seed, TwinSettings(ranges=LOUD, days=1.0, spin_up_days=1.0, dx=1.5))[1] for seed in range(8)
+    ]
     values = np.stack([truth.disturbance[::72] / areas for truth in per_area])  # 6 h: three correlation times
     assert values.std() == pytest.approx(2.0, rel=0.15)
 

@@ -10,7 +10,9 @@ from thermal.shuffle.random import execute_swaps
 def apply_swaps(temperatures, first, second, capacities=None):
     """Swaps of lists of cells, on a copy."""
     cells = (np.array(given, dtype=np.intp) for given in (first, second))
-    return execute_swaps(np.array(temperatures, dtype=float), *cells, None if capacities is None else np.array(capacities))
+    return execute_swaps(
+        np.array(temperatures, dtype=float), *cells, None if capacities is None else np.array(capacities)
+    )
 
 
 def sequential(temperatures, first, second, capacities=None):

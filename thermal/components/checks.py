@@ -27,9 +27,7 @@ def all_in_range(
     bad = ~((spread >= lowest) & (spread <= highest))
     if bad.any():
         first = int(np.argmax(bad))
-        raise ModelError(
-            describe(f"{where}[{first}]", f"{lowest:g} to {highest:g} {unit}", repr(float(spread[first])))
-        )
+        raise ModelError(describe(f"{where}[{first}]", f"{lowest:g} to {highest:g} {unit}", repr(float(spread[first]))))
     spread.setflags(write=False)
     return spread
 

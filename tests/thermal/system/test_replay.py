@@ -84,8 +84,11 @@ def test_an_air_handler_follows_its_air(plant_system, told):
 def test_an_air_handler_that_does_not_run_takes_nothing(gas_system):
     flow = np.array([0.0, 1.0])
     found = replay_air_handler(
-        gas_system.air_handlers[0], flow, np.full(2, 294.0),
-        Conditions(None, None, None, np.full(2, 260.0), 0.001, 0.005), AirCommand(np.full(2, 292.0), None),
+        gas_system.air_handlers[0],
+        flow,
+        np.full(2, 294.0),
+        Conditions(None, None, None, np.full(2, 260.0), 0.001, 0.005),
+        AirCommand(np.full(2, 292.0), None),
     )
     assert found.electric_power[0] == 0.0 < found.electric_power[1]
     assert found.fuel_power[0] == pytest.approx(0.0, abs=1e-3)
