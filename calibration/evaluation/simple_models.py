@@ -143,7 +143,7 @@ class _SimpleModels:
         self.remarks = []
         if not seen.all():
             unseen = [n for n, s in zip(names, seen, strict=True) if not s]
-            self.remarks.append(f"without {len(unseen)} zones that no sensor measures")
+            self.remarks.append(f"without {len(unseen)} of {len(names)} zones, which no sensor measures")
         provider = telemetry_inputs(case, Normalisation())
         if _GLOBAL in provider.series:
             self.sun = np.nan_to_num(provider.series[_GLOBAL])[:, None]
@@ -167,7 +167,7 @@ class _SimpleModels:
         return np.array(pairs, dtype=np.int64).reshape(-1, 2)
 
     def _runs(self, tuned: Sequence[Interval], spin_up: float, least: float, every: float = 3600.0) -> list[Runs]:
-        """Runs of the tuning intervals that start in them."""
+        """Choose runs of the tuning intervals that start in them."""
         chosen = []
         for interval in tuned:
             try:
@@ -222,7 +222,7 @@ class _SimpleModels:
         return predicted
 
     def _features(self, starts: IntArray) -> tuple[FloatArray, FloatArray]:
-        """What a regression sees of each zone, (n_run, n_zone, n), and of all together, (n_run, n)."""
+        """Collect what a regression sees of each zone, (n_run, n_zone, n), and of all together, (n_run, n)."""
         inputs = self.inputs
         edges = np.linspace(0, self.steps, min(_BLOCKS, self.steps) + 1).round().astype(int)
 

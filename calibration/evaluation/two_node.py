@@ -94,8 +94,16 @@ class TwoNodeData:
             total = np.add.reduceat(np.where(there, values, 0.0), first, axis=0)
             return np.where(count > 0, total / np.maximum(count, 1.0), np.nan)
 
-        means = {name: mean(getattr(self, name)) for name in ("zone", "held", "heat", "boundary", "sun")}
-        return replace(self, step=self.step * factor, known=self.known[last], **means)
+        return replace(
+            self,
+            step=self.step * factor,
+            zone=mean(self.zone),
+            known=self.known[last],
+            held=mean(self.held),
+            heat=mean(self.heat),
+            boundary=mean(self.boundary),
+            sun=mean(self.sun),
+        )
 
 
 @dataclass(frozen=True)
@@ -115,9 +123,7 @@ class TwoNode:
 
     @cached_property
     def parts(self) -> list[FloatArray]:
-        """Capacities of air and mass [kJ/K], conductances between them, from air and from mass, of pairs [W/K]; then
-        apertures [m2] and gains [W].
-        """
+        """Capacities [kJ/K] and conductances [W/K] as in `_sizes`; then apertures [m2] and gains [W]."""
         return _split(self.data, self.point)
 
     def predict(self, runs: Runs, keep: NDArray[np.int64]) -> FloatArray:
@@ -157,7 +163,7 @@ class TwoNode:
             before, state = state, decay * state + push[runs.starts + step]
             if step in wanted:
                 means[wanted[step]] = 0.5 * (before + state)
-        return _REFERENCE + (means @ shape[:nz].T).transpose(1, 0, 2)
+        return np.asarray(_REFERENCE + (means @ shape[:nz].T).transpose(1, 0, 2), dtype=float)
 
     def _spun_up(self, runs: Runs, into: FloatArray, total: FloatArray, between: FloatArray) -> FloatArray:
         """Temperatures of the masses since the spin-up began, with the air held at what was measured."""
@@ -172,16 +178,6 @@ class TwoNode:
         columns = [lfilter([1.0 - d], [1.0, -d], x, zi=[d * x0])[0]
                    for d, x, x0 in zip(decay, level.T, first, strict=True)]  # fmt: skip
         return np.stack(columns, axis=1)
-
-    def on(self, data: TwoNodeData) -> TwoNode:
-        """The same network driven by other data.
-
-        Parameters
-        ----------
-        data : TwoNodeData
-            Of the same zones.
-        """
-        return replace(self, data=data)
 
 
 def _sizes(data: TwoNodeData) -> list[int]:
