@@ -11,6 +11,7 @@ from calibration.errors import NotEnoughDataError
 from calibration.evaluation.intervals import Interval, Runs, horizon_steps, merge, select_runs
 from calibration.evaluation.n_step import HORIZONS, Evaluation, EvaluationSettings, Progress, evaluate_model
 from calibration.evaluation.settings import ModelSettings, load_parameters, read_settings
+from calibration.evaluation.simple_models import rest_of, with_yardsticks
 from calibration.results import Plain
 from thermal._types import FloatArray
 from thermal.case.case import Case
@@ -203,7 +204,9 @@ def evaluate_case(
     ready = case_model(case, parameters, dx=dx, scheme=scheme)
     parts = merge(intervals) or [Interval(ready.inputs.stamps[0], ready.inputs.stamps[-1])]
     model, _ = ready.certified(parts[0], horizon_steps(horizon, ready.inputs.step))
-    return ready.evaluate(model, parts, EvaluationSettings(horizon, trajectories, HORIZONS), progress)
+    found = ready.evaluate(model, parts, EvaluationSettings(horizon, trajectories, HORIZONS), progress)
+    rest, spin_up = rest_of(ready.inputs.stamps, parts), ready.settings.spin_up_seconds
+    return with_yardsticks(found, case, ready.inputs, ready.grid.network.anatomy, rest, spin_up)
 
 
 def _check_runs(inputs: Inputs, interval: Interval, steps: int, spin_up_seconds: float) -> Runs:

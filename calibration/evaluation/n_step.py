@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from calibration.errors import HorizonError, NotEnoughDataError
 from calibration.evaluation.intervals import Interval, Runs, horizon_steps, select_runs
+from calibration.evaluation.yardsticks import Yardsticks
 from calibration.results import Axes, Plain, Result
 from thermal._types import FloatArray
 from thermal.model.case_replay import SPIN_UP, Inputs, free_runs, spin_up
@@ -120,6 +121,8 @@ class Evaluation(Result):
         Zone names.
     by_horizon : mapping of str to float
         MAE at other horizons, each from its own runs [K].
+    yardsticks : Yardsticks or None
+        Errors of simple models on the same runs, where they were asked for.
     """
 
     steps: int
@@ -127,6 +130,12 @@ class Evaluation(Result):
     predictions: tuple[Predictions, ...]
     zones: tuple[str, ...]
     by_horizon: dict[str, float] = field(default_factory=dict)
+    yardsticks: Yardsticks | None = None
+
+    @property
+    def beside(self) -> dict[str, Any]:
+        """Yardsticks, and whether the model is below them all, as files hold them; nothing where there are none."""
+        return {} if self.yardsticks is None else self.yardsticks.beside(self.metrics.mae)
 
     @property
     def metrics(self) -> Metrics:
@@ -150,7 +159,8 @@ class Evaluation(Result):
             for p in self.predictions
         ]
         plain = {"steps": self.steps, "step_seconds": self.step_seconds, "intervals": intervals}
-        return {**plain, **self.metrics.to_dict(), "by_zone": self.by_zone(), "by_horizon": self.by_horizon}
+        return {**plain, **self.metrics.to_dict(), "by_zone": self.by_zone(), "by_horizon": self.by_horizon,
+                **self.beside}  # fmt: skip
 
     def to_frame(self) -> pd.DataFrame:
         """Errors of every measured zone [K]."""

@@ -135,6 +135,8 @@ class CalibrationSettings(ModelSettings):
     climb : bool
         Whether the building is also fitted lumped, and what predicts left-out tuning days better is kept; see
         `calibration.fit.ladder`.
+    yardsticks : bool
+        Whether simple models are fitted too, whose errors stand beside the model's.
 
     Raises
     ------
@@ -149,6 +151,7 @@ class CalibrationSettings(ModelSettings):
     starts: int = 3
     seed: int = 0
     climb: bool = False
+    yardsticks: bool = False
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -2,12 +2,14 @@
 
 import time
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 from calibration.evaluation.intervals import Interval
 from calibration.evaluation.n_step import Progress
 from calibration.evaluation.settings import ModelSettings, calibration_settings
-from calibration.fit.fitted_case import fit_case
+from calibration.evaluation.simple_models import with_yardsticks
+from calibration.fit.fitted_case import FittedCase, fit_case
 from calibration.fit.ladder import climb
 from calibration.fit.result import CalibrationResult
 from thermal.case.case import Case
@@ -59,4 +61,19 @@ def calibrate(
     """
     began, chosen = time.perf_counter(), calibration_settings(settings)
     fitted = fit_case(case, tune, hold_out, chosen, progress)
-    return climb(fitted, began, progress) if chosen.climb else fitted.result(began, progress)
+    result = climb(fitted, began, progress) if chosen.climb else fitted.result(began, progress)
+    return _beside_simple_models(result, fitted) if chosen.yardsticks else result
+
+
+def _beside_simple_models(result: CalibrationResult, fitted: FittedCase) -> CalibrationResult:
+    """Put the held-out errors of simple models beside those before and after."""
+    model, spin_up = fitted.model, fitted.settings.spin_up_seconds
+    judged = with_yardsticks(
+        result.calibrated["held_out"], model.case, model.inputs, model.grid.network.anatomy, fitted.tuned, spin_up
+    )
+    before = replace(result.uncalibrated["held_out"], yardsticks=judged.yardsticks)
+    return replace(
+        result,
+        uncalibrated={**result.uncalibrated, "held_out": before},
+        calibrated={**result.calibrated, "held_out": judged},
+    )

@@ -207,8 +207,8 @@ class CalibrationResult(Result):
         """Contents of ``calibration.json``."""
         content: dict[str, Any] = {
             "parameters": self.parameters,
-            "uncalibrated": {name: e.metrics for name, e in self.uncalibrated.items()},
-            "calibrated": {name: e.metrics for name, e in self.calibrated.items()},
+            "uncalibrated": {name: e.metrics.to_dict() | e.beside for name, e in self.uncalibrated.items()},
+            "calibrated": {name: e.metrics.to_dict() | e.beside for name, e in self.calibrated.items()},
             "effects": self.effects(),
         }
         names = ("solver", "grid_check", "disturbance", "excess", "information")

@@ -175,14 +175,19 @@ def information() -> Information:
 
 
 def power() -> Power:
-    parameters = (ParameterPower("slab_coupling", 0.3, 0.2, 0.4, "yes"), ParameterPower("window_u_value", 0.9, 0.8, 1.0, "no"))
+    parameters = (
+        ParameterPower("slab_coupling", 0.3, 0.2, 0.4, "yes"),
+        ParameterPower("window_u_value", 0.9, 0.8, 1.0, "no"),
+    )
     return Power(parameters, information(), {"a": 0.3}, 2, 0)
 
 
 def profile() -> Profile:
     values = np.array([1.0, 2.0, 3.0])
     interval = ProfileInterval(0.9, 1.2, 2.8, False, False)
-    return Profile(PARAMETERS["slab_coupling"], True, 2.0, values, (values - 2.0) ** 2, np.ones((3, 1)), (interval,), 0.0, 0)
+    return Profile(
+        PARAMETERS["slab_coupling"], True, 2.0, values, (values - 2.0) ** 2, np.ones((3, 1)), (interval,), 0.0, 0
+    )
 
 
 def selection() -> Selection:

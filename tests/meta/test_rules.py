@@ -60,13 +60,17 @@ def test_imports_make_no_circles(project: Any, expect_none: Check) -> None:
             todo += fresh
         return found
 
-    rings = {frozenset(n for n in near if name in reached(n)) for name in list(targets) if name in (near := reached(name))}
+    rings = {
+        frozenset(n for n in near if name in reached(n)) for name in list(targets) if name in (near := reached(name))
+    }
     expect_none([f"{' <-> '.join(sorted(ring))}: import each other; move what both need to a third" for ring in rings])
 
 
 def test_the_public_face_is_small(project: Any, expect_none: Check) -> None:
     counts = {package: len(module.__all__) for package, module in project.packages.items()}
-    problems = [f"{p}/__init__.py:1: hands on {n} names, over {MOST_NAMES}" for p, n in counts.items() if n > MOST_NAMES]
+    problems = [
+        f"{p}/__init__.py:1: hands on {n} names, over {MOST_NAMES}" for p, n in counts.items() if n > MOST_NAMES
+    ]
     if sum(counts.values()) > MOST_NAMES_TOGETHER:
         problems.append(f"{counts}: {sum(counts.values())} public names, over {MOST_NAMES_TOGETHER}")
     expect_none(problems)
@@ -98,7 +102,9 @@ def test_signatures_are_short(project: Any, expect_none: Check) -> None:
     long = {name: (at, n) for name, at, n in signatures(project) if n > MOST_PARAMETERS}
     problems = [f"{at}: {name} has {n} parameters, over {MOST_PARAMETERS}; make an object of its settings"
                 for name, (at, n) in long.items() if name not in LONG_SIGNATURES]  # fmt: skip
-    problems += [f"LONG_SIGNATURES: {name} is short now; drop the entry" for name in LONG_SIGNATURES if name not in long]
+    problems += [
+        f"LONG_SIGNATURES: {name} is short now; drop the entry" for name in LONG_SIGNATURES if name not in long
+    ]
     expect_none(problems)
     assert len(LONG_SIGNATURES) <= 8
 
@@ -107,7 +113,9 @@ def test_an_exception_class_is_one_that_somebody_catches(project: Any, expect_no
     classes, caught = {}, set(NOT_CAUGHT)
     for module, tree in project.trees.items():
         for node in ast.walk(tree):
-            if isinstance(node, ast.ClassDef) and any(re.search("(Error|Exception)$", ast.unparse(b)) for b in node.bases):
+            if isinstance(node, ast.ClassDef) and any(
+                re.search("(Error|Exception)$", ast.unparse(b)) for b in node.bases
+            ):
                 classes[node.name] = project.where(module, node.lineno)
         raised = {id(n) for r in ast.walk(tree) if isinstance(r, ast.Raise | ast.ClassDef)
                   for part in ([r.exc] if isinstance(r, ast.Raise) else r.bases) if part for n in ast.walk(part)}  # fmt: skip

@@ -59,7 +59,9 @@ def test_runs_are_those_of_the_model_alone() -> None:
     model, inputs = setting()
     theta, parts = model.network.start(), [part(1000, 1150), part(1400, 1700)]
     alone = evaluate_model(model, theta, inputs, parts, EvaluationSettings(horizons=HORIZONS, trajectories=True))
-    found = evaluate_filter(model, theta, inputs, parts, DISTURBANCE, EvaluationSettings(horizons=HORIZONS, trajectories=True))
+    found = evaluate_filter(
+        model, theta, inputs, parts, DISTURBANCE, EvaluationSettings(horizons=HORIZONS, trajectories=True)
+    )
     assert (found.steps, found.step_seconds, found.zones) == (alone.steps, alone.step_seconds, alone.zones)
     for a, b in zip(alone.predictions, found.predictions, strict=True):
         assert a.interval == b.interval

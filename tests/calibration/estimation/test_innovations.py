@@ -104,7 +104,11 @@ def test_result_is_the_likeliest_and_says_so() -> None:
 def test_a_start_near_the_optimum_finds_the_same_sooner() -> None:
     inputs, wanted = telemetry(0), tuned(0)
     for per_zone in ((), ("deviation", "sensor_deviation")):
-        cold = wanted if not per_zone else tune_disturbance(model(), theta(), inputs, whole(inputs), TuningSettings(per_zone=per_zone))
+        cold = (
+            wanted
+            if not per_zone
+            else tune_disturbance(model(), theta(), inputs, whole(inputs), TuningSettings(per_zone=per_zone))
+        )
         found = tune_disturbance(model(), theta(), inputs, whole(inputs), TuningSettings(per_zone=per_zone, start=cold.disturbance))  # fmt: skip
         assert found.evaluations < 0.5 * cold.evaluations
         assert found.disturbance.near(cold.disturbance, 0.02)
@@ -152,7 +156,9 @@ def test_random_walk_is_found_again_and_left_out_where_nothing_is_measured() -> 
     inputs = telemetry(3, truth, 2.0)
     zone = inputs.zone.copy()
     zone[:, 2] = np.nan
-    found = tune_disturbance(model(), theta(), sensed(inputs, zone), whole(inputs), TuningSettings(time_constant=np.inf))
+    found = tune_disturbance(
+        model(), theta(), sensed(inputs, zone), whole(inputs), TuningSettings(time_constant=np.inf)
+    )
     deviation = np.asarray(found.disturbance.deviation)
     assert deviation[2] == 0.0
     np.testing.assert_allclose(np.log(deviation[[0, 1, 3, 4]] / 200.0), 0.0, atol=4.0 * found.spread["deviation"] + 0.1)
@@ -204,7 +210,9 @@ def test_a_number_on_its_limit_is_named() -> None:
     inputs = telemetry(0, days=1.0)
     narrow = replace(DISTURBANCE_PRIORS["sensor_deviation"], median=0.02, upper=0.03)
     priors = {**DISTURBANCE_PRIORS, "sensor_deviation": narrow}
-    found = tune_disturbance(model(), theta(), inputs, whole(inputs), TuningSettings(time_constant=5400.0, priors=priors))
+    found = tune_disturbance(
+        model(), theta(), inputs, whole(inputs), TuningSettings(time_constant=5400.0, priors=priors)
+    )
     assert found.at_bound == ("sensor_deviation",)
 
 

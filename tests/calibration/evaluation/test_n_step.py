@@ -112,7 +112,9 @@ def test_several_intervals_count_run_by_run() -> None:
 def test_horizons_have_runs_of_their_own_and_only_multiples_of_the_step() -> None:
     _, model, inputs = setting()
     theta = model.network.start()
-    found = evaluate_model(model, theta, inputs, [part(1200, 1700)], EvaluationSettings(horizons=(*HORIZONS, "7min", "1000h")))
+    found = evaluate_model(
+        model, theta, inputs, [part(1200, 1700)], EvaluationSettings(horizons=(*HORIZONS, "7min", "1000h"))
+    )
     assert list(found.by_horizon) == list(HORIZONS)
     assert found.by_horizon["6h"] == pytest.approx(found.metrics.mae)
     assert found.by_horizon["5min"] < found.by_horizon["1h"] < found.by_horizon["6h"]

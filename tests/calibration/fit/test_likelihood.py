@@ -231,7 +231,9 @@ def test_innovations_determine_more_of_a_twin_than_errors_of_runs() -> None:
 def test_gaps_widen_an_estimate_and_do_not_move_it() -> None:
     """Every fiftieth reading lost, and a sensor for a day and a half: within two standard errors of the whole's."""
     whole = calibrated("innovations")
-    found = calibrate(without(twin()[0]), settings=CalibrationSettings(dx=2.0, objective="innovations", starts=1, horizon="3h"))
+    found = calibrate(
+        without(twin()[0]), settings=CalibrationSettings(dx=2.0, objective="innovations", starts=1, horizon="3h")
+    )
     assert found.solver.success
     for a, b in zip(whole.parameters, found.parameters, strict=True):
         if a.standard_error is not None and b.standard_error is not None:

@@ -103,14 +103,20 @@ def test_others_fall_back_on_the_evidence() -> None:
     found = compare_candidates([one, two])
     assert found.ratios == ()
     assert found.preferred == "three nodes"
-    assert "Against one node speak the tuning data, by a log evidence 3.5 below that of three nodes." in selection_verdict(found)
+    assert (
+        "Against one node speak the tuning data, by a log evidence 3.5 below that of three nodes."
+        in selection_verdict(found)
+    )
     assert compare_candidates([one, candidate("b", runs(10, 0.31, 0.1, 2), prior_cost=-4.0)]).preferred is None
 
 
 def test_few_days_tell_nothing() -> None:
     found = compare_candidates([candidate("a", runs(3, 0.2)), candidate("b", runs(3, 0.9))])
     assert np.isnan(found.differences[0].lower)
-    assert "Cannot tell a and b apart, by 3 days held out, which is too few, or by the tuning data" in selection_verdict(found)
+    assert (
+        "Cannot tell a and b apart, by 3 days held out, which is too few, or by the tuning data"
+        in selection_verdict(found)
+    )
 
 
 def test_a_difference_too_small_to_matter_does_not_decide() -> None:

@@ -72,7 +72,9 @@ def test_squares_of_whitened_errors_make_the_filter_s_likelihood(gaps: bool, cov
     """-2 log L = Σ r² + Σ log det S + n log 2π, r from a run that nothing corrects."""
     white, inputs = made(gaps, covariance), telemetry(gaps)
     found = white(errors_of_a_free_run(white, inputs))
-    filtered = filter_interval(model(), model().network.start(), inputs, interval(), DISTURBANCE, FilterSettings(covariance=covariance))
+    filtered = filter_interval(
+        model(), model().network.start(), inputs, interval(), DISTURBANCE, FilterSettings(covariance=covariance)
+    )
     determinants = sum(filtered.gains[g].log_determinant for g in filtered.gain_of)
     wanted = -2.0 * white.log_likelihood - determinants - white.measured.sum() * np.log(2.0 * np.pi)
     assert found.shape == (white.measured.sum(), 1)

@@ -80,7 +80,9 @@ def test_a_killed_worker_of_a_cluster_loses_nothing(
     start_worker()
     kill = kill_at_first(tmp_path / "out")
     with ClusterExecutor(scheduler, timeout=LONG, folders=[cases]) as executor:
-        outcomes = calibrate_many(case_folders(cases), tmp_path / "out", SETTINGS, files=calibration_files, workers=executor, progress=kill)
+        outcomes = calibrate_many(
+            case_folders(cases), tmp_path / "out", SETTINGS, files=calibration_files, workers=executor, progress=kill
+        )
         check_nothing_is_lost(tmp_path / "out", outcomes, kill.killed)
     with pytest.raises(CalibrationError, match=r"does not see .*nowhere; .* under the same path"):
         ClusterExecutor(scheduler, timeout=LONG, folders=[tmp_path / "nowhere"])

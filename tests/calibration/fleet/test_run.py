@@ -113,7 +113,9 @@ def test_force_calibrates_anew_and_keeps_what_it_did_not_make(one: tuple[Path, P
     (out / "office 0" / "notes.txt").write_text("mine", encoding="utf-8")
     tune = [Interval(*load_case(case).stamps[[0, 60]])]
     with ThreadPoolExecutor(1) as pool:
-        done = calibrate_many([case], out, {"starts": 1, "horizon": "2h", "tune": tune}, files=calibration_files, workers=pool, force=True)
+        done = calibrate_many(
+            [case], out, {"starts": 1, "horizon": "2h", "tune": tune}, files=calibration_files, workers=pool, force=True
+        )
     assert [(o.status, o.resumed) for o in done] == [("calibrated", False)]
     assert {p.name for p in (out / "office 0").iterdir()} > {"calibration.json", "report.html", RECORD, "notes.txt"}
     text = f"{tune[0].start.isoformat()}/{tune[0].end.isoformat()}"

@@ -267,7 +267,10 @@ def test_correlations_of_a_joint_prior_are_not_news() -> None:
 def test_members_of_a_large_group_are_told_together() -> None:
     sides = [PARAMETERS["window_u_value"].of("facade", s) for s in ("north", "east", "south", "west")]
     precise = fisher_information(sides, np.diag([10.0, 20.0, 40.0, 50.0]), np.eye(4))
-    assert information_sentences(precise)[1] == "Determined: window U-value of 4 facades (to 2 % at best, to 10 % at worst)."
+    assert (
+        information_sentences(precise)[1]
+        == "Determined: window U-value of 4 facades (to 2 % at best, to 10 % at worst)."
+    )
     partly = fisher_information(sides[:2], np.diag([1.0, 1.2]), np.eye(2))
     assert information_sentences(partly)[1].endswith(
         "window U-value of the north facade (71 %), window U-value of the east facade (64 %)."

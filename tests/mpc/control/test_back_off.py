@@ -69,7 +69,9 @@ def test_later_actions_stop_its_growth(kalman, modes) -> None:
 def test_bands_are_missed_as_often_as_was_asked_for(kalman, modes, make_data, violation) -> None:
     """Dear comfort and a heater just strong enough: zones sit on the narrowed edge, 500 futures miss the true one."""
     growth, rng = ErrorGrowth(2.0, 6 * 3600.0), np.random.default_rng(1)
-    predictor = HeatPredictor(modes, HORIZON, [HeatChannel("heating", z, 2e4) for z in range(5)], disturbance_time=3 * 3600.0)
+    predictor = HeatPredictor(
+        modes, HORIZON, [HeatChannel("heating", z, 2e4) for z in range(5)], disturbance_time=3 * 3600.0
+    )
     problem = ControlProblem(predictor, softness=0.005, terminal_time=0.0)
     data = make_data(problem, 270.0, 293.8, previous=np.zeros(5), comfort_price=np.full((12, 5), 100.0))
     data = replace(data, disturbance=np.zeros(5))

@@ -17,7 +17,10 @@ from mpc.errors import ControlError
 from thermal.system.smooth import SmoothHvac
 from thermal.system.system import HvacSystem
 
-PRESSURES = (Channel("supply_air_static_pressure_setpoint", 60.0, 300.0), Channel("differential_pressure_setpoint", 2e4, 9e4))
+PRESSURES = (
+    Channel("supply_air_static_pressure_setpoint", 60.0, 300.0),
+    Channel("differential_pressure_setpoint", 2e4, 9e4),
+)
 HEATING = Channel("zone_air_heating_temperature_setpoint", 289.0, 295.0, zones=(0, 2))
 COOLING = Channel("zone_air_cooling_temperature_setpoint", 295.5, 300.0)
 

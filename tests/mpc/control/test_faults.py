@@ -66,7 +66,9 @@ def run(make_problem, modes, hvac, points, make_data, make_forecast) -> Callable
     def go(fault: Callable | None = None, settings: ControllerSettings | None = None) -> tuple[Site, list[Action]]:
         kalman = KalmanFilter(state_space(modes, 300.0), DisturbanceModel(100.0, 6 * 3600.0, 0.05))
         problem = make_problem(Horizon.growing([(0.5, 300.0), (1.5, 900.0)], [0.5, 0.5, 1.0]))
-        controller = MpcController(SequentialSolver(problem), Observer(kalman, modes), points, settings or ControllerSettings())
+        controller = MpcController(
+            SequentialSolver(problem), Observer(kalman, modes), points, settings or ControllerSettings()
+        )
         site, actions = Site(modes, hvac, make_data, points), []
         for k in range(STEPS):
             now = START + k * pd.Timedelta(minutes=5)

@@ -78,11 +78,16 @@ def test_heat_content_is_that_of_capacities(make_problem, modes) -> None:
 
 
 def test_two_channels_for_one_setpoint_are_refused(modes, hvac) -> None:
-    twice = (Channel("supply_air_temperature_setpoint", 285.0, 300.0), Channel("supply_air_temperature_setpoint", 285.0, 300.0))
+    twice = (
+        Channel("supply_air_temperature_setpoint", 285.0, 300.0),
+        Channel("supply_air_temperature_setpoint", 285.0, 300.0),
+    )
     with pytest.raises(ControlError, match="one for each setpoint"):
         Predictor(modes, hvac, Horizon.regular(1.0, 300.0, 2), twice)
     with pytest.raises(ControlError, match="pressures=True"):
-        Predictor(modes, hvac, Horizon.regular(1.0, 300.0, 2), (Channel("supply_air_static_pressure_setpoint", 100.0, 300.0),))
+        Predictor(
+            modes, hvac, Horizon.regular(1.0, 300.0, 2), (Channel("supply_air_static_pressure_setpoint", 100.0, 300.0),)
+        )
 
 
 def test_what_is_not_finite_is_named(make_problem, make_data) -> None:

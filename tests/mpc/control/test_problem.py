@@ -49,7 +49,10 @@ def test_peaks_below_those_of_the_month_are_free() -> None:
 
 
 def test_limits_on_changes(make_problem, make_data) -> None:
-    channels = (Channel("supply_air_temperature_setpoint", 285.0, 300.0, 6.0), Channel("supply_water_temperature_setpoint", 310.0, 355.0))
+    channels = (
+        Channel("supply_air_temperature_setpoint", 285.0, 300.0, 6.0),
+        Channel("supply_water_temperature_setpoint", 310.0, 355.0),
+    )
     problem = make_problem(channels=channels)
     most = problem.most_change.reshape(4, 2) * [15.0, 45.0]
     np.testing.assert_allclose(most[:, 0], [0.5, 3.0, 3.0, 6.0])  # 5 minutes, then the lengths of the blocks

@@ -63,7 +63,9 @@ def test_heat_in_is_heat_out_and_kept(building: Building, kind: str) -> None:
     model: BuildingModel = (
         reduced_building(building, dx=1.0)
         if kind == "reduced"
-        else GridBuilding(Simulator(building, dx=1.0, shuffle=Shuffle("random" if kind == "random" else "mean", seed=1)))
+        else GridBuilding(
+            Simulator(building, dx=1.0, shuffle=Shuffle("random" if kind == "random" else "mean", seed=1))
+        )
     )
     run(model)
     flows = model.flows()

@@ -17,7 +17,9 @@ def test_radiators_warm_their_zones_and_energy_closes() -> None:
     more = [Device(name=f"RAD_{zone}", type="radiator", zone=zone) for zone in warm]
     ends = []
     for building in (office, replace(office, devices=(*office.devices, *more))):
-        plant = simulated_plant(building, pilot_weather(1, "2023-01-09", 2), "2023-01-09", "2023-01-10", PlantSettings(dx=1.0))
+        plant = simulated_plant(
+            building, pilot_weather(1, "2023-01-09", 2), "2023-01-09", "2023-01-10", PlantSettings(dx=1.0)
+        )
         plant.reset()
         for _ in range(120):
             plant.step(plant.default_actions)

@@ -38,7 +38,9 @@ def test_energy_closes_at_every_step_of_a_day(make_plant: Make) -> None:
 
 
 def test_energy_closes_on_the_grid_with_the_random_shuffle(building: Building, make_plant: Make) -> None:
-    plant = make_plant(model=GridBuilding(Simulator(building, dx=1.0, shuffle=Shuffle("random", seed=1))), warm_up_days=0)
+    plant = make_plant(
+        model=GridBuilding(Simulator(building, dx=1.0, shuffle=Shuffle("random", seed=1))), warm_up_days=0
+    )
     plant.reset()
     for _ in range(90):
         plant.step(plant.default_actions)
@@ -171,7 +173,10 @@ def test_a_cold_building_is_heated_at_night(make_plant: Make, drive: Make, scena
     for cycle in (None, 0.5):
         plan = scheduled_operation(sc, 2, night_cycle=cycle)
         plant = drive(make_plant(sc, operation=plan), 50)
-        nights[cycle] = plant.record().zone_temperature[1:50].min(), max(s.actions["BOILER/boiler_running"] for s in plant._steps)
+        nights[cycle] = (
+            plant.record().zone_temperature[1:50].min(),
+            max(s.actions["BOILER/boiler_running"] for s in plant._steps),
+        )
     assert nights[None][1] == 0.0 and nights[0.5][1] == 1.0
     assert nights[0.5][0] > nights[None][0] + 0.2
 

@@ -227,9 +227,7 @@ def test_the_map_of_the_grid_agrees_with_the_reduced_model(case: Case, result: C
     held_out = result.calibrated["held_out"]
     which, run = median_run(held_out)
     p = held_out.predictions[which]
-    field = spatial_field(
-        SymbolicModel(network), result.theta, replay_inputs(case, network), p.start[run], 72, 1.0
-    )
+    field = spatial_field(SymbolicModel(network), result.theta, replay_inputs(case, network), p.start[run], 72, 1.0)
     zones = network.observation @ field.temperatures
     assert np.abs(zones - p.simulated[run, -1]).max() < 0.05
     errors = np.nanmean(np.abs(np.concatenate([q.error for q in held_out.predictions])), axis=1)

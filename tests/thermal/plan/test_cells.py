@@ -54,7 +54,8 @@ def test_the_pilot_comes_back_from_its_codes_with_its_127_devices(tmp_path: Path
     assert zone_floor_areas(found.plans) == pytest.approx(wanted, rel=0.02)
     lines = ["Device,Type,Zone,Fed by"]
     lines += [
-        f"{d.name},{d.type.upper()},{(d.zone or '').replace('_', '-').lower()},{'; '.join(d.fed_by)}" for d in devices(plans)
+        f"{d.name},{d.type.upper()},{(d.zone or '').replace('_', '-').lower()},{'; '.join(d.fed_by)}"
+        for d in devices(plans)
     ]
     (tmp_path / "devices.csv").write_text("\n".join(lines), encoding="utf-8")
     served = read_devices(tmp_path / "devices.csv", list(wanted))

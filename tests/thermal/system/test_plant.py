@@ -41,12 +41,27 @@ def test_steps_repeat_bit_for_bit(plant, plant_system, actions):
 @pytest.mark.parametrize(
     ("changed", "said"),
     [
-        ({"supply_air_temperature_setpoint": 13.0}, r"supply_air_temperature_setpoint: expected 273.15 to 333.15 K, found 13.0; .* degC"),
-        ({"supply_air_temperature_setpoint": (287.0, float("nan"))}, r"AHU_1/supply_air_temperature_setpoint: .*not finite"),
+        (
+            {"supply_air_temperature_setpoint": 13.0},
+            r"supply_air_temperature_setpoint: expected 273.15 to 333.15 K, found 13.0; .* degC",
+        ),
+        (
+            {"supply_air_temperature_setpoint": (287.0, float("nan"))},
+            r"AHU_1/supply_air_temperature_setpoint: .*not finite",
+        ),
         ({"supply_air_temperature_setpoint": (287.0,)}, r"expected one value or 2, one a component, found 1 values"),
-        ({"supply_water_temperature_setpoint": float("inf")}, r"supply_water_temperature_setpoint: .* found inf \(not finite\)"),
-        ({"supply_water_temperature_setpoint": None}, r"supply_water_temperature_setpoint: expected a number of K, found None"),
-        ({"supply_water_temperature_setpoint": "warm"}, r"supply_water_temperature_setpoint: expected a number of K, found 'warm'"),
+        (
+            {"supply_water_temperature_setpoint": float("inf")},
+            r"supply_water_temperature_setpoint: .* found inf \(not finite\)",
+        ),
+        (
+            {"supply_water_temperature_setpoint": None},
+            r"supply_water_temperature_setpoint: expected a number of K, found None",
+        ),
+        (
+            {"supply_water_temperature_setpoint": "warm"},
+            r"supply_water_temperature_setpoint: expected a number of K, found 'warm'",
+        ),
         ({"supply_air_static_pressure_setpoint": -5.0}, r"supply_air_static_pressure_setpoint: expected 1 to 2500 Pa"),
         ({"differential_pressure_setpoint": 1e7}, r"differential_pressure_setpoint: expected 1000 to 600000 Pa"),
         ({"fan_running": 2.0}, r"fan_running: expected 0 to 1 -"),
@@ -64,8 +79,14 @@ def test_actions_are_refused_by_name(plant, changed, said):
         ({"zone_temperature": np.array([290.0, np.nan, 294.0, 295.0, 296.0])}, r"zone_temperature\[1\]: .* nan"),
         ({"zone_temperature": np.array([290.0, 22.0, 294.0, 295.0, 296.0])}, r"zone_temperature\[1\]: .* degC"),
         ({"zone_temperature": np.zeros(4)}, r"zone_temperature: expected an array of 5 zones, found shape \(4,\)"),
-        ({"zone_air_heating_temperature_setpoint": HIGH + 1.0}, r"setpoints: expected heating not above cooling, found 298.0 and 297.0 K"),
-        ({"zone_air_cooling_temperature_setpoint": np.full(5, np.inf)}, r"zone_air_cooling_temperature_setpoint\[0\]: .*not finite"),
+        (
+            {"zone_air_heating_temperature_setpoint": HIGH + 1.0},
+            r"setpoints: expected heating not above cooling, found 298.0 and 297.0 K",
+        ),
+        (
+            {"zone_air_cooling_temperature_setpoint": np.full(5, np.inf)},
+            r"zone_air_cooling_temperature_setpoint\[0\]: .*not finite",
+        ),
         ({"outdoor_temperature": float("nan")}, r"outdoor_temperature: .*not finite"),
         ({"outdoor_humidity": 6.0}, r"outdoor_humidity: expected 0 to 0.05 kg/kg, found 6.0"),
     ],

@@ -55,7 +55,9 @@ def test_meters_add_up(gas_system, command):
 
 
 def test_an_air_handler_that_is_off_has_closed_dampers(plant_system, command):
-    values, _, _ = read(plant_system, ["AHU_1", "AHU_2"], command, {"air": 287.0, "water": 335.0, "running": (0.0, 1.0)})
+    values, _, _ = read(
+        plant_system, ["AHU_1", "AHU_2"], command, {"air": 287.0, "water": 335.0, "running": (0.0, 1.0)}
+    )
     assert values["VAV_0/supply_air_damper_percentage_command"] == 0.0
     assert values["VAV_1/supply_air_damper_percentage_command"] > 0.0
 

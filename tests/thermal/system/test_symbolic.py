@@ -126,7 +126,7 @@ def test_the_second_law_holds_for_the_smooth_plant(plant_system, seed):
     water, conditions, actions = drawn(seed, 5, 2)
     found = dict(zip(function.name_out(), function(*arguments(water, conditions, actions)), strict=True))
     end, rate = float(found["supply_water_temperature_end"]), 1006.0 * np.array(found["VAV_airflow"]).ravel()
-    discharge = (np.array(found["VAV_entering"]).ravel() + np.array(found["VAV_reheat"]).ravel() / rate)
+    discharge = np.array(found["VAV_entering"]).ravel() + np.array(found["VAV_reheat"]).ravel() / rate
     supply = np.array(found["supply_temperature"]).ravel()[plant_system.terminals.air_handler]
     assert np.all(discharge <= np.maximum(supply, end) + 1e-9)
     assert np.all(discharge >= np.minimum(supply, end) - 1e-9)

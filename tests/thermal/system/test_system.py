@@ -38,7 +38,14 @@ def situation(system, s):
         s["indoor_damp"],
     )  # fmt: skip
     actions = told(
-        system, s["air"], s["water"], s["static"], s["pressure"], s["running"], s["boiler"], (s["ventilation"], 1.0)[: len(system.air_handlers)]
+        system,
+        s["air"],
+        s["water"],
+        s["static"],
+        s["pressure"],
+        s["running"],
+        s["boiler"],
+        (s["ventilation"], 1.0)[: len(system.air_handlers)],
     )
     return conditions, actions
 
@@ -87,7 +94,9 @@ def test_no_air_is_hotter_than_its_water_nor_beyond_its_limit(plant_system, s):
     assert np.all(step.terminals.discharge >= floor - 1e-9)
     assert state.water <= max(s["before"], s["water"], max(s["zones"]), s["outdoor"], 305.0) + 1e-6
     # water comes back no colder than the coldest of what it meets: air, plant room, the water before
-    coldest = min([293.15, s["before"], *(a.mixed.cooled_temperature for a in step.air_handlers), *step.terminals.entering])
+    coldest = min(
+        [293.15, s["before"], *(a.mixed.cooled_temperature for a in step.air_handlers), *step.terminals.entering]
+    )
     assert coldest - 1e-6 <= step.loop.return_water_temperature
     assert np.all((step.terminals.valve_flow >= 0.0) & (step.terminals.valve_flow <= 1.0 + 1e-12))
 

@@ -107,7 +107,9 @@ def test_a_zone_that_lacks_heat_drifts_in_proportion_to_time() -> None:
     """Free runs of a twin, and of the same with a meter that loses a constant heat: against the step response."""
     building = pilot_building(3, floor_area=120.0, zones=4, floors=1, name="office")
     quiet = TwinRanges(disturbance_deviation=(0.05, 0.1), noise=(0.002, 0.004))
-    case, _ = generate_twin(building, 3, TwinSettings(days=9.0, step_seconds=300.0, dx=1.0, meter="exact", ranges=quiet))
+    case, _ = generate_twin(
+        building, 3, TwinSettings(days=9.0, step_seconds=300.0, dx=1.0, meter="exact", ranges=quiet)
+    )
     models = ModelComparison(case, ModelSettings(dx=1.0))
     fit = models.fit({}, [{}])
     before = drift_of(fit, models.judged)

@@ -124,7 +124,9 @@ def biased_and_misread() -> tuple[ModelComparison, str, str]:
     """A twin whose meter of one zone reads low and whose sensor of another reads high; the two zones."""
     building = pilot_building(3, floor_area=120.0, zones=4, floors=1, name="office")
     quiet = TwinRanges(disturbance_deviation=(0.05, 0.1), noise=(0.005, 0.01))
-    case = generate_twin(building, 3, TwinSettings(days=15.0, step_seconds=900.0, dx=1.0, meter="exact", ranges=quiet))[0]
+    case = generate_twin(building, 3, TwinSettings(days=15.0, step_seconds=900.0, dx=1.0, meter="exact", ranges=quiet))[
+        0
+    ]
     low, high = building.zone_names[1], building.zone_names[3]
     frame = case.telemetry.frame.copy()
     (device,) = building.devices_of(low)

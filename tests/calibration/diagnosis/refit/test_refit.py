@@ -41,7 +41,9 @@ def late_heat() -> Case:
     """A twin of 15 days in which a meter of one zone misses half of the air in the last five."""
     building = pilot_building(3, floor_area=120.0, zones=4, floors=1, name="office")
     quiet = TwinRanges(disturbance_deviation=(0.05, 0.1), noise=(0.005, 0.01))
-    case = generate_twin(building, 3, TwinSettings(days=15.0, step_seconds=900.0, dx=1.0, meter="exact", ranges=quiet))[0]
+    case = generate_twin(building, 3, TwinSettings(days=15.0, step_seconds=900.0, dx=1.0, meter="exact", ranges=quiet))[
+        0
+    ]
     frame = case.telemetry.frame.copy()
     (device,) = building.devices_of(building.zone_names[1])
     flow = frame.columns.get_loc(f"{device.name}/supply_air_flowrate_sensor")
@@ -55,7 +57,11 @@ def test_days_alternate_where_the_last_third_shows_what_the_others_do_not() -> N
     answer = found.to_dict()
     assert found.last_third is not None and found.last_third > found.gap
     assert (list(found.tuned), list(found.judged)) == alternating_intervals(case)
-    assert answer["intervals"]["mae_of_last_third"] == found.last_third == pytest.approx(baseline_gap(case, dx=1.0), rel=1e-12)
+    assert (
+        answer["intervals"]["mae_of_last_third"]
+        == found.last_third
+        == pytest.approx(baseline_gap(case, dx=1.0), rel=1e-12)
+    )
     assert max(found.where.zones, key=lambda s: s.share).name == case.building.zone_names[1]
     assert "tuning and held-out days alternate" in alternating_sentence(found)
 

@@ -30,7 +30,9 @@ def twin() -> Case:
     """Two weeks of an office of four zones whose thermostats hold it whatever a window lets out."""
     building = pilot_building(3, floor_area=120.0, zones=4, floors=1, name="office")
     quiet = TwinRanges(disturbance_deviation=(0.05, 0.1), noise=(0.005, 0.01))
-    return generate_twin(building, 3, TwinSettings(days=15.0, step_seconds=STEP, dx=1.0, meter="exact", ranges=quiet))[0]
+    return generate_twin(building, 3, TwinSettings(days=15.0, step_seconds=STEP, dx=1.0, meter="exact", ranges=quiet))[
+        0
+    ]
 
 
 @cache
