@@ -19,6 +19,8 @@ from calibration.diagnosis.screen.missing import Missing, at_start, missing_heat
 from calibration.evaluation.intervals import Interval
 from calibration.evaluation.n_step import Evaluation, Progress
 from calibration.evaluation.settings import ModelSettings
+from calibration.evaluation.simple_models import with_yardsticks
+from calibration.evaluation.yardsticks import Yardsticks
 from calibration.fit.fitted_case import FittedCase
 from calibration.fit.ladder import beside_lumped, is_large
 from calibration.fit.result import CalibrationResult, Rung, SolverReport, effect_entries
@@ -94,6 +96,8 @@ class Diagnosis(Result):
         The final model and the lumped one by their errors on left-out tuning days; empty where there was no choice.
     lumped : CalibrationResult or None
         The lumped model, where it predicts those days better.
+    yardsticks : Yardsticks or None
+        Errors of simple models on the held-out runs.
     """
 
     case: str
@@ -115,6 +119,7 @@ class Diagnosis(Result):
     last_third: float | None = None
     rungs: tuple[Rung, ...] = ()
     lumped: CalibrationResult | None = None
+    yardsticks: Yardsticks | None = None
 
     @property
     def final(self) -> Fit:
@@ -139,6 +144,7 @@ class Diagnosis(Result):
                 "floor": self.floor,
                 "p_value": self.p_value,
                 "smallest_detectable_watts": self.detectable,
+                **({} if self.yardsticks is None else self.yardsticks.beside(self.predicts)),
             },
             "where": {
                 "zones": [
@@ -305,7 +311,15 @@ def diagnose(
         last_third=first.mae if turns else None,
         rungs=rungs,
         lumped=None if lumped is None else replace(lumped.result(began, progress), rungs=rungs),
+        yardsticks=_yardsticks(models, rounds[-1].after),
     )
+
+
+def _yardsticks(models: ModelComparison, final: Fit) -> Yardsticks | None:
+    """Errors of simple models on the held-out runs."""
+    evaluation, spin_up = final.evaluate(models.judged, models.horizon), models.settings.spin_up_seconds
+    judged = with_yardsticks(evaluation, models.case, final.built.inputs, models.anatomy, models.tuned, spin_up)
+    return judged.yardsticks
 
 
 def _beside_lumped(

@@ -31,6 +31,9 @@ _RIDGES, _FOLDS = np.logspace(-5, 1, 7), 5
 #: Runs below which tiles of the horizon are too few for a network, and starts follow each other by an hour.
 _FEW_RUNS = 40
 
+#: Times over which a regression sees how much a zone has warmed before its start [s].
+_LAGS = (3600.0, 10800.0)
+
 #: Where solar irradiance is measured on the horizontal.
 _GLOBAL = "global_horizontal_irradiance_sensor"
 
@@ -232,7 +235,13 @@ class _SimpleModels:
             return np.stack([(b - a) / n for a, b, n in zip(ends, ends[1:], np.diff(edges), strict=False)], axis=-1)
 
         heat = blocks(inputs.heat[:, self.seen])
-        own = np.concatenate([inputs.held[starts][:, self.seen, None], heat], axis=-1)
+        now = inputs.held[starts][:, self.seen]
+        back = [np.maximum(0, starts - max(1, round(s / inputs.step))) for s in _LAGS]
+        risen = [now - inputs.held[b][:, self.seen] for b in back]
+        total = np.vstack([np.zeros(now.shape[1]), np.cumsum(inputs.heat[:, self.seen], axis=0)])
+        before = np.maximum(0, starts - self.steps)
+        past = (total[starts + 1] - total[before]) / np.maximum(1, starts + 1 - before)[:, None]
+        own = np.concatenate([np.stack([now, *risen, past], axis=-1), heat], axis=-1)
         around = np.hstack([self.boundary, self.sun, inputs.heat[:, ~self.seen]])
         stamps = inputs.stamps[starts]
         angle = 2.0 * np.pi * np.asarray(stamps.hour + stamps.minute / 60.0) / 24.0

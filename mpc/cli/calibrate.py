@@ -72,7 +72,8 @@ def calibrate(
         "tune": tune or [], "hold_out": hold_out or [], "dx": dx, "horizon": horizon,
         "scheme": scheme or "implicit_euler", "objective": objective, "loss": loss, "starts": starts, "seed": seed,
         "effects": [name.strip() for name in effects.split(",") if name.strip()],
-        "climb": structure == "chosen", "yardsticks": True, "structure": {"lumped": True, "sun": True} if structure == "lumped" else {},
+        "climb": structure == "chosen", "yardsticks": True,
+        "structure": {"lumped": True, "sun": True} if structure == "lumped" else {},
     }  # fmt: skip
     CalibrationError.unless_known(structure, ("chosen", "drawn", "lumped"), "--structure", "chosen, drawn or lumped")
     if workers is not None and scheduler is not None:

@@ -102,7 +102,9 @@ def calibration_verdict(result: CalibrationResult) -> str:
         f"{ahead} ahead, on data it was not fitted to, the calibrated model misses the measured zone temperatures by",
         f"{kelvin(after)} K on average. Before calibration it was {kelvin(before)} K" + _change(before, after),
         f"Assuming that nothing changes misses by {kelvin(rest)} K"
-        + ("." if rest > after else ", less than the model."),
+        + ("." if rest > after else ", less than the model.")
+        if held_out.yardsticks is None
+        else evaluation.beside_sentence(after, held_out.yardsticks),
         *_structure_sentences(result),
         _parameter_sentence(result.parameters),
     ]

@@ -9,6 +9,7 @@ from calibration.diagnosis.decide.verdict import Candidate, group_of
 from calibration.diagnosis.decide.where import DriftCurve, Where
 from calibration.diagnosis.diagnosis import Diagnosis
 from calibration.diagnosis.refit.refit import WINDOWS, Refit
+from mpc.reports.evaluation import beside_sentence
 from mpc.reports.page import duration, kelvin, listed, percent, sure, watts
 from thermal.effects.catalogue import CATALOGUE
 
@@ -37,6 +38,8 @@ def diagnosis_verdict(result: Diagnosis) -> str:
         From `diagnose`.
     """
     text = _verdict(result)
+    if result.yardsticks is not None:
+        text += f" {beside_sentence(result.predicts, result.yardsticks)}"
     if result.lumped is None:
         return text
     beside = next(rung.left_out_mae for rung in result.rungs if not rung.chosen)

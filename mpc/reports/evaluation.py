@@ -9,11 +9,12 @@ import pandas as pd
 
 from calibration.evaluation.intervals import Interval
 from calibration.evaluation.n_step import Evaluation, spatial_metrics
+from calibration.evaluation.yardsticks import YARDSTICKS, Yardsticks
 from mpc.reports.figures.errors import Band, drift_boxes, error_growth, median_run, series_of_runs, zone_panels
 from mpc.reports.figures.field import Field
 from mpc.reports.figures.plan import floor_maps, tile_map
 from mpc.reports.figures.style import CELSIUS, Picture
-from mpc.reports.page import clock, counted, duration, kelvin, write_report
+from mpc.reports.page import clock, counted, duration, kelvin, listed, write_report
 from thermal._types import FloatArray
 from thermal.case.building import FloorPlans
 from thermal.case.case import Case
@@ -76,8 +77,40 @@ def evaluation_verdict(evaluation: Evaluation) -> str:
     lean = "too warm" if metrics.bias > 0 else "too cold"
     text = f"{ahead} ahead, the model misses the measured zone temperatures by {kelvin(metrics.mae)} K on average"
     text += f" and is {lean} by {kelvin(abs(metrics.bias))} K."
+    if evaluation.yardsticks is not None:
+        return f"{text} {beside_sentence(metrics.mae, evaluation.yardsticks)}"
     compared = "less" if rest < metrics.mae else "more"
     return f"{text} Assuming that nothing changes misses by {kelvin(rest)} K, {compared} than the model."
+
+
+#: What makes a model useful that is not yet.
+_WOULD_HELP = (
+    "more days to tune on with heat that varies, irradiance where none is measured, and the lumped structure where the "
+    "geometry is a guess"
+)
+
+
+def beside_sentence(mae: float, yardsticks: Yardsticks) -> str:
+    """Say how a model does beside what anyone fits in an hour.
+
+    Parameters
+    ----------
+    mae : float
+        Of the model [K].
+    yardsticks : Yardsticks
+        On the same runs.
+
+    Examples
+    --------
+    >>> beside_sentence(0.3, Yardsticks(1.0, 0.5, 0.4)).partition(":")[0]
+    'What anyone fits in an hour misses the same runs by'
+    """
+    errors = listed([f"{kelvin(error)} K ({YARDSTICKS[name]})" for name, error in yardsticks.made.items()])
+    text = f"What anyone fits in an hour misses the same runs by: {errors}."
+    better = [YARDSTICKS[name] for name, error in yardsticks.made.items() if error <= mae]
+    if better:
+        return f"{text} The model does not beat {listed(better)}, so it is not yet useful. What helps: {_WOULD_HELP}."
+    return f"{text} The model beats {'them all' if len(yardsticks.made) > 1 else 'it'}."
 
 
 def unchanged_error(evaluation: Evaluation) -> float:
