@@ -10,7 +10,6 @@ from mpc.loop.actuators import COOLING_SETPOINT, HEATING_SETPOINT, STATIC_PRESSU
 from mpc.loop.operation import Operation, shared_rows
 from thermal._types import FloatArray
 from thermal.components.air_handler import AirHandler
-from thermal.components.boiler_loop import BoilerLoop
 from thermal.system.system import HvacSystem
 
 
@@ -43,9 +42,9 @@ class Schedule:
         count, terminals = len(system.air_handlers), system.terminals
         self._served = [terminals.zone[terminals.air_handler == k] for k in range(count)]
         kinds, self._optional = (HEATING_SETPOINT, COOLING_SETPOINT), system.defaults
+        self._water = system.water_switches
         handlers = system.of_kind(AirHandler)
         self._switches = [f"{name}/fan_running" for name in handlers], [f"{name}/ventilation" for name in handlers]
-        self._boilers = [f"{name}/boiler_running" for name in system.of_kind(BoilerLoop)]
         self._supply = [(f"{name}/{SUPPLY_AIR}", f"{name}/{STATIC_PRESSURE}") for name in handlers]
         self._known: tuple[Any, ...] = (None, None, None)
         self._made: tuple[dict[str, float], tuple[float, ...], tuple[float, ...]] = ({}, (), ())
@@ -131,7 +130,7 @@ class Schedule:
             chosen = {name: value for name, value in given.items() if name not in self._given}
             fans, outdoor = self._switches
             chosen |= dict(zip(fans, runs, strict=True)) | dict.fromkeys(outdoor, ventilation)
-            chosen |= dict.fromkeys(self._boilers, max(runs))
+            chosen |= dict.fromkeys(self._water, max(runs))
             reach = [
                 run * math.sqrt(chosen.get(pressure, self._optional[pressure]) / self._optional[pressure])
                 for run, (_, pressure) in zip(runs, self._supply, strict=True)

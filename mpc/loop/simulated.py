@@ -67,7 +67,7 @@ class SimulatedPlant:
     forecaster : Forecaster, optional
         Forecasts of the scenario; none by default.
     limits : mapping of str to tuple of float, optional
-        Ranges of actions in the place of `ACTION_LIMITS` [K] or [Pa].
+        Ranges by kind of action in the place of those that the components declare [K] or [Pa].
     default_actions : mapping of str to float, optional
         Setpoints by kind of action during the warm-up [K] or [Pa]; 287.15 K of air and 333.15 K of water by default.
     warm_up_days : int
@@ -112,9 +112,7 @@ class SimulatedPlant:
         self.scenario, self.model, self.forecaster = scenario, model, forecaster
         self.control_steps, self._seed = control_steps, seed
         self._warm_up_steps = warm_up_days * round(_DAY / scenario.grid.step)
-        self.actuators: tuple[Actuator, ...] = actuators_of(
-            self.devices.air_handlers, self.devices.boiler, scenario.zones, limits
-        )
+        self.actuators: tuple[Actuator, ...] = actuators_of(system, scenario.zones, limits)
         self._by_name = {a.name: a for a in self.actuators}
         kinds = {SUPPLY_AIR: 287.15, SUPPLY_WATER: 333.15} | dict(default_actions or {})
         #: Setpoints during the warm-up, of all required actuators and what was given beside [K] or [Pa].

@@ -4,13 +4,14 @@ from dataclasses import dataclass
 from typing import Annotated, NamedTuple
 
 from thermal.components.checks import in_range
-from thermal.components.component import Actuator, Component, Conditions, EnergyBalance, Given, Port, Range, Run
+from thermal.components.component import Actuator, Component, Conditions, Given, Port, Range, Run
 from thermal.components.cooling_coil import CoolingCoil
+from thermal.components.energy_balance import EnergyBalance
 from thermal.components.fan import Fan
 from thermal.components.heater import Heater
 from thermal.components.moist_air import EVAPORATION_HEAT, enthalpy
 from thermal.components.operations import Operations, Value
-from thermal.components.streams import AirCommand, AirDrawn, Duct, HotWater, SupplyAir, WaterDrawn
+from thermal.components.streams import AirCommand, AirDrawn, Duct, HotWater, SupplyAir, SupplyWater, WaterDrawn
 from thermal.components.water_coil import WaterCoil, water_share
 from thermal.errors import ModelError, describe
 from thermal.units import AIR_HEAT_CAPACITY
@@ -95,22 +96,15 @@ class AirHandlerStep(NamedTuple):
         Its heating coil, valve set.
     electric_power, fuel_power : Value
         Taken up [W].
+    supply_temperature : Value
+        Supply air [K].
     """
 
     mixed: Mixed
     warmed: Warmed
     electric_power: Value
     fuel_power: Value
-
-    def supply_temperature(self, water: Value) -> Value:
-        """Supply air [K].
-
-        Parameters
-        ----------
-        water : Value
-            Temperature of the supply water [K].
-        """
-        return self.warmed.offset + self.warmed.slope * water
+    supply_temperature: Value
 
 
 @dataclass(frozen=True)
@@ -184,6 +178,11 @@ class AirHandler(Component):
             raise ModelError(describe("AirHandler.heating", "a WaterCoil, a Heater or None", found))
 
     @property
+    def connectors(self) -> tuple[Port, ...]:
+        """Supply air, and hot water where there is a coil for it."""
+        return tuple(p for p in super().connectors if p.supplies or isinstance(self.heating, WaterCoil))
+
+    @property
     def design_pressure(self) -> float:
         """Static pressure in the duct that holds where none is set [Pa]."""
         return self.supply_fan.static_pressure
@@ -207,10 +206,13 @@ class AirHandler(Component):
         mixed = self.mix(ops, drawn, given.conditions, command, water.opening if water else 1.0)
         warmed = self.warm(ops, mixed, water.warmest if water else 0.0, water.opening if water else 1.0)
         given.put("supply_air", SupplyAir(warmed.offset, warmed.slope))
+        supplied = warmed.offset
         if coil:
             source = warmed.conductance * mixed.cooled_temperature
             given.put("hot_water", WaterDrawn(warmed.conductance, source, warmed.flow_share * coil.water_flow))
-        return AirHandlerStep(mixed, warmed, *self.powers(mixed, warmed))
+            end: SupplyWater = yield "hot_water"
+            supplied = supplied + warmed.slope * end.temperature
+        return AirHandlerStep(mixed, warmed, *self.powers(mixed, warmed), supplied)
 
     def powers(self, mixed: Mixed, warmed: Warmed) -> tuple[Value, Value]:
         """Electric and fuel power [W].
@@ -359,7 +361,7 @@ class AirHandler(Component):
             plant_room=(1.0 - self.supply_fan.heat_to_air) * mixed.supply_fan_power,
         )
 
-    def read(self, ops: Operations, given: Given, done: AirHandlerStep, water: Value) -> list[Value]:
+    def read(self, ops: Operations, given: Given, done: AirHandlerStep) -> list[Value]:
         """Values of its points.
 
         Parameters
@@ -370,13 +372,11 @@ class AirHandler(Component):
             As `run` had it.
         done : AirHandlerStep
             What `run` returned.
-        water : Value
-            Supply water at the end of the step [K].
         """
         command, mixed = AirCommand(**given.actions), done.mixed
         held = command.supply_air_static_pressure_setpoint
         return [
-            command.supply_air_temperature_setpoint, done.supply_temperature(water), mixed.mixed_temperature,
+            command.supply_air_temperature_setpoint, done.supply_temperature, mixed.mixed_temperature,
             mixed.return_temperature, given.conditions.outdoor_temperature, mixed.supply_fan_power,
             done.electric_power, done.fuel_power, held, command.fan_running * held,
         ]  # fmt: skip

@@ -162,7 +162,7 @@ class Radiators(Group):
         heat = conductance * (water.temperature - zone)
         return RadiatorStep(valve_flow, heat, self.radiant_share * heat)
 
-    def read(self, ops: Operations, given: Given, done: RadiatorStep, water: Value) -> list[Value]:
+    def read(self, ops: Operations, given: Given, done: RadiatorStep) -> list[Value]:
         """Values of its points, one a radiator each.
 
         Parameters
@@ -173,7 +173,5 @@ class Radiators(Group):
             As `run` had it.
         done : RadiatorStep
             What `run` returned.
-        water : Value
-            Supply water at the end of the step [K].
         """
         return [done.valve_flow, done.heat]

@@ -200,7 +200,7 @@ class CompiledSystem:
             phases.append(_Phase(whole, out, messages, _writer(loads, received, trace.drawn), (function, buffer)))
             received = trace.drawn
         self._power = [len(trace.held) for trace in traces]
-        self._state = [self._places[name, state.name] for name, state in system.states]
+        self._state = [self._places[name, state.name] for name, state in system.states.values()]
         return phases
 
     def step(

@@ -43,11 +43,6 @@ class HvacState(NamedTuple):
     mode: ModeArray
     set_back: NDArray[np.bool_]
 
-    @property
-    def water(self) -> float:
-        """Temperature of the supply water, the first state [K]."""
-        return self.values[0]
-
 
 class HvacPlant:
     """Steps a system: heat into the zones from their temperatures and a controller's setpoints.
@@ -70,7 +65,7 @@ class HvacPlant:
     >>> cold = np.array([292.0, 296.0])
     >>> conditions = Conditions(cold, np.full(2, 294.0), np.full(2, 298.0), outdoor_temperature=275.0)
     >>> actions = system.actions(supply_air_temperature_setpoint=287.0, supply_water_temperature_setpoint=330.0)
-    >>> state, step = plant.step(plant.start(330.0), conditions, actions, 300.0)
+    >>> state, step = plant.step(plant.start(), conditions, actions, 300.0)
     >>> bool(plant.heat(step)[0] > 0.0)
     True
     """
@@ -82,24 +77,23 @@ class HvacPlant:
         self._usual: tuple[object, ...] = (None, None, None)
         self._asked: tuple[Mapping[str, Any] | None, tuple[float, ...]] = (None, ())
 
-    def start(self, water: float = 293.15) -> HvacState:
+    def start(self, **values: Any) -> HvacState:
         """State with thermostats off.
 
         Parameters
         ----------
-        water : float
-            Temperature of the supply water [K].
+        **values
+            As in `HvacSystem.start` [unit of the state].
 
         Returns
         -------
         HvacState
             To start from.
         """
-        for _, s in self.system.states:
-            scalar_action("supply water at the start", water, s.unit, s.lowest, s.highest)
-        n = self.system.zone_count
-        values = (float(water),) * len(self.system.states)
-        return HvacState(values, np.full(n, Mode.OFF, dtype=np.int8), np.zeros(n, dtype=bool))
+        chosen, n = self.system.start(**values), self.system.zone_count
+        for key, (_, s) in self.system.states.items():
+            scalar_action(f"{key} at the start", chosen[key], s.unit, s.lowest, s.highest)
+        return HvacState(tuple(map(float, chosen.values())), np.full(n, Mode.OFF, dtype=np.int8), np.zeros(n, dtype=bool))
 
     def step(
         self,

@@ -7,8 +7,8 @@ import numpy as np
 
 from thermal._types import FloatArray
 from thermal.case.points import POINT_TYPES
-from thermal.components.boiler_loop import BoilerLoop
-from thermal.components.component import Calls, Component, Conditions, EnergyBalance
+from thermal.components.component import Calls, Component, Conditions
+from thermal.components.energy_balance import EnergyBalance
 from thermal.components.operations import StepOperations
 from thermal.system.exchange import givens
 from thermal.system.step import HvacStep
@@ -31,8 +31,7 @@ class HvacPoints:
     def __init__(self, system: HvacSystem, pressures: bool = False) -> None:
         self.system, self._ops = system, StepOperations()
         kinds: dict[type[Component], list[str]] = {}
-        for name in [*system.groups, *(n for n in system.singles if not isinstance(system.components[n], BoilerLoop)),
-                     *system.of_kind(BoilerLoop)]:  # fmt: skip
+        for name in (*system.groups, *system.singles):
             kinds.setdefault(type(system.components[name]), []).append(name)
         #: Components of each kind, and which of their points are read.
         self._read = [
@@ -67,10 +66,10 @@ class HvacPoints:
         numpy.ndarray, shape (n_column,)
             In the library's units: kelvin, kg/s, W, shares.
         """
-        system, water = self.system, step.water
+        system = self.system
         given = givens(system, _NO_CALLS, conditions, actions, step.state, 0.0, _nowhere)
         values = {
-            name: component.read(self._ops, given[name], step.results[name], water)
+            name: component.read(self._ops, given[name], step.results[name])
             for name, component in system.components.items()
         }
         return np.concatenate([np.atleast_1d(values[name][k]) for names, k in self._read for name in names])

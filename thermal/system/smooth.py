@@ -106,7 +106,7 @@ class SmoothHvac:
     Attributes
     ----------
     inputs : dict of str to slice
-        Where states and manipulated inputs stand in the vector of inputs, by state and by type of the point.
+        Where states and manipulated inputs stand in the vector of inputs, by ``ENTITY/state`` and by type of the point.
     exogenous : dict of str to slice
         Where conditions and switches stand in the vector of exogenous inputs.
 
@@ -140,8 +140,7 @@ class SmoothHvac:
         sizes = {point: len(keys) for point, keys in system.by_point.items()}
         decided = {p: sizes[p] for p, a in kinds.items() if a.usual and a.default is None}
         held = {p: sizes[p] for p, a in kinds.items() if a.usual and a.default is not None and pressures}
-        states = {state.name: 1 for _, state in system.states}
-        self.inputs = _slices(states | decided | held | (zones if setpoints else {}))
+        self.inputs = _slices(dict.fromkeys(system.states, 1) | decided | held | (zones if setpoints else {}))
         others = {"outdoor_temperature": 1, "outdoor_humidity": 1, "return_humidity": self.n_air_handler,
                   "room_temperature": 1, "seconds": 1}  # fmt: skip
         switches = {p: sizes[p] for p, a in kinds.items() if not a.usual}

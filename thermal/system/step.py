@@ -1,12 +1,15 @@
 """What a step of a system gives."""
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 from thermal.components.air_handler import AirHandlerStep
 from thermal.components.boiler_loop import LoopStep
 from thermal.components.operations import Value
 from thermal.components.terminals import TerminalStep
+from thermal.errors import ModelError, describe
+
+_Kind = TypeVar("_Kind")
 
 
 class HvacStep(NamedTuple):
@@ -35,20 +38,21 @@ class HvacStep(NamedTuple):
     @property
     def terminals(self) -> TerminalStep:
         """What the terminals did."""
-        return next(r for r in self.results.values() if type(r) is TerminalStep)
+        return self._only(TerminalStep)
 
     @property
     def loop(self) -> LoopStep:
-        """What the hot-water loop did."""
-        return next(r for r in self.results.values() if type(r) is LoopStep)
-
-    @property
-    def water(self) -> Value:
-        """Supply water at the end [K]."""
-        return self.loop.supply_water_temperature
+        """What the boiler loop did."""
+        return self._only(LoopStep)
 
     @property
     def supply_temperature(self) -> tuple[Value, ...]:
         """Supply air of the air handlers [K]."""
-        water = self.water
-        return tuple([done.supply_temperature(water) for done in self.air_handlers])
+        return tuple([done.supply_temperature for done in self.air_handlers])
+
+    def _only(self, kind: type[_Kind]) -> _Kind:
+        for result in self.results.values():
+            if type(result) is kind:
+                return result
+        found = ", ".join(f"{name} ({type(result).__name__})" for name, result in self.results.items())
+        raise ModelError(describe("HvacStep", f"a {kind.__name__}", found, "results has all components by name"))
