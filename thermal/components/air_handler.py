@@ -96,15 +96,20 @@ class AirHandlerStep(NamedTuple):
         Its heating coil, valve set.
     electric_power, fuel_power : Value
         Taken up [W].
-    supply_temperature : Value
-        Supply air [K].
+    water : Value
+        Supply water at the end of the step [K]; 0 where no coil takes any.
     """
 
     mixed: Mixed
     warmed: Warmed
     electric_power: Value
     fuel_power: Value
-    supply_temperature: Value
+    water: Value
+
+    @property
+    def supply_temperature(self) -> Value:
+        """Supply air [K]."""
+        return self.warmed.offset + self.warmed.slope * self.water
 
 
 @dataclass(frozen=True)
@@ -206,13 +211,12 @@ class AirHandler(Component):
         mixed = self.mix(ops, drawn, given.conditions, command, water.opening if water else 1.0)
         warmed = self.warm(ops, mixed, water.warmest if water else 0.0, water.opening if water else 1.0)
         given.put("supply_air", SupplyAir(warmed.offset, warmed.slope))
-        supplied = warmed.offset
+        end = SupplyWater(0.0)
         if coil:
             source = warmed.conductance * mixed.cooled_temperature
             given.put("hot_water", WaterDrawn(warmed.conductance, source, warmed.flow_share * coil.water_flow))
-            end: SupplyWater = yield "hot_water"
-            supplied = supplied + warmed.slope * end.temperature
-        return AirHandlerStep(mixed, warmed, *self.powers(mixed, warmed), supplied)
+            end = yield "hot_water"
+        return AirHandlerStep(mixed, warmed, *self.powers(mixed, warmed), end.temperature)
 
     def powers(self, mixed: Mixed, warmed: Warmed) -> tuple[Value, Value]:
         """Electric and fuel power [W].

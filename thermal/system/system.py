@@ -348,31 +348,29 @@ class HvacSystem:
         return found
 
     def powers(self, ops: Operations, results: Mapping[str, Any]) -> tuple[Value, Value]:
-        """Electric and fuel power of all components that have a result [W].
+        """Electric and fuel power of components [W].
 
         Parameters
         ----------
         ops : Operations
             Arithmetic.
         results : mapping of str to named tuple
-            What components did.
+            What they did.
         """
-        totals: list[Value] = [0.0, 0.0]
-        for place, port, name, group in self._metered:
-            if name in results:
-                power = getattr(results[name], port)
-                totals[place] = totals[place] + (power if group is None else group.total(ops.of(name), power))
-        return totals[0], totals[1]
+        totals: dict[str, Value] = {"electricity": 0.0, "fuel": 0.0}
+        for name, result in results.items():
+            for kind, port in self.meters[name]:
+                power, group = getattr(result, port), self.groups.get(name)
+                totals[kind] = totals[kind] + (power if group is None else group.total(ops.of(name), power))
+        return totals["electricity"], totals["fuel"]
 
     @cached_property
-    def _metered(self) -> list[tuple[int, str, str, Group | None]]:
-        kinds = {"electricity": 0, "fuel": 1}
-        return [
-            (kinds[port.quantity], port.name, name, self.groups.get(name))
-            for name, c in self.components.items()
-            for port in c.ports
-            if port.quantity in kinds
-        ]
+    def meters(self) -> dict[str, list[tuple[str, str]]]:
+        """Electricity and fuel that each component takes up, with the ports, by component."""
+        return {
+            name: [(port.quantity, port.name) for port in component.ports if port.quantity in ("electricity", "fuel")]
+            for name, component in self.components.items()
+        }
 
 
 def vav_system(

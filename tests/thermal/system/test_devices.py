@@ -69,7 +69,7 @@ def test_radiators_of_a_case_are_sized_and_connected_and_unknown_types_are_named
     heats = []
     for each in (plain, system):
         plant = HvacPlant(each)
-        _, step = plant.step(plant.start(345.0), conditions, each.actions(**chosen), 300.0)
+        _, step = plant.step(plant.start(supply_water_temperature=345.0), conditions, each.actions(**chosen), 300.0)
         heats.append(plant.heat(step))
     gained = heats[1] - heats[0]
     assert gained[3] > 100.0 and np.abs(np.delete(gained, 3)).max() < 1e-6

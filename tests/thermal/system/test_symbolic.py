@@ -39,11 +39,11 @@ def outputs(system, *given):
 def test_casadi_and_numpy_are_the_same(plant_system, command, seed):
     water, conditions, actions = drawn(seed, 5, 2)
     plant = HvacPlant(plant_system)
-    state, step = plant.step(plant.start(water), conditions, command(plant_system, *actions), 300.0)
+    state, step = plant.step(plant.start(supply_water_temperature=water), conditions, command(plant_system, *actions), 300.0)
     found = outputs(plant_system, *arguments(water, conditions, actions))
     done, loop = step.terminals, step.loop
     expected = {
-        "supply_water_temperature_end": state.water, "heat": plant.heat(step), "electric_power": step.electric_power,
+        "supply_water_temperature_end": state.values[0], "heat": plant.heat(step), "electric_power": step.electric_power,
         "fuel_power": step.fuel_power, "VAV_airflow": done.airflow, "VAV_entering": done.entering,
         "VAV_reheat": done.reheat, "supply_temperature": step.supply_temperature,
         "BOILER_return_water_temperature": loop.return_water_temperature, "BOILER_pump_power": loop.pump_power,
@@ -59,7 +59,7 @@ def test_several_terminals_of_a_zone_add_up_symbolically(plant_system, command):
     system = vav_system(plant_system.air_handlers, plant_system.loop, terminals)
     water, conditions, actions = drawn(1, 2, 2)
     plant = HvacPlant(system)
-    heat = plant.heat(plant.step(plant.start(water), conditions, command(system, *actions), 300.0)[1])
+    heat = plant.heat(plant.step(plant.start(supply_water_temperature=water), conditions, command(system, *actions), 300.0)[1])
     assert np.allclose(np.array(hvac_function(system, 0.0)(*arguments(water, conditions, actions))[1]).ravel(), heat)
 
 
