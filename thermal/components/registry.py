@@ -1,5 +1,6 @@
 """Which component a device of a case is, by its type; one's own are added with `register_component`."""
 
+from thermal.case.building import DEVICE_TYPES
 from thermal.components.air_handler import AirHandler
 from thermal.components.boiler_loop import BoilerLoop
 from thermal.components.component import Actuator, Component
@@ -37,6 +38,11 @@ def register_component(kind: type[Component]) -> type[Component]:
         raise ModelError(describe(f"component {kind.__name__}: device", expected, repr(kind.device)))
     COMPONENTS[kind.device] = kind
     return kind
+
+
+def device_types() -> tuple[str, ...]:
+    """Give the types of devices that are known: of the case format, and of registered components."""
+    return (*DEVICE_TYPES, *(kind for kind in COMPONENTS if kind not in DEVICE_TYPES))
 
 
 def setpoints() -> dict[str, Actuator]:
