@@ -99,10 +99,9 @@ class Measured:
             self.gas = self._of(boiler, "gas_power_sensor")[:, 0]
         self.entering = self.supply[:, system.terminals.air_handler]
         self.static = self._pressure(handlers, "supply_air_static_pressure_sensor", system.static_pressures)
-        usual = tuple(v for key, v in system.defaults.items() if key.endswith(f"/{DIFFERENTIAL_PRESSURE}"))[:1] or (1.0,)
-        differential = self._pressure((devices.boiler,), "differential_pressure_sensor", usual)[:, 0]
-        #: Differential pressure of the hot water, and over its design value.
-        self.differential, self.differential_share = differential, differential / usual[0]
+        usual = system.defaults.get(next(iter(system.by_point.get(DIFFERENTIAL_PRESSURE, ())), ""), 1.0)
+        self.differential = self._pressure((devices.boiler,), "differential_pressure_sensor", (usual,))[:, 0]
+        self.differential_share = self.differential / usual
         # what is missing keeps its last value where a replay runs on, and is not compared
         self.running = self.flow > _LEAST_SHARE * system.terminals.design_flow
         of_handler = system.terminals.members

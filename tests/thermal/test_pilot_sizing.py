@@ -36,7 +36,7 @@ def test_the_design_day_is_held(office: Building) -> None:
     simulator.reset(zones, np.array([at.winter_outdoor]))
     after = simulator.step(plant.heat(step), np.array([at.winter_outdoor]))
     assert (after >= zones - 0.02).all()
-    assert step.loop.supply_water_temperature == pytest.approx(at.supply_water, abs=0.5)
+    assert step.results["BOILER"].supply_water_temperature == pytest.approx(at.supply_water, abs=0.5)
 
 
 def test_cooling_carries_gains_and_sun(office: Building) -> None:

@@ -13,7 +13,7 @@ from thermal.components.moist_air import EVAPORATION_HEAT, enthalpy
 from thermal.components.operations import Operations, Value
 from thermal.components.streams import AirCommand, AirDrawn, Duct, HotWater, SupplyAir, SupplyWater, WaterDrawn
 from thermal.components.water_coil import WaterCoil, water_share
-from thermal.errors import ModelError, describe
+from thermal.errors import ModelError
 from thermal.units import AIR_HEAT_CAPACITY
 
 _LEAST = 1e-9
@@ -179,8 +179,7 @@ class AirHandler(Component):
         super().__post_init__()
         in_range("AirHandler.low_limit", self.low_limit, "K", 173.15, self.high_limit)
         if self.heating is not None and not isinstance(self.heating, WaterCoil | Heater):
-            found = type(self.heating).__name__
-            raise ModelError(describe("AirHandler.heating", "a WaterCoil, a Heater or None", found))
+            raise ModelError("AirHandler.heating", "a WaterCoil, a Heater or None", type(self.heating).__name__)
 
     @property
     def connectors(self) -> tuple[Port, ...]:

@@ -18,7 +18,7 @@ from thermal.components.checks import all_in_range, in_range
 from thermal.components.energy_balance import EnergyBalance
 from thermal.components.moist_air import USUAL_HUMIDITY
 from thermal.components.operations import Operations, Value
-from thermal.errors import ModelError, describe
+from thermal.errors import ModelError
 
 Quantity = Literal["air", "water", "heat", "electricity", "fuel"]
 #: A component's function while it runs: yields the port that it waits for, returns its named results. One that waits
@@ -235,7 +235,7 @@ class Component:
             The class cannot be sized.
         """
         expected = "a class with a classmethod `sized`"
-        raise ModelError(describe(f"component {cls.__name__}", expected, "none", "write it, or pass the system itself"))
+        raise ModelError(f"component {cls.__name__}", expected, "none", "write it, or pass the system itself")
 
     def run(self, ops: Operations, given: Given) -> Any:
         """Give outputs of inputs: the component's equations, as a `Run`.
@@ -296,7 +296,7 @@ class Group(Component):
         if cls.states or cls.actuators:
             found = ", ".join([s.name for s in cls.states] + [a.point for a in cls.actuators])
             advice = "declare them in a Component that the group draws from"
-            raise ModelError(describe(f"group {cls.__name__}", "neither states nor actuators", found, advice))
+            raise ModelError(f"group {cls.__name__}", "neither states nor actuators", found, advice)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "zone", self.positions("zone"))
@@ -345,8 +345,7 @@ class Group(Component):
         """
         index = np.array(np.broadcast_to(np.asarray(getattr(self, name)), (len(np.atleast_1d(self.zone)),)))
         if not np.issubdtype(index.dtype, np.integer) or (len(index) and index.min() < 0):
-            where = f"{type(self).__name__}.{name}"
-            raise ModelError(describe(where, "positions from 0 on", f"{index.dtype} {index}"))
+            raise ModelError(f"{type(self).__name__}.{name}", "positions from 0 on", f"{index.dtype} {index}")
         return index.astype(np.intp)
 
     @cached_property

@@ -15,7 +15,7 @@ from thermal.components.moist_air import WATER_HEAT_CAPACITY
 from thermal.components.operations import Operations, Value
 from thermal.components.streams import HotWater, SupplyWater, WaterDrawn
 from thermal.components.water_coil import LEAST_FLOW
-from thermal.errors import ModelError, describe
+from thermal.errors import ModelError
 
 _LEAST = 1e-6  # K: of an overtemperature, so that its powers have finite slopes
 
@@ -86,7 +86,7 @@ class Radiators(Group):
         super().__post_init__()
         if not self.room_temperature < self.return_temperature < self.supply_temperature:
             found = f"{self.room_temperature:g}, {self.return_temperature:g} and {self.supply_temperature:g} K"
-            raise ModelError(describe("Radiators: nominal temperatures", "room < return < supply", found))
+            raise ModelError("Radiators: nominal temperatures", "room < return < supply", found)
 
     @classmethod
     def sized(cls, heat: ArrayLike, zone: IndexArray) -> Radiators:

@@ -7,7 +7,7 @@ from thermal.components.component import Actuator, Component
 from thermal.components.radiators import Radiators
 from thermal.components.terminals import Terminals
 from thermal.components.thermostat import Thermostat
-from thermal.errors import ModelError, describe
+from thermal.errors import ModelError
 
 #: Classes of components by type of device.
 COMPONENTS: dict[str, type[Component]] = {kind.device: kind for kind in (Terminals, AirHandler, BoilerLoop, Radiators)}
@@ -35,7 +35,7 @@ def register_component(kind: type[Component]) -> type[Component]:
     named = (kind.__module__, kind.__qualname__)
     if not kind.device or (known is not None and (known.__module__, known.__qualname__) != named):
         expected = f"a type of device beside {', '.join(sorted(COMPONENTS))}"
-        raise ModelError(describe(f"component {kind.__name__}: device", expected, repr(kind.device)))
+        raise ModelError(f"component {kind.__name__}: device", expected, repr(kind.device))
     COMPONENTS[kind.device] = kind
     return kind
 

@@ -26,7 +26,7 @@ from thermal.components.water_coil import (
     water_share,
     water_side,
 )
-from thermal.errors import ModelError, describe
+from thermal.errors import ModelError
 from thermal.units import AIR_HEAT_CAPACITY
 
 _LEAST = 1e-9  # K, W/K, kg/s: next to nothing
@@ -138,8 +138,7 @@ class Terminals(Group):
         if not in_order.all():
             k = int(np.argmin(in_order))
             found = f"{self.minimum_flow[k]:g}, {self.heating_flow[k]:g} and {self.design_flow[k]:g} kg/s"
-            expected = "minimum_flow <= heating_flow <= design_flow"
-            raise ModelError(describe(f"Terminals: terminal {k}", expected, found))
+            raise ModelError(f"Terminals: terminal {k}", "minimum_flow <= heating_flow <= design_flow", found)
 
     @classmethod
     def sized(

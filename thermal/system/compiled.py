@@ -16,7 +16,7 @@ import numpy as np
 from thermal._types import FloatArray
 from thermal.components.component import Calls, Conditions, Given
 from thermal.components.operations import CasadiOperations, StepOperations
-from thermal.errors import ModelError, describe
+from thermal.errors import ModelError
 from thermal.system.exchange import Mail, Runner, givens
 from thermal.system.step import HvacStep
 from thermal.system.system import HvacSystem
@@ -93,7 +93,8 @@ class CompiledSystem:
     -----
     The first step is taken with symbols for all single components. Each time all of them wait for what groups draw, the
     expressions that have come up since make a function, a phase; what groups send is a new symbol. What components give
-    is evaluated in the first phase that knows all that it is made of. A system of two air handlers has some 900 operations on single numbers a step, 50 ns each in Python, 4 ns here.
+    is evaluated in the first phase that knows all that it is made of. A system of two air handlers has
+    some 900 operations on single numbers a step, 50 ns each in Python, 4 ns here.
     """
 
     def __init__(self, system: HvacSystem) -> None:
@@ -164,13 +165,10 @@ class CompiledSystem:
             moved |= runner.advance(system.groups)
             traces.append(_Trace(held, list(told), slice(begin, len(carried)), drawn))
             if not moved:
-                expected = "components that do not wait for each other"
-                raise ModelError(describe("HvacSystem", expected, f"{runner.waiting}"))
+                raise ModelError("HvacSystem", "components that do not wait for each other", f"{runner.waiting}")
         return self._functions(symbols, traces, {name: runner.results[name] for name in system.singles})
 
-    def _functions(
-        self, symbols: tuple[list[Any], ...], traces: list[_Trace], results: dict[str, Any]
-    ) -> list[_Phase]:
+    def _functions(self, symbols: tuple[list[Any], ...], traces: list[_Trace], results: dict[str, Any]) -> list[_Phase]:
         """Make a function of each phase, bound to the arrays that it reads and writes."""
         (now, fixed, load, carried), phases, system = symbols, list[_Phase](), self._system
         values = _leaves(tuple(results.values()))
@@ -200,9 +198,9 @@ class CompiledSystem:
             told = self._values[start : start + next(places)]
             phases.append(_Phase(_writer(loads, drawn, trace.drawn), run, told, messages, (function, buffer)))
             drawn = trace.drawn
-        places = iter(place.tolist())
+        where = iter(place.tolist())
         self._readers: dict[str, _Read] = dict.fromkeys(system.components, tuple)
-        self._readers |= {name: _reader(result, places) for name, result in results.items()}
+        self._readers |= {name: _reader(result, where) for name, result in results.items()}
         numbered = Results(self._readers, list(range(ends[-1])), {})
         self._state = [getattr(numbered[name], state.name) for name, state in system.states.values()]
         self._electric, self._fuel = (

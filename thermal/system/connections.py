@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from thermal.components.component import Component, Port
-from thermal.errors import ModelError, describe, nearest
+from thermal.errors import ModelError, check_known
 
 
 class Connection(NamedTuple):
@@ -25,42 +25,21 @@ class Connection(NamedTuple):
     suppliers: tuple[str, ...]
 
 
-#: Components and ports at the other end, by component and port.
-Partners = dict[tuple[str, str], list[tuple[str, str]]]
-
-
-def find_port(components: Mapping[str, Component], name: str, port: str) -> Port:
-    """Find a port of a component that is to be connected.
+def connectors(components: Mapping[str, Component]) -> dict[tuple[str, str], Port]:
+    """List the ports that are to be connected, by the name of the component and their own.
 
     Parameters
     ----------
     components : mapping of str to Component
         By name.
-    name, port : str
-        Of the component, and of its port.
     """
-    ports = {p.name: p for p in components[name].connectors}
-    if port not in ports:
-        raise ModelError(describe(f"{name}: port", "one of its ports", repr(port), nearest(port, ports)))
-    return ports[port]
+    return {(name, port.name): port for name, component in components.items() for port in component.connectors}
 
 
-def find_suppliers(components: Mapping[str, Component], quantity: str) -> dict[str, str]:
-    """Find what supplies a quantity: components, each with its port.
-
-    Parameters
-    ----------
-    components : mapping of str to Component
-        By name.
-    quantity : str
-        ``air`` or ``water``.
-    """
-    every = ((name, port) for name, component in components.items() for port in component.connectors)
-    return {name: port.name for name, port in every if port.supplies and port.quantity == quantity}
-
-
-def find_partners(components: Mapping[str, Component], connections: Iterable[Connection]) -> Partners:
-    """Find what each port is connected to.
+def find_partners(
+    components: Mapping[str, Component], connections: Iterable[Connection]
+) -> dict[tuple[str, str], list[tuple[str, str]]]:
+    """Find which ports each port is connected to.
 
     Parameters
     ----------
@@ -74,27 +53,25 @@ def find_partners(components: Mapping[str, Component], connections: Iterable[Con
     ModelError
         When a connection does not fit its components, a port has none, or one that takes one supplier has several.
     """
-    found: Partners = {}
+    ports = connectors(components)
+    supplying = {(key[0], port.quantity): key for key, port in ports.items() if port.supplies}
+    found: dict[tuple[str, str], list[tuple[str, str]]] = {key: [] for key in ports}
     for consumer, port, suppliers in connections:
         for name in (consumer, *suppliers):
-            if name not in components:
-                raise ModelError(
-                    describe("HvacSystem: connection", "a component", repr(name), nearest(name, components))
-                )
-        quantity = find_port(components, consumer, port).quantity
-        supplying = find_suppliers(components, quantity)
+            check_known(name, components, "HvacSystem: connection", "a component", ModelError)
+        check_known(port, (p for name, p in ports if name == consumer), f"{consumer}: port", "one of its", ModelError)
+        quantity = ports[consumer, port].quantity
         for name in suppliers:
-            if name not in supplying:
-                raise ModelError(describe(f"{name}: port", f"one that supplies {quantity}", "none"))
-            found.setdefault((consumer, port), []).append((name, supplying[name]))
-            found.setdefault((name, supplying[name]), []).append((consumer, port))
-    for name, component in components.items():
-        for p in component.connectors:
-            count, single = len(found.get((name, p.name), ())), p.shape == "one" and not p.supplies
-            if count == 0 or (single and count > 1):
-                expected = f"{'one connection' if single else 'a connection'} for its {p.quantity}"
-                advice = f"with_component(..., {'feeds=' if p.supplies else p.name + '='}...) connects it"
-                raise ModelError(describe(f"{name}: port {p.name!r}", expected, str(count or "none"), advice))
+            if (name, quantity) not in supplying:
+                raise ModelError(f"{name}: port", f"one that supplies {quantity}", "none")
+            found[consumer, port].append(supplying[name, quantity])
+            found[supplying[name, quantity]].append((consumer, port))
+    for (name, port), others in found.items():
+        single = ports[name, port].shape == "one" and not ports[name, port].supplies
+        if not others or (single and len(others) > 1):
+            expected = f"{'one connection' if single else 'a connection'} for its {ports[name, port].quantity}"
+            advice = f"with_component(..., {'feeds=' if ports[name, port].supplies else port + '='}...) connects it"
+            raise ModelError(f"{name}: port {port!r}", expected, str(len(others) or "none"), advice)
     return found
 
 
@@ -133,11 +110,10 @@ def spread(where: str, keys: Iterable[str], values: Mapping[str, Any]) -> dict[s
     found, kinds = dict[str, Any](), by_kind(keys)
     kinds |= {key: (key,) for mine in tuple(kinds.values()) for key in mine}
     for kind, value in values.items():
-        if kind not in kinds:
-            raise ModelError(describe(where, "one that a component has", repr(kind), nearest(kind, kinds)))
+        check_known(kind, kinds, where, "one that a component has", ModelError)
         mine, plain = kinds[kind], value.tolist() if isinstance(value, np.ndarray) else value
         each = list(plain) if isinstance(plain, tuple | list) else [plain] * len(mine)
         if len(each) != len(mine):
-            raise ModelError(describe(kind, f"one value or {len(mine)}, one a component", f"{len(each)} values"))
+            raise ModelError(kind, f"one value or {len(mine)}, one a component", f"{len(each)} values")
         found |= zip(mine, each, strict=True)
     return found

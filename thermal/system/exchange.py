@@ -8,7 +8,7 @@ from typing import Any
 from thermal.components.air_handler import AirHandler
 from thermal.components.component import Calls, Conditions, Given
 from thermal.components.operations import Operations, Value
-from thermal.errors import ModelError, describe
+from thermal.errors import ModelError
 from thermal.system.connections import find_partners
 from thermal.system.step import HvacStep
 from thermal.system.system import HvacSystem
@@ -54,7 +54,7 @@ class Mail:
         """
         boxes = self.waiting.get((receiver, port))
         if boxes is None:
-            raise ModelError(describe(f"{receiver}: port {port!r}", "one that it declares", "none", "see `ports`"))
+            raise ModelError(f"{receiver}: port {port!r}", "one that it declares", "none", "see `ports`")
         if not all(boxes.values()):
             return None
         parts = [box.popleft() for box in boxes.values()]
@@ -197,21 +197,7 @@ def advance(
     runner = Runner(mail, runs)
     runner.advance(system.components)
     if runner.waiting:
-        raise ModelError(describe("HvacSystem", "components that do not wait for each other", f"{runner.waiting}"))
-    return finished(ops, system, {name: runner.results[name] for name in system.components})
-
-
-def finished(ops: Operations, system: HvacSystem, results: Mapping[str, Any]) -> HvacStep:
-    """Make a step of what the components did.
-
-    Parameters
-    ----------
-    ops : Operations
-        Arithmetic.
-    system : HvacSystem
-        The system.
-    results : mapping of str to named tuple
-        By component.
-    """
-    state = tuple([getattr(results[name], s.name) for name, s in system.states.values()])
-    return HvacStep(results, state, *system.powers(ops, results))
+        raise ModelError("HvacSystem", "components that do not wait for each other", f"{runner.waiting}")
+    results = {name: runner.results[name] for name in system.components}
+    end = tuple([getattr(results[name], s.name) for name, s in system.states.values()])
+    return HvacStep(results, end, *system.powers(ops, results))

@@ -169,12 +169,14 @@ class SmoothHvac:
         ----------
         values : mapping of str to ndarray
             By name, as in `exogenous`, shape (N,) or (N, n) [unit of each]; the usual humidity, a plant room of 293.15
-            K and running devices by default.
+            K and the actuators' defaults where they are not given.
         """
-        usual = {"return_humidity": USUAL_HUMIDITY, "room_temperature": 293.15}
+        usual: dict[str, Any] = {"return_humidity": USUAL_HUMIDITY, "room_temperature": 293.15}
+        points, known = self.system.by_point, self.system.defaults
+        usual |= {point: np.array([[known.get(key, 1.0) for key in keys]]) for point, keys in points.items()}
         rows = np.empty((len(values["seconds"]), self.n_exogenous))
         for name, at in self.exogenous.items():
-            given = np.asarray(values.get(name, usual.get(name, 1.0)), dtype=float)
+            given = np.asarray(values.get(name, usual.get(name)), dtype=float)
             rows[:, at] = given[:, None] if given.ndim == 1 else given
         return rows
 

@@ -1,15 +1,12 @@
 """What a step of a system gives."""
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 from thermal.components.air_handler import AirHandlerStep
-from thermal.components.boiler_loop import LoopStep
 from thermal.components.operations import Value
 from thermal.components.terminals import TerminalStep
-from thermal.errors import ModelError, describe
-
-_Kind = TypeVar("_Kind")
+from thermal.errors import ModelError
 
 
 class HvacStep(NamedTuple):
@@ -38,21 +35,12 @@ class HvacStep(NamedTuple):
     @property
     def terminals(self) -> TerminalStep:
         """What the terminals did."""
-        return self._only(TerminalStep)
-
-    @property
-    def loop(self) -> LoopStep:
-        """What the boiler loop did."""
-        return self._only(LoopStep)
+        for result in self.results.values():
+            if type(result) is TerminalStep:
+                return result
+        raise ModelError("HvacStep", "terminals", ", ".join(self.results), "results has all components by name")
 
     @property
     def supply_temperature(self) -> tuple[Value, ...]:
         """Supply air of the air handlers [K]."""
         return tuple([done.supply_temperature for done in self.air_handlers])
-
-    def _only(self, kind: type[_Kind]) -> _Kind:
-        for result in self.results.values():
-            if type(result) is kind:
-                return result
-        found = ", ".join(f"{name} ({type(result).__name__})" for name, result in self.results.items())
-        raise ModelError(describe("HvacStep", f"a {kind.__name__}", found, "results has all components by name"))

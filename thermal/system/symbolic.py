@@ -87,5 +87,5 @@ def hvac_function(system: HvacSystem, width: float = 0.02) -> Any:
         for field, value in result._asdict().items()
         if not isinstance(value, tuple) and f"{name}/{field}" not in system.states
     }
-    names = ([casadi.Function.fix_name(name) for name in each] for each in (s, outputs))
-    return casadi.Function("hvac", list(s.values()), list(outputs.values()), *names)
+    given, found = ([casadi.Function.fix_name(name) for name in each] for each in (s, outputs))
+    return casadi.Function("hvac", list(s.values()), list(outputs.values()), given, found)

@@ -17,8 +17,8 @@ from thermal.components.operations import Operations, Value
 from thermal.components.terminals import Terminals
 from thermal.components.thermostat import Thermostat
 from thermal.components.water_coil import WaterCoil
-from thermal.errors import ModelError, describe, nearest
-from thermal.system.connections import Connection, by_kind, find_partners, find_port, find_suppliers, spread
+from thermal.errors import ModelError, check_known
+from thermal.system.connections import Connection, by_kind, connectors, find_partners, spread
 
 _Kind = TypeVar("_Kind", bound=Component)
 
@@ -54,7 +54,7 @@ class HvacSystem:
         zones = np.unique(np.concatenate([g.zone for g in self.groups.values()] or [np.zeros(0, dtype=np.intp)]))
         if not len(zones) or len(zones) != zones[-1] + 1:
             missing = sorted(set(range(int(zones[-1]) if len(zones) else 1)) - set(zones.tolist()))
-            raise ModelError(describe("HvacSystem", "a terminal in each zone", f"none in zones {missing[:8]}"))
+            raise ModelError("HvacSystem", "a terminal in each zone", f"none in zones {missing[:8]}")
 
     def of_kind(self, kind: type[_Kind]) -> dict[str, _Kind]:
         """Components of a class, by name.
@@ -67,7 +67,7 @@ class HvacSystem:
         return {name: c for name, c in self.components.items() if isinstance(c, kind)}
 
     def only(self, kind: type[_Kind]) -> _Kind:
-        """The one component of a class.
+        """Give the one component of a class.
 
         Parameters
         ----------
@@ -82,7 +82,7 @@ class HvacSystem:
         found = self.of_kind(kind)
         if len(found) != 1:
             known = ", ".join(f"{name} ({type(c).__name__})" for name, c in self.components.items())
-            raise ModelError(describe("HvacSystem", f"one {kind.__name__}", f"{len(found)} among {known}"))
+            raise ModelError("HvacSystem", f"one {kind.__name__}", f"{len(found)} among {known}")
         return next(iter(found.values()))
 
     @cached_property
@@ -108,7 +108,8 @@ class HvacSystem:
     @cached_property
     def water_suppliers(self) -> tuple[str, ...]:
         """Names of the components that supply hot water."""
-        return tuple(find_suppliers(self.components, "water"))
+        ports = connectors(self.components).items()
+        return tuple(name for (name, _), port in ports if port.supplies and port.quantity == "water")
 
     @cached_property
     def terminals(self) -> Terminals:
@@ -191,23 +192,13 @@ class HvacSystem:
         return spread("actions", self.actuators, values)
 
     def start(self, **values: Any) -> dict[str, Any]:
-        """Give states to start from.
+        """Give states to start from, by ``ENTITY/state``.
 
         Parameters
         ----------
         **values
             By name of the state, one value for all that have it or one each, or by ``ENTITY/state`` [unit of the
             state]; as declared by default.
-
-        Returns
-        -------
-        dict
-            By ``ENTITY/state``.
-
-        Raises
-        ------
-        ModelError
-            When no component has such a state, or there are not as many values.
         """
         declared = {key: state.start for key, (_, state) in self.states.items()}
         return declared | spread("start", self.states, values)
@@ -253,7 +244,7 @@ class HvacSystem:
                 new |= zip(mine, each, strict=False)
         if not fits:
             found = f"{', '.join(str(len(each)) for each in names.values())}, {len(set(given))} different"
-            raise ModelError(describe("names", f"{' and '.join(parts)}, all named differently", found))
+            raise ModelError("names", f"{' and '.join(parts)}, all named differently", found)
         known = {name: new.get(name, name) for name in self.components}
         return replace(
             self,
@@ -278,9 +269,7 @@ class HvacSystem:
             When the system has no component of such a name, or a new one lacks a port that is connected.
         """
         for name in components:
-            if name not in self.components:
-                advice = f"{nearest(name, self.components)}; with_component adds one"
-                raise ModelError(describe("having", "a component of the system", repr(name), advice))
+            check_known(name, self.components, "having", "a component (with_component adds one)", ModelError)
         return replace(self, components={**self.components, **components})
 
     def with_component(
@@ -306,16 +295,15 @@ class HvacSystem:
         """
         if name in self.components:
             advice = "take another name, or replace that one with having"
-            raise ModelError(describe("with_component", "a new name", repr(name), advice))
-        more = {(name, port): (s,) if isinstance(s, str) else s for port, s in suppliers.items()}
-        supplied = {port.quantity for port in component.connectors if port.supplies}
-        more |= {(c, p): (name,) for c, p, _ in self.connections if c in feeds and find_port(self.components, c, p).quantity in supplied}
-        links = {(consumer, port): suppliers for consumer, port, suppliers in self.connections} | more
-        return replace(
-            self,
-            components={**self.components, name: component},
-            connections=tuple(Connection(*link, suppliers) for link, suppliers in links.items()),
-        )
+            raise ModelError("with_component", "a new name", repr(name), advice)
+        supplied, ports = {p.quantity for p in component.connectors if p.supplies}, connectors(self.components)
+        links = {(c.consumer, c.port): c.suppliers for c in self.connections}
+        for consumer in feeds:
+            check_known(consumer, self.components, "with_component: feeds", "a component of the system", ModelError)
+        links |= {link: (name,) for link in links if link[0] in feeds and ports[link].quantity in supplied}
+        links |= {(name, port): (s,) if isinstance(s, str) else s for port, s in suppliers.items()}
+        joined = tuple(Connection(*link, feeding) for link, feeding in links.items())
+        return replace(self, components={**self.components, name: component}, connections=joined)
 
     def at_zones(self, ops: Operations, results: Mapping[str, Any], port: str = "heat") -> Value:
         """Sum the heat that groups bring into the zones, one a zone [W].
@@ -398,7 +386,7 @@ def vav_system(
     if n == 0 or not supplied or supplied != set(range(n)):
         expected = "at least one air handler, each with a terminal of its own"
         advice = "Terminals.air_handler holds positions in air_handlers"
-        raise ModelError(describe("HvacSystem", expected, f"{n} of them and terminals at {supplied}", advice))
+        raise ModelError("HvacSystem", expected, f"{n} of them and terminals at {supplied}", advice)
     handlers = {f"AHU_{k}": handler for k, handler in enumerate(air_handlers)}
     wet = [name for name, handler in handlers.items() if isinstance(handler.heating, WaterCoil)]
     connections = [Connection("VAV", "supply_air", tuple(handlers))]

@@ -98,11 +98,11 @@ def test_casadi_and_numpy_are_the_same_and_derivatives_are_finite_differences(sy
     plant, conditions = HvacPlant(system), cold()
     state, step = plant.step(plant.start(supply_water_temperature=340.0), conditions, actions(system), 300.0)
     function, chosen = hvac_function(system, 0.0), system.defaults | actions(system)
-    given = {"supply_water_temperature": 340.0, "seconds": 300.0, **conditions._asdict()}
+    given = {"BOILER_supply_water_temperature": 340.0, "seconds": 300.0, **conditions._asdict()}
     given |= {point: [chosen[key] for key in keys] for point, keys in system.by_point.items()}
     found = function(**given)
     assert np.array(found["heat"]).ravel() == pytest.approx(plant.heat(step), rel=1e-12)
-    assert float(found["supply_water_temperature_end"]) == pytest.approx(state.values[0], rel=1e-12)
+    assert float(found["BOILER_supply_water_temperature_end"]) == pytest.approx(state.values[0], rel=1e-12)
     smooth = hvac_function(system, 0.02)
     symbols = {name: casadi.SX.sym(name, smooth.size1_in(name)) for name in smooth.name_in()}
     heat = smooth(**symbols)["heat"]

@@ -93,7 +93,7 @@ def test_actions_may_be_arrays(plant, actions, command):
 def test_steps_and_starts_out_of_range_are_refused(plant, actions):
     with pytest.raises(ModelError, match="step: expected 1 to 3600 s"):
         plant.step(plant.start(), CONDITIONS, actions, 0.0)
-    with pytest.raises(ModelError, match="supply water at the start"):
+    with pytest.raises(ModelError, match="BOILER.supply_water_temperature at the start: expected 273.15 to 373.15 K"):
         plant.start(supply_water_temperature=60.0)
 
 
@@ -137,7 +137,7 @@ def test_a_plant_gives_the_same_whatever_it_kept(plant_system, command):
     for chosen in [*actions, *actions[::-1], *actions]:
         fresh = HvacPlant(plant_system)
         state, step = plant.step(plant.start(supply_water_temperature=330.0), conditions, chosen, 300.0)
-        expected_state, expected = fresh.step(fresh.start(330.0), conditions, chosen, 300.0)
+        expected_state, expected = fresh.step(fresh.start(supply_water_temperature=330.0), conditions, chosen, 300.0)
         assert state.values[0] == expected_state.values[0]
         assert np.array_equal(step.terminals.heat, expected.terminals.heat)
         assert step.electric_power == expected.electric_power

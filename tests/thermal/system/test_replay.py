@@ -94,10 +94,10 @@ def test_an_air_handler_that_does_not_run_takes_nothing(gas_system):
 
 def test_a_loop_follows_its_load(plant_system, told):
     column, steps = told
-    flows = np.array([s.loop.water_flow for s in steps])
+    flows = np.array([s.results["BOILER"].water_flow for s in steps])
     found = replay_loop(
         plant_system.loop,
-        np.array([s.loop.load for s in steps]),
+        np.array([s.results["BOILER"].load for s in steps]),
         flows,
         column("B", "supply_water_temperature_setpoint")[:, 0],
         300.0,

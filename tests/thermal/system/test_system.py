@@ -88,7 +88,7 @@ def test_no_air_is_hotter_than_its_water_nor_beyond_its_limit(plant_system, s):
     assert state.values[0] <= max(s["before"], s["water"], max(s["zones"]), s["outdoor"], 305.0) + 1e-6
     # water comes back no colder than the coldest of what it meets: air, plant room, the water before
     coldest = min([293.15, s["before"], *(a.mixed.cooled_temperature for a in step.air_handlers), *step.terminals.entering])
-    assert coldest - 1e-6 <= step.loop.return_water_temperature
+    assert coldest - 1e-6 <= step.results["BOILER"].return_water_temperature
     assert np.all((step.terminals.valve_flow >= 0.0) & (step.terminals.valve_flow <= 1.0 + 1e-12))
 
 
@@ -125,7 +125,7 @@ def test_air_handlers_that_are_off_bring_nothing(plant_system, command):
     plant = HvacPlant(plant_system)
     _, step = plant.step(plant.start(supply_water_temperature=330.0), conditions, command(plant_system, 290.0, 330.0, running=0.0), 300.0)
     assert np.abs(plant.heat(step)).max() < 1e-6
-    assert step.electric_power == pytest.approx(step.loop.pump_power, abs=1e-6)
+    assert step.electric_power == pytest.approx(step.results["BOILER"].pump_power, abs=1e-6)
 
 
 def test_several_terminals_of_a_zone_add_up(plant_system, command):
