@@ -33,8 +33,8 @@ from calibration import CalibrationResult, CalibrationSettings, Interval, ModelS
 from calibration.evaluation.intervals import default_intervals, horizon_steps
 from calibration.evaluation.n_step import EvaluationSettings, spatial_metrics
 from thermal import Case, Inputs, Structure, SymbolicModel, free_runs, load_case, replay_inputs, spin_up
+from thermal.model.case_replay import SPIN_UP
 from thermal.model.matrices import Matrices
-from thermal.model.replay import SPIN_UP
 from thermal.network.structure import BASELINE
 
 FloatArray = NDArray[np.float64]

@@ -100,7 +100,8 @@ class DoMpcSolver:
         }  # fmt: skip
         known = {name: model.set_variable("_tvp", name, (size, 1)) for name, size in sizes.items()}
         plant = hvac_function(system, self.hvac.width)(
-            BOILER_supply_water_temperature=REFERENCE_TEMPERATURE + water, zone_temperature=REFERENCE_TEMPERATURE + seen,
+            BOILER_supply_water_temperature=REFERENCE_TEMPERATURE + water,
+            zone_temperature=REFERENCE_TEMPERATURE + seen,
             zone_air_heating_temperature_setpoint=known["heating"],
             zone_air_cooling_temperature_setpoint=known["cooling"], outdoor_temperature=known["outdoor"],
             outdoor_humidity=known["humidity"], return_humidity=np.full(n_air, HUMIDITY), room_temperature=ROOM,

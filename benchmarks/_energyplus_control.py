@@ -19,9 +19,9 @@ from mpc.control.problem.channels import Channel
 from mpc.control.problem.horizon import Horizon
 from mpc.loop.actuators import SUPPLY_AIR, SUPPLY_WATER
 from mpc.loop.plant import Measurements
+from mpc.model import control_model
 from mpc.scenario.forecast import Forecast
-from mpc.studies.controller import Site, make_controller
-from mpc.studies.model import control_model
+from mpc.studies.optimal_control import Site, make_controller
 from thermal.effects.catalogue import chosen
 
 #: Schedules as the building has them: setpoints half a kelvin inside of the band, an hour before people count.

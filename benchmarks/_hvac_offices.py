@@ -22,7 +22,7 @@ from thermal.components.pump import Pump
 from thermal.components.streams import AirCommand
 from thermal.components.terminals import Terminals
 from thermal.components.water_coil import WaterCoil
-from thermal.system.replay import AirHandlerReplay, replay_air_handler, replay_loop, replay_reheat
+from thermal.system.component_replay import AirHandlerReplay, replay_air_handler, replay_loop, replay_reheat
 from thermal.units import air_density
 
 FloatArray = npt.NDArray[np.float64]

@@ -28,7 +28,7 @@ from mpc.baselines.rules import OutdoorReset
 from mpc.environment.environment import ScenarioPlant
 from mpc.loop.plant import Controller
 from mpc.loop.run import FixedSetpoints
-from mpc.studies.model import control_model
+from mpc.model import control_model
 from thermal.effects.catalogue import chosen
 from thermal.model.reduce import ReducedModel
 

@@ -39,20 +39,20 @@ from mpc.loop.plant import Controller
 from mpc.loop.reduced import ReducedBuilding
 from mpc.loop.run import FixedSetpoints
 from mpc.loop.simulated import SimulatedPlant
+from mpc.model import ORDER, control_model
 from mpc.reports.diagnosis import write_diagnosis
 from mpc.scenario.forecast import DAY_AHEAD_ERRORS, Forecaster
 from mpc.scenario.gains import InternalGains
 from mpc.scenario.grid import StepGrid
 from mpc.scenario.scenario import Scenario, build_scenario
 from mpc.scenario.tariff import paper_carbon, paper_tariff
-from mpc.studies.controller import default_horizon, make_controller, site_points
-from mpc.studies.controllers import KnownState
-from mpc.studies.model import ORDER, control_model
+from mpc.studies.optimal_control import default_horizon, make_controller, site_points
+from mpc.studies.registry import KnownState
 from thermal import Building, Case
 from thermal.effects.catalogue import chosen
 from thermal.model.reduce import ReducedModel
 from thermal.pilot.building import pilot_building
-from thermal.pilot.sizing import size_system
+from thermal.system.sizing import size_system
 from thermal.system.system import HvacSystem
 
 EFFECTS = ("solar_gain", "infiltration")

@@ -36,7 +36,7 @@ from mpc.loop.noise import SensorNoise
 from mpc.loop.simulated import SimulatedPlant
 from thermal import Building
 from thermal.pilot.building import pilot_building
-from thermal.pilot.sizing import size_system
+from thermal.system.sizing import size_system
 from thermal.system.system import HvacSystem
 
 SEED = 0

@@ -18,7 +18,8 @@ Indicators have BOPTEST's names. A run is a file in ``OUT/SITE``, and the same c
 
 Run: ``python benchmarks/mpc_vs_rl.py --out results/mpc_vs_rl --processes 2 [--publish]``. Writes ``mpc_vs_rl.json``,
 ``.md`` and for each building ``mpc_vs_rl_front_SITE.svg`` and ``mpc_vs_rl_learning_SITE.svg``; with ``--publish`` also
-the tables and the fronts of README and docs. ``--sites office`` takes one of them; ``--smoke`` is a day on four zones.
+the tables and the fronts of README and docs. ``--sites office`` takes one of them; ``--smoke`` is a day on four zones,
+without policies unless ``--policies`` has such.
 """
 
 from __future__ import annotations
@@ -88,7 +89,8 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
 
 def jobs_of(site: Site, options: argparse.Namespace) -> dict[Path, Job]:
     """List the runs on a site by their files."""
-    policies = options.policies or site.policies
+    # the policies of a building were trained on all its zones, more than a smoke run has
+    policies = options.policies or (options.out if options.smoke else site.policies)
     chosen = [
         entry for entry in entries(site, tuple(options.prices), policies)
         if not options.controllers or entry.controller in options.controllers

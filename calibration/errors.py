@@ -1,7 +1,9 @@
 """The error family of the package."""
 
+from thermal.errors import Described
 
-class CalibrationError(Exception):
+
+class CalibrationError(Described, Exception):
     """Base of every error that `calibration` raises on purpose."""
 
 

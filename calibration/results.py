@@ -137,10 +137,10 @@ def check_results_folder(out: str | Path, force: bool = False) -> Path:
     return folder
 
 
-def write_results(out: str | Path, files: Mapping[str, Content], force: bool = False) -> Path:
+def write_results(out: str | Path, files: Mapping[str, Content], force: bool = False, work: Path | None = None) -> Path:
     """Write the files of one result, whole or not at all.
 
-    Everything is written beside the folder first and moved there at the end, so a failure leaves what was there before.
+    Everything is written elsewhere first and moved there at the end, so a failure leaves what was there before.
 
     Parameters
     ----------
@@ -150,6 +150,8 @@ def write_results(out: str | Path, files: Mapping[str, Content], force: bool = F
         Contents by file name. A dict becomes JSON (NaN as null), a table Parquet; its time index must have a time zone.
     force : bool
         Replace files of the same name; what else the folder holds stays.
+    work : Path, optional
+        Folder on the same disk that is written to first; that which `out` lies in by default.
 
     Returns
     -------
@@ -167,8 +169,8 @@ def write_results(out: str | Path, files: Mapping[str, Content], force: bool = F
             raise ResultsExistError(f"{folder}: expected plain file names for results, got {name!r}")
     folder = folder.resolve()
     folder.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(prefix=f".{folder.name}-", dir=folder.parent) as work:
-        new, old = Path(work) / "new", Path(work) / "old"
+    with tempfile.TemporaryDirectory(prefix=f".{folder.name}-", dir=work or folder.parent) as made:
+        new, old = Path(made) / "new", Path(made) / "old"
         new.mkdir()
         old.mkdir()
         for name, content in files.items():

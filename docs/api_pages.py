@@ -22,4 +22,5 @@ for path in (path for package in PACKAGES for path in sorted((ROOT / package).rg
         out.write(f"# `{name}`\n\n::: {name}\n    options:\n      heading_level: 2\n")
 
 with mkdocs_gen_files.open("api/SUMMARY.md", "w") as out:
+    out.write("---\nsearch: {exclude: true}\n---\n")
     out.writelines(nav.build_literate_nav())

@@ -5,9 +5,9 @@ from mpc.kpi.kpis import Kpis, measure_kpis
 from mpc.loop.make import PlantSettings, simulated_plant
 from mpc.loop.noise import SensorNoise
 from mpc.loop.run import run_closed_loop
+from mpc.model import control_model
 from mpc.scenario.weather_files import weather_of_case
-from mpc.studies.controller import make_controller
-from mpc.studies.model import control_model
+from mpc.studies.optimal_control import make_controller
 from thermal import load_bundled_case
 
 

@@ -17,22 +17,28 @@ if TYPE_CHECKING:
     from mpc.loop.plant import Controller, Plant
     from mpc.loop.run import FixedSetpoints, run_closed_loop
     from mpc.loop.simulated import SimulatedPlant
+    from mpc.model import control_model
     from mpc.plugins import load_plugins
     from mpc.scenario.scenario import Scenario, build_scenario
     from mpc.scenario.weather import Weather
     from mpc.scenario.weather_files import weather_of_case
-    from mpc.studies.controller import make_controller
-    from mpc.studies.controllers import register_controller
-    from mpc.studies.model import control_model
+    from mpc.studies.optimal_control import make_controller
+    from mpc.studies.registry import register_controller
     from mpc.studies.run import compare_controllers, run_controller
     from mpc.studies.study import StudySettings, make_study
 
-#: Modules that have the names; a name is looked for in one after the other, and only when it is used.
-_HOMES = (
-    "errors", "plugins", "scenario.scenario", "scenario.weather_files", "kpi.kpis", "loop.plant", "loop.noise",
-    "loop.run", "loop.make", "control.problem.horizon", "control.controller.controller", "studies.model",
-    "studies.controller", "studies.controllers", "studies.study", "studies.run",
-)  # fmt: skip
+#: Module of each name; it is imported when the name is first used.
+_MODULES = {
+    "Controller": "loop.plant", "ControllerSettings": "control.controller.site", "FixedSetpoints": "loop.run",
+    "Horizon": "control.problem.horizon", "Kpis": "kpi.kpis", "MpcController": "control.controller.controller",
+    "MpcError": "errors", "Plant": "loop.plant", "PlantSettings": "loop.make", "Scenario": "scenario.scenario",
+    "SensorNoise": "loop.noise", "SimulatedPlant": "loop.simulated", "StudySettings": "studies.study",
+    "Weather": "scenario.weather", "build_scenario": "scenario.scenario", "compare_controllers": "studies.run",
+    "control_model": "model", "load_plugins": "plugins", "make_controller": "studies.optimal_control",
+    "make_study": "studies.study", "measure_kpis": "kpi.kpis", "pilot_weather": "loop.make",
+    "register_controller": "studies.registry", "run_closed_loop": "loop.run", "run_controller": "studies.run",
+    "save_pilot": "loop.make", "simulated_plant": "loop.make", "weather_of_case": "scenario.weather_files",
+}  # fmt: skip
 
 __all__ = [
     "Controller", "ControllerSettings", "FixedSetpoints", "Horizon", "Kpis", "MpcController", "MpcError", "Plant",
@@ -44,9 +50,6 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    if name in __all__:
-        for home in _HOMES:
-            module = import_module(f"{__name__}.{home}")
-            if hasattr(module, name):
-                return getattr(module, name)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    if name not in _MODULES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f"{__name__}.{_MODULES[name]}"), name)

@@ -5,11 +5,12 @@ named on the command line, ``buildingmpc --plugin my_controller.py compare ...``
 """
 
 import sys
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from importlib import import_module
 from importlib.metadata import entry_points
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
+from typing import Any
 
 from mpc.errors import MpcError
 
@@ -37,8 +38,40 @@ def load_plugins(named: Iterable[str] = ()) -> None:
         for entry in entry_points(group=group):
             _imported(f"{entry.name} of {group}", entry.value)
     for name in named:
+        path = Path(name)
+        if path.suffix == ".py":
+            MpcError.unless(path.is_file(), "--plugin", "a file that is there", repr(name))
+            name = str(path.resolve())  # for a process with another working folder
         _imported("--plugin", name)
-        loaded.append(name)
+        if name not in loaded:
+            loaded.append(name)
+
+
+class WithPlugins:
+    """A function for other processes: these load the plugins of this one when it arrives there.
+
+    Parameters
+    ----------
+    function : callable
+        Importable by name.
+    names : iterable of str
+        As `load_plugins` takes them.
+    """
+
+    def __init__(self, function: Callable[..., Any], names: Iterable[str]) -> None:
+        self._function, self._names = function, tuple(names)
+
+    def __call__(self, *arguments: Any) -> Any:
+        """Call the function."""
+        return self._function(*arguments)
+
+    def __reduce__(self) -> tuple[Callable[..., Any], tuple[Any, ...]]:
+        return _arrived, (self._function, self._names)
+
+
+def _arrived(function: Callable[..., Any], names: Iterable[str]) -> WithPlugins:
+    load_plugins(names)
+    return WithPlugins(function, names)
 
 
 def _imported(where: str, name: str) -> None:
@@ -48,7 +81,7 @@ def _imported(where: str, name: str) -> None:
         if path.suffix != ".py":
             import_module(name.partition(":")[0])
             return
-        spec = spec_from_file_location(f"buildingmpc_plugin_{path.stem}", path.resolve())
+        spec = spec_from_file_location(f"buildingmpc_plugin_{path.stem}", path)
         known = sys.modules.get(spec.name) if spec else None
         if spec and spec.loader and getattr(known, "__file__", None) != spec.origin:
             module = module_from_spec(spec)

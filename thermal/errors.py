@@ -4,21 +4,94 @@ import difflib
 from collections.abc import Iterable
 
 
-class ThermalError(Exception):
-    """Base of every error that `thermal` raises on purpose: a message, or the parts of one as `describe` takes them."""
+class Described:
+    """What the families of errors share: a message, or the parts of one as `describe` takes them."""
+
+    args: tuple[str, ...]
 
     def __str__(self) -> str:
         """Message: the one that was given, or `describe` of its parts."""
         return describe(*self.args) if len(self.args) > 1 else super().__str__()
+
+    @classmethod
+    def unless(cls, valid: object, where: str, expected: str, found: object, advice: str = "") -> None:
+        """Refuse what is not valid, in the words of `describe`.
+
+        Parameters
+        ----------
+        valid : bool
+            Whether all is well.
+        where, expected : str
+            What is checked, and what would have been right.
+        found : object
+            What stood there, in words.
+        advice : str
+            What to do about it; empty when that is plain.
+        """
+        if not valid:
+            raise cls(where, expected, str(found), advice)  # type: ignore[call-arg, misc]
+
+    @classmethod
+    def unless_known(cls, value: object, options: Iterable[object], where: str, expected: str) -> None:
+        """Refuse an option that is not known, and name the nearest one, or all that `expected` does not list.
+
+        Parameters
+        ----------
+        value : object
+            What was asked for.
+        options : iterable
+            What there is.
+        where, expected : str
+            What is checked, and what would have been right.
+        """
+        known = list(options)
+        advice = "" if value in known else nearest(value, known)
+        told = advice.startswith("valid") and all(str(option) in expected for option in known)
+        cls.unless(value in known, where, expected, repr(value), "" if told else advice)
+
+
+class ThermalError(Described, Exception):
+    """Base of every error that `thermal` raises on purpose."""
 
 
 class CaseError(ThermalError):
     """Something is wrong with a case folder, or with what a case is asked for."""
 
 
-# The model
 class ModelError(ThermalError):
     """Something is wrong with a thermal model, or with what it is asked for."""
+
+
+class EffectError(ModelError):
+    """An effect is unknown, or asked for where it cannot be."""
+
+
+class PlanError(ThermalError):
+    """Something is wrong with a drawing or a list of devices, or with what it is asked for."""
+
+
+class MissingExtraError(ThermalError, ImportError):
+    """A package that only an extra of the installation brings."""
+
+
+class OversizedFileError(PlanError):
+    """A file, or what it unpacks to, is larger than any real plan."""
+
+
+class LostRoomError(PlanError):
+    """A room that the cells of a plan are too coarse for."""
+
+
+class LabelError(ThermalError):
+    """Something is wrong with what the labelling page is asked for."""
+
+
+class SessionHeldError(LabelError):
+    """The case is being labelled elsewhere, or somebody else has taken over."""
+
+
+class ReportError(LabelError):
+    """A report that is not there, or could not be made."""
 
 
 def describe(where: str, expected: str, found: str, advice: str = "") -> str:
@@ -67,56 +140,3 @@ def nearest(word: object, options: Iterable[object]) -> str:
         return "there is none to choose from"
     shown = ", ".join(names[:8])
     return f"valid: {shown}" + (f" and {len(names) - 8} more" if len(names) > 8 else "")
-
-
-def check_known(word: str, options: Iterable[str], where: str, expected: str, kind: type[ThermalError]) -> None:
-    """Refuse a name that is none of the known ones, and name the nearest of them.
-
-    Parameters
-    ----------
-    word
-        What was given.
-    options
-        What would have been valid.
-    where, expected
-        As `describe` takes them.
-    kind
-        Error to raise.
-    """
-    known = list(options)
-    if word not in known:
-        raise kind(where, expected, repr(word), nearest(word, known))
-
-
-class EffectError(ModelError):
-    """An effect is unknown, or asked for where it cannot be."""
-
-
-# Plans and devices from other files
-class PlanError(ThermalError):
-    """Something is wrong with a drawing or a list of devices, or with what it is asked for."""
-
-
-class MissingExtraError(ThermalError, ImportError):
-    """A package that only an extra of the installation brings."""
-
-
-class OversizedFileError(PlanError):
-    """A file, or what it unpacks to, is larger than any real plan."""
-
-
-class LostRoomError(PlanError):
-    """A room that the cells of a plan are too coarse for."""
-
-
-# The labelling page
-class LabelError(ThermalError):
-    """Something is wrong with what the labelling page is asked for."""
-
-
-class SessionHeldError(LabelError):
-    """The case is being labelled elsewhere, or somebody else has taken over."""
-
-
-class ReportError(LabelError):
-    """A report that is not there, or could not be made."""

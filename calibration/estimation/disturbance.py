@@ -68,8 +68,7 @@ class DisturbanceModel:
             raise FilterError(f"deviation: expected watts of 0 or more, one or one a zone, got {heat}")
         if noise.ndim > 1 or not (np.isfinite(noise) & (noise > 0)).all():
             raise FilterError(f"sensor_deviation: expected positive kelvins, one or one a zone, got {noise}")
-        if not self.time_constant > 0:
-            raise FilterError(f"time_constant: expected positive seconds, got {self.time_constant!r}")
+        FilterError.unless(self.time_constant > 0, "time_constant", "positive seconds", repr(self.time_constant))
 
     @property
     def random_walk(self) -> bool:
@@ -136,10 +135,8 @@ class DisturbedSpace:
     def __post_init__(self) -> None:
         for name in ("deviation", "sensor_deviation"):
             size = np.size(getattr(self.disturbance, name))
-            if size not in (1, self.space.n_zone):
-                raise FilterError(
-                    f"disturbance: expected one {name} or one for each of {self.space.n_zone} zones, got {size}"
-                )
+            expected = f"one {name} or one for each of {self.space.n_zone} zones"
+            FilterError.unless(size in (1, self.space.n_zone), "disturbance", expected, size)
 
     @property
     def n(self) -> int:

@@ -16,9 +16,9 @@ from calibration.estimation.state_space import StateSpace, state_space
 from calibration.evaluation.intervals import Interval
 from calibration.evaluation.n_step import Evaluation, EvaluationSettings, Progress, Wanted, evaluate_runs
 from thermal._types import BoolArray, FloatArray
+from thermal.model.case_replay import LEAST_SPIN_UP, SPIN_UP, Inputs, spin_up
 from thermal.model.matrices import Matrices, SymbolicModel
 from thermal.model.modal import ModalModel
-from thermal.model.replay import LEAST_SPIN_UP, SPIN_UP, Inputs, spin_up
 from thermal.model.step import IMPLICIT_EULER, Scheme
 
 #: How far the mean temperatures of the weeks before the telemetry may be from those of its first day [K], standard
@@ -149,8 +149,7 @@ def prepare(model: SymbolicModel, theta: FloatArray, inputs: Inputs, scheme: Sch
         When the model is not reduced.
     """
     matrices, airflows = model.matrices(theta), model.network.airflows
-    if not matrices.reduced:
-        raise FilterError("filter: expected a reduced model, got the grid; see `thermal.reduced_model`")
+    FilterError.unless(matrices.reduced, "filter", "a reduced model", "the grid", "see `thermal.reduced_model`")
     flow = inputs.airflow[inputs.complete].mean(axis=0) if airflows else None
     return _Prepared(
         matrices, state_space(matrices.modal.modes, inputs.step, scheme, airflows=airflows, flow=flow), inputs
@@ -184,11 +183,8 @@ def rows_of(inputs: Inputs, interval: Interval, settings: FilterSettings) -> tup
     if settings.covariance == "steady":
         least = max(least, min(longest, (stop - begin) // 3))
     at = max(first - 1, begin + least)
-    if at >= stop:
-        raise FilterError(
-            f"interval {interval.start} to {interval.end}: expected room for a step after {LEAST_SPIN_UP / 3600:g} h "
-            f"of spin-up, found {stop - begin + 1} stamps"
-        )
+    where, found = f"interval {interval.start} to {interval.end}", f"{stop - begin + 1} stamps"
+    FilterError.unless(at < stop, where, f"room for a step after {LEAST_SPIN_UP / 3600:g} h of spin-up", found)
     return begin, at, stop
 
 

@@ -12,8 +12,8 @@ from calibration.estimation.filtered import FilterSettings, rows_of
 from calibration.estimation.state_space import REFERENCE
 from calibration.evaluation.intervals import Interval
 from thermal._types import FloatArray
+from thermal.model.case_replay import LEAST_SPIN_UP, SPIN_UP, Inputs, spin_up
 from thermal.model.matrices import Matrices, SymbolicModel
-from thermal.model.replay import LEAST_SPIN_UP, SPIN_UP, Inputs, spin_up
 from thermal.units import AIR_HEAT_CAPACITY
 
 #: Limits of ASHRAE Guideline 14-2014 for a whole-building simulation calibrated on hourly data [-].

@@ -16,8 +16,8 @@ from calibration.evaluation.intervals import Interval
 from calibration.evaluation.n_step import Progress
 from calibration.results import Plain
 from thermal._types import FloatArray
+from thermal.model.case_replay import Inputs
 from thermal.model.matrices import SymbolicModel
-from thermal.model.replay import Inputs
 from thermal.network.network import ThermalNetwork
 
 
@@ -191,8 +191,7 @@ def tune_disturbance(
     FilterError
         When the model is not reduced, weights do not fit the zones, or there is no interval, or one too short.
     """
-    if not intervals:
-        raise FilterError("tune: expected at least one interval, got none")
+    FilterError.unless(intervals, "tune", "at least one interval", "none")
     chosen = settings or TuningSettings()
     ready = prepare(model, theta, inputs, chosen.scheme)
     parts = [ready.interval(interval, chosen) for interval in intervals]
@@ -318,11 +317,9 @@ def _numbers(zones: Sequence[str], settings: TuningSettings) -> dict[str, Distur
     """Numbers that are tuned, with their priors: deviations first, the sensors last."""
     priors, per_zone = settings.priors, settings.per_zone
     missing = sorted(set(DISTURBANCE_PRIORS) - set(priors))
-    if missing:
-        raise FilterError(f"priors: expected {sorted(DISTURBANCE_PRIORS)}, got none for {missing}")
+    FilterError.unless(not missing, "priors", f"{sorted(DISTURBANCE_PRIORS)}", f"none for {missing}")
     own = {per_zone} if isinstance(per_zone, str) else set(per_zone)
-    if not own <= set(_ZONAL):
-        raise FilterError(f"per_zone: expected some of {', '.join(_ZONAL)}, got {sorted(own)}")
+    FilterError.unless(own <= set(_ZONAL), "per_zone", f"some of {', '.join(_ZONAL)}", sorted(own))
     names = {name: [f"{name}@{zone}" for zone in zones] if name in own else [name] for name in _ZONAL}
     names["time_constant"] = ["time_constant"] if settings.time_constant is None else []
     return {full: priors[name] for name in ("deviation", "time_constant", "sensor_deviation") for full in names[name]}

@@ -14,7 +14,7 @@ from calibration.estimation.disturbance import DisturbanceModel, DisturbedSpace
 from calibration.estimation.gains import TOLERANCE, Covariance, Gain, exact_gains, steady_gains
 from calibration.estimation.state_space import REFERENCE, StateSpace
 from thermal._types import BoolArray, FloatArray
-from thermal.model.replay import Inputs
+from thermal.model.case_replay import Inputs
 
 
 @dataclass(frozen=True)
@@ -110,7 +110,7 @@ class KalmanFilter:
     >>> from calibration.estimation.state_space import state_space
     >>> from thermal.data import load_bundled_case
     >>> from thermal.model.reduce import reduced_model
-    >>> from thermal.model.replay import replay_inputs, spin_up
+    >>> from thermal.model.case_replay import replay_inputs, spin_up
     >>> from thermal.model.matrices import SymbolicModel
     >>> from thermal.network.build import build_network
     >>> case = load_bundled_case()
@@ -131,8 +131,8 @@ class KalmanFilter:
         covariance: Covariance = "exact",
         tolerance: float = TOLERANCE,
     ) -> None:
-        if covariance not in get_args(Covariance):
-            raise FilterError(f"covariance: expected one of {', '.join(get_args(Covariance))}, got {covariance!r}")
+        known = get_args(Covariance)
+        FilterError.unless_known(covariance, known, "covariance", f"one of {', '.join(known)}")
         self.space, self.disturbance, self.covariance, self.tolerance = space, disturbance, covariance, tolerance
         self.whole = DisturbedSpace(space, disturbance)
         self._steady: dict[bytes, tuple[FloatArray, FloatArray]] = {}
@@ -184,8 +184,7 @@ class KalmanFilter:
             raise FilterError("filter: expected finite states to start from, got NaN; see `thermal.spin_up`")
         rows = slice(begin + 1, stop + 1)
         measured, known = np.isfinite(inputs.zone[rows]), inputs.complete[rows]
-        if not measured.any():
-            raise FilterError(f"filter: expected zone temperatures in rows {begin + 1} to {stop}, found none")
+        FilterError.unless(measured.any(), "filter", f"zone temperatures in rows {begin + 1} to {stop}", "none")
         unknown = inputs.heat[inputs.complete].std(axis=0)
         ever = np.asarray(measured.any(axis=0))
         if self.covariance == "steady":

@@ -50,8 +50,7 @@ class Smoothed:
         FilterError
             When the level is not between 0 and 1.
         """
-        if not 0.0 < level < 1.0:
-            raise FilterError(f"level: expected a probability between 0 and 1, got {level}")
+        FilterError.unless(0.0 < level < 1.0, "level", "a probability between 0 and 1", level)
         half = float(ndtri(0.5 * (1.0 + level))) * self.disturbance_deviation
         return self.disturbance - half, self.disturbance + half
 
@@ -79,7 +78,7 @@ def smooth(filtered: Filtered) -> Smoothed:
     >>> from calibration.evaluation.intervals import Interval
     >>> from thermal.data import load_bundled_case
     >>> from thermal.model.reduce import reduced_model
-    >>> from thermal.model.replay import replay_inputs
+    >>> from thermal.model.case_replay import replay_inputs
     >>> from thermal.model.matrices import SymbolicModel
     >>> from thermal.network.build import build_network
     >>> grid = SymbolicModel(build_network(load_bundled_case().building, dx=1.0))
@@ -198,7 +197,7 @@ def averaged_deviation(filtered: Filtered, steps: int) -> FloatArray:
     >>> from calibration.evaluation.intervals import Interval
     >>> from thermal.data import load_bundled_case
     >>> from thermal.model.reduce import reduced_model
-    >>> from thermal.model.replay import replay_inputs
+    >>> from thermal.model.case_replay import replay_inputs
     >>> from thermal.model.matrices import SymbolicModel
     >>> from thermal.network.build import build_network
     >>> grid = SymbolicModel(build_network(load_bundled_case().building, dx=1.0))

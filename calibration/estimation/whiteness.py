@@ -14,7 +14,7 @@ from calibration.errors import FilterError
 from calibration.estimation.kalman import Filtered
 from calibration.results import Plain, plain
 from thermal._types import FloatArray
-from thermal.model.replay import Inputs
+from thermal.model.case_replay import Inputs
 
 #: Lags of the Ljung-Box test [s]: half an hour, two hours, a day.
 LAGS = (1800.0, 7200.0, 86400.0)

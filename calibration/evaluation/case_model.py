@@ -14,9 +14,9 @@ from calibration.evaluation.settings import ModelSettings, load_parameters, read
 from calibration.results import Plain
 from thermal._types import FloatArray
 from thermal.case.case import Case
+from thermal.model.case_replay import Inputs, free_runs, replay_inputs, spin_up
 from thermal.model.matrices import SymbolicModel
 from thermal.model.reduce import ReducedModel, reduced_model
-from thermal.model.replay import Inputs, free_runs, replay_inputs, spin_up
 
 #: Runs of the check of a reduced model on the grid, and the interval of telemetry they are spread over [days].
 CHECK_RUNS, CHECK_DAYS = 6, 2.0

@@ -13,7 +13,7 @@ from calibration.results import Plain
 from thermal._types import IntArray
 from thermal.case.case import Case, local_timestamp
 from thermal.errors import CaseError
-from thermal.model.replay import LEAST_SPIN_UP, SPIN_UP, Inputs
+from thermal.model.case_replay import LEAST_SPIN_UP, SPIN_UP, Inputs
 
 #: Days that tune before one that is held out, where they alternate, and fewest such turns.
 _TUNING_DAYS, _TURNS = 2, 3
@@ -53,10 +53,8 @@ def parse_interval(text: str, case: Case) -> Interval:
         When it is not two ordered times, or holds no telemetry.
     """
     parts = text.split("/")
-    if len(parts) != 2:
-        raise CalibrationError(
-            f"interval: expected START/END in ISO 8601, got {text!r}; for example 2023-10-02/2023-10-09T12:00"
-        )
+    advice = "for example 2023-10-02/2023-10-09T12:00"
+    CalibrationError.unless(len(parts) == 2, "interval", "START/END in ISO 8601", repr(text), advice)
     try:
         start, end = (pd.Timestamp(local_timestamp(part.strip(), case.building)) for part in parts)
     except CaseError as error:
@@ -125,10 +123,8 @@ def alternating_intervals(case: Case) -> tuple[list[Interval], list[Interval]]:
     midnight, turn = start.normalize(), _TUNING_DAYS + 1
     days = ((end + step).tz_localize(None) - midnight.tz_localize(None)) / pd.Timedelta(days=1)
     turns = int(days) // turn
-    if turns < _TURNS:
-        raise NotEnoughDataError(
-            f"alternating intervals: expected {_TURNS * turn} days of telemetry or more, found {days:.1f}"
-        )
+    expected = f"{_TURNS * turn} days of telemetry or more"
+    NotEnoughDataError.unless(turns >= _TURNS, "alternating intervals", expected, f"{days:.1f}")
     begins = [midnight + pd.DateOffset(days=k * turn) for k in range(turns + 1)]
     tuned = [Interval(max(b, start), b + pd.DateOffset(days=_TUNING_DAYS)) for b in begins[:-1]]
     judged = [Interval(i.end + step, b - step) for i, b in zip(tuned, begins[1:], strict=True)]
@@ -170,7 +166,10 @@ def horizon_steps(horizon: str, step: float) -> int:
         raise HorizonError(f"horizon: expected a duration such as 6h or 90min, got {horizon!r}") from error
     steps = seconds / step
     if not (np.isfinite(steps) and steps >= 1 and abs(steps - round(steps)) < 1e-9):
-        raise HorizonError(f"horizon {horizon!r}: expected a positive multiple of the telemetry's step of {step:g} s")
+        raise HorizonError(
+            f"horizon {horizon!r}: expected a positive multiple of the telemetry's step of {step:g} s, "
+            f"got {seconds:g} s, {steps:.4g} steps"
+        )
     return round(steps)
 
 

@@ -14,8 +14,8 @@ from calibration.errors import HorizonError, NotEnoughDataError
 from calibration.evaluation.intervals import Interval, Runs, horizon_steps, select_runs
 from calibration.results import Axes, Plain, Result
 from thermal._types import FloatArray
+from thermal.model.case_replay import SPIN_UP, Inputs, free_runs, spin_up
 from thermal.model.matrices import Matrices, SymbolicModel
-from thermal.model.replay import SPIN_UP, Inputs, free_runs, spin_up
 from thermal.model.step import IMPLICIT_EULER, Scheme
 from thermal.network.network import ThermalNetwork
 

@@ -14,7 +14,7 @@ from thermal.case.building import Building
 from thermal.effects.catalogue import CATALOGUE, chosen
 from thermal.errors import ModelError, nearest
 from thermal.inputs.normalisation import Normalisation
-from thermal.model.replay import LEAST_SPIN_UP, SPIN_UP
+from thermal.model.case_replay import LEAST_SPIN_UP, SPIN_UP
 from thermal.model.step import SCHEMES, Scheme
 from thermal.network.build import build_network
 from thermal.network.network import ThermalNetwork
@@ -71,14 +71,10 @@ class ModelSettings:
     normalisation: Normalisation | None = None
 
     def __post_init__(self) -> None:
-        if self.scheme not in SCHEMES:
-            raise CalibrationError(f"scheme: expected one of {', '.join(sorted(SCHEMES))}, got {self.scheme!r}")
-        if not LEAST_SPIN_UP <= self.spin_up_seconds < float("inf"):
-            raise CalibrationError(
-                f"spin_up_seconds: expected at least {LEAST_SPIN_UP:g} s, got {self.spin_up_seconds}"
-            )
-        if not isinstance(self.structure, Structure):
-            raise CalibrationError(f"structure: expected a Structure, got {self.structure!r}")
+        CalibrationError.unless_known(self.scheme, SCHEMES, "scheme", f"one of {', '.join(sorted(SCHEMES))}")
+        fits = LEAST_SPIN_UP <= self.spin_up_seconds < float("inf")
+        CalibrationError.unless(fits, "spin_up_seconds", f"at least {LEAST_SPIN_UP:g} s", self.spin_up_seconds)
+        CalibrationError.unless(isinstance(self.structure, Structure), "structure", "a Structure", repr(self.structure))
 
     @property
     def stepping(self) -> Scheme:
@@ -153,8 +149,7 @@ class CalibrationSettings(ModelSettings):
     def __post_init__(self) -> None:
         super().__post_init__()
         for name, known in (("loss", get_args(Loss)), ("objective", get_args(Objective))):
-            if getattr(self, name) not in known:
-                raise CalibrationError(f"{name}: expected one of {', '.join(known)}, got {getattr(self, name)!r}")
+            CalibrationError.unless_known(getattr(self, name), known, name, f"one of {', '.join(known)}")
         for name, least in (("starts", 1), ("seed", 0)):
             if getattr(self, name) < least:
                 raise CalibrationError(f"{name}: expected at least {least}, got {getattr(self, name)}")

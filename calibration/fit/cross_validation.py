@@ -21,7 +21,7 @@ from calibration.fit.result import ParameterEstimate
 from calibration.results import Axes, Plain, Result
 from thermal.case.case import Case
 from thermal.errors import ThermalError
-from thermal.model.replay import LEAST_SPIN_UP
+from thermal.model.case_replay import LEAST_SPIN_UP
 from thermal.parameters import PARAMETERS
 
 T = TypeVar("T")
@@ -251,8 +251,7 @@ def _folds(
         used[(stamps >= interval.start) & (stamps <= interval.end)] = number
     of_day = local_days(stamps)
     days = np.unique(of_day[used > 0])
-    if not 2 <= count <= days.size:
-        raise CalibrationError(f"folds: expected 2 to {days.size}, the days of telemetry to use, got {count}")
+    CalibrationError.unless(2 <= count <= days.size, "folds", f"2 to {days.size}, the days of telemetry to use", count)
     room = steps + round((LEAST_SPIN_UP + 3600.0) / step)  # runs start on the hour
     found = []
     for block in np.array_split(days, count):

@@ -22,8 +22,8 @@ from calibration.estimation.innovations import DISTURBANCE_PRIORS, ROUGH_TOLERAN
 from calibration.evaluation.intervals import Interval
 from calibration.fit.problem import Problem
 from thermal._types import FloatArray
+from thermal.model.case_replay import SPIN_UP, Inputs, free_runs, spin_up
 from thermal.model.matrices import SymbolicModel
-from thermal.model.replay import SPIN_UP, Inputs, free_runs, spin_up
 
 #: Zones beyond which the gains are those of the steady covariance, as in the tuning of the disturbance.
 _MANY_ZONES = 40

@@ -17,8 +17,8 @@ from calibration.estimation.disturbance import DisturbanceModel
 from calibration.fit.likelihood import InnovationsProblem
 from calibration.fit.problem import Problem
 from thermal._types import FloatArray
+from thermal.model.case_replay import Inputs
 from thermal.model.matrices import SymbolicModel
-from thermal.model.replay import Inputs
 
 #: Least standard deviation of daily means before the telemetry [K].
 _LEAST_SWING = 0.2

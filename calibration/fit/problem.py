@@ -15,8 +15,8 @@ from calibration.evaluation.intervals import Interval, Runs, default_intervals, 
 from calibration.evaluation.settings import Loss, ModelSettings, calibration_settings
 from thermal._types import FloatArray
 from thermal.case.case import Case
+from thermal.model.case_replay import LEAST_SPIN_UP, Inputs, free_runs, replay_inputs, spin_up
 from thermal.model.matrices import SymbolicModel
-from thermal.model.replay import LEAST_SPIN_UP, Inputs, free_runs, replay_inputs, spin_up
 from thermal.model.step import IMPLICIT_EULER, Scheme
 from thermal.parameters import Parameter
 
@@ -335,10 +335,8 @@ def tuning_problem(case: Case, tune: Sequence[Interval] = (), settings: ModelSet
     network = chosen.network(case.building)
     inputs, given = replay_inputs(case, network), network.values(chosen.fixed)
     free = tuple(i for i, p in enumerate(network.parameters) if p.name not in chosen.fixed)
-    if not free:
-        raise CalibrationError(
-            f"fixed: expected a parameter that is left to estimate, got all {len(given)}; evaluate instead"
-        )
+    expected = "a parameter that is left to estimate"
+    CalibrationError.unless(free, "fixed", expected, f"all {len(given)}", "evaluate instead")
     steps = horizon_steps(chosen.horizon, inputs.step)
     runs = tuning_runs(inputs, merge(tune) or default_intervals(case)[0], steps, chosen.spin_up_seconds)
     return Problem(SymbolicModel(network), inputs, runs, steps, free, given, chosen.stepping, loss=chosen.loss)

@@ -261,8 +261,7 @@ def select_structure(
     >>> structures = {"the paper's": Structure.paper(), "with interior mass": Structure()}
     >>> select_structure(load_bundled_case(), structures).preferred  # doctest: +SKIP
     """
-    if len(structures) < 2:
-        raise CalibrationError(f"structures: expected at least two to choose from, got {list(structures)}")
+    CalibrationError.unless(len(structures) >= 2, "structures", "at least two to choose from", list(structures))
     parts = tuple(tune), tuple(hold_out)
     tasks = [(case, name, *parts, _settings(settings, own)) for name, own in structures.items()]
     candidates = in_order(_candidate, tasks, executor, "select", progress)

@@ -22,6 +22,7 @@ from calibration.fit.result import CalibrationResult
 from calibration.results import Content, Plain, to_json, write_results
 from thermal.case.case import Case
 from thermal.case.load import NAME, load_case, read_building_file
+from thermal.case.plausibility.examine import check_calibratable
 from thermal.errors import CaseError, ThermalError
 
 #: File in the results of each case: what they were made from, and how it went.
@@ -200,6 +201,7 @@ def _calibrate_one(task: CaseTask) -> CaseOutcome:
     task.begin()
     files = digest(task.case)  # before it is loaded: what changes from here on counts as another case
     case = load_case(task.case)
+    check_calibratable(case)
     intervals, settings = split_settings(task.settings)
     read = {
         name: [parse_interval(entry, case) if isinstance(entry, str) else entry for entry in entries]
@@ -221,7 +223,8 @@ def _calibrate_one(task: CaseTask) -> CaseOutcome:
         "outcome": asdict(outcome),
     }
     task.check_running()  # a cluster cannot stop what it has begun when a run is interrupted
-    write_results(task.out, {**contents, RECORD: record}, task.force)
+    work = None if task.out.is_symlink() else task.running  # the run clears it away, also after a killed worker
+    write_results(task.out, {**contents, RECORD: record}, task.force, work)
     return outcome
 
 

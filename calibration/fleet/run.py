@@ -123,8 +123,7 @@ def calibrate_many(
     began = time.perf_counter()
     spelled = check_settings(settings)
     for name, value, least in (("retries", retries, 0), ("workers", workers, 1)):
-        if isinstance(value, int) and value < least:
-            raise CalibrationError(f"{name}: expected at least {least}, got {value}")
+        CalibrationError.unless(not isinstance(value, int) or value >= least, name, f"at least {least}", value)
     folder = _absolute(check_results_folder(out, force=True))
     paths = _check_cases(cases, folder)
     if not force:
@@ -151,8 +150,7 @@ def calibrate_many(
 def _check_cases(cases: Sequence[str | Path], out: Path) -> list[Path]:
     """Refuse cases whose results would get in each other's way; return their absolute paths."""
     paths = [_absolute(case) for case in cases]
-    if not paths:
-        raise CalibrationError("cases: expected at least one case folder, got none")
+    CalibrationError.unless(paths, "cases", "at least one case folder", "none")
     for name, count in Counter(path.name for path in paths).items():
         if count > 1:
             both = ", ".join(str(path) for path in paths if path.name == name)

@@ -135,8 +135,7 @@ def power_of_data(
     >>> {p.name: p.told for p in power.parameters}["shuffle_probability"]
     'no'
     """
-    if draws < 0:
-        raise CalibrationError(f"draws: expected at least 0, got {draws}")
+    CalibrationError.unless(draws >= 0, "draws", "at least 0", draws)
     chosen = calibration_settings(settings)
     problem = tuning_problem(case, tune, chosen)
     spread = _deviations(problem.grid.network.zones, deviation)

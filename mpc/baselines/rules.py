@@ -29,8 +29,8 @@ def day_schedule(
     actuators : sequence of Actuator
         Of the plant: those of supply air and supply water are set, each within its range.
     air, water : float
-        By day [K]; the defaults are those that plants are sized for (`thermal.pilot.sizing.DesignConditions`), 12.8 and
-        82.2 degC, as in the U.S. DOE's reference buildings.
+        By day [K]; the defaults are those that plants are sized for (`thermal.system.sizing.DesignConditions`), 12.8
+        and 82.2 degC, as in the U.S. DOE's reference buildings.
     night_water : float
         From the end of the day to its begin [K].
     day : tuple of float

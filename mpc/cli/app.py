@@ -19,6 +19,7 @@ from mpc.cli.imports import import_devices, import_plan, import_telemetry
 from mpc.cli.options import switch, value
 from mpc.cli.serve import label, serve
 from mpc.plugins import load_plugins
+from thermal.errors import Described
 
 P = ParamSpec("P")
 
@@ -26,8 +27,6 @@ P = ParamSpec("P")
 FAILURE, BAD_INPUT = 1, 2
 
 _settings: dict[str, Any] = {"debug": False, "plugins": []}
-
-_FAMILIES = {"ThermalError", "CalibrationError", "MpcError"}
 
 app = typer.Typer(
     name="buildingmpc",
@@ -87,7 +86,7 @@ def _report(error: Exception, command: str) -> int:
     if _settings["debug"]:
         traceback.print_exception(error, file=sys.stderr)
     typer.echo(f"error: {type(error).__name__}: {error}", err=True)
-    if any(base.__name__ in _FAMILIES for base in type(error).__mro__):
+    if isinstance(error, Described):
         return BAD_INPUT
     if not _settings["debug"]:
         typer.echo(f"For the traceback: buildingmpc --debug {command} ...", err=True)

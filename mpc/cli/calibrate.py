@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from calibration.errors import CalibrationError
+from mpc import plugins
 from mpc.cli import options
 from mpc.cli.console import Progress, Waiting, answer, complain, say, show_table
 
@@ -60,7 +62,6 @@ def calibrate(
     Example: buildingmpc calibrate cases/office --tune 2023-10-02/2023-10-16
     --hold-out 2023-10-16T00:05/2023-10-23 --out results
     """
-    from calibration.errors import CalibrationError
     from calibration.fleet.run import case_folders
 
     settings = {
@@ -114,8 +115,10 @@ def run_calibration(
     """
     from calibration.fit import calibrate as fit
     from mpc.reports.calibration import write_calibration
+    from thermal.case.plausibility.examine import check_calibratable
 
     case, given = options.open_case(folder, out, force), dict(settings or {})
+    check_calibratable(case)
     tuned, judged = (options.parse_intervals(given.pop(name, None), case) for name in ("tune", "hold_out"))
     result = fit.calibrate(case, tuned, judged, settings=given, progress=progress)
     return result, write_calibration(result, case, out, force=force)
@@ -166,11 +169,12 @@ def _calibrate_many(
     from calibration.fleet.run import calibrate_many
     from mpc.reports.calibration import calibration_files
 
+    files = plugins.WithPlugins(calibration_files, plugins.loaded)
     cluster = nullcontext() if scheduler is None else ClusterExecutor(scheduler, folders=[cases[0].parent])
     try:
         with Waiting("calibrate cases") as waiting, cluster as executor:
             outcomes = calibrate_many(
-                cases, out, settings, files=calibration_files, workers=executor or workers, force=force,
+                cases, out, settings, files=files, workers=executor or workers, force=force,
                 progress=lambda _, done, total: waiting(f"{done} of {total}", done, total),
             )  # fmt: skip
     except KeyboardInterrupt:
@@ -255,8 +259,10 @@ def run_diagnosis(
     """
     from calibration.diagnosis import diagnosis
     from mpc.reports.diagnosis import write_diagnosis
+    from thermal.case.plausibility.examine import check_calibratable
 
     loaded = options.open_case(case, out, force)
+    check_calibratable(loaded)
     tuned, judged = (options.parse_intervals(texts, loaded) for texts in intervals)
     result = diagnosis.diagnose(loaded, tuned, judged, dx=dx, horizon=horizon, progress=progress)
     return result, write_diagnosis(result, loaded, out, force=force)

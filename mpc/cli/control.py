@@ -80,7 +80,7 @@ def control(
     """
     from calibration.results import check_results_folder
     from mpc.reports.control import control_summary, control_verdict, write_control
-    from mpc.studies.controllers import find_controller
+    from mpc.studies.registry import find_controller
     from mpc.studies.run import run_controller
 
     check_results_folder(out, given.force)
@@ -113,7 +113,7 @@ def compare(
     """
     from calibration.results import check_results_folder
     from mpc.reports.control import comparison_rows, comparison_summary, comparison_verdict, write_comparison
-    from mpc.studies.controllers import find_controller
+    from mpc.studies.registry import find_controller
     from mpc.studies.run import compare_controllers
 
     check_results_folder(out, given.force)

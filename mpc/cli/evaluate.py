@@ -147,13 +147,15 @@ def run_check(case: Path, out: Path | None, force: bool, progress: Progress = si
 
 def _show_check(found: CaseCheck) -> None:
     """Write geometry, quality and points of a case to stdout."""
-    from mpc.reports.case import check_verdict, quality_rows
+    from mpc.reports.case import anomaly_rows, check_verdict, quality_rows
 
     say(
         f"{found.name} ({found.geometry}), {found.start:%Y-%m-%d %H:%M} to {found.end:%Y-%m-%d %H:%M} "
         f"{found.location.timezone}"
     )
     say(check_verdict(found))
+    for severity, sure, when, what, advice in anomaly_rows(found):
+        say(f"- {severity}, {sure}{'' if when == 'all' else f', {when}'}: {what}; {advice}")
     for remark in found.remarks:
         say(f"- {remark}")
     columns = {"zone": "", "floor": "", "area [m²]": ".1f", "volume [m³]": ".1f", "sensors": "d", "devices": ""}

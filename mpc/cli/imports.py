@@ -11,6 +11,7 @@ import typer
 
 from mpc.cli.console import Waiting, answer, say, show_table
 from mpc.cli.options import Force, Json, file, value
+from thermal.errors import PlanError
 
 if TYPE_CHECKING:
     from thermal.plan.assemble import PlanImport
@@ -97,51 +98,88 @@ def import_devices(
 
 
 def import_telemetry(
-    case: Annotated[Path, typer.Argument(metavar="CASE", help="Case folder with zones and devices.")],
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="CSV or Parquet; columns of any names.")],
+    case: Annotated[Path, typer.Argument(metavar="CASE", help="Case folder or building.yaml with zones and devices.")],
+    source: Annotated[
+        str, typer.Argument(metavar="SOURCE", help="Parquet, CSV, Excel or postgresql://; columns of any names.")
+    ],
     out: Annotated[Path, typer.Option(metavar="DIR", help="Case folder to make, with this telemetry.")],
     points: Annotated[Path | None, file("points.csv, corrected by hand; default: matched by name.")] = None,
     unit: Annotated[
-        list[str] | None, value("Unit in the file, repeatable; default: degC, kg/s, W, %, W/m^2.", "POINT=UNIT")
+        list[str] | None, value("Unit in the table, repeatable; of energy for counters.", "POINT=UNIT")
     ] = None,
+    table: Annotated[str, value("Sheet of a workbook; table of a database, or SELECT.", "NAME")] = "",
+    tz: Annotated[str, value("Time zone of stamps without offset, such as Europe/Berlin.", "ZONE")] = "",
+    resample: Annotated[str, value("Steps of 1min to 2h to average over; default: the table's.", "STEP")] = "",
     force: Force = False,
     json: Json = False,
 ) -> int:
-    """Give a case its telemetry, whatever its columns are called.
+    """Give a building its telemetry: any table, whatever its columns are called.
 
-    Example: buildingmpc import-telemetry cases/office export.csv --points points.csv --out cases/office-3
+    Example: buildingmpc import-telemetry cases/office export.csv --tz Europe/Berlin --resample 15min
+    --out cases/office-3
     """
-    from thermal.case.load import load_case
+    from thermal.case.case import Case
+    from thermal.case.load import load_building
+    from thermal.intake.telemetry import ImportSettings
+    from thermal.intake.telemetry import import_telemetry as read
     from thermal.plan.folder import save_with_labels
-    from thermal.plan.match import match_points, read_columns, read_matches, with_telemetry, write_matches
+    from thermal.plan.match import read_matches, write_matches
 
-    units = _units(unit or ())
-    if points is not None:
-        matches = read_matches(points)
-    else:
-        building = load_case(case).building
-        columns = read_columns(file)
-        matches = match_points(columns, building.devices, building.zone_names, weather_station=building.weather_station)
-    new = with_telemetry(case, file, matches, units)
-    folder = save_with_labels(new, case, out, overwrite=force)
-    write_matches(matches, folder / "points.csv")
-    frame = new.telemetry.frame
+    building = load_building(case)
+    settings = ImportSettings(table, _zone(tz), _seconds(resample), _units(unit or ()))
+    found = read(building, source, settings, read_matches(points) if points is not None else None)
+    new = Case(building, found.telemetry)
+    folder = save_with_labels(new, case.parent if case.is_file() else case, out, overwrite=force)
+    write_matches(found.matches, folder / "points.csv")
+    if len(found.aside):
+        found.aside.to_parquet(folder / "unmatched.parquet", index=False)
+    frame = found.telemetry.frame
     first, last = frame.index[0], frame.index[-1]
+    lost = f"{', '.join(found.unmatched_heat)}: heat, it seems, that is not in the case; say what it is in points.csv"
 
     def show() -> None:
-        _show_matches(matches)
-        say(f"{frame.shape[1]} columns from {first:%Y-%m-%d %H:%M} to {last:%Y-%m-%d %H:%M}")
+        _show_matches(found.matches)
+        for remark in (*found.remarks, *((lost,) if found.unmatched_heat else ())):
+            say(f"- {remark}")
+        say(f"{frame.shape[1]} columns from {first:%Y-%m-%d %H:%M} to {last:%Y-%m-%d %H:%M}, every {new.step:g} s")
+        if len(found.aside):
+            say(f"Kept aside: {folder / 'unmatched.parquet'}, {found.aside['column'].nunique()} columns")
         say(f"Case: {folder}   Points: {folder / 'points.csv'}")
         say(f"Next: buildingmpc check {folder}")
 
     content = {"start": first.isoformat(), "end": last.isoformat(), "step_seconds": new.step}
-    return answer(json, content | {"columns": frame.shape[1], "points": [asdict(m) for m in matches]}, show)
+    content |= {"columns": frame.shape[1], "points": [asdict(m) for m in found.matches]}
+    content |= {"remarks": list(found.remarks), "unmatched_heat": list(found.unmatched_heat)}
+    return answer(json, content, show)
+
+
+def _zone(name: str) -> str:
+    """Check the name of a time zone; empty stays empty."""
+    from zoneinfo import available_timezones
+
+    from thermal.errors import PlanError
+
+    if name:
+        PlanError.unless_known(name, available_timezones(), "--tz", "an IANA name")
+    return name
+
+
+def _seconds(text: str) -> float | None:
+    """Length of a step [s], such as 5min or 1h; None for none."""
+    from pandas import Timedelta
+
+    from thermal.errors import PlanError
+
+    if not text:
+        return None
+    try:
+        return float(Timedelta(text).total_seconds())
+    except ValueError as error:
+        raise PlanError("--resample", "a time such as 5min or 1h", repr(text)) from error
 
 
 def _units(given: Sequence[str]) -> dict[str, str]:
     """Take options POINT=UNIT apart."""
-    from thermal.errors import PlanError
-
     parts = [text.partition("=") for text in given]
     for text in ("".join(part) for part in parts if not all(part)):
         raise PlanError("--unit", "POINT=UNIT, such as zone_air_temperature_sensor=degF", repr(text))

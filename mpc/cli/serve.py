@@ -17,6 +17,8 @@ from mpc.cli.calibrate import run_calibration, run_diagnosis
 from mpc.cli.console import Progress, Waiting, answer, say, show_table
 from mpc.cli.evaluate import run_check
 from mpc.cli.options import Dx, Json, Parameters, file, switch, value
+from mpc.errors import BoptestError, MpcError
+from thermal.errors import LabelError
 
 if TYPE_CHECKING:
     from multiprocessing.connection import Connection
@@ -55,10 +57,8 @@ def serve(
     --port 8000
     """
     from mpc.adapters.boptest.server import BoptestServer, check_host
-    from mpc.errors import BoptestError
 
-    if not boptest:
-        raise BoptestError("serve: expected what to serve as, found nothing; say --boptest")
+    BoptestError.unless(boptest, "serve", "what to serve as", "nothing", "say --boptest")
     if parameters is not None and len(cases or ()) > 1:
         raise BoptestError("--parameters: expected one case that they belong to, found several; serve it alone")
     check_host(host, allow_remote)  # before the minutes that a large building takes
@@ -159,25 +159,20 @@ def label(
 
 def _case_of(target: Path | None, out: Path | None) -> tuple[Path, Path | None]:
     """Case folder to label, and the drawing or list to begin with."""
-    from thermal.errors import LabelError
-
     if target is None or target.is_dir() or not target.suffix:
         if target is not None and out is not None:
             raise LabelError("--out", "a drawing beside it", f"the case folder {target}", "drop --out")
         return target or out or Path("case"), None
-    if not target.is_file():
-        raise LabelError(str(target), "a case folder, a drawing or a list of drawings", "nothing")
+    LabelError.unless(target.is_file(), str(target), "a case folder, a drawing or a list of drawings", "nothing")
     return out or target.with_suffix(""), target
 
 
 def _prepare(desk: LabelDesk, drawings: Path) -> None:
     """Put a drawing, or all floors of a list, on the page of a new case."""
-    from thermal.errors import LabelError
     from thermal.plan.page.desk import import_list, import_sheet
 
-    if desk.store.draft.floors:
-        advice = "open the case itself, and import the drawing on the page"
-        raise LabelError(str(desk.store.folder), "a new case folder", "a case with floors", advice)
+    advice, where = "open the case itself, and import the drawing on the page", str(desk.store.folder)
+    LabelError.unless(not desk.store.draft.floors, where, "a new case folder", "a case with floors", advice)
     if drawings.suffix.lower() in (".yaml", ".yml"):
         with Waiting(f"import {drawings.name}") as progress:
             import_list(desk, drawings, progress)
@@ -187,8 +182,6 @@ def _prepare(desk: LabelDesk, drawings: Path) -> None:
 
 def _make_apart(kind: str, case: Path, out: Path, progress: Progress) -> None:
     """Make a report in a process of its own, so that the page stays quick, and stop it with the job."""
-    from mpc.errors import MpcError
-
     context = multiprocessing.get_context("spawn")
     here, there = context.Pipe(duplex=False)
     process = context.Process(target=_make, args=(kind, case, out, there, plugins.loaded), daemon=True)

@@ -11,7 +11,6 @@ from mpc.errors import MpcError, PlantActionError
 from mpc.loop.actuators import Actuator
 from thermal._types import FloatArray
 from thermal.case.points import split_column
-from thermal.errors import describe
 
 Observation = NDArray[np.float32]
 
@@ -194,7 +193,7 @@ class ActionLayout:
         given = values.tolist() if values.shape == self.lowest.shape else []
         if not given or not all(-_LARGEST <= value <= _LARGEST for value in given):  # NaN is in no range
             expected = f"{len(self)} numbers from -1 to 1, for {', '.join(self.chosen)}"
-            raise PlantActionError(describe("action", expected, repr(action)))
+            raise PlantActionError("action", expected, repr(action))
         setpoints: dict[str, float] = {}
         for (names, lowest, span), value in zip(self._groups, given, strict=True):
             setpoints |= dict.fromkeys(names, lowest + span * min(max(0.5 * (value + 1.0), 0.0), 1.0))

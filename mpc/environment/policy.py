@@ -19,7 +19,6 @@ from mpc.errors import MpcError
 from mpc.loop.plant import Measurements
 from mpc.scenario.forecast import Forecast
 from thermal._types import FloatArray
-from thermal.errors import describe
 
 #: What a layer applies to its sums.
 Activation = Literal["tanh", "relu"]
@@ -131,7 +130,7 @@ class ActorNetwork:
             return cls(layers["weights"], layers["biases"], about["activation"], about["squashed"], about["about"])
         except (OSError, KeyError, ValueError, TypeError, EOFError) as error:
             found = f"{type(error).__name__}: {error}"
-            raise MpcError(describe(str(path), "a file that ActorNetwork.save wrote", found)) from error
+            raise MpcError(str(path), "a file that ActorNetwork.save wrote", found) from error
 
     @classmethod
     def of_stable_baselines(cls, model: Any, about: Mapping[str, Any] | None = None) -> ActorNetwork:

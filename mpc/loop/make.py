@@ -15,6 +15,7 @@ from mpc.loop.reduced import ReducedBuilding
 from mpc.loop.run import FixedSetpoints
 from mpc.loop.signals import RadiantGains, check_extras
 from mpc.loop.simulated import SimulatedPlant
+from mpc.model import BuildingParameters, model_settings, parameter_vector
 from mpc.scenario.forecast import Forecaster
 from mpc.scenario.gains import InternalGains
 from mpc.scenario.grid import StepGrid
@@ -22,7 +23,6 @@ from mpc.scenario.occupancy import ComfortBand, Occupancy
 from mpc.scenario.scenario import Scenario, build_scenario
 from mpc.scenario.tariff import CarbonIntensity, Tariff, paper_carbon, paper_tariff
 from mpc.scenario.weather import Weather
-from mpc.studies.model import BuildingParameters, model_settings, parameter_vector
 from thermal._types import FloatArray
 from thermal.case.building import Building, Device
 from thermal.case.case import Case
@@ -36,9 +36,9 @@ from thermal.model.simulator import Shuffle, Simulator
 from thermal.network.build import Extension, build_network
 from thermal.network.structure import BASELINE
 from thermal.pilot.building import pilot_building
-from thermal.pilot.sizing import size_system
 from thermal.pilot.weather import MOUNTAIN_VIEW, generate_weather
 from thermal.system.devices import device_graph
+from thermal.system.sizing import size_system
 from thermal.system.system import HvacSystem
 
 #: What steps the plant: the reduced model, its grid with the mean of the shuffle, or with the random shuffle.
@@ -59,7 +59,7 @@ class SimulationSettings:
     kind : {"reduced", "grid", "random"}
         How the building steps: reduced to its modes, on the grid with the mean of the shuffle, or with the random one.
     system : HvacSystem, optional
-        Its HVAC system; sized by `thermal.pilot.sizing.size_system` by default.
+        Its HVAC system; sized by `thermal.system.sizing.size_system` by default.
     tariff : Tariff
         Prices; those of the paper's simulator by default.
     carbon : CarbonIntensity

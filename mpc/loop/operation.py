@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 from mpc.errors import PlantError
 from mpc.scenario.scenario import Scenario
 from thermal._types import FloatArray
-from thermal.errors import describe
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +52,7 @@ class Operation:
             PlantError.unless(valid, f"operation: {name}", f"finite values of shape {shape}", found)
         if not (self.heating <= self.cooling).all():
             row = int(np.argmax((self.heating > self.cooling).any(axis=1)))
-            raise PlantError(describe("operation", "heating setpoints not above cooling ones", f"others in row {row}"))
+            raise PlantError("operation", "heating setpoints not above cooling ones", f"others in row {row}")
         valid = self.night_cycle is None or 0.0 < self.night_cycle < 20.0
         PlantError.unless(valid, "operation: night_cycle", "0 to 20 K, or None", repr(self.night_cycle))
 
@@ -117,7 +116,7 @@ def scheduled_operation(
     """
     if not (air_handlers >= 1 and 0.0 <= lead_hours <= 12.0 and margin >= 0.0):
         found = f"{air_handlers}, {lead_hours} h and {margin} K"
-        raise PlantError(describe("operation", "an air handler or more, 0 to 12 h, a margin of 0 K or more", found))
+        raise PlantError("operation", "an air handler or more, 0 to 12 h, a margin of 0 K or more", found)
     width = scenario.upper - scenario.lower
     occupied = width <= width.min(axis=0) + 1e-9
     early = occupied.copy()

@@ -9,7 +9,6 @@ from mpc.errors import PlantError
 from mpc.loop.building import BuildingFlows, BuildingStep
 from thermal._types import FloatArray
 from thermal.case.building import Building
-from thermal.errors import describe
 from thermal.model.matrices import SymbolicModel
 from thermal.model.modal import ModalModel, modal_model
 from thermal.model.reduce import ReducedModel, reduced_model
@@ -39,7 +38,7 @@ class ReducedBuilding:
 
     def __init__(self, model: ReducedModel, theta: FloatArray | None = None, step_seconds: float = 300.0) -> None:
         if model.network.airflows:
-            raise PlantError(describe("building", "one without airflows from zone to zone", "some", "use the grid"))
+            raise PlantError("building", "one without airflows from zone to zone", "some", "use the grid")
         self.network, self.step_seconds = model.network, float(step_seconds)
         self.theta = model.theta if theta is None else np.asarray(theta, dtype=float)
         self._modes: ModalModel = modal_model(model.matrices(self.theta))
@@ -153,7 +152,7 @@ class ReducedBuilding:
         """
         state, reading = saved
         if state.shape != self._state.shape:
-            raise PlantError(describe("state", f"one of order {self._state.size}", f"one of order {state.size}"))
+            raise PlantError("state", f"one of order {self._state.size}", f"one of order {state.size}")
         self._state, self._reading = state.copy(), reading.copy()
 
 

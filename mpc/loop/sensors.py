@@ -18,7 +18,6 @@ from thermal.components.air_handler import AirHandler
 from thermal.components.component import Group
 from thermal.components.moist_air import LEAST_AIR
 from thermal.components.terminals import Terminals
-from thermal.errors import describe
 from thermal.system.points import HvacPoints
 from thermal.system.system import HvacSystem
 
@@ -89,7 +88,7 @@ def plant_devices(building: Building, system: HvacSystem) -> PlantDevices:
     """
     zones, found = building.zone_names, dict[str, tuple[str, ...]]()
     if system.zone_count != len(zones):
-        raise PlantError(describe("plant", f"terminals in all {len(zones)} zones", f"in {system.zone_count}"))
+        raise PlantError("plant", f"terminals in all {len(zones)} zones", f"in {system.zone_count}")
     for component in system.components.values():
         kind = component.device
         if isinstance(component, Group):
@@ -100,7 +99,7 @@ def plant_devices(building: Building, system: HvacSystem) -> PlantDevices:
             PlantError.unless(count == wanted, f"devices of type {kind!r}", str(wanted), count)
     found["chiller"] = tuple(d.name for d in building.devices if d.type == "chiller")
     if len(found["chiller"]) > 1:
-        raise PlantError(describe("devices of type 'chiller'", "one or none", f"{len(found['chiller'])}"))
+        raise PlantError("devices of type 'chiller'", "one or none", f"{len(found['chiller'])}")
     water = [system.components[name] for name in system.water_suppliers]
     names = [name for kind in dict.fromkeys(c.device for c in water) for name in found[kind]]
     electric = [p for c in water for p in c.sensors if p in ("electrical_power_sensor", PlantDevices.meter)]
@@ -118,7 +117,7 @@ def _of_zones(building: Building, kind: str, zones: Sequence[str]) -> tuple[str,
     spare = [name for left in waiting.values() for name in left]
     if spare:
         expected = f"no more devices of type {kind!r} than the plant has"
-        raise PlantError(describe("building", expected, f"{spare[0]!r} too"))
+        raise PlantError("building", expected, f"{spare[0]!r} too")
     return tuple(names)
 
 

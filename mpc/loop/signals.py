@@ -12,14 +12,13 @@ from mpc.scenario.scenario import Scenario
 from thermal._types import FloatArray
 from thermal.case.points import OUTDOOR_TEMPERATURE
 from thermal.effects.effect import Chosen
-from thermal.errors import describe
 from thermal.inputs.normalisation import WIND, Normalisation, usual_temperatures
 from thermal.inputs.provider import HVAC_INPUTS, InputProvider, LiveInputs
 from thermal.inputs.signals import Signal, zone_signal
 from thermal.network.build import Extension
 from thermal.network.graph import GraphBuilder
 from thermal.network.network import ThermalNetwork
-from thermal.system.replay import replay_reheat
+from thermal.system.component_replay import replay_reheat
 from thermal.system.system import HvacSystem
 from thermal.units import AIR_HEAT_CAPACITY
 
@@ -219,7 +218,7 @@ def check_radiant(network: ThermalNetwork, scenario: Scenario) -> None:
     takes = any(signal.name.startswith(RADIANT) for signal in network.signals)
     if scenario.heat.radiates and not takes and (network.kind == "radiant").any():
         advice = "build it with effects=(RadiantGains(),)"
-        raise PlantError(describe("building model", "one that takes gains that radiate", "gains to air only", advice))
+        raise PlantError("building model", "one that takes gains that radiate", "gains to air only", advice)
 
 
 def check_parts(scenario: Scenario, model: BuildingModel, control_steps: int, warm_up_days: int, seed: int) -> None:
@@ -269,7 +268,7 @@ def boundary_series(scenario: Scenario, model: BuildingModel, given: Mapping[str
         columns.append(np.broadcast_to(np.asarray(given[name], dtype=float), (n_steps,)))
     strange = sorted(set(given) - set(names[1:]))
     if strange:
-        raise PlantError(describe("boundaries", f"those of the building, {list(names[1:])}", repr(strange[0])))
+        raise PlantError("boundaries", f"those of the building, {list(names[1:])}", repr(strange[0]))
     return np.ascontiguousarray(np.column_stack(columns))
 
 

@@ -17,8 +17,8 @@ from mpc.reports.identifiability import in_words, information_content, informati
 from mpc.reports.page import counted, duration, kelvin, render
 from mpc.reports.residuals import diagnostics_content
 from thermal.case.case import Case
+from thermal.model.case_replay import Inputs, replay_inputs
 from thermal.model.matrices import SymbolicModel
-from thermal.model.replay import Inputs, replay_inputs
 
 #: The heat map shows every cell of the grid up to this many control volumes; beyond, one colour a zone.
 MOST_VOLUMES = 40_000

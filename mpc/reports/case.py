@@ -50,6 +50,7 @@ def write_check(check: CaseCheck, out: str | Path, *, force: bool = False) -> Pa
         "missing_rows": sum(finding.steps for finding in quality.missing_rows),
         "timeline": quality_timeline(quality),
         "flaws": quality_rows(check),
+        "anomalies": anomaly_rows(check),
         "zones": [vars(z) | {"seen": ", ".join(z.measured_by) or "nothing", "at": ", ".join(z.devices)}
                   for z in check.zones],
         "points": [vars(p) | {"of": p.zone or p.entity_kind, "usable": 100.0 * p.usable_share} for p in check.points],
@@ -69,13 +70,33 @@ def check_verdict(check: CaseCheck) -> str:
     usable = 1.0 - float(np.mean([c.unusable_share for c in check.quality.columns]))
     flawed = sum(c.unusable_share > 0 for c in check.quality.columns)
     days = ((check.end - check.start).total_seconds() + check.step) / 86400.0
+    wrong = [anomaly.what for anomaly in check.anomalies if anomaly.severity == "error"]
+    valid = f"The case is *not valid for calibration*: {'; '.join(wrong)}. It has" if wrong else "The case is valid:"
     parts = [
-        f"The case is valid: {counted(len(check.zones), 'zone')} on {significant(check.floor_area)} m², {measured}",
+        f"{valid} {counted(len(check.zones), 'zone')} on {significant(check.floor_area)} m², {measured}",
         f"of them measured, {counted(len(check.devices), 'device')}, {days:.3g} days of telemetry every",
         f"{duration(check.step)}. {100 * usable:.1f} % of its values can be used",
     ]
     text = " ".join(parts) + (f"; {flawed} of {len(check.quality.columns)} columns lack some." if flawed else ".")
+    if check.anomalies:
+        text += f" {counted(len(check.anomalies), 'finding').capitalize()}."
     return text + (f" {counted(len(check.remarks), 'remark').capitalize()}." if check.remarks else "")
+
+
+def anomaly_rows(check: CaseCheck) -> list[list[str]]:
+    """Rows of the table of anomalies: severity, certainty, when, what, what to do.
+
+    Parameters
+    ----------
+    check : CaseCheck
+        From `thermal.case.check.check_case`.
+    """
+    whole = (check.start, check.end)
+    return [
+        [a.severity, a.certainty, "all" if ends == whole else " to ".join(f"{t:%Y-%m-%d %H:%M}" for t in ends), a.what,
+         a.advice]
+        for a, ends in ((a, (a.start, a.end)) for a in check.anomalies)
+    ]  # fmt: skip
 
 
 def quality_rows(check: CaseCheck) -> list[list[str]]:

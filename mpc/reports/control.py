@@ -13,7 +13,7 @@ import pandas as pd
 from mpc.kpi.kpis import Kpis
 from mpc.reports.figures.control import cost_bars, course, expectations, side_by_side
 from mpc.reports.figures.style import CELSIUS
-from mpc.reports.page import significant, spell, write_report
+from mpc.reports.page import duration, significant, spell, write_report
 from mpc.studies.run import Comparison, ControlRun, prediction_errors
 from thermal.case.points import POINT_TYPES, split_column
 from thermal.units import QUANTITIES, from_si
@@ -225,7 +225,7 @@ def control_verdict(run: ControlRun) -> str:
     electricity, gas = (0.0 if power is None else float(power.sum()) for power in powers)
     parts = [
         f"{run.entry.title.capitalize()} spent {money(run.cost, k.currency)} on energy in "
-        f"{k.hours / 24:g} days ({significant(k.ener_tot)} kWh/m², of which "
+        f"{duration(3600.0 * k.hours)} ({significant(k.ener_tot)} kWh/m², of which "
         f"{electricity / max(electricity + gas, 1e-9):.0%} electricity)."
     ]
     if k.tdis_tot < 1e-3:
@@ -271,7 +271,7 @@ def comparison_verdict(comparison: Comparison) -> str:
     best, mpc = comparison.best_rule, comparison.of("mpc")
     if best is None or mpc is None:
         cheapest = min(comparison.runs, key=lambda run: run.objective)
-        return f"{cheapest.entry.title.capitalize()} costs least: {control_verdict(cheapest)}"
+        return f"{cheapest.entry.title.capitalize()} has the lowest cost with discomfort: {control_verdict(cheapest)}"
     name, change = best.entry.title, 1.0 - mpc.cost / best.cost
     comfort = mpc.kpis.tdis_tot - best.kpis.tdis_tot
     parts = [

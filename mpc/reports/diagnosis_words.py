@@ -8,7 +8,7 @@ from calibration.diagnosis.decide.levels import LARGEST_GROUP
 from calibration.diagnosis.decide.verdict import Candidate, group_of
 from calibration.diagnosis.decide.where import DriftCurve, Where
 from calibration.diagnosis.diagnosis import Diagnosis
-from calibration.diagnosis.refit.refit import Refit
+from calibration.diagnosis.refit.refit import WINDOWS, Refit
 from mpc.reports.page import duration, kelvin, listed, percent, sure, watts
 from thermal.effects.catalogue import CATALOGUE
 
@@ -216,6 +216,8 @@ def _how_far(result: Diagnosis, found: int) -> str:
     if result.verdict.name == "group" and len(rivals(result, accepted(result)[0].screened.effect)) > 1:
         them = "With the likeliest" + (" and the others" if found > 1 else "")
     there = f"{them} in the model, its error {ahead(result)}, on days that it was not fitted to,"
+    if WINDOWS in step.effects:
+        there = f"{there[:-1]} with windows open when the temperatures of these days show it, which no forecast knows,"
     if step.after >= step.before:
         return (
             f"{there} does not fall: {kelvin(step.before)} K before, {kelvin(step.after)} K after. What the tuning "

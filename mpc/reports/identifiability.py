@@ -11,7 +11,7 @@ from calibration.fit.selection import LEAST_DAYS, HeldOutDifference, LikelihoodR
 from calibration.identifiability.information import Combination, Information, ParameterInformation
 from calibration.identifiability.power import ParameterPower, Power
 from calibration.identifiability.profile import Profile
-from mpc.reports.page import listed, unit
+from mpc.reports.page import counted, listed, unit
 from thermal.parameters import FACADE_PREFIX, Parameter
 
 #: Relative deviations up to this one are told in per cent, larger ones as a factor [-].
@@ -195,11 +195,11 @@ def selection_verdict(selection: Selection) -> str:
     if len(left) == 1:
         sentences = [f"The structure {left[0].name} is preferred."]
     else:
-        plural, few = "s"[: days != 1], ", which is too few," if days < LEAST_DAYS else ""
+        few = ", which is too few," if days < LEAST_DAYS else ""
         simplest = min(left, key=lambda c: c.parameters)
         sentences = [
-            f"Cannot tell {listed(c.name for c in left)} apart, by {days} day{plural} held out{few} or by the tuning "
-            f"data: the simplest of them, {simplest.name}, is enough."
+            f"Cannot tell {listed(c.name for c in left)} apart, by {counted(days, 'day')} held out{few} or by the "
+            f"tuning data: the simplest of them, {simplest.name}, is enough."
         ]
     sentences += [f"Against {n} speak {_reason_words(selection, n, r)}." for n, r in selection.against.items()]
     size = selection.effective_size

@@ -201,14 +201,13 @@ def duration(seconds: float) -> str:
 
     Examples
     --------
-    >>> duration(21600.0), duration(5400.0), duration(864000.0)
-    ('6 hours', '90 minutes', '10 days')
+    >>> duration(21600.0), duration(5400.0), duration(864000.0), duration(45000.0)
+    ('6 hours', '90 minutes', '10 days', '12.5 hours')
     """
     for name, length in (("day", 86400.0), ("hour", 3600.0), ("minute", 60.0), ("second", 1.0)):
-        if seconds >= 2.0 * length or (seconds == length and name != "second"):
-            count = seconds / length
-            if abs(count - round(count)) < 1e-9:
-                return f"{round(count)} {name}{'s' if round(count) != 1 else ''}"
+        count = round(seconds / length)
+        if abs(seconds - count * length) < 1e-9 * length and 1 <= count <= (100 if name != "day" else count):
+            return counted(count, name)
     return f"{seconds / 3600.0:.3g} hours"
 
 
@@ -223,22 +222,22 @@ def clock(stamp: pd.Timestamp) -> str:
     return f"{stamp:%Y-%m-%d %H:%M}"
 
 
-def counted(number: int, noun: str, plural: str = "") -> str:
+def counted(number: int, noun: str) -> str:
     """Spell a count.
 
     Parameters
     ----------
     number : int
         How many.
-    noun, plural : str
-        Of what; by default the plural has an s.
+    noun : str
+        Of what; its plural has an s.
 
     Examples
     --------
     >>> counted(1, "zone"), counted(0, "zone")
     ('1 zone', 'no zones')
     """
-    return f"{number or 'no'} {noun if number == 1 else plural or noun + 's'}"
+    return f"{number or 'no'} {noun if number == 1 else noun + 's'}"
 
 
 def percent(value: float) -> str:

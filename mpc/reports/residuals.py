@@ -17,9 +17,9 @@ from calibration.fit.result import CalibrationResult
 from mpc.reports.figures.calibration import heat_lines, periodogram_bound, whiteness_panels
 from mpc.reports.page import clock, counted, duration, significant, spell
 from thermal._types import FloatArray
+from thermal.model.case_replay import Inputs
 from thermal.model.matrices import SymbolicModel
 from thermal.model.reduce import reduced_model
-from thermal.model.replay import Inputs
 
 #: Zones up to which innovations are tested: the filter of a larger building takes minutes.
 MOST_FILTERED = 40

@@ -17,8 +17,8 @@ from mpc.loop.plant import Controller, Measurements
 from mpc.loop.run import ClosedLoopRun, run_closed_loop
 from mpc.loop.simulated import SimulatedPlant
 from mpc.scenario.forecast import Forecast
-from mpc.studies.controller import MODEL_STEP
-from mpc.studies.controllers import RegisteredController, find_controller
+from mpc.studies.optimal_control import MODEL_STEP
+from mpc.studies.registry import RegisteredController, find_controller
 from mpc.studies.study import Study
 from thermal._types import FloatArray
 
@@ -123,7 +123,7 @@ def run_controller(study: Study, name: str, progress: Progress | None = None) ->
     Raises
     ------
     ControlError
-        When the controller is not known.
+        When the controller is not known, or what its function gives is none.
 
     Examples
     --------
@@ -132,7 +132,11 @@ def run_controller(study: Study, name: str, progress: Progress | None = None) ->
     entry = find_controller(name)
     step = study.settings.control_step if entry.predictive else MODEL_STEP
     plant = study.plant(step, bound=entry.perfect)
-    watched = _Watched(entry.make(study, plant))
+    controller = entry.make(study, plant)
+    asked = callable(getattr(controller, "step", None))
+    expected, advice = "an object with step(measurements, forecast)", "return one from the function that was registered"
+    ControlError.unless(asked, f"controller {name!r}", expected, repr(controller), advice)
+    watched = _Watched(controller)
     count = int(study.steps * MODEL_STEP / step)
     report = None if progress is None else (lambda done, _: progress(name, done, count))
     seed, ahead = study.settings.seed, entry.predictive
@@ -241,7 +245,7 @@ class Comparison:
 
     @property
     def best_rule(self) -> ControlRun | None:
-        """The rule that costs least with its discomfort, where there is one."""
+        """The rule whose cost with discomfort is lowest, where there is one."""
         rules = [run for run in self.runs if not run.entry.predictive]
         return min(rules, key=lambda run: run.objective) if rules else None
 

@@ -14,17 +14,17 @@ from mpc.loop.building import BuildingModel
 from mpc.loop.make import SimulationSettings, equip
 from mpc.loop.reduced import ReducedBuilding
 from mpc.loop.simulated import SimulatedPlant
+from mpc.model import ORDER, BuildingParameters, model_settings, reduced
 from mpc.scenario.forecast import ErrorGrowth, Forecaster
 from mpc.scenario.gains import InternalGains
 from mpc.scenario.grid import StepGrid
 from mpc.scenario.scenario import Scenario
 from mpc.scenario.weather import Weather
-from mpc.studies.controller import MODEL_STEP
-from mpc.studies.model import ORDER, BuildingParameters, model_settings, reduced
+from mpc.studies.optimal_control import MODEL_STEP
 from thermal.case.building import Building
 from thermal.effects.catalogue import chosen
 from thermal.model.reduce import ReducedModel
-from thermal.pilot.sizing import size_system
+from thermal.system.sizing import size_system
 from thermal.system.system import HvacSystem
 
 #: How far forecasts reach [h].
@@ -177,7 +177,7 @@ def make_study(
     longer = StepGrid(grid.start, MODEL_STEP, grid.n_steps + round(HORIZON_HOURS * 3600.0 / MODEL_STEP))
     built = model_settings(given.parameters, dx=given.dx)
     if given.system is None:
-        notes += ("sizes of the plant follow from the building's loads (thermal.pilot.sizing.size_system)",)
+        notes += ("sizes of the plant follow from the building's loads (thermal.system.sizing.size_system)",)
     gains = None
     if "internal_gains" in built.effects:
         gains = InternalGains(sensible=0.0, equipment=0.0, lights=0.0)

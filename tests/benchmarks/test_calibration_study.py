@@ -15,7 +15,7 @@ import pytest
 from calibration import Interval, evaluate_model
 from calibration.evaluation.n_step import EvaluationSettings
 from thermal import Case
-from thermal.model.replay import SPIN_UP
+from thermal.model.case_replay import SPIN_UP
 from thermal.network.structure import BASELINE
 from thermal.pilot.building import pilot_building
 from thermal.pilot.twin import TwinSettings, generate_twin

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from thermal.pilot.building import pilot_building
-from thermal.pilot.sizing import size_system
+from thermal.system.sizing import size_system
 
 
 @pytest.fixture(scope="module")

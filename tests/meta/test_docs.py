@@ -51,6 +51,14 @@ def test_what_the_documentation_points_to_exists(expect_none: Check) -> None:
     expect_none(problems)
 
 
+def test_search_of_the_site_asks_no_other_site(expect_none: Check) -> None:
+    # The theme's plugin for pages read from a folder loads a stand-in for workers from elsewhere, unless one is named here.
+    config = (ROOT / "mkdocs.yml").read_text(encoding="utf-8")
+    stands_in = re.findall(r"^  polyfills: \[(.*iframe-worker.*)\]", config, re.MULTILINE)
+    missing = not stands_in or not (DOCS / stands_in[0]).is_file()
+    expect_none(["mkdocs.yml:1: expected extra.polyfills with a file of docs/, iframe-worker.js"] * missing)
+
+
 def test_the_index_links_every_page(expect_none: Check) -> None:
     linked = set(LINK.findall((DOCS / "index.md").read_text(encoding="utf-8")))
     missing = [page.name for page in sorted(DOCS.glob("*.md")) if page.name not in linked | {"index.md"}]

@@ -45,7 +45,7 @@ def kept(registry: dict[str, Any]) -> Iterator[None]:
 
 
 def test_a_controller_of_ones_own(tmp_path: Path) -> None:
-    from mpc.studies.controllers import REGISTERED
+    from mpc.studies.registry import REGISTERED
 
     with kept(REGISTERED):
         out = follow("own_controller.md", tmp_path)
@@ -77,6 +77,9 @@ def test_an_effect_of_ones_own(tmp_path: Path) -> None:
 
 def test_a_plugin_that_is_broken_is_named(tmp_path: Path) -> None:
     (tmp_path / "broken.py").write_text("import nothing_of_this_name\n", encoding="utf-8")
+    missing = str(tmp_path / "not_there.py")
+    answer = CliRunner().invoke(app, ["--plugin", missing, "check", str(bundled_case_path())])
+    assert answer.exit_code == 2 and answer.stderr.count(missing) == 1 and "Errno" not in answer.stderr
     for name in (str(tmp_path / "broken.py"), "nothing_of_this_name"):
         answer = CliRunner().invoke(app, ["--plugin", name, "check", str(bundled_case_path())])
         assert answer.exit_code == 2 and answer.stdout == ""

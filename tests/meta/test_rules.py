@@ -21,7 +21,7 @@ MOST_PARAMETERS = 8
 
 # Functions with more parameters than that, with the reason; at most eight.
 LONG_SIGNATURES: dict[str, str] = {
-    "mpc.loop.replay.replay_subsystems": "what no telemetry says of a plant, each known on its own",
+    "mpc.loop.subsystem_replay.replay_subsystems": "what no telemetry says of a plant, each known on its own",
     "mpc.loop.simulated.SimulatedPlant.__init__": "every choice of a plant; PlantSettings has those of simulated_plant",
 }
 

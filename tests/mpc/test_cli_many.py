@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -150,7 +151,7 @@ def test_a_solver_that_does_not_converge_fails_the_run_and_keeps_the_results(
     ("options", "message"),
     [
         (("--workers", "2", "--scheduler", "tcp://127.0.0.1:9"), "CalibrationError: --workers and --scheduler"),
-        (("--workers", "0"), "CalibrationError: workers: expected at least 1, got 0"),
+        (("--workers", "0"), "CalibrationError: workers: expected at least 1, found 0"),
         (("--scheduler", "nonsense://x"), "CalibrationError: scheduler 'nonsense://x': expected an answer within 10 s"),
     ],
 )
@@ -173,6 +174,25 @@ def test_the_missing_extra_is_named(cases: Path, tmp_path: Path, monkeypatch: py
     answer = run("calibrate", cases, "--out", tmp_path / "out", "--scheduler", "tcp://127.0.0.1:9")
     assert answer.exit_code == 2
     assert "MissingExtraError: " in answer.stderr and 'pip install "buildingmpc[cluster]"' in answer.stderr
+
+
+def test_workers_load_the_plugins(cases: Path, tmp_path: Path) -> None:
+    """An effect that only a plugin has is known in the processes of the workers."""
+    text = Path(__file__).parents[2].joinpath("docs", "own_effect.md").read_text(encoding="utf-8")
+    code = re.search(r"```python\n(.*?)```", text, re.DOTALL)
+    assert code is not None
+    (tmp_path / "night_machines.py").write_text(code[1], encoding="utf-8")
+    shutil.copytree(cases / NAMES[0], tmp_path / "cases" / NAMES[0])
+    options = ("--plugin", "night_machines.py", "calibrate", "cases", "--out", "out", "--effects", "night_machines")
+    command = [sys.executable, "-m", "mpc.cli", *options, "--workers", "1", *OPTIONS]
+    here = os.pathsep.join([str(Path(__file__).parents[2]), *os.environ.get("PYTHONPATH", "").split(os.pathsep)])
+    answer = subprocess.run(
+        command, cwd=tmp_path, env={**os.environ, "PYTHONPATH": here}, capture_output=True, text=True, timeout=120.0,
+        check=False,
+    )  # fmt: skip
+    assert answer.returncode == 0, answer.stderr
+    found = json.loads((tmp_path / "out" / NAMES[0] / "calibration.json").read_text(encoding="utf-8"))
+    assert [e["effect"] for e in found["effects"]] == ["night_machines"]
 
 
 def test_doctor_knows_the_extra() -> None:

@@ -14,7 +14,7 @@ import pytest
 from mpc.cli import console as _console
 from thermal.data import bundled_case_path
 
-HEAVY = ("casadi", "matplotlib", "pandas", "scipy", "thermal", "calibration")
+HEAVY = ("casadi", "matplotlib", "numpy", "pandas", "scipy", "thermal.case", "thermal.model", "calibration.fit")
 
 
 def run(*arguments: str | Path) -> subprocess.CompletedProcess[str]:

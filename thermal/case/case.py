@@ -60,9 +60,8 @@ def local_timestamp(time: str | datetime, building: Building) -> pd.Timestamp:
         return stamp.tz_convert(zone)
     naive = stamp.to_pydatetime()
     first, second = (naive.replace(tzinfo=ZoneInfo(zone), fold=fold).utcoffset() for fold in (0, 1))
-    if first != second:
-        advice = "give the time with its offset, such as +02:00"
-        raise CaseError("time", f"a time that the clocks of {zone} show once", stamp.isoformat(), advice)
+    advice = "give the time with its offset, such as +02:00"
+    CaseError.unless(first == second, "time", f"a time that the clocks of {zone} show once", stamp.isoformat(), advice)
     return stamp.tz_localize(zone)
 
 

@@ -10,7 +10,9 @@ import pandas as pd
 from thermal.case.building import Building, FloorPlans, Location
 from thermal.case.case import Case
 from thermal.case.load import load_case
-from thermal.case.plan import zone_floor_areas, zone_volumes
+from thermal.case.plan import zone_sizes
+from thermal.case.plausibility.anomaly import Anomaly
+from thermal.case.plausibility.examine import examine
 from thermal.case.points import POINT_TYPES, ZONE_TEMPERATURE, split_column
 from thermal.case.quality import QualityReport, plain
 from thermal.case.validation import unknown_device_types
@@ -124,19 +126,15 @@ def summarise_zones(case: Case) -> tuple[ZoneSummary, ...]:
         In the building's order.
     """
     building = case.building
-    if isinstance(building.geometry, FloorPlans):
-        areas, volumes = zone_floor_areas(building.geometry), zone_volumes(building.geometry)
-        floors = {zone: floor.name for floor in building.geometry.floors for zone in floor.zone_names}
-    else:
-        areas = {zone.name: zone.floor_area for zone in building.geometry.zones}
-        volumes = {zone.name: zone.volume for zone in building.geometry.zones}
-        floors = {}
+    plans = building.geometry.floors if isinstance(building.geometry, FloorPlans) else ()
+    floors = {zone: floor.name for floor in plans for zone in floor.zone_names}
+    sizes = zone_sizes(building)
     summaries = []
     for zone in building.zone_names:
         devices = tuple(device.name for device in building.devices_of(zone))
         columns = [f"{entity}/{ZONE_TEMPERATURE}" for entity in (zone, *devices)]
         measured_by = tuple(column for column in columns if column in case.telemetry.frame)
-        summaries.append(ZoneSummary(zone, floors.get(zone), areas[zone], volumes[zone], measured_by, devices))
+        summaries.append(ZoneSummary(zone, floors.get(zone), *sizes[zone], measured_by, devices))
     return tuple(summaries)
 
 
@@ -234,6 +232,8 @@ class CaseCheck:
         What is valid, and yet worth a look.
     quality
         Quality of the telemetry.
+    anomalies
+        What can hardly be true, the worst first.
     """
 
     case: Case = field(repr=False)
@@ -252,6 +252,12 @@ class CaseCheck:
     n_time: int
     remarks: tuple[str, ...]
     quality: QualityReport
+    anomalies: tuple[Anomaly, ...] = ()
+
+    @property
+    def is_fit_for_calibration(self) -> bool:
+        """Whether nothing was found with which a calibration makes no sense."""
+        return all(anomaly.severity != "error" for anomaly in self.anomalies)
 
     @property
     def floor_area(self) -> float:
@@ -271,7 +277,8 @@ class CaseCheck:
             **{"start": plain(self.start), "end": plain(self.end), "step_seconds": self.step, "stamps": self.n_time},
             **{"timezone": self.location.timezone, "points": plain(self.points)},
         }
-        return content | {"remarks": list(self.remarks), "quality": self.quality.to_dict()}
+        content |= {"remarks": list(self.remarks), "valid_for_calibration": self.is_fit_for_calibration}
+        return content | {"anomalies": plain(self.anomalies), "quality": self.quality.to_dict()}
 
 
 def check_case(path: str | PathLike[str]) -> CaseCheck:
@@ -332,4 +339,5 @@ def describe_case(case: Case) -> CaseCheck:
         n_time=len(case.stamps),
         remarks=case.remarks,
         quality=case.quality,
+        anomalies=examine(case),
     )

@@ -72,12 +72,10 @@ def migrate(content: Mapping[str, Any], file: str) -> dict[str, Any]:
     CaseError
         The format is missing or unknown, or a key is of a later format than the file's.
     """
-    if "format" not in content:
-        raise CaseError(f"{file}: format", "1, 2 or 3", "no such key", f"add 'format: {FORMAT}'")
+    CaseError.unless("format" in content, f"{file}: format", "1, 2 or 3", "no such key", f"add 'format: {FORMAT}'")
     number = content["format"]
-    if type(number) is not int or not 1 <= number <= FORMAT:
-        advice = "use a library that reads this format, or migrate the case"
-        raise CaseError(f"{file}: format", "1, 2 or 3", repr(number), advice)
+    advice, where = "use a library that reads this format, or migrate the case", f"{file}: format"
+    CaseError.unless(type(number) is int and 1 <= number <= FORMAT, where, "1, 2 or 3", repr(number), advice)
     if number == FORMAT:
         return dict(content)
     # Format 2 has four more points, of pressures; format 3 has feeders of devices and the quality of the geometry.
@@ -109,13 +107,15 @@ class _Loader(yaml.SafeLoader):
         return super().construct_mapping(node, deep=deep)
 
 
-def read_building_file(folder: Path) -> schema.BuildingFile:
+def read_building_file(folder: Path, *, with_telemetry: bool = True) -> schema.BuildingFile:
     """Read and check `building.yaml` by itself, without the files it names.
 
     Parameters
     ----------
     folder
         Case folder.
+    with_telemetry
+        Whether it must name its telemetry and units; a building that is to get some may not have them yet.
 
     Returns
     -------
@@ -128,7 +128,10 @@ def read_building_file(folder: Path) -> schema.BuildingFile:
         One of its family: the file is missing, no YAML, of another format, or holds a key or value that does not fit.
     """
     try:
-        parsed = schema.BuildingFile.model_validate(migrate(_read_yaml(folder), NAME))
+        content = migrate(_read_yaml(folder), NAME)
+        if not with_telemetry:
+            content |= {"telemetry": content.get("telemetry") or "telemetry.parquet", "units": {}}
+        parsed = schema.BuildingFile.model_validate(content)
     except ValidationError as error:
         raise _named(error) from error
     _check_geometry_choice(parsed)
@@ -141,8 +144,7 @@ def _read_yaml(folder: Path) -> dict[str, Any]:
         found = "a file" if folder.exists() else "nothing"
         raise CaseError("path", "a case folder", found, f"give the folder that holds {NAME}")
     path = folder / NAME
-    if not path.is_file():
-        raise CaseError(NAME, "the description of the building", "no such file")
+    CaseError.unless(path.is_file(), NAME, "the description of the building", "no such file")
     try:
         content = yaml.load(path.read_text(encoding="utf-8-sig"), Loader=_Loader)
     except (OSError, UnicodeDecodeError) as error:
@@ -167,13 +169,11 @@ def _check_geometry_choice(parsed: schema.BuildingFile) -> None:
     table = [key for key in ("zones", "surfaces", "constructions") if getattr(parsed, key) is not None]
     if plans and table:
         raise CaseError(NAME, "floor plans or a zone table", f"keys of both: {', '.join(plans + table)}", "drop one")
-    if not plans and not table:
-        raise CaseError(NAME, "'floors' (plans) or 'zones' (a zone table)", "neither", "add one")
+    CaseError.unless(plans or table, NAME, "'floors' (plans) or 'zones' (a zone table)", "neither", "add one")
     for key in ("cell_size", "floors") if plans else ("zones",):
         if getattr(parsed, key) is None:
             raise CaseError(f"{NAME}: {key}", "a value", "no such key", f"needed beside {plans + table}")
-        if getattr(parsed, key) == ():
-            raise CaseError(f"{NAME}: {key}", "at least one entry", "none")
+        CaseError.unless(getattr(parsed, key) != (), f"{NAME}: {key}", "at least one entry", "none")
 
 
 def _named(error: ValidationError) -> CaseError:
@@ -253,6 +253,36 @@ def load_case(path: str | PathLike[str]) -> Case:
         error.args = (f"{folder}: {error}",)
         raise
     return Case(building, telemetry, folder)
+
+
+def load_building(path: str | PathLike[str]) -> Building:
+    """Load the building of a case folder, whether it has telemetry or not.
+
+    Parameters
+    ----------
+    path
+        Folder that holds ``building.yaml`` and the plans it names, or that file.
+
+    Returns
+    -------
+    Building
+        Checked like that of a case.
+
+    Raises
+    ------
+    CaseError
+        One of its family, for the first thing that does not fit.
+    """
+    given = Path(path)
+    folder = given.parent if given.name == NAME else given
+    try:
+        parsed = read_building_file(folder, with_telemetry=False)
+        building = _building(parsed, folder)
+        check_building(building, {floor.name: floor.plan for floor in parsed.floors or ()})
+    except CaseError as error:
+        error.args = (f"{folder}: {error}",)
+        raise
+    return building
 
 
 def _building(parsed: BuildingFile, folder: Path) -> Building:

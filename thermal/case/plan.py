@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from thermal.case.building import EXTERIOR_WALL, INTERIOR_WALL, OUTSIDE, PLAN_TOKENS, FloorPlan, FloorPlans
+from thermal.case.building import EXTERIOR_WALL, INTERIOR_WALL, OUTSIDE, PLAN_TOKENS, Building, FloorPlan, FloorPlans
 from thermal.errors import CaseError
 
 
@@ -42,8 +42,7 @@ def read_plan(path: Path) -> NDArray[np.str_]:
         raise CaseError(path.name, "a CSV of tokens in UTF-8", f"{error}") from error
     while rows and not any(rows[-1]):
         rows.pop()
-    if not rows:
-        raise CaseError(path.name, "rows of tokens", "no row")
+    CaseError.unless(rows, path.name, "rows of tokens", "no row")
     for number, row in enumerate(rows, start=1):
         if len(row) != len(rows[0]):
             raise CaseError(f"{path.name}: row {number}", f"{len(rows[0])} cells as in row 1", f"{len(row)} cells")
@@ -77,8 +76,7 @@ def check_plan(tokens: NDArray[np.str_], where: str) -> None:
     if tokens.ndim != 2 or tokens.size == 0:
         raise CaseError(where, "rows and columns of tokens", f"an array of shape {tokens.shape}")
     is_zone = ~np.isin(tokens, PLAN_TOKENS)
-    if not is_zone.any():
-        raise CaseError(where, "at least one zone", "none")
+    CaseError.unless(is_zone.any(), where, "at least one zone", "none")
     _check_walls(tokens, is_zone, where)
     for zone in np.unique(tokens[is_zone]):
         parts, n_part = ndimage.label(tokens == zone)
@@ -184,6 +182,26 @@ def zone_volumes(plans: FloorPlans) -> dict[str, float]:
     """
     areas = zone_floor_areas(plans)
     return {zone: areas[zone] * floor.height for floor in plans.floors for zone in floor.zone_names}
+
+
+def zone_sizes(building: Building) -> dict[str, tuple[float, float]]:
+    """Floor area and volume of each zone.
+
+    Parameters
+    ----------
+    building
+        With plans or a zone table.
+
+    Returns
+    -------
+    dict
+        Area [m2] and volume [m3] by zone, in the building's order.
+    """
+    geometry = building.geometry
+    if not isinstance(geometry, FloorPlans):
+        return {zone.name: (zone.floor_area, zone.volume) for zone in geometry.zones}
+    areas, volumes = zone_floor_areas(geometry), zone_volumes(geometry)
+    return {zone: (areas[zone], volumes[zone]) for zone in building.zone_names}
 
 
 def facade_areas(plans: FloorPlans) -> dict[str, dict[str, float]]:

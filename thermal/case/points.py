@@ -4,7 +4,7 @@ import csv
 from dataclasses import dataclass
 from pathlib import Path
 
-from thermal.errors import CaseError, check_known
+from thermal.errors import CaseError
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ def point_type(name: str, where: str) -> PointType:
     >>> point_type("wind_speed_sensor", "units").quantity
     'speed'
     """
-    check_known(name, POINT_TYPES, where, "a point type of the case format", CaseError)
+    CaseError.unless_known(name, POINT_TYPES, where, "a point type of the case format")
     return POINT_TYPES[name]
 
 

@@ -16,8 +16,8 @@ import pandas as pd
 from pydantic import BaseModel
 
 from thermal.case.building import Building
-from thermal.case.judgement import flat_lines, impossible_values, runs, spikes
 from thermal.case.points import OUTDOOR_TEMPERATURE, POINT_TYPES, ZONE_TEMPERATURE, split_column
+from thermal.case.signal_faults import flat_lines, impossible_values, runs, spikes
 from thermal.case.telemetry import Telemetry
 
 GAP, IMPOSSIBLE, FLAT, SPIKE, CONSTANT = "gap", "impossible", "flat", "spike", "constant"

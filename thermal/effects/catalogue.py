@@ -66,8 +66,7 @@ def chosen(effects: Iterable[str] | Mapping[str, Sequence[str]]) -> tuple[Chosen
     """
     zones = dict(effects) if isinstance(effects, Mapping) else {name: () for name in effects}
     for name, where in zones.items():
-        if isinstance(where, str):
-            raise EffectError(f"effect {name}: expected a sequence of zones, got {where!r}")
+        EffectError.unless(not isinstance(where, str), f"effect {name}", "a sequence of zones", repr(where))
     for name in zones:
         if name not in CATALOGUE:
             raise EffectError(f"effect {name!r}: not in the catalogue; {nearest(name, CATALOGUE)}")

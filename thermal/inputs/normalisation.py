@@ -76,9 +76,7 @@ class Normalisation:
         return f"Normalisation({len(self.usual)} zones, people={self.people}, wind={self.wind})"
 
 
-def fit_normalisation(
-    case: Case, intervals: Iterable[tuple[pd.Timestamp, pd.Timestamp]] = ()
-) -> Normalisation:
+def fit_normalisation(case: Case, intervals: Iterable[tuple[pd.Timestamp, pd.Timestamp]] = ()) -> Normalisation:
     """Fit the constants of a case's inputs.
 
     Parameters

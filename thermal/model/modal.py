@@ -126,8 +126,7 @@ class ModalModel:
         ModelError
             When the step is not positive.
         """
-        if not step > 0.0:
-            raise ModelError(f"step: expected a positive number of seconds, got {step!r}")
+        ModelError.unless(step > 0.0, "step", "a positive number of seconds", repr(step))
         return Propagator(*(np.asarray(f(self.capacity), dtype=float) for f in propagator_functions(step, scheme)))
 
     def to_control(self, inputs: list[str], outputs: list[str], step: float | None = None) -> Any:
@@ -173,8 +172,7 @@ def modal_model(matrices: Pencil) -> ModalModel:
     ModelError
         When they are not positive definite.
     """
-    if not matrices.reduced:
-        raise ModelError("modes: expected a reduced model, got the grid; see `thermal.reduced_model`")
+    ModelError.unless(matrices.reduced, "modes", "a reduced model", "the grid", "see `thermal.reduced_model`")
     n = matrices.n
     capacity = 0.5 * (matrices.capacity + matrices.capacity.T)
     stiffness = matrices.flow[:, :n] + SHIFT * capacity

@@ -97,8 +97,7 @@ class ReducedModel(SymbolicModel):
         (20, ['temperature of outdoor', 'heat of F1_N'])
         """
         network = self.network
-        if network.airflows:
-            raise ModelError("to_control: expected a building without airflows from zone to zone, got some")
+        ModelError.unless(not network.airflows, "to_control", "a building without airflows from zone to zone", "some")
         modes = modal_model(self.matrices(self.theta if theta is None else theta))
         temperatures, heats = ([f"{kind} of {zone}" for zone in network.zones] for kind in ("temperature", "heat"))
         outside = [f"temperature of {name}" for name in network.boundaries]
@@ -273,10 +272,8 @@ def reduced_model(
     >>> reduced_model(grid, [grid.network.start()], order=20).certificate.max_difference < 0.1
     True
     """
-    if order is not None and tolerance is not None:
-        raise ModelError("reduced model: expected an order or a tolerance, got both")
-    if order is not None and order < 2:
-        raise ModelError(f"order: expected at least 2 states, got {order}")
+    ModelError.unless(order is None or tolerance is None, "reduced model", "an order or a tolerance", "both")
+    ModelError.unless(order is None or order >= 2, "order", "at least 2 states", order)
     inputs = len(model.network.zones) + len(model.network.boundaries)
     chosen = shifts or (SHIFTS if inputs < _MANY_INPUTS else FEW_SHIFTS)
     whole = [model.matrices(t) for t in thetas]
@@ -338,9 +335,8 @@ def _dense(matrix: Matrix) -> FloatArray:
 def _least(m: Matrices, tolerance: float, replay: Replay) -> FloatArray:
     """Fewest directions whose replay is within the tolerance, by bisection."""
     least = differences(m, replay)[1]
-    if least > tolerance:
-        expected = f"at least {least:.2g} K, the error of all {m.n} states of the basis"
-        raise ModelError("tolerance", expected, f"{tolerance:g}", "add shifts")
+    expected = f"at least {least:.2g} K, the error of all {m.n} states of the basis"
+    ModelError.unless(least <= tolerance, "tolerance", expected, f"{tolerance:g}", "add shifts")
     ranked = _ranked([m])
     low, high = 1, ranked.shape[1]
     while high - low > max(1, high // 50):

@@ -58,8 +58,7 @@ class RolloutData:
         shapes = {name: (len(self.boundary), count) for name, count in columns.items()}
         for name, shape in {"initial": (model.n_state,), **shapes}.items():
             value = getattr(self, name)
-            if value.shape != shape:
-                raise ModelError(f"{name}: expected shape {shape}, got {value.shape}")
+            ModelError.unless(value.shape == shape, name, f"shape {shape}", value.shape)
             if not np.isfinite(value).all():
                 raise ModelError(f"{name}: expected finite values, got {value[~np.isfinite(value)][0]}")
 
@@ -101,13 +100,11 @@ def rollout(
     data.check(model)
     if executor == "sparse":
         return _sparse_rollout(model, data, step, scheme)
-    if executor != "symbolic":
-        raise ModelError(f"executor: expected 'symbolic' or 'sparse', got {executor!r}")
+    ModelError.unless(executor == "symbolic", "executor", "'symbolic' or 'sparse'", repr(executor))
     if model.projection is not None:
         raise ModelError("symbolic executor: expected a grid model, got a reduced one; use executor='sparse'")
-    if model.network.n_node > LARGEST_SYMBOLIC:
-        most, count = f"at most {LARGEST_SYMBOLIC} volumes", str(model.network.n_node)
-        raise ModelError("symbolic executor", most, count, "use executor='sparse'")
+    most, count, where = f"at most {LARGEST_SYMBOLIC} volumes", str(model.network.n_node), "symbolic executor"
+    ModelError.unless(model.network.n_node <= LARGEST_SYMBOLIC, where, most, count, "use executor='sparse'")
     return _symbolic_rollout(model, data, step, scheme)
 
 

@@ -10,8 +10,8 @@ import pandas as pd
 from thermal._types import FloatArray
 from thermal.case.case import Case
 from thermal.errors import ModelError
+from thermal.model.case_replay import LEAST_SPIN_UP, SPIN_UP, free_runs, replay_inputs, spin_up
 from thermal.model.matrices import SymbolicModel
-from thermal.model.replay import LEAST_SPIN_UP, SPIN_UP, free_runs, replay_inputs, spin_up
 from thermal.model.step import IMPLICIT_EULER, Scheme
 
 

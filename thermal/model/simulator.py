@@ -9,10 +9,8 @@ import numpy as np
 
 from thermal._types import FloatArray
 from thermal.case.building import Building
-from thermal.case.case import Case
 from thermal.errors import ModelError
-from thermal.model.matrices import Matrices, SymbolicModel
-from thermal.model.replay import LEAST_SPIN_UP, SPIN_UP, replay_inputs, spin_up
+from thermal.model.matrices import SymbolicModel
 from thermal.model.step import SCHEMES, Stepper
 from thermal.network.build import Extension, build_network
 from thermal.network.structure import SHUFFLE_STEP
@@ -59,8 +57,7 @@ class Shuffle:
     def __post_init__(self) -> None:
         if self.probability is not None and not 0.0 <= self.probability <= 1.0:
             raise ModelError(f"probability: expected a number from 0 to 1, got {self.probability}")
-        if self.kind not in ("mean", "random"):
-            raise ModelError(f"shuffle: expected 'mean' or 'random', got {self.kind!r}")
+        ModelError.unless(self.kind in ("mean", "random"), "shuffle", "'mean' or 'random'", repr(self.kind))
 
 
 class Simulator:
@@ -111,8 +108,7 @@ class Simulator:
         scopes: Mapping[str, Scope] | None = None,
         effects: Sequence[Extension] = (),
     ) -> None:
-        if scheme not in SCHEMES:
-            raise ModelError(f"scheme: expected one of {sorted(SCHEMES)}, got {scheme!r}")
+        ModelError.unless_known(scheme, SCHEMES, "scheme", f"one of {', '.join(sorted(SCHEMES))}")
         if not (np.isfinite(step_seconds) and step_seconds > 0):
             raise ModelError(f"step_seconds: expected a positive number of seconds, got {step_seconds}")
         mixing = shuffle if isinstance(shuffle, Shuffle) else Shuffle(shuffle)
@@ -147,16 +143,6 @@ class Simulator:
     def zone_names(self) -> tuple[str, ...]:
         """Zones, the order of every zone axis."""
         return self.network.zones
-
-    @property
-    def boundary_names(self) -> tuple[str, ...]:
-        """Boundaries, ``outdoor`` first."""
-        return self.network.boundaries
-
-    @property
-    def signal_names(self) -> tuple[str, ...]:
-        """Signals that drive the effects, the order of the signals' axis; none in the baseline."""
-        return tuple(s.name for s in self.network.signals)
 
     @property
     def states(self) -> FloatArray:
@@ -199,53 +185,13 @@ class Simulator:
         if boundary_temperatures is None:
             boundary_temperatures = np.full(len(self.network.boundaries), zone.mean())
         outside, zero = self._outside(boundary_temperatures, signals), self._reference
-        matrices = self._start_matrices()
+        matrices = self._start_model.matrices(self._start_theta)
         start = (zone.mean() - zero) * matrices.uniform[:, None]
         states, _, _ = Stepper(matrices, _STEADY_STEP).hold(start, outside, zone[:, None] - zero)
-        self._states, self._stepped, self._elapsed = self._without_stars(states) + zero, None, 0.0
+        if self._shuffle is not None:  # the star nodes stand for the mean of the shuffle, which this simulator has not
+            states = states[self._start_model.network.kind != "mixing"]
+        self._states, self._stepped, self._elapsed = states + zero, None, 0.0
         return self.zone_temperatures
-
-    def reset_from(self, case: Case, stamp: int, spin_up_seconds: float = SPIN_UP) -> FloatArray:
-        """Start from telemetry: zones matched at a stamp, everything else from a spin-up over what precedes it.
-
-        Parameters
-        ----------
-        case : Case
-            Telemetry of this building at the simulator's step.
-        stamp : int
-            Row of the telemetry.
-        spin_up_seconds : float
-            Length of the spin-up [s].
-
-        Returns
-        -------
-        ndarray, shape (n_zone,)
-            Zone means [K].
-
-        Raises
-        ------
-        ModelError
-            When the telemetry has another step, or no such row.
-        """
-        inputs = replay_inputs(case, self._start_model.network)
-        if inputs.step != self.step_seconds:
-            raise ModelError(f"telemetry: expected a step of {self.step_seconds:g} s, got {inputs.step:g} s")
-        if not 0 < stamp < len(inputs):
-            raise ModelError(f"stamp: expected a row from 1 to {len(inputs) - 1}, got {stamp}")
-        if not LEAST_SPIN_UP <= spin_up_seconds < np.inf or stamp * inputs.step < LEAST_SPIN_UP:
-            found = f"{spin_up_seconds} s before row {stamp}"
-            raise ModelError("spin-up", "at least 12 h before the stamp", found)
-        begin = max(0, stamp - round(spin_up_seconds / inputs.step))
-        states, _ = spin_up(self._start_matrices(), inputs, begin, np.array([stamp]))
-        self._states, self._stepped, self._elapsed = self._without_stars(states), None, 0.0
-        return self.zone_temperatures
-
-    def _start_matrices(self) -> Matrices:
-        return self._start_model.matrices(self._start_theta)
-
-    def _without_stars(self, states: FloatArray) -> FloatArray:
-        """Drop the star nodes that stand for the mean of the shuffle where this simulator has none."""
-        return states if self._shuffle is None else states[self._start_model.network.kind != "mixing"]
 
     def _outside(self, boundary_temperatures: FloatArray, signals: FloatArray | None) -> FloatArray:
         """Boundary temperatures, counted from the reference, then signals, shape (n_boundary, 1)."""
@@ -307,8 +253,7 @@ class Simulator:
         """
         place = self.network.place
         mine = place[:, 0] == floor
-        if floor < 0 or not mine.any():
-            raise ModelError(f"floor: expected a floor of a plan, got {floor}")
+        ModelError.unless(floor >= 0 and mine.any(), "floor", "a floor of a plan", floor)
         out = np.full(self.network.floor_shapes[floor], np.nan)
         for shown in (mine & (self.network.kind != "air"), mine & (self.network.kind == "air")):
             out[place[shown, 1], place[shown, 2]] = self._current()[shown, 0]
@@ -352,7 +297,7 @@ class Simulator:
 
     def _current(self) -> FloatArray:
         if self._states is None:
-            raise ModelError("simulator: call reset() or reset_from() before the first step")
+            raise ModelError("simulator: call reset() before the first step")
         return self._states
 
     def _random_shuffle(self, mixing: Shuffle) -> RandomShuffle:

@@ -361,5 +361,3 @@ def _combine(weights: tuple[float, ...], trail: list[FloatArray]) -> FloatArray:
     for w, x in zip(weights[1:], trail[1:], strict=False):
         total = total + w * x
     return np.asarray(total)
-
-

@@ -190,7 +190,6 @@ class ThermalNetwork:
         signed = {p.name for p in self.parameters if p.scale == "linear"}
         for name, value in given.items():
             number = isinstance(value, int | float | np.number) and not isinstance(value, bool)
-            if not number or not np.isfinite(value) or (value <= 0 and name not in signed):
-                what = "a finite number" if name in signed else "a positive finite number"
-                raise ModelError(f"{name}: expected {what}, got {value!r}")
+            what, found = "a finite number" if name in signed else "a positive finite number", repr(value)
+            ModelError.unless(number and np.isfinite(value) and (value > 0 or name in signed), name, what, found)
         return np.array([float(given.get(p.name, p.start)) for p in self.parameters])

@@ -92,18 +92,15 @@ def generate_office(
     [6, 6]
     """
     low, high = window_to_wall_ratio
-    if seed < 0:
-        raise ThermalError(f"seed: expected 0 or more, found {seed}")
+    ThermalError.unless(seed >= 0, "seed", "0 or more", seed)
     given = {"floor_area": floor_area, "cell_size": cell_size, "height": height, "min_zone_area": min_zone_area}
     for name, value in given.items():
-        if not (np.isfinite(value) and value > 0.0):
-            raise ThermalError(name, "a positive number", f"{value}")
+        ThermalError.unless(np.isfinite(value) and value > 0.0, name, "a positive number", f"{value}")
     if floors < 1 or zones < floors:
         raise ThermalError(f"zones: expected at least one a floor on one or more floors, found {zones} on {floors}")
     most = int(floor_area / (_MEAN_OVER_SMALLEST * min_zone_area))
-    if zones > most:
-        mean = f"{_MEAN_OVER_SMALLEST} times min_zone_area ({min_zone_area} m2) on average"
-        raise ThermalError("zones", f"at most {most} on {floor_area} m2, so that they have {mean}", f"{zones}")
+    fits, mean = zones <= most, f"{_MEAN_OVER_SMALLEST} times min_zone_area ({min_zone_area} m2) on average"
+    ThermalError.unless(fits, "zones", f"at most {most} on {floor_area} m2, so that they have {mean}", f"{zones}")
     if not 0.0 <= low <= high <= 1.0:
         raise ThermalError(f"window_to_wall_ratio: expected (smallest, largest) between 0 and 1, found {low, high}")
     counts = [zones // floors + (floor < zones % floors) for floor in range(floors)]

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import ndimage
 
-from thermal.case.judgement import runs
+from thermal.case.signal_faults import runs
 from thermal.errors import ThermalError
 
 Mask = npt.NDArray[np.bool_]

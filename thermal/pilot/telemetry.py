@@ -112,7 +112,6 @@ def generate_telemetry(
     settings: TelemetrySettings | None = None,
     *,
     thermostats: Thermostats | None = None,
-    terminals: Terminals | None = None,
     progress: Progress | None = None,
 ) -> Telemetry:
     """Run a plant under thermostats and report what its sensors see.
@@ -137,15 +136,13 @@ def generate_telemetry(
         Seed, spin-up and sensors.
     thermostats : Thermostats, optional
         Schedules in the order of the plant's zones; drawn by default.
-    terminals : Terminals, optional
-        Units in the order of the plant's zones; sized by floor area by default.
     progress : callable, optional
         Called as ``progress(steps_done, steps)`` after every step.
 
     Returns
     -------
     Telemetry
-        Of the weather station, as it came, and of a device ``VAV_<zone>`` a zone: zone and discharge temperature, both
+        Of the weather station, unchanged, and of a device ``VAV_<zone>`` a zone: zone and discharge temperature, both
         setpoints [K], supply flow [kg/s] (of single precision, as building automation stores it).
 
     Raises
@@ -158,7 +155,7 @@ def generate_telemetry(
     areas = zone_floor_areas(plans)
     floor_area = np.array([areas[zone] for zone in plant.zone_names])
     thermostats = thermostats or draw_thermostats(settings.seed, len(floor_area))
-    terminals = terminals or size_terminals(settings.seed, floor_area)
+    terminals = size_terminals(settings.seed, floor_area)
     index = pd.DatetimeIndex(weather.index)
     setpoints = thermostats.setpoints(index - pd.Timedelta(seconds=plant.step_seconds))
     outdoor = weather[f"{settings.station}/{OUTDOOR_TEMPERATURE}"].to_numpy(dtype=float)
@@ -228,8 +225,7 @@ def _check(plant: Plant, plans: FloorPlans, weather: pd.DataFrame, settings: Tel
     """Refuse what does not fit; return the steps of the spin-up."""
     zones = {zone for floor in plans.floors for zone in floor.zone_names}
     strange = sorted(zones.symmetric_difference(plant.zone_names))
-    if strange:
-        raise ThermalError(f"plant: expected the zones of the plans, found a difference in {', '.join(strange[:5])}")
+    ThermalError.unless(not strange, "plant", "the zones of the plans", f"a difference in {', '.join(strange[:5])}")
     column = f"{settings.station}/{OUTDOOR_TEMPERATURE}"
     if column not in weather or not isinstance(weather.index, pd.DatetimeIndex) or weather.index.tz is None:
         raise ThermalError(f"weather: expected a column {column!r} on a tz-aware index, found {list(weather)[:3]}")

@@ -13,7 +13,7 @@ from thermal.case.case import Case
 from thermal.case.plan import zone_floor_areas
 from thermal.case.points import DISCHARGE_TEMPERATURE, OUTDOOR_TEMPERATURE, SUPPLY_FLOW, ZONE_TEMPERATURE
 from thermal.case.telemetry import Telemetry
-from thermal.errors import ThermalError, check_known
+from thermal.errors import ThermalError
 from thermal.model.simulator import Simulator
 from thermal.network.build import build_network
 from thermal.parameters import Parameter, Scope
@@ -52,9 +52,8 @@ class TwinRanges:
     def __post_init__(self) -> None:
         for name, (low, high) in vars(self).items():
             positive = low > 0.0 or (low == high == 0.0 and name != "disturbance_time")
-            if not (positive and low <= high < np.inf):
-                expected = "two positive numbers in order (or twice 0 for none)"
-                raise ThermalError(f"ranges: {name}", expected, f"{low}, {high}")
+            expected = "two positive numbers in order (or twice 0 for none)"
+            ThermalError.unless(positive and low <= high < np.inf, f"ranges: {name}", expected, f"{low}, {high}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,7 +168,7 @@ class TwinSettings(Period):
 
     def __post_init__(self) -> None:
         for name, options in (("excitation", get_args(Excitation)), ("meter", get_args(Meter))):
-            check_known(getattr(self, name), options, name, f"one of {', '.join(options)}", ThermalError)
+            ThermalError.unless_known(getattr(self, name), options, name, f"one of {', '.join(options)}")
 
 
 class _DisturbedPlant:

@@ -224,10 +224,8 @@ def _area_errors(floors: Sequence[ZonedFloor], plans: Sequence[FloorPlan], cell_
 
 
 def _check_names(floors: Sequence[ZonedFloor]) -> None:
-    if not floors:
-        raise PlanError("floors", "at least one", "none")
+    PlanError.unless(floors, "floors", "at least one", "none")
     named = {"floor": [floor.name for floor in floors], "zone": [zone for floor in floors for zone in floor.names]}
     for what, names in named.items():
         for name in names:
-            if names.count(name) > 1:
-                raise PlanError(f"{what} {name!r}", "a name of its own", "two of that name")
+            PlanError.unless(names.count(name) <= 1, f"{what} {name!r}", "a name of its own", "two of that name")

@@ -114,8 +114,7 @@ def import_devices(
         if zone and len(place) != 1:
             unplaced[name] = zone
         devices.append(Device(name=name, type=known or kind or "unknown", zone=place[0] if len(place) == 1 else None))
-    if not devices:
-        raise PlanError(where, "at least one device", "none")
+    PlanError.unless(devices, where, "at least one device", "none")
     certain = certain_feeders({device.name: device.type for device in devices})
     for i, device in enumerate(devices):
         told = tuple(f for f in dict.fromkeys((fed_by or {}).get(device.name, ())) if f in seen and f != device.name)
@@ -193,8 +192,7 @@ def read_rows(file: Path) -> list[dict[str, str]]:
         lines = file.read_text(encoding="utf-8-sig").splitlines() or [""]
         sign = max(",;\t", key=lines[0].count)
         rows = [row for row in csv.reader(lines, delimiter=sign, strict=True) if any(x.strip() for x in row)]
-    if not rows:
-        raise PlanError(file.name, "a header and a row a device", "an empty file")
+    PlanError.unless(rows, file.name, "a header and a row a device", "an empty file")
     header = ["_".join(words_of(cell)) for cell in rows[0]]
     named = {use: [header.index(name) for name in names if name in header] for use, names in _COLUMNS.items()}
     found = {use: places[0] for use, places in named.items() if places}
@@ -206,7 +204,6 @@ def read_rows(file: Path) -> list[dict[str, str]]:
         if len(row) != len(header):
             raise PlanError(f"{file.name}: row {number}", f"{len(header)} cells as in the header", f"{len(row)}")
         entry = {use: row[place].strip() for use, place in found.items()}
-        if not entry["name"]:
-            raise PlanError(f"{file.name}: row {number}", "the name of a device", "a blank")
+        PlanError.unless(entry["name"], f"{file.name}: row {number}", "the name of a device", "a blank")
         result.append(entry)
     return result

@@ -132,9 +132,8 @@ def checked_scale(metres_per_pixel: float) -> float:
     PlanError
         It is out of the range of plans.
     """
-    if not FINEST <= metres_per_pixel <= COARSEST:
-        advice = "are points in pixels and distances in metres?"
-        raise PlanError("scale", f"{FINEST:g} to {COARSEST:g} m for a pixel", f"{metres_per_pixel:g} m", advice)
+    advice, expected = "are points in pixels and distances in metres?", f"{FINEST:g} to {COARSEST:g} m for a pixel"
+    PlanError.unless(FINEST <= metres_per_pixel <= COARSEST, "scale", expected, f"{metres_per_pixel:g} m", advice)
     return metres_per_pixel
 
 
@@ -252,8 +251,7 @@ def _pdf_page(file: Path, page: int, dpi: float) -> NDArray[np.uint8]:
         pages_wanted = ["-f", str(page), "-l", str(page), "-singlefile"]
         _poppler(["pdftoppm", "-r", f"{dpi:g}", *pages_wanted, "-gray", "-png", str(file), str(target)], file)
         drawn = target.with_suffix(".png")
-        if not drawn.is_file():
-            raise PlanError(file.name, f"a page {page} that can be drawn", "nothing drawn")
+        PlanError.unless(drawn.is_file(), file.name, f"a page {page} that can be drawn", "nothing drawn")
         return _image(drawn)
 
 

@@ -211,9 +211,8 @@ def check_nothing_lost(path: str | PathLike[str]) -> None:
         It does; the message names all of it.
     """
     held = held_work(path)
-    if held:
-        advice = "choose another folder, or correct the case with buildingmpc label; --force replaces all of it"
-        raise PlanError(str(path), "nothing that would be lost", "; ".join(held), advice)
+    advice = "choose another folder, or correct the case with buildingmpc label; --force replaces all of it"
+    PlanError.unless(not held, str(path), "nothing that would be lost", "; ".join(held), advice)
 
 
 _WIDEST = 1600  # px of the picture's ground; text and marks are drawn as vectors

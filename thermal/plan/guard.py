@@ -102,24 +102,21 @@ def checked_file(path: Path, kinds: tuple[str, ...]) -> Path:
         It is larger than `MOST_BYTES`.
     """
     suffix = path.suffix.lower()
-    if suffix not in kinds:
-        advice = "unpack it first" if suffix == ".zip" else ""
-        raise PlanError(path.name, f"a file that ends in {', '.join(kinds)}", repr(suffix or path.name), advice)
+    advice, expected = "unpack it first" if suffix == ".zip" else "", f"a file that ends in {', '.join(kinds)}"
+    PlanError.unless(suffix in kinds, path.name, expected, repr(suffix or path.name), advice)
     with reading(path, "a file that can be read"):
         if not path.is_file():
             raise PlanError(str(path), "a file", "a folder" if path.is_dir() else "nothing")
         size = path.stat().st_size
-        if size > MOST_BYTES:
-            found = f"{size / 1e6:.0f} MB"
-            raise OversizedFileError(path.name, f"at most {MOST_BYTES / 1e6:.0f} MB", found, "export it anew")
+        found, expected = f"{size / 1e6:.0f} MB", f"at most {MOST_BYTES / 1e6:.0f} MB"
+        OversizedFileError.unless(size <= MOST_BYTES, path.name, expected, found, "export it anew")
         with path.open("rb") as stream:
             start = stream.read(1024)
     known = _SIGNATURES.get(suffix)
     # A PDF may have some bytes before its signature (ISO 32000-1, annex H, note 13).
     fits = known is None or (known[0] in start if suffix == ".pdf" else start.startswith(known))
-    if not fits or not start:
-        found = f"a file that begins with {start[:8]!r}" if start else "an empty file"
-        raise PlanError(path.name, f"a {suffix[1:].upper()} file", found, "export the drawing anew")
+    found = f"a file that begins with {start[:8]!r}" if start else "an empty file"
+    PlanError.unless(fits and start, path.name, f"a {suffix[1:].upper()} file", found, "export the drawing anew")
     return path.absolute()
 
 

@@ -186,9 +186,8 @@ def _cover(drawing: Drawing, block: int) -> FloatArray:
     """Share of ink in blocks of pixels; white on black is turned over."""
     grey = drawing.grey
     contrast = int(grey.max()) - int(grey.min()) if grey.size else 0
-    if contrast < _LEAST_CONTRAST:
-        found = f"one shade of grey (contrast {contrast} of 255)"
-        raise PlanError(drawing.source, "walls darker than the paper", found, "is the drawing blank?")
+    found, where = f"one shade of grey (contrast {contrast} of 255)", drawing.source
+    PlanError.unless(contrast >= _LEAST_CONTRAST, where, "walls darker than the paper", found, "is the drawing blank?")
     threshold = float(extra("skimage.filters").threshold_otsu(grey))
     dark = grey <= threshold
     light, black = float(grey[~dark].mean()), float(grey[dark].mean())

@@ -2,20 +2,17 @@
 
 import csv
 import difflib
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
 
 from thermal.case.building import Device
-from thermal.case.case import Case
-from thermal.case.load import load_case
-from thermal.case.points import POINT_TYPES, point_type
-from thermal.case.telemetry import INDEX, check_units, read_telemetry
+from thermal.case.points import POINT_TYPES
+from thermal.case.telemetry import INDEX
 from thermal.errors import PlanError
 from thermal.plan.devices import ListedPoint, key, words_of
 from thermal.plan.guard import checked_file, reading, vocabulary
-from thermal.units import QUANTITIES
 
 _LEAST = 0.5  # -, of the confidence of a match that is offered
 _ALIKE = 0.85  # -, of two names that differ by a slip of the pen
@@ -43,6 +40,8 @@ class PointMatch:
         From 0 to 1 [-]; 1 for ``ENTITY/POINT`` itself.
     remark : str
         Why it is not matched; empty when it is.
+    unit : str
+        Unit in the table; empty for that of `--unit`, or the usual one.
     """
 
     column: str
@@ -50,6 +49,7 @@ class PointMatch:
     point: str
     confidence: float
     remark: str = ""
+    unit: str = ""
 
 
 def match_points(
@@ -184,7 +184,7 @@ def _weight(words: set[str]) -> float:
     return sum(float(_WEIGHTS.get(word, 1.0)) for word in words)
 
 
-_HEADER = ("column", "entity", "point", "confidence", "remark")
+_HEADER = ("column", "entity", "point", "confidence", "remark", "unit")
 
 
 def read_columns(path: str | PathLike[str]) -> tuple[str, ...]:
@@ -230,13 +230,13 @@ def write_matches(matches: Sequence[PointMatch], path: str | PathLike[str]) -> P
     Returns
     -------
     Path
-        The file: column, entity, point, confidence, remark.
+        The file: column, entity, point, confidence, remark, unit.
     """
     file = Path(path)
     with file.open("w", encoding="utf-8", newline="") as stream:
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow(_HEADER)
-        writer.writerows([m.column, m.entity, m.point, f"{m.confidence:.3f}", m.remark] for m in matches)
+        writer.writerows([m.column, m.entity, m.point, f"{m.confidence:.3f}", m.remark, m.unit] for m in matches)
     return file
 
 
@@ -269,56 +269,7 @@ def read_matches(path: str | PathLike[str]) -> tuple[PointMatch, ...]:
     matches = []
     for number, row in enumerate(rows, start=2):
         column, entity, point = ((row[name] or "").strip() for name in _HEADER[:3])
-        if not column:
-            raise PlanError(f"{file.name}: line {number}", "the name of a column", "none")
+        PlanError.unless(column, f"{file.name}: line {number}", "the name of a column", "none")
         remark = (row.get("remark") or "").strip() or ("" if entity and point else "left out")
-        matches.append(PointMatch(column, entity, point, 1.0, remark))
+        matches.append(PointMatch(column, entity, point, 1.0, remark, (row.get("unit") or "").strip()))
     return tuple(matches)
-
-
-def with_telemetry(
-    path: str | PathLike[str],
-    file: str | PathLike[str],
-    matches: Sequence[PointMatch],
-    units: Mapping[str, str] | None = None,
-) -> Case:
-    """Load a case and give it other telemetry.
-
-    Parameters
-    ----------
-    path : str or path
-        Case folder.
-    file : str or path
-        CSV or Parquet: a column ``timestamp`` of ISO 8601 with offset, and a column a point under any name.
-    matches : sequence of PointMatch
-        What its columns are; those without an entity or a point, or with a remark, are left out.
-    units : mapping of str to str, optional
-        Unit in the file by point type; those of the case format's table for the rest.
-
-    Returns
-    -------
-    Case
-        Not saved yet, which is when its columns are held against its devices.
-
-    Raises
-    ------
-    PlanError
-        No column is matched, or the file lacks one that is.
-    CaseError
-        One of its family: the case does not load, or values cannot be read.
-    """
-    case = load_case(path)
-    source = checked_file(Path(file), (".csv", ".parquet"))
-    names = {match.column: f"{match.entity}/{match.point}" for match in matches if match.point and not match.remark}
-    if not names:
-        raise PlanError(source.name, "a column that is matched to a point", "none", "see points.csv")
-    lacking = sorted(names.keys() - {*read_columns(source)})
-    if lacking:
-        found = f"no {lacking[0]!r}" + (f" and {len(lacking) - 1} more" if len(lacking) > 1 else "")
-        raise PlanError(source.name, "the columns of the list of points", found)
-    given = dict(units or {})
-    check_units(given)
-    points = {m.point: point_type(m.point, f"points: {m.column!r}") for m in matches if m.column in names}
-    usual = {point: QUANTITIES[kind.quantity].file_unit for point, kind in points.items()}
-    telemetry = read_telemetry(source, usual | given, case.building.location, names)
-    return replace(case, telemetry=telemetry, judged=None)

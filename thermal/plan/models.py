@@ -86,8 +86,7 @@ def read_brick(file: Path, zones: Sequence[str]) -> DeviceImport:
         rows.append((name, kind, zone))
         fed_by[name] = model.feeders(subject)
         points += model.points(subject, name, kind)
-    if not rows:
-        raise PlanError(file.name, "equipment of Brick", "none", "does it declare brick:VAV, brick:AHU and so on?")
+    PlanError.unless(rows, file.name, "equipment of Brick", "none", "does it declare brick:VAV, brick:AHU and so on?")
     rows.sort(key=lambda row: row[0])
     return import_devices(rows, zones, file.name, sorted(points, key=lambda p: p.column), fed_by)
 
@@ -236,8 +235,7 @@ def read_haystack(file: Path, zones: Sequence[str]) -> DeviceImport:
         owner = kinds.get(entity.get("equipRef", ""))
         if "point" in entity and owner is not None:
             points.append(ListedPoint(entity.get("id", _name(entity)), owner[0], _point(entity, owner[1])))
-    if not rows:
-        raise PlanError(file.name, "entities with the tag 'equip'", f"none of {len(entities)}")
+    PlanError.unless(rows, file.name, "entities with the tag 'equip'", f"none of {len(entities)}")
     return import_devices(rows, zones, file.name, points, fed_by)
 
 

@@ -57,9 +57,8 @@ class PlanSettings:
         checked_number(self.thinnest_wall, "thinnest_wall", 0.0, 0.5, "m")
         checked_number(self.smallest_room, "smallest_room", 0.1, 50.0, "m2")
         checked_number(self.smallest_zone, "smallest_zone", 0.0, 100.0, "m2")
-        if self.thinnest_wall >= self.thickest_wall:
-            expected = f"less than thickest_wall ({self.thickest_wall} m)"
-            raise PlanError("thinnest_wall", expected, f"{self.thinnest_wall}")
+        expected = f"less than thickest_wall ({self.thickest_wall} m)"
+        PlanError.unless(self.thinnest_wall < self.thickest_wall, "thinnest_wall", expected, f"{self.thinnest_wall}")
 
 
 @dataclass(frozen=True)
@@ -297,8 +296,7 @@ def survey_codes(codes: ArrayLike, cell_size: float, source: str = "codes") -> F
     labels, count = ndimage.label(framed == INSIDE)
     labels = labels.astype(np.int32)
     labels[framed == OUTSIDE] = OUTSIDE_LABEL
-    if count == 0:
-        raise PlanError(source, "cells of code 0, inside", "none")
+    PlanError.unless(count != 0, source, "cells of code 0, inside", "none")
     _check_closed(labels, source)
     fine = np.repeat(np.repeat(labels, _REFINE, axis=0), _REFINE, axis=1)
     middle = 1.5 * _REFINE - 0.5
@@ -337,11 +335,9 @@ def _read_numpy(file: Path) -> NDArray[Any]:
             with zipfile.ZipFile(file) as archive:
                 unpacked = sum(entry.file_size for entry in archive.infolist())
                 names = archive.namelist()
-            if unpacked > MOST_BYTES:
-                expected, found = f"at most {MOST_BYTES / 1e6:.0f} MB unpacked", f"{unpacked / 1e6:.0f} MB"
-                raise OversizedFileError(file.name, expected, found, "this is no plan")
-            if len(names) != 1:
-                raise PlanError(file.name, "one array", ", ".join(names[:5]) or "none")
+            expected, found = f"at most {MOST_BYTES / 1e6:.0f} MB unpacked", f"{unpacked / 1e6:.0f} MB"
+            OversizedFileError.unless(unpacked <= MOST_BYTES, file.name, expected, found, "this is no plan")
+            PlanError.unless(len(names) == 1, file.name, "one array", ", ".join(names[:5]) or "none")
             with np.load(file, allow_pickle=False) as arrays:
                 codes = np.asarray(arrays[arrays.files[0]])
         else:

@@ -107,9 +107,8 @@ def _unit(document: Any, unit: float | None, where: str) -> float:
     if unit is not None:
         return checked_number(unit, "unit", 1e-6, 1e4, "m")
     code = document.header.get("$INSUNITS", 0)
-    if code not in _UNITS:
-        expected = "a unit of length in $INSUNITS"
-        raise PlanError(where, expected, f"code {code}", "pass unit, such as 0.001 for millimetres")
+    expected = "a unit of length in $INSUNITS"
+    PlanError.unless(code in _UNITS, where, expected, f"code {code}", "pass unit, such as 0.001 for millimetres")
     return _UNITS[code]
 
 
@@ -173,8 +172,7 @@ def _upright(
 ) -> tuple[float, FloatArray, tuple[int, int]]:
     """Angle of the walls clockwise, what takes (x, y, 1) [m] to column and row of the survey, and its shape."""
     lines = content.lines + content.solids or content.rooms
-    if not lines:
-        raise PlanError(where, "lines", "none that can be drawn")
+    PlanError.unless(lines, where, "lines", "none that can be drawn")
     angle = _main_angle(lines) if straighten else 0.0
     cosine, sine = math.cos(math.radians(angle)), math.sin(math.radians(angle))
     turn = np.array([[cosine, -sine], [sine, cosine]])

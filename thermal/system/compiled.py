@@ -17,7 +17,7 @@ from thermal._types import FloatArray
 from thermal.components.component import Calls, Conditions, Given
 from thermal.components.operations import CasadiOperations, StepOperations
 from thermal.errors import ModelError
-from thermal.system.exchange import Mail, Runner, givens
+from thermal.system.exchange import PortMessages, Runner, givens
 from thermal.system.step import HvacStep
 from thermal.system.system import HvacSystem
 
@@ -108,7 +108,7 @@ class CompiledSystem:
 
     def _trace(self, calls: Calls, conditions: Conditions, seconds: float) -> list[_Phase]:
         """Take a step with symbols for single components, numbers for groups; make functions of what comes up."""
-        system, n_state, mail = self._system, len(self._system.states), Mail(self._system)
+        system, n_state, messages = self._system, len(self._system.states), PortMessages(self._system)
         now, fixed = _symbols("now", self._now.size), _symbols("set", self._set.size)
         load, carried, sent, kept = list[Any](), list[Any](), list[float](), list[float]()
         symbols = now, fixed, load, carried
@@ -125,7 +125,7 @@ class CompiledSystem:
                 if name in system.groups:
                     sent.extend(_leaves(message))
                     message = _replaced(message, load)
-                mail.put(name, port, message)
+                messages.put(name, port, message)
 
             return put
 
@@ -146,13 +146,13 @@ class CompiledSystem:
             alone = name not in system.groups
             ops, given = (CasadiOperations(), single[name]) if alone else (self._ops, group._replace(put=sender(name)))
             runs[name] = component.run(ops, given)
-        runner, traces = Runner(mail, runs, deliver), list[_Trace]()
+        runner, traces = Runner(messages, runs, deliver), list[_Trace]()
         runner.advance(system.groups)  # up to where they wait first
         while runner.waiting:
             begin, drawn = len(carried), len(load)
             moved = runner.advance(system.singles)
             held: list[Any] = []
-            for (receiver, _), boxes in mail.waiting.items():
+            for (receiver, _), boxes in messages.waiting.items():
                 if receiver in system.singles:  # what waits for groups goes on as numbers, not as expressions
                     for box in boxes.values():
                         held += [value for message in box for value in message]

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from thermal.components.component import Component, Port
-from thermal.errors import ModelError, check_known
+from thermal.errors import ModelError
 
 
 class Connection(NamedTuple):
@@ -58,8 +58,8 @@ def find_partners(
     found: dict[tuple[str, str], list[tuple[str, str]]] = {key: [] for key in ports}
     for consumer, port, suppliers in connections:
         for name in (consumer, *suppliers):
-            check_known(name, components, "HvacSystem: connection", "a component", ModelError)
-        check_known(port, (p for name, p in ports if name == consumer), f"{consumer}: port", "one of its", ModelError)
+            ModelError.unless_known(name, components, "HvacSystem: connection", "a component")
+        ModelError.unless_known(port, (p for name, p in ports if name == consumer), f"{consumer}: port", "one of its")
         quantity = ports[consumer, port].quantity
         for name in suppliers:
             if (name, quantity) not in supplying:
@@ -110,7 +110,7 @@ def spread(where: str, keys: Iterable[str], values: Mapping[str, Any]) -> dict[s
     found, kinds = dict[str, Any](), by_kind(keys)
     kinds |= {key: (key,) for mine in tuple(kinds.values()) for key in mine}
     for kind, value in values.items():
-        check_known(kind, kinds, where, "one that a component has", ModelError)
+        ModelError.unless_known(kind, kinds, where, "one that a component has")
         mine, plain = kinds[kind], value.tolist() if isinstance(value, np.ndarray) else value
         each = list(plain) if isinstance(plain, tuple | list) else [plain] * len(mine)
         if len(each) != len(mine):

@@ -10,7 +10,7 @@ from thermal.components.boiler_loop import BoilerLoop
 from thermal.components.component import Group, IndexArray
 from thermal.components.registry import COMPONENTS
 from thermal.components.terminals import Terminals
-from thermal.errors import ModelError, check_known
+from thermal.errors import ModelError
 
 _METERS = ("chiller",)  # devices that are read, and are parts of others' models
 
@@ -70,7 +70,7 @@ def device_graph(building: Building) -> DeviceGraph:
     for device in building.devices:
         feeding = getattr(device, "fed_by", ())
         for name in feeding:
-            check_known(name, names, f"device {device.name!r}: fed_by", "a device", ModelError)
+            ModelError.unless_known(name, names, f"device {device.name!r}: fed_by", "a device")
         kind = COMPONENTS.get(device.type)
         if kind is None:
             unused |= {} if device.type in _METERS else {device.name: f"no component has the type {device.type!r}"}

@@ -14,7 +14,7 @@ from thermal.system.step import HvacStep
 from thermal.system.system import HvacSystem
 
 
-class Mail:
+class PortMessages:
     """Carries messages through ports: what is drawn is added up at suppliers, what is supplied goes to all who draw.
 
     Parameters
@@ -68,7 +68,7 @@ class Runner:
 
     Parameters
     ----------
-    mail : Mail
+    messages : PortMessages
         Brings the messages.
     runs : mapping of str to generator
         Functions, by component; the result itself of one that waits for nobody.
@@ -77,9 +77,12 @@ class Runner:
     """
 
     def __init__(
-        self, mail: Mail, runs: Mapping[str, Any], on_take: Callable[[str, Any], Any] = lambda name, message: message
+        self,
+        messages: PortMessages,
+        runs: Mapping[str, Any],
+        on_take: Callable[[str, Any], Any] = lambda name, message: message,
     ) -> None:
-        self._mail, self._on_take = mail, on_take
+        self._messages, self._on_take = messages, on_take
         self._runs = {name: run for name, run in runs.items() if isinstance(run, GeneratorType)}
         self._wants: dict[str, str | None] = dict.fromkeys(self._runs)
         self.results = {name: run for name, run in runs.items() if name not in self._runs}
@@ -107,7 +110,7 @@ class Runner:
         while again:
             again = False
             for name in (n for n in names if n in self._wants):
-                while (port := self._wants[name]) is None or (message := self._mail.take(name, port)) is not None:
+                while (port := self._wants[name]) is None or (message := self._messages.take(name, port)) is not None:
                     moved = again = True
                     told = None if port is None else self._on_take(name, message)
                     try:
@@ -189,12 +192,12 @@ def advance(
     While the water is colder than that - a boiler at its capacity, a setpoint that falls - coils give a little less
     than their valves could let them.
     """
-    mail = Mail(system)
+    messages = PortMessages(system)
     given = givens(
-        system, calls, conditions, actions, state, seconds, lambda name: lambda port, m: mail.put(name, port, m)
+        system, calls, conditions, actions, state, seconds, lambda name: lambda port, m: messages.put(name, port, m)
     )
     runs = {n: c.run(ops.of(n) if n in system.groups else ops.scalar, given[n]) for n, c in system.components.items()}
-    runner = Runner(mail, runs)
+    runner = Runner(messages, runs)
     runner.advance(system.components)
     if runner.waiting:
         raise ModelError("HvacSystem", "components that do not wait for each other", f"{runner.waiting}")

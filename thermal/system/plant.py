@@ -11,7 +11,7 @@ from thermal.components.checks import action, scalar_action
 from thermal.components.component import Conditions
 from thermal.components.operations import StepOperations
 from thermal.components.thermostat import Mode, ModeArray
-from thermal.errors import ModelError, check_known
+from thermal.errors import ModelError
 from thermal.system.compiled import CompiledSystem
 from thermal.system.step import HvacStep
 from thermal.system.system import HvacSystem
@@ -184,7 +184,7 @@ class HvacPlant:
         """Check actions by the ranges of their actuators, and lay them out."""
         system, chosen = self.system, []
         for name in actions:
-            check_known(name, system.actuators, "actions", "an actuator", ModelError)
+            ModelError.unless_known(name, system.actuators, "actions", "an actuator")
         for name, (_, actuator) in system.actuators.items():
             value = actions.get(name, system.defaults.get(name))
             if not isinstance(value, float | int):

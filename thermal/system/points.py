@@ -33,21 +33,16 @@ class HvacPoints:
         kinds: dict[type[Component], list[str]] = {}
         for name in (*system.groups, *system.singles):
             kinds.setdefault(type(system.components[name]), []).append(name)
-        #: Components of each kind, and which of their points are read.
-        self._read = [
-            (names, k)
-            for of_pressure in (False, True)[: 1 + pressures]
-            for kind, names in kinds.items()
-            for k, point in enumerate(kind.sensors)
-            if (POINT_TYPES[point].quantity == "pressure") == of_pressure
-        ]
+        columns, self._read = list[str](), list[tuple[slice, str, int]]()
+        for of_pressure in (False, True)[: 1 + pressures]:
+            for kind, names in kinds.items():
+                for k, point in enumerate(kind.sensors):
+                    for name in names if (POINT_TYPES[point].quantity == "pressure") == of_pressure else ():
+                        begin = len(columns)
+                        columns += [f"{entity}/{point}" for entity in system.entities(name)]
+                        self._read.append((slice(begin, len(columns)), name, k))
         #: Columns ``ENTITY/POINT`` in the order of `read`, point by point.
-        self.columns = tuple(
-            f"{entity}/{type(system.components[names[0]]).sensors[k]}"
-            for names, k in self._read
-            for name in names
-            for entity in system.entities(name)
-        )
+        self.columns = tuple(columns)
 
     def read(self, conditions: Conditions, actions: Mapping[str, float], step: HvacStep) -> FloatArray:
         """Read all points after a step.
@@ -72,7 +67,10 @@ class HvacPoints:
             name: component.read(self._ops, given[name], step.results[name])
             for name, component in system.components.items()
         }
-        return np.concatenate([np.atleast_1d(values[name][k]) for names, k in self._read for name in names])
+        found = np.empty(len(self.columns))
+        for place, name, k in self._read:
+            found[place] = values[name][k]
+        return found
 
 
 def energy_balance(system: HvacSystem, conditions: Conditions, step: HvacStep) -> EnergyBalance:

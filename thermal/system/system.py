@@ -17,7 +17,7 @@ from thermal.components.operations import Operations, Value
 from thermal.components.terminals import Terminals
 from thermal.components.thermostat import Thermostat
 from thermal.components.water_coil import WaterCoil
-from thermal.errors import ModelError, check_known
+from thermal.errors import ModelError
 from thermal.system.connections import Connection, by_kind, connectors, find_partners, spread
 
 _Kind = TypeVar("_Kind", bound=Component)
@@ -269,7 +269,7 @@ class HvacSystem:
             When the system has no component of such a name, or a new one lacks a port that is connected.
         """
         for name in components:
-            check_known(name, self.components, "having", "a component (with_component adds one)", ModelError)
+            ModelError.unless_known(name, self.components, "having", "a component (with_component adds one)")
         return replace(self, components={**self.components, **components})
 
     def with_component(
@@ -299,7 +299,7 @@ class HvacSystem:
         supplied, ports = {p.quantity for p in component.connectors if p.supplies}, connectors(self.components)
         links = {(c.consumer, c.port): c.suppliers for c in self.connections}
         for consumer in feeds:
-            check_known(consumer, self.components, "with_component: feeds", "a component of the system", ModelError)
+            ModelError.unless_known(consumer, self.components, "with_component: feeds", "a component of the system")
         links |= {link: (name,) for link in links if link[0] in feeds and ports[link].quantity in supplied}
         links |= {(name, port): (s,) if isinstance(s, str) else s for port, s in suppliers.items()}
         joined = tuple(Connection(*link, feeding) for link, feeding in links.items())

@@ -21,7 +21,7 @@ from calibration.results import Plain
 from thermal._types import BoolArray, FloatArray
 from thermal.case.building import FloorPlans
 from thermal.inputs.provider import InputProvider
-from thermal.model.replay import Inputs
+from thermal.model.case_replay import Inputs
 
 Kind = Literal["sensors", "random", "persistent", "hump"]
 

@@ -20,9 +20,9 @@ from thermal.case.case import Case
 from thermal.effects.catalogue import CATALOGUE, chosen
 from thermal.inputs.normalisation import fit_normalisation
 from thermal.inputs.provider import InputProvider, telemetry_inputs
+from thermal.model.case_replay import Inputs, replay_inputs
 from thermal.model.matrices import SymbolicModel
 from thermal.model.reduce import ReducedModel
-from thermal.model.replay import Inputs, replay_inputs
 from thermal.network.build import Blueprint, Extension, blueprint
 from thermal.network.network import ThermalNetwork
 from thermal.network.topology import Anatomy

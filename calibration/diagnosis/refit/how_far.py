@@ -15,8 +15,8 @@ from calibration.diagnosis.refit.search import Round
 from calibration.diagnosis.screen.screen import GENERIC
 from calibration.errors import HorizonError, NotEnoughDataError
 from thermal.effects.effect import Chosen
+from thermal.model.case_replay import Inputs
 from thermal.model.reduce import reduced_model
-from thermal.model.replay import Inputs
 
 #: Resamples of days for intervals, and the share of them that an interval holds [-].
 _RESAMPLES, _LEVEL = 1000, 0.9

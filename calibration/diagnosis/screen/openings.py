@@ -14,9 +14,9 @@ from calibration.evaluation.settings import ModelSettings
 from thermal._types import FloatArray
 from thermal.case.case import Case
 from thermal.inputs.provider import InputProvider
+from thermal.model.case_replay import Inputs, replay_inputs
 from thermal.model.matrices import SymbolicModel
 from thermal.model.reduce import reduced_model
-from thermal.model.replay import Inputs, replay_inputs
 
 #: Deviations within which 90 % of a normal distribution are [-].
 _NINETY = 1.645

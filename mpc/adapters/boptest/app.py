@@ -91,12 +91,10 @@ class HeldTests:
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self.cases = {case.name: case for case in cases}
-        if not cases or len(self.cases) < len(cases):
-            found = ", ".join(case.name for case in cases) or "none"
-            raise BoptestError("cases", "one or more, each with a name of its own", found)
-        if not (most >= 1 and idle_seconds > 0):
-            found = f"{most} and {idle_seconds} s"
-            raise BoptestError("server", "one test at least, and a positive idle time", found)
+        found, expected = ", ".join(case.name for case in cases) or "none", "one or more, each with a name of its own"
+        BoptestError.unless(cases and len(self.cases) >= len(cases), "cases", expected, found)
+        fits, found = most >= 1 and idle_seconds > 0, f"{most} and {idle_seconds} s"
+        BoptestError.unless(fits, "server", "one test at least, and a positive idle time", found)
         self.most, self.idle_seconds, self.clock = most, idle_seconds, clock
         self._held: dict[str, HeldTest] = {}
 

@@ -22,7 +22,7 @@ from thermal.model.matrices import SymbolicModel
 from thermal.model.reduce import reduced_model
 from thermal.network.build import build_network
 from thermal.pilot.building import pilot_building
-from thermal.pilot.sizing import size_system
+from thermal.system.sizing import size_system
 
 _PILOT_START, _PILOT_STEP = "2023-01-01", 3600.0  # of a year of made weather; step in s
 

@@ -72,9 +72,8 @@ class Unit:
         found = self.variables.get(name)
         if found is None:
             raise PlantError(f"FMU {self.name}: {what}", "a variable", repr(name), nearest(name, self.variables))
-        if found.type != "Real" or found.causality not in kinds:
-            expected = f"a real {' or '.join(kinds)}"
-            raise PlantError(f"FMU {self.name}: {what} {name!r}", expected, f"{found.type} {found.causality}")
+        fits, expected = found.type == "Real" and found.causality in kinds, f"a real {' or '.join(kinds)}"
+        PlantError.unless(fits, f"FMU {self.name}: {what} {name!r}", expected, f"{found.type} {found.causality}")
         return found
 
     def start(self, time: float, values: Mapping[str, float]) -> None:

@@ -344,6 +344,11 @@ class ControllerSettings:
         Narrows the comfort bands by what is uncertain; none by default.
     false_alarm, resolution : float
         Of the recognition of stuck sensors, see `StuckSensors` [-], [K].
+
+    Raises
+    ------
+    ControlError
+        When the price of discomfort is negative or no number: a controller would seek discomfort, or never find a plan.
     """
 
     comfort_price: float = DISCOMFORT_PRICE
@@ -357,3 +362,6 @@ class ControllerSettings:
     back_off: BackOff | Margin | None = None
     false_alarm: float = 1e-5
     resolution: float = 0.1
+
+    def __post_init__(self) -> None:
+        ControlError.unless(0 <= self.comfort_price < np.inf, "comfort price", "a number from 0 on", self.comfort_price)

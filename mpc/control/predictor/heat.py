@@ -108,9 +108,8 @@ class HeatPredictor(Predictor):
         if not places or len(set(places)) != len(places) or max(zone for _, zone in places) >= n_zone:
             expected = f"channels of zones 0 to {n_zone - 1}, each once"
             raise ControlError("heat predictor", expected, f"{places}")
-        if not (efficiency > 0.0 and performance > 0.0):
-            found = f"{efficiency!r} and {performance!r}"
-            raise ControlError("heat predictor", "a positive efficiency and performance", found)
+        fits, found = efficiency > 0.0 and performance > 0.0, f"{efficiency!r} and {performance!r}"
+        ControlError.unless(fits, "heat predictor", "a positive efficiency and performance", found)
         self.channels = cast("tuple[Channel, ...]", tuple(channels))  # of problems: range, rate, name and unit
         self.efficiency, self.performance = efficiency, performance
         self._prepare(modes, horizon, disturbance_time, scheme)

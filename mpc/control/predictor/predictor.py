@@ -11,7 +11,6 @@ from mpc.control.problem.horizon import Horizon, HorizonData
 from mpc.errors import ControlError
 from mpc.loop.actuators import COOLING_SETPOINT, HEATING_SETPOINT, SUPPLY_AIR, SUPPLY_WATER
 from thermal._types import FloatArray
-from thermal.errors import describe
 from thermal.model.modal import ModalModel
 from thermal.model.step import IMPLICIT_EULER, Scheme
 from thermal.system.smooth import SmoothHvac
@@ -135,14 +134,12 @@ class Predictor:
         scheme: Scheme = IMPLICIT_EULER,
     ) -> None:
         n_zone = modes.output.shape[0]
-        if hvac.n_zone != n_zone:
-            raise ControlError(describe("predictor", f"a plant of {n_zone} zones", f"one of {hvac.n_zone}"))
+        ControlError.unless(hvac.n_zone == n_zone, "predictor", f"a plant of {n_zone} zones", f"one of {hvac.n_zone}")
         self.hvac, self.channels = hvac, tuple(channels)
         self.at = [channel.places(hvac) for channel in self.channels]
         used = np.concatenate(self.at) if self.at else np.zeros(0, dtype=np.intp)
-        if not used.size or len(np.unique(used)) != used.size:
-            expected = "at least one channel, and one for each setpoint"
-            raise ControlError(describe("predictor", expected, f"{[c.name for c in self.channels]}"))
+        expected, found = "at least one channel, and one for each setpoint", f"{[c.name for c in self.channels]}"
+        ControlError.unless(used.size and len(np.unique(used)) == used.size, "predictor", expected, found)
         self._prepare(modes, horizon, disturbance_time, scheme)
         self._design, self._scheduled = self._design_inputs(), self._undecided_setpoints(used)
         self._stepper, self._device = hvac.stepper(), np.array(list(hvac.system.start().values()))
@@ -184,7 +181,7 @@ class Predictor:
         if (highest[heating] > lowest[cooling]).any():
             found = f"{highest[heating].max():g} and {lowest[cooling].min():g} K"
             expected = "ranges of heating setpoints below those of cooling setpoints"
-            raise ControlError(describe("predictor", expected, found))
+            raise ControlError("predictor", expected, found)
         return np.setdiff1d(np.concatenate([heating, cooling]), used)
 
     def _given(self, data: HorizonData) -> tuple[FloatArray, FloatArray]:

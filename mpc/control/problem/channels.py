@@ -86,9 +86,8 @@ class Channel:
             raise ControlError(f"channel {self.quantity}", f"a plant whose {kind} can be set", "none", advice)
         count, given = at.stop - at.start, self.zones if self.of_zones else self.air_handlers
         chosen = tuple(range(count)) if given is None or count == 1 else given
-        if not chosen or not set(chosen) <= set(range(count)):
-            expected = f"{'zones' if self.of_zones else 'air handlers'} from 0 to {count - 1}"
-            raise ControlError(f"channel {self.quantity}", expected, repr(given))
+        expected, found = f"{'zones' if self.of_zones else 'air handlers'} from 0 to {count - 1}", repr(given)
+        ControlError.unless(chosen and set(chosen) <= set(range(count)), f"channel {self.quantity}", expected, found)
         return np.arange(at.start, at.stop, dtype=np.intp)[list(chosen)]
 
 

@@ -6,8 +6,8 @@ import numpy as np
 import pandas as pd
 
 from thermal._types import FloatArray
+from thermal.model.case_replay import SPIN_UP, Inputs, spin_up
 from thermal.model.matrices import SymbolicModel
-from thermal.model.replay import SPIN_UP, Inputs, spin_up
 from thermal.model.step import IMPLICIT_EULER, Scheme, Stepper
 from thermal.network.network import ThermalNetwork
 

@@ -76,7 +76,7 @@ def test_values_of_a_file() -> None:
     [
         ((-1.0, 3600.0, 0.1), "deviation: expected watts of 0 or more"),
         ((np.nan, 3600.0, 0.1), "deviation: expected watts"),
-        ((1.0, 0.0, 0.1), "time_constant: expected positive seconds, got 0.0"),
+        ((1.0, 0.0, 0.1), "time_constant: expected positive seconds, found 0.0"),
         ((1.0, np.nan, 0.1), "time_constant"),
         ((1.0, 3600.0, 0.0), "sensor_deviation: expected positive kelvins"),
     ],
@@ -87,7 +87,7 @@ def test_values_out_of_range_are_refused(values: tuple[float, float, float], mes
 
 
 def test_zones_must_fit() -> None:
-    with pytest.raises(FilterError, match="one deviation or one for each of 5 zones, got 3"):
+    with pytest.raises(FilterError, match="one deviation or one for each of 5 zones, found 3"):
         disturbed(DisturbanceModel(np.ones(3), 3600.0, 0.1))
 
 

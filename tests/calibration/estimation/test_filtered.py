@@ -133,9 +133,9 @@ def test_grid_and_short_intervals_are_refused() -> None:
     model, inputs = setting()
     theta = model.network.start()
     grid = SymbolicModel(model.network)
-    with pytest.raises(FilterError, match="expected a reduced model, got the grid"):
+    with pytest.raises(FilterError, match="expected a reduced model, found the grid"):
         filter_interval(grid, theta, inputs, part(1000, 1100), DISTURBANCE)
-    with pytest.raises(FilterError, match="expected a reduced model, got the grid"):
+    with pytest.raises(FilterError, match="expected a reduced model, found the grid"):
         evaluate_filter(grid, theta, inputs, [part(1000, 1100)], DISTURBANCE)
     with pytest.raises(FilterError, match="room for a step after 12 h"):
         filter_interval(model, theta, inputs, part(0, 100), DISTURBANCE)

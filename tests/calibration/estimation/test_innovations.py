@@ -222,16 +222,16 @@ def test_progress_and_file() -> None:
 def test_bad_wishes_are_refused() -> None:
     inputs = telemetry(0)
     grid = SymbolicModel(model().network)
-    with pytest.raises(FilterError, match="expected a reduced model, got the grid"):
+    with pytest.raises(FilterError, match="expected a reduced model, found the grid"):
         tune_disturbance(grid, theta(), inputs, whole(inputs))
     with pytest.raises(FilterError, match="weights: expected 5 numbers of 0 or more"):
         tune_disturbance(model(), theta(), inputs, whole(inputs), TuningSettings(weights=np.ones(3)))
-    with pytest.raises(FilterError, match=r"got none for \['time_constant'\]"):
+    with pytest.raises(FilterError, match=r"found none for \['time_constant'\]"):
         some = {k: v for k, v in DISTURBANCE_PRIORS.items() if k != "time_constant"}
         tune_disturbance(model(), theta(), inputs, whole(inputs), TuningSettings(priors=some))
     with pytest.raises(FilterError, match="room for a step after 12 h of spin-up"):
         tune_disturbance(model(), theta(), inputs, [Interval(inputs.stamps[0], inputs.stamps[100])])
-    with pytest.raises(FilterError, match=r"some of deviation, sensor_deviation, got \['time_constant'\]"):
+    with pytest.raises(FilterError, match=r"some of deviation, sensor_deviation, found \['time_constant'\]"):
         tune_disturbance(model(), theta(), inputs, whole(inputs), TuningSettings(per_zone=["time_constant"]))
     with pytest.raises(FilterError, match="at least one interval"):
         tune_disturbance(model(), theta(), inputs, [])

@@ -362,7 +362,7 @@ def test_bad_wishes_are_refused(space_of: SpaceOf, simulated: Simulate) -> None:
     space = space_of()
     inputs = simulated(space, 20, 0).inputs
     kalman = KalmanFilter(space, DISTURBANCE)
-    with pytest.raises(FilterError, match="covariance: expected one of exact, steady, got 'fast'"):
+    with pytest.raises(FilterError, match="covariance: expected one of exact, steady, found 'fast'"):
         KalmanFilter(space, DISTURBANCE, covariance="fast")  # type: ignore[arg-type]
     with pytest.raises(FilterError, match="0 <= begin < stop < 21, got 20 and 21"):
         kalman.filter(inputs, 20, 21, START)

@@ -23,7 +23,7 @@ from calibration.evaluation.intervals import (
 )
 from calibration.fit.problem import tuning_runs
 from thermal import Case, Inputs, Telemetry, build_network, load_bundled_case, replay_inputs
-from thermal.model.replay import SPIN_UP
+from thermal.model.case_replay import SPIN_UP
 
 
 def inputs_of(days: float = 6.0, step: float = 300.0, start: str = "2023-03-01T00:05:00-05:00", **given: Any) -> Inputs:
@@ -65,6 +65,11 @@ def test_horizons_of_five_minute_telemetry(horizon: str, steps: int) -> None:
 def test_horizons_that_are_no_positive_multiple_of_the_step_are_refused(horizon: str) -> None:
     with pytest.raises(HorizonError, match="horizon"):
         horizon_steps(horizon, 300.0)
+
+
+def test_a_horizon_that_does_not_fit_is_told_in_steps() -> None:
+    with pytest.raises(HorizonError, match=r"step of 300 s, got 420 s, 1\.4 steps"):
+        horizon_steps("7min", 300.0)
 
 
 # Runs

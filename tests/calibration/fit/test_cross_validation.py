@@ -166,7 +166,7 @@ def test_settings_reach_the_calibration(monkeypatch: pytest.MonkeyPatch) -> None
 @pytest.mark.parametrize(
     ("folds", "settings", "message"),
     [
-        (1, {}, "folds: expected 2 to 10, the days of telemetry to use, got 1"),
+        (1, {}, "folds: expected 2 to 10, the days of telemetry to use, found 1"),
         (11, {}, "folds: expected 2 to 10"),
         (2, {"tune": []}, "chooses 'tune' itself"),
         (2, {"dy": 1.0}, "calibrate takes no 'dy'"),

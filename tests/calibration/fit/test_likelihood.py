@@ -241,5 +241,5 @@ def test_gaps_widen_an_estimate_and_do_not_move_it() -> None:
 def test_result_says_what_was_minimised() -> None:
     assert calibrated("innovations").to_dict()["objective"] == "innovations"
     assert calibrated("multi_step").to_dict()["objective"] == "multi_step"
-    with pytest.raises(CalibrationError, match="objective: expected one of multi_step, innovations, got 'kalman'"):
+    with pytest.raises(CalibrationError, match="objective: expected one of multi_step, innovations, found 'kalman'"):
         calibrate(twin()[0], settings=CalibrationSettings(objective="kalman"))  # type: ignore[arg-type]

@@ -246,7 +246,7 @@ def test_each_structure_is_calibrated_and_judged(monkeypatch: pytest.MonkeyPatch
 
 def test_what_cannot_be_compared_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     case = load_bundled_case()
-    with pytest.raises(CalibrationError, match="expected at least two to choose from, got \\['bare'\\]"):
+    with pytest.raises(CalibrationError, match="expected at least two to choose from, found \\['bare'\\]"):
         select_structure(case, {"bare": BARE})
     with pytest.raises(CalibrationError, match="calibrate takes no 'scope'; the nearest valid one is 'scopes'"):
         select_structure(case, {"bare": BARE, "zoned": {"scope": {}}})

@@ -215,7 +215,7 @@ def test_cases_that_cannot_go_together_are_refused(cases: Path, tmp_path: Path) 
         assert not (tmp_path / "out").exists()
 
     office = cases / "office 0"
-    with pytest.raises(CalibrationError, match="at least one case folder, got none"):
+    with pytest.raises(CalibrationError, match="at least one case folder, found none"):
         calibrate_many(case_folders(tmp_path), tmp_path / "out")
     refused("expected each name once", [office, office])
     refused("expected each name once", [office, tmp_path / "office 0"])
@@ -225,8 +225,8 @@ def test_cases_that_cannot_go_together_are_refused(cases: Path, tmp_path: Path) 
     refused("would land in the case", [office], office / "results")
     refused("found a file", [office], office / "building.yaml")
     refused("can be written to", [office], office / "building.yaml" / "out")
-    refused("retries: expected at least 0, got -1", [office], retries=-1)
-    refused("workers: expected at least 1, got 0", [office], workers=0)
+    refused("retries: expected at least 0, found -1", [office], retries=-1)
+    refused("workers: expected at least 1, found 0", [office], workers=0)
 
 
 def test_a_folder_of_something_else_is_refused(cases: Path, tmp_path: Path) -> None:

@@ -158,6 +158,12 @@ def test_solvers_that_fail_fall_back(controller, modes, points, make_forecast, m
     assert out_of_time.source is Source.RULES
 
 
+@pytest.mark.parametrize("price", [-3.0, np.nan, np.inf])
+def test_a_price_of_discomfort_that_is_none_is_refused(price: float) -> None:
+    with pytest.raises(ControlError, match="comfort price: expected a number from 0 on, found"):
+        ControllerSettings(comfort_price=price)
+
+
 def test_comfort_that_cannot_be_had_is_explained(controller, modes, points, make_forecast) -> None:
     twin = Twin(modes, len(points.zones))
     twin.zone = np.full(len(points.zones), 283.15)

@@ -22,7 +22,7 @@ from mpc.scenario.scenario import Scenario, build_scenario
 from mpc.scenario.tariff import paper_carbon, paper_tariff
 from thermal import Building
 from thermal.pilot.building import pilot_building
-from thermal.pilot.sizing import size_system
+from thermal.system.sizing import size_system
 from thermal.system.system import HvacSystem
 
 

@@ -21,7 +21,7 @@ from thermal.errors import EffectError
 from thermal.inputs.provider import telemetry_inputs
 from thermal.inputs.signals import signal_values
 from thermal.pilot.building import pilot_building
-from thermal.pilot.sizing import size_system
+from thermal.system.sizing import size_system
 from thermal.system.system import HvacSystem
 
 #: Effects that a plant cannot have, and what is said.

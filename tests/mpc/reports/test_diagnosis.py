@@ -107,6 +107,13 @@ def test_an_error_that_does_not_fall_is_said_to_be_no_help() -> None:
     assert "does not fall" in diagnosis_verdict(replace(named("named"), steps=(step,)))
 
 
+def test_an_error_with_windows_seen_open_is_no_forecast() -> None:
+    step = replace(diagnosed().steps[-1], effects=("window_opening",))
+    told = "which no forecast knows, falls from"
+    assert told in diagnosis_verdict(replace(named("named"), steps=(step,)))
+    assert told not in diagnosis_verdict(named("named"))
+
+
 def test_other_verdicts_name_nothing() -> None:
     assert "explains" in diagnosis_verdict(named("unexplained"))
     assert "explains too little" in diagnosis_verdict(named("no_gap"))

@@ -11,11 +11,11 @@ import pytest
 from mpc.loop.make import PlantSettings, pilot_weather, simulated_plant
 from mpc.loop.noise import SensorNoise
 from mpc.loop.simulated import SimulatedPlant
-from mpc.studies.model import control_model
+from mpc.model import control_model
 from thermal import Building
 from thermal.model.reduce import ReducedModel
 from thermal.pilot.building import pilot_building
-from thermal.pilot.sizing import size_system
+from thermal.system.sizing import size_system
 from thermal.system.system import HvacSystem
 
 

@@ -24,8 +24,8 @@ from mpc.reports.control import (
     write_control,
 )
 from mpc.scenario.weather_files import weather_of_case
-from mpc.studies.controller import make_controller
-from mpc.studies.controllers import KnownState, find_controller
+from mpc.studies.optimal_control import make_controller
+from mpc.studies.registry import REGISTERED, KnownState, find_controller, register_controller
 from mpc.studies.run import Comparison, compare_controllers, prediction_errors, run_controller
 from mpc.studies.study import Study, StudySettings, make_study
 from thermal import Building, load_bundled_case
@@ -73,8 +73,11 @@ def test_the_last_day_of_the_weather_comes_again_for_the_forecast_but_not_for_th
 def test_names_are_checked(make: Callable[..., Study]) -> None:
     with pytest.raises(ControlError, match="guideline36"):
         find_controller("guideline")
-    with pytest.raises(PlantError, match="one of reduced, grid, random"):
+    with pytest.raises(PlantError, match="one of reduced, grid, random, found 'full'$"):
         StudySettings(kind="full")  # type: ignore[arg-type]
+    with pytest.raises(ControlError) as unknown:
+        find_controller("xyz")
+    assert str(unknown.value).count("guideline36") == 1
     with pytest.raises(ControlError, match="some, each once"):
         compare_controllers(make(), ["reset", "reset"])
     with pytest.raises(PlantError, match="a multiple of 300 s"):
@@ -138,6 +141,22 @@ def test_the_log_has_each_reason_once(both: Comparison) -> None:
     rows = reason_rows(replace(mpc, decisions=told))
     assert [(row.times, row.reason) for row in rows] == [(2, said[0])]
     assert rows[0].first == told[0].stamp and rows[0].last == told[1].stamp
+
+
+@pytest.mark.parametrize("made", [None, 3])
+def test_a_function_that_makes_no_controller_is_refused(make: Callable[..., Study], made: object) -> None:
+    register_controller("none_at_all")(lambda study, plant: made)  # type: ignore[arg-type, return-value]
+    try:
+        with pytest.raises(ControlError, match=f"'none_at_all': expected an object with step.*found {made}; return"):
+            run_controller(make(), "none_at_all")
+    finally:
+        del REGISTERED["none_at_all"]
+
+
+def test_verdicts_say_how_long_and_what_is_lowest(make: Callable[..., Study]) -> None:
+    verdict = comparison_verdict(compare_controllers(make(), ["reset"]))
+    assert verdict.startswith("Outdoor reset has the lowest cost with discomfort: Outdoor reset spent ")
+    assert " on energy in 2 hours (" in verdict
 
 
 def test_rules_run_by_name(make: Callable[..., Study]) -> None:

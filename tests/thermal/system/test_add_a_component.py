@@ -18,7 +18,7 @@ from thermal.components.component import Component
 from thermal.components.registry import COMPONENTS, register_component
 from thermal.errors import ModelError
 from thermal.pilot.building import pilot_building
-from thermal.pilot.sizing import size_system
+from thermal.system.sizing import size_system
 
 PAGE = Path(__file__).parents[3] / "docs" / "add_a_component.md"
 

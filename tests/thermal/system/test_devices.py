@@ -13,9 +13,9 @@ from thermal.components.component import Conditions
 from thermal.components.radiators import Radiators
 from thermal.errors import ModelError
 from thermal.pilot.building import pilot_building
-from thermal.pilot.sizing import size_system
 from thermal.system.devices import device_graph
 from thermal.system.plant import HvacPlant
+from thermal.system.sizing import size_system
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ def test_without_fed_by_each_floor_has_its_air_handler(office: Building) -> None
     graph = device_graph(office)
     assert graph.air_handlers == ("AHU_F1", "AHU_F2")
     assert [graph.air_handlers[k][-2:] for k in graph.serving] == [name[:2] for name in office.zone_names]
-    assert graph.emitters == {} and graph.unknown == ()
+    assert graph.emitters == {} and graph.unused == {}
 
 
 def test_fed_by_decides(office: Building) -> None:
@@ -57,7 +57,7 @@ def test_radiators_of_a_case_are_sized_and_connected_and_unknown_types_are_named
     zone = office.zone_names[3]
     more = [Device(name=name, type="radiator", zone=zone) for name in ("RAD_A", "RAD_B")]
     building = replace(office, devices=(*office.devices, *more, Device(name="ODD", type="ice_storage")))
-    assert device_graph(building).unknown == ("ODD (ice_storage)",)
+    assert device_graph(building).unused == {"ODD": "no component has the type 'ice_storage'"}
     plain, system = size_system(office), size_system(building)
     radiators = system.components["RADIATOR"]
     assert isinstance(radiators, Radiators) and radiators.zone.tolist() == [3, 3]

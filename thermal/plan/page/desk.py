@@ -94,9 +94,8 @@ class LabelDesk:
         with self._lock:
             self.sessions.check(window)
             revision = self.store.draft.revision
-            if draft.revision != revision:
-                found = f"a change of revision {draft.revision}"
-                raise SessionHeldError("draft", f"one of revision {revision}", found, "load the page anew")
+            found, expected = f"a change of revision {draft.revision}", f"one of revision {revision}"
+            SessionHeldError.unless(draft.revision == revision, "draft", expected, found, "load the page anew")
             if window != self._saver:
                 self._saver, self._since = window, revision
             saved = draft.model_copy(update={"revision": revision + 1})

@@ -79,9 +79,8 @@ def checked_name(name: str, kinds: tuple[str, ...]) -> str:
     if any(sign in name for sign in "/\\\0") or name.startswith(".") or not name.isprintable() or len(name) > 150:
         raise PlanError("upload", "the plain name of a file", repr(name[:200]), "rename the file")
     suffix = Path(name).suffix.lower()
-    if suffix not in kinds:
-        advice = "unpack it first" if suffix == ".zip" else "export it as one of these"
-        raise PlanError(name, f"a file that ends in {', '.join(kinds)}", repr(suffix or name), advice)
+    advice = "unpack it first" if suffix == ".zip" else "export it as one of these"
+    PlanError.unless(suffix in kinds, name, f"a file that ends in {', '.join(kinds)}", repr(suffix or name), advice)
     return name
 
 
@@ -129,9 +128,8 @@ class Upload:
             It is more than `MOST_BYTES` by now.
         """
         self._size += len(chunk)
-        if self._size > MOST_BYTES:
-            expected = f"at most {MOST_BYTES / 1e6:.0f} MB"
-            raise OversizedFileError(self.path.name, expected, "more", "export it anew, or crop it")
+        expected, where = f"at most {MOST_BYTES / 1e6:.0f} MB", self.path.name
+        OversizedFileError.unless(self._size <= MOST_BYTES, where, expected, "more", "export it anew, or crop it")
         self._stream.write(chunk)
 
     def close(self) -> Path:

@@ -35,7 +35,7 @@ class DraftFinding:
     name : str
         Which; a key of the site.
     message : str
-        What was expected, what came, what to do.
+        What was expected, what was got, what to do.
     floor : str
         Where a zone stands.
     """

@@ -276,8 +276,7 @@ class Reports:
             It is not one of `kinds`.
         """
         out = self._case / OWN_FOLDER / "reports" / self.checked_kind(kind)
-        if out.is_symlink():
-            raise ReportError(str(out), "a folder of the page's own", "a link", "remove it")
+        ReportError.unless(not out.is_symlink(), str(out), "a folder of the page's own", "a link", "remove it")
         self._makers[kind](self._case, out, progress)
         return self._report(out / _PAGE).to_dict()
 

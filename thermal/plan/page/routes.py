@@ -69,8 +69,7 @@ def _add_page(app: FastAPI) -> None:
 
     @app.get("/static/{name}")
     def file(name: str) -> Response:
-        if name not in known:
-            raise ReportError("address", "a file of the page", repr(name[:80]))
+        ReportError.unless(name in known, "address", "a file of the page", repr(name[:80]))
         kind = _TYPES.get(name[name.rfind(".") :], "application/octet-stream")
         return Response(known[name].read_bytes(), media_type=kind)
 
@@ -137,8 +136,7 @@ def _add_drawings(app: FastAPI, desk: LabelDesk) -> None:
     @app.get("/api/drawings/{name}")
     def show_drawing(name: str, page: int = 1, dots_per_inch: float = DOTS_PER_INCH) -> Response:
         file = inside_folder(own / "drawings", name, "drawing")
-        if file.suffix.lower() not in RASTER_KINDS:
-            raise PlanError(file.name, "a raster drawing", repr(file.suffix))
+        PlanError.unless(file.suffix.lower() in RASTER_KINDS, file.name, "a raster drawing", repr(file.suffix))
         sheet = look_at(file, page, dots_per_inch)
         picture = png_of(read_drawing(file, page=page, dots_per_inch=dots_per_inch).grey, WIDEST_PICTURE)
         size = {"x-width": f"{sheet.width:.0f}", "x-height": f"{sheet.height:.0f}"}
@@ -147,8 +145,7 @@ def _add_drawings(app: FastAPI, desk: LabelDesk) -> None:
     @app.get("/api/pictures/{name}")
     def show_picture(name: str) -> Response:
         file = inside_folder(own / "pictures", name, "picture")
-        if not file.is_file() or file.suffix != ".png":
-            raise PlanError(name[:80], "a picture of the page", "none")
+        PlanError.unless(file.is_file() and file.suffix == ".png", name[:80], "a picture of the page", "none")
         return FileResponse(file, media_type="image/png")
 
     @app.post("/api/floors")
@@ -211,13 +208,11 @@ def _add_reports(app: FastAPI, desk: LabelDesk) -> None:
 async def _body(request: Request, most: int) -> bytes:
     """Read a body of JSON, up to a size."""
     kind = request.headers.get("content-type", "").partition(";")[0].strip()
-    if kind != "application/json":
-        raise LabelError("content-type", "application/json", repr(kind[:60]))
+    LabelError.unless(kind == "application/json", "content-type", "application/json", repr(kind[:60]))
     parts, size = [], 0
     async for chunk in request.stream():
         size += len(chunk)
-        if size > most:
-            raise OversizedFileError("body", f"at most {most / 1e6:g} MB", "more")
+        OversizedFileError.unless(size <= most, "body", f"at most {most / 1e6:g} MB", "more")
         parts.append(chunk)
     return b"".join(parts)
 
@@ -231,8 +226,7 @@ def _floor_request(content: Any) -> tuple[list[FloorEntry], float | None]:
         raise LabelError(*first_fault(error, "floors")) from error
     except (TypeError, KeyError, AttributeError) as error:
         raise LabelError("body", "{'floors': [...]}", repr(content)[:80]) from error
-    if not entries:
-        raise LabelError("floors", "at least one drawing", "none")
+    LabelError.unless(entries, "floors", "at least one drawing", "none")
     return entries, size
 
 
