@@ -392,7 +392,17 @@ class Terminals(Group):
         return ops.capped(to_limit, call * conductance, 2.5)
 
     def read(self, ops: Operations, given: Given, done: TerminalStep) -> list[Value]:
-        """Values of its points, one a terminal each."""
+        """Values of its points, one a terminal each.
+
+        Parameters
+        ----------
+        ops : Operations
+            Arithmetic.
+        given : Given
+            As `run` had it.
+        done : TerminalStep
+            What `run` returned.
+        """
         seen = given.conditions[:3]
         damper = np.minimum(done.airflow / done.most_airflow, 1.0) * (done.most_airflow > LEAST_AIR)
         valve = valve_position(ops, done.valve_flow, self.rangeability)

@@ -16,6 +16,7 @@ from thermal._types import FloatArray
 from thermal.components.component import Conditions
 from thermal.components.moist_air import USUAL_HUMIDITY
 from thermal.components.operations import CasadiOperations, Value
+from thermal.errors import ModelError
 from thermal.system.step import HvacStep
 from thermal.system.symbolic import step_of
 from thermal.system.system import HvacSystem
@@ -176,7 +177,9 @@ class SmoothHvac:
         usual |= {point: np.array([[known.get(key, 1.0) for key in keys]]) for point, keys in points.items()}
         rows = np.empty((len(values["seconds"]), self.n_exogenous))
         for name, at in self.exogenous.items():
-            given = np.asarray(values.get(name, usual.get(name)), dtype=float)
+            found = values.get(name, usual.get(name))
+            ModelError.unless(found is not None, "exogenous inputs", f"values of {name!r}", "none")
+            given = np.asarray(found, dtype=float)
             rows[:, at] = given[:, None] if given.ndim == 1 else given
         return rows
 
