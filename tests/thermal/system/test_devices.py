@@ -7,10 +7,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
+from mpc.loop.make import equip
 from thermal import Building
 from thermal.case.building import Device
-from thermal.components.component import Conditions
+from thermal.case.validation import unknown_device_types
+from thermal.components.component import Component, Conditions
 from thermal.components.radiators import Radiators
+from thermal.components.registry import COMPONENTS, register_component
 from thermal.errors import ModelError
 from thermal.pilot.building import pilot_building
 from thermal.system.devices import device_graph
@@ -73,3 +76,22 @@ def test_radiators_of_a_case_are_sized_and_connected_and_unknown_types_are_named
         heats.append(plant.heat(step))
     gained = heats[1] - heats[0]
     assert gained[3] > 100.0 and np.abs(np.delete(gained, 3)).max() < 1e-6
+
+
+def test_a_registered_device_that_no_rule_connects_is_known_and_said_to_be_left_out(office: Building) -> None:
+    class ExhaustFan(Component):
+        label, device = "exhaust fan", "exhaust_fan"
+
+    odd = Device(name="FAN", type="exhaust_fan")
+    building = replace(office, devices=(*office.devices, odd))
+    assert unknown_device_types(building) == {"FAN": "exhaust_fan"}
+    register_component(ExhaustFan)
+    try:
+        assert unknown_device_types(building) == {}
+        assert device_graph(building).unused == {"FAN": "a exhaust_fan, no rule connects it: pass the system"}
+        _, notes = equip(building)
+        assert [n for n in notes if "FAN (a exhaust_fan, no rule connects it" in n]
+        with pytest.raises(ModelError, match="component ExhaustFan: expected a class with a classmethod `sized`"):
+            ExhaustFan.sized(1.0)
+    finally:
+        del COMPONENTS["exhaust_fan"]
