@@ -100,7 +100,8 @@ class DoMpcSolver:
         }  # fmt: skip
         known = {name: model.set_variable("_tvp", name, (size, 1)) for name, size in sizes.items()}
         plant = hvac_function(system, self.hvac.width)(
-            supply_water_temperature=REFERENCE_TEMPERATURE + water, zone_temperature=REFERENCE_TEMPERATURE + seen,
+            BOILER_supply_water_temperature=REFERENCE_TEMPERATURE + water,
+            zone_temperature=REFERENCE_TEMPERATURE + seen,
             zone_air_heating_temperature_setpoint=known["heating"],
             zone_air_cooling_temperature_setpoint=known["cooling"], outdoor_temperature=known["outdoor"],
             outdoor_humidity=known["humidity"], return_humidity=np.full(n_air, HUMIDITY), room_temperature=ROOM,
@@ -114,7 +115,7 @@ class DoMpcSolver:
         left = self._part.end * self._unit * x + drive
         own = np.diag(self._response)
         model.set_rhs("modes", (left + self._part.end_gain * (self.modes.heating @ (KILOWATT * heat))) / self._unit)
-        model.set_rhs("water", plant["supply_water_temperature_end"] - REFERENCE_TEMPERATURE)
+        model.set_rhs("water", plant["BOILER_supply_water_temperature_end"] - REFERENCE_TEMPERATURE)
         model.set_alg("plant", heat - plant["heat"] / KILOWATT)
         model.set_alg("thermostats", seen - self._output @ left - own * KILOWATT * heat)
         # the zones at the end of the step, by the two equations above

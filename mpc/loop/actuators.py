@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from mpc.errors import PlantActionError
 from thermal.components.registry import setpoints
 from thermal.errors import describe
+from thermal.system.system import HvacSystem
 
 SUPPLY_AIR = "supply_air_temperature_setpoint"
 SUPPLY_WATER = "supply_water_temperature_setpoint"
@@ -15,9 +16,8 @@ DIFFERENTIAL_PRESSURE = "differential_pressure_setpoint"
 HEATING_SETPOINT = "zone_air_heating_temperature_setpoint"
 COOLING_SETPOINT = "zone_air_cooling_temperature_setpoint"
 
-#: Lowest and highest value of each kind of action [K] or [Pa], as the components declare them.
+#: Lowest and highest value of each kind of action [K] or [Pa] where no component declares them, as in foreign plants.
 ACTION_LIMITS: Mapping[str, tuple[float, float]] = {name: a.usual for name, a in setpoints().items() if a.usual}
-_UNITS = {name: a.unit for name, a in setpoints().items()}
 
 
 @dataclass(frozen=True)
@@ -49,44 +49,36 @@ class Actuator:
 
 
 def actuators_of(
-    air_handlers: Sequence[str], boiler: str, zones: Sequence[str], limits: Mapping[str, tuple[float, float]] | None
+    system: HvacSystem, zones: Sequence[str], limits: Mapping[str, tuple[float, float]] | None = None
 ) -> tuple[Actuator, ...]:
-    """List the actuators of a building: supply setpoints first, which are required.
+    """List the setpoints of a plant, first those that every action must have.
 
     Parameters
     ----------
-    air_handlers : sequence of str
-        Names of the devices.
-    boiler : str
-        Name of the boiler.
+    system : HvacSystem
+        Its components, with the names of the devices; each declares its setpoints with their ranges.
     zones : sequence of str
         Names of the zones.
     limits : mapping of str to tuple of float, optional
-        In the place of those of `ACTION_LIMITS` [K] or [Pa].
+        In the place of the declared ranges, by kind of action [K] or [Pa].
 
     Raises
     ------
     PlantActionError
         When a limit is for no kind of action, or the lower is not below the upper.
     """
+    declared = [(system.actuators[key][1], key) for keys in system.by_point.values() for key in keys]
+    declared += [(a, f"{zone}/{a.point}") for a in system.thermostat.actuators for zone in zones]
+    known = [(a, key, a.usual) for a, key in declared if a.usual is not None]
     for kind, pair in (limits or {}).items():
-        PlantActionError.unless_known(kind, ACTION_LIMITS, "limits", "a kind of action")
+        PlantActionError.unless_known(kind, {a.point for a, _, _ in known}, "limits", "a kind of action")
         finite = -math.inf < pair[0] < pair[1] < math.inf
         PlantActionError.unless(finite, f"limits: {kind}", "a lower and a higher number", repr(pair))
-    bounds = {**ACTION_LIMITS, **(limits or {})}
-    kinds = (
-        (SUPPLY_AIR, air_handlers, True),
-        (SUPPLY_WATER, [boiler], True),
-        (STATIC_PRESSURE, air_handlers, False),
-        (DIFFERENTIAL_PRESSURE, [boiler], False),
-        (HEATING_SETPOINT, zones, False),
-        (COOLING_SETPOINT, zones, False),
-    )
-    return tuple(
-        Actuator(f"{entity}/{kind}", _UNITS[kind], *bounds[kind], required)
-        for kind, entities, required in kinds
-        for entity in entities
-    )
+    found = [
+        Actuator(key, a.unit, *(limits or {}).get(a.point, usual), required=a.default is None)
+        for a, key, usual in known
+    ]
+    return tuple(sorted(found, key=lambda actuator: not actuator.required))
 
 
 def checked_actions(actions: Mapping[str, float], actuators: Mapping[str, Actuator]) -> dict[str, float]:

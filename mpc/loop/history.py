@@ -5,7 +5,8 @@ from typing import NamedTuple
 
 from mpc.loop.building import BuildingFlows
 from thermal._types import FloatArray
-from thermal.components.component import Conditions, EnergyBalance
+from thermal.components.component import Conditions
+from thermal.components.energy_balance import EnergyBalance
 from thermal.system.step import HvacStep
 
 

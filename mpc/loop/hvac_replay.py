@@ -7,9 +7,11 @@ import numpy as np
 import pandas as pd
 
 from mpc.errors import MpcError
+from mpc.loop.actuators import DIFFERENTIAL_PRESSURE
 from mpc.loop.sensors import PlantDevices
 from thermal._types import FloatArray
 from thermal.case.points import ZONE_TEMPERATURE
+from thermal.components.boiler_loop import BoilerLoop
 from thermal.components.component import Conditions
 from thermal.components.moist_air import WATER_HEAT_CAPACITY
 from thermal.components.streams import AirCommand
@@ -93,11 +95,13 @@ class Measured:
         boiler = [devices.boiler]
         self.water = self._of(boiler, "supply_water_temperature_sensor")[:, 0]
         self.water_setpoint = self._of(boiler, "supply_water_temperature_setpoint")[:, 0]
-        self.gas = self._of(boiler, "gas_power_sensor")[:, 0]
+        if system.of_kind(BoilerLoop):
+            self.gas = self._of(boiler, "gas_power_sensor")[:, 0]
         self.entering = self.supply[:, system.terminals.air_handler]
         self.static = self._pressure(handlers, "supply_air_static_pressure_sensor", system.static_pressures)
-        usual = (system.loop.pump.differential_pressure,)
-        self.differential = self._pressure((devices.boiler,), "differential_pressure_sensor", usual)[:, 0]
+        usual = system.defaults.get(next(iter(system.by_point.get(DIFFERENTIAL_PRESSURE, ())), ""), 1.0)
+        self.differential = self._pressure((devices.boiler,), "differential_pressure_sensor", (usual,))[:, 0]
+        self.differential_share = self.differential / usual
         # what is missing keeps its last value where a replay runs on, and is not compared
         self.running = self.flow > _LEAST_SHARE * system.terminals.design_flow
         of_handler = system.terminals.members
@@ -132,7 +136,7 @@ class Measured:
 def replay_plant(
     seen: Measured, system: HvacSystem, devices: PlantDevices, ventilation: FloatArray | float, room: float
 ) -> list[Replayed]:
-    """Replay terminals, air handlers and hot water.
+    """Replay terminals, air handlers and, of a boiler, hot water.
 
     Parameters
     ----------
@@ -147,10 +151,10 @@ def replay_plant(
     room : float
         Temperature of the plant room [K].
     """
-    pump, statics = system.loop.pump, seen.static / np.array(system.static_pressures)
+    statics = seen.static / np.array(system.static_pressures)
     terminals = replay_terminals(
         system.terminals, seen.damper, seen.valve, seen.entering, seen.water,
-        statics[:, system.terminals.air_handler], seen.differential / pump.differential_pressure,
+        statics[:, system.terminals.air_handler], seen.differential_share,
     )  # fmt: skip
     found = _terminals(seen, terminals, devices)
     heating, drawn = np.zeros(len(seen.water)), terminals.water_flow.sum(axis=1)
@@ -165,6 +169,8 @@ def replay_plant(
         power = Gap("air handler", devices.chiller, "refrigeration power", "W")
         found.append(Replayed(power, error, error, measured))
     reheat = AIR_HEAT_CAPACITY * seen.flow * np.maximum(seen.discharge - seen.entering, 0.0)
+    if not system.of_kind(BoilerLoop):  # other suppliers have no replay by themselves
+        return found
     return found + _hot_water(seen, system, devices.boiler, reheat.sum(axis=1) + heating, drawn, room)
 
 

@@ -18,7 +18,6 @@ from thermal.components.terminals import Terminals
 from thermal.system.plant import HvacPlant, HvacState
 from thermal.system.system import HvacSystem
 
-_WATER = 320.0  # K, of the loop at a start
 _ZONES = 293.15  # K, of the zones at a start
 
 
@@ -86,7 +85,7 @@ class PlantLoop:
         self._offset = sensor_offset(model)
         self._biased = bool(self._offset.any())
         self._reading = np.zeros(len(scenario.zones))
-        self._state, self._cycling = self.hvac.start(_WATER), self._off
+        self._state, self._cycling = self.hvac.start(), self._off
 
     @property
     def air(self) -> FloatArray:
@@ -104,7 +103,7 @@ class PlantLoop:
         zones = np.clip(_ZONES, self._operation.heating[0], self._operation.cooling[0])
         self._reading = self._model.reset(zones, self._boundary[0], signals)
         self._model.reseed(0)
-        self._state, self._cycling = self.hvac.start(_WATER), self._off
+        self._state, self._cycling = self.hvac.start(), self._off
         self._local.missed = np.zeros_like(self._reading)
 
     def save(self) -> LoopState:

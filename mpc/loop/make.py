@@ -37,6 +37,7 @@ from thermal.network.build import Extension, build_network
 from thermal.network.structure import BASELINE
 from thermal.pilot.building import pilot_building
 from thermal.pilot.weather import MOUNTAIN_VIEW, generate_weather
+from thermal.system.devices import device_graph
 from thermal.system.sizing import size_system
 from thermal.system.system import HvacSystem
 
@@ -237,7 +238,7 @@ def simulated_plant(
 
 
 def equip(building: Building) -> tuple[Building, tuple[str, ...]]:
-    """Give a building the devices of an HVAC system that it lacks: a terminal a zone, an air handler, a boiler.
+    """Give a building the devices of an HVAC system that it lacks: a terminal a zone, an air handler, hot water.
 
     Parameters
     ----------
@@ -258,7 +259,8 @@ def equip(building: Building) -> tuple[Building, tuple[str, ...]]:
     terminals = {z: [d for d in building.devices_of(z) if d.type == "vav"] for z in building.zone_names}
     spare = {d.name for found in terminals.values() for d in found[1:]}  # a plant is sized with one a zone
     bare = [zone for zone, found in terminals.items() if not found]
-    names = {"ahu": "air handler", "boiler": "boiler"}
+    graph = device_graph(building)
+    names = {"ahu": "air handler", graph.water: graph.water.replace("_", " ")}
     lacking = [kind for kind in names if not any(d.type == kind for d in building.devices)]
     taken = {d.name for d in building.devices} | set(building.zone_names)
     wanted = [(f"VAV_{zone}", "vav", zone) for zone in bare] + [(kind.upper(), kind, None) for kind in lacking]
@@ -276,6 +278,9 @@ def equip(building: Building) -> tuple[Building, tuple[str, ...]]:
     if lacking:
         one = " and ".join(f"no {names[kind]}" for kind in lacking)
         said.append(f"the case names {one}: one{' of each' if len(lacking) > 1 else ''} is assumed")
+    if graph.unused:
+        why = "; ".join(f"{name} ({reason})" for name, reason in sorted(graph.unused.items()))
+        said.append(f"devices that the plant leaves out: {why}")
     return replace(building, devices=tuple(devices)), tuple(said)
 
 

@@ -6,11 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from mpc.loop.actuators import COOLING_SETPOINT, HEATING_SETPOINT, STATIC_PRESSURE, SUPPLY_AIR
+from mpc.loop.actuators import COOLING_SETPOINT, HEATING_SETPOINT, STATIC_PRESSURE, SUPPLY_AIR, actuators_of
 from mpc.loop.operation import Operation, shared_rows
 from thermal._types import FloatArray
 from thermal.components.air_handler import AirHandler
-from thermal.components.boiler_loop import BoilerLoop
 from thermal.system.system import HvacSystem
 
 
@@ -43,9 +42,10 @@ class Schedule:
         count, terminals = len(system.air_handlers), system.terminals
         self._served = [terminals.zone[terminals.air_handler == k] for k in range(count)]
         kinds, self._optional = (HEATING_SETPOINT, COOLING_SETPOINT), system.defaults
+        self._water = system.water_switches
+        self._required = sum(a.required for a in actuators_of(system, ()))
         handlers = system.of_kind(AirHandler)
         self._switches = [f"{name}/fan_running" for name in handlers], [f"{name}/ventilation" for name in handlers]
-        self._boilers = [f"{name}/boiler_running" for name in system.of_kind(BoilerLoop)]
         self._supply = [(f"{name}/{SUPPLY_AIR}", f"{name}/{STATIC_PRESSURE}") for name in handlers]
         self._known: tuple[Any, ...] = (None, None, None)
         self._made: tuple[dict[str, float], tuple[float, ...], tuple[float, ...]] = ({}, (), ())
@@ -67,7 +67,7 @@ class Schedule:
             Heating and cooling setpoints [K]; where an action crosses them, the heating one gives way.
         """
         both = self._heating[k], self._cooling[k]
-        if len(given) == len(self._served) + 1:  # the required ones alone
+        if len(given) == self._required:
             return both
         asked = [(place, value) for name, value in given.items() if (place := self._given.get(name)) is not None]
         if asked:
@@ -131,7 +131,7 @@ class Schedule:
             chosen = {name: value for name, value in given.items() if name not in self._given}
             fans, outdoor = self._switches
             chosen |= dict(zip(fans, runs, strict=True)) | dict.fromkeys(outdoor, ventilation)
-            chosen |= dict.fromkeys(self._boilers, max(runs))
+            chosen |= dict.fromkeys(self._water, max(runs))
             reach = [
                 run * math.sqrt(chosen.get(pressure, self._optional[pressure]) / self._optional[pressure])
                 for run, (_, pressure) in zip(runs, self._supply, strict=True)

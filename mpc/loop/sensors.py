@@ -30,9 +30,15 @@ class PlantDevices:
     ----------
     by_type : mapping of str to tuple of str
         Names by type, in the order of the plant.
+    boiler : str
+        Name of what supplies the hot water, a boiler or another; empty where nothing does.
+    meter : str
+        Type of the point that reads its electric power.
     """
 
     by_type: Mapping[str, tuple[str, ...]]
+    boiler: str = ""
+    meter: str = "pump_power_sensor"
 
     @property
     def terminals(self) -> tuple[str, ...]:
@@ -43,11 +49,6 @@ class PlantDevices:
     def air_handlers(self) -> tuple[str, ...]:
         """Names of the air handlers."""
         return self.by_type["ahu"]
-
-    @property
-    def boiler(self) -> str:
-        """Name of the boiler; empty where there is none."""
-        return next(iter(self.by_type["boiler"]), "")
 
     @property
     def chiller(self) -> str | None:
@@ -99,7 +100,10 @@ def plant_devices(building: Building, system: HvacSystem) -> PlantDevices:
     found["chiller"] = tuple(d.name for d in building.devices if d.type == "chiller")
     if len(found["chiller"]) > 1:
         raise PlantError("devices of type 'chiller'", "one or none", f"{len(found['chiller'])}")
-    return PlantDevices(found)
+    water = [system.components[name] for name in system.water_suppliers]
+    names = [name for kind in dict.fromkeys(c.device for c in water) for name in found[kind]]
+    electric = [p for c in water for p in c.sensors if p in ("electrical_power_sensor", PlantDevices.meter)]
+    return PlantDevices(found, next(iter(names), ""), next(iter(electric), PlantDevices.meter))
 
 
 def _of_zones(building: Building, kind: str, zones: Sequence[str]) -> tuple[str, ...]:

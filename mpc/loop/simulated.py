@@ -67,9 +67,10 @@ class SimulatedPlant:
     forecaster : Forecaster, optional
         Forecasts of the scenario; none by default.
     limits : mapping of str to tuple of float, optional
-        Ranges of actions in the place of `ACTION_LIMITS` [K] or [Pa].
+        Ranges by kind of action in the place of those that the components declare [K] or [Pa].
     default_actions : mapping of str to float, optional
-        Setpoints by kind of action during the warm-up [K] or [Pa]; 287.15 K of air and 333.15 K of water by default.
+        Setpoints by kind of action during the warm-up [K] or [Pa]; 287.15 K of air and 333.15 K of water, or what
+        is nearest in the range, by default.
     warm_up_days : int
         How often the scenario's first day is run before it begins [d], with expected people, so that walls forget
         how they started.
@@ -112,15 +113,14 @@ class SimulatedPlant:
         self.scenario, self.model, self.forecaster = scenario, model, forecaster
         self.control_steps, self._seed = control_steps, seed
         self._warm_up_steps = warm_up_days * round(_DAY / scenario.grid.step)
-        self.actuators: tuple[Actuator, ...] = actuators_of(
-            self.devices.air_handlers, self.devices.boiler, scenario.zones, limits
-        )
+        self.actuators: tuple[Actuator, ...] = actuators_of(system, scenario.zones, limits)
         self._by_name = {a.name: a for a in self.actuators}
-        kinds = {SUPPLY_AIR: 287.15, SUPPLY_WATER: 333.15} | dict(default_actions or {})
+        usual, given = {SUPPLY_AIR: 287.15, SUPPLY_WATER: 333.15}, default_actions or {}
+        kinds = {a: a.name.rpartition("/")[2] for a in self.actuators}
+        chosen = {a.name: float(np.clip(usual[k], a.lowest, a.highest)) for a, k in kinds.items() if k in usual}
+        chosen |= {a.name: given[kind] for a, kind in kinds.items() if kind in given}
         #: Setpoints during the warm-up, of all required actuators and what was given beside [K] or [Pa].
-        self.default_actions = checked_actions(
-            {a.name: kinds[kind] for a in self.actuators if (kind := a.name.rpartition("/")[2]) in kinds}, self._by_name
-        )
+        self.default_actions = checked_actions(chosen, self._by_name)
         self.operation = operation or scheduled_operation(scenario, len(system.air_handlers))
         self.operation.fits(scenario.grid.n_steps, len(scenario.zones), len(system.air_handlers))
         boundary = boundary_series(scenario, model, boundaries or {})

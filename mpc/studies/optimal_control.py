@@ -87,7 +87,7 @@ def site_points(building: Building, devices: PlantDevices) -> SitePoints:
     meters = [f"{name}/electrical_power_sensor" for name in (*devices.air_handlers, *chiller)]
     return SitePoints(
         building.zone_names, devices.terminals, devices.air_handlers, devices.boiler, building.weather_station,
-        (*meters, f"{devices.boiler}/pump_power_sensor"),
+        (*meters, f"{devices.boiler}/{devices.meter}"),
     )  # fmt: skip
 
 
@@ -100,7 +100,7 @@ class Site:
     building : Building
         Zones, floor areas and weather station.
     system : HvacSystem
-        Air handlers, terminals and boiler as the controller believes them to be.
+        Air handlers, terminals and hot water as the controller believes them to be.
     devices : PlantDevices
         Their names.
     """

@@ -21,7 +21,20 @@ PARAMETERS = re.compile(r"^Parameters\n-+\n(.*?)(?=^\S[^\n]*\n-{3,}$|\Z)", re.MU
 ANY_KEYWORD: dict[str, str] = {
     "thermal.system.system.HvacSystem.actions": "points of its components; an unknown one is refused with the nearest",
     "thermal.system.system.HvacSystem.having": "names of its components; connections refuse others",
-    "thermal.system.system.HvacSystem.with_group": "ports of the group; connections refuse others",
+    "thermal.system.system.HvacSystem.with_component": "ports of the component; connections refuse others",
+    "thermal.system.system.HvacSystem.start": "states of its components; an unknown one is refused with the nearest",
+    "thermal.system.plant.HvacPlant.start": "states of its components; an unknown one is refused with the nearest",
+    **{
+        f"thermal.components.{name}.sized": "refuses all: the class has no `sized` of its own"
+        for name in (
+            "air_handler.AirHandler",
+            "cooling_coil.CoolingCoil",
+            "fan.Fan",
+            "heater.Heater",
+            "pump.Pump",
+            "thermostat.Thermostat",
+        )
+    },
 }
 
 

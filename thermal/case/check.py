@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from thermal.case.building import DEVICE_TYPES, Building, FloorPlans, Location
+from thermal.case.building import Building, FloorPlans, Location
 from thermal.case.case import Case
 from thermal.case.load import load_case
 from thermal.case.plan import zone_sizes
@@ -16,6 +16,7 @@ from thermal.case.plausibility.examine import examine
 from thermal.case.points import POINT_TYPES, ZONE_TEMPERATURE, split_column
 from thermal.case.quality import QualityReport, plain
 from thermal.case.validation import unknown_device_types
+from thermal.components.registry import device_types
 from thermal.units import QUANTITIES, from_si
 
 
@@ -155,7 +156,7 @@ def summarise_devices(case: Case) -> tuple[DeviceSummary, ...]:
         entity, point = split_column(str(column), "telemetry")
         points.setdefault(entity, []).append(point)
     return tuple(
-        DeviceSummary(d.name, d.type, d.type in DEVICE_TYPES, d.zone, tuple(points.get(d.name, ())))
+        DeviceSummary(d.name, d.type, d.type in device_types(), d.zone, tuple(points.get(d.name, ())))
         for d in case.building.devices
     )
 

@@ -8,7 +8,6 @@ from scipy import ndimage
 
 from thermal.case import points
 from thermal.case.building import (
-    DEVICE_TYPES,
     FACADES,
     GROUND,
     INTERIOR_WALL,
@@ -23,6 +22,7 @@ from thermal.case.building import (
 )
 from thermal.case.plan import check_plan, facade_areas
 from thermal.case.telemetry import Telemetry
+from thermal.components.registry import device_types
 from thermal.errors import CaseError, nearest
 
 _ZONE, _DEVICE = "a zone of the building", "a device of the building"
@@ -262,7 +262,7 @@ def unknown_device_types(building: Building) -> dict[str, str]:
     dict
         Type by name of the device.
     """
-    return {device.name: device.type for device in building.devices if device.type not in DEVICE_TYPES}
+    return {device.name: device.type for device in building.devices if device.type not in device_types()}
 
 
 def _on_plans(building: Building) -> Iterator[str]:
@@ -275,7 +275,7 @@ def _on_plans(building: Building) -> Iterator[str]:
 
 def _on_devices(building: Building, columns: set[str]) -> Iterator[str]:
     for name, kind in unknown_device_types(building).items():
-        yield f"device {name!r} has the unknown type {kind!r} ({nearest(kind, DEVICE_TYPES)})"
+        yield f"device {name!r} has the unknown type {kind!r} ({nearest(kind, device_types())})"
     for device in building.devices:
         has = {point for point in _OF_DEVICES if f"{device.name}/{point}" in columns}
         if not any(column.startswith(f"{device.name}/") for column in columns):

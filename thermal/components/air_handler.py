@@ -4,15 +4,16 @@ from dataclasses import dataclass
 from typing import Annotated, NamedTuple
 
 from thermal.components.checks import in_range
-from thermal.components.component import Actuator, Component, Conditions, EnergyBalance, Given, Port, Range, Run
+from thermal.components.component import Actuator, Component, Conditions, Given, Port, Range, Run
 from thermal.components.cooling_coil import CoolingCoil
+from thermal.components.energy_balance import EnergyBalance
 from thermal.components.fan import Fan
 from thermal.components.heater import Heater
 from thermal.components.moist_air import EVAPORATION_HEAT, enthalpy
 from thermal.components.operations import Operations, Value
-from thermal.components.streams import AirCommand, AirDrawn, Duct, HotWater, SupplyAir, WaterDrawn
+from thermal.components.streams import AirCommand, AirDrawn, Duct, HotWater, SupplyAir, SupplyWater, WaterDrawn
 from thermal.components.water_coil import WaterCoil, water_share
-from thermal.errors import ModelError, describe
+from thermal.errors import ModelError
 from thermal.units import AIR_HEAT_CAPACITY
 
 _LEAST = 1e-9
@@ -95,22 +96,20 @@ class AirHandlerStep(NamedTuple):
         Its heating coil, valve set.
     electric_power, fuel_power : Value
         Taken up [W].
+    water : Value
+        Supply water at the end of the step [K]; 0 where no coil takes any.
     """
 
     mixed: Mixed
     warmed: Warmed
     electric_power: Value
     fuel_power: Value
+    water: Value
 
-    def supply_temperature(self, water: Value) -> Value:
-        """Supply air [K].
-
-        Parameters
-        ----------
-        water : Value
-            Temperature of the supply water [K].
-        """
-        return self.warmed.offset + self.warmed.slope * water
+    @property
+    def supply_temperature(self) -> Value:
+        """Supply air [K]."""
+        return self.warmed.offset + self.warmed.slope * self.water
 
 
 @dataclass(frozen=True)
@@ -180,8 +179,12 @@ class AirHandler(Component):
         super().__post_init__()
         in_range("AirHandler.low_limit", self.low_limit, "K", 173.15, self.high_limit)
         if self.heating is not None and not isinstance(self.heating, WaterCoil | Heater):
-            found = type(self.heating).__name__
-            raise ModelError(describe("AirHandler.heating", "a WaterCoil, a Heater or None", found))
+            raise ModelError("AirHandler.heating", "a WaterCoil, a Heater or None", type(self.heating).__name__)
+
+    @property
+    def connectors(self) -> tuple[Port, ...]:
+        """Supply air, and hot water where there is a coil for it."""
+        return tuple(p for p in super().connectors if p.supplies or isinstance(self.heating, WaterCoil))
 
     @property
     def design_pressure(self) -> float:
@@ -207,10 +210,12 @@ class AirHandler(Component):
         mixed = self.mix(ops, drawn, given.conditions, command, water.opening if water else 1.0)
         warmed = self.warm(ops, mixed, water.warmest if water else 0.0, water.opening if water else 1.0)
         given.put("supply_air", SupplyAir(warmed.offset, warmed.slope))
+        end = SupplyWater(0.0)
         if coil:
             source = warmed.conductance * mixed.cooled_temperature
             given.put("hot_water", WaterDrawn(warmed.conductance, source, warmed.flow_share * coil.water_flow))
-        return AirHandlerStep(mixed, warmed, *self.powers(mixed, warmed))
+            end = yield "hot_water"
+        return AirHandlerStep(mixed, warmed, *self.powers(mixed, warmed), end.temperature)
 
     def powers(self, mixed: Mixed, warmed: Warmed) -> tuple[Value, Value]:
         """Electric and fuel power [W].
@@ -359,7 +364,7 @@ class AirHandler(Component):
             plant_room=(1.0 - self.supply_fan.heat_to_air) * mixed.supply_fan_power,
         )
 
-    def read(self, ops: Operations, given: Given, done: AirHandlerStep, water: Value) -> list[Value]:
+    def read(self, ops: Operations, given: Given, done: AirHandlerStep) -> list[Value]:
         """Values of its points.
 
         Parameters
@@ -370,13 +375,11 @@ class AirHandler(Component):
             As `run` had it.
         done : AirHandlerStep
             What `run` returned.
-        water : Value
-            Supply water at the end of the step [K].
         """
         command, mixed = AirCommand(**given.actions), done.mixed
         held = command.supply_air_static_pressure_setpoint
         return [
-            command.supply_air_temperature_setpoint, done.supply_temperature(water), mixed.mixed_temperature,
+            command.supply_air_temperature_setpoint, done.supply_temperature, mixed.mixed_temperature,
             mixed.return_temperature, given.conditions.outdoor_temperature, mixed.supply_fan_power,
             done.electric_power, done.fuel_power, held, command.fan_running * held,
         ]  # fmt: skip

@@ -1,17 +1,22 @@
 """The hot-water loop: boiler, water and pipes, with its pump."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from typing import Annotated, NamedTuple
 
 from thermal.components.checks import in_range
-from thermal.components.component import Actuator, Component, Conditions, EnergyBalance, Given, Port, Range, Run, State
+from thermal.components.component import Actuator, Component, Conditions, Given, Port, Range, Run, State
 from thermal.components.curves import ORDINARY_BOILER, Biquadratic, celsius
+from thermal.components.energy_balance import EnergyBalance
 from thermal.components.moist_air import WATER_DENSITY, WATER_HEAT_CAPACITY
 from thermal.components.operations import Operations, Value
 from thermal.components.pump import Pump
 from thermal.components.streams import HotWater, SupplyWater, WaterDrawn
 
 _LEAST = 1e-9
+_LEAST_PIPES = 20.0  # W/K
+_LITRES = 0.01  # m3 of water per kW of boiler, usual for loops of steel pipe
 
 
 class Heated(NamedTuple):
@@ -105,7 +110,7 @@ class BoilerLoop(Component):
         Port("electric_power", "electricity", "W"),
         Port("fuel_power", "fuel", "W"),
     )
-    states = (State("supply_water_temperature", "K", 273.15, 373.15),)
+    states = (State("supply_water_temperature", "K", 273.15, 373.15, 320.0),)
     actuators = (
         # water that is neither frozen nor steam; the usual range is that of the paper's simulator
         Actuator("supply_water_temperature_setpoint", "K", 278.15, 373.15, (310.0, 355.0)),
@@ -131,6 +136,23 @@ class BoilerLoop(Component):
         # beyond this the least flow would come back colder than the plant room
         highest = 0.5 * self.pump.minimum_share * self.pump.design_flow * WATER_HEAT_CAPACITY
         in_range("BoilerLoop.pipe_conductance", self.pipe_conductance, "W/K", 0.0, highest)
+
+    @classmethod
+    def sized(cls, capacity: float, water_flow: float) -> BoilerLoop:
+        """Size boiler, pump and pipes.
+
+        Parameters
+        ----------
+        capacity : float
+            Largest heat [W].
+        water_flow : float
+            Through the open valves of all that draw from the loop [kg/s].
+        """
+        pump, pipes = Pump(water_flow), max(_LEAST_PIPES, 1e-3 * capacity / 10.0)
+        return cls(
+            capacity, pump, pipe_conductance=min(pipes, 0.4 * pump.minimum_share * pump.design_flow * 4186.0),
+            standing_conductance=0.25 * pipes, water_volume=max(0.05, _LITRES * capacity / 1000.0),
+        )  # fmt: skip
 
     @property
     def design_pressure(self) -> float:
@@ -271,7 +293,7 @@ class BoilerLoop(Component):
             storage=done.storage,
         )  # fmt: skip
 
-    def read(self, ops: Operations, given: Given, done: LoopStep, water: Value) -> list[Value]:
+    def read(self, ops: Operations, given: Given, done: LoopStep) -> list[Value]:
         """Values of its points.
 
         Parameters
@@ -282,11 +304,10 @@ class BoilerLoop(Component):
             As `run` had it.
         done : LoopStep
             What `run` returned.
-        water : Value
-            Supply water at the end of the step [K].
         """
         held = given.actions["differential_pressure_setpoint"]
         return [
-            given.actions["supply_water_temperature_setpoint"], water, done.return_water_temperature, done.fuel_power,
-            done.pump_power, held, given.actions["boiler_running"] * held,
+            given.actions["supply_water_temperature_setpoint"], done.supply_water_temperature,
+            done.return_water_temperature, done.fuel_power, done.pump_power, held,
+            given.actions["boiler_running"] * held,
         ]  # fmt: skip

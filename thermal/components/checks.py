@@ -5,13 +5,13 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from thermal.errors import ModelError, describe
+from thermal.errors import ModelError
 
 
 def in_range(where: str, value: float, unit: str, lowest: float, highest: float, advice: str = "") -> None:
     """Refuse a parameter [its unit] that is no number within its range."""
     if not (isinstance(value, int | float | np.floating | np.integer) and lowest <= value <= highest):
-        raise ModelError(describe(where, f"{lowest:g} to {highest:g} {unit}", repr(value), advice))
+        raise ModelError(where, f"{lowest:g} to {highest:g} {unit}", repr(value), advice)
 
 
 def all_in_range(
@@ -22,12 +22,11 @@ def all_in_range(
         array = np.asarray(values, dtype=float)
         spread = np.array(np.broadcast_to(array, (size,)))
     except (TypeError, ValueError):
-        found = f"shape {np.shape(values)}"
-        raise ModelError(describe(where, f"a number or {size} of them", found)) from None
+        raise ModelError(where, f"a number or {size} of them", f"shape {np.shape(values)}") from None
     bad = ~((spread >= lowest) & (spread <= highest))
     if bad.any():
         first = int(np.argmax(bad))
-        raise ModelError(describe(f"{where}[{first}]", f"{lowest:g} to {highest:g} {unit}", repr(float(spread[first]))))
+        raise ModelError(f"{where}[{first}]", f"{lowest:g} to {highest:g} {unit}", repr(float(spread[first])))
     spread.setflags(write=False)
     return spread
 
@@ -49,4 +48,4 @@ def scalar_action(name: str, value: float, unit: str, lowest: float, highest: fl
 def _refuse(where: str, value: float, unit: str, lowest: float, highest: float) -> None:
     advice = "a setpoint in degC must be converted to K" if unit == "K" and 0.0 < value < lowest else ""
     found = repr(value) if math.isfinite(value) else f"{value} (not finite)"
-    raise ModelError(describe(where, f"{lowest:g} to {highest:g} {unit}", found, advice))
+    raise ModelError(where, f"{lowest:g} to {highest:g} {unit}", found, advice)

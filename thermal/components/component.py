@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 
 from thermal._types import FloatArray
 from thermal.components.checks import all_in_range, in_range
+from thermal.components.energy_balance import EnergyBalance
 from thermal.components.moist_air import USUAL_HUMIDITY
 from thermal.components.operations import Operations, Value
-from thermal.errors import ModelError, describe
+from thermal.errors import ModelError
 
 Quantity = Literal["air", "water", "heat", "electricity", "fuel"]
 #: A component's function while it runs: yields the port that it waits for, returns its named results. One that waits
@@ -72,7 +73,8 @@ class Actuator(NamedTuple):
     Parameters
     ----------
     point : str
-        Type of the point, as in telemetry.
+        Type of the point, as in telemetry. What supplies hot water is switched by points that end in ``_running``,
+        1 while the building is in operation.
     unit : str
         Unit of the values.
     lowest, highest : float
@@ -102,12 +104,15 @@ class State(NamedTuple):
         Unit of the value.
     lowest, highest : float
         Of a value to start from [unit].
+    start : float
+        Value to start from where none is given [unit].
     """
 
     name: str
     unit: str
     lowest: float
     highest: float
+    start: float
 
 
 class Conditions(NamedTuple):
@@ -178,50 +183,6 @@ class Given(NamedTuple):
     put: Callable[[str, Any], None]
 
 
-class EnergyBalance(NamedTuple):
-    """Energy into components and out of them; means over a step.
-
-    Parameters
-    ----------
-    electricity, fuel : Value
-        Taken up [W].
-    zones : Value
-        Heat into the zones [W].
-    moisture : Value
-        Latent heat of the water vapour that the supply air brings into the zones; negative where it is dried [W].
-    exhaust : Value
-        What the exhaust carries away beyond what the outdoor air brought in, with the heat of its fan [W].
-    condenser : Value
-        Rejected by the refrigeration outdoors [W].
-    flue : Value
-        Up the chimneys of boiler and gas coils [W].
-    plant_room : Value
-        From pipes, jacket and motors into the plant room [W].
-    storage : Value
-        Kept in the water of the loop [W].
-    """
-
-    electricity: Value = 0.0
-    fuel: Value = 0.0
-    zones: Value = 0.0
-    moisture: Value = 0.0
-    exhaust: Value = 0.0
-    condenser: Value = 0.0
-    flue: Value = 0.0
-    plant_room: Value = 0.0
-    storage: Value = 0.0
-
-    @property
-    def residual(self) -> Value:
-        """What goes in and neither comes out nor stays [W]."""
-        return self.electricity + self.fuel - sum(self[2:])
-
-    @property
-    def turnover(self) -> Value:
-        """Sum of all terms' sizes [W], which a residual is to be compared with."""
-        return sum(abs(term) for term in self)
-
-
 class Component:
     """A device, or a part of one: a frozen dataclass whose parameters are annotated with their `Range`.
 
@@ -251,6 +212,31 @@ class Component:
         in_range(where, value, *limits)
         return float(value)
 
+    @property
+    def connectors(self) -> tuple[Port, ...]:
+        """Ports of air and water: each needs something that it is connected to."""
+        return tuple(port for port in self.ports if port.quantity in ("air", "water"))
+
+    @classmethod
+    def sized(cls, *design: Any, **options: Any) -> Any:
+        """Size the component by its design loads, for the devices of a case.
+
+        Parameters
+        ----------
+        *design : Any
+            Of a group: heat of each element [W], and positions of their zones. Of what supplies hot water: largest heat
+            [W], and water through the open valves of all that draw from it [kg/s].
+        **options
+            Of a class's own.
+
+        Raises
+        ------
+        ModelError
+            The class cannot be sized.
+        """
+        expected = "a class with a classmethod `sized`"
+        raise ModelError(f"component {cls.__name__}", expected, "none", "write it, or pass the system itself")
+
     def run(self, ops: Operations, given: Given) -> Any:
         """Give outputs of inputs: the component's equations, as a `Run`.
 
@@ -275,7 +261,7 @@ class Component:
         """
         raise NotImplementedError
 
-    def read(self, ops: Operations, given: Given, done: Any, water: Value) -> list[Value]:
+    def read(self, ops: Operations, given: Given, done: Any) -> list[Value]:
         """Values of its points, in the order of `sensors`.
 
         Parameters
@@ -286,8 +272,6 @@ class Component:
             As `run` had it.
         done : object
             What `run` returned.
-        water : Value
-            Supply water at the end of the step [K].
         """
         return []
 
@@ -296,10 +280,23 @@ class Group(Component):
     """Many components of a kind at once, as arrays; each belongs to a zone.
 
     Its parameters may be arrays, one value an element. It sums over its elements with `Operations.sums` and
-    `Operations.dot` only, so that whoever differentiates can cut there.
+    `Operations.dot` only, so that whoever differentiates can cut there. It has neither states nor actuators: what
+    remembers or is set is a component of its own, which the group draws from.
+
+    Raises
+    ------
+    ModelError
+        When a class of groups declares states or actuators.
     """
 
     zone: IndexArray
+
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        if cls.states or cls.actuators:
+            found = ", ".join([s.name for s in cls.states] + [a.point for a in cls.actuators])
+            advice = "declare them in a Component that the group draws from"
+            raise ModelError(f"group {cls.__name__}", "neither states nor actuators", found, advice)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "zone", self.positions("zone"))
@@ -348,8 +345,7 @@ class Group(Component):
         """
         index = np.array(np.broadcast_to(np.asarray(getattr(self, name)), (len(np.atleast_1d(self.zone)),)))
         if not np.issubdtype(index.dtype, np.integer) or (len(index) and index.min() < 0):
-            where = f"{type(self).__name__}.{name}"
-            raise ModelError(describe(where, "positions from 0 on", f"{index.dtype} {index}"))
+            raise ModelError(f"{type(self).__name__}.{name}", "positions from 0 on", f"{index.dtype} {index}")
         return index.astype(np.intp)
 
     @cached_property

@@ -19,7 +19,7 @@ from thermal.components.curves import (
 )
 from thermal.components.moist_air import EVAPORATION_HEAT, dew_point, saturation_humidity, wet_bulb
 from thermal.components.operations import Operations, Value
-from thermal.errors import ModelError, describe
+from thermal.errors import ModelError
 from thermal.units import AIR_HEAT_CAPACITY
 
 _LEAST = 1e-9  # J/kg
@@ -102,9 +102,8 @@ class CoolingCoil(Component):
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.part_load.lowest <= 0.0 and self.part_load.coefficients[0] != 0.0:
-            found = f"{self.part_load.coefficients[0]:g} at no load"
             expected = "0 at no load, or a range that begins above 0"
-            raise ModelError(describe("CoolingCoil.part_load", expected, found))
+            raise ModelError("CoolingCoil.part_load", expected, f"{self.part_load.coefficients[0]:g} at no load")
 
     @classmethod
     def chilled(

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from thermal.components.operations import Operations, Value
-from thermal.errors import ModelError, describe
+from thermal.errors import ModelError
 
 _FREEZING = 273.15  # K
 
@@ -31,7 +31,7 @@ class Polynomial:
     def __post_init__(self) -> None:
         if not self.coefficients or not self.lowest < self.highest:
             found = f"{len(self.coefficients)} and a range {self.lowest} to {self.highest}"
-            raise ModelError(describe("polynomial", "coefficients and a rising range", found))
+            raise ModelError("polynomial", "coefficients and a rising range", found)
 
     def __call__(self, ops: Operations, x: Value) -> Value:
         """Evaluate the polynomial at a share [-]."""
@@ -69,7 +69,7 @@ class Biquadratic:
     def __post_init__(self) -> None:
         if len(self.coefficients) != 6 or not (self.x_range[0] < self.x_range[1] and self.y_range[0] < self.y_range[1]):
             found = f"{len(self.coefficients)} coefficients, ranges {self.x_range} and {self.y_range}"
-            raise ModelError(describe("biquadratic curve", "six coefficients and rising ranges", found))
+            raise ModelError("biquadratic curve", "six coefficients and rising ranges", found)
 
     def __call__(self, ops: Operations, x: Value, y: Value) -> Value:
         """Evaluate the curve at x and y in the units of its ranges."""

@@ -15,7 +15,7 @@ import casadi
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal.errors import ModelError, describe
+from thermal.errors import ModelError
 
 #: A float, an array or a CasADi expression: what an equation takes and gives.
 Value = Any
@@ -49,11 +49,8 @@ class Operations:
 
     def __init__(self, width: float = 0.0) -> None:
         if not 0.0 <= width <= 0.5:
-            raise ModelError(
-                describe(
-                    "smoothing width", "a share from 0 (exact) to 0.5", repr(width), "0.02 is usual in a predictor"
-                )
-            )
+            expected = "a share from 0 (exact) to 0.5"
+            raise ModelError("smoothing width", expected, repr(width), "0.02 is usual in a predictor")
         self.width = width
         if width == 0.0:
             self._make_exact()

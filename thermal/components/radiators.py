@@ -15,7 +15,7 @@ from thermal.components.moist_air import WATER_HEAT_CAPACITY
 from thermal.components.operations import Operations, Value
 from thermal.components.streams import HotWater, SupplyWater, WaterDrawn
 from thermal.components.water_coil import LEAST_FLOW
-from thermal.errors import ModelError, describe
+from thermal.errors import ModelError
 
 _LEAST = 1e-6  # K: of an overtemperature, so that its powers have finite slopes
 
@@ -86,7 +86,7 @@ class Radiators(Group):
         super().__post_init__()
         if not self.room_temperature < self.return_temperature < self.supply_temperature:
             found = f"{self.room_temperature:g}, {self.return_temperature:g} and {self.supply_temperature:g} K"
-            raise ModelError(describe("Radiators: nominal temperatures", "room < return < supply", found))
+            raise ModelError("Radiators: nominal temperatures", "room < return < supply", found)
 
     @classmethod
     def sized(cls, heat: ArrayLike, zone: IndexArray) -> Radiators:
@@ -162,7 +162,7 @@ class Radiators(Group):
         heat = conductance * (water.temperature - zone)
         return RadiatorStep(valve_flow, heat, self.radiant_share * heat)
 
-    def read(self, ops: Operations, given: Given, done: RadiatorStep, water: Value) -> list[Value]:
+    def read(self, ops: Operations, given: Given, done: RadiatorStep) -> list[Value]:
         """Values of its points, one a radiator each.
 
         Parameters
@@ -173,7 +173,5 @@ class Radiators(Group):
             As `run` had it.
         done : RadiatorStep
             What `run` returned.
-        water : Value
-            Supply water at the end of the step [K].
         """
         return [done.valve_flow, done.heat]

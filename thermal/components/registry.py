@@ -1,12 +1,13 @@
 """Which component a device of a case is, by its type; one's own are added with `register_component`."""
 
+from thermal.case.building import DEVICE_TYPES
 from thermal.components.air_handler import AirHandler
 from thermal.components.boiler_loop import BoilerLoop
 from thermal.components.component import Actuator, Component
 from thermal.components.radiators import Radiators
 from thermal.components.terminals import Terminals
 from thermal.components.thermostat import Thermostat
-from thermal.errors import ModelError, describe
+from thermal.errors import ModelError
 
 #: Classes of components by type of device.
 COMPONENTS: dict[str, type[Component]] = {kind.device: kind for kind in (Terminals, AirHandler, BoilerLoop, Radiators)}
@@ -34,9 +35,14 @@ def register_component(kind: type[Component]) -> type[Component]:
     named = (kind.__module__, kind.__qualname__)
     if not kind.device or (known is not None and (known.__module__, known.__qualname__) != named):
         expected = f"a type of device beside {', '.join(sorted(COMPONENTS))}"
-        raise ModelError(describe(f"component {kind.__name__}: device", expected, repr(kind.device)))
+        raise ModelError(f"component {kind.__name__}: device", expected, repr(kind.device))
     COMPONENTS[kind.device] = kind
     return kind
+
+
+def device_types() -> tuple[str, ...]:
+    """Give the types of devices that are known: of the case format, and of registered components."""
+    return (*DEVICE_TYPES, *(kind for kind in COMPONENTS if kind not in DEVICE_TYPES))
 
 
 def setpoints() -> dict[str, Actuator]:

@@ -26,7 +26,7 @@ from thermal.components.water_coil import (
     water_share,
     water_side,
 )
-from thermal.errors import ModelError, describe
+from thermal.errors import ModelError
 from thermal.units import AIR_HEAT_CAPACITY
 
 _LEAST = 1e-9  # K, W/K, kg/s: next to nothing
@@ -138,8 +138,7 @@ class Terminals(Group):
         if not in_order.all():
             k = int(np.argmin(in_order))
             found = f"{self.minimum_flow[k]:g}, {self.heating_flow[k]:g} and {self.design_flow[k]:g} kg/s"
-            expected = "minimum_flow <= heating_flow <= design_flow"
-            raise ModelError(describe(f"Terminals: terminal {k}", expected, found))
+            raise ModelError(f"Terminals: terminal {k}", "minimum_flow <= heating_flow <= design_flow", found)
 
     @classmethod
     def sized(
@@ -230,7 +229,7 @@ class Terminals(Group):
 
         supply: SupplyAir = yield "supply_air"
         coil = valve_flow = np.zeros(len(self))  # shut, where nobody calls
-        if not ops.surely_below(heating, 0.0):
+        if not (self._tight and ops.surely_below(heating, 0.0)):
             open_water = self.open_water(ops, pipe.opening)
             open_coil = self.conductance(ops, airflow, rate, open_water)
             at_warmest = [o + s * pipe.warmest for o, s in zip(*supply, strict=True)]
@@ -270,6 +269,12 @@ class Terminals(Group):
     def _resistance(self) -> FloatArray:
         """Of the air film, per power -0.8 of the flow."""
         return self.design_flow**0.8 / self.air_film
+
+    @cached_property
+    def _tight(self) -> bool:
+        """Whether valves are shut where nobody calls: those of a subclass with rules of its own may leak."""
+        own = type(self)
+        return own.throttled is Terminals.throttled and own.reheat_call is Terminals.reheat_call
 
     @cached_property
     def _at_opening(self) -> LastValue:
@@ -375,7 +380,7 @@ class Terminals(Group):
         ops : Operations
             Arithmetic.
         call : Value
-            Share of the reheat that is called for [-]; where all are 0, it is not asked.
+            Share of the reheat that is called for [-].
         rate, conductance : Value
             Heat capacity rate of the air, and conductance of the open coils [W/K].
         allowance : Value
@@ -386,13 +391,17 @@ class Terminals(Group):
             return ops.capped(call * to_limit, conductance, 2.5)
         return ops.capped(to_limit, call * conductance, 2.5)
 
-    def read(self, ops: Operations, given: Given, done: TerminalStep, water: Value) -> list[Value]:
-        """Values of its points, one a terminal each; see `Component.read`.
+    def read(self, ops: Operations, given: Given, done: TerminalStep) -> list[Value]:
+        """Values of its points, one a terminal each.
 
         Parameters
         ----------
-        ops, given, done, water : as there
-            Water [K].
+        ops : Operations
+            Arithmetic.
+        given : Given
+            As `run` had it.
+        done : TerminalStep
+            What `run` returned.
         """
         seen = given.conditions[:3]
         damper = np.minimum(done.airflow / done.most_airflow, 1.0) * (done.most_airflow > LEAST_AIR)

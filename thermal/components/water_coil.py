@@ -15,7 +15,7 @@ from thermal.components.checks import in_range
 from thermal.components.component import Component, Port, Range
 from thermal.components.moist_air import WATER_HEAT_CAPACITY
 from thermal.components.operations import FloatOperations, Operations, Value
-from thermal.errors import ModelError, describe
+from thermal.errors import ModelError
 from thermal.units import AIR_HEAT_CAPACITY
 
 _LITTLE_NTU = 0.01**-0.15  # NTU of the water at a hundredth of its flow over that at full flow: hA as flow to 0.85
@@ -119,7 +119,7 @@ class WaterCoil(Component):
         if not wanted < reachable:
             limit = f"an effectiveness below {reachable:.3f}"
             advice = "more air or a smaller fall of the water's temperature"
-            raise ModelError(describe("WaterCoil.sized: capacity", limit, f"{wanted:.3f}", advice))
+            raise ModelError("WaterCoil.sized: capacity", limit, f"{wanted:.3f}", advice)
         ntu = brentq(lambda n: _effectiveness(ops, n, least / most) - wanted, 1e-12, 30.0, xtol=1e-14)
         overall = ntu * least
         return cls(

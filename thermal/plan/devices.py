@@ -6,8 +6,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from thermal.case.building import DEVICE_TYPES, Device
+from thermal.case.building import Device
 from thermal.case.load import certain_feeders
+from thermal.components.registry import device_types
 from thermal.errors import PlanError, nearest
 from thermal.plan.guard import reading, vocabulary
 
@@ -140,7 +141,7 @@ def device_type(words: str) -> str | None:
     'fan_coil'
     """
     plain = words.strip().casefold()
-    if plain in DEVICE_TYPES:
+    if plain in device_types():
         return plain
     # "VAV_1" and "VAV-F1": signs and digits part words, but not for the pattern's \b.
     plain = " ".join(re.findall(r"[a-z]+", plain))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
+from itertools import count
 from operator import itemgetter
 from struct import Struct
 from types import GeneratorType
@@ -15,7 +16,7 @@ import numpy as np
 from thermal._types import FloatArray
 from thermal.components.component import Calls, Conditions, Given
 from thermal.components.operations import CasadiOperations, StepOperations
-from thermal.errors import ModelError, describe
+from thermal.errors import ModelError
 from thermal.system.exchange import PortMessages, Runner, givens
 from thermal.system.step import HvacStep
 from thermal.system.system import HvacSystem
@@ -28,25 +29,22 @@ class Results(Mapping[str, Any]):
 
     Parameters
     ----------
-    readers : mapping of str to tuple
-        Phase of each component, and how its result is read; None for those that are known.
-    rows : list of list of float
+    readers : mapping of str to callable
+        How the result of each component is read; of no use for those that are known.
+    values : list of float
         What the phases gave [any].
     known : dict
         Results that are known.
     """
 
-    __slots__ = ("_known", "_readers", "_rows")
+    __slots__ = ("_known", "_readers", "_values")
 
-    def __init__(
-        self, readers: Mapping[str, tuple[int, _Read] | None], rows: list[list[float]], known: dict[str, Any]
-    ) -> None:
-        self._readers, self._rows, self._known = readers, rows, known
+    def __init__(self, readers: Mapping[str, _Read], values: list[float], known: dict[str, Any]) -> None:
+        self._readers, self._values, self._known = readers, values, known
 
     def __getitem__(self, name: str) -> Any:
         if name not in self._known:
-            phase, read = self._readers[name] or (0, tuple)
-            self._known[name] = read(self._rows[phase])
+            self._known[name] = self._readers[name](self._values)
         return self._known[name]
 
     def __iter__(self) -> Iterator[str]:
@@ -64,22 +62,22 @@ class _Phase(NamedTuple):
 
     Parameters
     ----------
-    run : callable
-        Evaluates them, from array to array.
-    out : ndarray
-        What they give.
-    messages : list of tuple
-        What groups are told next, and how it is read.
     receive : callable
         Takes what groups have sent since the phase before.
+    run : callable
+        Evaluates them, from array to array.
+    told : ndarray
+        What groups are told next.
+    messages : list of tuple
+        The groups, each with how its message is read from it.
     owner : object
         What must live as long.
     """
 
-    run: Callable[[], None]
-    out: FloatArray
-    messages: list[tuple[str, _Read]]
     receive: Callable[..., None]
+    run: Callable[[], None]
+    told: FloatArray
+    messages: list[tuple[str, _Read]]
     owner: Any
 
 
@@ -94,8 +92,9 @@ class CompiledSystem:
     Notes
     -----
     The first step is taken with symbols for all single components. Each time all of them wait for what groups draw, the
-    expressions that have come up since make a function, a phase; what groups send is a new symbol. A system of two air
-    handlers has some 900 operations on single numbers a step, 50 ns each in Python, 4 ns here.
+    expressions that have come up since make a function, a phase; what groups send is a new symbol. What components give
+    is evaluated in the first phase that knows all that it is made of. A system of two air handlers has
+    some 900 operations on single numbers a step, 50 ns each in Python, 4 ns here.
     """
 
     def __init__(self, system: HvacSystem) -> None:
@@ -103,9 +102,9 @@ class CompiledSystem:
         self._phases: list[_Phase] | None = None
         self._actions: Any = None
         self._pending: list[float] = []
-        count = len(system.states) + 4 + len(system.air_handlers)
-        self._now, self._set = np.zeros(count), np.zeros(len(system.actuators))
-        self._write = _writer(self._now, 0, count)
+        size = len(system.states) + 4 + len(system.air_handlers)
+        self._now, self._set = np.zeros(size), np.zeros(len(system.actuators))
+        self._write = _writer(self._now, 0, size)
 
     def _trace(self, calls: Calls, conditions: Conditions, seconds: float) -> list[_Phase]:
         """Take a step with symbols for single components, numbers for groups; make functions of what comes up."""
@@ -134,7 +133,7 @@ class CompiledSystem:
             if name not in system.groups:
                 return message
             told.append((name, message))
-            return _reader(message, 0)(evaluated(_leaves(message)))
+            return _reader(message, count())(evaluated(_leaves(message)))
 
         outdoor, damp, room, length, *humid = now[n_state:]
         weather = conditions._replace(
@@ -150,7 +149,7 @@ class CompiledSystem:
         runner, traces = Runner(messages, runs, deliver), list[_Trace]()
         runner.advance(system.groups)  # up to where they wait first
         while runner.waiting:
-            known, begin, drawn = {n for trace in traces for n in trace.results}, len(carried), len(load)
+            begin, drawn = len(carried), len(load)
             moved = runner.advance(system.singles)
             held: list[Any] = []
             for (receiver, _), boxes in messages.waiting.items():
@@ -164,43 +163,50 @@ class CompiledSystem:
             carried += new
             told.clear()
             moved |= runner.advance(system.groups)
-            results = {n: r for n, r in runner.results.items() if n in system.singles and n not in known}
-            traces.append(_Trace(held, results, list(told), slice(begin, len(carried)), drawn))
+            traces.append(_Trace(held, list(told), slice(begin, len(carried)), drawn))
             if not moved:
-                expected = "components that do not wait for each other"
-                raise ModelError(describe("HvacSystem", expected, f"{runner.waiting}"))
-        return self._functions(symbols, traces)
+                raise ModelError("HvacSystem", "components that do not wait for each other", f"{runner.waiting}")
+        return self._functions(symbols, traces, {name: runner.results[name] for name in system.singles})
 
-    def _functions(self, symbols: tuple[list[Any], ...], traces: list[_Trace]) -> list[_Phase]:
+    def _functions(self, symbols: tuple[list[Any], ...], traces: list[_Trace], results: dict[str, Any]) -> list[_Phase]:
         """Make a function of each phase, bound to the arrays that it reads and writes."""
-        system, received = self._system, 0
-        loads, kept = np.zeros(len(symbols[2])), np.zeros(len(symbols[3]))
-        inputs, phases = [casadi.vertcat(*part) for part in symbols], []
-        self._readers: dict[str, tuple[int, _Read] | None] = dict.fromkeys(system.components)
-        self._places: dict[tuple[str, str], tuple[int, int]] = {}
+        (now, fixed, load, carried), phases, system = symbols, list[_Phase](), self._system
+        values = _leaves(tuple(results.values()))
+        first, drawn, kept = np.zeros(len(values), dtype=int), 0, slice(0)
         for k, trace in enumerate(traces):
-            values = [*trace.held, *system.powers(CasadiOperations(), trace.results)]
-            for name, result in trace.results.items():
-                self._readers[name] = k, _reader(result, len(values))
-                values += _leaves(result)
-                for state in system.components[name].states:
-                    self._places[name, state.name] = k, len(values)
-                    values.append(getattr(result, state.name))
-            messages = []
-            for name, message in trace.messages:
-                messages.append((name, _reader(message, len(values))))
-                values += _leaves(message)
-            function: Any = casadi.Function("phase", inputs, [casadi.densify(casadi.cse(casadi.vertcat(*values)))])
-            out = np.zeros(len(values))
+            if fresh := load[drawn : trace.drawn] + carried[kept]:
+                first[casadi.which_depends(casadi.vertcat(*values), casadi.vertcat(*fresh), 1, True)] = k
+            drawn, kept = trace.drawn, trace.carried
+        rows = [[*t.held, *_leaves([m for _, m in t.messages]), *(values[i] for i in np.flatnonzero(first == k))]
+                for k, t in enumerate(traces)]  # fmt: skip
+        ends = np.cumsum([0, *(len(row) for row in rows)])
+        # what goes on is read where it was written
+        seen, place = [casadi.SX.sym("any") for _ in range(ends[-1])], np.zeros(len(values), dtype=int)
+        for k, trace in enumerate(traces):
+            seen[ends[k] : ends[k] + len(trace.held)] = carried[trace.carried]
+            place[first == k] = np.arange(ends[k + 1] - (first == k).sum(), ends[k + 1])
+        loads, self._values, drawn = np.zeros(len(load)), np.zeros(ends[-1]), 0
+        for row, trace, begin, end in zip(rows, traces, ends[:-1], ends[1:], strict=True):
+            function: Any = casadi.Function("phase", [casadi.vertcat(*part) for part in (now, fixed, load, seen)],
+                                            [casadi.densify(casadi.cse(casadi.vertcat(*row)))])  # fmt: skip
             buffer, run = function.buffer()
-            for place, array in enumerate((self._now, self._set, loads, kept)):
-                buffer.set_arg(place, memoryview(array.data))
-            buffer.set_res(0, memoryview(out.data))
-            whole = _keeping(run, out[: len(trace.held)], kept[trace.carried]) if trace.held else run
-            phases.append(_Phase(whole, out, messages, _writer(loads, received, trace.drawn), (function, buffer)))
-            received = trace.drawn
-        self._power = [len(trace.held) for trace in traces]
-        self._state = [self._places[name, state.name] for name, state in system.states]
+            for k, array in enumerate((self._now, self._set, loads, self._values)):
+                buffer.set_arg(k, memoryview(array.data))
+            buffer.set_res(0, memoryview(self._values[begin:end].data))
+            start, places = begin + len(trace.held), count()
+            messages = [(name, _reader(message, places)) for name, message in trace.messages]
+            told = self._values[start : start + next(places)]
+            phases.append(_Phase(_writer(loads, drawn, trace.drawn), run, told, messages, (function, buffer)))
+            drawn = trace.drawn
+        where = iter(place.tolist())
+        self._readers: dict[str, _Read] = dict.fromkeys(system.components, tuple)
+        self._readers |= {name: _reader(result, where) for name, result in results.items()}
+        numbered = Results(self._readers, list(range(ends[-1])), {})
+        self._state = [getattr(numbered[name], state.name) for name, state in system.states.values()]
+        self._electric, self._fuel = (
+            [getattr(numbered[name], port) for name in results for kind, port in system.meters[name] if kind == which]
+            for which in ("electricity", "fuel")
+        )
         return phases
 
     def step(
@@ -221,7 +227,7 @@ class CompiledSystem:
         seconds : float
             Length of the step [s].
         """
-        system, pending, rows = self._system, self._pending, list[list[float]]()
+        system, pending = self._system, self._pending
         if actions is not self._actions:
             self._actions = actions
             self._set[:] = actions
@@ -244,19 +250,21 @@ class CompiledSystem:
             phase.receive(*pending)
             pending.clear()
             phase.run()
-            row = phase.out.tolist()
-            rows.append(row)
-            for name, read in phase.messages:
-                try:
-                    runs[name].send(read(row))
-                except StopIteration as done:
-                    results[name] = done.value
+            if phase.messages:
+                told = phase.told.tolist()
+                for name, read in phase.messages:
+                    try:
+                        runs[name].send(read(told))
+                    except StopIteration as done:
+                        results[name] = done.value
         electric, fuel = system.powers(ops, results)
-        for row, place in zip(rows, self._power, strict=True):
-            electric += row[place]
-            fuel += row[place + 1]
-        after = tuple([rows[phase][place] for phase, place in self._state])
-        return HvacStep(Results(self._readers, rows, results), after, electric, fuel)
+        values = self._values.tolist()
+        for place in self._electric:
+            electric += values[place]
+        for place in self._fuel:
+            fuel += values[place]
+        after = tuple([values[place] for place in self._state])
+        return HvacStep(Results(self._readers, values, results), after, electric, fuel)
 
     def _put(self, port: str, message: Any) -> None:
         """Take down what a group draws, in the order in which its symbols were made."""
@@ -274,18 +282,15 @@ class _Trace(NamedTuple):
     ----------
     held : list
         What goes on to later phases.
-    results : dict
-        What components did that are done.
     messages : list of tuple
         What groups are told next.
     carried : slice
-        Where `held` stands among all that goes on.
+        Where symbols of `held` stand among all that goes on.
     drawn : int
         How many values groups have sent before.
     """
 
     held: list[Any]
-    results: dict[str, Any]
     messages: list[tuple[str, Any]]
     carried: slice
     drawn: int
@@ -317,24 +322,13 @@ def _leaves(template: Any) -> list[Any]:
     return [v for value in template for v in (_leaves(value) if isinstance(value, tuple | list) else [value])]
 
 
-def _reader(template: Any, begin: int) -> _Read:
-    """Make what reads a message or result, with its names, from a row of values."""
+def _reader(template: Any, places: Iterator[int]) -> _Read:
+    """Make what reads a message or result, with its names, from a row of values at the next of these places."""
     make: Callable[[Any], Any] | None = getattr(type(template), "_make", None)
-    if not any(isinstance(value, tuple | list) for value in template):
-        row = slice(begin, begin + len(template))
-        return itemgetter(row) if make is None else lambda values: make(values[row])
-    parts: list[_Read] = []
-    for value in template:
-        parts.append(_reader(value, begin) if isinstance(value, tuple | list) else itemgetter(begin))
-        begin += len(_leaves([value]))
-    return lambda values: make([part(values) for part in parts])  # type: ignore[misc]
-
-
-def _keeping(run: Callable[[], None], new: FloatArray, kept: FloatArray) -> Callable[[], None]:
-    """Let a function keep a part of what it gives for those after it."""
-
-    def both() -> None:
-        run()
-        kept[:] = new
-
-    return both
+    if any(isinstance(value, tuple | list) for value in template):
+        parts = [_reader(v, places) if isinstance(v, tuple | list) else itemgetter(next(places)) for v in template]
+        return lambda values: make([part(values) for part in parts])  # type: ignore[misc]
+    at = [next(places) for _ in template]
+    in_a_row = at == list(range(at[0], at[0] + len(at)))
+    row: _Read = itemgetter(slice(at[0], at[0] + len(at))) if in_a_row else itemgetter(*at)
+    return row if make is None else lambda values: make(row(values))

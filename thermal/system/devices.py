@@ -5,10 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from thermal.case.building import Building, Device, FloorPlans
+from thermal.components.air_handler import AirHandler
+from thermal.components.boiler_loop import BoilerLoop
 from thermal.components.component import Group, IndexArray
 from thermal.components.registry import COMPONENTS
 from thermal.components.terminals import Terminals
-from thermal.errors import ModelError, describe, nearest
+from thermal.errors import ModelError
 
 _METERS = ("chiller",)  # devices that are read, and are parts of others' models
 
@@ -25,14 +27,17 @@ class DeviceGraph:
         Position of the air handler that feeds each zone.
     emitters : dict of str to tuple of Device
         Further devices in zones, by type.
-    unknown : tuple of str
-        Devices whose type no component has, as ``name (type)``; they are left out.
+    water : str
+        Type of what supplies hot water: of the first device that does, else ``boiler``.
+    unused : dict of str to str
+        Devices that a plant made of the graph leaves out, each with the reason.
     """
 
     air_handlers: tuple[str, ...]
     serving: IndexArray
     emitters: dict[str, tuple[Device, ...]]
-    unknown: tuple[str, ...]
+    water: str
+    unused: dict[str, str]
 
 
 def device_graph(building: Building) -> DeviceGraph:
@@ -60,20 +65,26 @@ def device_graph(building: Building) -> DeviceGraph:
     names, zones = [d.name for d in building.devices], building.zone_names
     air_handlers = tuple(d.name for d in building.devices if d.type == "ahu")
     serving, emitters = _by_floor(building, max(1, len(air_handlers))), dict[str, tuple[Device, ...]]()
+    heats = {kind for kind, c in COMPONENTS.items() if any(p.quantity == "water" and p.supplies for p in c.ports)}
+    water, unused = next((d.type for d in building.devices if d.type in heats), BoilerLoop.device), dict[str, str]()
     for device in building.devices:
         feeding = getattr(device, "fed_by", ())
         for name in feeding:
-            if name not in names:
-                found = f"{name!r}"
-                raise ModelError(describe(f"device {device.name!r}: fed_by", "a device", found, nearest(name, names)))
+            ModelError.unless_known(name, names, f"device {device.name!r}: fed_by", "a device")
         kind = COMPONENTS.get(device.type)
-        if kind is Terminals and device.zone is not None:
+        if kind is None:
+            unused |= {} if device.type in _METERS else {device.name: f"no component has the type {device.type!r}"}
+        elif issubclass(kind, Group) and device.zone is None:
+            unused[device.name] = f"a {device.type} without a zone"
+        elif kind is Terminals:
             for name in (n for n in feeding if n in air_handlers):
-                serving[zones.index(device.zone)] = air_handlers.index(name)
-        elif kind is not None and issubclass(kind, Group) and device.zone is not None:
+                serving[zones.index(str(device.zone))] = air_handlers.index(name)
+        elif issubclass(kind, Group):
             emitters[device.type] = (*emitters.get(device.type, ()), device)
-    unknown = [f"{d.name} ({d.type})" for d in building.devices if d.type not in (*COMPONENTS, *_METERS)]
-    return DeviceGraph(air_handlers, serving, emitters, tuple(unknown))
+        elif device.type not in (AirHandler.device, water):
+            why = f"the hot water is of a {water}" if device.type in heats else "no rule connects it: pass the system"
+            unused[device.name] = f"a {device.type}, {why}"
+    return DeviceGraph(air_handlers, serving, emitters, water, unused)
 
 
 def _by_floor(building: Building, count: int) -> IndexArray:

@@ -5,9 +5,11 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from types import GeneratorType
 from typing import Any
 
+from thermal.components.air_handler import AirHandler
 from thermal.components.component import Calls, Conditions, Given
 from thermal.components.operations import Operations, Value
-from thermal.errors import ModelError, describe
+from thermal.errors import ModelError
+from thermal.system.connections import find_partners
 from thermal.system.step import HvacStep
 from thermal.system.system import HvacSystem
 
@@ -22,20 +24,10 @@ class PortMessages:
     """
 
     def __init__(self, system: HvacSystem) -> None:
-        self._each: set[tuple[str, str]] = set()
-        self._to: dict[tuple[str, str], list[tuple[str, str]]] = {}
+        self._to = find_partners(system.components, system.connections)
+        self._each = {(name, p.name) for name, c in system.components.items() for p in c.ports if p.shape == "each"}
         #: Messages on their way, by receiver and port, and by sender.
-        self.waiting: dict[tuple[str, str], dict[str, deque[Any]]] = {}
-        for consumer, port, suppliers in system.connections:
-            declared = system.port(consumer, port)
-            mine = consumer, port
-            self._each |= {mine} if declared.shape == "each" else set()
-            for name in suppliers:
-                theirs = name, system.supplying(name, declared.quantity)
-                self._to.setdefault(mine, []).append(theirs)
-                self._to.setdefault(theirs, []).append(mine)
-                self.waiting.setdefault(mine, {})[name] = deque()
-                self.waiting.setdefault(theirs, {})[consumer] = deque()
+        self.waiting = {port: {name: deque[Any]() for name, _ in others} for port, others in self._to.items()}
 
     def put(self, sender: str, port: str, message: Any) -> None:
         """Send a message; that of a group with several suppliers has a value for each of them in its fields.
@@ -62,7 +54,7 @@ class PortMessages:
         """
         boxes = self.waiting.get((receiver, port))
         if boxes is None:
-            raise ModelError(describe(f"{receiver}: port {port!r}", "a connection", "none", "connect it to a supplier"))
+            raise ModelError(f"{receiver}: port {port!r}", "one that it declares", "none", "see `ports`")
         if not all(boxes.values()):
             return None
         parts = [box.popleft() for box in boxes.values()]
@@ -154,8 +146,7 @@ def givens(
         Gives the `Given.put` of a component.
     """
     chosen, humid, found = {**system.defaults, **actions}, conditions.return_humidity, {}
-    handlers = list(system.of_kind(type(system.air_handlers[0]))) if system.air_handlers else []
-    states = list(zip(system.states, state, strict=True))
+    handlers, states = list(system.of_kind(AirHandler)), list(zip(system.states.values(), state, strict=True))
     for name, component in system.components.items():
         own = conditions
         if name in handlers and isinstance(humid, tuple | list):
@@ -209,21 +200,7 @@ def advance(
     runner = Runner(messages, runs)
     runner.advance(system.components)
     if runner.waiting:
-        raise ModelError(describe("HvacSystem", "components that do not wait for each other", f"{runner.waiting}"))
-    return finished(ops, system, {name: runner.results[name] for name in system.components})
-
-
-def finished(ops: Operations, system: HvacSystem, results: Mapping[str, Any]) -> HvacStep:
-    """Make a step of what the components did.
-
-    Parameters
-    ----------
-    ops : Operations
-        Arithmetic.
-    system : HvacSystem
-        The system.
-    results : mapping of str to named tuple
-        By component.
-    """
-    state = tuple([getattr(results[name], s.name) for name, s in system.states])
-    return HvacStep(results, state, *system.powers(ops, results))
+        raise ModelError("HvacSystem", "components that do not wait for each other", f"{runner.waiting}")
+    results = {name: runner.results[name] for name in system.components}
+    end = tuple([getattr(results[name], s.name) for name, s in system.states.values()])
+    return HvacStep(results, end, *system.powers(ops, results))

@@ -11,7 +11,7 @@ from thermal.components.checks import action, scalar_action
 from thermal.components.component import Conditions
 from thermal.components.operations import StepOperations
 from thermal.components.thermostat import Mode, ModeArray
-from thermal.errors import ModelError, describe, nearest
+from thermal.errors import ModelError
 from thermal.system.compiled import CompiledSystem
 from thermal.system.step import HvacStep
 from thermal.system.system import HvacSystem
@@ -43,11 +43,6 @@ class HvacState(NamedTuple):
     mode: ModeArray
     set_back: NDArray[np.bool_]
 
-    @property
-    def water(self) -> float:
-        """Temperature of the supply water, the first state [K]."""
-        return self.values[0]
-
 
 class HvacPlant:
     """Steps a system: heat into the zones from their temperatures and a controller's setpoints.
@@ -70,7 +65,7 @@ class HvacPlant:
     >>> cold = np.array([292.0, 296.0])
     >>> conditions = Conditions(cold, np.full(2, 294.0), np.full(2, 298.0), outdoor_temperature=275.0)
     >>> actions = system.actions(supply_air_temperature_setpoint=287.0, supply_water_temperature_setpoint=330.0)
-    >>> state, step = plant.step(plant.start(330.0), conditions, actions, 300.0)
+    >>> state, step = plant.step(plant.start(), conditions, actions, 300.0)
     >>> bool(plant.heat(step)[0] > 0.0)
     True
     """
@@ -82,24 +77,24 @@ class HvacPlant:
         self._usual: tuple[object, ...] = (None, None, None)
         self._asked: tuple[Mapping[str, Any] | None, tuple[float, ...]] = (None, ())
 
-    def start(self, water: float = 293.15) -> HvacState:
+    def start(self, **values: Any) -> HvacState:
         """State with thermostats off.
 
         Parameters
         ----------
-        water : float
-            Temperature of the supply water [K].
+        **values
+            As in `HvacSystem.start` [unit of the state].
 
         Returns
         -------
         HvacState
             To start from.
         """
-        for _, s in self.system.states:
-            scalar_action("supply water at the start", water, s.unit, s.lowest, s.highest)
-        n = self.system.zone_count
-        values = (float(water),) * len(self.system.states)
-        return HvacState(values, np.full(n, Mode.OFF, dtype=np.int8), np.zeros(n, dtype=bool))
+        chosen, n = self.system.start(**values), self.system.zone_count
+        for key, (_, s) in self.system.states.items():
+            scalar_action(f"{key} at the start", chosen[key], s.unit, s.lowest, s.highest)
+        off = np.full(n, Mode.OFF, dtype=np.int8)
+        return HvacState(tuple(map(float, chosen.values())), off, np.zeros(n, dtype=bool))
 
     def step(
         self,
@@ -169,8 +164,7 @@ class HvacPlant:
     def _check(self, conditions: Conditions, seconds: float) -> Conditions:
         zone, n = conditions.zone_temperature, self.system.zone_count
         if getattr(zone, "shape", None) != (n,):
-            found = f"shape {np.shape(zone)}"
-            raise ModelError(describe("zone_temperature", f"an array of {n} zones", found))
+            raise ModelError("zone_temperature", f"an array of {n} zones", f"shape {np.shape(zone)}")
         action("zone_temperature", zone, "K", *_AIR)
         setpoints = conditions[1:3]
         if setpoints[0] is not self._checked[0] or setpoints[1] is not self._checked[1]:
@@ -190,12 +184,11 @@ class HvacPlant:
         """Check actions by the ranges of their actuators, and lay them out."""
         system, chosen = self.system, []
         for name in actions:
-            if name not in system.actuators:
-                raise ModelError(describe("actions", "an actuator", repr(name), nearest(name, system.actuators)))
+            ModelError.unless_known(name, system.actuators, "actions", "an actuator")
         for name, (_, actuator) in system.actuators.items():
             value = actions.get(name, system.defaults.get(name))
             if not isinstance(value, float | int):
-                raise ModelError(describe(name, f"a number of {actuator.unit}", repr(value)))
+                raise ModelError(name, f"a number of {actuator.unit}", repr(value))
             scalar_action(name, value, actuator.unit, actuator.lowest, actuator.highest)
             chosen.append(float(value))
         self._asked = (actions, tuple(chosen))
@@ -207,10 +200,10 @@ class HvacPlant:
         plain: Any = value.tolist() if isinstance(value, np.ndarray | np.generic) else value
         each, n = name == "return_humidity" and isinstance(plain, tuple | list), len(self.system.air_handlers)
         if each and len(plain) != n:
-            raise ModelError(describe(name, f"one value or {n}, one an air handler", f"{len(plain)} values"))
+            raise ModelError(name, f"one value or {n}, one an air handler", f"{len(plain)} values")
         for one in plain if each else [plain]:
             if not isinstance(one, float | int):
-                raise ModelError(describe(name, f"a number of {unit}", repr(one)))
+                raise ModelError(name, f"a number of {unit}", repr(one))
             scalar_action(name, one, unit, lowest, highest)
         return tuple(map(float, plain)) if each else plain if type(plain) is float else float(plain)
 
@@ -219,11 +212,10 @@ class HvacPlant:
         n = self.system.zone_count
         for name, values in zip(Conditions._fields[1:3], (heating, cooling), strict=True):
             if getattr(values, "shape", None) != (n,):
-                raise ModelError(describe(name, f"an array of {n} zones", f"shape {np.shape(values)}"))
+                raise ModelError(name, f"an array of {n} zones", f"shape {np.shape(values)}")
             action(name, values, "K", *_AIR)
         if not (heating <= cooling).all():
             k = int(np.argmax(heating > cooling))
-            found = f"{heating[k]} and {cooling[k]} K in zone {k}"
-            raise ModelError(describe("setpoints", "heating not above cooling", found))
+            raise ModelError("setpoints", "heating not above cooling", f"{heating[k]} and {cooling[k]} K in zone {k}")
         frozen = not (heating.flags.writeable or cooling.flags.writeable)
         self._checked = (heating, cooling) if frozen else (None, None)

@@ -7,8 +7,8 @@ import numpy as np
 
 from thermal._types import FloatArray
 from thermal.case.points import POINT_TYPES
-from thermal.components.boiler_loop import BoilerLoop
-from thermal.components.component import Calls, Component, Conditions, EnergyBalance
+from thermal.components.component import Calls, Component, Conditions
+from thermal.components.energy_balance import EnergyBalance
 from thermal.components.operations import StepOperations
 from thermal.system.exchange import givens
 from thermal.system.step import HvacStep
@@ -31,8 +31,7 @@ class HvacPoints:
     def __init__(self, system: HvacSystem, pressures: bool = False) -> None:
         self.system, self._ops = system, StepOperations()
         kinds: dict[type[Component], list[str]] = {}
-        for name in [*system.groups, *(n for n in system.singles if not isinstance(system.components[n], BoilerLoop)),
-                     *system.of_kind(BoilerLoop)]:  # fmt: skip
+        for name in (*system.groups, *system.singles):
             kinds.setdefault(type(system.components[name]), []).append(name)
         columns, self._read = list[str](), list[tuple[slice, str, int]]()
         for of_pressure in (False, True)[: 1 + pressures]:
@@ -62,10 +61,10 @@ class HvacPoints:
         numpy.ndarray, shape (n_column,)
             In the library's units: kelvin, kg/s, W, shares.
         """
-        system, water = self.system, step.water
+        system = self.system
         given = givens(system, _NO_CALLS, conditions, actions, step.state, 0.0, _nowhere)
         values = {
-            name: component.read(self._ops, given[name], step.results[name], water)
+            name: component.read(self._ops, given[name], step.results[name])
             for name, component in system.components.items()
         }
         found = np.empty(len(self.columns))

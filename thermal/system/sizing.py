@@ -8,11 +8,9 @@ from thermal._types import FloatArray
 from thermal.case.building import Building, FloorPlans, ZoneTable
 from thermal.case.plan import zone_floor_areas
 from thermal.components.air_handler import AirHandler
-from thermal.components.boiler_loop import BoilerLoop
 from thermal.components.component import Group
 from thermal.components.cooling_coil import CoolingCoil
 from thermal.components.fan import Fan
-from thermal.components.pump import Pump
 from thermal.components.registry import COMPONENTS
 from thermal.components.terminals import Terminals
 from thermal.components.thermostat import Thermostat
@@ -27,8 +25,6 @@ from thermal.units import AIR_HEAT_CAPACITY, air_density
 
 _LONG_RUN = 1e8  # s: one implicit step to the steady state
 _COARSE = 1.0  # m: loads need no finer grid
-_LEAST_PIPES = 20.0  # W/K
-_LITRES = 0.01  # m3 of water per kW of boiler, usual for loops of steel pipe
 _HEATING_SHARE = 0.5  # largest heating flow over design flow: the most that ASHRAE 90.1 lets boxes reheat
 _DIVERSITY = 0.85  # zones do not peak together: air handlers carry this share of the terminals' flow
 
@@ -85,7 +81,8 @@ def size_system(
 ) -> HvacSystem:
     """Size the plant of a building: a terminal with reheat a zone, an air handler a device of type ``ahu``, one boiler.
 
-    Other devices in zones, such as radiators, get the heat that their zones lose, by the `sized` of their class.
+    Other devices in zones, such as radiators, get the heat that their zones lose, by the `sized` of their class; what
+    supplies the hot water is of the class of the first device that does, or a boiler.
     Heating loads are those of the steady state in the winter, from the building's model with its starting parameters;
     cooling flows are those of gains, sun and warmth outdoors. Which air handler feeds which zone says
     `thermal.system.devices.device_graph`.
@@ -103,6 +100,11 @@ def size_system(
     -------
     HvacSystem
         One terminal a zone, in the order of the zones.
+
+    Raises
+    ------
+    ModelError
+        When a device is fed by one that the building does not have, or its class cannot be sized.
 
     Examples
     --------
@@ -129,19 +131,14 @@ def size_system(
     emitters: dict[str, Group] = {}  # those of a zone share the heat that it loses
     for kind, devices in graph.emitters.items():
         zone = np.array([building.zone_names.index(str(device.zone)) for device in devices], dtype=np.intp)
-        emitters[kind] = COMPONENTS[kind].sized(loss[zone] / np.bincount(zone)[zone], zone)  # type: ignore[attr-defined]
+        emitters[kind] = COMPONENTS[kind].sized(loss[zone] / np.bincount(zone)[zone], zone)
     wet = [*coils, *emitters.values()]
-    pump = Pump(float(terminals.water_flow.sum() + sum(np.sum(getattr(part, "water_flow", 0.0)) for part in wet)))
+    water_flow = float(terminals.water_flow.sum() + sum(np.sum(getattr(part, "water_flow", 0.0)) for part in wet))
     capacity = float(reheat.sum()) + sum(c.air_flow * AIR_HEAT_CAPACITY * 12.0 for c in coils)
-    pipes = max(_LEAST_PIPES, 1e-3 * capacity / 10.0)
-    loop = BoilerLoop(
-        capacity, pump, pipe_conductance=min(pipes, 0.4 * pump.minimum_share * pump.design_flow * 4186.0),
-        standing_conductance=0.25 * pipes, water_volume=max(0.05, _LITRES * capacity / 1000.0),
-    )  # fmt: skip
-    system = vav_system(handlers, loop, terminals, thermostat)
+    system = vav_system(handlers, COMPONENTS[graph.water].sized(capacity, water_flow), terminals, thermostat)
     for kind, group in emitters.items():
-        suppliers = {port.name: "BOILER" for port in group.ports if port.quantity == "water"}
-        system = system.with_group(kind.upper(), group, **suppliers)
+        suppliers = {port.name: system.water_suppliers for port in group.connectors if port.quantity == "water"}
+        system = system.with_component(kind.upper(), group, **suppliers)
     return system
 
 

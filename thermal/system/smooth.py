@@ -16,6 +16,7 @@ from thermal._types import FloatArray
 from thermal.components.component import Conditions
 from thermal.components.moist_air import USUAL_HUMIDITY
 from thermal.components.operations import CasadiOperations, Value
+from thermal.errors import ModelError
 from thermal.system.step import HvacStep
 from thermal.system.symbolic import step_of
 from thermal.system.system import HvacSystem
@@ -106,7 +107,7 @@ class SmoothHvac:
     Attributes
     ----------
     inputs : dict of str to slice
-        Where states and manipulated inputs stand in the vector of inputs, by state and by type of the point.
+        Where states and manipulated inputs stand in the vector of inputs, by ``ENTITY/state`` and by type of the point.
     exogenous : dict of str to slice
         Where conditions and switches stand in the vector of exogenous inputs.
 
@@ -140,8 +141,7 @@ class SmoothHvac:
         sizes = {point: len(keys) for point, keys in system.by_point.items()}
         decided = {p: sizes[p] for p, a in kinds.items() if a.usual and a.default is None}
         held = {p: sizes[p] for p, a in kinds.items() if a.usual and a.default is not None and pressures}
-        states = {state.name: 1 for _, state in system.states}
-        self.inputs = _slices(states | decided | held | (zones if setpoints else {}))
+        self.inputs = _slices(dict.fromkeys(system.states, 1) | decided | held | (zones if setpoints else {}))
         others = {"outdoor_temperature": 1, "outdoor_humidity": 1, "return_humidity": self.n_air_handler,
                   "room_temperature": 1, "seconds": 1}  # fmt: skip
         switches = {p: sizes[p] for p, a in kinds.items() if not a.usual}
@@ -170,12 +170,16 @@ class SmoothHvac:
         ----------
         values : mapping of str to ndarray
             By name, as in `exogenous`, shape (N,) or (N, n) [unit of each]; the usual humidity, a plant room of 293.15
-            K and running devices by default.
+            K and the actuators' defaults where they are not given.
         """
-        usual = {"return_humidity": USUAL_HUMIDITY, "room_temperature": 293.15}
+        usual: dict[str, Any] = {"return_humidity": USUAL_HUMIDITY, "room_temperature": 293.15}
+        points, known = self.system.by_point, self.system.defaults
+        usual |= {point: np.array([[known.get(key, 1.0) for key in keys]]) for point, keys in points.items()}
         rows = np.empty((len(values["seconds"]), self.n_exogenous))
         for name, at in self.exogenous.items():
-            given = np.asarray(values.get(name, usual.get(name, 1.0)), dtype=float)
+            found = values.get(name, usual.get(name))
+            ModelError.unless(found is not None, "exogenous inputs", f"values of {name!r}", "none")
+            given = np.asarray(found, dtype=float)
             rows[:, at] = given[:, None] if given.ndim == 1 else given
         return rows
 

@@ -4,9 +4,9 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from thermal.components.air_handler import AirHandlerStep
-from thermal.components.boiler_loop import LoopStep
 from thermal.components.operations import Value
 from thermal.components.terminals import TerminalStep
+from thermal.errors import ModelError
 
 
 class HvacStep(NamedTuple):
@@ -35,20 +35,12 @@ class HvacStep(NamedTuple):
     @property
     def terminals(self) -> TerminalStep:
         """What the terminals did."""
-        return next(r for r in self.results.values() if type(r) is TerminalStep)
-
-    @property
-    def loop(self) -> LoopStep:
-        """What the hot-water loop did."""
-        return next(r for r in self.results.values() if type(r) is LoopStep)
-
-    @property
-    def water(self) -> Value:
-        """Supply water at the end [K]."""
-        return self.loop.supply_water_temperature
+        for result in self.results.values():
+            if type(result) is TerminalStep:
+                return result
+        raise ModelError("HvacStep", "terminals", ", ".join(self.results), "results has all components by name")
 
     @property
     def supply_temperature(self) -> tuple[Value, ...]:
         """Supply air of the air handlers [K]."""
-        water = self.water
-        return tuple([done.supply_temperature(water) for done in self.air_handlers])
+        return tuple([done.supply_temperature for done in self.air_handlers])

@@ -22,15 +22,15 @@ def step_of(ops: CasadiOperations, system: HvacSystem, known: Mapping[str, Any])
     system : HvacSystem
         The system.
     known : mapping of str to casadi.SX
-        States, fields of `Conditions` and ``seconds`` by name, actuators by point; pressures that are not there stay at
-        their design values.
+        States by ``ENTITY/state``, fields of `Conditions` and ``seconds`` by name, actuators by point; pressures that
+        are not there stay at their design values.
     """
     conditions = Conditions(*(known[name] for name in Conditions._fields))
     conditions = conditions._replace(return_humidity=tuple(casadi.vertsplit(known["return_humidity"])))
     points = [point for point in system.by_point if point in known]
     actions = system.actions(**{point: tuple(casadi.vertsplit(known[point])) for point in points})
     calls = system.thermostat.calls(ops, *conditions[:3])
-    state = [known[s.name] for _, s in system.states]
+    state = [known[key] for key in system.states]
     return advance(ops, system, state, calls, conditions, actions, known["seconds"])
 
 
@@ -48,10 +48,10 @@ def hvac_function(system: HvacSystem, width: float = 0.02) -> Any:
     Returns
     -------
     casadi.Function
-        Of SX. Inputs by name: the states, such as ``supply_water_temperature`` [K]; the fields of `Conditions`, zones
-        of shape (n_zone,), ``return_humidity`` of shape (n_air_handler,); the actuators by point, such as
+        Of SX. Inputs by name: the states, such as ``BOILER_supply_water_temperature`` [K]; the fields of `Conditions`,
+        zones of shape (n_zone,), ``return_humidity`` of shape (n_air_handler,); the actuators by point, such as
         ``supply_air_temperature_setpoint`` [K], (n_air_handler,); ``seconds`` [s]. Outputs: the states at the end, such
-        as ``supply_water_temperature_end``; ``heat`` [W], (n_zone,); ``electric_power``, ``fuel_power`` [W];
+        as ``BOILER_supply_water_temperature_end``; ``heat`` [W], (n_zone,); ``electric_power``, ``fuel_power`` [W];
         ``supply_temperature`` [K], (n_air_handler,); and what groups and loop did, such as ``VAV_airflow`` [kg/s],
         (n_terminal,), by component and field.
 
@@ -70,22 +70,22 @@ def hvac_function(system: HvacSystem, width: float = 0.02) -> Any:
     >>> from thermal.system.system import vav_system
     >>> system = vav_system([AirHandler(Fan(1.0))], BoilerLoop(2e4, Pump(0.5)), Terminals.sized([0.5], 4000.0))
     >>> hvac_function(system).name_out()[:2]
-    ['supply_water_temperature_end', 'heat']
+    ['BOILER_supply_water_temperature_end', 'heat']
     """
     ops, n, n_air = CasadiOperations(width), system.zone_count, len(system.air_handlers)
-    states = [state.name for _, state in system.states]
-    sizes = dict.fromkeys(states, 1) | dict.fromkeys(Conditions._fields, 1)
+    sizes = dict.fromkeys(system.states, 1) | dict.fromkeys(Conditions._fields, 1)
     sizes |= dict.fromkeys(Conditions._fields[:3], n) | {"return_humidity": n_air}
     sizes |= {point: len(keys) for point, keys in system.by_point.items()} | {"seconds": 1}
     s = {name: casadi.SX.sym(name, size) for name, size in sizes.items()}
     done = step_of(ops, system, s)
-    outputs = {f"{name}_end": value for name, value in zip(states, done.state, strict=True)}
+    outputs = {f"{key}_end": value for key, value in zip(system.states, done.state, strict=True)}
     outputs |= {"heat": system.at_zones(ops, done.results), "electric_power": done.electric_power}
     outputs |= {"fuel_power": done.fuel_power, "supply_temperature": casadi.vertcat(*done.supply_temperature)}
     outputs |= {
-        f"{name}_{field}": value
+        f"{name}/{field}": value
         for name, result in done.results.items()
         for field, value in result._asdict().items()
-        if not isinstance(value, tuple)
+        if not isinstance(value, tuple) and f"{name}/{field}" not in system.states
     }
-    return casadi.Function("hvac", list(s.values()), list(outputs.values()), list(s), list(outputs))
+    given, found = ([casadi.Function.fix_name(name) for name in each] for each in (s, outputs))
+    return casadi.Function("hvac", list(s.values()), list(outputs.values()), given, found)

@@ -5,37 +5,22 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
 from thermal._types import FloatArray
 from thermal.components.air_handler import AirHandler
 from thermal.components.boiler_loop import BoilerLoop
-from thermal.components.component import Actuator, Component, Group, Port, State
+from thermal.components.component import Actuator, Component, Group, State
 from thermal.components.operations import Operations, Value
 from thermal.components.terminals import Terminals
 from thermal.components.thermostat import Thermostat
 from thermal.components.water_coil import WaterCoil
-from thermal.errors import ModelError, describe, nearest
+from thermal.errors import ModelError
+from thermal.system.connections import Connection, by_kind, connectors, find_partners, spread
 
 _Kind = TypeVar("_Kind", bound=Component)
-
-
-class Connection(NamedTuple):
-    """A port that draws, and what supplies it.
-
-    Parameters
-    ----------
-    consumer, port : str
-        Name of the component that draws, and of its port.
-    suppliers : tuple of str
-        Names of the components that supply; one, or for a port of shape ``each`` those that its elements point to.
-    """
-
-    consumer: str
-    port: str
-    suppliers: tuple[str, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,44 +50,11 @@ class HvacSystem:
     names: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        for consumer, port, suppliers in self.connections:
-            for name in (consumer, *suppliers):
-                if name not in self.components:
-                    advice = nearest(name, self.components)
-                    raise ModelError(describe("HvacSystem: connection", "a component", repr(name), advice))
-            quantity = self.port(consumer, port).quantity
-            for name in suppliers:
-                self.supplying(name, quantity)
+        find_partners(self.components, self.connections)
         zones = np.unique(np.concatenate([g.zone for g in self.groups.values()] or [np.zeros(0, dtype=np.intp)]))
         if not len(zones) or len(zones) != zones[-1] + 1:
             missing = sorted(set(range(int(zones[-1]) if len(zones) else 1)) - set(zones.tolist()))
-            raise ModelError(describe("HvacSystem", "a terminal in each zone", f"none in zones {missing[:8]}"))
-
-    def port(self, component: str, name: str) -> Port:
-        """Find a port of a component.
-
-        Parameters
-        ----------
-        component, name : str
-            Names.
-        """
-        ports = {port.name: port for port in self.components[component].ports}
-        if name not in ports:
-            raise ModelError(describe(f"{component}: port", "one of its ports", repr(name), nearest(name, ports)))
-        return ports[name]
-
-    def supplying(self, component: str, quantity: str) -> str:
-        """Name of the port through which a component supplies a quantity.
-
-        Parameters
-        ----------
-        component, quantity : str
-            Name; ``air`` or ``water``.
-        """
-        for port in self.components[component].ports:
-            if port.supplies and port.quantity == quantity:
-                return port.name
-        raise ModelError(describe(f"{component}: port", f"one that supplies {quantity}", "none"))
+            raise ModelError("HvacSystem", "a terminal in each zone", f"none in zones {missing[:8]}")
 
     def of_kind(self, kind: type[_Kind]) -> dict[str, _Kind]:
         """Components of a class, by name.
@@ -113,6 +65,25 @@ class HvacSystem:
             The class.
         """
         return {name: c for name, c in self.components.items() if isinstance(c, kind)}
+
+    def only(self, kind: type[_Kind]) -> _Kind:
+        """Give the one component of a class.
+
+        Parameters
+        ----------
+        kind : type
+            The class.
+
+        Raises
+        ------
+        ModelError
+            There is none, or several.
+        """
+        found = self.of_kind(kind)
+        if len(found) != 1:
+            known = ", ".join(f"{name} ({type(c).__name__})" for name, c in self.components.items())
+            raise ModelError("HvacSystem", f"one {kind.__name__}", f"{len(found)} among {known}")
+        return next(iter(found.values()))
 
     @cached_property
     def groups(self) -> dict[str, Group]:
@@ -131,13 +102,19 @@ class HvacSystem:
 
     @cached_property
     def loop(self) -> BoilerLoop:
-        """The hot-water loop."""
-        return next(iter(self.of_kind(BoilerLoop).values()))
+        """The boiler loop."""
+        return self.only(BoilerLoop)
+
+    @cached_property
+    def water_suppliers(self) -> tuple[str, ...]:
+        """Names of the components that supply hot water."""
+        ports = connectors(self.components).items()
+        return tuple(name for (name, _), port in ports if port.supplies and port.quantity == "water")
 
     @cached_property
     def terminals(self) -> Terminals:
         """The VAV terminals."""
-        return next(iter(self.of_kind(Terminals).values()))
+        return self.only(Terminals)
 
     @cached_property
     def zone_count(self) -> int:
@@ -165,9 +142,9 @@ class HvacSystem:
         return tuple(handler.design_pressure for handler in self.air_handlers)
 
     @cached_property
-    def states(self) -> tuple[tuple[str, State], ...]:
-        """States, each with the component that has it."""
-        return tuple((name, state) for name, c in self.singles.items() for state in c.states)
+    def states(self) -> dict[str, tuple[str, State]]:
+        """States by ``ENTITY/state``, each with the component that has it."""
+        return {f"{name}/{s.name}": (name, s) for name, c in self.singles.items() for s in c.states}
 
     @cached_property
     def actuators(self) -> dict[str, tuple[str, Actuator]]:
@@ -186,8 +163,13 @@ class HvacSystem:
     @cached_property
     def by_point(self) -> dict[str, tuple[str, ...]]:
         """Actuators of each type, by the type of the point."""
-        points = dict.fromkeys(a.point for _, a in self.actuators.values())
-        return {p: tuple(key for key, (_, a) in self.actuators.items() if a.point == p) for p in points}
+        return by_kind(self.actuators)
+
+    @cached_property
+    def water_switches(self) -> tuple[str, ...]:
+        """Actuators that switch what supplies hot water, by ``ENTITY/point``."""
+        every = ((key, name) for key, (name, _) in self.actuators.items() if key.endswith("_running"))
+        return tuple(key for key, name in every if name in self.water_suppliers)
 
     def actions(self, **values: Any) -> dict[str, Any]:
         """Spread values of points over the components that have them.
@@ -195,7 +177,7 @@ class HvacSystem:
         Parameters
         ----------
         **values
-            By type of the point, one value for all or one each [unit of the actuator].
+            By type of the point, one value for all or one each, or by ``ENTITY/point`` [unit of the actuator].
 
         Returns
         -------
@@ -207,16 +189,19 @@ class HvacSystem:
         ModelError
             When no component has such an actuator, or there are not as many values.
         """
-        found: dict[str, Any] = {}
-        for point, value in values.items():
-            if point not in self.by_point:
-                raise ModelError(describe("actions", "a point", repr(point), nearest(point, self.by_point)))
-            keys, plain = self.by_point[point], value.tolist() if isinstance(value, np.ndarray) else value
-            each = list(plain) if isinstance(plain, tuple | list) else [plain] * len(keys)
-            if len(each) != len(keys):
-                raise ModelError(describe(point, f"one value or {len(keys)}, one a component", f"{len(each)} values"))
-            found |= zip(keys, each, strict=True)
-        return found
+        return spread("actions", self.actuators, values)
+
+    def start(self, **values: Any) -> dict[str, Any]:
+        """Give states to start from, by ``ENTITY/state``.
+
+        Parameters
+        ----------
+        **values
+            By name of the state, one value for all that have it or one each, or by ``ENTITY/state`` [unit of the
+            state]; as declared by default.
+        """
+        declared = {key: state.start for key, (_, state) in self.states.items()}
+        return declared | spread("start", self.states, values)
 
     def entities(self, name: str) -> tuple[str, ...]:
         """Names under which a component, or each element of a group, is known.
@@ -259,7 +244,7 @@ class HvacSystem:
                 new |= zip(mine, each, strict=False)
         if not fits:
             found = f"{', '.join(str(len(each)) for each in names.values())}, {len(set(given))} different"
-            raise ModelError(describe("names", f"{' and '.join(parts)}, all named differently", found))
+            raise ModelError("names", f"{' and '.join(parts)}, all named differently", found)
         known = {name: new.get(name, name) for name in self.components}
         return replace(
             self,
@@ -277,25 +262,48 @@ class HvacSystem:
         ----------
         **components : Component
             By name.
+
+        Raises
+        ------
+        ModelError
+            When the system has no component of such a name, or a new one lacks a port that is connected.
         """
+        for name in components:
+            ModelError.unless_known(name, self.components, "having", "a component (with_component adds one)")
         return replace(self, components={**self.components, **components})
 
-    def with_group(self, name: str, group: Group, **suppliers: str | tuple[str, ...]) -> HvacSystem:
-        """Add a group, such as radiators, and connect its ports.
+    def with_component(
+        self, name: str, component: Component, feeds: Sequence[str] = (), **suppliers: str | tuple[str, ...]
+    ) -> HvacSystem:
+        """Add a component, such as radiators or a heat pump, and connect its ports.
 
         Parameters
         ----------
         name : str
-            Of the group.
-        group : Group
-            The group.
+            A new one.
+        component : Component
+            The component.
+        feeds : sequence of str
+            Names of components that from now on draw from this one what it supplies.
         **suppliers : str or tuple of str
             Names of the components that supply it, by port.
+
+        Raises
+        ------
+        ModelError
+            When there is a component of this name, or a port stays without a connection.
         """
-        more = [Connection(name, port, (s,) if isinstance(s, str) else s) for port, s in suppliers.items()]
-        return replace(
-            self, components={**self.components, name: group}, connections=(*self.connections, *more)
-        )  # fmt: skip
+        if name in self.components:
+            advice = "take another name, or replace that one with having"
+            raise ModelError("with_component", "a new name", repr(name), advice)
+        supplied, ports = {p.quantity for p in component.connectors if p.supplies}, connectors(self.components)
+        links = {(c.consumer, c.port): c.suppliers for c in self.connections}
+        for consumer in feeds:
+            ModelError.unless_known(consumer, self.components, "with_component: feeds", "a component of the system")
+        links |= {link: (name,) for link in links if link[0] in feeds and ports[link].quantity in supplied}
+        links |= {(name, port): (s,) if isinstance(s, str) else s for port, s in suppliers.items()}
+        joined = tuple(Connection(*link, feeding) for link, feeding in links.items())
+        return replace(self, components={**self.components, name: component}, connections=joined)
 
     def at_zones(self, ops: Operations, results: Mapping[str, Any], port: str = "heat") -> Value:
         """Sum the heat that groups bring into the zones, one a zone [W].
@@ -328,35 +336,33 @@ class HvacSystem:
         return found
 
     def powers(self, ops: Operations, results: Mapping[str, Any]) -> tuple[Value, Value]:
-        """Electric and fuel power of all components that have a result [W].
+        """Electric and fuel power of components [W].
 
         Parameters
         ----------
         ops : Operations
             Arithmetic.
         results : mapping of str to named tuple
-            What components did.
+            What they did.
         """
-        totals: list[Value] = [0.0, 0.0]
-        for place, port, name, group in self._metered:
-            if name in results:
-                power = getattr(results[name], port)
-                totals[place] = totals[place] + (power if group is None else group.total(ops.of(name), power))
-        return totals[0], totals[1]
+        totals: dict[str, Value] = {"electricity": 0.0, "fuel": 0.0}
+        for name, result in results.items():
+            for kind, port in self.meters[name]:
+                power, group = getattr(result, port), self.groups.get(name)
+                totals[kind] = totals[kind] + (power if group is None else group.total(ops.of(name), power))
+        return totals["electricity"], totals["fuel"]
 
     @cached_property
-    def _metered(self) -> list[tuple[int, str, str, Group | None]]:
-        kinds = {"electricity": 0, "fuel": 1}
-        return [
-            (kinds[port.quantity], port.name, name, self.groups.get(name))
-            for name, c in self.components.items()
-            for port in c.ports
-            if port.quantity in kinds
-        ]
+    def meters(self) -> dict[str, list[tuple[str, str]]]:
+        """Electricity and fuel that each component takes up, with the ports, by component."""
+        return {
+            name: [(port.quantity, port.name) for port in component.ports if port.quantity in ("electricity", "fuel")]
+            for name, component in self.components.items()
+        }
 
 
 def vav_system(
-    air_handlers: Sequence[AirHandler], loop: BoilerLoop, terminals: Terminals, thermostat: Thermostat | None = None
+    air_handlers: Sequence[AirHandler], loop: Component, terminals: Terminals, thermostat: Thermostat | None = None
 ) -> HvacSystem:
     """Join air handlers, a hot-water loop and terminals, the usual system of an office.
 
@@ -364,8 +370,8 @@ def vav_system(
     ----------
     air_handlers : sequence of AirHandler
         At least one; they become ``AHU_0`` and so on.
-    loop : BoilerLoop
-        The hot-water loop, ``BOILER``, that every water coil draws from.
+    loop : Component
+        What supplies the hot water that every water coil draws; by its type of device ``BOILER``, ``HEAT_PUMP`` or so.
     terminals : Terminals
         Each supplied by one of the air handlers; the group is ``VAV``.
     thermostat : Thermostat, optional
@@ -380,11 +386,10 @@ def vav_system(
     if n == 0 or not supplied or supplied != set(range(n)):
         expected = "at least one air handler, each with a terminal of its own"
         advice = "Terminals.air_handler holds positions in air_handlers"
-        raise ModelError(describe("HvacSystem", expected, f"{n} of them and terminals at {supplied}", advice))
+        raise ModelError("HvacSystem", expected, f"{n} of them and terminals at {supplied}", advice)
     handlers = {f"AHU_{k}": handler for k, handler in enumerate(air_handlers)}
     wet = [name for name, handler in handlers.items() if isinstance(handler.heating, WaterCoil)]
     connections = [Connection("VAV", "supply_air", tuple(handlers))]
-    connections += [Connection(name, "hot_water", ("BOILER",)) for name in ("VAV", *wet)]
-    return HvacSystem(
-        {"VAV": terminals, **handlers, "BOILER": loop}, tuple(connections), thermostat or Thermostat()
-    )  # fmt: skip
+    water = loop.device.upper() or "HOT_WATER"
+    connections += [Connection(name, "hot_water", (water,)) for name in ("VAV", *wet)]
+    return HvacSystem({"VAV": terminals, **handlers, water: loop}, tuple(connections), thermostat or Thermostat())

@@ -90,7 +90,8 @@ class EnergyPlusBuilding:
         """Names of the devices; a building without boilers has an empty one, several chillers count as the first."""
         kinds = ("vav", "ahu", "boiler", "chiller")
         names = {kind: [d.name for d in self.building.devices if d.type == kind] for kind in kinds}
-        return PlantDevices({kind: tuple(each[:1] if kind == "chiller" else each) for kind, each in names.items()})
+        names["chiller"] = names["chiller"][:1]
+        return PlantDevices({kind: tuple(each) for kind, each in names.items()}, next(iter(names["boiler"]), ""))
 
     @property
     def full_water_flow(self) -> dict[str, float]:

@@ -40,7 +40,7 @@ class SitePoints:
     air_handlers : tuple of str
         Air handlers.
     boiler : str
-        Boiler.
+        Boiler, or what else supplies the hot water.
     weather_station : str
         Weather station.
     meters : tuple of str

@@ -46,7 +46,7 @@ class Rollout:
     air : ndarray, shape (N, n_air_handler)
         Supply air as it leaves each air handler [K].
     water : ndarray, shape (N,)
-        Supply water at the ends of the steps [K].
+        Supply water at the ends of the steps [K]; NaN where no state of the plant is its temperature.
     """
 
     plan: FloatArray
@@ -142,7 +142,8 @@ class Predictor:
         ControlError.unless(used.size and len(np.unique(used)) == used.size, "predictor", expected, found)
         self._prepare(modes, horizon, disturbance_time, scheme)
         self._design, self._scheduled = self._design_inputs(), self._undecided_setpoints(used)
-        self._stepper = hvac.stepper()
+        self._stepper, self._device = hvac.stepper(), np.array(list(hvac.system.start().values()))
+        self._water = [k for k, key in enumerate(hvac.system.states) if key.endswith("/supply_water_temperature")]
         self._known: tuple[HorizonData | None, FloatArray, FloatArray] = (None, np.zeros(0), np.zeros(0))
 
     def _prepare(self, modes: ModalModel, horizon: Horizon, disturbance_time: float, scheme: Scheme) -> None:
@@ -189,8 +190,8 @@ class Predictor:
             exogenous = self.hvac.surroundings({
                 HEATING_SETPOINT: data.heating_setpoint, COOLING_SETPOINT: data.cooling_setpoint,
                 "outdoor_temperature": data.outdoor_temperature, "outdoor_humidity": data.outdoor_humidity,
-                "fan_running": data.running, "boiler_running": data.boiler, "ventilation": data.ventilation,
-                "seconds": self.horizon.steps,
+                "fan_running": data.running, "ventilation": data.ventilation, "seconds": self.horizon.steps,
+                **{key.rpartition("/")[2]: data.boiler for key in self.hvac.system.water_switches},
             })  # fmt: skip
             self._known = (data, exogenous, self._undecided(data))
         return self._known[1], self._known[2]
@@ -230,7 +231,8 @@ class Predictor:
         """
         n, count, stepper, n_state = self.n_zone, len(self.horizon), self._stepper, self.hvac.n_state
         exogenous, drive = self._given(data)
-        inputs, x, device = self.inputs(plan), data.state, np.atleast_1d(data.water)
+        inputs, x, device = self.inputs(plan), data.state, self._device.copy()
+        device[self._water] = data.water
         if self._scheduled.size:
             first = self.hvac.inputs[HEATING_SETPOINT].start
             inputs[:, self._scheduled] = np.hstack([data.heating_setpoint, data.cooling_setpoint])[
@@ -254,7 +256,7 @@ class Predictor:
         sums, air = np.split(done[:, n + 2 + n_state : -n], [self.hvac.n_sum], axis=1)
         return Rollout(
             plan, zone, seen, done[:, n], done[:, n + 1], x, inputs, np.ascontiguousarray(sums), done[:, :n], air,
-            done[:, n + 2],
+            done[:, n + 2 + self._water[0]] if self._water else np.full(count, np.nan),
         )  # fmt: skip
 
     def reached(self, data: HorizonData, rollout: Rollout) -> FloatArray:

@@ -22,7 +22,7 @@ def test_a_rollout_solves_plant_and_building_together(make_problem, make_data, h
     for k, dt in enumerate(predictor.horizon.steps):
         air, hot = plan[predictor.horizon.block_of[k]]
         done = function(
-            supply_water_temperature=water, zone_temperature=found.seen[k],
+            BOILER_supply_water_temperature=water, zone_temperature=found.seen[k],
             zone_air_heating_temperature_setpoint=294.65, zone_air_cooling_temperature_setpoint=296.65,
             outdoor_temperature=276.0, outdoor_humidity=0.003, return_humidity=0.006, room_temperature=293.15,
             supply_air_temperature_setpoint=air, supply_water_temperature_setpoint=hot,
@@ -35,7 +35,7 @@ def test_a_rollout_solves_plant_and_building_together(make_problem, make_data, h
         free = step.end * x + step.end_gain * drive
         own = np.diag(modes.output @ (step.end_gain[:, None] * modes.heating))
         np.testing.assert_allclose(found.seen[k], modes.output @ free + 293.15 + own * heat, atol=1e-5)
-        x, water = free + step.end_gain * (modes.heating @ heat), float(done["supply_water_temperature_end"])
+        x, water = free + step.end_gain * (modes.heating @ heat), float(done["BOILER_supply_water_temperature_end"])
         np.testing.assert_allclose(found.zone[k + 1], modes.output @ x + 293.15, atol=1e-5)
         assert found.electric[k] == pytest.approx(float(done["electric_power"]), rel=1e-9)
         assert found.fuel[k] == pytest.approx(float(done["fuel_power"]), rel=1e-9)

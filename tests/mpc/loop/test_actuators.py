@@ -8,9 +8,18 @@ import pytest
 
 from mpc.errors import PlantActionError
 from mpc.loop.actuators import ACTION_LIMITS, actuators_of, checked_actions
+from thermal.components.air_handler import AirHandler
+from thermal.components.boiler_loop import BoilerLoop
+from thermal.components.fan import Fan
+from thermal.components.pump import Pump
+from thermal.components.terminals import Terminals
+from thermal.system.system import vav_system
 
 AIR, WATER = "AHU/supply_air_temperature_setpoint", "BOILER/supply_water_temperature_setpoint"
-ACTUATORS = {a.name: a for a in actuators_of(["AHU"], "BOILER", ["west"], None)}
+SYSTEM = vav_system([AirHandler(Fan(1.0))], BoilerLoop(2e4, Pump(0.5)), Terminals.sized([0.5], 4000.0)).named(
+    {AirHandler: ["AHU"]}
+)
+ACTUATORS = {a.name: a for a in actuators_of(SYSTEM, ["west"])}
 FINE = {AIR: 287.0, WATER: 330.0}
 
 
@@ -47,9 +56,9 @@ def test_a_missing_setpoint_is_named() -> None:
 
 
 def test_limits_are_of_known_kinds_and_in_order() -> None:
-    narrow = actuators_of(["AHU"], "BOILER", [], {"supply_air_temperature_setpoint": (286.0, 290.0)})
+    narrow = actuators_of(SYSTEM, [], {"supply_air_temperature_setpoint": (286.0, 290.0)})
     assert (narrow[0].lowest, narrow[0].highest) == (286.0, 290.0)
     with pytest.raises(PlantActionError, match="kind of action"):
-        actuators_of(["AHU"], "BOILER", [], {"supply_air": (286.0, 290.0)})
+        actuators_of(SYSTEM, [], {"supply_air": (286.0, 290.0)})
     with pytest.raises(PlantActionError, match="lower and a higher"):
-        actuators_of(["AHU"], "BOILER", [], {"supply_air_temperature_setpoint": (290.0, 286.0)})
+        actuators_of(SYSTEM, [], {"supply_air_temperature_setpoint": (290.0, 286.0)})

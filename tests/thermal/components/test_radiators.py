@@ -33,7 +33,7 @@ def system() -> HvacSystem:
     base = vav_system(
         [AirHandler(Fan(1.2), cooling=CoolingCoil(15e3))], BoilerLoop(3e4, Pump(1.0), water_volume=0.2), terminals
     )
-    return base.with_group("RADIATORS", RADIATORS, hot_water="BOILER")
+    return base.with_component("RADIATORS", RADIATORS, hot_water="BOILER")
 
 
 def cold(zone: tuple[float, ...] = (293.3, 292.0, 290.0), outdoor: float = 268.0) -> Conditions:
@@ -68,9 +68,9 @@ def test_near_en_442_with_the_logarithmic_mean(over: float, share: float) -> Non
 
 def test_a_steady_step_brings_the_characteristic_and_closes_to_round_off(system: HvacSystem) -> None:
     plant, conditions = HvacPlant(system), cold()
-    state, step = plant.step(plant.start(348.15), conditions, actions(system), 300.0)
+    state, step = plant.step(plant.start(supply_water_temperature=348.15), conditions, actions(system), 300.0)
     done = step.results["RADIATORS"]
-    assert state.water == pytest.approx(348.15, abs=1e-9)
+    assert state.values[0] == pytest.approx(348.15, abs=1e-9)
     call = np.clip(294.0 - conditions.zone_temperature[RADIATORS.zone], 0.0, 1.0)
     expected = RADIATORS.emitted(call * RADIATORS.water_flow, 348.15 - conditions.zone_temperature[RADIATORS.zone])
     assert done.heat == pytest.approx(expected, rel=1e-6)
@@ -88,7 +88,7 @@ def test_a_steady_step_brings_the_characteristic_and_closes_to_round_off(system:
 )  # fmt: skip
 def test_energy_closes(system: HvacSystem, water: float, zone: float, outdoor: float, seconds: float) -> None:
     plant, conditions = HvacPlant(system), cold((zone, zone + 1.0, zone - 2.0), outdoor)
-    _, step = plant.step(plant.start(320.0), conditions, actions(system, water), seconds)
+    _, step = plant.step(plant.start(supply_water_temperature=320.0), conditions, actions(system, water), seconds)
     balance = energy_balance(system, conditions, step)
     assert abs(balance.residual) <= 1e-9 * balance.turnover
     assert balance.zones == pytest.approx(plant.heat(step).sum(), rel=1e-12, abs=1e-9)
@@ -96,13 +96,13 @@ def test_energy_closes(system: HvacSystem, water: float, zone: float, outdoor: f
 
 def test_casadi_and_numpy_are_the_same_and_derivatives_are_finite_differences(system: HvacSystem) -> None:
     plant, conditions = HvacPlant(system), cold()
-    state, step = plant.step(plant.start(340.0), conditions, actions(system), 300.0)
+    state, step = plant.step(plant.start(supply_water_temperature=340.0), conditions, actions(system), 300.0)
     function, chosen = hvac_function(system, 0.0), system.defaults | actions(system)
-    given = {"supply_water_temperature": 340.0, "seconds": 300.0, **conditions._asdict()}
+    given = {"BOILER_supply_water_temperature": 340.0, "seconds": 300.0, **conditions._asdict()}
     given |= {point: [chosen[key] for key in keys] for point, keys in system.by_point.items()}
     found = function(**given)
     assert np.array(found["heat"]).ravel() == pytest.approx(plant.heat(step), rel=1e-12)
-    assert float(found["supply_water_temperature_end"]) == pytest.approx(state.water, rel=1e-12)
+    assert float(found["BOILER_supply_water_temperature_end"]) == pytest.approx(state.values[0], rel=1e-12)
     smooth = hvac_function(system, 0.02)
     symbols = {name: casadi.SX.sym(name, smooth.size1_in(name)) for name in smooth.name_in()}
     heat = smooth(**symbols)["heat"]
@@ -139,7 +139,7 @@ def test_the_jacobian_is_still_a_diagonal_and_a_product_of_low_rank(system: Hvac
 def test_points_and_parameters(system: HvacSystem) -> None:
     plant, points = HvacPlant(system), HvacPoints(system)
     chosen = actions(system)
-    _, step = plant.step(plant.start(348.15), cold(), chosen, 300.0)
+    _, step = plant.step(plant.start(supply_water_temperature=348.15), cold(), chosen, 300.0)
     values = dict(zip(points.columns, points.read(cold(), chosen, step), strict=True))
     assert values["RADIATORS_1/heating_power_sensor"] == step.results["RADIATORS"].heat[1]
     with pytest.raises(ModelError, match=r"Radiators.exponent\[0\]: expected 1.05 to 1.6 -"):

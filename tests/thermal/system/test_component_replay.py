@@ -18,7 +18,7 @@ def told(plant_system, command):
     """What a plant's sensors say over many steps, with what happened behind them."""
     system = plant_system.named({Terminals: list("abcde"), AirHandler: ["A0", "A1"], BoilerLoop: ["B"]})
     plant, points = HvacPlant(system), HvacPoints(system)
-    rng, state, rows, steps = np.random.default_rng(0), plant.start(330.0), [], []
+    rng, state, rows, steps = np.random.default_rng(0), plant.start(supply_water_temperature=330.0), [], []
     for k in range(N_TIME):
         zone = rng.uniform(289.0, 300.0, 5)
         conditions = Conditions(zone, np.full(5, 293.0), np.full(5, 297.0), 283.0 + 12.0 * np.sin(k / 30.0), 0.005)
@@ -97,10 +97,10 @@ def test_an_air_handler_that_does_not_run_takes_nothing(gas_system):
 
 def test_a_loop_follows_its_load(plant_system, told):
     column, steps = told
-    flows = np.array([s.loop.water_flow for s in steps])
+    flows = np.array([s.results["B"].water_flow for s in steps])
     found = replay_loop(
         plant_system.loop,
-        np.array([s.loop.load for s in steps]),
+        np.array([s.results["B"].load for s in steps]),
         flows,
         column("B", "supply_water_temperature_setpoint")[:, 0],
         300.0,

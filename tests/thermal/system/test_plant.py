@@ -26,13 +26,13 @@ def actions(plant_system):
 
 def test_steps_repeat_bit_for_bit(plant, plant_system, actions):
     def day(plant):
-        state, heats = plant.start(300.0), []
+        state, heats = plant.start(supply_water_temperature=300.0), []
         for k in range(288):
             zone = CONDITIONS.zone_temperature + np.sin(k / 40.0)
             conditions = CONDITIONS._replace(zone_temperature=zone, outdoor_temperature=285.0 + 8.0 * np.sin(k / 46.0))
             state, step = plant.step(state, conditions, actions, 300.0)
             heats.append(plant.heat(step))
-        return np.array(heats), state.water
+        return np.array(heats), state.values[0]
 
     first, second = day(plant), day(HvacPlant(plant_system))
     assert np.array_equal(first[0], second[0]) and first[1] == second[1]
@@ -114,14 +114,14 @@ def test_actions_may_be_arrays(plant, actions, command):
 def test_steps_and_starts_out_of_range_are_refused(plant, actions):
     with pytest.raises(ModelError, match="step: expected 1 to 3600 s"):
         plant.step(plant.start(), CONDITIONS, actions, 0.0)
-    with pytest.raises(ModelError, match="supply water at the start"):
-        plant.start(60.0)
+    with pytest.raises(ModelError, match="BOILER.supply_water_temperature at the start: expected 273.15 to 373.15 K"):
+        plant.start(supply_water_temperature=60.0)
 
 
 def test_thermostats_that_remember_keep_heating(plant_system, actions):
     plant = HvacPlant(replace(plant_system, thermostat=Thermostat(release=0.5)))
     inside = CONDITIONS._replace(zone_temperature=np.full(5, 294.0))
-    state, step = plant.step(plant.start(330.0), inside, actions, 300.0)
+    state, step = plant.step(plant.start(supply_water_temperature=330.0), inside, actions, 300.0)
     assert set(state.mode) == {Mode.OFF} and not step.terminals.reheat.any()
     state, _ = plant.step(state, CONDITIONS._replace(zone_temperature=np.full(5, 292.0)), actions, 300.0)
     state, step = plant.step(state, inside, actions, 300.0)
@@ -136,7 +136,7 @@ def test_a_step_of_the_pilots_size_is_fast(pilot_system, command):
     for setpoints in (low, high):
         setpoints.setflags(write=False)
     conditions = Conditions(np.linspace(290.0, 300.0, n), low, high, 300.0)
-    state = plant.start(330.0)
+    state = plant.start(supply_water_temperature=330.0)
     taken = []
     for _ in range(20):
         start = time.process_time()
@@ -157,8 +157,8 @@ def test_a_plant_gives_the_same_whatever_it_kept(plant_system, command):
     plant = HvacPlant(plant_system)
     for chosen in [*actions, *actions[::-1], *actions]:
         fresh = HvacPlant(plant_system)
-        state, step = plant.step(plant.start(330.0), conditions, chosen, 300.0)
-        expected_state, expected = fresh.step(fresh.start(330.0), conditions, chosen, 300.0)
-        assert state.water == expected_state.water
+        state, step = plant.step(plant.start(supply_water_temperature=330.0), conditions, chosen, 300.0)
+        expected_state, expected = fresh.step(fresh.start(supply_water_temperature=330.0), conditions, chosen, 300.0)
+        assert state.values[0] == expected_state.values[0]
         assert np.array_equal(step.terminals.heat, expected.terminals.heat)
         assert step.electric_power == expected.electric_power

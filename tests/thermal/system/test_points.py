@@ -22,7 +22,7 @@ def read(system, names, command, given, pressures=False):
     actions, plant = command(system, **given), HvacPlant(system)
     zone = np.array([290.0, 294.0, 296.5, 297.4, 300.0])
     conditions = Conditions(zone, np.full(5, 293.0), np.full(5, 297.0), 275.0)
-    state, step = plant.step(plant.start(330.0), conditions, actions, 300.0)
+    state, step = plant.step(plant.start(supply_water_temperature=330.0), conditions, actions, 300.0)
     points = HvacPoints(system, pressures)
     return dict(zip(points.columns, points.read(conditions, actions, step), strict=True)), step, state
 
@@ -42,7 +42,7 @@ def test_points_say_what_happened(plant_system, command):
     assert values["VAV_4/heating_water_valve_percentage_command"] == pytest.approx(0.0, abs=1e-9)
     assert values["VAV_0/heating_water_valve_percentage_command"] > 0.1
     assert values["AHU_2/supply_air_temperature_setpoint"] == 288.0
-    assert values["BOILER/supply_water_temperature_sensor"] == state.water
+    assert values["BOILER/supply_water_temperature_sensor"] == state.values[0]
     assert values["BOILER/gas_power_sensor"] == pytest.approx(step.fuel_power)
 
 

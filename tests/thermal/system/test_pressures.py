@@ -58,4 +58,6 @@ def test_expressions_are_laid_out_as_floats_are(plant_system, command):
     assert np.array(casadi.DM(found.terminals.most_airflow)).ravel() == pytest.approx(
         held.terminals.most_airflow, rel=1e-12
     )
-    assert float(casadi.DM(found.loop.water_flow)) == pytest.approx(held.loop.water_flow, rel=1e-12)
+    assert float(casadi.DM(found.results["BOILER"].water_flow)) == pytest.approx(
+        held.results["BOILER"].water_flow, rel=1e-12
+    )

@@ -19,7 +19,7 @@ def points(smooth: SmoothHvac, count: int = 12) -> tuple[np.ndarray, np.ndarray,
     rng = np.random.default_rng(1)
     zone, n, n_air = rng.uniform(291.0, 299.0, (count, smooth.n_zone)), smooth.n_zone, smooth.n_air_handler
     inputs, at = np.zeros((count, smooth.n_input)), smooth.inputs
-    inputs[:, at["supply_water_temperature"]] = rng.uniform(310.0, 350.0, (count, 1))
+    inputs[:, at["BOILER/supply_water_temperature"]] = rng.uniform(310.0, 350.0, (count, 1))
     inputs[:, at["supply_air_temperature_setpoint"]] = rng.uniform(285.0, 297.0, (count, n_air))
     inputs[:, at["supply_water_temperature_setpoint"]] = rng.uniform(310.0, 350.0, (count, 1))
     inputs[:, at["supply_air_static_pressure_setpoint"]] = rng.uniform(60.0, 110.0, (count, n_air))
@@ -47,7 +47,7 @@ def test_a_step_is_that_of_the_plants_function(smooth: SmoothHvac) -> None:
     function = hvac_function(smooth.system)
     for k in range(len(zone)):
         found = function(
-            supply_water_temperature=inputs[k, 0], zone_temperature=zone[k],
+            BOILER_supply_water_temperature=inputs[k, 0], zone_temperature=zone[k],
             zone_air_heating_temperature_setpoint=294.0, zone_air_cooling_temperature_setpoint=297.0,
             outdoor_temperature=exogenous[k, 2 * n], outdoor_humidity=0.005, return_humidity=0.006,
             room_temperature=293.15,
@@ -57,7 +57,7 @@ def test_a_step_is_that_of_the_plants_function(smooth: SmoothHvac) -> None:
             differential_pressure_setpoint=inputs[k, smooth.inputs["differential_pressure_setpoint"]],
             fan_running=np.ones(n_air), boiler_running=1.0, ventilation=np.ones(n_air), seconds=300.0,
         )  # fmt: skip
-        names = ("heat", "electric_power", "fuel_power", "supply_water_temperature_end")
+        names = ("heat", "electric_power", "fuel_power", "BOILER_supply_water_temperature_end")
         wanted = np.concatenate([np.array(found[name]).ravel() for name in names])
         np.testing.assert_allclose(done[k, : n + 3], wanted, rtol=1e-10)
 

@@ -39,11 +39,13 @@ def outputs(system, *given):
 def test_casadi_and_numpy_are_the_same(plant_system, command, seed):
     water, conditions, actions = drawn(seed, 5, 2)
     plant = HvacPlant(plant_system)
-    state, step = plant.step(plant.start(water), conditions, command(plant_system, *actions), 300.0)
+    state, step = plant.step(
+        plant.start(supply_water_temperature=water), conditions, command(plant_system, *actions), 300.0
+    )
     found = outputs(plant_system, *arguments(water, conditions, actions))
-    done, loop = step.terminals, step.loop
+    done, loop = step.terminals, step.results["BOILER"]
     expected = {
-        "supply_water_temperature_end": state.water, "heat": plant.heat(step), "electric_power": step.electric_power,
+        "BOILER_supply_water_temperature_end": state.values[0], "heat": plant.heat(step), "electric_power": step.electric_power,
         "fuel_power": step.fuel_power, "VAV_airflow": done.airflow, "VAV_entering": done.entering,
         "VAV_reheat": done.reheat, "supply_temperature": step.supply_temperature,
         "BOILER_return_water_temperature": loop.return_water_temperature, "BOILER_pump_power": loop.pump_power,
@@ -59,18 +61,20 @@ def test_several_terminals_of_a_zone_add_up_symbolically(plant_system, command):
     system = vav_system(plant_system.air_handlers, plant_system.loop, terminals)
     water, conditions, actions = drawn(1, 2, 2)
     plant = HvacPlant(system)
-    heat = plant.heat(plant.step(plant.start(water), conditions, command(system, *actions), 300.0)[1])
+    heat = plant.heat(
+        plant.step(plant.start(supply_water_temperature=water), conditions, command(system, *actions), 300.0)[1]
+    )
     assert np.allclose(np.array(hvac_function(system, 0.0)(*arguments(water, conditions, actions))[1]).ravel(), heat)
 
 
 @pytest.mark.parametrize("seed", range(10))
 def test_derivatives_are_those_of_finite_differences(plant_system, seed):
     function = hvac_function(plant_system, 0.05)
-    names = ("supply_water_temperature", "zone_temperature", "supply_air_temperature_setpoint",
+    names = ("BOILER_supply_water_temperature", "zone_temperature", "supply_air_temperature_setpoint",
              "supply_water_temperature_setpoint", "supply_air_static_pressure_setpoint")  # fmt: skip
     point = dict(zip(function.name_in(), arguments(*drawn(seed, 5, 2)), strict=True))
     point = {name: np.array(casadi.DM(value)).ravel().astype(float) for name, value in point.items()}
-    outputs = ("supply_water_temperature_end", "heat", "electric_power", "fuel_power")
+    outputs = ("BOILER_supply_water_temperature_end", "heat", "electric_power", "fuel_power")
     symbols = [casadi.SX.sym(n, function.size1_in(n)) for n in function.name_in()]
     results = function.call(dict(zip(function.name_in(), symbols, strict=True)))
     stacked = casadi.vertcat(*(results[name] for name in outputs))
@@ -125,7 +129,7 @@ def test_the_second_law_holds_for_the_smooth_plant(plant_system, seed):
     function = hvac_function(plant_system, 0.1)
     water, conditions, actions = drawn(seed, 5, 2)
     found = dict(zip(function.name_out(), function(*arguments(water, conditions, actions)), strict=True))
-    end, rate = float(found["supply_water_temperature_end"]), 1006.0 * np.array(found["VAV_airflow"]).ravel()
+    end, rate = float(found["BOILER_supply_water_temperature_end"]), 1006.0 * np.array(found["VAV_airflow"]).ravel()
     discharge = np.array(found["VAV_entering"]).ravel() + np.array(found["VAV_reheat"]).ravel() / rate
     supply = np.array(found["supply_temperature"]).ravel()[plant_system.terminals.air_handler]
     assert np.all(discharge <= np.maximum(supply, end) + 1e-9)

@@ -56,7 +56,7 @@ plant_of = cache(HvacPlant)
 def taken(system, s):
     conditions, actions = situation(system, s)
     plant = plant_of(system)
-    state, step = plant.step(plant.start(s["before"]), conditions, actions, s["seconds"])
+    state, step = plant.step(plant.start(supply_water_temperature=s["before"]), conditions, actions, s["seconds"])
     return conditions, step, state, plant.heat(step)
 
 
@@ -77,7 +77,7 @@ def test_energy_closes_with_gas_coils(gas_system, s):
     s = s | {"ventilation": 1.0}
     conditions, actions = situation(gas_system, s)
     plant = plant_of(gas_system)
-    _, step = plant.step(plant.start(s["before"]), conditions, actions, s["seconds"])
+    _, step = plant.step(plant.start(supply_water_temperature=s["before"]), conditions, actions, s["seconds"])
     balance = energy_balance(gas_system, conditions, step)
     assert abs(balance.residual) <= 1e-9 * balance.turnover + 1e-6
 
@@ -86,18 +86,18 @@ def test_energy_closes_with_gas_coils(gas_system, s):
 @given(s=st.fixed_dictionaries(SITUATIONS))
 def test_no_air_is_hotter_than_its_water_nor_beyond_its_limit(plant_system, s):
     _, step, state, _ = taken(plant_system, s)
-    ceiling = np.maximum(step.terminals.entering, state.water)
+    ceiling = np.maximum(step.terminals.entering, state.values[0])
     assert np.all(step.terminals.discharge <= ceiling + 1e-9)
     limit = plant_system.terminals.discharge_limit
     assert np.all(step.terminals.discharge <= np.maximum(limit, step.terminals.entering) + 1e-6)
-    floor = np.minimum(step.terminals.entering, state.water)
+    floor = np.minimum(step.terminals.entering, state.values[0])
     assert np.all(step.terminals.discharge >= floor - 1e-9)
-    assert state.water <= max(s["before"], s["water"], max(s["zones"]), s["outdoor"], 305.0) + 1e-6
+    assert state.values[0] <= max(s["before"], s["water"], max(s["zones"]), s["outdoor"], 305.0) + 1e-6
     # water comes back no colder than the coldest of what it meets: air, plant room, the water before
     coldest = min(
         [293.15, s["before"], *(a.mixed.cooled_temperature for a in step.air_handlers), *step.terminals.entering]
     )
-    assert coldest - 1e-6 <= step.loop.return_water_temperature
+    assert coldest - 1e-6 <= step.results["BOILER"].return_water_temperature
     assert np.all((step.terminals.valve_flow >= 0.0) & (step.terminals.valve_flow <= 1.0 + 1e-12))
 
 
@@ -132,9 +132,11 @@ def test_hotter_water_is_never_less_heat(plant_system, s, more):
 def test_air_handlers_that_are_off_bring_nothing(plant_system, command):
     conditions = Conditions(np.full(5, 285.0), np.full(5, 293.0), np.full(5, 297.0), 270.0)
     plant = HvacPlant(plant_system)
-    _, step = plant.step(plant.start(330.0), conditions, command(plant_system, 290.0, 330.0, running=0.0), 300.0)
+    _, step = plant.step(
+        plant.start(supply_water_temperature=330.0), conditions, command(plant_system, 290.0, 330.0, running=0.0), 300.0
+    )
     assert np.abs(plant.heat(step)).max() < 1e-6
-    assert step.electric_power == pytest.approx(step.loop.pump_power, abs=1e-6)
+    assert step.electric_power == pytest.approx(step.results["BOILER"].pump_power, abs=1e-6)
 
 
 def test_several_terminals_of_a_zone_add_up(plant_system, command):
@@ -142,7 +144,9 @@ def test_several_terminals_of_a_zone_add_up(plant_system, command):
     system = vav_system(plant_system.air_handlers, plant_system.loop, terminals)
     plant = HvacPlant(system)
     conditions = Conditions(np.array([290.0, 299.0]), np.full(2, 293.0), np.full(2, 297.0), 280.0)
-    _, step = plant.step(plant.start(330.0), conditions, command(plant.system, 287.0, 330.0), 300.0)
+    _, step = plant.step(
+        plant.start(supply_water_temperature=330.0), conditions, command(plant.system, 287.0, 330.0), 300.0
+    )
     heat = plant.heat(step)
     assert heat.shape == (2,)
     assert heat[0] == pytest.approx(step.terminals.heat[0] + step.terminals.heat[2])
@@ -152,7 +156,9 @@ def test_several_terminals_of_a_zone_add_up(plant_system, command):
 def test_the_heat_is_the_metered_heat(plant_system, command):
     conditions = Conditions(np.linspace(290.0, 299.0, 5), np.full(5, 293.0), np.full(5, 297.0), 280.0)
     plant = HvacPlant(plant_system)
-    _, step = plant.step(plant.start(330.0), conditions, command(plant.system, 287.0, 330.0), 300.0)
+    _, step = plant.step(
+        plant.start(supply_water_temperature=330.0), conditions, command(plant.system, 287.0, 330.0), 300.0
+    )
     metered = step.terminals.airflow * 1006.0 * (step.terminals.discharge - conditions.zone_temperature)
     assert np.allclose(plant.heat(step), metered, rtol=1e-12)
 

@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 from scipy import ndimage
 
-from thermal.case.building import DEVICE_TYPES, INTERIOR_WALL, PLAN_TOKENS, FloorPlan, FloorPlans, Location
+from thermal.case.building import INTERIOR_WALL, PLAN_TOKENS, FloorPlan, FloorPlans, Location
 from thermal.case.plan import check_plan, facade_areas, zone_floor_areas
 from thermal.case.validation import GLAZING_TOLERANCE, RESERVED, TERMINAL_TYPES, check_building, check_columns
+from thermal.components.registry import device_types
 from thermal.errors import CaseError, nearest
 from thermal.plan.page.draft import Draft, DraftFloor, building_of_draft, zones_of
 
@@ -207,6 +208,6 @@ def _on_devices(draft: Draft) -> Iterator[DraftFinding]:
             yield _error("device", device.name, f"zone {device.zone!r} is on no floor; {nearest(device.zone, zones)}")
         if device.zone is None and device.type in TERMINAL_TYPES:
             yield _remark("device", device.name, f"a {device.type} that serves no zone: its heat is not counted")
-        if device.type and device.type not in DEVICE_TYPES:
-            text = f"a type that the library does not know: {device.type!r}; {nearest(device.type, DEVICE_TYPES)}"
+        if device.type and device.type not in device_types():
+            text = f"a type that the library does not know: {device.type!r}; {nearest(device.type, device_types())}"
             yield _remark("device", device.name, text)
