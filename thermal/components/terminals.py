@@ -190,11 +190,9 @@ class Terminals(Group):
         heats = all_in_range("Terminals.sized: heating_capacity", heating_capacity, n, "W", 0.0, 1e7)
         films = np.full((n, 3), _LEAST)
         for k in np.flatnonzero(heats):
-            coil = WaterCoil.sized(
-                float(heats[k]), float(heating_share * flows[k]), supply_temperature, water_temperature
-            )
-            rise = (heating_share) ** -0.8  # films are stated at the design flow
-            films[k] = coil.air_conductance * rise, coil.water_conductance, coil.water_flow
+            coil = WaterCoil.sized(heats.item(k), heating_share * flows.item(k), supply_temperature, water_temperature)
+            # films are stated at the design flow
+            films[k] = coil.air_conductance * heating_share**-0.8, coil.water_conductance, coil.water_flow
         return cls(
             design_flow=flows,
             minimum_flow=minimum_share * flows,
@@ -226,7 +224,6 @@ class Terminals(Group):
         airflow = self.airflow(ops, heating, cooling, most)
         rate = AIR_HEAT_CAPACITY * airflow
         given.put("supply_air", AirDrawn(ops.sums(airflow, self.members), ops.sums(airflow * zone, self.members)))
-
         supply: SupplyAir = yield "supply_air"
         coil = valve_flow = np.zeros(len(self))  # shut, where nobody calls
         if not (self._tight and ops.surely_below(heating, 0.0)):
@@ -278,8 +275,7 @@ class Terminals(Group):
 
     @cached_property
     def _at_opening(self) -> LastValue:
-        rate = WATER_HEAT_CAPACITY * self.water_flow
-        return LastValue(partial(water_side, NumpyOperations(), rate, self.water_film))
+        return LastValue(partial(water_side, NumpyOperations(), WATER_HEAT_CAPACITY * self.water_flow, self.water_film))
 
     @cached_property
     def _at_reach(self) -> LastValue:
@@ -396,14 +392,9 @@ class Terminals(Group):
 
         Parameters
         ----------
-        ops : Operations
-            Arithmetic.
-        given : Given
-            As `run` had it.
-        done : TerminalStep
-            What `run` returned.
+        ops, given, done : Operations, Given, TerminalStep
+            Arithmetic; what `run` had, and what it returned.
         """
-        seen = given.conditions[:3]
         damper = np.minimum(done.airflow / done.most_airflow, 1.0) * (done.most_airflow > LEAST_AIR)
         valve = valve_position(ops, done.valve_flow, self.rangeability)
-        return [*(values[self.zone] for values in seen), done.airflow, done.discharge, damper, valve]
+        return [*(values[self.zone] for values in given.conditions[:3]), done.airflow, done.discharge, damper, valve]
