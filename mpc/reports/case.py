@@ -71,7 +71,7 @@ def check_verdict(check: CaseCheck) -> str:
     flawed = sum(c.unusable_share > 0 for c in check.quality.columns)
     days = ((check.end - check.start).total_seconds() + check.step) / 86400.0
     wrong = [anomaly.what for anomaly in check.anomalies if anomaly.severity == "error"]
-    valid = f"The case is *not valid for calibration*: {'; '.join(wrong)}. It has" if wrong else "The case is valid:"
+    valid = f"The case is not valid for calibration: {'; '.join(wrong)}. It has" if wrong else "The case is valid:"
     parts = [
         f"{valid} {counted(len(check.zones), 'zone')} on {significant(check.floor_area)} m², {measured}",
         f"of them measured, {counted(len(check.devices), 'device')}, {days:.3g} days of telemetry every",

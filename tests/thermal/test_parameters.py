@@ -30,9 +30,13 @@ def test_parameter_has_a_unit_a_range_and_a_source(name: str) -> None:
     p = PARAMETERS[name]
     assert p.name == name
     UNITS.parse_units(p.unit)
+    assert len(p.source) > 5
+    if p.scale == "linear":  # what may be absent or of either sign
+        assert p.lower <= p.start < p.upper
+        assert p.prior_deviation == max(p.start - p.lower, p.upper - p.start) / 2.0
+        return
     assert 0 < p.lower < p.start < p.upper
     assert p.scale != "logit" or p.upper < 1
-    assert len(p.source) > 5
     # the range is the 95 % interval of the prior: four deviations on the estimation scale
     assert p.transform(p.upper) - p.transform(p.lower) == pytest.approx(4 * p.prior_deviation, rel=1e-13)
 

@@ -208,7 +208,7 @@ def test_check_and_calibrate_say_what_cannot_be_fitted(tmp_path: Path) -> None:
     frame = scaled("flowrate", 3600.0)(case.telemetry.frame.copy(), case)
     folder = save_case(Case(case.building, Telemetry.from_frame(frame)), tmp_path / "kgh")
     answer = CliRunner().invoke(app, ["check", str(folder)])
-    assert answer.exit_code == 0 and "*not valid for calibration*" in answer.stdout and "kg/h" in answer.stdout
+    assert answer.exit_code == 0 and "not valid for calibration" in answer.stdout and "kg/h" in answer.stdout
     answer = CliRunner().invoke(app, ["calibrate", str(folder), "--out", str(tmp_path / "out")])
     assert answer.exit_code == 2 and "valid for calibration" in answer.stderr
     with pytest.raises(CaseError, match="valid for calibration"):
