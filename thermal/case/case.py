@@ -12,6 +12,7 @@ import numpy as np
 import pandas as pd
 
 from thermal.case.building import OUTDOOR, Building, Device
+from thermal.case.estimated import Estimated, estimate_remarks, estimate_temperatures
 from thermal.case.points import DISCHARGE_TEMPERATURE, HEATING_POWER, OUTDOOR_TEMPERATURE, SUPPLY_FLOW, ZONE_TEMPERATURE
 from thermal.case.quality import QualityReport, assess, usable
 from thermal.case.telemetry import Telemetry
@@ -100,7 +101,7 @@ class Case:
     @property
     def remarks(self) -> tuple[str, ...]:
         """What is valid in the case and yet worth a look, one sentence each."""
-        return remarks(self.building, self.telemetry)
+        return (*remarks(self.building, self.telemetry), *estimate_remarks(self.estimated))
 
     @property
     def step(self) -> float:
@@ -200,7 +201,31 @@ class Case:
 
     @cached_property
     def _zone_heat(self) -> pd.DataFrame:
-        temperatures = self._zone_temperatures
+        return self._heat_at(self._zone_temperatures)
+
+    def zone_heat_estimated(self) -> pd.DataFrame:
+        """Heat that each zone receives, with zone temperatures estimated where a sensor is dead or stuck for long.
+
+        Returns
+        -------
+        DataFrame
+            `zone_heat` [W], but for the intervals of `estimated`: what a replay is driven by.
+        """
+        return self._estimated[0].copy()
+
+    @property
+    def estimated(self) -> tuple[Estimated, ...]:
+        """Where a zone's heat takes an estimated temperature, since its sensor is dead or stuck for over 30 minutes."""
+        return self._estimated[1]
+
+    @cached_property
+    def _estimated(self) -> tuple[pd.DataFrame, tuple[Estimated, ...]]:
+        temperatures, found = estimate_temperatures(self._zone_temperatures, self.step)
+        heat = self._heat_at(temperatures)
+        gained = heat.notna() & self._zone_heat.isna()
+        return heat, tuple(i for i in found if gained.loc[i.start : i.end, i.zone].any())
+
+    def _heat_at(self, temperatures: pd.DataFrame) -> pd.DataFrame:
         heat = pd.DataFrame(0.0, index=temperatures.index, columns=temperatures.columns)
         for device in self.building.devices:
             if device.zone is not None:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from thermal._types import FloatArray, IntArray
 from thermal.case.case import Case
+from thermal.case.estimated import LONGEST_BRIDGE
 from thermal.errors import ModelError
 from thermal.inputs.provider import InputProvider, telemetry_inputs
 from thermal.inputs.signals import signal_values
@@ -18,9 +19,6 @@ from thermal.model.modal import run_along
 from thermal.model.step import IMPLICIT_EULER, Scheme, Stepper
 from thermal.network.network import ThermalNetwork
 from thermal.units import REFERENCE_TEMPERATURE as _REFERENCE
-
-#: Longest gap of an input that is bridged by a straight line [s] (results contract: 30 minutes).
-LONGEST_BRIDGE = 1800.0
 
 #: Length of the spin-up [s] (results contract: 3 days).
 SPIN_UP = 3 * 86400.0
@@ -56,7 +54,8 @@ class Inputs:
     held : ndarray, shape (n_time, n_zone)
         ``zone`` with the last value kept through every gap, to hold the zones at in a spin-up [K].
     complete : ndarray of bool, shape (n_time,)
-        Whether heat, boundaries and airflows of this step are measured or bridged over at most 30 minutes.
+        Whether heat, boundaries and airflows of this step are measured, bridged over at most 30 minutes, or, heat
+        for want of a zone's temperature, estimated (`Case.estimated`).
     """
 
     stamps: pd.DatetimeIndex
@@ -126,7 +125,7 @@ def replay_inputs(case: Case, network: ThermalNetwork, provider: InputProvider |
         raise ModelError("telemetry", "a zone_air_temperature_sensor of at least one zone", "none that is usable")
     missing = [str(c) for c in boundary.columns if boundary[c].isna().all()]
     ModelError.unless(not missing, "telemetry", "temperatures of the boundaries", f"none that is usable for {missing}")
-    frames = [case.zone_heat(), boundary, case.airflow_rates()]
+    frames = [case.zone_heat_estimated(), boundary, case.airflow_rates()]
     limit = int(LONGEST_BRIDGE // step)
     bridged = [_bridge(f, limit) for f in frames]
     complete = np.logical_and.reduce([f.notna().all(axis=1).to_numpy() for f in bridged])
