@@ -38,17 +38,16 @@ def diagnosis_verdict(result: Diagnosis) -> str:
         From `diagnose`.
     """
     text = _verdict(result)
+    if result.lumped is not None:
+        own, beside = (next(r.left_out_mae for r in result.rungs if r.chosen == kept) for kept in (True, False))
+        text += (
+            " For prediction and control take the lumped model that calibration.json holds: it misses tuning days that "
+            f"were left out by {kelvin(own)} K, this one by {kelvin(beside)} K; and held-out days by "
+            f"{kelvin(result.predicts)} K."
+        )
     if result.yardsticks is not None:
         text += f" {beside_sentence(result.predicts, result.yardsticks)}"
-    if result.lumped is None:
-        return text
-    beside = next(rung.left_out_mae for rung in result.rungs if not rung.chosen)
-    own = next(rung.left_out_mae for rung in result.rungs if rung.chosen)
-    return (
-        f"{text} For prediction and control take the lumped model that calibration.json holds: it misses tuning days "
-        f"that were left out by {kelvin(own)} K, this one by {kelvin(beside)} K; and held-out days by "
-        f"{kelvin(result.predicts)} K."
-    )
+    return text
 
 
 def _verdict(result: Diagnosis) -> str:
