@@ -22,7 +22,7 @@ from calibration.evaluation.settings import ModelSettings
 from calibration.evaluation.simple_models import with_yardsticks
 from calibration.evaluation.yardsticks import Yardsticks
 from calibration.fit.fitted_case import FittedCase
-from calibration.fit.ladder import beside_lumped, is_large
+from calibration.fit.ladder import ADVANCE, beside_lumped, is_large
 from calibration.fit.result import CalibrationResult, Rung, SolverReport, effect_entries
 from calibration.results import Axes, Result, plain
 from thermal.case.case import Case
@@ -291,10 +291,13 @@ def diagnose(
     steps, floor = how_far(models, rounds)
     areas = {name: room.floor_area for name, room in models.anatomy.rooms.items()}
     watts = rounds[0].screening.detectable(ACCEPTED)
-    rungs, lumped = _beside_lumped(models, rounds[-1].after, progress)
+    verdict = judge(rounds, untestable)
+    # a drawing that is known to lack what nothing explains has no advance
+    advance = 0.0 if verdict.name == "unexplained" else ADVANCE
+    rungs, lumped = _beside_lumped(models, rounds[-1].after, progress, advance)
     return Diagnosis(
         case=case.building.name,
-        verdict=judge(rounds, untestable),
+        verdict=verdict,
         where=where,
         steps=steps,
         gap=errors.mae,
@@ -323,13 +326,13 @@ def _yardsticks(models: ModelComparison, final: Fit) -> Yardsticks | None:
 
 
 def _beside_lumped(
-    models: ModelComparison, final: Fit, progress: Progress | None
+    models: ModelComparison, final: Fit, progress: Progress | None, advance: float
 ) -> tuple[tuple[Rung, ...], FittedCase | None]:
     """Fit the building lumped, beside the final model."""
     if is_large(final.built.network.zones):
         return (), None
     name = "named" if final.effects else "drawn"
-    return beside_lumped(name, final.problem, final.model, final.found.point, models, progress)
+    return beside_lumped(name, final.problem, final.model, final.found.point, models, progress, advance)
 
 
 def baseline_gap(
