@@ -331,17 +331,6 @@ def hat(value: ca.SX, knots: Sequence[float], number: int, signed: bool = False)
     return ca.fmax(0.0, ca.fmin(rise, fall))
 
 
-def _always(inputs: InputProvider, value: float) -> FloatArray:
-    return np.full(len(inputs.stamps), value)
-
-
-#: A signal that is 1 throughout.
-CONSTANT = Signal.made("constant", "1", _always, given={"value": 1.0})
-
-#: A temperature that stays at the reference; what differs from it acts as heat.
-STEADY = Signal.made("constant temperature", "K", _always, given={"value": 0.0})
-
-
 def lacking(part: str, reason: str) -> Callable[[Anatomy], str | None]:
     """Make what says that a building has nothing of which an effect is made, for `Effect.applies`.
 

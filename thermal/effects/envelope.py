@@ -8,9 +8,9 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from thermal._types import FloatArray
-from thermal.effects.effect import CONSTANT, STEADY, EffectBuilder, described, lacking, paired, without_facades
+from thermal.effects.effect import EffectBuilder, described, lacking, paired, without_facades
 from thermal.inputs.provider import InputProvider
-from thermal.inputs.signals import Signal
+from thermal.inputs.signals import CONSTANT, STEADY, Signal
 from thermal.network.structure import RATED_OUTSIDE_FILM
 from thermal.network.topology import UPWARD, Anatomy, OuterFaces, Outlook, Room
 from thermal.units import REFERENCE_TEMPERATURE

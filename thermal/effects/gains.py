@@ -7,9 +7,9 @@ import casadi as ca
 import numpy as np
 
 from thermal._types import FloatArray
-from thermal.effects.effect import CONSTANT, EffectBuilder, described, hat, lacking
+from thermal.effects.effect import EffectBuilder, described, hat, lacking
 from thermal.inputs.provider import InputProvider
-from thermal.inputs.signals import Signal
+from thermal.inputs.signals import CONSTANT, Signal, on_plane
 from thermal.network.topology import Anatomy
 
 #: Solar transmittance that a window is taken for where another's is known [-]: double glazing (EN 410).
@@ -21,13 +21,9 @@ _DRAWN_AT = (100.0, 200.0, 300.0, 400.0)
 PRESENCE = Signal("presence", "1", attrgetter("occupancy"), ("occupancy",))
 
 
-def _on_plane(inputs: InputProvider, azimuth: float, tilt: float) -> FloatArray:
-    return np.asarray(sum(inputs.sun.plane(azimuth, tilt)))
-
-
 def _through(inputs: InputProvider, azimuth: float, tilt: float, threshold: float = -1.0) -> FloatArray:
     """Sun through glass while more than a threshold falls on it; by default always."""
-    return np.where(_on_plane(inputs, azimuth, tilt) > threshold, inputs.sun.through_glass(azimuth, tilt), 0.0)
+    return np.where(on_plane(inputs, azimuth, tilt) > threshold, inputs.sun.through_glass(azimuth, tilt), 0.0)
 
 
 def _of_sun(name: str, of: Callable[..., FloatArray], azimuth: float, tilt: float, **given: float) -> Signal:
@@ -69,7 +65,7 @@ def _build_opaque(builder: EffectBuilder) -> None:
         look = faces.outlook
         if look.glass or look.tilt > 90.0:
             continue
-        signal = _of_sun("sun", _on_plane, look.azimuth, look.tilt)
+        signal = _of_sun("sun", on_plane, look.azimuth, look.tilt)
         builder.graph.source(builder.key(), absorptance * faces.value / look.film, faces.node, signal, faces.area)
 
 

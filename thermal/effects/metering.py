@@ -6,9 +6,9 @@ import casadi as ca
 import numpy as np
 
 from thermal._types import FloatArray
-from thermal.effects.effect import CONSTANT, EffectBuilder, described, hat
+from thermal.effects.effect import EffectBuilder, described, hat
 from thermal.inputs.provider import InputProvider
-from thermal.inputs.signals import Signal, of_zone, zone_signal
+from thermal.inputs.signals import CONSTANT, Signal, of_zone, zone_signal
 from thermal.units import AIR_HEAT_CAPACITY
 
 #: Heat that a sensor takes up in a minute over that of the zone's air [-]: too little to cool the zone, and enough for

@@ -106,3 +106,27 @@ def signal_values(signals: Sequence[Signal], inputs: InputProvider) -> FloatArra
     for signal in signals:
         inputs.need(*signal.inputs)
     return np.column_stack([np.empty((len(inputs.stamps), 0)), *(s.of(inputs) for s in signals)])
+
+
+def _always(inputs: InputProvider, value: float) -> FloatArray:
+    return np.full(len(inputs.stamps), value)
+
+
+#: A signal that is 1 throughout.
+CONSTANT = Signal.made("constant", "1", _always, given={"value": 1.0})
+
+#: A temperature that stays at the reference; what differs from it acts as heat.
+STEADY = Signal.made("constant temperature", "K", _always, given={"value": 0.0})
+
+
+def on_plane(inputs: InputProvider, azimuth: float, tilt: float) -> FloatArray:
+    """Irradiance on a plane, shape (n_time,) [W/m2].
+
+    Parameters
+    ----------
+    inputs : InputProvider
+        With the sun.
+    azimuth, tilt : float
+        Clockwise from north, and of the normal from the vertical [deg].
+    """
+    return np.asarray(sum(inputs.sun.plane(azimuth, tilt)))

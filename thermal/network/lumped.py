@@ -15,8 +15,7 @@ import scipy.sparse.linalg as sla
 
 from thermal._types import FloatArray, IntArray
 from thermal.case.building import GeometryQuality
-from thermal.inputs.provider import InputProvider
-from thermal.inputs.signals import Signal
+from thermal.inputs.signals import CONSTANT, Signal, on_plane
 from thermal.network.graph import GraphBuilder
 from thermal.network.network import ThermalNetwork
 from thermal.network.structure import Structure
@@ -126,8 +125,7 @@ def lump(network: ThermalNetwork, quality: GeometryQuality, structure: Structure
 def _add_gains(graph: GraphBuilder, room: Room, panes: list[Pane], quality: GeometryQuality, sun: bool) -> None:
     """Add heat that is always there, and the sun from each direction."""
     steady = graph.own(PARAMETERS["constant_gain"].of("zone", room.name))
-    always = Signal("constant", "1", _always)
-    graph.source(f"constant gain {room.name}", steady, int(room.air[0]), always, room.floor_area)
+    graph.source(f"constant gain {room.name}", steady, int(room.air[0]), CONSTANT, room.floor_area)
     for name, (azimuth, tilt) in _PLANES.items() if sun else ():
         looking = [p for p in panes if _nearest(p) == name]
         glass = sum(p.area * (p.transmittance or _TRANSMITTANCE) for p in looking) / room.floor_area
@@ -135,7 +133,7 @@ def _add_gains(graph: GraphBuilder, room: Room, panes: list[Pane], quality: Geom
         if quality != "generic":
             own = replace(own, start=max(own.start / 4.0, min(0.6 * glass, own.upper / 2.0)))
         value = graph.own(own.of("zone", f"{room.name} from {name}"))
-        signal = Signal.made(f"sun from {name}", "W/m^2", _on_plane, "sun", given={"azimuth": azimuth, "tilt": tilt})
+        signal = Signal.made(f"sun from {name}", "W/m^2", on_plane, "sun", given={"azimuth": azimuth, "tilt": tilt})
         graph.source(f"sun {room.name} from {name}", value, int(room.air[0]), signal, room.floor_area)
 
 
@@ -144,14 +142,6 @@ def _nearest(pane: Pane) -> str:
     if pane.tilt < 45.0:
         return "roof"
     return _COMPASS[int((pane.azimuth + 45.0) % 360.0 // 90.0) % 4]
-
-
-def _on_plane(inputs: InputProvider, azimuth: float, tilt: float) -> FloatArray:
-    return np.asarray(sum(inputs.sun.plane(azimuth, tilt)))
-
-
-def _always(inputs: InputProvider) -> FloatArray:
-    return np.ones(len(inputs.stamps))
 
 
 def _drawn(network: ThermalNetwork) -> _Drawn:

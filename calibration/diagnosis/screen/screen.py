@@ -19,9 +19,9 @@ from calibration.diagnosis.refit.comparison import Fit, ModelComparison, is_stre
 from calibration.diagnosis.screen.gains import Gain, choice_of
 from thermal._types import BoolArray, FloatArray, IntArray
 from thermal.effects.catalogue import CATALOGUE
-from thermal.effects.effect import CONSTANT, PAIR, Chosen, Effect, EffectBuilder, strength
+from thermal.effects.effect import PAIR, Chosen, Effect, EffectBuilder, strength
 from thermal.inputs.provider import InputProvider
-from thermal.inputs.signals import Signal
+from thermal.inputs.signals import CONSTANT, Signal
 from thermal.model.reduce import FEW_SHIFTS, SHIFTS, reduced_model
 from thermal.parameters import Parameter
 
