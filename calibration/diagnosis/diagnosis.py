@@ -21,8 +21,8 @@ from calibration.evaluation.n_step import Evaluation, Progress
 from calibration.evaluation.settings import ModelSettings
 from calibration.evaluation.simple_models import with_yardsticks
 from calibration.evaluation.yardsticks import Yardsticks
-from calibration.fit.fitted_case import FittedCase
-from calibration.fit.ladder import ADVANCE, beside_lumped, is_large
+from calibration.fit.fitted_case import FittedCase, is_large
+from calibration.fit.ladder import ADVANCE, beside_lumped
 from calibration.fit.result import CalibrationResult, Rung, SolverReport, effect_entries
 from calibration.results import Axes, Result, plain
 from thermal.case.case import Case
@@ -332,7 +332,7 @@ def _beside_lumped(
     if is_large(final.built.network.zones):
         return (), None
     name = "named" if final.effects else "drawn"
-    return beside_lumped(name, final.problem, final.model, final.found.point, models, progress, advance)
+    return beside_lumped(name, final, models, progress, advance)[:2]
 
 
 def baseline_gap(

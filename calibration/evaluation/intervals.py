@@ -264,3 +264,14 @@ def merge(intervals: Sequence[Interval]) -> list[Interval]:
                 f"intervals {a.start}/{a.end} and {b.start}/{b.end} overlap: their telemetry would count twice"
             )
     return ordered
+
+
+def days_of(intervals: Sequence[Interval]) -> float:
+    """Length of intervals together [days].
+
+    Parameters
+    ----------
+    intervals : sequence of Interval
+        That do not overlap.
+    """
+    return sum((i.end - i.start for i in intervals), pd.Timedelta(0)) / pd.Timedelta(days=1)

@@ -11,6 +11,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from calibration.errors import HorizonError, NotEnoughDataError
+from calibration.evaluation.carried import Carried
 from calibration.evaluation.intervals import Interval, Runs, horizon_steps, select_runs
 from calibration.evaluation.yardsticks import Yardsticks
 from calibration.results import Axes, Plain, Result
@@ -123,6 +124,8 @@ class Evaluation(Result):
         MAE at other horizons, each from its own runs [K].
     yardsticks : Yardsticks or None
         Errors of simple models on the same runs, where they were asked for.
+    carried : Carried or None
+        Errors when runs begin from a filter's state and carry its unmeasured heat on; None without a disturbance model.
     """
 
     steps: int
@@ -131,11 +134,13 @@ class Evaluation(Result):
     zones: tuple[str, ...]
     by_horizon: dict[str, float] = field(default_factory=dict)
     yardsticks: Yardsticks | None = None
+    carried: Carried | None = None
 
     @property
     def beside(self) -> dict[str, Any]:
-        """Yardsticks, and whether the model is below them all, as files hold them; nothing where there are none."""
-        return {} if self.yardsticks is None else self.yardsticks.beside(self.metrics.mae)
+        """What files hold beside the errors, as far as it was made: with heat carried on, and yardsticks."""
+        carried = {} if self.carried is None else {"carried": self.carried.to_dict()}
+        return carried | ({} if self.yardsticks is None else self.yardsticks.beside(self.metrics.mae))
 
     @property
     def metrics(self) -> Metrics:

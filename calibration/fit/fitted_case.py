@@ -1,16 +1,18 @@
 """A case whose parameters are estimated, and the judgement of the estimate on tuning and held-out intervals."""
 
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib.metadata import version
 
 from calibration.errors import CalibrationError
+from calibration.estimation.bands import Forecaster
 from calibration.evaluation.case_model import CaseModel, GridCheck
 from calibration.evaluation.intervals import Interval, default_intervals, horizon_steps, select_runs
 from calibration.evaluation.n_step import HORIZONS, Evaluation, EvaluationSettings, Progress
 from calibration.evaluation.settings import CalibrationSettings
 from calibration.fit.estimate import Estimate, solve_starts
+from calibration.fit.left_out import LeftOut, left_out
 from calibration.fit.likelihood import InnovationsProblem
 from calibration.fit.problem import tuning_problem
 from calibration.fit.result import CalibrationResult, SolverReport, describe
@@ -18,6 +20,9 @@ from calibration.identifiability.information import information_of
 from thermal.case.case import Case
 from thermal.inputs.normalisation import fit_normalisation
 from thermal.model.reduce import ReducedModel, reduced_model
+
+#: Zones beyond which no days are left out and no lumped structure is fitted: that has some ten parameters a zone.
+_MOST_ZONES = 40
 
 
 @dataclass(frozen=True)
@@ -38,6 +43,8 @@ class FittedCase:
         Where it was fitted, and where it is judged.
     settings : CalibrationSettings
         Model and fit.
+    left : LeftOut or None
+        Tuning days predicted by fits without them, where that is done already.
     """
 
     model: CaseModel
@@ -47,6 +54,7 @@ class FittedCase:
     tuned: tuple[Interval, ...]
     judged: tuple[Interval, ...]
     settings: CalibrationSettings
+    left: LeftOut | None = None
 
     @property
     def case(self) -> Case:
@@ -71,6 +79,7 @@ class FittedCase:
         before, best, chosen = self.model, self.best, self.settings
         after = replace(before, theta=best.theta, source="estimate")
         calibrated, check = self._evaluated(after, best.model, progress)
+        calibrated, factors = self._carried(calibrated)
         seconds, solve = time.perf_counter() - began, best.solve
         network, information = before.grid.network, information_of(best)
         return CalibrationResult(
@@ -87,6 +96,7 @@ class FittedCase:
                 best.evaluations, best.settled,
             ),
             disturbance=best.disturbance,
+            band_factors=factors,
             excess=best.excess,
             information=information,
             grid_check=check,
@@ -107,6 +117,24 @@ class FittedCase:
         """
         return self._evaluated(self.model, self.reduced, progress)[0]
 
+    def _carried(self, calibrated: dict[str, Evaluation]) -> tuple[dict[str, Evaluation], dict[str, float]]:
+        """Put errors with the unmeasured heat carried on beside those without, and make bands."""
+        best, chosen, left = self.best, self.settings, self.left
+        if best.disturbance is None:
+            return calibrated, {}
+        settings = EvaluationSettings(
+            chosen.horizon, horizons=HORIZONS, scheme=chosen.stepping, spin_up_seconds=chosen.spin_up_seconds
+        )
+        forecaster = Forecaster(best.model, self.model.inputs, best.disturbance, settings)
+        unjudged = chosen.yardsticks and chosen.objective == "multi_step"
+        if left is None and unjudged and not is_large(self.model.grid.network.zones):
+            left = left_out(best, self.tuned, chosen.spin_up_seconds)
+        factors = forecaster.factors(left.parts, left.thetas) if left is not None else {}
+        return {
+            name: replace(e, carried=forecaster.judge(best.theta, [p.interval for p in e.predictions], factors))
+            for name, e in calibrated.items()
+        }, factors
+
     def _evaluated(
         self, model: CaseModel, reduced: ReducedModel, progress: Progress | None
     ) -> tuple[dict[str, Evaluation], GridCheck]:
@@ -126,6 +154,7 @@ def fit_case(
     hold_out: Sequence[Interval],
     settings: CalibrationSettings,
     progress: Progress | None = None,
+    begin: Mapping[str, float] | None = None,
 ) -> FittedCase:
     """Estimate the parameters of a case; `FittedCase.result` judges them.
 
@@ -135,6 +164,8 @@ def fit_case(
         As `calibrate` takes them.
     settings : CalibrationSettings
         Model and fit.
+    begin : mapping of str to float, optional
+        Where the estimation begins, by name [parameter units]; the centres of the priors by default.
 
     Raises
     ------
@@ -146,6 +177,8 @@ def fit_case(
         settings = replace(settings, normalisation=fit_normalisation(case, ((i.start, i.end) for i in tuned)))
     _refuse_overlap(tuned, judged)
     problem = tuning_problem(case, tuned, settings)
+    if begin is not None:
+        problem = replace(problem, start=problem.grid.network.values({**begin, **settings.fixed}))
     grid, inputs, given = problem.grid, problem.inputs, problem.start
     for interval in judged:  # refused now rather than after the solve
         select_runs(inputs, interval, problem.steps, spin_up=settings.spin_up_seconds)
@@ -158,6 +191,17 @@ def fit_case(
     best, failures = solve_starts(problem, first, settings.starts, settings.seed, progress)
     before = CaseModel(case, settings.model, grid, inputs, given, "start")
     return FittedCase(before, first, best, tuple(failures), tuple(tuned), tuple(judged), settings)
+
+
+def is_large(zones: Sequence[str]) -> bool:
+    """Whether a building has too many zones to leave days out, or to be fitted lumped.
+
+    Parameters
+    ----------
+    zones : sequence of str
+        Their names.
+    """
+    return len(zones) > _MOST_ZONES
 
 
 def _refuse_overlap(tuning: Sequence[Interval], held_out: Sequence[Interval]) -> None:

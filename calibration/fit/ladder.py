@@ -1,37 +1,31 @@
-"""Ladder of structures: as drawn, and lumped with factors of its own for every zone and pair; days left out choose."""
+"""Ladder of structures: as drawn; lumped, with factors of its own for every zone and pair; and with a gain that recurs.
 
-import itertools
+Tuning days that are left out choose.
+"""
+
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 from typing import Protocol
 
-import numpy as np
-import pandas as pd
-
-from calibration.errors import NotEnoughDataError
-from calibration.evaluation.intervals import Interval, Runs, select_runs
-from calibration.evaluation.n_step import Progress, spatial_metrics
+from calibration.evaluation.intervals import Interval, days_of
+from calibration.evaluation.n_step import Progress
 from calibration.evaluation.settings import CalibrationSettings
-from calibration.fit.fitted_case import FittedCase, fit_case
-from calibration.fit.least_squares import solve_least_squares
-from calibration.fit.problem import Problem
+from calibration.fit.estimate import Estimate
+from calibration.fit.fitted_case import FittedCase, fit_case, is_large
+from calibration.fit.left_out import Begun, Fitted, LeftOut, left_out
+from calibration.fit.problem import tuning_problem
 from calibration.fit.result import CalibrationResult, Rung
-from thermal._types import FloatArray
 from thermal.case.case import Case
 from thermal.inputs.provider import telemetry_inputs
-from thermal.model.reduce import ReducedModel
+from thermal.model.reduce import reduced_model
 from thermal.network.structure import BASELINE, Structure
-
-#: Parts that tuning days are cut into, each left out once, and the least length of one [days].
-_FOLDS, _LEAST_DAYS = 4, 1.0
 
 #: Share by which a lumped model must predict left-out days better than a building as drawn [-]: it has ten times the
 #: parameters, and on a simulated office whose drawing is true a fitting advance of 7 % did not last on later days.
 ADVANCE = 0.1
 
-#: Zones beyond which no lumped structure is fitted: it has some ten parameters a zone.
-_MOST_ZONES = 40
+#: Tuning days from which a gain that recurs from day to day is looked for [days]: it has to recur.
+_WEEK = 7.0
 
 
 def climb(drawn: FittedCase, began: float, progress: Progress | None = None) -> CalibrationResult:
@@ -58,23 +52,11 @@ def climb(drawn: FittedCase, began: float, progress: Progress | None = None) -> 
     asked = chosen.effects or chosen.scopes or chosen.fixed or chosen.structure != BASELINE
     if asked or is_large(drawn.model.grid.network.zones) or chosen.objective != "multi_step":
         return drawn.result(began, progress)
-    best = drawn.best
-    rungs, lumped = beside_lumped("drawn", best.problem, best.model, best.point, drawn, progress)
+    rungs, lumped, left = beside_lumped("drawn", drawn.best, drawn, progress)
     if lumped is None:
-        return replace(drawn.result(began, progress), rungs=rungs)
+        return replace(replace(drawn, left=left).result(began, progress), rungs=rungs)
     # before is what the drawing says
     return replace(lumped.result(began, progress), rungs=rungs, uncalibrated=drawn.uncalibrated(progress))
-
-
-def is_large(zones: Sequence[str]) -> bool:
-    """Whether a building has too many zones to be fitted lumped.
-
-    Parameters
-    ----------
-    zones : sequence of str
-        Their names.
-    """
-    return len(zones) > _MOST_ZONES
 
 
 class Tuned(Protocol):
@@ -99,27 +81,22 @@ class Tuned(Protocol):
 
 def beside_lumped(
     name: str,
-    problem: Problem,
-    model: ReducedModel,
-    point: FloatArray,
+    fitted: Fitted,
     given: Tuned,
     progress: Progress | None = None,
     advance: float = ADVANCE,
-) -> tuple[tuple[Rung, ...], FittedCase | None]:
+) -> tuple[tuple[Rung, ...], FittedCase | None, LeftOut]:
     """Fit the lumped structure beside a fitted model; it is returned where it predicts left-out days better.
 
-    The sun is a part of it where irradiance is measured.
+    The sun is a part of it where irradiance is measured. With a gain that recurs from day to day it is fitted too
+    where a few Newton steps from the lumped estimate promise enough.
 
     Parameters
     ----------
     name : str
         Of the fitted model.
-    problem : Problem
-        That it solves.
-    model : ReducedModel
-        Accurate at its estimate.
-    point : ndarray, shape (n_free,)
-        Its estimate on the estimation scale [-].
+    fitted : Fitted
+        It.
     given : Tuned
         The case and its days.
     progress : callable, optional
@@ -130,78 +107,39 @@ def beside_lumped(
     Returns
     -------
     tuple
-        Both rungs, and the lumped model or None.
+        The rungs, the lumped model or None, and the days left out by what was chosen.
     """
-    settings = given.calibration
     structure = Structure(lumped=True, sun=telemetry_inputs(given.case).gives("sun"))
-    # its priors hold it so well that further starts find the same
-    settings = replace(settings, structure=structure, starts=1)
+    # priors hold it so well that further starts find the same
+    settings = replace(given.calibration, structure=structure, starts=1)
     lumped = fit_case(given.case, given.tuned, given.judged, settings, progress)
-    own = lumped.best
-    models = ((problem, model, point), (own.problem, own.model, own.point))
-    errors = [left_out(*fitted, given.tuned, settings.spin_up_seconds) for fitted in models]
-    better = errors[1] < (1.0 - advance) * errors[0]
-    rungs = (
-        Rung(name, errors[0], len(problem.free), not better),
-        Rung("lumped", errors[1], len(own.problem.free), better),
-    )
-    return rungs, lumped if better else None
+    spin_up = settings.spin_up_seconds
+    left = left_out(fitted, given.tuned, spin_up)
+    tried = [(name, len(fitted.problem.free), left.mae)]
+    kept, beside = None, left_out(lumped.best, given.tuned, spin_up)
+    tried.append(("lumped", len(lumped.best.problem.free), beside.mae))
+    if beside.mae < (1.0 - advance) * left.mae:
+        kept, left = lumped, beside
+    if days_of(given.tuned) >= _WEEK:
+        settings = replace(settings, structure=replace(structure, recurring=True))
+        begun = _begun(given, settings, lumped.best)
+        beside = left_out(begun, given.tuned, spin_up)
+        if beside.mae < (1.0 - ADVANCE) * left.mae:
+            recurring = fit_case(given.case, given.tuned, given.judged, settings, progress, lumped.best.values)
+            beside = left_out(recurring.best, given.tuned, spin_up)
+            if beside.mae < (1.0 - ADVANCE) * left.mae:
+                kept, left = recurring, beside
+        tried.append(("recurring", len(begun.problem.free), beside.mae))
+    rungs = tuple(Rung(own, mae, count, mae == left.mae) for own, count, mae in tried)
+    return rungs, None if kept is None else replace(kept, left=left), left
 
 
-def left_out(
-    problem: Problem, model: ReducedModel, point: FloatArray, tuned: Sequence[Interval], spin_up_seconds: float
-) -> float:
-    """Mean absolute error on tuning days that are left out in turn, fitted anew from the others [K].
-
-    Weights and the reduced model stay those of the fit of all days.
-
-    Parameters
-    ----------
-    problem : Problem
-        Fitted on all tuning days.
-    model : ReducedModel
-        Accurate at the estimate.
-    point : ndarray, shape (n_free,)
-        The estimate on the estimation scale [-].
-    tuned : sequence of Interval
-        The tuning days.
-    spin_up_seconds : float
-        Length of the spin-up before an interval [s].
-    """
-    errors = []
-    for part in _parts(tuned):
-        kept = [_outside(problem.inputs.stamps, runs, problem.steps, part) for runs in problem.runs]
-        try:
-            left = select_runs(problem.inputs, part, problem.steps, spin_up=spin_up_seconds)
-        except NotEnoughDataError:
-            continue
-        rest = tuple(runs for runs in kept if runs.starts.size)
-        if not rest or not left.starts.size:
-            continue
-        share = sum(r.starts.size for r in rest) / sum(r.starts.size for r in problem.runs)
-        fold = replace(problem, runs=rest, effective=share * problem.effective_size())
-        weighted = partial(fold.weighted, model)
-        found = solve_least_squares(weighted, point, *problem.bounds, tolerance=1e-2)
-        error, _ = fold.errors(model, fold.theta(found.x), left, slopes=False)
-        errors.append(error[:, -1])
-    return spatial_metrics(np.concatenate(errors)).mae if len(errors) > 1 else float("nan")
-
-
-def _parts(tuned: Sequence[Interval]) -> list[Interval]:
-    """Cut the tuning intervals into parts of equal length, each left out once."""
-    length = sum((i.end - i.start for i in tuned), pd.Timedelta(0))
-    count = min(_FOLDS, int(length / pd.Timedelta(days=_LEAST_DAYS)))
-    if len(tuned) >= count > 0:  # whole intervals
-        return list(tuned)
-    parts = []
-    for interval in tuned:
-        own = max(1, round(count * ((interval.end - interval.start) / length)))
-        cuts = pd.date_range(interval.start, interval.end, periods=own + 1)
-        parts += [Interval(a, b) for a, b in itertools.pairwise(cuts)]
-    return parts
-
-
-def _outside(stamps: pd.DatetimeIndex, runs: Runs, steps: int, part: Interval) -> Runs:
-    """Keep the runs that share no step with an interval."""
-    clear = (stamps[runs.starts + steps] < part.start) | (stamps[runs.starts] > part.end)
-    return replace(runs, starts=runs.starts[np.asarray(clear)])
+def _begun(given: Tuned, settings: CalibrationSettings, known: Estimate) -> Begun:
+    """Take a structure with further parameters as it begins: at what is known of the others, and weighed like these."""
+    problem, own = tuning_problem(given.case, given.tuned, settings), known.problem
+    theta = problem.grid.network.values(known.values)
+    problem = replace(
+        problem, start=theta, deviation=own.deviation, effective=own.effective_size(),
+        shrinkage={**problem.shrinkage, **own.shrinkage},
+    )  # fmt: skip
+    return Begun(problem, reduced_model(problem.grid, [theta]))

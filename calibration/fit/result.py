@@ -85,8 +85,8 @@ class Rung(Plain):
 
     Parameters
     ----------
-    name : {"drawn", "lumped"}
-        Which.
+    name : {"drawn", "named", "lumped", "recurring"}
+        As drawn, with what a diagnosis named, lumped, or lumped with a gain that recurs from day to day.
     left_out_mae : float
         Mean absolute error on tuning days that a fit has not seen [K]; NaN where there are too few days.
     parameters : int
@@ -160,6 +160,8 @@ class CalibrationResult(Result):
         Certificate of the reduced model that the numbers were made with.
     disturbance : DisturbanceModel or None
         Unmeasured heat and sensor noise that the standard errors follow.
+    band_factors : mapping of str to float
+        What the deviations of predictions are multiplied by for 90 % bands, by zone [-]; see `Forecaster.factors`.
     excess : float
         Mean square of the tuning errors, or of what a day's innovations pull at, over that which the disturbance makes
         [-]; far above 1, physics is missing.
@@ -190,6 +192,7 @@ class CalibrationResult(Result):
     solver: SolverReport
     grid_check: GridCheck
     disturbance: DisturbanceModel | None
+    band_factors: Mapping[str, float]
     excess: float
     information: Information
     horizon: str
@@ -211,7 +214,7 @@ class CalibrationResult(Result):
             "calibrated": {name: e.metrics.to_dict() | e.beside for name, e in self.calibrated.items()},
             "effects": self.effects(),
         }
-        names = ("solver", "grid_check", "disturbance", "excess", "information")
+        names = ("solver", "grid_check", "disturbance", "band_factors", "excess", "information")
         intervals = {"tuning": self.tuning, "held_out": self.held_out}
         about = ("objective", "horizon", "settings", "case", "version", "seed")
         content |= {k: getattr(self, k) for k in names} | {"intervals": intervals}

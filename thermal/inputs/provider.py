@@ -269,11 +269,19 @@ class InputProvider:
         if most is not None and "people" in self.series:
             people = self.series["people"]
             return np.asarray(people / most) if most > 0.0 else np.zeros(len(people))
-        middle = self.stamps - pd.Timedelta(seconds=self.step / 2.0)
-        hour = np.asarray(middle.hour + middle.minute / 60.0 + middle.second / 3600.0, dtype=float)
-        rise = np.clip((hour - _WORK[0]) / _RAMP + 0.5, 0.0, 1.0)
-        fall = np.clip((_WORK[1] - hour) / _RAMP + 0.5, 0.0, 1.0)
-        return np.where(middle.day_of_week < 5, rise * fall, 0.0)
+        rise = np.clip((self.clock - _WORK[0]) / _RAMP + 0.5, 0.0, 1.0)
+        fall = np.clip((_WORK[1] - self.clock) / _RAMP + 0.5, 0.0, 1.0)
+        return np.where(self._middle.day_of_week < 5, rise * fall, 0.0)
+
+    @property
+    def _middle(self) -> pd.DatetimeIndex:
+        return self.stamps - pd.Timedelta(seconds=self.step / 2.0)
+
+    @cached_property
+    def clock(self) -> FloatArray:
+        """Time of day in the middle of each step, by the building's clock, shape (n_time,) [h]."""
+        middle = self._middle
+        return np.asarray(middle.hour + middle.minute / 60.0 + middle.second / 3600.0, dtype=float)
 
     @cached_property
     def through_windows(self) -> FloatArray:

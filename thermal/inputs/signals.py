@@ -130,3 +130,22 @@ def on_plane(inputs: InputProvider, azimuth: float, tilt: float) -> FloatArray:
         Clockwise from north, and of the normal from the vertical [deg].
     """
     return np.asarray(sum(inputs.sun.plane(azimuth, tilt)))
+
+
+def _wave(inputs: InputProvider, of: Callable[[FloatArray], FloatArray], hours: float) -> FloatArray:
+    return of(2.0 * np.pi * inputs.clock / hours)
+
+
+def waves_of_day(*hours: float) -> list[Signal]:
+    """Sine and cosine of each period, which repeat from day to day by the clock on the wall.
+
+    Parameters
+    ----------
+    *hours : float
+        Periods [h], parts of a day.
+    """
+    return [
+        Signal.made(f"{of.__name__} of {period:g} h", "1", _wave, given={"of": of, "hours": period})
+        for period in hours
+        for of in (np.sin, np.cos)
+    ]

@@ -15,7 +15,7 @@ import scipy.sparse.linalg as sla
 
 from thermal._types import FloatArray, IntArray
 from thermal.case.building import GeometryQuality
-from thermal.inputs.signals import CONSTANT, Signal, on_plane
+from thermal.inputs.signals import CONSTANT, Signal, on_plane, waves_of_day
 from thermal.network.graph import GraphBuilder
 from thermal.network.network import ThermalNetwork
 from thermal.network.structure import Structure
@@ -38,6 +38,9 @@ _KNOWN = 0.1
 #: Directions that the sun is taken from [deg]: azimuth and tilt of the compass's points and of a roof.
 _COMPASS = ("north", "east", "south", "west")
 _PLANES = {**{name: (90.0 * number, VERTICAL) for number, name in enumerate(_COMPASS)}, "roof": (0.0, UPWARD)}
+
+#: Periods of a gain that recurs from day to day [h].
+_PERIODS = (24.0, 12.0, 8.0)
 
 #: Solar transmittance of a pane that nothing tells [-]: double glazing (EN 410).
 _TRANSMITTANCE = 0.6
@@ -118,15 +121,20 @@ def lump(network: ThermalNetwork, quality: GeometryQuality, structure: Structure
         graph.anatomy.rooms[zone] = Room(
             zone, i, air[i : i + 1], np.ones(1), int(air[i]), -1, (), (), int(mass[i]), room.floor_area, room.volume
         )
-        _add_gains(graph, graph.anatomy.rooms[zone], [p for p in old.panes if p.zone == zone], quality, structure.sun)
+        _add_gains(graph, graph.anatomy.rooms[zone], [p for p in old.panes if p.zone == zone], quality, structure)
     return graph, air
 
 
-def _add_gains(graph: GraphBuilder, room: Room, panes: list[Pane], quality: GeometryQuality, sun: bool) -> None:
-    """Add heat that is always there, and the sun from each direction."""
+def _add_gains(
+    graph: GraphBuilder, room: Room, panes: list[Pane], quality: GeometryQuality, structure: Structure
+) -> None:
+    """Add heat that is always there, that recurs from day to day, and the sun from each direction."""
     steady = graph.own(PARAMETERS["constant_gain"].of("zone", room.name))
     graph.source(f"constant gain {room.name}", steady, int(room.air[0]), CONSTANT, room.floor_area)
-    for name, (azimuth, tilt) in _PLANES.items() if sun else ():
+    for wave in waves_of_day(*_PERIODS) if structure.recurring else ():
+        value = graph.own(PARAMETERS["recurring_gain"].of("zone", f"{room.name}, {wave.name}"))
+        graph.source(f"recurring gain {room.name}, {wave.name}", value, int(room.air[0]), wave, room.floor_area)
+    for name, (azimuth, tilt) in _PLANES.items() if structure.sun else ():
         looking = [p for p in panes if _nearest(p) == name]
         glass = sum(p.area * (p.transmittance or _TRANSMITTANCE) for p in looking) / room.floor_area
         own = PARAMETERS["solar_aperture"]

@@ -99,6 +99,8 @@ class Structure:
         Air and one mass a zone, with a multiplier for every conductance and capacity of the drawing.
     sun : bool
         Of a lumped model: an aperture for the sun a zone and direction, which takes measured irradiance.
+    recurring : bool
+        Of a lumped model: a gain a zone that recurs from day to day, as people and their devices bring it.
 
     Raises
     ------
@@ -108,7 +110,8 @@ class Structure:
     Examples
     --------
     >>> Structure.paper()
-    Structure(furniture=False, slab_nodes=0, wall_nodes=1, radiant=False, lumped=False, sun=False)
+    Structure(furniture=False, slab_nodes=0, wall_nodes=1, radiant=False, lumped=False, sun=False,
+    recurring=False)
     """
 
     furniture: bool = True
@@ -117,9 +120,10 @@ class Structure:
     radiant: bool = True
     lumped: bool = False
     sun: bool = False
+    recurring: bool = False
 
     def __post_init__(self) -> None:
-        for name in ("furniture", "radiant", "lumped", "sun"):
+        for name in ("furniture", "radiant", "lumped", "sun", "recurring"):
             if not isinstance(getattr(self, name), bool):
                 raise ModelError(f"structure.{name}: expected true or false, got {getattr(self, name)!r}")
         for name, least in (("slab_nodes", 0), ("wall_nodes", 1)):

@@ -128,6 +128,11 @@ class Fit:
         """Parameters, shape (n_parameter,) [parameter units]."""
         return self.problem.theta(self.found.point)
 
+    @property
+    def point(self) -> FloatArray:
+        """The estimate on the estimation scale, (n_free,) [-]."""
+        return self.found.point
+
     @cached_property
     def by_zone(self) -> FloatArray:
         """Mean squared tuning error of each zone, shape (n_zone,) [K²]; 0 where nothing is measured."""

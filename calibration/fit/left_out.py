@@ -1,0 +1,148 @@
+"""Tuning days that are left out in turn and predicted by fits of the others."""
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+import pandas as pd
+from scipy.optimize import lsq_linear
+
+from calibration.errors import NotEnoughDataError
+from calibration.evaluation.intervals import Interval, Runs, days_of, select_runs
+from calibration.evaluation.n_step import spatial_metrics
+from calibration.fit.problem import Problem
+from thermal._types import FloatArray
+from thermal.model.reduce import ReducedModel
+
+#: Parts that tuning days are cut into, each left out once, and the least length of one [days].
+_FOLDS, _LEAST_DAYS = 4, 1.0
+
+#: Newton steps of a fit without some days, from that with all: on nine cases errors so found were within 8 % of those
+#: of fits to the end, most within 2 %.
+_STEPS = 2
+
+#: Width that the range of a parameter on a bound is given for a step [-].
+_SLACK = 1e-12
+
+
+class Fitted(Protocol):
+    """A model with its estimate."""
+
+    @property
+    def problem(self) -> Problem:
+        """That was solved."""
+
+    @property
+    def model(self) -> ReducedModel:
+        """Accurate at the estimate."""
+
+    @property
+    def point(self) -> FloatArray:
+        """The estimate on the estimation scale, (n_free,) [-]."""
+
+
+@dataclass(frozen=True)
+class Begun:
+    """A problem that is not solved yet, at its start; as a `Fitted`.
+
+    Parameters
+    ----------
+    problem : Problem
+        With the start.
+    model : ReducedModel
+        Accurate there.
+    """
+
+    problem: Problem
+    model: ReducedModel
+
+    @property
+    def point(self) -> FloatArray:
+        """Start on the estimation scale, (n_free,) [-]."""
+        return self.problem.point(self.problem.start)
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """Tuning days that are left out in turn, and fits of the others.
+
+    Parameters
+    ----------
+    parts : tuple of Interval
+        The days.
+    thetas : tuple of ndarray, shape (n_parameter,)
+        Without each of them [parameter units].
+    errors : ndarray, shape (n_run, n_zone)
+        Errors in all of them at the end of the horizon [K].
+    """
+
+    parts: tuple[Interval, ...]
+    thetas: tuple[FloatArray, ...]
+    errors: FloatArray
+
+    @property
+    def mae(self) -> float:
+        """Mean absolute error [K]; NaN where there are too few days to leave any out."""
+        return spatial_metrics(self.errors).mae if len(self.parts) > 1 else float("nan")
+
+
+def left_out(fitted: Fitted, tuned: Sequence[Interval], spin_up_seconds: float) -> LeftOut:
+    """Leave tuning days out in turn, with a fit of the others.
+
+    Weights and the reduced model stay those of the fit of all days, whose estimate Newton steps start from.
+
+    Parameters
+    ----------
+    fitted : Fitted
+        On all tuning days.
+    tuned : sequence of Interval
+        These days.
+    spin_up_seconds : float
+        Length of the spin-up before an interval [s].
+    """
+    problem, model = fitted.problem, fitted.model
+    parts, thetas, errors = [], [], [np.empty((0, problem.inputs.zone.shape[1]))]
+    for part in _parts(tuned):
+        kept = [_outside(problem.inputs.stamps, runs, problem.steps, part) for runs in problem.runs]
+        try:
+            left = select_runs(problem.inputs, part, problem.steps, spin_up=spin_up_seconds)
+        except NotEnoughDataError:
+            continue
+        rest = tuple(runs for runs in kept if runs.starts.size)
+        if not rest or not left.starts.size:
+            continue
+        share = sum(r.starts.size for r in rest) / sum(r.starts.size for r in problem.runs)
+        fold = replace(problem, runs=rest, effective=share * problem.effective_size())
+        point, bounds = fitted.point, np.array(problem.bounds)
+        for _ in range(_STEPS):
+            residual, jacobian = fold.weighted(model, point)
+            room = bounds - point + [[-_SLACK], [_SLACK]]
+            point = np.clip(point + lsq_linear(jacobian, -residual, tuple(room)).x, *bounds)
+        theta = fold.theta(point)
+        error, _ = fold.errors(model, theta, left, slopes=False)
+        parts.append(part)
+        thetas.append(theta)
+        errors.append(error[:, -1])
+    return LeftOut(tuple(parts), tuple(thetas), np.concatenate(errors))
+
+
+def _parts(tuned: Sequence[Interval]) -> list[Interval]:
+    """Cut the tuning intervals into parts of equal length, each left out once."""
+    length = days_of(tuned)
+    count = min(_FOLDS, int(length / _LEAST_DAYS))
+    if len(tuned) >= count > 0:  # whole intervals
+        return list(tuned)
+    parts = []
+    for interval in tuned:
+        own = max(1, round(count * days_of([interval]) / length))
+        cuts = pd.date_range(interval.start, interval.end, periods=own + 1)
+        parts += [Interval(a, b) for a, b in itertools.pairwise(cuts)]
+    return parts
+
+
+def _outside(stamps: pd.DatetimeIndex, runs: Runs, steps: int, part: Interval) -> Runs:
+    """Keep the runs that share no step with an interval."""
+    clear = (stamps[runs.starts + steps] < part.start) | (stamps[runs.starts] > part.end)
+    return replace(runs, starts=runs.starts[np.asarray(clear)])
