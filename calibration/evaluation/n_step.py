@@ -282,8 +282,7 @@ def _further(inputs: Inputs, interval: Interval, horizon: str, spin_up_seconds: 
 def _predictions(inputs: Inputs, interval: Interval, wanted: Wanted, simulated: FloatArray) -> Predictions:
     """Put runs beside what was measured; a zone that could not be matched at its start has no error."""
     runs, keep = wanted
-    known = inputs.bridged[runs.starts]
-    measured = np.where(np.isfinite(known)[:, None, :], inputs.zone[runs.starts[:, None] + keep[None, :]], np.nan)
+    known, measured = inputs.bridged[runs.starts], inputs.targets(runs.starts, keep)
     return Predictions(interval, inputs.stamps[runs.starts], simulated, measured, keep, known, runs.skipped)
 
 
