@@ -97,14 +97,16 @@ def estimate_parts(
     areas = pd.Series({zone: area for zone, (area, _) in zone_sizes(building).items()})
     filled, found = [], []
     for part, points in zip(parts, _OF_PARTS, strict=True):
-        whole, density = part.copy(), part / areas[list(part)]
         lacking = [str(zone) for zone in part if part[zone].isna().any() and len(areas) > 1]
-        for zone in lacking:
-            guess = areas[zone] * like_others(density, zone, step)
-            for gap in _gaps(building, frame, zone, points, step):
-                found.append(gap)
-                whole.loc[gap.start : gap.end, zone] = whole[zone].fillna(guess)
+        gaps = [gap for zone in lacking for gap in _gaps(building, frame, zone, points, step)]
+        whole, density = part.copy(), part / areas[list(part)]
+        for gap in gaps:  # no flow is no heat without a discharge temperature too, but no sample of what is missing
+            density.loc[gap.start : gap.end, gap.zone] = np.nan
+        guess = {zone: areas[zone] * like_others(density, zone, step) for zone in {gap.zone for gap in gaps}}
+        for gap in gaps:
+            whole.loc[gap.start : gap.end, gap.zone] = whole[gap.zone].fillna(guess[gap.zone])
         filled.append(whole)
+        found += gaps
     return filled, tuple(found)
 
 
