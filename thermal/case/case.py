@@ -225,10 +225,16 @@ class Case:
     def _estimated(self) -> tuple[pd.DataFrame, tuple[Estimated, ...]]:
         temperatures, found = estimate_temperatures(self._zone_temperatures, self.step)
         parts = heat_parts(self.building, self.usable, temperatures)
-        parts, lacking = estimate_parts(self.building, self.usable, parts, self.step)
-        heat = total_heat(self.building, parts)
-        gained = heat.notna() & self._zone_heat.isna()
-        return heat, tuple(i for i in (*found, *lacking) if gained.loc[i.start : i.end, i.zone].any())
+        filled, lacking = estimate_parts(self.building, self.usable, parts, self.step)
+        stages = [total_heat(self.building, stage) for stage in (parts, filled)]
+        gained = [heat.notna() & self._zone_heat.isna() for heat in stages]
+        kept = [
+            i
+            for own, g in zip((found, lacking), gained, strict=True)
+            for i in own
+            if g.loc[i.start : i.end, i.zone].any()
+        ]
+        return stages[-1], tuple(kept)
 
     def boundary_temperatures(self) -> pd.DataFrame:
         """Temperatures that the zones look out on.
