@@ -15,6 +15,7 @@ from calibration.evaluation.intervals import Interval, Runs, horizon_steps, sele
 from calibration.evaluation.yardsticks import Yardsticks
 from calibration.results import Axes, Plain, Result
 from thermal._types import FloatArray
+from thermal.case.estimated import Estimated, estimate_entry
 from thermal.model.case_replay import SPIN_UP, Inputs, free_runs, spin_up
 from thermal.model.matrices import Matrices, SymbolicModel
 from thermal.model.step import IMPLICIT_EULER, Scheme
@@ -123,6 +124,8 @@ class Evaluation(Result):
         MAE at other horizons, each from its own runs [K].
     yardsticks : Yardsticks or None
         Errors of simple models on the same runs, where they were asked for.
+    estimated : tuple of Estimated
+        Where heat of the telemetry is estimated.
     """
 
     steps: int
@@ -131,6 +134,7 @@ class Evaluation(Result):
     zones: tuple[str, ...]
     by_horizon: dict[str, float] = field(default_factory=dict)
     yardsticks: Yardsticks | None = None
+    estimated: tuple[Estimated, ...] = ()
 
     @property
     def beside(self) -> dict[str, Any]:
@@ -160,7 +164,7 @@ class Evaluation(Result):
         ]
         plain = {"steps": self.steps, "step_seconds": self.step_seconds, "intervals": intervals}
         return {**plain, **self.metrics.to_dict(), "by_zone": self.by_zone(), "by_horizon": self.by_horizon,
-                **self.beside}  # fmt: skip
+                **self.beside, **estimate_entry(self.estimated)}  # fmt: skip
 
     def to_frame(self) -> pd.DataFrame:
         """Errors of every measured zone [K]."""

@@ -14,7 +14,7 @@ from mpc.reports.figures.calibration import paper_values, parameter_ranges
 from mpc.reports.figures.errors import error_band, error_growth, median_run
 from mpc.reports.figures.field import spatial_field
 from mpc.reports.identifiability import in_words, information_content, information_sentences
-from mpc.reports.page import counted, duration, kelvin, render
+from mpc.reports.page import counted, duration, estimated_sentences, kelvin, render
 from mpc.reports.residuals import diagnostics_content
 from thermal.case.case import Case
 from thermal.model.case_replay import Inputs, replay_inputs
@@ -106,6 +106,7 @@ def calibration_verdict(result: CalibrationResult) -> str:
         if held_out.yardsticks is None
         else evaluation.beside_sentence(after, held_out.yardsticks),
         *_structure_sentences(result),
+        *estimated_sentences(held_out.estimated),
         _parameter_sentence(result.parameters),
     ]
     if not result.solver.success:

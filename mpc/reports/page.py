@@ -13,8 +13,12 @@ import pandas as pd
 from jinja2.filters import make_attrgetter
 
 from calibration.results import write_results
+from thermal.case.estimated import Estimated, estimate_summary
 
 _NO_NUMBER = "–"
+
+#: More zones than this are counted, not named.
+_MOST_NAMED = 4
 
 
 @cache
@@ -297,6 +301,27 @@ def listed(words: Iterable[str], last: str = "and") -> str:
     """
     *first, end = words
     return f"{', '.join(first)} {last} {end}" if first else end
+
+
+def estimated_sentences(found: Sequence[Estimated]) -> list[str]:
+    """Say which zones' heat was estimated, in one sentence; in none where there is nothing to say.
+
+    Parameters
+    ----------
+    found : sequence of Estimated
+        Where it was.
+    """
+    if not found:
+        return []
+    hours: dict[str, float] = {}
+    for entry in estimate_summary(found):
+        hours[entry["zone"]] = max(entry["hours"], hours.get(entry["zone"], 0.0))
+    named = [f"{zone} ({worst:.0f} h)" for zone, worst in hours.items()]
+    rest = [f"{len(named) - _MOST_NAMED} more"] if len(named) > _MOST_NAMED else []
+    return [
+        f"Sensors failed in {listed([*named[:_MOST_NAMED], *rest])}: heat there was estimated meanwhile, and errors "
+        "there do not count."
+    ]
 
 
 #: How values read, by name of the filter.

@@ -1,7 +1,8 @@
 """What a dead or stuck sensor leaves unknown, estimated: a zone's temperature, its heat, the flow of a device."""
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import pandas as pd
 
@@ -35,6 +36,39 @@ class Estimated:
     end: pd.Timestamp
 
 
+def estimate_summary(found: Sequence[Estimated]) -> list[dict[str, Any]]:
+    """Sum up by sensor what was estimated.
+
+    Parameters
+    ----------
+    found
+        Where.
+
+    Returns
+    -------
+    list of dict
+        ``zone``, ``lacking``, first ``start``, last ``end``, and ``hours`` in all [h], one a sensor.
+    """
+    entries = []
+    for zone, lacking in dict.fromkeys((interval.zone, interval.lacking) for interval in found):
+        own = [interval for interval in found if (interval.zone, interval.lacking) == (zone, lacking)]
+        start, end = own[0].start.isoformat(), own[-1].end.isoformat()
+        hours = round(sum((i.end - i.start).total_seconds() for i in own) / 3600.0, 1)
+        entries.append({"zone": zone, "lacking": lacking, "start": start, "end": end, "hours": hours})
+    return entries
+
+
+def estimate_entry(found: Sequence[Estimated]) -> dict[str, Any]:
+    """Entry ``estimated`` of a results file; nothing where nothing was estimated.
+
+    Parameters
+    ----------
+    found
+        Where.
+    """
+    return {"estimated": estimate_summary(found)} if found else {}
+
+
 def estimate_remarks(found: Sequence[Estimated]) -> tuple[str, ...]:
     """Say of each sensor for how long it was missing and that its zone's heat was estimated.
 
@@ -43,15 +77,11 @@ def estimate_remarks(found: Sequence[Estimated]) -> tuple[str, ...]:
     found
         Where.
     """
-    told = []
-    for zone, lacking in dict.fromkeys((interval.zone, interval.lacking) for interval in found):
-        own = [interval for interval in found if (interval.zone, interval.lacking) == (zone, lacking)]
-        hours = sum((i.end - i.start).total_seconds() for i in own) / 3600.0
-        told.append(
-            f"zone {zone!r}: no usable {lacking} for {hours:.0f} h since {own[0].start}; its heat follows from an "
-            "estimate, and its errors do not count"
-        )
-    return tuple(told)
+    return tuple(
+        f"zone {e['zone']!r}: no usable {e['lacking']} for {e['hours']:.0f} h since {e['start'][:10]}; "
+        "its heat follows from an estimate, and its errors do not count"
+        for e in estimate_summary(found)
+    )
 
 
 def long_gaps(values: pd.Series, step: float) -> list[tuple[int, int]]:
@@ -72,7 +102,7 @@ def long_gaps(values: pd.Series, step: float) -> list[tuple[int, int]]:
     return [(a, b) for a, b in runs(values.isna().to_numpy()) if b - a + 1 > int(LONGEST_BRIDGE // step)]
 
 
-def like_others(values: pd.DataFrame, name: str, step: float, age: float = 0.0) -> pd.Series:
+def like_others(values: pd.DataFrame, name: Hashable, step: float, age: float = 0.0) -> pd.Series:
     """Estimate a column from the others: their mean, and the mean difference from it until a day before.
 
     Parameters

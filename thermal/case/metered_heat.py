@@ -99,7 +99,7 @@ def estimate_parts(
     for part, points in zip(parts, _OF_PARTS, strict=True):
         lacking = [str(zone) for zone in part if part[zone].isna().any() and len(areas) > 1]
         gaps = [gap for zone in lacking for gap in _gaps(building, frame, zone, points, step)]
-        whole, density = part.copy(), part / areas[list(part)]
+        whole, density = part.copy(), (part / areas)[part.columns]
         for gap in gaps:  # no flow is no heat without a discharge temperature too, but no sample of what is missing
             density.loc[gap.start : gap.end, gap.zone] = np.nan
         guess = {zone: areas[zone] * like_others(density, zone, step) for zone in {gap.zone for gap in gaps}}
