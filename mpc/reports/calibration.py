@@ -13,8 +13,8 @@ from mpc.reports import evaluation
 from mpc.reports.figures.calibration import paper_values, parameter_ranges
 from mpc.reports.figures.errors import error_band, error_growth, median_run
 from mpc.reports.figures.field import spatial_field
-from mpc.reports.identifiability import in_words, information_content, information_sentences
-from mpc.reports.page import counted, duration, estimated_sentences, kelvin, render
+from mpc.reports.identifiability import information_content, information_sentences
+from mpc.reports.page import counted, duration, estimated_sentences, in_words, kelvin, render
 from mpc.reports.residuals import diagnostics_content
 from thermal.case.case import Case
 from thermal.model.case_replay import Inputs, replay_inputs
@@ -128,7 +128,7 @@ def _structure_sentences(result: CalibrationResult) -> list[str]:
     what = "lumped into air and mass a zone" if kept.name == "lumped" else f"as {kept.name}"
     sentences = [f"The building is taken {what}, which predicts tuning days best that were left out ({errors})."]
     far = result.against_drawing()
-    named = [f"{in_words(f['what'].replace('@', ' of '))} {f['factor']:.2g}" for f in far[:_MOST_FAR]]
+    named = [f"{in_words(f['what'])} {f['factor']:.2g}" for f in far[:_MOST_FAR]]
     if named:
         rest = f" and {len(far) - len(named)} more" if len(far) > len(named) else ""
         sentences.append(f"Farthest from the drawing, as factors on it: {', '.join(named)}{rest}.")

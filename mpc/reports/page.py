@@ -14,6 +14,7 @@ from jinja2.filters import make_attrgetter
 
 from calibration.results import write_results
 from thermal.case.estimated import Estimated, estimate_summary
+from thermal.parameters import FACADE_PREFIX
 
 _NO_NUMBER = "–"
 
@@ -303,6 +304,26 @@ def listed(words: Iterable[str], last: str = "and") -> str:
     return f"{', '.join(first)} {last} {end}" if first else end
 
 
+def in_words(name: str) -> str:
+    """Spell the name of a parameter as people write it.
+
+    Parameters
+    ----------
+    name : str
+        Such as ``window_u_value``, or ``window_u_value@facade:south`` of a facade or zone.
+
+    Examples
+    --------
+    >>> in_words("window_u_value"), in_words("constant_gain@F1_N"), in_words("window_u_value@facade:south")
+    ('window U-value', 'constant gain of F1_N', 'window U-value of the south facade')
+    """
+    base, _, member = name.partition("@")
+    words = base.replace("_u_value", "_U-value").replace("_", " ")
+    if member.startswith(FACADE_PREFIX):
+        return f"{words} of the {member.removeprefix(FACADE_PREFIX)} facade"
+    return f"{words} of {member}" if member else words
+
+
 def estimated_sentences(found: Sequence[Estimated]) -> list[str]:
     """Say which zones' heat was estimated, in one sentence; in none where there is nothing to say.
 
@@ -327,5 +348,20 @@ def estimated_sentences(found: Sequence[Estimated]) -> list[str]:
 #: How values read, by name of the filter.
 _SPELLINGS: dict[str, Callable[..., str]] = {
     f.__name__: f
-    for f in (kelvin, signed, watts, significant, plain, unit, duration, clock, counted, percent, sure, ends, listed)
+    for f in (
+        kelvin,
+        signed,
+        watts,
+        significant,
+        plain,
+        unit,
+        duration,
+        clock,
+        counted,
+        percent,
+        sure,
+        ends,
+        in_words,
+        listed,
+    )
 }

@@ -143,7 +143,7 @@ def stuck_meters(values: FloatArray, others: Sequence[FloatArray], step: float) 
     values
         Shape (n_time,) [unit inside the library]; NaN = missing.
     others
-        The same point of other devices, shape (n_time,) each.
+        The same point of other devices, shape (n_time,) each [unit inside the library].
     step
         Time from a stamp to the next [s].
 

@@ -13,7 +13,7 @@ from scipy.stats import kstwo
 from calibration.fit.result import ParameterEstimate
 from mpc.reports.figures import style
 from mpc.reports.figures.style import Picture, keys_below, lines_over_time, panel, picture, styled
-from mpc.reports.identifiability import in_words
+from mpc.reports.page import in_words
 from thermal._types import FloatArray
 from thermal.effects.catalogue import CATALOGUE
 from thermal.parameters import PARAMETERS, Parameter
