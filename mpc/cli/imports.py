@@ -118,6 +118,7 @@ def import_telemetry(
     Example: buildingmpc import-telemetry cases/office export.csv --tz Europe/Berlin --resample 15min
     --out cases/office-3
     """
+    from mpc.reports.page import counted
     from thermal.case.case import Case
     from thermal.case.load import load_building
     from thermal.intake.telemetry import ImportSettings
@@ -143,7 +144,7 @@ def import_telemetry(
             say(f"- {remark}")
         say(f"{frame.shape[1]} columns from {first:%Y-%m-%d %H:%M} to {last:%Y-%m-%d %H:%M}, every {new.step:g} s")
         if len(found.aside):
-            say(f"Kept aside: {folder / 'unmatched.parquet'}, {found.aside['column'].nunique()} columns")
+            say(f"Kept aside: {folder / 'unmatched.parquet'}, {counted(found.aside['column'].nunique(), 'column')}")
         say(f"Case: {folder}   Points: {folder / 'points.csv'}")
         say(f"Next: buildingmpc check {folder}")
 

@@ -1,6 +1,6 @@
 """What a calibration leaves behind: its numbers as JSON, its predictions as a table, and a page to read."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +10,7 @@ from calibration.evaluation.case_model import CHECK_TOLERANCE
 from calibration.fit.result import CalibrationResult, ParameterEstimate
 from calibration.results import Content, check_results_folder, write_results
 from mpc.reports import evaluation
-from mpc.reports.figures.calibration import paper_values, parameter_ranges
+from mpc.reports.figures.calibration import MOST_ROWS, paper_values, parameter_ranges
 from mpc.reports.figures.errors import error_band, error_growth, median_run
 from mpc.reports.figures.field import spatial_field
 from mpc.reports.identifiability import information_content, information_sentences
@@ -128,7 +128,7 @@ def _structure_sentences(result: CalibrationResult) -> list[str]:
     what = "lumped into air and mass a zone" if kept.name == "lumped" else f"as {kept.name}"
     sentences = [f"The building is taken {what}, which predicts tuning days best that were left out ({errors})."]
     far = result.against_drawing()
-    named = [f"{in_words(f['what'])} {f['factor']:.2g}" for f in far[:_MOST_FAR]]
+    named = [f"{in_words(f['what'])} ({f['factor']:.2g})" for f in far[:_MOST_FAR]]
     if named:
         rest = f" and {len(far) - len(named)} more" if len(far) > len(named) else ""
         sentences.append(f"Farthest from the drawing, as factors on it: {', '.join(named)}{rest}.")
@@ -159,6 +159,14 @@ def _parameter_sentence(parameters: Sequence[ParameterEstimate]) -> str:
     return "; ".join([*parts, f"{len(bound)} {lie} on a bound{names}, which hints at physics that the model lacks."])
 
 
+def _kinds(rows: Sequence[Mapping[str, Any]]) -> dict[str, list[Mapping[str, Any]]]:
+    """Rows of the table of parameters by kind, where there are too many for one table."""
+    kinds: dict[str, list[Mapping[str, Any]]] = {}
+    for row in rows:
+        kinds.setdefault(row["base"] if len(rows) > MOST_ROWS else "parameters", []).append(row)
+    return kinds
+
+
 def _content(result: CalibrationResult, case: Case, grid: SymbolicModel, inputs: Inputs) -> dict[str, Any]:
     """Lay out the page."""
     before, after = result.uncalibrated["held_out"], result.calibrated["held_out"]
@@ -172,6 +180,9 @@ def _content(result: CalibrationResult, case: Case, grid: SymbolicModel, inputs:
     pairs = {title: {"before": result.uncalibrated[k], "after": result.calibrated[k]} for title, k in parts.items()}
     drawn["growth"] = error_growth(pairs)
     paper, objective = paper_values(result.parameters), result.objective
+    rows = [
+        vars(p) | {"title": in_words(p.name), "base": p.base, "paper": paper.get(p.name)} for p in result.parameters
+    ]
     flags = f" --scheme {chosen.scheme}" + (f" --objective {objective}" if objective != "multi_step" else "")
     flags += f" --starts {result.solver.starts} --seed {result.seed}"
     return {
@@ -184,7 +195,8 @@ def _content(result: CalibrationResult, case: Case, grid: SymbolicModel, inputs:
                    evaluation.unchanged_error(result.calibrated[k])) for title, k in parts.items()],
         "figures": drawn,
         "estimated": [p for p in result.parameters if p.standard_error is not None],
-        "parameters": [vars(p) | {"title": in_words(p.name), "paper": paper.get(p.name)} for p in result.parameters],
+        "kinds": list(_kinds(rows).items()),
+        "drawn": MOST_ROWS,
         "parameter_figure": parameter_ranges(result.parameters),
         "told": information_sentences(result.information),
         "zones": evaluation.by_error(after.by_zone()),

@@ -255,7 +255,9 @@ def _gathered(parameters: Sequence[tuple[Parameter, float]], words: Callable[[Pa
         parts = [(in_words(p.name), words(p, number)) for p, number in group]
         if count > MOST_NAMED:
             best, worst = (words(first, end) for end in (min(n for _, n in group), max(n for _, n in group)))
-            name = f"{in_words(first.base)} of {count} {first.scope}s"
+            of_pairs = any(" " in str(p.member) for p, _ in group)  # of zones, or of a zone and a direction
+            base = in_words(first.base)
+            name = f"{count} values of {base}" if of_pairs else f"{base} of {count} {first.scope}s"
             parts = [(name, best if best == worst else f"{best} at best, {worst} at worst")]
         named += [f"{name} ({said})" if said else name for name, said in parts]
     return named

@@ -321,7 +321,7 @@ def in_words(name: str) -> str:
     words = base.replace("_u_value", "_U-value").replace("_", " ")
     if member.startswith(FACADE_PREFIX):
         return f"{words} of the {member.removeprefix(FACADE_PREFIX)} facade"
-    return f"{words} of {member}" if member else words
+    return f"{words} of {member.replace(' + ', ' and ')}" if member else words
 
 
 def estimated_sentences(found: Sequence[Estimated]) -> list[str]:
