@@ -151,7 +151,7 @@ def _parameter_sentence(parameters: Sequence[ParameterEstimate]) -> str:
     if free:
         parts.append(f"{free} stay{'s' if free == 1 else ''} open within the physical range")
     if absent:
-        parts.append(f"{len(absent)} say that no sun enters from there")
+        parts.append(f"{counted(len(absent), 'solar aperture')} of no size: no sun is seen to enter there")
     if not bound:
         return "; ".join([*parts, "none lies on a bound."])
     names = f" ({', '.join(bound)})" if len(bound) < 4 else ""

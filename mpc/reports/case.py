@@ -94,8 +94,8 @@ def anomaly_rows(check: CaseCheck) -> list[list[str]]:
     """
     whole = (check.start, check.end)
     return [
-        [a.severity, a.certainty, "all the time" if ends == whole else " to ".join(f"{t:%Y-%m-%d %H:%M}" for t in ends), a.what,
-         a.advice]
+        [a.severity, a.certainty,
+         "all the time" if ends == whole else " to ".join(f"{t:%Y-%m-%d %H:%M}" for t in ends), a.what, a.advice]
         for a, ends in ((a, (a.start, a.end)) for a in check.anomalies)
     ]  # fmt: skip
 

@@ -81,7 +81,7 @@ def magnitudes(case: Case) -> Iterator[Anomaly]:
 
 
 def _rounded(value: float) -> str:
-    """Number to three digits without an exponent."""
+    """Write a number to three digits without an exponent."""
     return f"{float(f'{value:.3g}'):.12g}"
 
 
