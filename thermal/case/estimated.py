@@ -152,7 +152,9 @@ def estimate_temperatures(measured: pd.DataFrame, step: float) -> tuple[pd.DataF
     """
     filled, found = measured.copy(), []
     for zone in map(str, measured.columns):
-        for a, b in long_gaps(measured[zone], step):
+        gaps = long_gaps(measured[zone], step)
+        guess = like_others(measured, zone, step, DELAY) if gaps else measured[zone]
+        for a, b in gaps:
             found.append(Estimated(zone, ZONE_TEMPERATURE, measured.index[a], measured.index[b]))
-            filled.loc[found[-1].start : found[-1].end, zone] = like_others(measured, zone, step, DELAY)
+            filled.loc[found[-1].start : found[-1].end, zone] = guess
     return filled, tuple(found)
