@@ -230,9 +230,11 @@ def _show_devices(served: DeviceImport) -> None:
 
 
 def _show_matches(matches: tuple[PointMatch, ...]) -> None:
-    """Write what columns were matched to, least certain first, to stdout."""
-    ordered = sorted(matches, key=lambda m: (not m.remark, m.confidence))
-    say(f"{sum(not m.remark for m in matches)} of {len(matches)} columns matched")
-    rows = [(m.column, m.entity or None, m.point or None, m.confidence, m.remark) for m in ordered]
-    columns = {"column": "", "device": "", "point": "", "confidence": ".2f", "not matched because": ""}
-    show_table("Columns", columns, rows)
+    """Write what columns were matched to, least certain first and without those of certain names, to stdout."""
+    ordered = sorted((m for m in matches if m.confidence < 1.0), key=lambda m: (not m.remark, m.confidence))
+    named = len(matches) - len(ordered)
+    say(f"{sum(not m.remark for m in matches)} of {len(matches)} columns matched, {named} by the case's own names")
+    taken = [f"not matched: {m.remark}" if m.remark else f"{m.entity}/{m.point}" for m in ordered]
+    rows = [(m.column, m.confidence, what) for m, what in zip(ordered, taken, strict=True)]
+    if rows:
+        show_table("Columns", {"column": "", "confidence": ".2f", "taken for": ""}, rows)
