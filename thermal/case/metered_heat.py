@@ -38,7 +38,8 @@ def heat_parts(
         By air, by power [W], a column a zone; NaN where something is missing.
     """
     unknown = pd.Series(np.nan, index=frame.index)
-    air, power = (pd.DataFrame(index=frame.index) for _ in range(2))
+    air: dict[str, pd.Series] = {}
+    power: dict[str, pd.Series] = {}
     for device in building.devices:
         zone = device.zone
         if zone is None:
@@ -50,7 +51,7 @@ def heat_parts(
             rate, warm = (unknown if series is None else series for series in (flow, discharge))
             brought = rate * AIR_HEAT_CAPACITY * (warm - temperatures[zone])
             air[zone] = air.get(zone, 0.0) + brought.where(rate != 0.0, 0.0)
-    return air, power
+    return pd.DataFrame(air, index=frame.index), pd.DataFrame(power, index=frame.index)
 
 
 def total_heat(building: Building, parts: Iterable[pd.DataFrame]) -> pd.DataFrame:
