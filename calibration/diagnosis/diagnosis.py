@@ -26,6 +26,8 @@ from calibration.fit.ladder import ADVANCE, beside_lumped
 from calibration.fit.result import CalibrationResult, Rung, SolverReport, effect_entries
 from calibration.results import Axes, Result, plain
 from thermal.case.case import Case
+from thermal.case.estimated import Estimated, estimate_entry
+from thermal.case.plausibility.examine import check_calibratable
 from thermal.effects.catalogue import CATALOGUE
 
 #: Subsystem that an effect belongs to.
@@ -98,6 +100,8 @@ class Diagnosis(Result):
         The lumped model, where it predicts those days better.
     yardsticks : Yardsticks or None
         Errors of simple models on the held-out runs.
+    estimated : tuple of Estimated
+        Where heat of the telemetry is estimated.
     """
 
     case: str
@@ -120,6 +124,7 @@ class Diagnosis(Result):
     rungs: tuple[Rung, ...] = ()
     lumped: CalibrationResult | None = None
     yardsticks: Yardsticks | None = None
+    estimated: tuple[Estimated, ...] = ()
 
     @property
     def final(self) -> Fit:
@@ -175,6 +180,7 @@ class Diagnosis(Result):
                 "mae_of_last_third": self.last_third,
             },
             **{key: getattr(self, key) for key in ("seconds", "case", "version", "seed")},
+            **estimate_entry(self.estimated),
         }  # fmt: skip
 
     @property
@@ -212,7 +218,7 @@ class Diagnosis(Result):
                                    evaluations=found.evaluations, settled=found.converged),
             "intervals": intervals, "objective": "multi_step", "horizon": self.horizon,
             "settings": replace(self.settings, effects=dict(final.effects)), "zones": final.built.network.zones,
-            "case": self.case, "version": self.version, "seed": self.seed,
+            "case": self.case, "version": self.version, "seed": self.seed, **estimate_entry(self.estimated),
         })  # fmt: skip
         return content
 
@@ -268,6 +274,8 @@ def diagnose(
 
     Raises
     ------
+    CaseError
+        When the case holds what cannot be true, as `buildingmpc check` says.
     CalibrationError
         When an interval has no usable run.
 
@@ -278,6 +286,7 @@ def diagnose(
     'solar_gain'
     """
     began = time.perf_counter()
+    check_calibratable(case)
     models = ModelComparison(case, ModelSettings(dx=dx), tune, hold_out, horizon)
     untestable = models.untestable()
     baseline = models.fit({}, [{}])
@@ -315,6 +324,7 @@ def diagnose(
         rungs=rungs,
         lumped=None if lumped is None else replace(lumped.result(began, progress), rungs=rungs),
         yardsticks=_yardsticks(models, rounds[-1].after),
+        estimated=case.estimated,
     )
 
 

@@ -1,9 +1,9 @@
 """Predictions that carry the filter's unmeasured heat on, with bands that hold on days that were left out.
 
 A band is as wide as the filter says of each zone and each step ahead, times a factor a zone: the quantile of what
-errors on left-out tuning days were of it (Papadopoulos, Vovk and Gammerman 2011, doi:10.1613/jair.3198, for such normalised
-conformal predictions). So a disturbance that is no Ornstein-Uhlenbeck process, parameters that the days leave open and
-innovations with heavy tails are counted as they are.
+errors on left-out tuning days were of it (Papadopoulos, Vovk and Gammerman 2011, doi:10.1613/jair.3198, for such
+normalised conformal predictions). So a disturbance that is no Ornstein-Uhlenbeck process, parameters that the days
+leave open and innovations with heavy tails are counted as they are.
 """
 
 from __future__ import annotations

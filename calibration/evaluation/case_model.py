@@ -130,7 +130,8 @@ class CaseModel:
             Called with stage, done, total.
         """
         own = replace(settings, scheme=self.settings.stepping, spin_up_seconds=self.settings.spin_up_seconds)
-        return evaluate_model(model, self.theta, self.inputs, intervals, own, progress)
+        found = evaluate_model(model, self.theta, self.inputs, intervals, own, progress)
+        return replace(found, estimated=self.case.estimated)
 
 
 def case_model(

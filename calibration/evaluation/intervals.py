@@ -239,7 +239,7 @@ def select_runs(
         )
     gaps = np.concatenate([[0], np.cumsum(~inputs.complete)])
     whole = gaps[starts + steps + 1] == gaps[starts + 1]
-    seen = (np.isfinite(inputs.bridged[starts]) & np.isfinite(inputs.zone[starts + steps])).any(axis=1)
+    seen = np.isfinite(inputs.targets(starts, np.array([steps]))).any(axis=(1, 2))
     usable = whole & seen
     return Runs(begin, starts[usable], int((~usable).sum()))
 

@@ -16,6 +16,7 @@ from calibration.evaluation.intervals import Interval, Runs, horizon_steps, sele
 from calibration.evaluation.yardsticks import Yardsticks
 from calibration.results import Axes, Plain, Result
 from thermal._types import FloatArray
+from thermal.case.estimated import Estimated, estimate_entry
 from thermal.model.case_replay import SPIN_UP, Inputs, free_runs, spin_up
 from thermal.model.matrices import Matrices, SymbolicModel
 from thermal.model.step import IMPLICIT_EULER, Scheme
@@ -126,6 +127,8 @@ class Evaluation(Result):
         Errors of simple models on the same runs, where they were asked for.
     carried : Carried or None
         Errors when runs begin from a filter's state and carry its unmeasured heat on; None without a disturbance model.
+    estimated : tuple of Estimated
+        Where heat of the telemetry is estimated.
     """
 
     steps: int
@@ -135,6 +138,7 @@ class Evaluation(Result):
     by_horizon: dict[str, float] = field(default_factory=dict)
     yardsticks: Yardsticks | None = None
     carried: Carried | None = None
+    estimated: tuple[Estimated, ...] = ()
 
     @property
     def beside(self) -> dict[str, Any]:
@@ -165,7 +169,7 @@ class Evaluation(Result):
         ]
         plain = {"steps": self.steps, "step_seconds": self.step_seconds, "intervals": intervals}
         return {**plain, **self.metrics.to_dict(), "by_zone": self.by_zone(), "by_horizon": self.by_horizon,
-                **self.beside}  # fmt: skip
+                **self.beside, **estimate_entry(self.estimated)}  # fmt: skip
 
     def to_frame(self) -> pd.DataFrame:
         """Errors of every measured zone [K]."""
@@ -287,8 +291,7 @@ def _further(inputs: Inputs, interval: Interval, horizon: str, spin_up_seconds: 
 def _predictions(inputs: Inputs, interval: Interval, wanted: Wanted, simulated: FloatArray) -> Predictions:
     """Put runs beside what was measured; a zone that could not be matched at its start has no error."""
     runs, keep = wanted
-    known = inputs.bridged[runs.starts]
-    measured = np.where(np.isfinite(known)[:, None, :], inputs.zone[runs.starts[:, None] + keep[None, :]], np.nan)
+    known, measured = inputs.bridged[runs.starts], inputs.targets(runs.starts, keep)
     return Predictions(interval, inputs.stamps[runs.starts], simulated, measured, keep, known, runs.skipped)
 
 

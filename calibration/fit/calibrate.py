@@ -13,6 +13,7 @@ from calibration.fit.fitted_case import FittedCase, fit_case
 from calibration.fit.ladder import climb
 from calibration.fit.result import CalibrationResult
 from thermal.case.case import Case
+from thermal.case.plausibility.examine import check_calibratable
 
 
 def calibrate(
@@ -49,6 +50,8 @@ def calibrate(
 
     Raises
     ------
+    CaseError
+        When the case holds what cannot be true, as `buildingmpc check` says.
     CalibrationError
         When an interval has no usable run, a name is unknown, or every start failed.
 
@@ -60,6 +63,7 @@ def calibrate(
     True
     """
     began, chosen = time.perf_counter(), calibration_settings(settings)
+    check_calibratable(case)
     fitted = fit_case(case, tune, hold_out, chosen, progress)
     result = climb(fitted, began, progress) if chosen.climb else fitted.result(began, progress)
     return _beside_simple_models(result, fitted) if chosen.yardsticks else result

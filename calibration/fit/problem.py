@@ -228,8 +228,7 @@ class Problem:
         inputs, keep = self.inputs, self.keep
         states, moved = spin_up(matrices, inputs, runs.begin, runs.starts)
         means, mean_slopes = free_runs(matrices, inputs, runs.starts, keep, states, moved, self.scheme)
-        error = means - inputs.zone[runs.starts[:, None] + keep[None, :]]
-        error[~np.isfinite(inputs.bridged[runs.starts])[:, None, :] & np.ones_like(error, dtype=bool)] = np.nan
+        error = means - inputs.targets(runs.starts, keep)
         return error, None if mean_slopes is None else mean_slopes[..., list(self.free)]
 
     def spread(self, error: FloatArray) -> float:

@@ -17,6 +17,7 @@ from calibration.fit.estimate import Estimate
 from calibration.identifiability.information import DETERMINED, Information
 from calibration.results import Axes, Plain, Result, draw_rows, plain
 from thermal._types import FloatArray
+from thermal.case.estimated import estimate_entry
 from thermal.effects.catalogue import CATALOGUE
 from thermal.parameters import Parameter
 
@@ -219,6 +220,7 @@ class CalibrationResult(Result):
         about = ("objective", "horizon", "settings", "case", "version", "seed")
         content |= {k: getattr(self, k) for k in names} | {"intervals": intervals}
         content |= {"rungs": self.rungs, "against_drawing": self.against_drawing()}
+        content |= estimate_entry(self.calibrated["held_out"].estimated)
         found: dict[str, Any] = plain(content | {k: getattr(self, k) for k in about})
         return found
 

@@ -22,7 +22,6 @@ from calibration.fit.result import CalibrationResult
 from calibration.results import Content, Plain, to_json, write_results
 from thermal.case.case import Case
 from thermal.case.load import NAME, load_case, read_building_file
-from thermal.case.plausibility.examine import check_calibratable
 from thermal.errors import CaseError, ThermalError
 
 #: File in the results of each case: what they were made from, and how it went.
@@ -201,7 +200,6 @@ def _calibrate_one(task: CaseTask) -> CaseOutcome:
     task.begin()
     files = digest(task.case)  # before it is loaded: what changes from here on counts as another case
     case = load_case(task.case)
-    check_calibratable(case)
     intervals, settings = split_settings(task.settings)
     read = {
         name: [parse_interval(entry, case) if isinstance(entry, str) else entry for entry in entries]

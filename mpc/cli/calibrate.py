@@ -122,10 +122,8 @@ def run_calibration(
     """
     from calibration.fit import calibrate as fit
     from mpc.reports.calibration import write_calibration
-    from thermal.case.plausibility.examine import check_calibratable
 
     case, given = options.open_case(folder, out, force), dict(settings or {})
-    check_calibratable(case)
     tuned, judged = (options.parse_intervals(given.pop(name, None), case) for name in ("tune", "hold_out"))
     result = fit.calibrate(case, tuned, judged, settings=given, progress=progress)
     return result, write_calibration(result, case, out, force=force)
@@ -266,10 +264,8 @@ def run_diagnosis(
     """
     from calibration.diagnosis import diagnosis
     from mpc.reports.diagnosis import write_diagnosis
-    from thermal.case.plausibility.examine import check_calibratable
 
     loaded = options.open_case(case, out, force)
-    check_calibratable(loaded)
     tuned, judged = (options.parse_intervals(texts, loaded) for texts in intervals)
     result = diagnosis.diagnose(loaded, tuned, judged, dx=dx, horizon=horizon, progress=progress)
     return result, write_diagnosis(result, loaded, out, force=force)

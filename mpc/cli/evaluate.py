@@ -155,7 +155,7 @@ def _show_check(found: CaseCheck) -> None:
     )
     say(check_verdict(found))
     for severity, sure, when, what, advice in anomaly_rows(found):
-        say(f"- {severity}, {sure}{'' if when == 'all' else f', {when}'}: {what}; {advice}")
+        say(f"- {severity}, {sure}, {when}: {what}; {advice}")
     for remark in found.remarks:
         say(f"- {remark}")
     columns = {"zone": "", "floor": "", "area [m²]": ".1f", "volume [m³]": ".1f", "sensors": "d", "devices": ""}

@@ -118,6 +118,7 @@ def import_telemetry(
     Example: buildingmpc import-telemetry cases/office export.csv --tz Europe/Berlin --resample 15min
     --out cases/office-3
     """
+    from mpc.reports.page import counted
     from thermal.case.case import Case
     from thermal.case.load import load_building
     from thermal.intake.telemetry import ImportSettings
@@ -143,7 +144,7 @@ def import_telemetry(
             say(f"- {remark}")
         say(f"{frame.shape[1]} columns from {first:%Y-%m-%d %H:%M} to {last:%Y-%m-%d %H:%M}, every {new.step:g} s")
         if len(found.aside):
-            say(f"Kept aside: {folder / 'unmatched.parquet'}, {found.aside['column'].nunique()} columns")
+            say(f"Kept aside: {folder / 'unmatched.parquet'}, {counted(found.aside['column'].nunique(), 'column')}")
         say(f"Case: {folder}   Points: {folder / 'points.csv'}")
         say(f"Next: buildingmpc check {folder}")
 
@@ -229,9 +230,11 @@ def _show_devices(served: DeviceImport) -> None:
 
 
 def _show_matches(matches: tuple[PointMatch, ...]) -> None:
-    """Write what columns were matched to, least certain first, to stdout."""
-    ordered = sorted(matches, key=lambda m: (not m.remark, m.confidence))
-    say(f"{sum(not m.remark for m in matches)} of {len(matches)} columns matched")
-    rows = [(m.column, m.entity or None, m.point or None, m.confidence, m.remark) for m in ordered]
-    columns = {"column": "", "device": "", "point": "", "confidence": ".2f", "not matched because": ""}
-    show_table("Columns", columns, rows)
+    """Write what columns were matched to, least certain first and without those of certain names, to stdout."""
+    ordered = sorted((m for m in matches if m.confidence < 1.0), key=lambda m: (not m.remark, m.confidence))
+    named = len(matches) - len(ordered)
+    say(f"{sum(not m.remark for m in matches)} of {len(matches)} columns matched, {named} by the case's own names")
+    taken = [f"not matched: {m.remark}" if m.remark else f"{m.entity}/{m.point}" for m in ordered]
+    rows = [(m.column, m.confidence, what) for m, what in zip(ordered, taken, strict=True)]
+    if rows:
+        show_table("Columns", {"column": "", "confidence": ".2f", "taken for": ""}, rows)

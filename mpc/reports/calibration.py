@@ -1,6 +1,6 @@
 """What a calibration leaves behind: its numbers as JSON, its predictions as a table, and a page to read."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,11 +10,11 @@ from calibration.evaluation.case_model import CHECK_TOLERANCE
 from calibration.fit.result import CalibrationResult, ParameterEstimate
 from calibration.results import Content, check_results_folder, write_results
 from mpc.reports import evaluation
-from mpc.reports.figures.calibration import paper_values, parameter_ranges
+from mpc.reports.figures.calibration import MOST_ROWS, paper_values, parameter_ranges
 from mpc.reports.figures.errors import error_band, error_growth, median_run
 from mpc.reports.figures.field import spatial_field
-from mpc.reports.identifiability import in_words, information_content, information_sentences
-from mpc.reports.page import counted, duration, kelvin, render
+from mpc.reports.identifiability import information_content, information_sentences
+from mpc.reports.page import counted, duration, estimated_sentences, in_words, kelvin, render
 from mpc.reports.residuals import diagnostics_content
 from thermal.case.case import Case
 from thermal.model.case_replay import Inputs, replay_inputs
@@ -106,6 +106,7 @@ def calibration_verdict(result: CalibrationResult) -> str:
         if held_out.yardsticks is None
         else evaluation.beside_sentence(after, held_out.yardsticks),
         *_structure_sentences(result),
+        *estimated_sentences(held_out.estimated),
         _parameter_sentence(result.parameters),
     ]
     if not result.solver.success:
@@ -127,7 +128,7 @@ def _structure_sentences(result: CalibrationResult) -> list[str]:
     what = "lumped into air and mass a zone" if kept.name == "lumped" else f"as {kept.name}"
     sentences = [f"The building is taken {what}, which predicts tuning days best that were left out ({errors})."]
     far = result.against_drawing()
-    named = [f"{in_words(f['what'].replace('@', ' of '))} {f['factor']:.2g}" for f in far[:_MOST_FAR]]
+    named = [f"{in_words(f['what'])} ({f['factor']:.2g})" for f in far[:_MOST_FAR]]
     if named:
         rest = f" and {len(far) - len(named)} more" if len(far) > len(named) else ""
         sentences.append(f"Farthest from the drawing, as factors on it: {', '.join(named)}{rest}.")
@@ -150,12 +151,20 @@ def _parameter_sentence(parameters: Sequence[ParameterEstimate]) -> str:
     if free:
         parts.append(f"{free} stay{'s' if free == 1 else ''} open within the physical range")
     if absent:
-        parts.append(f"{len(absent)} say that no sun enters from there")
+        parts.append(f"{counted(len(absent), 'solar aperture')} of no size: no sun is seen to enter there")
     if not bound:
         return "; ".join([*parts, "none lies on a bound."])
     names = f" ({', '.join(bound)})" if len(bound) < 4 else ""
     lie = "lies" if len(bound) == 1 else "lie"
     return "; ".join([*parts, f"{len(bound)} {lie} on a bound{names}, which hints at physics that the model lacks."])
+
+
+def _kinds(rows: Sequence[Mapping[str, Any]]) -> dict[str, list[Mapping[str, Any]]]:
+    """Rows of the table of parameters by kind, where there are too many for one table."""
+    kinds: dict[str, list[Mapping[str, Any]]] = {}
+    for row in rows:
+        kinds.setdefault(row["base"] if len(rows) > MOST_ROWS else "parameters", []).append(row)
+    return kinds
 
 
 def _content(result: CalibrationResult, case: Case, grid: SymbolicModel, inputs: Inputs) -> dict[str, Any]:
@@ -171,6 +180,9 @@ def _content(result: CalibrationResult, case: Case, grid: SymbolicModel, inputs:
     pairs = {title: {"before": result.uncalibrated[k], "after": result.calibrated[k]} for title, k in parts.items()}
     drawn["growth"] = error_growth(pairs)
     paper, objective = paper_values(result.parameters), result.objective
+    rows = [
+        vars(p) | {"title": in_words(p.name), "base": p.base, "paper": paper.get(p.name)} for p in result.parameters
+    ]
     flags = f" --scheme {chosen.scheme}" + (f" --objective {objective}" if objective != "multi_step" else "")
     flags += f" --starts {result.solver.starts} --seed {result.seed}"
     return {
@@ -183,7 +195,8 @@ def _content(result: CalibrationResult, case: Case, grid: SymbolicModel, inputs:
                    evaluation.unchanged_error(result.calibrated[k])) for title, k in parts.items()],
         "figures": drawn,
         "estimated": [p for p in result.parameters if p.standard_error is not None],
-        "parameters": [vars(p) | {"title": in_words(p.name), "paper": paper.get(p.name)} for p in result.parameters],
+        "kinds": list(_kinds(rows).items()),
+        "drawn": MOST_ROWS,
         "parameter_figure": parameter_ranges(result.parameters),
         "told": information_sentences(result.information),
         "zones": evaluation.by_error(after.by_zone()),

@@ -51,6 +51,7 @@ def write_check(check: CaseCheck, out: str | Path, *, force: bool = False) -> Pa
         "timeline": quality_timeline(quality),
         "flaws": quality_rows(check),
         "anomalies": anomaly_rows(check),
+        "fine": check.is_fit_for_calibration,
         "zones": [vars(z) | {"seen": ", ".join(z.measured_by) or "nothing", "at": ", ".join(z.devices)}
                   for z in check.zones],
         "points": [vars(p) | {"of": p.zone or p.entity_kind, "usable": 100.0 * p.usable_share} for p in check.points],
@@ -84,7 +85,7 @@ def check_verdict(check: CaseCheck) -> str:
 
 
 def anomaly_rows(check: CaseCheck) -> list[list[str]]:
-    """Rows of the table of anomalies: severity, certainty, when, what, what to do.
+    """Rows of the list of anomalies: severity, certainty, when, what, what to do.
 
     Parameters
     ----------
@@ -93,8 +94,8 @@ def anomaly_rows(check: CaseCheck) -> list[list[str]]:
     """
     whole = (check.start, check.end)
     return [
-        [a.severity, a.certainty, "all" if ends == whole else " to ".join(f"{t:%Y-%m-%d %H:%M}" for t in ends), a.what,
-         a.advice]
+        [a.severity, a.certainty,
+         "all the time" if ends == whole else " to ".join(f"{t:%Y-%m-%d %H:%M}" for t in ends), a.what, a.advice]
         for a, ends in ((a, (a.start, a.end)) for a in check.anomalies)
     ]  # fmt: skip
 

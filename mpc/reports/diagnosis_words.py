@@ -10,7 +10,7 @@ from calibration.diagnosis.decide.where import DriftCurve, Where
 from calibration.diagnosis.diagnosis import Diagnosis
 from calibration.diagnosis.refit.refit import WINDOWS, Refit
 from mpc.reports.evaluation import beside_sentence
-from mpc.reports.page import duration, kelvin, listed, percent, sure, watts
+from mpc.reports.page import duration, estimated_sentences, kelvin, listed, percent, sure, watts
 from thermal.effects.catalogue import CATALOGUE
 
 #: What an effect is called where its title would read oddly after "leaves out".
@@ -47,7 +47,7 @@ def diagnosis_verdict(result: Diagnosis) -> str:
         )
     if result.yardsticks is not None:
         text += f" {beside_sentence(result.predicts, result.yardsticks)}"
-    return text
+    return " ".join([text, *estimated_sentences(result.estimated)])
 
 
 def _verdict(result: Diagnosis) -> str:

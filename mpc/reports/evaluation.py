@@ -14,7 +14,7 @@ from mpc.reports.figures.errors import Band, drift_boxes, error_growth, median_r
 from mpc.reports.figures.field import Field
 from mpc.reports.figures.plan import floor_maps, tile_map
 from mpc.reports.figures.style import CELSIUS, Picture
-from mpc.reports.page import clock, counted, duration, kelvin, listed, write_report
+from mpc.reports.page import clock, counted, duration, estimated_sentences, kelvin, listed, write_report
 from thermal._types import FloatArray
 from thermal.case.building import FloorPlans
 from thermal.case.case import Case
@@ -77,6 +77,7 @@ def evaluation_verdict(evaluation: Evaluation) -> str:
     lean = "too warm" if metrics.bias > 0 else "too cold"
     text = f"{ahead} ahead, the model misses the measured zone temperatures by {kelvin(metrics.mae)} K on average"
     text += f" and is {lean} by {kelvin(abs(metrics.bias))} K."
+    text = " ".join([text, *estimated_sentences(evaluation.estimated)])
     if evaluation.yardsticks is not None:
         return f"{text} {beside_sentence(metrics.mae, evaluation.yardsticks)}"
     compared = "less" if rest < metrics.mae else "more"

@@ -1,7 +1,6 @@
 """What the data determine and prefer, in words: on the estimation scale these are products, ratios, odds."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,8 +10,8 @@ from calibration.fit.selection import LEAST_DAYS, HeldOutDifference, LikelihoodR
 from calibration.identifiability.information import Combination, Information, ParameterInformation
 from calibration.identifiability.power import ParameterPower, Power
 from calibration.identifiability.profile import Profile
-from mpc.reports.page import counted, listed, unit
-from thermal.parameters import FACADE_PREFIX, Parameter
+from mpc.reports.page import counted, in_words, listed, unit
+from thermal.parameters import Parameter
 
 #: Relative deviations up to this one are told in per cent, larger ones as a factor [-].
 MOST_PER_CENT = 0.5
@@ -22,36 +21,6 @@ MOST_NAMED = 3
 
 #: End of the names of nominal values, and of the parameters with which they enter as a product.
 _DENSITY, _CAPACITY = "_density", "_heat_capacity"
-
-
-def in_words(name: str) -> str:
-    """Spell the name of a parameter as people write it.
-
-    Parameters
-    ----------
-    name : str
-        Such as ``window_u_value``.
-
-    Examples
-    --------
-    >>> in_words("window_u_value")
-    'window U-value'
-    """
-    return name.replace("_u_value", "_U-value").replace("_", " ")
-
-
-def spoken(parameter: Parameter) -> str:
-    """Name a parameter as one says it.
-
-    Parameters
-    ----------
-    parameter : Parameter
-        Of the building, a facade or a zone.
-    """
-    name = in_words(parameter.base)
-    if parameter.scope == "facade":
-        return f"{name} of the {str(parameter.member).removeprefix(FACADE_PREFIX)} facade"
-    return f"{name} of zone {parameter.member}" if parameter.scope == "zone" else name
 
 
 def _precision_words(parameter: Parameter | None, deviation: float) -> str:
@@ -85,7 +54,7 @@ def combination_words(parameters: Mapping[str, Parameter], exponents: Mapping[st
     'ratio slab heat capacity / slab coupling'
     """
     names = {
-        name: ("odds of the " if parameters[name].scale == "logit" else "") + spoken(parameters[name])
+        name: ("odds of the " if parameters[name].scale == "logit" else "") + in_words(parameters[name].name)
         for name in exponents
     }
     if any(abs(abs(e) - 1.0) > 1e-9 for e in exponents.values()):
@@ -119,7 +88,7 @@ def information_sentences(information: Information) -> tuple[str, ...]:
     sentences += _open(named, [k for k in known if k.name not in members | set(told)])
     sentences += [_nominal(named, set(told), name, *value) for name, value in information.nominal.items()]
     sentences += [
-        f"The errors of {spoken(named[a])} and {spoken(named[b])} go together: correlation {r:.2f}."
+        f"The errors of {in_words(named[a].name)} and {in_words(named[b].name)} go together: correlation {r:.2f}."
         for a, b, r in information.correlations
     ]
     return tuple(sentences)
@@ -156,7 +125,7 @@ def _power_sentence(parameter: Parameter, power: ParameterPower, drawn: bool) ->
     first, least, most = (f"{100 * r:.0f} %" for r in (power.ratio, power.least, power.most))
     span = f" ({least} to {most} over the prior)" if drawn and least != most else ""
     verb = {"yes": "will tell", "perhaps": "may tell", "no": "will not tell"}[power.told]
-    return f"These data {verb} the {spoken(parameter)}: {first} of the prior's deviation will be left{span}."
+    return f"These data {verb} the {in_words(parameter.name)}: {first} of the prior's deviation will be left{span}."
 
 
 def profile_sentence(profile: Profile) -> str:
@@ -167,7 +136,7 @@ def profile_sentence(profile: Profile) -> str:
     profile : Profile
         From `profile_likelihood`.
     """
-    name, interval = spoken(profile.parameter), profile.intervals[0]
+    name, interval = in_words(profile.parameter.name), profile.intervals[0]
     of = "" if profile.parameter.unit == "1" else f" {profile.parameter.unit}"
     lower, upper = f"{interval.lower:.3g}{of}", f"{interval.upper:.3g}{of}"
     source = "data and prior" if profile.with_prior else "the data alone"
@@ -250,7 +219,7 @@ def _summary(told: int, count: int, combinations: int) -> str:
 
 
 def _combination(named: Mapping[str, Parameter], told: set[str], combination: Combination) -> str:
-    apart = [spoken(named[name]) for name in combination.exponents if name not in told]
+    apart = [in_words(named[name].name) for name in combination.exponents if name not in told]
     kept = "by themselves" if len(apart) > 1 else "by itself"
     precise = _precision_words(None, combination.deviation)
     words = combination_words(named, combination.exponents)
@@ -283,10 +252,12 @@ def _gathered(parameters: Sequence[tuple[Parameter, float]], words: Callable[[Pa
     named = []
     for group in groups.values():
         first, count = group[0][0], len(group)
-        parts = [(spoken(p), words(p, number)) for p, number in group]
+        parts = [(in_words(p.name), words(p, number)) for p, number in group]
         if count > MOST_NAMED:
             best, worst = (words(first, end) for end in (min(n for _, n in group), max(n for _, n in group)))
-            name = f"{spoken(replace(first, scope='global', member=None))} of {count} {first.scope}s"
+            of_pairs = any(" " in str(p.member) for p, _ in group)  # of zones, or of a zone and a direction
+            base = in_words(first.base)
+            name = f"{count} values of {base}" if of_pairs else f"{base} of {count} {first.scope}s"
             parts = [(name, best if best == worst else f"{best} at best, {worst} at worst")]
         named += [f"{name} ({said})" if said else name for name, said in parts]
     return named

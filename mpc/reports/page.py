@@ -13,8 +13,13 @@ import pandas as pd
 from jinja2.filters import make_attrgetter
 
 from calibration.results import write_results
+from thermal.case.estimated import Estimated, estimate_summary
+from thermal.parameters import FACADE_PREFIX
 
 _NO_NUMBER = "–"
+
+#: More zones than this are counted, not named.
+_MOST_NAMED = 4
 
 
 @cache
@@ -299,8 +304,64 @@ def listed(words: Iterable[str], last: str = "and") -> str:
     return f"{', '.join(first)} {last} {end}" if first else end
 
 
+def in_words(name: str) -> str:
+    """Spell the name of a parameter as people write it.
+
+    Parameters
+    ----------
+    name : str
+        Such as ``window_u_value``, or ``window_u_value@facade:south`` of a facade or zone.
+
+    Examples
+    --------
+    >>> in_words("window_u_value"), in_words("constant_gain@F1_N"), in_words("window_u_value@facade:south")
+    ('window U-value', 'constant gain of F1_N', 'window U-value of the south facade')
+    """
+    base, _, member = name.partition("@")
+    words = base.replace("_u_value", "_U-value").replace("_", " ")
+    if member.startswith(FACADE_PREFIX):
+        return f"{words} of the {member.removeprefix(FACADE_PREFIX)} facade"
+    return f"{words} of {member.replace(' + ', ' and ')}" if member else words
+
+
+def estimated_sentences(found: Sequence[Estimated]) -> list[str]:
+    """Say which zones' heat was estimated, in one sentence; in none where there is nothing to say.
+
+    Parameters
+    ----------
+    found : sequence of Estimated
+        Where it was.
+    """
+    if not found:
+        return []
+    hours: dict[str, float] = {}
+    for entry in estimate_summary(found):
+        hours[entry["zone"]] = max(entry["hours"], hours.get(entry["zone"], 0.0))
+    named = [f"{zone} ({worst:.0f} h)" for zone, worst in hours.items()]
+    rest = [f"{len(named) - _MOST_NAMED} more"] if len(named) > _MOST_NAMED else []
+    return [
+        f"Sensors failed in {listed([*named[:_MOST_NAMED], *rest])}: heat there was estimated meanwhile, and errors "
+        "there do not count."
+    ]
+
+
 #: How values read, by name of the filter.
 _SPELLINGS: dict[str, Callable[..., str]] = {
     f.__name__: f
-    for f in (kelvin, signed, watts, significant, plain, unit, duration, clock, counted, percent, sure, ends, listed)
+    for f in (
+        kelvin,
+        signed,
+        watts,
+        significant,
+        plain,
+        unit,
+        duration,
+        clock,
+        counted,
+        percent,
+        sure,
+        ends,
+        in_words,
+        listed,
+    )
 }

@@ -8,17 +8,16 @@ from functools import cached_property
 from pathlib import Path
 from zoneinfo import ZoneInfo
 
-import numpy as np
 import pandas as pd
 
-from thermal.case.building import OUTDOOR, Building, Device
-from thermal.case.estimated import Estimated, estimate_remarks, estimate_temperatures
-from thermal.case.points import DISCHARGE_TEMPERATURE, HEATING_POWER, OUTDOOR_TEMPERATURE, SUPPLY_FLOW, ZONE_TEMPERATURE
+from thermal.case.building import OUTDOOR, Building
+from thermal.case.estimated import Estimated, estimate_remarks, estimate_temperatures, like_others, long_gaps
+from thermal.case.metered_heat import estimate_parts, heat_parts, total_heat
+from thermal.case.points import OUTDOOR_TEMPERATURE, SUPPLY_FLOW, ZONE_TEMPERATURE
 from thermal.case.quality import QualityReport, assess, usable
 from thermal.case.telemetry import Telemetry
-from thermal.case.validation import TERMINAL_TYPES, remarks
+from thermal.case.validation import remarks
 from thermal.errors import CaseError
-from thermal.units import AIR_HEAT_CAPACITY
 
 
 def local_timestamp(time: str | datetime, building: Building) -> pd.Timestamp:
@@ -201,10 +200,10 @@ class Case:
 
     @cached_property
     def _zone_heat(self) -> pd.DataFrame:
-        return self._heat_at(self._zone_temperatures)
+        return total_heat(self.building, heat_parts(self.building, self.usable, self._zone_temperatures))
 
     def zone_heat_estimated(self) -> pd.DataFrame:
-        """Heat that each zone receives, with zone temperatures estimated where a sensor is dead or stuck for long.
+        """Heat that each zone receives, estimated where a sensor that it follows from is dead or stuck for long.
 
         Returns
         -------
@@ -213,24 +212,29 @@ class Case:
         """
         return self._estimated[0].copy()
 
+    def heat_is_estimated(self) -> pd.DataFrame:
+        """Whether the heat of each zone is an estimate, shape (n_time, n_zone)."""
+        return self._estimated[0].notna() & self._zone_heat.isna()
+
     @property
     def estimated(self) -> tuple[Estimated, ...]:
-        """Where a zone's heat takes an estimated temperature, since its sensor is dead or stuck for over 30 minutes."""
+        """Where a zone's heat is estimated: a sensor that it follows from is dead or stuck for over 30 minutes."""
         return self._estimated[1]
 
     @cached_property
     def _estimated(self) -> tuple[pd.DataFrame, tuple[Estimated, ...]]:
         temperatures, found = estimate_temperatures(self._zone_temperatures, self.step)
-        heat = self._heat_at(temperatures)
-        gained = heat.notna() & self._zone_heat.isna()
-        return heat, tuple(i for i in found if gained.loc[i.start : i.end, i.zone].any())
-
-    def _heat_at(self, temperatures: pd.DataFrame) -> pd.DataFrame:
-        heat = pd.DataFrame(0.0, index=temperatures.index, columns=temperatures.columns)
-        for device in self.building.devices:
-            if device.zone is not None:
-                heat[device.zone] = heat[device.zone] + self._device_heat(device, temperatures[device.zone])
-        return heat
+        parts = heat_parts(self.building, self.usable, temperatures)
+        filled, lacking = estimate_parts(self.building, self.usable, parts, self.step)
+        stages = [total_heat(self.building, stage) for stage in (parts, filled)]
+        gained = [heat.notna() & self._zone_heat.isna() for heat in stages]
+        kept = [
+            i
+            for own, g in zip((found, lacking), gained, strict=True)
+            for i in own
+            if g.loc[i.start : i.end, i.zone].any()
+        ]
+        return stages[-1], tuple(kept)
 
     def boundary_temperatures(self) -> pd.DataFrame:
         """Temperatures that the zones look out on.
@@ -259,23 +263,21 @@ class Case:
             Shape (n_time, n_airflow) [kg/s], columns 0..n-1 in the order of `building.airflows`: the device's flow
             times the fraction. NaN where the flow is missing or unusable.
         """
-        frame = self.usable
-        rates = {}
-        for number, airflow in enumerate(self.building.airflows):
-            column = f"{airflow.device}/{SUPPLY_FLOW}"
-            flow = frame[column] if column in frame else pd.Series(np.nan, index=frame.index)
-            rates[number] = flow * airflow.fraction
-        return pd.DataFrame(rates, index=frame.index, columns=range(len(self.building.airflows)), dtype=float)
+        flows = self.usable.reindex(columns=[f"{airflow.device}/{SUPPLY_FLOW}" for airflow in self.building.airflows])
+        rates = flows * [airflow.fraction for airflow in self.building.airflows]
+        return rates.set_axis(range(len(self.building.airflows)), axis=1).astype(float)
 
-    def _device_heat(self, device: Device, zone_temperature: pd.Series) -> pd.Series:
-        frame = self.usable
-        flow, discharge, power = (
-            frame.get(f"{device.name}/{point}") for point in (SUPPLY_FLOW, DISCHARGE_TEMPERATURE, HEATING_POWER)
-        )
-        heat = pd.Series(0.0, index=frame.index)
-        if flow is None and power is None and (discharge is not None or device.type in TERMINAL_TYPES):
-            return heat * np.nan
-        if flow is not None:
-            air = discharge if discharge is not None else heat * np.nan
-            heat = heat + (flow * AIR_HEAT_CAPACITY * (air - zone_temperature)).where(flow != 0.0, 0.0)
-        return heat if power is None else heat + power
+    def airflow_rates_estimated(self) -> pd.DataFrame:
+        """Air that goes on from zone to zone; where it is missing for over 30 minutes, its mean until a day before.
+
+        Returns
+        -------
+        DataFrame
+            `airflow_rates` [kg/s], but for such gaps; what is missing all the time stays missing.
+        """
+        rates = self.airflow_rates()
+        for number in rates:
+            usual = like_others(rates[[number]], number, self.step)
+            for a, b in long_gaps(rates[number], self.step):
+                rates.loc[self.stamps[a] : self.stamps[b], number] = usual
+        return rates

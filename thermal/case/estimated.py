@@ -1,11 +1,12 @@
-"""Temperatures of zones whose sensor is dead or stuck for long, estimated from what was measured a day before."""
+"""What a dead or stuck sensor leaves unknown, estimated: a zone's temperature, its heat, the flow of a device."""
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
-import numpy as np
 import pandas as pd
 
+from thermal.case.points import ZONE_TEMPERATURE
 from thermal.case.signal_faults import runs
 
 #: Longest gap that is bridged by a straight line, not estimated [s] (results contract: 30 minutes).
@@ -17,47 +18,124 @@ DELAY = 86400.0
 
 @dataclass(frozen=True)
 class Estimated:
-    """An interval in which a zone's temperature was estimated.
+    """An interval in which what a zone's heat follows from was estimated.
 
     Parameters
     ----------
     zone
         Name of the zone.
+    lacking
+        What no usable value was there of: ``zone_air_temperature_sensor``, or ``DEVICE/POINT``.
     start, end
         First and last stamp of it.
     """
 
     zone: str
+    lacking: str
     start: pd.Timestamp
     end: pd.Timestamp
 
 
-def estimate_remarks(found: Sequence[Estimated]) -> tuple[str, ...]:
-    """Say of each zone for how long its temperature was estimated.
+def estimate_summary(found: Sequence[Estimated]) -> list[dict[str, Any]]:
+    """Sum up by sensor what was estimated.
+
+    Parameters
+    ----------
+    found
+        Where.
+
+    Returns
+    -------
+    list of dict
+        ``zone``, ``lacking``, first ``start``, last ``end``, and ``hours`` in all [h], one a sensor.
+    """
+    entries = []
+    for zone, lacking in dict.fromkeys((interval.zone, interval.lacking) for interval in found):
+        own = [interval for interval in found if (interval.zone, interval.lacking) == (zone, lacking)]
+        start, end = own[0].start.isoformat(), own[-1].end.isoformat()
+        hours = round(sum((i.end - i.start).total_seconds() for i in own) / 3600.0, 1)
+        entries.append({"zone": zone, "lacking": lacking, "start": start, "end": end, "hours": hours})
+    return entries
+
+
+def estimate_entry(found: Sequence[Estimated]) -> dict[str, Any]:
+    """Entry ``estimated`` of a results file; nothing where nothing was estimated.
 
     Parameters
     ----------
     found
         Where.
     """
-    told = []
-    for zone in dict.fromkeys(interval.zone for interval in found):
-        own = [interval for interval in found if interval.zone == zone]
-        hours = sum((i.end - i.start).total_seconds() for i in own) / 3600.0
-        told.append(
-            f"zone {zone!r}: no usable temperature for {hours:.0f} h since {own[0].start}; its heat follows from an "
-            "estimate, and its errors do not count"
-        )
-    return tuple(told)
+    return {"estimated": estimate_summary(found)} if found else {}
+
+
+def estimate_remarks(found: Sequence[Estimated]) -> tuple[str, ...]:
+    """Say of each sensor for how long it was missing and that its zone's heat was estimated.
+
+    Parameters
+    ----------
+    found
+        Where.
+    """
+    return tuple(
+        f"zone {e['zone']!r}: no usable {e['lacking']} for {e['hours']:.0f} h since {e['start'][:10]}; "
+        "its heat follows from an estimate, and its errors do not count"
+        for e in estimate_summary(found)
+    )
+
+
+def long_gaps(values: pd.Series, step: float) -> list[tuple[int, int]]:
+    """Find gaps that are too long to be bridged by a straight line.
+
+    Parameters
+    ----------
+    values
+        Shape (n_time,), NaN where missing.
+    step
+        Time from a stamp to the next [s].
+
+    Returns
+    -------
+    list of tuple
+        First and last position of each gap of more than 30 minutes.
+    """
+    return [(a, b) for a, b in runs(values.isna().to_numpy()) if b - a + 1 > int(LONGEST_BRIDGE // step)]
+
+
+def like_others(values: pd.DataFrame, name: Hashable, step: float, age: float = 0.0) -> pd.Series:
+    """Estimate a column from the others: their mean, and the mean difference from it until a day before.
+
+    Parameters
+    ----------
+    values
+        Shape (n_time, n), NaN where missing.
+    name
+        Column to estimate. Without others it is its own mean until a day before.
+    step
+        Time from a stamp to the next [s].
+    age
+        How old the mean of the others is [s]; 0 for inputs of a model, which are given, not for what it predicts.
+
+    Returns
+    -------
+    Series
+        Shape (n_time,) [unit of `values`]; NaN where all the others are missing.
+    """
+    rest = values.drop(columns=name)
+    others = rest.mean(axis=1) if rest.shape[1] else pd.Series(0.0, index=values.index)
+    usual = (values[name] - others).expanding().mean().shift(max(1, round(DELAY / step)))
+    if age:
+        others = others.ffill().bfill().shift(max(1, round(age / step))).bfill()
+    return others + (usual.fillna(0.0) if rest.shape[1] else usual.bfill())
 
 
 def estimate_temperatures(measured: pd.DataFrame, step: float) -> tuple[pd.DataFrame, tuple[Estimated, ...]]:
-    """Fill long gaps of zone temperatures with the mean of the other zones a day before.
+    """Fill long gaps of zone temperatures with those of the other zones a day before (`like_others`).
 
     Parameters
     ----------
     measured
-        Temperatures of the zones that devices give air to, shape (n_time, n_zone) [K], NaN where missing.
+        Temperatures of the zones, shape (n_time, n_zone) [K], NaN where missing.
     step
         Time from a stamp to the next [s].
 
@@ -69,22 +147,14 @@ def estimate_temperatures(measured: pd.DataFrame, step: float) -> tuple[pd.DataF
 
     Notes
     -----
-    The zone's mean difference from the others is added, a day old as well. In the first day of the telemetry, where
-    nothing is a day old, the first stamp's mean stands; a run of over a day still sees what comes after its start.
+    In the first day of the telemetry, where nothing is a day old, the first stamp's mean stands; a run of over a day
+    still sees what comes after its start.
     """
-    limit, delay = int(LONGEST_BRIDGE // step), max(1, round(DELAY / step))
     filled, found = measured.copy(), []
-    mean = measured.mean(axis=1).ffill().bfill()
-    for zone in measured.columns:
-        gap = measured[zone].isna().to_numpy()
-        long = [(a, b) for a, b in runs(gap) if b - a + 1 > limit]
-        if not long or mean.isna().all():
-            continue
-        difference = (measured[zone] - mean).expanding().mean().shift(delay).fillna(0.0)
-        estimate = (mean.shift(delay).bfill() + difference).to_numpy()
-        values = measured[zone].to_numpy(dtype=float, copy=True)
-        for a, b in long:
-            values[a : b + 1] = estimate[a : b + 1]
-            found.append(Estimated(str(zone), measured.index[a], measured.index[b]))
-        filled[zone] = np.asarray(values)
+    for zone in map(str, measured.columns):
+        gaps = long_gaps(measured[zone], step)
+        guess = like_others(measured, zone, step, DELAY) if gaps else measured[zone]
+        for a, b in gaps:
+            found.append(Estimated(zone, ZONE_TEMPERATURE, measured.index[a], measured.index[b]))
+            filled.loc[found[-1].start : found[-1].end, zone] = guess
     return filled, tuple(found)

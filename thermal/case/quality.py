@@ -16,8 +16,15 @@ import pandas as pd
 from pydantic import BaseModel
 
 from thermal.case.building import Building
-from thermal.case.points import OUTDOOR_TEMPERATURE, POINT_TYPES, ZONE_TEMPERATURE, split_column
-from thermal.case.signal_faults import flat_lines, impossible_values, runs, spikes
+from thermal.case.points import (
+    DISCHARGE_TEMPERATURE,
+    OUTDOOR_TEMPERATURE,
+    POINT_TYPES,
+    SUPPLY_FLOW,
+    ZONE_TEMPERATURE,
+    split_column,
+)
+from thermal.case.signal_faults import flat_lines, impossible_values, runs, spikes, stuck_meters
 from thermal.case.telemetry import Telemetry
 
 GAP, IMPOSSIBLE, FLAT, SPIKE, CONSTANT = "gap", "impossible", "flat", "spike", "constant"
@@ -177,8 +184,9 @@ def assess(telemetry: Telemetry, building: Building) -> QualityReport:
     Notes
     -----
     Impossible values are judged for every point (`thermal.case.points`), flat lines and spikes for the temperatures of
-    zones, measured boundaries and outdoors only. Other signals do jump, and do stand still, in sound buildings: flows
-    and powers at zero or at full load, sun at night, wind calm, setpoints, water and supply air under control.
+    zones, measured boundaries and outdoors only, flows and discharge temperatures by those of other devices
+    (`stuck_meters`). Other signals do jump, and do stand still, in sound buildings: flows and powers at zero or at full
+    load, sun at night, wind calm, setpoints, water and supply air under control.
     """
     frame, step, stamps = telemetry.frame, telemetry.step, telemetry.frame.index
     clean = {str(name): frame[name].to_numpy(dtype=float, copy=True) for name in frame.columns}
@@ -204,6 +212,10 @@ def assess(telemetry: Telemetry, building: Building) -> QualityReport:
         if finite.size > 1 and np.ptp(finite) == 0.0:
             note(name, CONSTANT, [(0, len(values) - 1, f"always {finite[0] - 273.15:.2f} degC")])
         note(name, SPIKE, spikes(values, step))
+    for point in (SUPPLY_FLOW, DISCHARGE_TEMPERATURE):
+        meters = {name: clean[name].copy() for name in clean if name.endswith(f"/{point}")}
+        for name, values in meters.items():
+            note(name, FLAT, stuck_meters(values, [meters[other] for other in meters if other != name], step))
     columns = []
     for name, flaws in findings.items():
         missing = sum(finding.steps for finding in flaws if finding.kind == GAP) / len(frame)

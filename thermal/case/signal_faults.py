@@ -1,5 +1,7 @@
 """Judging one signal: impossible values, flat lines, spikes. Numbers in, stretches out."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -130,6 +132,41 @@ def flat_lines(
         certain = seconds[run] >= CERTAIN_FLAT_SECONDS and not is_input
         if moved and (jumped or certain or not needs_jump):
             found += _pieces(present[first : last + 1], seconds[run])
+    return found
+
+
+def stuck_meters(values: FloatArray, others: Sequence[FloatArray], step: float) -> list[Stretch]:
+    """Find stretches where a flow or the temperature of supplied air repeats itself while those of others move.
+
+    Parameters
+    ----------
+    values
+        Shape (n_time,) [unit inside the library]; NaN = missing.
+    others
+        The same point of other devices, shape (n_time,) each [unit inside the library].
+    step
+        Time from a stamp to the next [s].
+
+    Returns
+    -------
+    list of tuple
+        First and last position of each stretch of 6 hours or more.
+
+    Notes
+    -----
+    A control holds what it comes back to: values seen at another time too, zero, the smallest and the largest are not
+    judged, unless the meter never shows another. Half of the others must move meanwhile, or the column may be assumed.
+    """
+    present = np.flatnonzero(np.isfinite(values))
+    series, found = values[present], []
+    for first, last in runs(np.concatenate(([False], np.diff(series) == 0.0))):
+        value, positions = series[last], present[first - 1 : last + 1]
+        seconds, returns = positions.size * step, (series == value).sum() > positions.size
+        if value == 0.0 or returns or seconds < max(FLAT_SECONDS, FLAT_SAMPLES * step):
+            continue
+        moved = [bool(np.diff(o[np.isfinite(o)]).any()) for o in (v[positions] for v in others)]
+        if (positions.size == series.size or series.min() < value < series.max()) and 0 < len(moved) <= 2 * sum(moved):
+            found += _pieces(positions, seconds)
     return found
 
 

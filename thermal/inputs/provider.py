@@ -359,7 +359,7 @@ def telemetry_inputs(case: Case, normalisation: Normalisation | None = None) -> 
         if weather[name].notna().any()
     }
     series["outdoor"] = filled(case.boundary_temperatures()["outdoor"])
-    series |= {"heat": filled(case.zone_heat_estimated()), "airflow": filled(case.airflow_rates())}
+    series |= {"heat": filled(case.zone_heat_estimated()), "airflow": filled(case.airflow_rates_estimated())}
     series |= {"supply_flow": flow.to_numpy(), "supply_heat": supplied.to_numpy()}
     if people is not None:
         series["people"] = filled(people)

@@ -48,14 +48,18 @@ class Inputs:
     airflow : ndarray, shape (n_time, n_airflow)
         Directed airflows [kg/s].
     zone : ndarray, shape (n_time, n_zone)
-        Measured zone temperatures [K], NaN where missing; an unmeasured zone is NaN throughout.
+        Measured zone temperatures [K], NaN where missing and where the zone's heat is estimated; an unmeasured zone is
+        NaN throughout.
     bridged : ndarray, shape (n_time, n_zone)
-        ``zone`` with the last value kept for at most 30 minutes: a start may know nothing of what comes after it [K].
+        Measured zone temperatures [K] with the last value kept for at most 30 minutes: a start may know nothing of
+        what comes after it.
     held : ndarray, shape (n_time, n_zone)
-        ``zone`` with the last value kept through every gap, to hold the zones at in a spin-up [K].
+        Measured zone temperatures [K] with the last value kept through every gap, to hold the zones at in a spin-up.
     complete : ndarray of bool, shape (n_time,)
-        Whether heat, boundaries and airflows of this step are measured, bridged over at most 30 minutes, or, heat
-        for want of a zone's temperature, estimated (`Case.estimated`).
+        Whether heat, boundaries and airflows of this step are measured, bridged over at most 30 minutes, or
+        estimated (`Case.estimated`).
+    estimated : ndarray of bool, shape (n_time, n_zone), optional
+        Where the heat of a zone is estimated; nowhere by default.
     """
 
     stamps: pd.DatetimeIndex
@@ -67,6 +71,7 @@ class Inputs:
     bridged: FloatArray
     held: FloatArray
     complete: NDArray[np.bool_]
+    estimated: NDArray[np.bool_] | None = None
 
     def __len__(self) -> int:
         return len(self.stamps)
@@ -75,6 +80,29 @@ class Inputs:
         n, share = self.zone.shape[1], self.complete.mean()
         span = f"{self.stamps[0]} to {self.stamps[-1]} by {self.step:g} s" if len(self) else "no steps"
         return f"Inputs({span}, {n} zones, {self.boundary.shape[1]} boundaries and signals, {share:.0%} complete)"
+
+    def targets(self, starts: IntArray, keep: IntArray) -> FloatArray:
+        """Temperatures that runs are held against.
+
+        Parameters
+        ----------
+        starts : ndarray of int, shape (m,)
+            Stamps at which the runs start.
+        keep : ndarray of int, shape (n_keep,)
+            Steps after the start.
+
+        Returns
+        -------
+        ndarray, shape (m, n_keep, n_zone)
+            Measured temperatures [K]; NaN where a zone could not be matched at its start, or its heat has been
+            estimated since.
+        """
+        rows = starts[:, None] + keep
+        known = np.isfinite(self.bridged[starts])[:, None, :]
+        if self.estimated is not None:
+            count = np.cumsum(self.estimated, axis=0)
+            known = known & (count[rows] == count[starts][:, None, :])
+        return np.where(known, self.zone[rows], np.nan)
 
     def to_frame(self) -> pd.DataFrame:
         """All inputs as a table, shape (n_time, n) [K], [W], [kg/s]; columns of two levels, kind and number."""
@@ -125,7 +153,8 @@ def replay_inputs(case: Case, network: ThermalNetwork, provider: InputProvider |
         raise ModelError("telemetry", "a zone_air_temperature_sensor of at least one zone", "none that is usable")
     missing = [str(c) for c in boundary.columns if boundary[c].isna().all()]
     ModelError.unless(not missing, "telemetry", "temperatures of the boundaries", f"none that is usable for {missing}")
-    frames = [case.zone_heat_estimated(), boundary, case.airflow_rates()]
+    frames = [case.zone_heat_estimated(), boundary, case.airflow_rates_estimated()]
+    estimated = case.heat_is_estimated().to_numpy()
     limit = int(LONGEST_BRIDGE // step)
     bridged = [_bridge(f, limit) for f in frames]
     complete = np.logical_and.reduce([f.notna().all(axis=1).to_numpy() for f in bridged])
@@ -143,10 +172,11 @@ def replay_inputs(case: Case, network: ThermalNetwork, provider: InputProvider |
         heat=filled[0],
         boundary=np.hstack([filled[1], signals]),
         airflow=filled[2],
-        zone=zone.to_numpy(dtype=float),
+        zone=np.where(estimated, np.nan, zone.to_numpy(dtype=float)),
         bridged=(zone.ffill(limit=limit) if limit else zone).to_numpy(dtype=float),
         held=zone.ffill().bfill().to_numpy(dtype=float),
         complete=complete,
+        estimated=estimated,
     )
 
 

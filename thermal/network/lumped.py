@@ -14,12 +14,12 @@ import scipy.sparse as sp
 import scipy.sparse.linalg as sla
 
 from thermal._types import FloatArray, IntArray
-from thermal.case.building import GeometryQuality
+from thermal.case.building import FACADES, GeometryQuality
 from thermal.inputs.signals import CONSTANT, Signal, on_plane, waves_of_day
 from thermal.network.graph import GraphBuilder
 from thermal.network.network import ThermalNetwork
 from thermal.network.structure import Structure
-from thermal.network.topology import UPWARD, VERTICAL, Pane, Room
+from thermal.network.topology import UPWARD, VERTICAL, Pane, Room, direction_of
 from thermal.parameters import PARAMETERS
 
 #: Factor that the drawing's sums are within, 95 times in a hundred [-]: what surveys, drawings and guesses are off by.
@@ -36,8 +36,7 @@ _LEAST = 0.1
 _KNOWN = 0.1
 
 #: Directions that the sun is taken from [deg]: azimuth and tilt of the compass's points and of a roof.
-_COMPASS = ("north", "east", "south", "west")
-_PLANES = {**{name: (90.0 * number, VERTICAL) for number, name in enumerate(_COMPASS)}, "roof": (0.0, UPWARD)}
+_PLANES = {**{name: (90.0 * number, VERTICAL) for number, name in enumerate(FACADES)}, "roof": (0.0, UPWARD)}
 
 #: Periods of a gain that recurs from day to day [h].
 _PERIODS = (24.0, 12.0, 8.0)
@@ -135,7 +134,7 @@ def _add_gains(
         value = graph.own(PARAMETERS["recurring_gain"].of("zone", f"{room.name}, {wave.name}"))
         graph.source(f"recurring gain {room.name}, {wave.name}", value, int(room.air[0]), wave, room.floor_area)
     for name, (azimuth, tilt) in _PLANES.items() if structure.sun else ():
-        looking = [p for p in panes if _nearest(p) == name]
+        looking = [p for p in panes if (direction_of(p.azimuth) if p.tilt >= 45.0 else "roof") == name]
         glass = sum(p.area * (p.transmittance or _TRANSMITTANCE) for p in looking) / room.floor_area
         own = PARAMETERS["solar_aperture"]
         if quality != "generic":
@@ -143,13 +142,6 @@ def _add_gains(
         value = graph.own(own.of("zone", f"{room.name} from {name}"))
         signal = Signal.made(f"sun from {name}", "W/m^2", on_plane, "sun", given={"azimuth": azimuth, "tilt": tilt})
         graph.source(f"sun {room.name} from {name}", value, int(room.air[0]), signal, room.floor_area)
-
-
-def _nearest(pane: Pane) -> str:
-    """Direction that a pane looks to."""
-    if pane.tilt < 45.0:
-        return "roof"
-    return _COMPASS[int((pane.azimuth + 45.0) % 360.0 // 90.0) % 4]
 
 
 def _drawn(network: ThermalNetwork) -> _Drawn:

@@ -20,7 +20,7 @@ from thermal.network.structure import (
     WINDOW_RATED_FILM,
     series,
 )
-from thermal.network.topology import DOWNWARD, UPWARD, VERTICAL, GroundFace, OuterFaces, Outlook, Pane
+from thermal.network.topology import DOWNWARD, UPWARD, VERTICAL, GroundFace, OuterFaces, Outlook, Pane, direction_of
 
 #: Time that a sublayer must resolve [s]: its thickness is at most sqrt(diffusivity x this), a Fourier number of one.
 SUBLAYER_TIME = 1800.0
@@ -96,9 +96,6 @@ def _lumped(layers: tuple[Layer, ...], nodes: int) -> Chain:
     at = np.bincount(part, stored * place, minlength=nodes) / capacity
     return Chain(float(at[0]), float(resistance.sum() - at[-1]), np.diff(at), capacity)
 
-
-#: Directions of a zone table's facades, each a quarter of the compass that begins 45 degrees before its own azimuth.
-_COMPASS = ("north", "east", "south", "west")
 
 #: Horizontal surfaces to outdoor by kind.
 _HORIZONTAL = {"ceiling": "roof", "floor": "floor"}
@@ -246,4 +243,4 @@ def facade_of(surface: Surface) -> str | None:
     if surface.azimuth is None:
         expected = "an azimuth [deg], since a parameter has one value a facade"
         raise ModelError(f"surface {surface.name}", expected, "none")
-    return _COMPASS[int((surface.azimuth + 45.0) % 360.0 // 90.0) % 4]
+    return direction_of(surface.azimuth)

@@ -10,7 +10,7 @@ import casadi as ca
 import numpy as np
 
 from thermal._types import FloatArray, IntArray
-from thermal.case.building import FloorPlan, FloorPlans
+from thermal.case.building import FACADES, FloorPlan, FloorPlans
 
 #: Tilt of a vertical, an upward and a downward face [deg].
 VERTICAL, UPWARD, DOWNWARD = 90.0, 0.0, 180.0
@@ -21,6 +21,22 @@ UNKNOWN_GLAZING = 0.5
 
 #: Azimuth of a plan's sides before the building is turned [deg].
 _SIDES = {"north": 0.0, "east": 90.0, "south": 180.0, "west": 270.0}
+
+
+def direction_of(azimuth: float) -> str:
+    """Point of the compass that is nearest to an azimuth; half way between two the next one clockwise.
+
+    Parameters
+    ----------
+    azimuth : float
+        Clockwise from true north [deg].
+
+    Examples
+    --------
+    >>> direction_of(44.9), direction_of(-45.0), direction_of(135.0)
+    ('north', 'north', 'south')
+    """
+    return FACADES[int((azimuth + 45.0) % 360.0 // 90.0) % 4]
 
 
 @dataclass(frozen=True)

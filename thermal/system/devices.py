@@ -75,15 +75,15 @@ def device_graph(building: Building) -> DeviceGraph:
         if kind is None:
             unused |= {} if device.type in _METERS else {device.name: f"no component has the type {device.type!r}"}
         elif issubclass(kind, Group) and device.zone is None:
-            unused[device.name] = f"a {device.type} without a zone"
+            unused[device.name] = f"{device.type} without a zone"
         elif kind is Terminals:
             for name in (n for n in feeding if n in air_handlers):
                 serving[zones.index(str(device.zone))] = air_handlers.index(name)
         elif issubclass(kind, Group):
             emitters[device.type] = (*emitters.get(device.type, ()), device)
         elif device.type not in (AirHandler.device, water):
-            why = f"the hot water is of a {water}" if device.type in heats else "no rule connects it: pass the system"
-            unused[device.name] = f"a {device.type}, {why}"
+            why = f"the hot water is from {water}" if device.type in heats else "no rule connects it: pass the system"
+            unused[device.name] = f"{device.type}, {why}"
     return DeviceGraph(air_handlers, serving, emitters, water, unused)
 
 

@@ -13,7 +13,7 @@ from scipy.stats import kstwo
 from calibration.fit.result import ParameterEstimate
 from mpc.reports.figures import style
 from mpc.reports.figures.style import Picture, keys_below, lines_over_time, panel, picture, styled
-from mpc.reports.identifiability import in_words
+from mpc.reports.page import in_words
 from thermal._types import FloatArray
 from thermal.effects.catalogue import CATALOGUE
 from thermal.parameters import PARAMETERS, Parameter
@@ -59,14 +59,18 @@ def paper_values(parameters: Sequence[ParameterEstimate]) -> dict[str, float]:
 
 @styled
 def parameter_ranges(parameters: Sequence[ParameterEstimate]) -> list[Picture]:
-    """Draw each estimated parameter within its range, on the scale it is estimated on (logarithmic, or logit).
+    """Draw estimated parameters within their ranges, on the scale they are estimated on (logarithmic, or logit).
+
+    Of more than 40, those that the data determine are drawn first.
 
     Parameters
     ----------
     parameters : sequence of ParameterEstimate
         Those without a standard error are left out.
     """
-    shown = [p for p in parameters if p.standard_error is not None][:MOST_ROWS]
+    shown = [p for p in parameters if p.standard_error is not None]
+    if len(shown) > MOST_ROWS:
+        shown = sorted(shown, key=lambda p: not p.identifiable)[:MOST_ROWS]
     if not shown:
         return []
     figure, axes = panel(7.4, 0.9 + 0.3 * len(shown))

@@ -272,3 +272,19 @@ def test_file_that_is_not_there_is_refused(tmp_path: Path) -> None:
         load_parameters(tmp_path / "nothing.json", network())
     with pytest.raises(CalibrationError):
         load_parameters(tmp_path, network())
+
+
+def test_files_say_what_was_estimated() -> None:
+    whole = load_bundled_case()
+    frame = whole.telemetry.frame.copy()
+    column = next(c for c in frame if c.endswith("supply_air_flowrate_sensor"))
+    frame.iloc[-300:-250, frame.columns.get_loc(column)] = np.nan
+    case = replace(whole, telemetry=replace(whole.telemetry, frame=frame))
+    result = calibrate(case, settings=CalibrationSettings(dx=1.0, starts=1))
+    zone = next(d.zone for d in case.building.devices if column.startswith(d.name))
+    start, end = case.stamps[-300].isoformat(), case.stamps[-251].isoformat()
+    entry = {"zone": zone, "lacking": column, "start": start, "end": end, "hours": 4.1}
+    for content in (result.to_dict(), result.calibrated["held_out"].to_dict()):
+        assert content["estimated"] == [entry]
+    for content in (calibrated().to_dict(), calibrated().calibrated["held_out"].to_dict()):
+        assert "estimated" not in content

@@ -23,7 +23,7 @@ from mpc.reports.evaluation import evaluation_verdict, write_evaluation
 from mpc.reports.figures.calibration import paper_values, parameter_ranges
 from mpc.reports.figures.errors import error_band, median_run, series_of_runs, zone_panels
 from mpc.reports.figures.field import spatial_field
-from mpc.reports.page import significant
+from mpc.reports.page import estimated_sentences, significant
 from thermal import (
     Building,
     Case,
@@ -36,6 +36,7 @@ from thermal import (
 )
 from thermal.case.building import Location, ZoneEntry
 from thermal.case.check import describe_case
+from thermal.case.estimated import Estimated
 from thermal.model.simulation import simulate
 
 LARGEST_PAGE = 5e6  # bytes
@@ -317,3 +318,19 @@ def test_odd_cases_make_whole_pages(tmp_path: Path, zones: int) -> None:
     panels = [alt for alt in page.alts if alt.startswith("Measured and simulated temperature of zone")]
     assert len(panels) == min(12, zones - (zones > 1))
     assert ("of 39 zones with the largest error" in page.text) == (zones == 40)
+
+
+def test_many_parameters_are_folded_by_kind(result: CalibrationResult, tmp_path: Path) -> None:
+    first = result.parameters[0]
+    many = tuple(replace(first, name=f"{kind}@Z{k}") for kind in ("air_film", "gain") for k in range(30))
+    page = Page(write_calibration(replace(result, parameters=many), load_bundled_case(), tmp_path / "many"))
+    assert "air film: 30 values" in page.text and "gain of Z29" in page.text
+    assert "Drawn are 40 of 60" in page.text
+
+
+def test_a_sentence_says_what_was_estimated() -> None:
+    stamp = pd.Timestamp("2024-01-01", tz="UTC")
+    found = [Estimated(f"Z{k}", f"VAV_{k}/flow", stamp, stamp + pd.Timedelta(hours=5)) for k in range(6)]
+    assert estimated_sentences([]) == []
+    (sentence,) = estimated_sentences([*found, *found[:1]])
+    assert sentence.startswith("Sensors failed in Z0 (10 h), Z1 (5 h), Z2 (5 h), Z3 (5 h) and 2 more: ")

@@ -1,13 +1,14 @@
-"""Temperatures of zones with dead or stuck sensors: estimated a day old, only for what heat needs, and said."""
+"""What dead or stuck sensors leave unknown: temperatures estimated a day old, what others give, means of a day ago."""
 
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from calibration.evaluation.intervals import default_intervals, select_runs
 from thermal.case.case import Case
-from thermal.case.estimated import estimate_temperatures
+from thermal.case.estimated import estimate_temperatures, like_others, long_gaps
 from thermal.case.points import ZONE_TEMPERATURE
 from thermal.data import load_bundled_case
 from thermal.model.case_replay import replay_inputs
@@ -59,3 +60,15 @@ def test_short_gaps_stay() -> None:
     filled, found = estimate_temperatures(measured, step)
     assert (found == ()) == (step <= 1800.0)
     assert filled.iloc[:, 1:].equals(measured.iloc[:, 1:])
+
+
+def test_an_estimate_follows_the_others_at_the_difference_of_a_day_before() -> None:
+    stamps = pd.date_range("2024-01-01", periods=72, freq="h", tz="UTC")
+    wave = pd.Series(np.sin(np.arange(72.0)), stamps)
+    values = pd.DataFrame({"A": wave + 3.0, "B": wave, "C": wave + 2.0})
+    values.loc[stamps[48] :, "A"] = np.nan
+    np.testing.assert_allclose(like_others(values, "A", 3600.0).iloc[48:], wave.iloc[48:] + 3.0)
+    np.testing.assert_allclose(like_others(values[["A"]], "A", 3600.0).iloc[-1], values["A"].mean())
+    values.loc[stamps[60], ["B", "C"]] = np.nan
+    assert np.isnan(like_others(values, "A", 3600.0).iloc[60])
+    assert long_gaps(values["A"], 3600.0) == [(48, 71)]

@@ -12,6 +12,7 @@ import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
+from calibration import calibrate, diagnose
 from mpc.cli.app import app
 from thermal import load_bundled_case
 from thermal.case.building import Device
@@ -211,5 +212,6 @@ def test_check_and_calibrate_say_what_cannot_be_fitted(tmp_path: Path) -> None:
     assert answer.exit_code == 0 and "not valid for calibration" in answer.stdout and "kg/h" in answer.stdout
     answer = CliRunner().invoke(app, ["calibrate", str(folder), "--out", str(tmp_path / "out")])
     assert answer.exit_code == 2 and "valid for calibration" in answer.stderr
-    with pytest.raises(CaseError, match="valid for calibration"):
-        check_calibratable(load_case(folder))
+    for refuse in (check_calibratable, calibrate, diagnose):
+        with pytest.raises(CaseError, match="valid for calibration"):
+            refuse(load_case(folder))

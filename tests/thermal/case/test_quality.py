@@ -83,7 +83,9 @@ def test_nothing_is_flagged_in_coarser_means(practice: Case, step: str) -> None:
 def test_signals_that_may_stand_still_or_jump_do(practice: Case) -> None:
     def change(frame: pd.DataFrame) -> None:
         frame["VAV_F1_C/supply_air_flowrate_sensor"] = 0.0
-        frame["VAV_F1_C/discharge_air_temperature_sensor"] = 285.15
+        frame["VAV_F1_C/discharge_air_temperature_sensor"] = frame["VAV_F1_C/discharge_air_temperature_sensor"].clip(
+            288.15, 300.0
+        )
         frame["weather_station/direct_normal_irradiance_sensor"] = 0.0
         frame["weather_station/wind_speed_sensor"] = 0.0
         frame.iloc[700, frame.columns.get_loc("VAV_F1_N1/supply_air_flowrate_sensor")] = 3.0

@@ -290,8 +290,22 @@ def test_gaps_of_inputs_are_bridged_by_straight_lines_up_to_30_minutes(count: in
     )
 
 
-def test_missing_flow_makes_the_heat_of_its_zone_missing() -> None:
-    found = replay_inputs(case_with({FLOW: (100, 12)}), bundled_network().network)
+def test_a_missing_flow_costs_its_zone() -> None:
+    case = case_with({FLOW: (100, 12)})
+    found = replay_inputs(case, bundled_network().network)
+    column = case.building.zone_names.index("F1_W")
+    assert found.complete.all()
+    assert np.isnan(found.zone[100:112, column]).all()
+    assert np.isfinite(found.held).all()
+    runs = np.array([80, 99, 105, 112])
+    seen = np.isfinite(found.targets(runs, np.array([10, 30])))
+    np.testing.assert_array_equal(seen[:, :, column], [[True, False], [False, False], [False, False], [True, True]])
+    assert np.delete(seen, column, axis=2).all()
+
+
+def test_flows_that_are_all_missing_leave_the_heat_missing() -> None:
+    flows = {c: (100, 12) for c in load_bundled_case().telemetry.frame if c.endswith("supply_air_flowrate_sensor")}
+    found = replay_inputs(case_with(flows), bundled_network().network)
     assert not found.complete[100:112].any()
     assert found.complete.sum() == 564
     assert np.isfinite(found.heat).all()
@@ -335,5 +349,6 @@ def test_telemetry_without_zones_or_outdoors_is_refused() -> None:
 
 
 def test_telemetry_without_a_complete_step_names_what_is_missing() -> None:
+    flows = {c: (0, 576) for c in load_bundled_case().telemetry.frame if c.endswith("supply_air_flowrate_sensor")}
     with pytest.raises(ModelError, match="F1_W"):
-        replay_inputs(case_with({FLOW: (0, 576)}), bundled_network().network)
+        replay_inputs(case_with(flows), bundled_network().network)

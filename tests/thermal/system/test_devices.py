@@ -88,9 +88,9 @@ def test_a_registered_device_that_no_rule_connects_is_known_and_said_to_be_left_
     register_component(ExhaustFan)
     try:
         assert unknown_device_types(building) == {}
-        assert device_graph(building).unused == {"FAN": "a exhaust_fan, no rule connects it: pass the system"}
+        assert device_graph(building).unused == {"FAN": "exhaust_fan, no rule connects it: pass the system"}
         _, notes = equip(building)
-        assert [n for n in notes if "FAN (a exhaust_fan, no rule connects it" in n]
+        assert [n for n in notes if "FAN (exhaust_fan, no rule connects it" in n]
         with pytest.raises(ModelError, match="component ExhaustFan: expected a class with a classmethod `sized`"):
             ExhaustFan.sized(1.0)
     finally:

@@ -69,7 +69,7 @@ def magnitudes(case: Case) -> Iterator[Anomaly]:
         columns, typical = tuple(c for c, _ in found), float(np.median([changes for _, changes in found]))
         units = [unit for unit, factor in FLOW_UNITS.items() if 0.5 <= typical / factor <= 20.0]
         looks = f"; they look like {listed(units)}" if units else ""
-        what = f"supply air changes the air of its zones {typical:.3g} times an hour: {listed(columns)}{looks}"
+        what = f"supply air changes the air of its zones {_rounded(typical)} times an hour: {listed(columns)}{looks}"
         advice = "correct the unit of supply_air_flowrate_sensor under 'units', or the volume of the zones"
         certainty: Certainty = "certain" if impossible else "likely" if side == "low" else "possible"
         yield Anomaly("unit", "error" if impossible else "warning", certainty, columns, *_ends(frame), what, advice)
@@ -78,6 +78,11 @@ def magnitudes(case: Case) -> Iterator[Anomaly]:
     if not blamed:
         yield from _loss(case, heat, sum(area for area, _ in sizes.values()))
     yield from _rates(case)
+
+
+def _rounded(value: float) -> str:
+    """Write a number to three digits without an exponent."""
+    return f"{float(f'{value:.3g}'):.12g}"
 
 
 def _ends(frame: pd.DataFrame) -> tuple[pd.Timestamp, pd.Timestamp]:
@@ -91,7 +96,7 @@ def _heat(heat: pd.DataFrame, sizes: dict[str, tuple[float, float]]) -> Iterator
     if by_area:
         worst = max(by_area.values())
         impossible = worst > IMPOSSIBLE_HEAT
-        what = f"heat of up to {worst:.3g} W by m2 of floor in {listed(by_area)}"
+        what = f"heat of up to {_rounded(worst)} W by m2 of floor in {listed(by_area)}"
         advice = "correct the unit of heat or flow, or the floor area"
         severity: Severity = "error" if impossible else "warning"
         sure: Certainty = "certain" if impossible else "possible"

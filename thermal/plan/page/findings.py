@@ -207,7 +207,7 @@ def _on_devices(draft: Draft) -> Iterator[DraftFinding]:
         if device.zone is not None and device.zone not in zones:
             yield _error("device", device.name, f"zone {device.zone!r} is on no floor; {nearest(device.zone, zones)}")
         if device.zone is None and device.type in TERMINAL_TYPES:
-            yield _remark("device", device.name, f"a {device.type} that serves no zone: its heat is not counted")
+            yield _remark("device", device.name, f"{device.type} that serves no zone: its heat is not counted")
         if device.type and device.type not in device_types():
             text = f"a type that the library does not know: {device.type!r}; {nearest(device.type, device_types())}"
             yield _remark("device", device.name, text)

@@ -47,9 +47,15 @@ def planted() -> tuple[Case, str, FloatArray]:
         opened[first : first + int(rng.integers(2, 8))] = 1.0
     unit = -AIR_HEAT_CAPACITY * 1.2 * drivers.through_windows[:, 0]  # 1.2 kg of air a cubic metre
     frame, (device,) = case.telemetry.frame.copy(), case.building.devices_of(zone)
-    flow = frame[f"{device.name}/supply_air_flowrate_sensor"].to_numpy()
-    assert (flow > 0.0).all()
-    frame[f"{device.name}/discharge_air_temperature_sensor"] += AREA * opened * unit / (AIR_HEAT_CAPACITY * flow)
+    rate, discharge = (
+        f"{device.name}/{point}_sensor" for point in ("supply_air_flowrate", "discharge_air_temperature")
+    )
+    assert (frame[rate] > 0.0).all()
+    # the same heat by thrice the flow, so that no discharge temperature is impossible
+    air = case.zone_temperatures()[zone]
+    frame[discharge] = air + (frame[discharge] - air) / 3.0
+    frame[rate] *= 3.0
+    frame[discharge] += AREA * opened * unit / (AIR_HEAT_CAPACITY * frame[rate])
     return Case(case.building, Telemetry.from_frame(frame)), zone, opened
 
 
