@@ -15,6 +15,7 @@ import numpy as np
 
 from calibration.estimation.disturbance import DisturbanceModel
 from calibration.estimation.filtered import evaluate_filter, prepare
+from calibration.estimation.gains import Covariance
 from calibration.estimation.kalman import KalmanFilter
 from calibration.evaluation.carried import LEVEL, Carried
 from calibration.evaluation.intervals import Interval
@@ -93,8 +94,8 @@ class Forecaster:
     def _predict(self, theta: FloatArray, intervals: Sequence[Interval]) -> tuple[Evaluation, FloatArray]:
         """Predictions, and the deviation of what is measured from them after each step, (n_kept, n_zone) [K]."""
         settings = replace(self.settings, trajectories=True)
-        measured = np.isfinite(self.inputs.zone).any(axis=0)
-        covariance = "steady" if measured.size > _MOST_ZONES else "exact"
+        measured = np.asarray(np.isfinite(self.inputs.zone).any(axis=0))
+        covariance: Covariance = "steady" if measured.size > _MOST_ZONES else "exact"
         found = evaluate_filter(
             self.model, theta, self.inputs, intervals, self.disturbance, settings, covariance=covariance
         )

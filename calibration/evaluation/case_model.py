@@ -1,13 +1,16 @@
 """A case with its model and parameters, ready to run: what calibration, evaluation and replay have in common."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
-from calibration.errors import NotEnoughDataError
+from calibration.errors import CalibrationError, FilterError, NotEnoughDataError
+from calibration.estimation.bands import Forecaster
+from calibration.estimation.disturbance import DisturbanceModel
 from calibration.evaluation.intervals import Interval, Runs, horizon_steps, merge, select_runs
 from calibration.evaluation.n_step import HORIZONS, Evaluation, EvaluationSettings, Progress, evaluate_model
 from calibration.evaluation.settings import ModelSettings, load_parameters, read_settings
@@ -65,6 +68,10 @@ class CaseModel:
         Parameter values [parameter units].
     source : str
         Where they come from, in a few words.
+    disturbance : DisturbanceModel or None
+        Unmeasured heat and sensors that belong to them.
+    band_factors : mapping of str to float
+        Of the bands of predictions, by zone [-]; see `Forecaster.factors`.
     """
 
     case: Case
@@ -73,6 +80,8 @@ class CaseModel:
     inputs: Inputs
     theta: FloatArray
     source: str
+    disturbance: DisturbanceModel | None = None
+    band_factors: Mapping[str, float] = field(default_factory=dict)
 
     def certified(
         self, interval: Interval, steps: int, reduced: ReducedModel | None = None
@@ -131,7 +140,11 @@ class CaseModel:
         """
         own = replace(settings, scheme=self.settings.stepping, spin_up_seconds=self.settings.spin_up_seconds)
         found = evaluate_model(model, self.theta, self.inputs, intervals, own, progress)
-        return replace(found, estimated=self.case.estimated)
+        carried = None
+        if self.disturbance is not None and isinstance(model, ReducedModel):
+            forecaster = Forecaster(model, self.inputs, self.disturbance, own)
+            carried = forecaster.judge(self.theta, intervals, self.band_factors)
+        return replace(found, carried=carried, estimated=self.case.estimated)
 
 
 def case_model(
@@ -161,7 +174,41 @@ def case_model(
     network = chosen.network(case.building)
     theta = load_parameters(parameters, network) if parameters is not None else network.start()
     source = Path(parameters).name if parameters is not None else "uncalibrated start values"
-    return CaseModel(case, chosen, SymbolicModel(network), replay_inputs(case, network), theta, source)
+    disturbance, factors = (None, {}) if parameters is None else read_disturbance(parameters, network.zones)
+    inputs = replay_inputs(case, network)
+    return CaseModel(case, chosen, SymbolicModel(network), inputs, theta, source, disturbance, factors)
+
+
+def read_disturbance(path: str | Path, zones: Sequence[str]) -> tuple[DisturbanceModel | None, dict[str, float]]:
+    """Read unmeasured heat, sensors and factors of bands from a ``calibration.json``, as far as it has them.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file, which `load_parameters` could read.
+    zones : sequence of str
+        Of the building.
+
+    Raises
+    ------
+    CalibrationError
+        When they are not as `calibrate` writes them.
+    """
+    content = json.loads(Path(path).read_text(encoding="utf-8"))
+    entry = content.get("disturbance")
+    if entry is None:
+        return None, {}
+    try:
+        found = DisturbanceModel(**entry)
+        factors = {str(zone): float(factor) for zone, factor in (content.get("band_factors") or {}).items()}
+    except (FilterError, TypeError, ValueError, AttributeError) as error:
+        raise CalibrationError(
+            f"{path}: disturbance: expected what `calibrate` writes, found {entry} ({error})"
+        ) from error
+    sizes = {np.size(found.deviation), np.size(found.sensor_deviation)}
+    expected = f"one number, or one for each of {len(zones)} zones"
+    CalibrationError.unless(sizes <= {1, len(zones)}, f"{path}: disturbance", expected, entry)
+    return found, factors
 
 
 def evaluate_case(

@@ -11,7 +11,7 @@ from calibration.errors import CalibrationError
 from calibration.estimation.disturbance import DisturbanceModel
 from calibration.estimation.innovations import TuningSettings, air_volumes, tune_disturbance
 from calibration.evaluation.n_step import Progress
-from calibration.fit.least_squares import LeastSquaresResult, solve_least_squares
+from calibration.fit.least_squares import INTERRUPTED, LeastSquaresResult, solve_damped, solve_least_squares
 from calibration.fit.precision import Precision, precision, unexplained
 from calibration.fit.problem import Problem
 from thermal._types import FloatArray
@@ -31,6 +31,9 @@ _SIZE_TOLERANCE = 0.1
 
 #: Share by which numbers of the disturbance change in a round below which they are kept from there on [-].
 _SAME_DISTURBANCE = 0.05
+
+#: Gain of twice the cost below which a solve after the first round is done [-].
+_LEAST_GAIN = 1e-3
 
 #: Times by which gradients of whitened residuals may be larger at convergence [-]: an effective sample a hundred times
 #: as large makes them so at the same distance in standard errors.
@@ -117,7 +120,8 @@ def estimate(
 ) -> Estimate:
     """Solve the problem from one start.
 
-    Each round solves by Ipopt on a reduced model, then takes the deviation of the errors (and, with a tuner, how many
+    Each round solves on a reduced model, the first by Ipopt and those that begin close by with damped Gauss-Newton
+    steps, then takes the deviation of the errors (and, with a tuner, how many
     independent observations there are in them) for the next, and reduces anew where θ has moved too far from the
     basis; the rounds end when nothing moves.
 
@@ -185,8 +189,14 @@ class _Rounds:
             self.evaluations += 1
             return problem.weighted(model, x)
 
-        slack = _WHITENED_SLACK if problem.whitened else 1.0
-        found = solve_least_squares(weighted, z, *problem.bounds, tolerance=slack * tolerance)
+        if self.last is None or problem.whitened:
+            slack = _WHITENED_SLACK if problem.whitened else 1.0
+            found = solve_least_squares(weighted, z, *problem.bounds, tolerance=slack * tolerance)
+        else:  # close by, where Ipopt would take six evaluations for its barrier
+            try:
+                found = solve_damped(weighted, z, problem.bounds, problem.prior_deviations, _LEAST_GAIN)
+            except KeyboardInterrupt:
+                found = replace(self.last, success=False, status=INTERRUPTED, interrupted=True)
         self.iterations += found.iterations
         self.interrupted = found.interrupted
         # in units of what the data leave open, so that flat directions do not keep the rounds going

@@ -77,9 +77,10 @@ class FittedCase:
             Called with stage, done, total.
         """
         before, best, chosen = self.model, self.best, self.settings
-        after = replace(before, theta=best.theta, source="estimate")
+        after = replace(
+            before, theta=best.theta, source="estimate", disturbance=best.disturbance, band_factors=self._band_factors()
+        )
         calibrated, check = self._evaluated(after, best.model, progress)
-        calibrated, factors = self._carried(calibrated)
         seconds, solve = time.perf_counter() - began, best.solve
         network, information = before.grid.network, information_of(best)
         return CalibrationResult(
@@ -96,7 +97,7 @@ class FittedCase:
                 best.evaluations, best.settled,
             ),
             disturbance=best.disturbance,
-            band_factors=factors,
+            band_factors=after.band_factors,
             excess=best.excess,
             information=information,
             grid_check=check,
@@ -117,23 +118,17 @@ class FittedCase:
         """
         return self._evaluated(self.model, self.reduced, progress)[0]
 
-    def _carried(self, calibrated: dict[str, Evaluation]) -> tuple[dict[str, Evaluation], dict[str, float]]:
-        """Put errors with the unmeasured heat carried on beside those without, and make bands."""
+    def _band_factors(self) -> dict[str, float]:
+        """Make bands of predictions, where days were left out or somebody wants to know how good the model is."""
         best, chosen, left = self.best, self.settings, self.left
-        if best.disturbance is None:
-            return calibrated, {}
-        settings = EvaluationSettings(
-            chosen.horizon, horizons=HORIZONS, scheme=chosen.stepping, spin_up_seconds=chosen.spin_up_seconds
-        )
-        forecaster = Forecaster(best.model, self.model.inputs, best.disturbance, settings)
-        unjudged = chosen.yardsticks and chosen.objective == "multi_step"
-        if left is None and unjudged and not is_large(self.model.grid.network.zones):
+        small = not is_large(self.model.grid.network.zones)
+        if left is None and chosen.yardsticks and small and chosen.objective == "multi_step":
             left = left_out(best, self.tuned, chosen.spin_up_seconds)
-        factors = forecaster.factors(left.parts, left.thetas) if left is not None else {}
-        return {
-            name: replace(e, carried=forecaster.judge(best.theta, [p.interval for p in e.predictions], factors))
-            for name, e in calibrated.items()
-        }, factors
+        if left is None or best.disturbance is None:
+            return {}
+        settings = EvaluationSettings(chosen.horizon, scheme=chosen.stepping, spin_up_seconds=chosen.spin_up_seconds)
+        forecaster = Forecaster(best.model, self.model.inputs, best.disturbance, settings)
+        return forecaster.factors(left.parts, left.thetas)
 
     def _evaluated(
         self, model: CaseModel, reduced: ReducedModel, progress: Progress | None

@@ -47,7 +47,7 @@ def evaluate(
 
 
 def _show(found: Evaluation, source: str) -> None:
-    from mpc.reports.evaluation import evaluation_verdict
+    from mpc.reports.evaluation import evaluation_verdict, horizon_rows
 
     say(f"{evaluation_verdict(found)} Parameters: {source}.")
     errors = {"MAE [K]": ".3f", "median [K]": ".3f", "bias [K]": ".3f"}
@@ -55,7 +55,7 @@ def _show(found: Evaluation, source: str) -> None:
     rows = [[i[key] for key in keys] for i in found.to_dict()["intervals"]]
     show_table("Intervals", {"from": "", "to": "", "runs": "d", "skipped": "d", **errors}, rows)
     if found.by_horizon:
-        show_table("Horizons", {"horizon": "", "MAE [K]": ".3f"}, found.by_horizon.items())
+        show_table("Horizons", {"horizon": "", "MAE [K]": ".3f", "heat carried on [K]": ".3f"}, horizon_rows(found))
     zones = sorted(((z, e["mae"], e["bias"]) for z, e in found.by_zone().items()), key=lambda row: -row[1])
     show_table("Zones", {"zone": "", "MAE [K]": ".3f", "bias [K]": ".3f"}, zones)
 

@@ -105,6 +105,7 @@ def calibration_verdict(result: CalibrationResult) -> str:
         + ("." if rest > after else ", less than the model.")
         if held_out.yardsticks is None
         else evaluation.beside_sentence(after, held_out.yardsticks),
+        evaluation.carried_sentence(held_out.carried).strip(),
         *_structure_sentences(result),
         *estimated_sentences(held_out.estimated),
         _parameter_sentence(result.parameters),
@@ -112,11 +113,18 @@ def calibration_verdict(result: CalibrationResult) -> str:
     if not result.solver.success:
         status = result.solver.status
         sentences.insert(0, f"The solver stopped before it converged ({status}): do not rely on these numbers.")
-    return " ".join(sentences)
+    return " ".join(filter(None, sentences))
 
 
 #: Conductances and capacities that a verdict says to be far from the drawing's; the data have them all.
 _MOST_FAR = 3
+
+
+#: Structures in words.
+_STRUCTURES = {
+    "lumped": "lumped into air and mass a zone",
+    "recurring": "lumped into air and mass a zone, with a gain that recurs from day to day",
+}
 
 
 def _structure_sentences(result: CalibrationResult) -> list[str]:
@@ -125,7 +133,7 @@ def _structure_sentences(result: CalibrationResult) -> list[str]:
         return []
     kept = next(rung for rung in result.rungs if rung.chosen)
     errors = ", ".join(f"{rung.name} {kelvin(rung.left_out_mae)} K" for rung in result.rungs)
-    what = "lumped into air and mass a zone" if kept.name == "lumped" else f"as {kept.name}"
+    what = _STRUCTURES.get(kept.name, f"as {kept.name}")
     sentences = [f"The building is taken {what}, which predicts tuning days best that were left out ({errors})."]
     far = result.against_drawing()
     named = [f"{in_words(f['what'])} ({f['factor']:.2g})" for f in far[:_MOST_FAR]]

@@ -39,7 +39,7 @@ def diagnosis_verdict(result: Diagnosis) -> str:
     """
     text = _verdict(result)
     if result.lumped is not None:
-        own, beside = (next(r.left_out_mae for r in result.rungs if r.chosen == kept) for kept in (True, False))
+        own, beside = next(r.left_out_mae for r in result.rungs if r.chosen), result.rungs[0].left_out_mae
         text += (
             " For prediction and control take the lumped model that calibration.json holds: it misses tuning days that "
             f"were left out by {kelvin(own)} K, this one by {kelvin(beside)} K; and held-out days by "

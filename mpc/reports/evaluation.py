@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from calibration.evaluation.carried import Carried
 from calibration.evaluation.intervals import Interval
 from calibration.evaluation.n_step import Evaluation, spatial_metrics
 from calibration.evaluation.yardsticks import YARDSTICKS, Yardsticks
@@ -55,6 +56,7 @@ def write_evaluation(
         "verdict": evaluation_verdict(evaluation),
         "evaluation": evaluation,
         "unchanged": unchanged_error(evaluation),
+        "horizons": horizon_rows(evaluation),
         "intervals": interval_records(evaluation),
         "figures": drawn,
         "zones": by_error(evaluation.by_zone()),
@@ -78,10 +80,46 @@ def evaluation_verdict(evaluation: Evaluation) -> str:
     text = f"{ahead} ahead, the model misses the measured zone temperatures by {kelvin(metrics.mae)} K on average"
     text += f" and is {lean} by {kelvin(abs(metrics.bias))} K."
     text = " ".join([text, *estimated_sentences(evaluation.estimated)])
+    text += carried_sentence(evaluation.carried)
     if evaluation.yardsticks is not None:
         return f"{text} {beside_sentence(metrics.mae, evaluation.yardsticks)}"
     compared = "less" if rest < metrics.mae else "more"
     return f"{text} Assuming that nothing changes misses by {kelvin(rest)} K, {compared} than the model."
+
+
+def horizon_rows(evaluation: Evaluation) -> list[tuple[str, float, float | None]]:
+    """Errors at every horizon, without and with unmeasured heat carried on [K].
+
+    Parameters
+    ----------
+    evaluation : Evaluation
+        From `evaluate_model`.
+    """
+    carried = {} if evaluation.carried is None else evaluation.carried.by_horizon
+    return [(name, mae, carried.get(name)) for name, mae in evaluation.by_horizon.items()]
+
+
+def carried_sentence(carried: Carried | None) -> str:
+    """Say how a model does that carries on what a filter knows, and how sure it is; nothing where that was not tried.
+
+    Parameters
+    ----------
+    carried : Carried or None
+        Of an evaluation.
+
+    Examples
+    --------
+    >>> carried_sentence(Carried(0.2, 0.0, 0.0, coverage=0.91, half_width=0.5))[:72]
+    ' Begun from the filtered state, with its unmeasured heat carried on, it '
+    """
+    if carried is None:
+        return ""
+    text = " Begun from the filtered state, with its unmeasured heat carried on,"
+    text += f" it misses them by {kelvin(carried.mae)} K"
+    if carried.coverage is None or carried.half_width is None:
+        return f"{text}."
+    held, wide = f"{100 * carried.coverage:.0f} %", kelvin(carried.half_width)
+    return f"{text}; its 90 % bands, at the end ± {wide} K, held {held} of what was measured."
 
 
 #: What makes a model useful that is not yet.

@@ -7,11 +7,10 @@ import numpy as np
 
 from calibration.errors import FilterError, NotEnoughDataError
 from calibration.estimation.disturbance import DisturbanceModel
-from calibration.estimation.filtered import FilterSettings, evaluate_filter, filter_interval
+from calibration.estimation.filtered import FilterSettings, filter_interval
 from calibration.estimation.heat_balance import CV_RMSE_LIMIT, NMBE_LIMIT, HeatBalance, HeatFit, heat_balance
 from calibration.estimation.kalman import Filtered
 from calibration.estimation.whiteness import Whiteness, whiteness
-from calibration.evaluation.n_step import HORIZONS, Evaluation, EvaluationSettings
 from calibration.evaluation.settings import Objective
 from calibration.fit.result import CalibrationResult
 from mpc.reports.figures.calibration import heat_lines, periodogram_bound, whiteness_panels
@@ -108,14 +107,15 @@ def _innovations(result: CalibrationResult, model: SymbolicModel, inputs: Inputs
             f"(buildings of up to {MOST_FILTERED} are)."
         }
     try:
-        filtered, corrected = _filter(result, result.disturbance, model, inputs)
+        filtered = _filter(result, result.disturbance, model, inputs)
     except (FilterError, NotEnoughDataError) as error:
         return {"reason": f"Innovations are not tested: {error}."}
     found = whiteness(filtered, result.zones)
     ranked = _ranked(found)
     if not ranked:
         return {"reason": "Innovations are not tested: no zone has enough of them."}
-    alone = result.calibrated["held_out"].by_horizon
+    judged = result.calibrated["held_out"]
+    carried = {} if judged.carried is None else judged.carried.by_horizon
     bound = periodogram_bound(len(filtered.stamps))
     return {
         "verdict": _whiteness_sentence(found),
@@ -127,22 +127,16 @@ def _innovations(result: CalibrationResult, model: SymbolicModel, inputs: Inputs
         "rows": [_white_row(name, found) for name in ranked[:MOST_ROWS]],
         "count": len(ranked),
         "pictures": whiteness_panels(_shown(ranked, filtered, result.zones), found.step),
-        "horizons": [
-            [h, f"{alone[h]:.3f}", f"{corrected.by_horizon[h]:.3f}"] for h in alone if h in corrected.by_horizon
-        ],
+        "horizons": [[h, f"{mae:.3f}", f"{carried[h]:.3f}"] for h, mae in judged.by_horizon.items() if h in carried],
     }
 
 
-def _filter(
-    result: CalibrationResult, disturbance: DisturbanceModel, model: SymbolicModel, inputs: Inputs
-) -> tuple[Filtered, Evaluation]:
-    """Filter the longest held-out interval, and predict all of them from filtered states."""
+def _filter(result: CalibrationResult, disturbance: DisturbanceModel, model: SymbolicModel, inputs: Inputs) -> Filtered:
+    """Filter the longest held-out interval."""
     longest = max(result.held_out, key=lambda i: i.end - i.start)
     scheme, spin = result.settings.stepping, result.settings.spin_up_seconds
     filtering = FilterSettings(scheme, spin_up_seconds=spin)
-    filtered = filter_interval(model, result.theta, inputs, longest, disturbance, filtering)
-    runs = EvaluationSettings(result.horizon, horizons=HORIZONS, scheme=scheme, spin_up_seconds=spin)
-    return filtered, evaluate_filter(model, result.theta, inputs, result.held_out, disturbance, runs)
+    return filter_interval(model, result.theta, inputs, longest, disturbance, filtering)
 
 
 def _ranked(found: Whiteness) -> list[str]:
