@@ -116,10 +116,10 @@ def beside_lumped(
     spin_up = settings.spin_up_seconds
     left = left_out(fitted, given.tuned, spin_up)
     tried = [(name, len(fitted.problem.free), left.mae)]
-    kept, beside = None, left_out(lumped.best, given.tuned, spin_up)
+    chosen, kept, beside = name, None, left_out(lumped.best, given.tuned, spin_up)
     tried.append(("lumped", len(lumped.best.problem.free), beside.mae))
     if beside.mae < (1.0 - advance) * left.mae:
-        kept, left = lumped, beside
+        chosen, kept, left = "lumped", lumped, beside
     if days_of(given.tuned) >= _WEEK:
         settings = replace(settings, structure=replace(structure, recurring=True))
         begun = _begun(given, settings, lumped.best)
@@ -128,9 +128,9 @@ def beside_lumped(
             recurring = fit_case(given.case, given.tuned, given.judged, settings, progress, lumped.best.values)
             beside = left_out(recurring.best, given.tuned, spin_up)
             if beside.mae < (1.0 - ADVANCE) * left.mae:
-                kept, left = recurring, beside
+                chosen, kept, left = "recurring", recurring, beside
         tried.append(("recurring", len(begun.problem.free), beside.mae))
-    rungs = tuple(Rung(own, mae, count, mae == left.mae) for own, count, mae in tried)
+    rungs = tuple(Rung(own, mae, count, own == chosen) for own, count, mae in tried)
     return rungs, None if kept is None else replace(kept, left=left), left
 
 

@@ -53,6 +53,9 @@ class LeastSquaresResult:
 #: Status of a solve that Ctrl-C ended, as Ipopt has it.
 INTERRUPTED = "User_Requested_Stop"
 
+#: Status of a solve that converged, as Ipopt has it.
+SOLVED = "Solve_Succeeded"
+
 #: Ipopt's options beside its tolerances: quiet, and with a small barrier from close to the bounds, since the start is
 #: usually good.
 _IPOPT = {
@@ -283,7 +286,7 @@ def solve_damped(
         if gained > 0.0:
             x, (residual, jacobian) = x + step, there
         if expected < tolerance or 0.0 < gained < tolerance:
-            return LeastSquaresResult(x, 0.5 * float(residual @ residual), jacobian, "Solved", True, number + 1)
+            return LeastSquaresResult(x, 0.5 * float(residual @ residual), jacobian, SOLVED, True, number + 1)
 
     def filled(y: FloatArray) -> FloatArray:
         whole = x.copy()

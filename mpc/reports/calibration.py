@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from calibration.evaluation.case_model import CHECK_TOLERANCE
@@ -132,6 +133,8 @@ def _structure_sentences(result: CalibrationResult) -> list[str]:
     if not result.rungs:
         return []
     kept = next(rung for rung in result.rungs if rung.chosen)
+    if np.isnan(kept.left_out_mae):
+        return ["The tuning intervals are too short to leave any of them out, so the building is taken as drawn."]
     errors = ", ".join(f"{rung.name} {kelvin(rung.left_out_mae)} K" for rung in result.rungs)
     what = _STRUCTURES.get(kept.name, f"as {kept.name}")
     sentences = [f"The building is taken {what}, which predicts tuning days best that were left out ({errors})."]

@@ -277,7 +277,7 @@ class InputProvider:
     def _middle(self) -> pd.DatetimeIndex:
         return self.stamps - pd.Timedelta(seconds=self.step / 2.0)
 
-    @cached_property
+    @property
     def clock(self) -> FloatArray:
         """Time of day in the middle of each step, by the building's clock, shape (n_time,) [h]."""
         middle = self._middle

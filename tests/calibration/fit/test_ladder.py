@@ -3,12 +3,11 @@
 from dataclasses import replace
 
 import numpy as np
-import pandas as pd
 import pytest
 
-from calibration.evaluation.intervals import Interval, default_intervals
+from calibration.evaluation.intervals import default_intervals
+from calibration.fit import ladder
 from calibration.fit.calibrate import calibrate
-from calibration.fit.ladder import _parts
 from calibration.fit.result import CalibrationResult
 from mpc.reports.calibration import calibration_verdict
 from thermal.case.case import Case
@@ -74,12 +73,30 @@ def test_effects_that_were_asked_for_are_kept(case: Case) -> None:
     assert list(result.settings.effects) == ["solar_gain"]
 
 
-def test_tuning_days_are_cut_into_parts_that_meet() -> None:
-    start = pd.Timestamp("2024-01-01", tz="UTC")
-    whole = Interval(start, start + pd.Timedelta(days=10))
-    parts = _parts([whole])
-    assert len(parts) == 4
-    assert parts[0].start == whole.start and parts[-1].end == whole.end
-    days = [Interval(start + pd.Timedelta(days=2 * k), start + pd.Timedelta(days=2 * k + 1)) for k in range(5)]
-    assert _parts(days) == days
-    assert len(_parts([Interval(start, start + pd.Timedelta(hours=20))])) == 1
+def test_left_out_days_make_bands(climbed: CalibrationResult) -> None:
+    assert set(climbed.band_factors) == set(climbed.zones)
+    carried = climbed.calibrated["held_out"].carried
+    assert carried is not None and carried.coverage is not None
+    assert 0.8 < carried.coverage < 1.0
+    assert climbed.to_dict()["calibrated"]["held_out"]["carried"]["coverage"] == carried.coverage
+    assert "carried on" in calibration_verdict(climbed)
+
+
+def test_a_gain_that_recurs_is_kept_where_it_predicts_better(case: Case, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(ladder, "_WEEK", 3.0)
+    _, lumped, recurring = calibrate(case, settings={**QUICK, "climb": True}).rungs
+    assert (recurring.name, recurring.parameters - lumped.parameters) == (
+        "recurring",
+        6 * len(case.building.zone_names),
+    )
+    assert recurring.chosen == (recurring.left_out_mae < 0.9 * lumped.left_out_mae)
+    monkeypatch.setattr(
+        ladder, "ADVANCE", -1.0
+    )  # it predicts days left out worse here, with five of them to learn from
+    result = calibrate(case, settings={**QUICK, "climb": True})
+    assert [rung.chosen for rung in result.rungs] == [False, False, True]
+    assert result.settings.structure.recurring
+    assert "recurs from day to day" in calibration_verdict(result)
+    # with more freedom the days that were fitted are followed more closely
+    only = calibrate(case, settings={**QUICK, "structure": {"lumped": True, "sun": True}})
+    assert result.calibrated["tuning"].metrics.mae < only.calibrated["tuning"].metrics.mae

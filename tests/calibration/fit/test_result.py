@@ -81,7 +81,10 @@ def check_calibration(content: Mapping[str, Any]) -> None:
     for stage in ("uncalibrated", "calibrated"):
         for part in ("tuning", "held_out"):
             assert {"mae", "median"} <= set(content[stage][part])
-            assert all(number(v) for v in content[stage][part].values())
+            assert all(number(content[stage][part][key]) for key in ("mae", "median", "bias"))
+    for part in ("tuning", "held_out"):
+        carried = content["calibrated"][part]["carried"]
+        assert number(carried["mae"]) and all(number(v) for v in carried["by_horizon"].values())
     assert isinstance(content["effects"], list)
     for effect in content["effects"]:
         assert {"effect", "zones", "parameters"} <= set(effect)

@@ -110,7 +110,7 @@ def test_a_calibration_writes_four_files(written: Path) -> None:
 
 def test_evaluation_json_follows_the_contract(written: Path, result: CalibrationResult) -> None:
     content = json.loads((written / "evaluation.json").read_text(encoding="utf-8"))
-    keys = {"steps", "step_seconds", "intervals", "mae", "median", "bias", "by_zone", "by_horizon"}
+    keys = {"steps", "step_seconds", "intervals", "mae", "median", "bias", "by_zone", "by_horizon", "carried"}
     assert set(content) == keys
     assert (content["steps"], content["step_seconds"]) == (72, 300.0)
     assert list(content["by_horizon"]) == ["5min", "1h", "3h", "6h", "24h"]

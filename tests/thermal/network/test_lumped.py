@@ -9,6 +9,8 @@ import scipy.sparse as sp
 
 from thermal.case.building import Building
 from thermal.data import load_bundled_case
+from thermal.inputs.provider import telemetry_inputs
+from thermal.inputs.signals import signal_values
 from thermal.model.matrices import SymbolicModel
 from thermal.network.build import build_network
 from thermal.network.network import ThermalNetwork
@@ -86,3 +88,21 @@ def test_the_sun_takes_irradiance_and_enters_from_five_directions(building: Buil
     assert len(apertures) == 5 * len(building.zone_names)
     assert {s.name for s in sunny.signals} >= {"sun from south", "sun from roof", "constant"}
     assert all(p.lower == 0.0 for p in apertures)
+
+
+def test_a_recurring_gain_is_its_wave_times_the_floor(building: Building) -> None:
+    network = build_network(building, dx=1.0, structure=Structure(lumped=True, recurring=True))
+    theta = network.start()
+    names = [p.name for p in network.parameters]
+    zone = network.zones[1]
+    theta[names.index(f"recurring_gain@{zone}, cos of 12 h")] = 2.0
+    inputs = telemetry_inputs(load_bundled_case())
+    signals = signal_values(network.signals, inputs)
+    brought = SymbolicModel(network).matrices(theta)
+    columns = brought.flow.toarray()[:, brought.n + len(network.boundaries) :]
+    assert columns.shape[1] == signals.shape[1]
+    heat = -signals @ columns[: network.n_node].T
+    expected = 2.0 * network.anatomy.rooms[zone].floor_area * np.cos(4.0 * np.pi * inputs.clock / 24.0)
+    air = int(network.anatomy.rooms[zone].air[0])
+    assert heat[:, air] == pytest.approx(expected, abs=1e-9)
+    assert np.delete(heat, air, axis=1) == pytest.approx(0.0)
