@@ -16,13 +16,15 @@ from calibration.diagnosis.refit.how_far import Step, how_far
 from calibration.diagnosis.refit.refit import ACCEPTED, elsewhere, held_out
 from calibration.diagnosis.refit.search import Round, search
 from calibration.diagnosis.screen.missing import Missing, at_start, missing_heat
+from calibration.estimation.bands import Forecaster
 from calibration.evaluation.intervals import Interval
-from calibration.evaluation.n_step import Evaluation, Progress
+from calibration.evaluation.n_step import Evaluation, EvaluationSettings, Progress
 from calibration.evaluation.settings import ModelSettings
 from calibration.evaluation.simple_models import with_yardsticks
-from calibration.evaluation.yardsticks import Yardsticks
+from calibration.fit.estimate import tune
 from calibration.fit.fitted_case import FittedCase, is_large
 from calibration.fit.ladder import ADVANCE, beside_lumped
+from calibration.fit.left_out import LeftOut
 from calibration.fit.result import CalibrationResult, Rung, SolverReport, effect_entries
 from calibration.results import Axes, Result, plain
 from thermal.case.case import Case
@@ -98,8 +100,8 @@ class Diagnosis(Result):
         The final model and the lumped one by their errors on left-out tuning days; empty where there was no choice.
     lumped : CalibrationResult or None
         The lumped model, where it predicts those days better.
-    yardsticks : Yardsticks or None
-        Errors of simple models on the held-out runs.
+    prediction : Evaluation
+        Held-out errors of the model that is handed on, `final` or the lumped one, beside those of simple models.
     estimated : tuple of Estimated
         Where heat of the telemetry is estimated.
     """
@@ -117,13 +119,13 @@ class Diagnosis(Result):
     judged: tuple[Interval, ...]
     seconds: float
     version: str
+    prediction: Evaluation
     seed: int = field(default=0)
     settings: ModelSettings = field(default_factory=ModelSettings)
     horizon: str = "6h"
     last_third: float | None = None
     rungs: tuple[Rung, ...] = ()
     lumped: CalibrationResult | None = None
-    yardsticks: Yardsticks | None = None
     estimated: tuple[Estimated, ...] = ()
 
     @property
@@ -149,7 +151,7 @@ class Diagnosis(Result):
                 "floor": self.floor,
                 "p_value": self.p_value,
                 "smallest_detectable_watts": self.detectable,
-                **({} if self.yardsticks is None else self.yardsticks.beside(self.predicts)),
+                **self.prediction.beside,
             },
             "where": {
                 "zones": [
@@ -186,9 +188,7 @@ class Diagnosis(Result):
     @property
     def predicts(self) -> float:
         """Held-out mean absolute error of the model that is handed on: `final`, or the lumped one [K]."""
-        if self.lumped is not None:
-            return self.lumped.calibrated["held_out"].metrics.mae
-        return self.steps[-1].after if self.steps else self.gap
+        return self.prediction.metrics.mae
 
     def replays(self) -> list[Replay]:
         """Replay the calibrated baseline on the held-out intervals, and the final model where it has an effect."""
@@ -303,7 +303,8 @@ def diagnose(
     verdict = judge(rounds, untestable)
     # a drawing that is known to lack what nothing explains has no advance
     advance = 0.0 if verdict.name == "unexplained" else ADVANCE
-    rungs, lumped = _beside_lumped(models, rounds[-1].after, progress, advance)
+    rungs, kept, left = _beside_lumped(models, rounds[-1].after, progress, advance)
+    lumped = None if kept is None else replace(kept.result(began, progress), rungs=rungs)
     return Diagnosis(
         case=case.building.name,
         verdict=verdict,
@@ -322,27 +323,35 @@ def diagnose(
         horizon=horizon,
         last_third=first.mae if turns else None,
         rungs=rungs,
-        lumped=None if lumped is None else replace(lumped.result(began, progress), rungs=rungs),
-        yardsticks=_yardsticks(models, rounds[-1].after),
+        lumped=lumped,
+        prediction=_prediction(models, rounds[-1].after, lumped, left),
         estimated=case.estimated,
     )
 
 
-def _yardsticks(models: ModelComparison, final: Fit) -> Yardsticks | None:
-    """Errors of simple models on the held-out runs."""
-    evaluation, spin_up = final.evaluate(models.judged, models.horizon), models.settings.spin_up_seconds
-    judged = with_yardsticks(evaluation, models.case, final.built.inputs, models.anatomy, models.tuned, spin_up)
-    return judged.yardsticks
+def _prediction(
+    models: ModelComparison, final: Fit, lumped: CalibrationResult | None, left: LeftOut | None
+) -> Evaluation:
+    """Held-out errors of the model that is handed on, with unmeasured heat carried on too, beside simple models."""
+    inputs, spin_up = final.built.inputs, models.settings.spin_up_seconds
+    found = final.evaluate(models.judged, models.horizon) if lumped is None else lumped.calibrated["held_out"]
+    if lumped is None and left is not None:
+        disturbance = tune(final.problem, final.model, final.theta)
+        settings = EvaluationSettings(models.horizon, scheme=models.settings.stepping, spin_up_seconds=spin_up)
+        forecaster = Forecaster(final.model, inputs, disturbance, settings)
+        factors = forecaster.factors(left.parts, left.thetas)
+        found = replace(found, carried=forecaster.judge(final.theta, models.judged, factors))
+    return with_yardsticks(found, models.case, inputs, models.anatomy, models.tuned, spin_up)
 
 
 def _beside_lumped(
     models: ModelComparison, final: Fit, progress: Progress | None, advance: float
-) -> tuple[tuple[Rung, ...], FittedCase | None]:
+) -> tuple[tuple[Rung, ...], FittedCase | None, LeftOut | None]:
     """Fit the building lumped, beside the final model."""
     if is_large(final.built.network.zones):
-        return (), None
+        return (), None, None
     name = "named" if final.effects else "drawn"
-    return beside_lumped(name, final, models, progress, advance)[:2]
+    return beside_lumped(name, final, models, progress, advance)
 
 
 def baseline_gap(

@@ -9,7 +9,7 @@ from calibration.diagnosis.decide.verdict import Candidate, group_of
 from calibration.diagnosis.decide.where import DriftCurve, Where
 from calibration.diagnosis.diagnosis import Diagnosis
 from calibration.diagnosis.refit.refit import WINDOWS, Refit
-from mpc.reports.evaluation import beside_sentence
+from mpc.reports.evaluation import beside_sentence, carried_sentence
 from mpc.reports.page import duration, estimated_sentences, kelvin, listed, percent, sure, watts
 from thermal.effects.catalogue import CATALOGUE
 
@@ -45,8 +45,9 @@ def diagnosis_verdict(result: Diagnosis) -> str:
             f"were left out by {kelvin(own)} K, this one by {kelvin(beside)} K; and held-out days by "
             f"{kelvin(result.predicts)} K."
         )
-    if result.yardsticks is not None:
-        text += f" {beside_sentence(result.predicts, result.yardsticks)}"
+    text += carried_sentence(result.prediction.carried)
+    if result.prediction.yardsticks is not None:
+        text += f" {beside_sentence(result.predicts, result.prediction.yardsticks)}"
     return " ".join([text, *estimated_sentences(result.estimated)])
 
 

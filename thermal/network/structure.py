@@ -110,8 +110,7 @@ class Structure:
     Examples
     --------
     >>> Structure.paper()
-    Structure(furniture=False, slab_nodes=0, wall_nodes=1, radiant=False, lumped=False, sun=False,
-    recurring=False)
+    Structure(furniture=False, slab_nodes=0, wall_nodes=1, radiant=False, lumped=False, sun=False, recurring=False)
     """
 
     furniture: bool = True

@@ -99,7 +99,7 @@ def test_a_named_effect_comes_with_its_probability_and_the_fall_of_the_error() -
 def test_no_share_is_told_where_there_is_none() -> None:
     step = replace(diagnosed().steps[-1], share_closed=None, interval=None)
     text = diagnosis_verdict(replace(named("named"), steps=(step,)))
-    assert "too small" in text and "% of what" not in text
+    assert "too small" in text and "% of what the model" not in text
 
 
 def test_an_error_that_does_not_fall_is_said_to_be_no_help() -> None:
