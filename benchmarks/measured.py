@@ -1,7 +1,8 @@
 """Measured buildings: as drawn, calibrated and diagnosed, beside what anyone fits in an hour, on the same runs.
 
 Run: ``python benchmarks/measured.py CASE... --out DIR [--diagnose] [--publish]``; a CASE may be a folder of cases.
-Intervals are of 90 %, by a bootstrap over held-out days. ``chosen`` is the structure that left-out tuning days prefer.
+Intervals are of 90 %, by a bootstrap over held-out days. ``bands hold`` is the share of the held-out temperatures
+inside their 90 % bands. ``chosen`` is the structure that left-out tuning days prefer.
 """
 
 import argparse
@@ -19,7 +20,8 @@ from calibration.fit.result import CalibrationResult
 from thermal import load_case
 
 COLUMNS = (
-    "case", "zones", "days", "step", "as drawn [K]", "calibrated [K]", "90 % [K]", "chosen", "persistence [K]",
+    "case", "zones", "days", "step", "as drawn [K]", "calibrated [K]", "90 % [K]", "heat carried on [K]",
+    "bands hold [%]", "chosen", "persistence [K]",
     "2R2C [K]", "ARX [K]", "useful", "diagnosed [K]", "verdict", "CPU [s]",
 )  # fmt: skip
 
@@ -43,6 +45,7 @@ def measure(path: Path, diagnosed: bool) -> dict[str, Any]:
         "drawn": result.uncalibrated["held_out"].metrics.mae,
         "calibrated": judged.metrics.mae,
         "interval90": interval(result),
+        "carried": None if judged.carried is None else judged.carried.to_dict(),
         "rungs": [rung.to_dict() for rung in result.rungs],
         "chosen": next((rung.name for rung in result.rungs if rung.chosen), "drawn"),
         "seconds": seconds,
@@ -70,12 +73,17 @@ def cells(row: dict[str, Any]) -> list[str]:
     def kelvin(value: float | None) -> str:
         return "–" if value is None else f"{value:.3f}"
 
+    def percent(share: float | None) -> str:
+        return "–" if share is None else f"{100.0 * share:.0f}"
+
     low, high = row["interval90"]
-    yardsticks = row["yardsticks"]
+    yardsticks, known = row["yardsticks"], row["carried"] or {}
+    carried = kelvin(known.get("mae")), percent(known.get("coverage"))
     return [
         row["case"], str(row["zones"]), f"{row['days']:.0f}", f"{row['step_seconds'] / 60:g} min", kelvin(row["drawn"]),
-        f"**{row['calibrated']:.3f}**", f"{low:.2f}-{high:.2f}", row["chosen"], kelvin(yardsticks["persistence"]),
-        kelvin(yardsticks["rc"]), kelvin(yardsticks["arx"]), "yes" if row["useful"] else "not yet",
+        f"**{row['calibrated']:.3f}**", f"{low:.2f}-{high:.2f}", *carried, row["chosen"],
+        kelvin(yardsticks["persistence"]), kelvin(yardsticks["rc"]), kelvin(yardsticks["arx"]),
+        "yes" if row["useful"] else "not yet",
         kelvin(row.get("diagnosed")), row.get("verdict", "–"), f"{row['seconds']:.0f}",
     ]  # fmt: skip
 

@@ -23,7 +23,7 @@ from calibration.evaluation.settings import ModelSettings
 from calibration.evaluation.simple_models import with_yardsticks
 from calibration.fit.estimate import tune
 from calibration.fit.fitted_case import FittedCase, is_large
-from calibration.fit.ladder import ADVANCE, beside_lumped
+from calibration.fit.ladder import ADVANCE, climb_from
 from calibration.fit.left_out import LeftOut
 from calibration.fit.result import CalibrationResult, Rung, SolverReport, effect_entries
 from calibration.results import Axes, Result, plain
@@ -97,11 +97,11 @@ class Diagnosis(Result):
         Held-out mean absolute error of a baseline tuned on the first two thirds [K], where that was so large that
         tuning and held-out days alternate instead.
     rungs : tuple of Rung
-        The final model and the lumped one by their errors on left-out tuning days; empty where there was no choice.
-    lumped : CalibrationResult or None
-        The lumped model, where it predicts those days better.
+        The final model and other structures by their errors on left-out tuning days; empty where there was no choice.
+    better : CalibrationResult or None
+        Of another structure, where it predicts those days better.
     prediction : Evaluation
-        Held-out errors of the model that is handed on, `final` or the lumped one, beside those of simple models.
+        Held-out errors of the model that is handed on, `final` or the better one, beside those of simple models.
     estimated : tuple of Estimated
         Where heat of the telemetry is estimated.
     """
@@ -125,7 +125,7 @@ class Diagnosis(Result):
     horizon: str = "6h"
     last_third: float | None = None
     rungs: tuple[Rung, ...] = ()
-    lumped: CalibrationResult | None = None
+    better: CalibrationResult | None = None
     estimated: tuple[Estimated, ...] = ()
 
     @property
@@ -187,7 +187,7 @@ class Diagnosis(Result):
 
     @property
     def predicts(self) -> float:
-        """Held-out mean absolute error of the model that is handed on: `final`, or the lumped one [K]."""
+        """Held-out mean absolute error of the model that is handed on: `final`, or the better one [K]."""
         return self.prediction.metrics.mae
 
     def replays(self) -> list[Replay]:
@@ -201,9 +201,9 @@ class Diagnosis(Result):
         ]
 
     def calibration(self) -> dict[str, Any]:
-        """Contents of the ``calibration.json`` of the final model, or of the lumped one where that predicts better."""
-        if self.lumped is not None:
-            return self.lumped.to_dict()
+        """Contents of the ``calibration.json`` of the final model, or of a structure that predicts better."""
+        if self.better is not None:
+            return self.better.to_dict()
         final, found = self.final, self.final.found
         parameters, status = final.describe(), "settled" if found.converged else "evaluations used up"
         intervals = {"tuning": self.tuned, "held_out": self.judged}
@@ -303,8 +303,8 @@ def diagnose(
     verdict = judge(rounds, untestable)
     # a drawing that is known to lack what nothing explains has no advance
     advance = 0.0 if verdict.name == "unexplained" else ADVANCE
-    rungs, kept, left = _beside_lumped(models, rounds[-1].after, progress, advance)
-    lumped = None if kept is None else replace(kept.result(began, progress), rungs=rungs)
+    rungs, kept, left = _climbed(models, rounds[-1].after, progress, advance)
+    better = None if kept is None else replace(kept.result(began, progress), rungs=rungs)
     return Diagnosis(
         case=case.building.name,
         verdict=verdict,
@@ -323,19 +323,19 @@ def diagnose(
         horizon=horizon,
         last_third=first.mae if turns else None,
         rungs=rungs,
-        lumped=lumped,
-        prediction=_prediction(models, rounds[-1].after, lumped, left),
+        better=better,
+        prediction=_prediction(models, rounds[-1].after, better, left),
         estimated=case.estimated,
     )
 
 
 def _prediction(
-    models: ModelComparison, final: Fit, lumped: CalibrationResult | None, left: LeftOut | None
+    models: ModelComparison, final: Fit, better: CalibrationResult | None, left: LeftOut | None
 ) -> Evaluation:
     """Held-out errors of the model that is handed on, with unmeasured heat carried on too, beside simple models."""
     inputs, spin_up = final.built.inputs, models.settings.spin_up_seconds
-    found = final.evaluate(models.judged, models.horizon) if lumped is None else lumped.calibrated["held_out"]
-    if lumped is None and left is not None:
+    found = final.evaluate(models.judged, models.horizon) if better is None else better.calibrated["held_out"]
+    if better is None and left is not None:
         disturbance = tune(final.problem, final.model, final.theta)
         settings = EvaluationSettings(models.horizon, scheme=models.settings.stepping, spin_up_seconds=spin_up)
         forecaster = Forecaster(final.model, inputs, disturbance, settings)
@@ -344,14 +344,14 @@ def _prediction(
     return with_yardsticks(found, models.case, inputs, models.anatomy, models.tuned, spin_up)
 
 
-def _beside_lumped(
+def _climbed(
     models: ModelComparison, final: Fit, progress: Progress | None, advance: float
 ) -> tuple[tuple[Rung, ...], FittedCase | None, LeftOut | None]:
-    """Fit the building lumped, beside the final model."""
+    """Fit other structures beside the final model."""
     if is_large(final.built.network.zones):
         return (), None, None
     name = "named" if final.effects else "drawn"
-    return beside_lumped(name, final, models, progress, advance)
+    return climb_from(name, final, models, progress, advance)
 
 
 def baseline_gap(

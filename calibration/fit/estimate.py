@@ -94,11 +94,6 @@ class Estimate:
         """The estimate on the estimation scale, (n_free,) [-]."""
         return self.problem.point(self.theta)
 
-    @property
-    def values(self) -> dict[str, float]:
-        """The estimate by the parameters' names [parameter units]."""
-        return {p.name: float(v) for p, v in zip(self.problem.grid.network.parameters, self.theta, strict=True)}
-
     def better_than(self, other: Estimate) -> bool:
         """Whether its cost is less, errors weighed as the other has them.
 

@@ -173,7 +173,7 @@ def fit_case(
     _refuse_overlap(tuned, judged)
     problem = tuning_problem(case, tuned, settings)
     if begin is not None:
-        problem = replace(problem, start=problem.grid.network.values({**begin, **settings.fixed}))
+        problem = problem.begun(begin)
     grid, inputs, given = problem.grid, problem.inputs, problem.start
     for interval in judged:  # refused now rather than after the solve
         select_runs(inputs, interval, problem.steps, spin_up=settings.spin_up_seconds)

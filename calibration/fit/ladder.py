@@ -1,35 +1,38 @@
-"""Ladder of structures: as drawn; lumped, with factors of its own for every zone and pair; and with a gain that recurs.
-
-Tuning days that are left out choose.
-"""
+"""Ladder of structures, from as drawn to lumped with a factor for every zone and pair; left-out tuning days choose."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 from calibration.evaluation.intervals import Interval, days_of
 from calibration.evaluation.n_step import Progress
 from calibration.evaluation.settings import CalibrationSettings
-from calibration.fit.estimate import Estimate
 from calibration.fit.fitted_case import FittedCase, fit_case, is_large
-from calibration.fit.left_out import Begun, Fitted, LeftOut, left_out
+from calibration.fit.left_out import Begun, Fitted, LeftOut, left_out, values_of
 from calibration.fit.problem import tuning_problem
 from calibration.fit.result import CalibrationResult, Rung
 from thermal.case.case import Case
 from thermal.inputs.provider import telemetry_inputs
 from thermal.model.reduce import reduced_model
 from thermal.network.structure import BASELINE, Structure
+from thermal.parameters import Scope
 
-#: Share by which a lumped model must predict left-out days better than a building as drawn [-]: it has ten times the
-#: parameters, and on a simulated office whose drawing is true a fitting advance of 7 % did not last on later days.
+#: Share by which a structure must predict left-out days better than a simpler one [-]: a lumped model has ten times the
+#: parameters of a drawn one, and on a simulated office whose drawing is true an advance of 7 % did not last.
 ADVANCE = 0.1
+
+#: What a building as drawn has one value of for all zones, though rooms differ in it: slabs and furniture.
+_MASSES = ("slab_heat_capacity", "slab_coupling", "furniture_heat_capacity", "furniture_coupling")
+
+#: Share of the drawing's error on left-out days below which a lumped model's says that more than masses is wrong [-].
+_WRONG = 0.5
 
 #: Tuning days from which a gain that recurs from day to day is looked for [days]: it has to recur.
 _WEEK = 7.0
 
 
 def climb(drawn: FittedCase, began: float, progress: Progress | None = None) -> CalibrationResult:
-    """Fit a building lumped too, and keep what predicts tuning days better that a fit has not seen.
+    """Fit a building in other structures too, and keep what predicts tuning days better that a fit has not seen.
 
     Effects or values a facade that somebody asked for are kept; so is the drawing in a building of more than 40 zones.
     Held-out intervals have no part in the choice.
@@ -52,11 +55,11 @@ def climb(drawn: FittedCase, began: float, progress: Progress | None = None) -> 
     asked = chosen.effects or chosen.scopes or chosen.fixed or chosen.structure != BASELINE
     if asked or is_large(drawn.model.grid.network.zones) or chosen.objective != "multi_step":
         return drawn.result(began, progress)
-    rungs, lumped, left = beside_lumped("drawn", drawn.best, drawn, progress)
-    if lumped is None:
+    rungs, kept, left = climb_from("drawn", drawn.best, drawn, progress)
+    if kept is None:
         return replace(replace(drawn, left=left).result(began, progress), rungs=rungs)
     # before is what the drawing says
-    return replace(lumped.result(began, progress), rungs=rungs, uncalibrated=drawn.uncalibrated(progress))
+    return replace(kept.result(began, progress), rungs=rungs, uncalibrated=drawn.uncalibrated(progress))
 
 
 class Tuned(Protocol):
@@ -79,17 +82,14 @@ class Tuned(Protocol):
         """Of the fit as drawn."""
 
 
-def beside_lumped(
-    name: str,
-    fitted: Fitted,
-    given: Tuned,
-    progress: Progress | None = None,
-    advance: float = ADVANCE,
+def climb_from(
+    name: str, fitted: Fitted, given: Tuned, progress: Progress | None = None, advance: float = ADVANCE
 ) -> tuple[tuple[Rung, ...], FittedCase | None, LeftOut]:
-    """Fit the lumped structure beside a fitted model; it is returned where it predicts left-out days better.
+    """Fit further structures beside a fitted model; the simplest is kept that predicts left-out days about best.
 
-    The sun is a part of it where irradiance is measured. With a gain that recurs from day to day it is fitted too
-    where a few Newton steps from the lumped estimate promise enough.
+    With slabs and furniture by zone, unless a lumped model halves the drawing's error; lumped, where the sun is a part
+    of it if irradiance is measured; lumped, with a gain that recurs from day to day, which is linear, so that a few
+    Newton steps from the lumped estimate tell whether it is worth a fit.
 
     Parameters
     ----------
@@ -102,44 +102,63 @@ def beside_lumped(
     progress : callable, optional
         Called with stage, done, total.
     advance : float
-        Share by which the lumped model's error must be less [-].
+        Share by which another's error must be less than the fitted model's [-].
 
     Returns
     -------
     tuple
-        The rungs, the lumped model or None, and the days left out by what was chosen.
+        The rungs; what is kept, or None where that is the fitted model; and the days left out by what is kept.
     """
+    base, spin_up = replace(given.calibration, starts=1), given.calibration.spin_up_seconds
+
+    def look(name: str, found: Fitted, fit: FittedCase | None = None) -> _Looked:
+        return _Looked(name, left_out(found, given.tuned, spin_up), len(found.problem.free), fit)
+
+    def solve(settings: CalibrationSettings, known: Fitted | None = None) -> FittedCase:
+        begin = None if known is None else values_of(known)
+        return fit_case(given.case, given.tuned, given.judged, settings, progress, begin)
+
     structure = Structure(lumped=True, sun=telemetry_inputs(given.case).gives("sun"))
-    # priors hold it so well that further starts find the same
-    settings = replace(given.calibration, structure=structure, starts=1)
-    lumped = fit_case(given.case, given.tuned, given.judged, settings, progress)
-    spin_up = settings.spin_up_seconds
-    left = left_out(fitted, given.tuned, spin_up)
-    tried = [(name, len(fitted.problem.free), left.mae)]
-    chosen, kept, beside = name, None, left_out(lumped.best, given.tuned, spin_up)
-    tried.append(("lumped", len(lumped.best.problem.free), beside.mae))
-    if beside.mae < (1.0 - advance) * left.mae:
-        chosen, kept, left = "lumped", lumped, beside
+    lumped = solve(replace(base, structure=structure))
+    looked, beside = [look(name, fitted)], look("lumped", lumped.best, lumped)
+    parameters = fitted.problem.grid.network.parameters
+    scopes: dict[str, Scope] = {p.base: "zone" for p in parameters if p.base in _MASSES}
+    plain = len(fitted.model.network.zones) > 1 and all(p.effect is None for p in parameters)
+    if scopes and plain and not beside.left.mae < _WRONG * looked[0].left.mae:
+        zoned = solve(replace(base, scopes={**base.scopes, **scopes}), fitted)
+        looked.append(look("zoned", zoned.best, zoned))
+    looked.append(beside)
+    recurring = replace(base, structure=replace(structure, recurring=True))
     if days_of(given.tuned) >= _WEEK:
-        settings = replace(settings, structure=replace(structure, recurring=True))
-        begun = _begun(given, settings, lumped.best)
-        beside = left_out(begun, given.tuned, spin_up)
-        if beside.mae < (1.0 - ADVANCE) * left.mae:
-            recurring = fit_case(given.case, given.tuned, given.judged, settings, progress, lumped.best.values)
-            beside = left_out(recurring.best, given.tuned, spin_up)
-            if beside.mae < (1.0 - ADVANCE) * left.mae:
-                chosen, kept, left = "recurring", recurring, beside
-        tried.append(("recurring", len(begun.problem.free), beside.mae))
-    rungs = tuple(Rung(own, mae, count, own == chosen) for own, count, mae in tried)
-    return rungs, None if kept is None else replace(kept, left=left), left
+        looked.append(look("recurring", _begun(given, recurring, lumped.best)))
+    best = looked[0]
+    for other in looked[1:]:
+        if other.left.mae < (1.0 - (advance if best is looked[0] else ADVANCE)) * best.left.mae:
+            best = other
+    number = looked.index(best)
+    if best.name == "recurring":
+        found = solve(recurring, lumped.best)
+        best = looked[number] = look(best.name, found.best, found)
+    rungs = tuple(Rung(each.name, each.left.mae, each.parameters, each is best) for each in looked)
+    return rungs, None if best.fit is None else replace(best.fit, left=best.left), best.left
 
 
-def _begun(given: Tuned, settings: CalibrationSettings, known: Estimate) -> Begun:
+@dataclass(frozen=True)
+class _Looked:
+    """A structure with its left-out days, and its fit where it was made here."""
+
+    name: str
+    left: LeftOut
+    parameters: int
+    fit: FittedCase | None
+
+
+def _begun(given: Tuned, settings: CalibrationSettings, known: Fitted) -> Begun:
     """Take a structure with further parameters as it begins: at what is known of the others, and weighed like these."""
-    problem, own = tuning_problem(given.case, given.tuned, settings), known.problem
-    theta = problem.grid.network.values(known.values)
+    own = known.problem
+    problem = tuning_problem(given.case, given.tuned, settings).begun(values_of(known))
     problem = replace(
-        problem, start=theta, deviation=own.deviation, effective=own.effective_size(),
+        problem, deviation=own.deviation, effective=own.effective_size(),
         shrinkage={**problem.shrinkage, **own.shrinkage},
     )  # fmt: skip
-    return Begun(problem, reduced_model(problem.grid, [theta]))
+    return Begun(problem, reduced_model(problem.grid, [problem.start]))

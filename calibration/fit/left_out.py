@@ -41,6 +41,19 @@ class Fitted(Protocol):
         """The estimate on the estimation scale, (n_free,) [-]."""
 
 
+def values_of(fitted: Fitted) -> dict[str, float]:
+    """Parameters of an estimate by their names [parameter units].
+
+    Parameters
+    ----------
+    fitted : Fitted
+        Any.
+    """
+    problem = fitted.problem
+    theta = problem.theta(fitted.point)
+    return {p.name: float(v) for p, v in zip(problem.grid.network.parameters, theta, strict=True)}
+
+
 @dataclass(frozen=True)
 class Begun:
     """A problem that is not solved yet, at its start; as a `Fitted`.

@@ -121,13 +121,6 @@ def calibration_verdict(result: CalibrationResult) -> str:
 _MOST_FAR = 3
 
 
-#: Structures in words.
-_STRUCTURES = {
-    "lumped": "lumped into air and mass a zone",
-    "recurring": "lumped into air and mass a zone, with a gain that recurs from day to day",
-}
-
-
 def _structure_sentences(result: CalibrationResult) -> list[str]:
     """Which structure was kept and why, and what it says of the drawing."""
     if not result.rungs:
@@ -136,8 +129,8 @@ def _structure_sentences(result: CalibrationResult) -> list[str]:
     if np.isnan(kept.left_out_mae):
         return ["The tuning intervals are too short to leave any of them out, so the building is taken as drawn."]
     errors = ", ".join(f"{rung.name} {kelvin(rung.left_out_mae)} K" for rung in result.rungs)
-    what = _STRUCTURES.get(kept.name, f"as {kept.name}")
-    sentences = [f"The building is taken {what}, which predicts tuning days best that were left out ({errors})."]
+    taken = evaluation.structure_words(result.rungs)
+    sentences = [f"The building is taken {taken}, which predicts tuning days best that were left out ({errors})."]
     far = result.against_drawing()
     named = [f"{in_words(f['what'])} ({f['factor']:.2g})" for f in far[:_MOST_FAR]]
     if named:

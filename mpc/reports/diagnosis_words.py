@@ -9,7 +9,7 @@ from calibration.diagnosis.decide.verdict import Candidate, group_of
 from calibration.diagnosis.decide.where import DriftCurve, Where
 from calibration.diagnosis.diagnosis import Diagnosis
 from calibration.diagnosis.refit.refit import WINDOWS, Refit
-from mpc.reports.evaluation import beside_sentence, carried_sentence
+from mpc.reports.evaluation import beside_sentence, carried_sentence, structure_words
 from mpc.reports.page import duration, estimated_sentences, kelvin, listed, percent, sure, watts
 from thermal.effects.catalogue import CATALOGUE
 
@@ -38,10 +38,11 @@ def diagnosis_verdict(result: Diagnosis) -> str:
         From `diagnose`.
     """
     text = _verdict(result)
-    if result.lumped is not None:
+    if result.better is not None:
         own, beside = next(r.left_out_mae for r in result.rungs if r.chosen), result.rungs[0].left_out_mae
         text += (
-            " For prediction and control take the lumped model that calibration.json holds: it misses tuning days that "
+            f" For prediction and control take the building {structure_words(result.rungs)}, which calibration.json "
+            "holds: it misses tuning days that "
             f"were left out by {kelvin(own)} K, this one by {kelvin(beside)} K; and held-out days by "
             f"{kelvin(result.predicts)} K."
         )

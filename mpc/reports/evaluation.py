@@ -11,6 +11,7 @@ from calibration.evaluation.carried import Carried
 from calibration.evaluation.intervals import Interval
 from calibration.evaluation.n_step import Evaluation, spatial_metrics
 from calibration.evaluation.yardsticks import YARDSTICKS, Yardsticks
+from calibration.fit.result import Rung
 from mpc.reports.figures.errors import Band, drift_boxes, error_growth, median_run, series_of_runs, zone_panels
 from mpc.reports.figures.field import Field
 from mpc.reports.figures.plan import floor_maps, tile_map
@@ -120,6 +121,31 @@ def carried_sentence(carried: Carried | None) -> str:
         return f"{text}."
     held, wide = f"{100 * carried.coverage:.0f} %", kelvin(carried.half_width)
     return f"{text}; its 90 % bands, at the end ± {wide} K, held {held} of what was measured."
+
+
+#: Structures in words.
+_STRUCTURES = {
+    "zoned": "as drawn, with slabs and furniture of each zone's own",
+    "lumped": "lumped into air and mass a zone",
+    "recurring": "lumped into air and mass a zone, with a gain that recurs from day to day",
+}
+
+
+def structure_words(rungs: Sequence[Rung]) -> str:
+    """Say how a building is taken.
+
+    Parameters
+    ----------
+    rungs : sequence of Rung
+        One of them chosen.
+
+    Examples
+    --------
+    >>> structure_words([Rung("drawn", 0.2, 13, True)])
+    'as drawn'
+    """
+    kept = next(rung.name for rung in rungs if rung.chosen)
+    return _STRUCTURES.get(kept, f"as {kept}")
 
 
 #: What makes a model useful that is not yet.
