@@ -33,7 +33,7 @@ _SIZE_TOLERANCE = 0.1
 _SAME_DISTURBANCE = 0.05
 
 #: Gain of twice the cost below which a solve after the first round is done [-].
-_LEAST_GAIN = 1e-3
+_LEAST_GAIN = 1e-5
 
 #: Times by which gradients of whitened residuals may be larger at convergence [-]: an effective sample a hundred times
 #: as large makes them so at the same distance in standard errors.

@@ -12,7 +12,7 @@ from calibration.evaluation.intervals import Interval, default_intervals, horizo
 from calibration.evaluation.n_step import HORIZONS, Evaluation, EvaluationSettings, Progress
 from calibration.evaluation.settings import CalibrationSettings
 from calibration.fit.estimate import Estimate, solve_starts
-from calibration.fit.left_out import LeftOut, left_out
+from calibration.fit.left_out import LeftOut, begin_at, left_out
 from calibration.fit.likelihood import InnovationsProblem
 from calibration.fit.problem import tuning_problem
 from calibration.fit.result import CalibrationResult, SolverReport, describe
@@ -173,7 +173,7 @@ def fit_case(
     _refuse_overlap(tuned, judged)
     problem = tuning_problem(case, tuned, settings)
     if begin is not None:
-        problem = problem.begun(begin)
+        problem = begin_at(problem, begin)
     grid, inputs, given = problem.grid, problem.inputs, problem.start
     for interval in judged:  # refused now rather than after the solve
         select_runs(inputs, interval, problem.steps, spin_up=settings.spin_up_seconds)

@@ -8,7 +8,7 @@ from calibration.evaluation.intervals import Interval, days_of
 from calibration.evaluation.n_step import Progress
 from calibration.evaluation.settings import CalibrationSettings
 from calibration.fit.fitted_case import FittedCase, fit_case, is_large
-from calibration.fit.left_out import Begun, Fitted, LeftOut, left_out, values_of
+from calibration.fit.left_out import Begun, Fitted, LeftOut, begin_at, left_out, values_of
 from calibration.fit.problem import tuning_problem
 from calibration.fit.result import CalibrationResult, Rung
 from thermal.case.case import Case
@@ -156,7 +156,7 @@ class _Looked:
 def _begun(given: Tuned, settings: CalibrationSettings, known: Fitted) -> Begun:
     """Take a structure with further parameters as it begins: at what is known of the others, and weighed like these."""
     own = known.problem
-    problem = tuning_problem(given.case, given.tuned, settings).begun(values_of(known))
+    problem = begin_at(tuning_problem(given.case, given.tuned, settings), values_of(known))
     problem = replace(
         problem, deviation=own.deviation, effective=own.effective_size(),
         shrinkage={**problem.shrinkage, **own.shrinkage},

@@ -1,7 +1,7 @@
 """Tuning days that are left out in turn and predicted by fits of the others."""
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
 
@@ -52,6 +52,22 @@ def values_of(fitted: Fitted) -> dict[str, float]:
     problem = fitted.problem
     theta = problem.theta(fitted.point)
     return {p.name: float(v) for p, v in zip(problem.grid.network.parameters, theta, strict=True)}
+
+
+def begin_at(problem: Problem, values: Mapping[str, float]) -> Problem:
+    """Let a problem begin elsewhere.
+
+    Parameters
+    ----------
+    problem : Problem
+        At its own start.
+    values : mapping of str to float
+        Starts of the estimated parameters by name [parameter units]; a common one's is that of each facade or zone.
+    """
+    start, parameters = problem.start.copy(), problem.grid.network.parameters
+    for i in problem.free:
+        start[i] = values.get(parameters[i].name, values.get(parameters[i].base, start[i]))
+    return replace(problem, start=start)
 
 
 @dataclass(frozen=True)

@@ -175,19 +175,6 @@ class Problem:
         """
         return np.array([p.slope(theta[i]) for i, p in zip(self.free, self.parameters, strict=True)])
 
-    def begun(self, values: Mapping[str, float]) -> Problem:
-        """Return the same problem that begins elsewhere.
-
-        Parameters
-        ----------
-        values : mapping of str to float
-            Starts of the estimated parameters by name [parameter units]; a common one's is that of each facade or zone.
-        """
-        start, parameters = self.start.copy(), self.grid.network.parameters
-        for i in self.free:
-            start[i] = values.get(parameters[i].name, values.get(parameters[i].base, start[i]))
-        return replace(self, start=start)
-
     def residuals(self, model: SymbolicModel, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Errors of all runs [K] and their derivatives with respect to θ; unmeasured ones left out.
 

@@ -26,6 +26,8 @@ MEDIUM_RESOLUTION = 0.15  # K
 COARSE_FLAT_SECONDS = 72 * 3600.0
 # A week at one value needs no jump: no room is held so well.
 CERTAIN_FLAT_SECONDS = 7 * 24 * 3600.0
+# A flow stays at its minimum for all of a working day: what stands is held for longer.
+STUCK_SECONDS = 24 * 3600.0
 # While it is flat, the outdoors must have moved by so much; else a standstill says nothing.
 OUTDOOR_RANGE = 0.5  # K
 # A whole record at one value: a day of it, with the outdoors moving, is enough.
@@ -150,7 +152,7 @@ def stuck_meters(values: FloatArray, others: Sequence[FloatArray], step: float) 
     Returns
     -------
     list of tuple
-        First and last position of each stretch of 6 hours or more.
+        First and last position of each stretch of a day or more.
 
     Notes
     -----
@@ -162,7 +164,7 @@ def stuck_meters(values: FloatArray, others: Sequence[FloatArray], step: float) 
     for first, last in runs(np.concatenate(([False], np.diff(series) == 0.0))):
         value, positions = series[last], present[first - 1 : last + 1]
         seconds, returns = positions.size * step, (series == value).sum() > positions.size
-        if value == 0.0 or returns or seconds < max(FLAT_SECONDS, FLAT_SAMPLES * step):
+        if value == 0.0 or returns or seconds < STUCK_SECONDS:
             continue
         moved = [bool(np.diff(o[np.isfinite(o)]).any()) for o in (v[positions] for v in others)]
         if (positions.size == series.size or series.min() < value < series.max()) and 0 < len(moved) <= 2 * sum(moved):

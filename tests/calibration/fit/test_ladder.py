@@ -27,14 +27,16 @@ def climbed(case: Case) -> CalibrationResult:
 
 
 def test_what_predicts_left_out_days_better_is_kept(climbed: CalibrationResult) -> None:
-    drawn, lumped = climbed.rungs
-    assert (drawn.name, lumped.name) == ("drawn", "lumped")
-    assert lumped.chosen == (lumped.left_out_mae < 0.9 * drawn.left_out_mae) != drawn.chosen
+    drawn, zoned, lumped = climbed.rungs
+    assert (drawn.name, zoned.name, lumped.name) == ("drawn", "zoned", "lumped")
+    assert zoned.parameters > drawn.parameters
+    simpler = min(drawn.left_out_mae, zoned.left_out_mae)
+    assert lumped.chosen == (lumped.left_out_mae < 0.9 * simpler) and sum(r.chosen for r in climbed.rungs) == 1
     assert climbed.settings.structure.lumped == lumped.chosen
     # the bundled building has sun, which the drawing leaves to an effect
     assert lumped.chosen
     plain = climbed.to_dict()
-    assert [rung["name"] for rung in plain["rungs"]] == ["drawn", "lumped"]
+    assert [rung["name"] for rung in plain["rungs"]] == ["drawn", "zoned", "lumped"]
 
 
 def test_before_is_what_the_drawing_says(case: Case, climbed: CalibrationResult) -> None:
@@ -84,7 +86,7 @@ def test_left_out_days_make_bands(climbed: CalibrationResult) -> None:
 
 def test_a_gain_that_recurs_is_kept_where_it_predicts_better(case: Case, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(ladder, "_WEEK", 3.0)
-    _, lumped, recurring = calibrate(case, settings={**QUICK, "climb": True}).rungs
+    _, _, lumped, recurring = calibrate(case, settings={**QUICK, "climb": True}).rungs
     assert (recurring.name, recurring.parameters - lumped.parameters) == (
         "recurring",
         6 * len(case.building.zone_names),
@@ -94,7 +96,7 @@ def test_a_gain_that_recurs_is_kept_where_it_predicts_better(case: Case, monkeyp
         ladder, "ADVANCE", -1.0
     )  # it predicts days left out worse here, with five of them to learn from
     result = calibrate(case, settings={**QUICK, "climb": True})
-    assert [rung.chosen for rung in result.rungs] == [False, False, True]
+    assert [rung.chosen for rung in result.rungs] == [False, False, False, True]
     assert result.settings.structure.recurring
     assert "recurs from day to day" in calibration_verdict(result)
     # with more freedom the days that were fitted are followed more closely
