@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 from importlib.metadata import version
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from calibration.diagnosis.decide.levels import p_value
@@ -24,7 +25,7 @@ from calibration.evaluation.simple_models import with_yardsticks
 from calibration.fit.estimate import tune
 from calibration.fit.fitted_case import FittedCase, is_large
 from calibration.fit.ladder import ADVANCE, climb_from
-from calibration.fit.left_out import LeftOut
+from calibration.fit.left_out import Known, LeftOut
 from calibration.fit.result import CalibrationResult, Rung, SolverReport, effect_entries
 from calibration.results import Axes, Result, plain
 from thermal.case.case import Case
@@ -351,7 +352,9 @@ def _climbed(
     if is_large(final.built.network.zones):
         return (), None, None
     name = "named" if final.effects else "drawn"
-    return climb_from(name, final, models, progress, advance)
+    # the fit has found its deviation beside its parameters
+    problem = replace(final.problem, deviation=float(np.sqrt(final.found.mean_square)))
+    return climb_from(name, Known(problem, final.model, final.point), models, progress, advance)
 
 
 def baseline_gap(

@@ -8,7 +8,7 @@ from calibration.evaluation.intervals import Interval, days_of
 from calibration.evaluation.n_step import Progress
 from calibration.evaluation.settings import CalibrationSettings
 from calibration.fit.fitted_case import FittedCase, fit_case, is_large
-from calibration.fit.left_out import Begun, Fitted, LeftOut, begin_at, left_out, values_of
+from calibration.fit.left_out import Fitted, Known, LeftOut, begin_at, left_out, values_of
 from calibration.fit.problem import tuning_problem
 from calibration.fit.result import CalibrationResult, Rung
 from thermal.case.case import Case
@@ -153,7 +153,7 @@ class _Looked:
     fit: FittedCase | None
 
 
-def _begun(given: Tuned, settings: CalibrationSettings, known: Fitted) -> Begun:
+def _begun(given: Tuned, settings: CalibrationSettings, known: Fitted) -> Known:
     """Take a structure with further parameters as it begins: at what is known of the others, and weighed like these."""
     own = known.problem
     problem = begin_at(tuning_problem(given.case, given.tuned, settings), values_of(known))
@@ -161,4 +161,4 @@ def _begun(given: Tuned, settings: CalibrationSettings, known: Fitted) -> Begun:
         problem, deviation=own.deviation, effective=own.effective_size(),
         shrinkage={**problem.shrinkage, **own.shrinkage},
     )  # fmt: skip
-    return Begun(problem, reduced_model(problem.grid, [problem.start]))
+    return Known(problem, reduced_model(problem.grid, [problem.start]), problem.point(problem.start))

@@ -3,7 +3,7 @@
 import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 import pandas as pd
@@ -70,25 +70,22 @@ def begin_at(problem: Problem, values: Mapping[str, float]) -> Problem:
     return replace(problem, start=start)
 
 
-@dataclass(frozen=True)
-class Begun:
-    """A problem that is not solved yet, at its start; as a `Fitted`.
+class Known(NamedTuple):
+    """A `Fitted` of parts: one that was made elsewhere, or that only begins.
 
     Parameters
     ----------
     problem : Problem
-        With the start.
+        With the weights that belong to the estimate.
     model : ReducedModel
         Accurate there.
+    point : ndarray, shape (n_free,)
+        The estimate on the estimation scale [-].
     """
 
     problem: Problem
     model: ReducedModel
-
-    @property
-    def point(self) -> FloatArray:
-        """Start on the estimation scale, (n_free,) [-]."""
-        return self.problem.point(self.problem.start)
+    point: FloatArray
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ from calibration.diagnosis.refit.refit import ACCEPTED, CHANCE, MATTERS, Refit, 
 from calibration.diagnosis.refit.search import _first
 from calibration.diagnosis.screen.screen import Screening
 from calibration.evaluation.settings import ModelSettings
+from calibration.fit.least_squares import bounded_step
 from mpc.reports.diagnosis_words import where_sentence
 from thermal import Case, Telemetry
 from thermal.effects.catalogue import CATALOGUE
@@ -251,3 +252,13 @@ def test_screening_is_about_the_estimate() -> None:
     assert all(0.0 < small[z] < large[z] for z in models.case.building.zone_names)
     assert np.all(np.linalg.eigvalsh(made.gram) > -1e-6 * np.abs(made.gram).max())
     assert isinstance(made, Screening)
+
+
+def test_left_out_days_are_those_of_the_model_that_is_handed_on() -> None:
+    """The weights that other structures are judged by are those at which the final model is an optimum."""
+    final = diagnosed(None).final
+    problem = replace(final.problem, deviation=float(np.sqrt(final.found.mean_square)))
+    residual, jacobian = problem.weighted(final.model, final.point)
+    lower, upper = problem.bounds
+    step = bounded_step(residual, jacobian, lower - final.point, upper - final.point)
+    assert np.linalg.norm(jacobian @ step) < 0.1 * np.sqrt(step.size)
