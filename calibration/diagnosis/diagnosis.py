@@ -144,7 +144,7 @@ class Diagnosis(Result):
 
     def to_dict(self) -> dict[str, Any]:
         """Contents of ``diagnosis.json`` but for its sentence, which `mpc.reports` adds."""
-        w = self.where
+        w, simple, carried = self.where, self.prediction.yardsticks, self.prediction.carried
         return {
             "verdict": self.verdict.name,
             "gap": {
@@ -152,7 +152,7 @@ class Diagnosis(Result):
                 "floor": self.floor,
                 "p_value": self.p_value,
                 "smallest_detectable_watts": self.detectable,
-                **self.prediction.beside,
+                **({} if simple is None else simple.beside(self.predicts)),
             },
             "where": {
                 "zones": [
@@ -176,7 +176,7 @@ class Diagnosis(Result):
             "combinations": [{"effects": list(e), "probability": p} for e, p in self.verdict.combinations.items()],
             "how_far": [s.to_dict() for s in self.steps],
             "rounds": [r.to_dict() | {"worth": gains_of(r)} for r in self.rounds],
-            "prediction": {"rungs": plain(self.rungs), "held_out_mae": self.predicts},
+            "prediction": {"rungs": plain(self.rungs), "held_out_mae": self.predicts, "carried": plain(carried)},
             "intervals": {
                 "tuning": plain(self.tuned),
                 "held_out": plain(self.judged),

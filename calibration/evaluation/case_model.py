@@ -198,9 +198,12 @@ def read_disturbance(path: str | Path, zones: Sequence[str]) -> tuple[Disturbanc
     entry = content.get("disturbance")
     if entry is None:
         return None, {}
+    factors = content.get("band_factors") or {}
+    usable = isinstance(factors, dict) and set(factors) <= set(zones)
+    if not usable or not all(isinstance(v, int | float) and 0.0 < v < float("inf") for v in factors.values()):
+        raise CalibrationError(f"{path}: band_factors: expected a positive number by zone, found {factors}")
     try:
         found = DisturbanceModel(**entry)
-        factors = {str(zone): float(factor) for zone, factor in (content.get("band_factors") or {}).items()}
     except (FilterError, TypeError, ValueError, AttributeError) as error:
         raise CalibrationError(
             f"{path}: disturbance: expected what `calibrate` writes, found {entry} ({error})"

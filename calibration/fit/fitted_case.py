@@ -124,7 +124,7 @@ class FittedCase:
         small = not is_large(self.model.grid.network.zones)
         if left is None and chosen.yardsticks and small and chosen.objective == "multi_step":
             left = left_out(best, self.tuned, chosen.spin_up_seconds)
-        if left is None or best.disturbance is None:
+        if left is None or len(left.parts) < 2 or best.disturbance is None:
             return {}
         settings = EvaluationSettings(chosen.horizon, scheme=chosen.stepping, spin_up_seconds=chosen.spin_up_seconds)
         forecaster = Forecaster(best.model, self.model.inputs, best.disturbance, settings)

@@ -8,6 +8,7 @@ from calibration.evaluation.intervals import Interval, days_of
 from calibration.evaluation.n_step import Progress
 from calibration.evaluation.settings import CalibrationSettings
 from calibration.fit.fitted_case import FittedCase, fit_case, is_large
+from calibration.fit.least_squares import INTERRUPTED
 from calibration.fit.left_out import Fitted, Known, LeftOut, begin_at, left_out, values_of
 from calibration.fit.problem import tuning_problem
 from calibration.fit.result import CalibrationResult, Rung
@@ -49,13 +50,19 @@ def climb(drawn: FittedCase, began: float, progress: Progress | None = None) -> 
     Returns
     -------
     CalibrationResult
-        With ``rungs``, the drawing's first; empty where there was no choice.
+        With ``rungs``, the drawing's first; empty where there was no choice, or Ctrl-C ended it.
     """
     chosen = drawn.settings
     asked = chosen.effects or chosen.scopes or chosen.fixed or chosen.structure != BASELINE
     if asked or is_large(drawn.model.grid.network.zones) or chosen.objective != "multi_step":
         return drawn.result(began, progress)
-    rungs, kept, left = climb_from("drawn", drawn.best, drawn, progress)
+    if drawn.best.solve.interrupted:
+        return drawn.result(began, progress)
+    try:
+        rungs, kept, left = climb_from("drawn", drawn.best, drawn, progress)
+    except KeyboardInterrupt:  # what is finished is the drawing's
+        stopped = replace(drawn.best.solve, success=False, status=INTERRUPTED, interrupted=True)
+        return replace(drawn, best=replace(drawn.best, solve=stopped)).result(began, progress)
     if kept is None:
         return replace(replace(drawn, left=left).result(began, progress), rungs=rungs)
     # before is what the drawing says
@@ -116,7 +123,10 @@ def climb_from(
 
     def solve(settings: CalibrationSettings, known: Fitted | None = None) -> FittedCase:
         begin = None if known is None else values_of(known)
-        return fit_case(given.case, given.tuned, given.judged, settings, progress, begin)
+        found = fit_case(given.case, given.tuned, given.judged, settings, progress, begin)
+        if found.best.solve.interrupted:
+            raise KeyboardInterrupt
+        return found
 
     structure = Structure(lumped=True, sun=telemetry_inputs(given.case).gives("sun"))
     lumped = solve(replace(base, structure=structure))
@@ -124,7 +134,7 @@ def climb_from(
     parameters = fitted.problem.grid.network.parameters
     scopes: dict[str, Scope] = {p.base: "zone" for p in parameters if p.base in _MASSES}
     plain = len(fitted.model.network.zones) > 1 and all(p.effect is None for p in parameters)
-    if scopes and plain and not beside.left.mae < _WRONG * looked[0].left.mae:
+    if scopes and plain and beside.left.mae >= _WRONG * looked[0].left.mae:
         zoned = solve(replace(base, scopes={**base.scopes, **scopes}), fitted)
         looked.append(look("zoned", zoned.best, zoned))
     looked.append(beside)

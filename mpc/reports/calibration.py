@@ -130,7 +130,8 @@ def _structure_sentences(result: CalibrationResult) -> list[str]:
         return ["The tuning intervals are too short to leave any of them out, so the building is taken as drawn."]
     errors = ", ".join(f"{rung.name} {kelvin(rung.left_out_mae)} K" for rung in result.rungs)
     taken = evaluation.structure_words(result.rungs)
-    sentences = [f"The building is taken {taken}, which predicts tuning days best that were left out ({errors})."]
+    how = "the simplest that predicts left-out tuning days within a tenth of the best"
+    sentences = [f"The building is taken {taken}, {how} ({errors})."]
     far = result.against_drawing()
     named = [f"{in_words(f['what'])} ({f['factor']:.2g})" for f in far[:_MOST_FAR]]
     if named:

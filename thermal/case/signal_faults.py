@@ -157,7 +157,8 @@ def stuck_meters(values: FloatArray, others: Sequence[FloatArray], step: float) 
     Notes
     -----
     A control holds what it comes back to: values seen at another time too, zero, the smallest and the largest are not
-    judged, unless the meter never shows another. Half of the others must move meanwhile, or the column may be assumed.
+    judged, and neither is a meter that never shows another: a constant flow is how some terminals work. Half of the
+    others must move meanwhile, or the column may be assumed.
     """
     present = np.flatnonzero(np.isfinite(values))
     series, found = values[present], []
@@ -167,7 +168,7 @@ def stuck_meters(values: FloatArray, others: Sequence[FloatArray], step: float) 
         if value == 0.0 or returns or seconds < STUCK_SECONDS:
             continue
         moved = [bool(np.diff(o[np.isfinite(o)]).any()) for o in (v[positions] for v in others)]
-        if (positions.size == series.size or series.min() < value < series.max()) and 0 < len(moved) <= 2 * sum(moved):
+        if series.min() < value < series.max() and 0 < len(moved) <= 2 * sum(moved):
             found += _pieces(positions, seconds)
     return found
 

@@ -1,6 +1,7 @@
 """The choice between a building as drawn and lumped, by tuning days that are left out."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ import pytest
 from calibration.evaluation.intervals import default_intervals
 from calibration.fit import ladder
 from calibration.fit.calibrate import calibrate
+from calibration.fit.fitted_case import FittedCase, fit_case
 from calibration.fit.result import CalibrationResult
 from mpc.reports.calibration import calibration_verdict
 from thermal.case.case import Case
@@ -102,3 +104,22 @@ def test_a_gain_that_recurs_is_kept_where_it_predicts_better(case: Case, monkeyp
     # with more freedom the days that were fitted are followed more closely
     only = calibrate(case, settings={**QUICK, "structure": {"lumped": True, "sun": True}})
     assert result.calibrated["tuning"].metrics.mae < only.calibrated["tuning"].metrics.mae
+
+
+@pytest.mark.parametrize("which", [1, 2])
+def test_a_fit_that_is_interrupted_has_no_part_in_the_choice(
+    case: Case, monkeypatch: pytest.MonkeyPatch, which: int
+) -> None:
+    fits = iter(range(9))
+
+    def interrupted(*args: Any, **settings: Any) -> FittedCase:
+        found = fit_case(*args, **settings)
+        if next(fits) < which - 1:
+            return found
+        solve = replace(found.best.solve, success=False, interrupted=True)
+        return replace(found, best=replace(found.best, solve=solve))
+
+    monkeypatch.setattr(ladder, "fit_case", interrupted)
+    result = calibrate(case, settings={**QUICK, "climb": True})
+    assert result.rungs == () and not result.settings.structure.lumped
+    assert (result.solver.status, result.solver.success) == ("User_Requested_Stop", False)

@@ -15,7 +15,7 @@ def held(value: float, start: int, end: int) -> np.ndarray:
     return values
 
 
-@pytest.mark.parametrize(("start", "end"), [(0, 1152), (400, 688), (800, 1152)])
+@pytest.mark.parametrize(("start", "end"), [(0, 600), (400, 688), (800, 1152)])
 def test_a_meter_that_stands_for_a_day_is_stuck(start: int, end: int) -> None:
     found = stuck_meters(held(0.15, start, end), [MOVING], STEP)
     assert [(a, b) for a, b, _ in found] == [(start, end - 1)]
@@ -24,7 +24,14 @@ def test_a_meter_that_stands_for_a_day_is_stuck(start: int, end: int) -> None:
 def test_what_control_holds_is_not_stuck() -> None:
     twice = held(0.15, 400, 720)
     twice[20] = 0.15
-    for values in (held(0.15, 400, 687), held(0.0, 400, 800), held(0.05, 400, 800), held(0.5, 400, 800), twice):
+    for values in (
+        held(0.15, 400, 687),
+        held(0.0, 400, 800),
+        held(0.05, 400, 800),
+        held(0.5, 400, 800),
+        held(0.15, 0, 1152),
+        twice,
+    ):
         assert stuck_meters(values, [MOVING], STEP) == []
 
 
