@@ -32,6 +32,9 @@ _SIZE_TOLERANCE = 0.1
 #: Share by which numbers of the disturbance change in a round below which they are kept from there on [-].
 _SAME_DISTURBANCE = 0.05
 
+#: What is said of a start that Ctrl-C ended.
+STOPPED = "stopped by Ctrl-C"
+
 #: Gain of twice the cost below which a solve after the first round is done [-].
 _LEAST_GAIN = 1e-5
 
@@ -374,12 +377,12 @@ def solve_starts(
         except KeyboardInterrupt:
             if best is None:
                 raise
-            failures.append(f"start {number + 1}: stopped by Ctrl-C")
+            failures.append(f"start {number + 1}: {STOPPED}")
             break
         if best is None or found.better_than(best):
             best = found
         if found.solve.interrupted:
-            failures.append(f"start {number + 1}: stopped by Ctrl-C")
+            failures.append(f"start {number + 1}: {STOPPED}")
             break
     if best is None:
         raise CalibrationError(f"every start failed: {'; '.join(failures)}")

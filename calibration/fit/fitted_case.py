@@ -11,7 +11,7 @@ from calibration.evaluation.case_model import CaseModel, GridCheck
 from calibration.evaluation.intervals import Interval, default_intervals, horizon_steps, select_runs
 from calibration.evaluation.n_step import HORIZONS, Evaluation, EvaluationSettings, Progress
 from calibration.evaluation.settings import CalibrationSettings
-from calibration.fit.estimate import Estimate, solve_starts
+from calibration.fit.estimate import STOPPED, Estimate, solve_starts
 from calibration.fit.left_out import LeftOut, begin_at, left_out
 from calibration.fit.likelihood import InnovationsProblem
 from calibration.fit.problem import tuning_problem
@@ -65,6 +65,17 @@ class FittedCase:
     def calibration(self) -> CalibrationSettings:
         """Settings of the fit."""
         return self.settings
+
+    def raise_if_interrupted(self) -> None:
+        """Pass Ctrl-C on, which ended one of the starts and left the best of the others.
+
+        Raises
+        ------
+        KeyboardInterrupt
+            When it did.
+        """
+        if self.best.solve.interrupted or any(STOPPED in failure for failure in self.failures):
+            raise KeyboardInterrupt
 
     def result(self, began: float, progress: Progress | None = None) -> CalibrationResult:
         """Judge the estimate on the grid and on the held-out intervals.

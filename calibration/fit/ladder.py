@@ -56,9 +56,8 @@ def climb(drawn: FittedCase, began: float, progress: Progress | None = None) -> 
     asked = chosen.effects or chosen.scopes or chosen.fixed or chosen.structure != BASELINE
     if asked or is_large(drawn.model.grid.network.zones) or chosen.objective != "multi_step":
         return drawn.result(began, progress)
-    if drawn.best.solve.interrupted:
-        return drawn.result(began, progress)
     try:
+        drawn.raise_if_interrupted()
         rungs, kept, left = climb_from("drawn", drawn.best, drawn, progress)
     except KeyboardInterrupt:  # what is finished is the drawing's
         stopped = replace(drawn.best.solve, success=False, status=INTERRUPTED, interrupted=True)
@@ -124,8 +123,7 @@ def climb_from(
     def solve(settings: CalibrationSettings, known: Fitted | None = None) -> FittedCase:
         begin = None if known is None else values_of(known)
         found = fit_case(given.case, given.tuned, given.judged, settings, progress, begin)
-        if found.best.solve.interrupted:
-            raise KeyboardInterrupt
+        found.raise_if_interrupted()
         return found
 
     structure = Structure(lumped=True, sun=telemetry_inputs(given.case).gives("sun"))
