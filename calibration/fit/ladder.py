@@ -139,16 +139,16 @@ def climb_from(
     recurring = replace(base, structure=replace(structure, recurring=True))
     if days_of(given.tuned) >= _WEEK:
         looked.append(look("recurring", _begun(given, recurring, lumped.best)))
-    best = looked[0]
-    for other in looked[1:]:
-        if other.left.mae < (1.0 - (advance if best is looked[0] else ADVANCE)) * best.left.mae:
-            best = other
-    number = looked.index(best)
-    if best.name == "recurring":
+    best = 0
+    for number, other in enumerate(looked):
+        if other.left.mae < (1.0 - (ADVANCE if best else advance)) * looked[best].left.mae:
+            best = number
+    if looked[best].name == "recurring":
         found = solve(recurring, lumped.best)
-        best = looked[number] = look(best.name, found.best, found)
-    rungs = tuple(Rung(each.name, each.left.mae, each.parameters, each is best) for each in looked)
-    return rungs, None if best.fit is None else replace(best.fit, left=best.left), best.left
+        looked[best] = look("recurring", found.best, found)
+    kept = looked[best]
+    rungs = tuple(Rung(each.name, each.left.mae, each.parameters, each is kept) for each in looked)
+    return rungs, None if kept.fit is None else replace(kept.fit, left=kept.left), kept.left
 
 
 @dataclass(frozen=True)
