@@ -102,7 +102,8 @@ class ModelSettings:
     def to_dict(self) -> dict[str, Any]:
         """Entry of ``calibration.json``."""
         effects = {name: list(zones) for name, zones in self.effects.items()}
-        kept = self.normalisation.to_dict() if self.effects and self.normalisation is not None else None
+        counted = self.effects or self.structure.follows_weather
+        kept = self.normalisation.to_dict() if counted and self.normalisation is not None else None
         return {**asdict(replace(self, normalisation=None)), "effects": effects, "normalisation": kept}
 
 

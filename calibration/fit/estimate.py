@@ -38,6 +38,10 @@ STOPPED = "stopped by Ctrl-C"
 #: Gain of twice the cost below which a solve after the first round is done [-].
 _LEAST_GAIN = 1e-5
 
+#: Share of the gain of such a solve below which it is done as well [-], since the next one weighs errors anew. With it
+#: six lumped fits took two thirds of the evaluations, and their held-out errors changed by less than 1 %.
+_ENOUGH = 0.03
+
 #: Times by which gradients of whitened residuals may be larger at convergence [-]: an effective sample a hundred times
 #: as large makes them so at the same distance in standard errors.
 _WHITENED_SLACK = 10.0
@@ -49,8 +53,8 @@ _LEAST_DEVIATION = 0.02
 #: tuned on a model of the order that follows; 123 zones take minutes with the five hundred states of a calibration.
 _MOST_ZONES, _TUNING_ORDER = 40, 300
 
-#: Finds the unmeasured heat and the sensors' noise at θ.
-Tuner = Callable[[Problem, ReducedModel, FloatArray], DisturbanceModel]
+#: Finds the unmeasured heat and the sensors' noise at θ, from what is known of them.
+Tuner = Callable[[Problem, ReducedModel, FloatArray, DisturbanceModel | None], DisturbanceModel]
 
 
 @dataclass(frozen=True)
@@ -173,7 +177,7 @@ class _Rounds:
         if not self.problem.whitened or self.tuner is None:
             return
         if self.disturbance is None or self.retune:
-            tuned = self.tuner(self.problem, self.model, theta)
+            tuned = self.tuner(self.problem, self.model, theta, self.disturbance)
             self.retune = self.disturbance is None or not tuned.near(self.disturbance, _SAME_DISTURBANCE)
             self.disturbance = tuned
         self.problem = self.problem.at(self.model, theta, self.disturbance)
@@ -192,7 +196,7 @@ class _Rounds:
             found = solve_least_squares(weighted, z, *problem.bounds, tolerance=slack * tolerance)
         else:  # close by, where Ipopt would take six evaluations for its barrier
             try:
-                found = solve_damped(weighted, z, problem.bounds, problem.prior_deviations, _LEAST_GAIN)
+                found = solve_damped(weighted, z, problem.bounds, problem.prior_deviations, _LEAST_GAIN, _ENOUGH)
             except KeyboardInterrupt:
                 found = replace(self.last, success=False, status=INTERRUPTED, interrupted=True)
         self.iterations += found.iterations
@@ -217,9 +221,10 @@ class _Rounds:
         before = self.problem.effective_size()
         deviation = max(_LEAST_DEVIATION, self.problem.spread(error))
         self.problem = replace(self.problem, deviation=deviation, shrinkage=_shrinkage(self.problem, z, self.last))
-        if self.tuner is not None and (still or self.disturbance is not None):
+        begun = self.disturbance is not None or (number > 0 and not self.problem.capped)
+        if self.tuner is not None and (still or begun):
             if self.disturbance is None or (self.retune and not self.problem.capped):
-                tuned = self.tuner(self.problem, self.model, theta)
+                tuned = self.tuner(self.problem, self.model, theta, self.disturbance)
                 self.retune = self.disturbance is None or not tuned.near(self.disturbance, _SAME_DISTURBANCE)
                 self.disturbance = tuned
             self.excess = max(1.0, unexplained(self.problem, self.model, theta, self.disturbance))
@@ -304,7 +309,9 @@ def compensated_start(problem: Problem, z: FloatArray, model: SymbolicModel) -> 
     return solve_least_squares(lambda x: bold.weighted(model, x), z, *problem.bounds, tolerance=1e-1, iterations=15).x
 
 
-def tune(problem: Problem, model: ReducedModel, theta: FloatArray) -> DisturbanceModel:
+def tune(
+    problem: Problem, model: ReducedModel, theta: FloatArray, known: DisturbanceModel | None = None
+) -> DisturbanceModel:
     """Unmeasured heat in proportion to the zones' air and sensor noise, by the likelihood of a filter's innovations.
 
     Parameters
@@ -315,13 +322,15 @@ def tune(problem: Problem, model: ReducedModel, theta: FloatArray) -> Disturbanc
         That is accurate at θ.
     theta : ndarray, shape (n_parameter,)
         Parameter values [parameter units].
+    known : DisturbanceModel, optional
+        Where to start, such as what was found at a θ close by.
     """
     large = len(model.network.zones) > _MOST_ZONES
     settings = TuningSettings(
         problem.scheme,
         covariance="steady",  # where sensors come and go exact gains take ten times as long
         weights=air_volumes(model.network),
-        start=problem.disturbance,
+        start=known,
         curvature=False,
     )
     small = reduced_model(problem.grid, [theta], order=_TUNING_ORDER) if large else model

@@ -179,8 +179,7 @@ def fit_case(
         As `calibrate` does.
     """
     tuned, judged = default_intervals(case, tune, hold_out)
-    if settings.effects:
-        settings = replace(settings, normalisation=fit_normalisation(case, ((i.start, i.end) for i in tuned)))
+    settings = with_normalisation(settings, case, tuned)
     _refuse_overlap(tuned, judged)
     problem = tuning_problem(case, tuned, settings)
     if begin is not None:
@@ -197,6 +196,23 @@ def fit_case(
     best, failures = solve_starts(problem, first, settings.starts, settings.seed, progress)
     before = CaseModel(case, settings.model, grid, inputs, given, "start")
     return FittedCase(before, first, best, tuple(failures), tuple(tuned), tuple(judged), settings)
+
+
+def with_normalisation(settings: CalibrationSettings, case: Case, tuned: Sequence[Interval]) -> CalibrationSettings:
+    """Fit the constants of a model's inputs on tuning intervals, where it has inputs that are counted by some.
+
+    Parameters
+    ----------
+    settings : CalibrationSettings
+        Model and fit.
+    case : Case
+        With telemetry.
+    tuned : sequence of Interval
+        Where it is fitted.
+    """
+    if not (settings.effects or settings.structure.follows_weather):
+        return settings
+    return replace(settings, normalisation=fit_normalisation(case, ((i.start, i.end) for i in tuned)))
 
 
 def is_large(zones: Sequence[str]) -> bool:

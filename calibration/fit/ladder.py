@@ -7,7 +7,7 @@ from typing import Protocol
 from calibration.evaluation.intervals import Interval, days_of
 from calibration.evaluation.n_step import Progress
 from calibration.evaluation.settings import CalibrationSettings
-from calibration.fit.fitted_case import FittedCase, fit_case, is_large
+from calibration.fit.fitted_case import FittedCase, fit_case, is_large, with_normalisation
 from calibration.fit.least_squares import INTERRUPTED
 from calibration.fit.left_out import Fitted, Known, LeftOut, begin_at, left_out, values_of
 from calibration.fit.problem import tuning_problem
@@ -93,7 +93,8 @@ def climb_from(
 ) -> tuple[tuple[Rung, ...], FittedCase | None, LeftOut]:
     """Fit further structures beside a fitted model; the simplest is kept that predicts left-out days about best.
 
-    With slabs and furniture by zone, unless a lumped model halves the drawing's error; lumped, where the sun is a part
+    With outside films that follow the wind, and with slabs and furniture by zone, unless a lumped model halves the
+    drawing's error; lumped, where the sun is a part
     of it if irradiance is measured; lumped, with a gain that recurs from day to day, which is linear, so that a few
     Newton steps from the lumped estimate tell whether it is worth a fit.
 
@@ -126,13 +127,20 @@ def climb_from(
         found.raise_if_interrupted()
         return found
 
-    structure = Structure(lumped=True, sun=telemetry_inputs(given.case).gives("sun"))
+    source = telemetry_inputs(given.case)
+    structure = Structure(lumped=True, sun=source.gives("sun"))
     lumped = solve(replace(base, structure=structure))
     looked, beside = [look(name, fitted)], look("lumped", lumped.best, lumped)
     parameters = fitted.problem.grid.network.parameters
+    plain, drawn = all(p.effect is None for p in parameters), beside.left.mae >= _WRONG * looked[0].left.mae
+    if plain and drawn and source.gives("wind"):
+        follows = replace(base, structure=replace(base.structure, wind_films=True))
+        if look("wind", _begun(given, follows, fitted)).left.mae < looked[0].left.mae:
+            base, wind = follows, solve(follows, fitted)
+            looked.append(look("wind", wind.best, wind))
+            fitted = wind.best
     scopes: dict[str, Scope] = {p.base: "zone" for p in parameters if p.base in _MASSES}
-    plain = len(fitted.model.network.zones) > 1 and all(p.effect is None for p in parameters)
-    if scopes and plain and beside.left.mae >= _WRONG * looked[0].left.mae:
+    if scopes and plain and drawn and len(fitted.model.network.zones) > 1:
         zoned = solve(replace(base, scopes={**base.scopes, **scopes}), fitted)
         looked.append(look("zoned", zoned.best, zoned))
     looked.append(beside)
@@ -141,7 +149,9 @@ def climb_from(
         looked.append(look("recurring", _begun(given, recurring, lumped.best)))
     best = 0
     for number, other in enumerate(looked):
-        if other.left.mae < (1.0 - (ADVANCE if best else advance)) * looked[best].left.mae:
+        # films that follow the wind have no more parameters
+        least = 0.0 if other.name == "wind" else ADVANCE if best else advance
+        if other.left.mae < (1.0 - least) * looked[best].left.mae:
             best = number
     if looked[best].name == "recurring":
         found = solve(recurring, lumped.best)
@@ -164,6 +174,7 @@ class _Looked:
 def _begun(given: Tuned, settings: CalibrationSettings, known: Fitted) -> Known:
     """Take a structure with further parameters as it begins: at what is known of the others, and weighed like these."""
     own = known.problem
+    settings = with_normalisation(settings, given.case, given.tuned)
     problem = begin_at(tuning_problem(given.case, given.tuned, settings), values_of(known))
     problem = replace(
         problem, deviation=own.deviation, effective=own.effective_size(),

@@ -250,6 +250,7 @@ def solve_damped(
     bounds: tuple[FloatArray, FloatArray],
     spread: FloatArray,
     tolerance: float,
+    share: float = 0.0,
 ) -> LeastSquaresResult:
     """Minimise ``½ Σ r(x)²`` by damped Gauss-Newton steps within bounds, and by Ipopt where these go on for long.
 
@@ -268,10 +269,14 @@ def solve_damped(
     tolerance : float
         It is solved when a step lowers ``Σ r²``, or could, by no more than this [-]. A gradient does not say that where
         the data leave a direction open.
+    share : float
+        It is also solved when that is no more than this share of what all steps have gained [-]: enough where another
+        solve with other weights follows.
     """
     (lower, upper), x, damping = bounds, start, DAMPING
     free = lower < upper
     residual, jacobian = function(x)
+    first = float(residual @ residual)
     for number in range(MOST_STEPS):
         step = np.zeros_like(x)
         if free.any():
@@ -285,7 +290,8 @@ def solve_damped(
             damping *= EASED if gained > 0.8 * expected else TIGHTENED if gained < 0.5 * expected else 1.0
         if gained > 0.0:
             x, (residual, jacobian) = x + step, there
-        if expected < tolerance or 0.0 < gained < tolerance:
+        enough = max(tolerance, share * (first - float(residual @ residual)))
+        if expected < enough or 0.0 < gained < enough:
             return LeastSquaresResult(x, 0.5 * float(residual @ residual), jacobian, SOLVED, True, number + 1)
 
     def filled(y: FloatArray) -> FloatArray:

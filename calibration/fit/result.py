@@ -86,9 +86,9 @@ class Rung(Plain):
 
     Parameters
     ----------
-    name : {"drawn", "named", "zoned", "lumped", "recurring"}
-        As drawn, with what a diagnosis named, with slabs and furniture by zone, lumped, or lumped with a gain that
-        recurs from day to day.
+    name : {"drawn", "named", "wind", "zoned", "lumped", "recurring"}
+        As drawn, with what a diagnosis named, with films that follow the wind, with slabs and furniture by zone,
+        lumped, or lumped with a gain that recurs from day to day.
     left_out_mae : float
         Mean absolute error on tuning days that a fit has not seen [K]; NaN where there are too few days.
     parameters : int

@@ -125,6 +125,7 @@ def carried_sentence(carried: Carried | None) -> str:
 
 #: Structures in words.
 _STRUCTURES = {
+    "wind": "as drawn, with outside films that follow the wind",
     "zoned": "as drawn, with slabs and furniture of each zone's own",
     "lumped": "lumped into air and mass a zone",
     "recurring": "lumped into air and mass a zone, with a gain that recurs from day to day",

@@ -12,6 +12,7 @@ from thermal._types import FloatArray, IntArray
 from thermal.case.building import Building, FloorPlans, ZoneTable
 from thermal.case.plan import facade_areas, zone_floor_areas
 from thermal.errors import ModelError
+from thermal.network.films import add_films
 from thermal.network.floor import Floor, Zone
 from thermal.network.graph import GraphBuilder
 from thermal.network.grid import floor_grid
@@ -157,7 +158,8 @@ def build_network(
 
 def _lumped(building: Building, dx: float | None, structure: Structure) -> Blueprint:
     """Lump a building into two nodes a zone."""
-    detailed = build_network(building, dx, structure=replace(structure, lumped=False, sun=False))
+    drawn = replace(structure, lumped=False, sun=False, recurring=False, wind_films=False, natural_films=False)
+    detailed = build_network(building, dx, structure=drawn)
     graph, air = lump(detailed, building.geometry_quality, structure)
     ones = np.ones(air.size)
     return Blueprint(graph, air, np.arange(air.size), ones, ones)
@@ -203,6 +205,22 @@ def blueprint(
     """
     if structure.lumped:
         return _lumped(building, dx, structure)
+    baseline = _drawn(building, dx, reach, scopes, diffusers, mean_shuffle, structure)
+    if structure.follows_weather:
+        add_films(baseline.graph, structure)
+    return baseline
+
+
+def _drawn(
+    building: Building,
+    dx: float | None,
+    reach: float | None,
+    scopes: Mapping[str, Scope] | None,
+    diffusers: Mapping[str, NDArray[np.bool_]] | None,
+    mean_shuffle: bool,
+    structure: Structure,
+) -> Blueprint:
+    """Build the baseline as it is drawn."""
     boundaries = ("outdoor", *building.measured_boundaries)
     graph, plans = GraphBuilder(building.zone_names, boundaries, scopes or {}, structure), building.geometry
     graph.anatomy.air_heat_capacity = air_density(building.location.elevation) * AIR_HEAT_CAPACITY

@@ -107,6 +107,23 @@ class GraphBuilder:
         return self._parameters[parameter.name][1]
 
     @property
+    def parameters(self) -> list[tuple[Parameter, ca.SX]]:
+        """Parameters so far, with their symbols."""
+        return list(self._parameters.values())
+
+    def classes(self) -> list[tuple[str, ca.SX, IntArray, IntArray, FloatArray]]:
+        """Classes of faces so far, sources left out: name, κ, both ends, and weights."""
+
+        def join(faces: list[tuple[Any, Any, Any]], column: int) -> Any:
+            return np.concatenate([face[column] for face in faces])
+
+        return [
+            (key, value, join(faces, 0), join(faces, 1), join(faces, 2).astype(float))
+            for key, (value, faces) in self._faces.items()
+            if key not in self._sources
+        ]
+
+    @property
     def size(self) -> int:
         """Number of control volumes so far."""
         return self._count

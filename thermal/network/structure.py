@@ -101,6 +101,11 @@ class Structure:
         Of a lumped model: an aperture for the sun a zone and direction, which takes measured irradiance.
     recurring : bool
         Of a lumped model: a gain a zone that recurs from day to day, as people and their devices bring it.
+    wind_films : bool
+        Outside films that follow the wind, of a model that is not lumped.
+    natural_films : bool
+        Inside films that follow the temperature difference to outdoors, of a model with a radiant node that is not
+        lumped.
 
     Raises
     ------
@@ -109,8 +114,9 @@ class Structure:
 
     Examples
     --------
-    >>> Structure.paper()
-    Structure(furniture=False, slab_nodes=0, wall_nodes=1, radiant=False, lumped=False, sun=False, recurring=False)
+    >>> paper = Structure.paper()
+    >>> paper.furniture, paper.slab_nodes, paper.wall_nodes, paper.radiant
+    (False, 0, 1, False)
     """
 
     furniture: bool = True
@@ -120,9 +126,16 @@ class Structure:
     lumped: bool = False
     sun: bool = False
     recurring: bool = False
+    wind_films: bool = False
+    natural_films: bool = False
+
+    @property
+    def follows_weather(self) -> bool:
+        """Whether its films follow wind or temperatures, which takes a `Normalisation`."""
+        return self.wind_films or self.natural_films
 
     def __post_init__(self) -> None:
-        for name in ("furniture", "radiant", "lumped", "sun", "recurring"):
+        for name in ("furniture", "radiant", "lumped", "sun", "recurring", "wind_films", "natural_films"):
             if not isinstance(getattr(self, name), bool):
                 raise ModelError(f"structure.{name}: expected true or false, got {getattr(self, name)!r}")
         for name, least in (("slab_nodes", 0), ("wall_nodes", 1)):

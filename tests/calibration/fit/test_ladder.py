@@ -29,16 +29,29 @@ def climbed(case: Case) -> CalibrationResult:
 
 
 def test_what_predicts_left_out_days_better_is_kept(climbed: CalibrationResult) -> None:
-    drawn, zoned, lumped = climbed.rungs
-    assert (drawn.name, zoned.name, lumped.name) == ("drawn", "zoned", "lumped")
-    assert zoned.parameters > drawn.parameters
-    simpler = min(drawn.left_out_mae, zoned.left_out_mae)
+    drawn, wind, zoned, lumped = climbed.rungs
+    assert [rung.name for rung in climbed.rungs] == ["drawn", "wind", "zoned", "lumped"]
+    assert zoned.parameters > drawn.parameters == wind.parameters
+    assert wind.left_out_mae < drawn.left_out_mae  # or it would not have been fitted
+    simpler = min(wind.left_out_mae, zoned.left_out_mae)
     assert lumped.chosen == (lumped.left_out_mae < 0.9 * simpler) and sum(r.chosen for r in climbed.rungs) == 1
     assert climbed.settings.structure.lumped == lumped.chosen
     # the bundled building has sun, which the drawing leaves to an effect
     assert lumped.chosen
     plain = climbed.to_dict()
-    assert [rung["name"] for rung in plain["rungs"]] == ["drawn", "zoned", "lumped"]
+    assert [rung["name"] for rung in plain["rungs"]] == ["drawn", "wind", "zoned", "lumped"]
+
+
+def test_films_that_follow_the_wind_are_kept_without_an_advance(case: Case, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(ladder, "ADVANCE", 1.0)  # nothing with more parameters is better by so much
+    result = calibrate(case, settings={**QUICK, "climb": True})
+    assert [rung.chosen for rung in result.rungs] == [False, True, False, False]
+    assert result.settings.structure.wind_films
+    assert result.settings.normalisation is not None and result.settings.normalisation.wind is not None
+    assert "outside films that follow the wind" in calibration_verdict(result)
+    frame = case.telemetry.frame.drop(columns="weather_station/wind_speed_sensor")
+    still = replace(case, telemetry=replace(case.telemetry, frame=frame), judged=None)
+    assert [r.name for r in calibrate(still, settings={**QUICK, "climb": True}).rungs] == ["drawn", "zoned", "lumped"]
 
 
 def test_before_is_what_the_drawing_says(case: Case, climbed: CalibrationResult) -> None:
@@ -88,17 +101,14 @@ def test_left_out_days_make_bands(climbed: CalibrationResult) -> None:
 
 def test_a_gain_that_recurs_is_kept_where_it_predicts_better(case: Case, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(ladder, "_WEEK", 3.0)
-    _, _, lumped, recurring = calibrate(case, settings={**QUICK, "climb": True}).rungs
-    assert (recurring.name, recurring.parameters - lumped.parameters) == (
-        "recurring",
-        6 * len(case.building.zone_names),
-    )
+    *_, lumped, recurring = calibrate(case, settings={**QUICK, "climb": True}).rungs
+    further = recurring.parameters - lumped.parameters
+    assert (recurring.name, further) == ("recurring", 6 * len(case.building.zone_names))
     assert recurring.chosen == (recurring.left_out_mae < 0.9 * lumped.left_out_mae)
-    monkeypatch.setattr(
-        ladder, "ADVANCE", -1.0
-    )  # it predicts days left out worse here, with five of them to learn from
+    # it predicts days left out worse here, with five of them to learn from
+    monkeypatch.setattr(ladder, "ADVANCE", -1.0)
     result = calibrate(case, settings={**QUICK, "climb": True})
-    assert [rung.chosen for rung in result.rungs] == [False, False, False, True]
+    assert [rung.chosen for rung in result.rungs] == [False] * 4 + [True]
     assert result.settings.structure.recurring
     assert "recurs from day to day" in calibration_verdict(result)
     # with more freedom the days that were fitted are followed more closely
