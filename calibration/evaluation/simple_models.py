@@ -17,6 +17,7 @@ from thermal.case.case import Case
 from thermal.inputs.normalisation import Normalisation
 from thermal.inputs.provider import telemetry_inputs
 from thermal.model.case_replay import SPIN_UP, Inputs
+from thermal.network.commands import nominal_heat
 from thermal.network.topology import Anatomy
 
 #: Zones up to which every two are taken for neighbours, and beyond which a network of them is not fitted.
@@ -140,7 +141,7 @@ class _SimpleModels:
     """Telemetry of a case as the simple models see it."""
 
     def __init__(self, case: Case, inputs: Inputs, anatomy: Anatomy, seen: np.ndarray, steps: int) -> None:
-        self.inputs, self.seen, self.steps = inputs, seen, steps
+        self.inputs, self.seen, self.steps, self.heat = inputs, seen, steps, inputs.heat.copy()
         self.boundary = inputs.boundary[:, : len(case.boundary_temperatures().columns)]
         names = case.building.zone_names
         self.remarks = []
@@ -155,6 +156,11 @@ class _SimpleModels:
         else:
             self.sun = np.empty((len(inputs), 0))
             self.remarks.append("without irradiance, which is not measured")
+        if case.building.commanded:
+            sizes = {n: anatomy.rooms[n].floor_area for n in names}
+            for zone, heat in nominal_heat(case.building.commanded, provider.commanded, sizes).items():
+                self.heat[:, names.index(zone)] += heat
+            self.remarks.append("with heat that no meter tells as their valves, dampers and counters are usually sized")
         self.areas = np.array([anatomy.rooms[n].floor_area for n, s in zip(names, seen, strict=True) if s])
         self.pairs = self._pairs([n for n, s in zip(names, seen, strict=True) if s], anatomy)
 
@@ -234,15 +240,15 @@ class _SimpleModels:
             ends = [total[starts + 1 + e] for e in edges]
             return np.stack([(b - a) / n for a, b, n in zip(ends, ends[1:], np.diff(edges), strict=False)], axis=-1)
 
-        heat = blocks(inputs.heat[:, self.seen])
+        heat = blocks(self.heat[:, self.seen])
         now = inputs.held[starts][:, self.seen]
         back = [np.maximum(0, starts - max(1, round(s / inputs.step))) for s in _LAGS]
         risen = [now - inputs.held[b][:, self.seen] for b in back]
-        total = np.vstack([np.zeros(now.shape[1]), np.cumsum(inputs.heat[:, self.seen], axis=0)])
+        total = np.vstack([np.zeros(now.shape[1]), np.cumsum(self.heat[:, self.seen], axis=0)])
         before = np.maximum(0, starts - self.steps)
         past = (total[starts + 1] - total[before]) / np.maximum(1, starts + 1 - before)[:, None]
         own = np.concatenate([np.stack([now, *risen, past], axis=-1), heat], axis=-1)
-        around = np.hstack([self.boundary, self.sun, inputs.heat[:, ~self.seen]])
+        around = np.hstack([self.boundary, self.sun, self.heat[:, ~self.seen]])
         stamps = inputs.stamps[starts]
         angle = 2.0 * np.pi * np.asarray(stamps.hour + stamps.minute / 60.0) / 24.0
         common = [blocks(around).reshape(len(starts), -1), np.sin(angle)[:, None], np.cos(angle)[:, None]]
@@ -254,7 +260,7 @@ class _SimpleModels:
             raise NotEnoughDataError(f"not fitted for more than {_MOST_ZONES} zones; there are {len(self.areas)}")
         inputs, seen = self.inputs, self.seen
         data = TwoNodeData(
-            inputs.step, inputs.zone[:, seen], inputs.bridged[:, seen], inputs.held[:, seen], inputs.heat[:, seen],
+            inputs.step, inputs.zone[:, seen], inputs.bridged[:, seen], inputs.held[:, seen], self.heat[:, seen],
             self.boundary, self.sun, self.areas, self.pairs,
         )  # fmt: skip
         least = min(spin_up, 43200.0)

@@ -303,6 +303,27 @@ class ZoneTable:
     constructions: Mapping[str, tuple[Layer, ...]] = field(default_factory=dict)
 
 
+@dataclass(frozen=True)
+class Commanded:
+    """A device whose heat no meter tells, so that it is fitted: a signal times a parameter of the device's own.
+
+    Parameters
+    ----------
+    device, zone
+        Which, and where its heat goes.
+    kind
+        ``damper``: air in proportion to its opening; ``valve``: heat in proportion to its opening; ``counter``: a share
+        of what a feeder is metered to give.
+    columns
+        Telemetry that the signal is made of, `thermal.case.commands.command_signals`.
+    """
+
+    device: str
+    zone: str
+    kind: Literal["damper", "valve", "counter"]
+    columns: tuple[str, ...]
+
+
 @dataclass(frozen=True, eq=False)
 class Building:
     """A building: what stands where, and what serves it.
@@ -326,6 +347,8 @@ class Building:
     geometry_quality
         How the geometry was come by: ``surveyed`` (measured on site or taken from a checked drawing), ``approximate``,
         or ``generic`` (that of a typical building).
+    commanded
+        Devices whose heat no meter tells, as the telemetry of a case has it.
     """
 
     name: str
@@ -336,6 +359,7 @@ class Building:
     airflows: tuple[Airflow, ...] = ()
     weather_station: str = "weather_station"
     geometry_quality: GeometryQuality = "approximate"
+    commanded: tuple[Commanded, ...] = ()
 
     @property
     def zone_names(self) -> tuple[str, ...]:

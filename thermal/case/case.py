@@ -11,6 +11,7 @@ from zoneinfo import ZoneInfo
 import pandas as pd
 
 from thermal.case.building import OUTDOOR, Building
+from thermal.case.commands import command_signals, commanded_devices
 from thermal.case.estimated import Estimated, estimate_remarks, estimate_temperatures, like_others, long_gaps
 from thermal.case.metered_heat import estimate_parts, heat_parts, total_heat
 from thermal.case.points import OUTDOOR_TEMPERATURE, SUPPLY_FLOW, ZONE_TEMPERATURE
@@ -86,6 +87,11 @@ class Case:
     telemetry: Telemetry
     path: Path | None = None
     judged: QualityReport | None = field(default=None, repr=False)
+
+    def __post_init__(self) -> None:
+        found = commanded_devices(self.building, set(self.telemetry.frame.columns))
+        if found != self.building.commanded:
+            object.__setattr__(self, "building", replace(self.building, commanded=found))
 
     @cached_property
     def quality(self) -> QualityReport:
@@ -194,13 +200,27 @@ class Case:
         -----
         ``q = flow * 1006 J/kg/K * (discharge - zone temperature) + heating_power``, of measured temperatures of the
         same stamp. A flow of exactly zero brings no heat, whatever the discharge sensor says or fails to say. A
-        terminal unit or heater of a known type that reports neither flow nor power makes its zone's heat unknown: NaN.
+        terminal unit or heater of a known type that reports neither flow nor power makes its zone's heat unknown: NaN,
+        unless a valve, a damper or a counter tells what it does (`building.commanded`): such heat is fitted, and not
+        in this.
         """
         return self._zone_heat.copy()
 
     @cached_property
     def _zone_heat(self) -> pd.DataFrame:
         return total_heat(self.building, heat_parts(self.building, self.usable, self._zone_temperatures))
+
+    def command_signals(self) -> pd.DataFrame:
+        """Give what the heat of devices that no meter tells is in proportion to.
+
+        Returns
+        -------
+        DataFrame
+            Shape (n_time, n_commanded), columns 0..n-1 in the order of `building.commanded`, NaN where something is
+            missing; see `thermal.case.commands.command_signals`.
+        """
+        temperatures, _ = estimate_temperatures(self._zone_temperatures, self.step)
+        return command_signals(self.building, self.usable, temperatures)
 
     def zone_heat_estimated(self) -> pd.DataFrame:
         """Heat that each zone receives, estimated where a sensor that it follows from is dead or stuck for long.

@@ -295,7 +295,9 @@ def _building(parsed: BuildingFile, folder: Path) -> Building:
         geometry = FloorPlans(parsed.cell_size, floors, parsed.glazing or {})
     else:
         geometry = ZoneTable(parsed.zones or (), parsed.surfaces or (), parsed.constructions or {})
-    kept = {field.name: getattr(parsed, field.name) for field in fields(Building) if field.name != "geometry"}
+    kept = {
+        field.name: getattr(parsed, field.name) for field in fields(Building) if field.name in BuildingFile.model_fields
+    }
     return Building(geometry=geometry, **kept)
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 
 from thermal.case.building import Building, Device
+from thermal.case.commands import air_column
 from thermal.case.estimated import Estimated, like_others, long_gaps
 from thermal.case.plan import zone_sizes
 from thermal.case.points import DISCHARGE_TEMPERATURE, HEATING_POWER, SUPPLY_FLOW
@@ -37,17 +38,18 @@ def heat_parts(
     tuple of DataFrame
         By air, by power [W], a column a zone; NaN where something is missing.
     """
-    unknown = pd.Series(np.nan, index=frame.index)
+    unknown, columns = pd.Series(np.nan, index=frame.index), set(frame.columns)
     air: dict[str, pd.Series] = {}
     power: dict[str, pd.Series] = {}
     for device in building.devices:
         zone = device.zone
         if zone is None:
             continue
-        flow, discharge, watts = (frame.get(f"{device.name}/{point}") for point in _POINTS)
+        flow, _, watts = (frame.get(f"{device.name}/{point}") for point in _POINTS)
+        discharge = frame.get(air_column(building, device, columns) or "")
         if watts is not None:
             power[zone] = power.get(zone, 0.0) + watts
-        if flow is not None or _is_unmetered(device, frame):
+        if flow is not None or _is_unmetered(building, device, frame):
             rate, warm = (unknown if series is None else series for series in (flow, discharge))
             brought = rate * AIR_HEAT_CAPACITY * (warm - temperatures[zone])
             air[zone] = air.get(zone, 0.0) + brought.where(rate != 0.0, 0.0)
@@ -117,14 +119,19 @@ def _gaps(
     """Find where some points of a zone's devices are missing for long."""
     for device in building.devices_of(zone):
         columns = [f"{device.name}/{point}" for point in points]
-        expected = SUPPLY_FLOW in points and _is_unmetered(device, frame)
+        air = air_column(building, device, set(frame.columns))
+        if DISCHARGE_TEMPERATURE in points and air is not None:
+            columns[points.index(DISCHARGE_TEMPERATURE)] = air
+        expected = SUPPLY_FLOW in points and _is_unmetered(building, device, frame)
         if expected or any(column in frame for column in columns):
             for column in columns:
                 for a, b in long_gaps(frame.get(column, pd.Series(np.nan, frame.index)), step):
                     yield Estimated(zone, column, frame.index[a], frame.index[b])
 
 
-def _is_unmetered(device: Device, frame: pd.DataFrame) -> bool:
-    """Whether a device gives heat and reports neither flow nor power."""
+def _is_unmetered(building: Building, device: Device, frame: pd.DataFrame) -> bool:
+    """Whether a device gives heat, and nothing tells how much."""
+    if any(own.device == device.name for own in building.commanded):
+        return False
     flow, discharge, power = (f"{device.name}/{point}" in frame for point in _POINTS)
     return not flow and not power and (discharge or device.type in TERMINAL_TYPES)

@@ -20,6 +20,7 @@ from thermal.case.building import (
     Surface,
     ZoneTable,
 )
+from thermal.case.commands import air_column, commanded_devices
 from thermal.case.plan import check_plan, facade_areas
 from thermal.case.telemetry import Telemetry
 from thermal.components.registry import device_types
@@ -218,6 +219,8 @@ def _check_kind(surface: Surface, zones: Collection[str], where: str) -> None:
         CaseError.unless_known(surface.other, zones, f"{where}: other", "a zone, for an opening")
 
 
+#: What tells the heat of a device without a meter, and how many devices are named in one sentence.
+_TOLD, _NAMED = {"damper": "dampers", "valve": "valves", "counter": "the counter of their feeder"}, 5
 TERMINAL_TYPES = frozenset({"vav", "fan_coil", "electric_heater", "radiator", "supply_air_terminal"})
 """Devices that give heat to the zone they serve: without flow or power, that heat is unknown."""
 
@@ -274,6 +277,13 @@ def _on_plans(building: Building) -> Iterator[str]:
 
 
 def _on_devices(building: Building, columns: set[str]) -> Iterator[str]:
+    commanded = commanded_devices(building, columns)
+    for what, meaning in _TOLD.items():
+        named = [own.device for own in commanded if own.kind == what]
+        if named:
+            more = f" and {len(named) - _NAMED} more" if len(named) > _NAMED else ""
+            yield f"heat that no meter tells is fitted to {meaning}: {', '.join(named[:_NAMED])}{more}"
+    told = {own.device for own in commanded} | {column.partition("/")[0] for own in commanded for column in own.columns}
     for name, kind in unknown_device_types(building).items():
         yield f"device {name!r} has the unknown type {kind!r} ({nearest(kind, device_types())})"
     for device in building.devices:
@@ -281,11 +291,15 @@ def _on_devices(building: Building, columns: set[str]) -> Iterator[str]:
         if not any(column.startswith(f"{device.name}/") for column in columns):
             yield f"device {device.name!r} has no telemetry"
         if device.zone is None:
+            if device.name in told:
+                continue
             if device.type in TERMINAL_TYPES or has & {points.HEATING_POWER, points.DISCHARGE_TEMPERATURE}:
                 yield f"device {device.name!r} ({device.type}) serves no zone: its heat is not counted"
+        elif device.name in told:
+            continue
         elif has == {points.DISCHARGE_TEMPERATURE} or (device.type in TERMINAL_TYPES and not has):
             yield f"device {device.name!r} reports neither flow nor power: the heat of zone {device.zone!r} is unknown"
-        elif points.SUPPLY_FLOW in has and points.DISCHARGE_TEMPERATURE not in has:
+        elif points.SUPPLY_FLOW in has and air_column(building, device, columns) is None:
             zone = f"the heat of zone {device.zone!r} is unknown while air flows"
             yield f"device {device.name!r} reports a flow without a discharge temperature: {zone}"
 

@@ -42,11 +42,11 @@ IRRADIANCE, INFRARED = "direct_normal_irradiance_sensor", "horizontal_infrared_i
 INPUTS: dict[str, str] = {
     "outdoor": "K", "wind": "m/s", "sky": "W/m^2", "sun": "W/m^2", "occupancy": "1", "usual": "K", "openings": "1",
     "through_windows": "K*m/s", "heat": "W", "airflow": "kg/s", "supply_flow": "kg/s", "supply_heat": "W",
-    "radiant_gains": "W", "outdoor_rate": "K/h", "occupancy_rate": "1/h", "heat_rate": "W/h",
+    "radiant_gains": "W", "outdoor_rate": "K/h", "occupancy_rate": "1/h", "heat_rate": "W/h", "commanded": "1",
 }  # fmt: skip
 
 #: Inputs that depend on what the HVAC system does: telemetry and a running plant know them, nobody else.
-HVAC_INPUTS = frozenset({"heat", "airflow", "supply_flow", "supply_heat", "heat_rate"})
+HVAC_INPUTS = frozenset({"heat", "airflow", "supply_flow", "supply_heat", "heat_rate", "commanded"})
 
 #: Series that inputs are made of where these are not of the same name.
 _SERIES: dict[str, tuple[str, ...]] = {
@@ -83,7 +83,7 @@ class InputProvider:
     series : mapping of str to ndarray
         What the source knows, of shape (n_time,) or (n_time, n_zone): points of the weather station; ``outdoor``,
         ``people`` in the building, ``heat``, ``airflow``, ``supply_flow``, ``supply_heat``, ``radiant_gains`` [units
-        of `INPUTS`].
+        of `INPUTS`]; ``commanded``, shape (n_time, n_commanded), [units of `thermal.case.commands.command_signals`].
     normalisation : Normalisation
         Constants that some inputs are counted by.
     source : str
@@ -234,6 +234,8 @@ class InputProvider:
     supply_heat = _input("supply_heat", "Heat of supply air above the zone's temperature, shape (n_time, n_zone) [W].")
     radiant_gains = _input("radiant_gains", "Part of the gains of the zones that radiates, shape (n_time, n_zone) [W].")
 
+    commanded = _input("commanded", "What unmetered heat is in proportion to, (n_time, n_commanded) [each its own].")
+
     @cached_property
     def wind(self) -> FloatArray:
         """Wind speed at the station, shape (n_time,) [m/s]."""
@@ -363,4 +365,6 @@ def telemetry_inputs(case: Case, normalisation: Normalisation | None = None) -> 
     series |= {"supply_flow": flow.to_numpy(), "supply_heat": supplied.to_numpy()}
     if people is not None:
         series["people"] = filled(people)
+    if case.building.commanded:
+        series["commanded"] = filled(case.command_signals())
     return InputProvider(case.building, case.stamps, case.step, series, normalisation or fit_normalisation(case))

@@ -157,7 +157,8 @@ def replay_inputs(case: Case, network: ThermalNetwork, provider: InputProvider |
     estimated = case.heat_is_estimated().to_numpy()
     limit = int(LONGEST_BRIDGE // step)
     bridged = [_bridge(f, limit) for f in frames]
-    complete = np.logical_and.reduce([f.notna().all(axis=1).to_numpy() for f in bridged])
+    told = _bridge(case.command_signals(), limit)
+    complete = np.logical_and.reduce([f.notna().all(axis=1).to_numpy() for f in (*bridged, told)])
     if not complete.any():
         raise ModelError(f"telemetry: no step has all its inputs; {_most_missing(bridged)}")
     filled = [f.interpolate(limit_direction="both").fillna(0.0).to_numpy(dtype=float) for f in bridged]

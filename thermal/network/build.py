@@ -12,6 +12,7 @@ from thermal._types import FloatArray, IntArray
 from thermal.case.building import Building, FloorPlans, ZoneTable
 from thermal.case.plan import facade_areas, zone_floor_areas
 from thermal.errors import ModelError
+from thermal.network.commands import add_commanded
 from thermal.network.films import add_films
 from thermal.network.floor import Floor, Zone
 from thermal.network.graph import GraphBuilder
@@ -159,8 +160,9 @@ def build_network(
 def _lumped(building: Building, dx: float | None, structure: Structure) -> Blueprint:
     """Lump a building into two nodes a zone."""
     drawn = replace(structure, lumped=False, sun=False, recurring=False, wind_films=False, natural_films=False)
-    detailed = build_network(building, dx, structure=drawn)
+    detailed = build_network(replace(building, commanded=()), dx, structure=drawn)
     graph, air = lump(detailed, building.geometry_quality, structure)
+    add_commanded(graph, building.commanded)
     ones = np.ones(air.size)
     return Blueprint(graph, air, np.arange(air.size), ones, ones)
 
@@ -208,6 +210,7 @@ def blueprint(
     baseline = _drawn(building, dx, reach, scopes, diffusers, mean_shuffle, structure)
     if structure.follows_weather:
         add_films(baseline.graph, structure)
+    add_commanded(baseline.graph, building.commanded)
     return baseline
 
 

@@ -79,10 +79,12 @@ def _lacking(case: Case) -> Iterator[Anomaly]:
     heat = case.zone_heat()
     metered = [str(zone) for zone in heat if heat[zone].notna().mean() >= LEAST_KNOWN]
     served = {device.zone for device in case.building.devices if _reports_heat(case, device.name)}
-    if not {*metered} & served:
+    told = bool(case.command_signals().abs().sum().sum() > 0.0)
+    if not {*metered} & served and not told:
         what = "no zone's heat is known: no device of a zone reports a power, or a flow with its temperature"
-        yield error("no heat", what, "give devices their heating_power_sensor, or flow and discharge temperature")
-    elif metered and not heat[metered].abs().sum().sum() > 0.0:
+        advice = "give devices their heating_power_sensor, flow and discharge temperature, valve or damper"
+        yield error("no heat", what, advice)
+    elif metered and not told and not heat[metered].abs().sum().sum() > 0.0:
         what, advice = "the metered heat is 0 all the time", "calibrate on a time with heating or cooling too"
         yield Anomaly("no heat", "warning", "certain", (), stamps[0], stamps[-1], what, advice)
 

@@ -75,7 +75,7 @@ def magnitudes(case: Case) -> Iterator[Anomaly]:
         yield Anomaly("unit", "error" if impossible else "warning", certainty, columns, *_ends(frame), what, advice)
     heat = case.zone_heat()
     yield from _heat(heat.drop(columns=[z for z in heat if z in blamed]), sizes)
-    if not blamed:
+    if not blamed and not case.building.commanded:
         yield from _loss(case, heat, sum(area for area, _ in sizes.values()))
     yield from _rates(case)
 
