@@ -6,26 +6,22 @@ from dataclasses import dataclass, field, replace
 from importlib.metadata import version
 from typing import Any
 
-import numpy as np
 import pandas as pd
 
 from calibration.diagnosis.decide.levels import p_value
 from calibration.diagnosis.decide.verdict import Verdict, gains_of, judge
 from calibration.diagnosis.decide.where import DriftCurve, Where, drift_of, where_it_lies
+from calibration.diagnosis.handed_on import judge_handed_on, other_structures
 from calibration.diagnosis.refit.comparison import Fit, ModelComparison
 from calibration.diagnosis.refit.how_far import Step, how_far
 from calibration.diagnosis.refit.refit import ACCEPTED, elsewhere, held_out
 from calibration.diagnosis.refit.search import Round, search
 from calibration.diagnosis.screen.missing import Missing, at_start, missing_heat
-from calibration.estimation.bands import Forecaster
+from calibration.estimation.disturbance import DisturbanceModel
 from calibration.evaluation.intervals import Interval
-from calibration.evaluation.n_step import Evaluation, EvaluationSettings, Progress
+from calibration.evaluation.n_step import Evaluation, Progress
 from calibration.evaluation.settings import ModelSettings
-from calibration.evaluation.simple_models import with_yardsticks
-from calibration.fit.estimate import tune
-from calibration.fit.fitted_case import FittedCase, is_large
-from calibration.fit.ladder import ADVANCE, climb_from
-from calibration.fit.left_out import Known, LeftOut
+from calibration.fit.ladder import ADVANCE
 from calibration.fit.result import CalibrationResult, Rung, SolverReport, effect_entries
 from calibration.results import Axes, Result, plain
 from thermal.case.case import Case
@@ -105,6 +101,10 @@ class Diagnosis(Result):
         Held-out errors of the model that is handed on, `final` or the better one, beside those of simple models.
     estimated : tuple of Estimated
         Where heat of the telemetry is estimated.
+    disturbance : DisturbanceModel or None
+        Unmeasured heat and sensor noise of the final model, where that is handed on.
+    band_factors : mapping of str to float
+        What the filter's deviation is multiplied by for bands of its predictions, by zone [-].
     """
 
     case: str
@@ -128,6 +128,8 @@ class Diagnosis(Result):
     rungs: tuple[Rung, ...] = ()
     better: CalibrationResult | None = None
     estimated: tuple[Estimated, ...] = ()
+    disturbance: DisturbanceModel | None = None
+    band_factors: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def final(self) -> Fit:
@@ -220,6 +222,7 @@ class Diagnosis(Result):
             "intervals": intervals, "objective": "multi_step", "horizon": self.horizon,
             "settings": replace(self.settings, effects=dict(final.effects)), "zones": final.built.network.zones,
             "case": self.case, "version": self.version, "seed": self.seed, **estimate_entry(self.estimated),
+            "disturbance": self.disturbance, "band_factors": self.band_factors,
         })  # fmt: skip
         return content
 
@@ -304,8 +307,9 @@ def diagnose(
     verdict = judge(rounds, untestable)
     # a drawing that is known to lack what nothing explains has no advance
     advance = 0.0 if verdict.name == "unexplained" else ADVANCE
-    rungs, kept, left = _climbed(models, rounds[-1].after, progress, advance)
+    rungs, kept, left = other_structures(models, rounds[-1].after, progress, advance)
     better = None if kept is None else replace(kept.result(began, progress), rungs=rungs)
+    prediction, disturbance, factors = judge_handed_on(models, rounds[-1].after, better, left)
     return Diagnosis(
         case=case.building.name,
         verdict=verdict,
@@ -325,36 +329,11 @@ def diagnose(
         last_third=first.mae if turns else None,
         rungs=rungs,
         better=better,
-        prediction=_prediction(models, rounds[-1].after, better, left),
+        prediction=prediction,
         estimated=case.estimated,
+        disturbance=disturbance,
+        band_factors=factors,
     )
-
-
-def _prediction(
-    models: ModelComparison, final: Fit, better: CalibrationResult | None, left: LeftOut | None
-) -> Evaluation:
-    """Held-out errors of the model that is handed on, with unmeasured heat carried on too, beside simple models."""
-    inputs, spin_up = final.built.inputs, models.settings.spin_up_seconds
-    found = final.evaluate(models.judged, models.horizon) if better is None else better.calibrated["held_out"]
-    if better is None and left is not None:
-        disturbance = tune(final.problem, final.model, final.theta)
-        settings = EvaluationSettings(models.horizon, scheme=models.settings.stepping, spin_up_seconds=spin_up)
-        forecaster = Forecaster(final.model, inputs, disturbance, settings)
-        factors = forecaster.factors(left.parts, left.thetas)
-        found = replace(found, carried=forecaster.judge(final.theta, models.judged, factors))
-    return with_yardsticks(found, models.case, inputs, models.anatomy, models.tuned, spin_up)
-
-
-def _climbed(
-    models: ModelComparison, final: Fit, progress: Progress | None, advance: float
-) -> tuple[tuple[Rung, ...], FittedCase | None, LeftOut | None]:
-    """Fit other structures beside the final model."""
-    if is_large(final.built.network.zones):
-        return (), None, None
-    name = "named" if final.effects else "drawn"
-    # the fit has found its deviation beside its parameters
-    problem = replace(final.problem, deviation=float(np.sqrt(final.found.mean_square)))
-    return climb_from(name, Known(problem, final.model, final.point), models, progress, advance)
 
 
 def baseline_gap(

@@ -214,6 +214,28 @@ def read_disturbance(path: str | Path, zones: Sequence[str]) -> tuple[Disturbanc
     return found, factors
 
 
+def read_tuning(path: str | Path) -> list[Interval]:
+    """Read what a ``calibration.json`` was tuned on, so that simple models see no more; nothing where it has none.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file, which `load_parameters` could read.
+
+    Raises
+    ------
+    CalibrationError
+        When its intervals are not as `calibrate` writes them.
+    """
+    content = json.loads(Path(path).read_text(encoding="utf-8"))
+    entries = (content.get("intervals") or {}).get("tuning") or []
+    try:
+        ends = [[pd.Timestamp(entry[key]).tz_convert("UTC") for key in ("start", "end")] for entry in entries]
+        return [Interval(*pair) for pair in ends]
+    except (TypeError, KeyError, ValueError, CalibrationError) as error:
+        raise CalibrationError(f"{path}: intervals.tuning", "what `calibrate` writes", f"{entries}") from error
+
+
 def evaluate_case(
     case: Case,
     intervals: Sequence[Interval] = (),
@@ -256,7 +278,8 @@ def evaluate_case(
     parts = merge(intervals) or [Interval(ready.inputs.stamps[0], ready.inputs.stamps[-1])]
     model, _ = ready.certified(parts[0], horizon_steps(horizon, ready.inputs.step))
     found = ready.evaluate(model, parts, EvaluationSettings(horizon, trajectories, HORIZONS), progress)
-    rest, spin_up = rest_of(ready.inputs.stamps, parts), ready.settings.spin_up_seconds
+    tuned = [] if parameters is None else read_tuning(parameters)
+    rest, spin_up = tuned or rest_of(ready.inputs.stamps, parts), ready.settings.spin_up_seconds
     return with_yardsticks(found, case, ready.inputs, ready.grid.network.anatomy, rest, spin_up)
 
 

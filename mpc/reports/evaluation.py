@@ -150,10 +150,7 @@ def structure_words(rungs: Sequence[Rung]) -> str:
 
 
 #: What makes a model useful that is not yet.
-_WOULD_HELP = (
-    "more days to tune on with heat that varies, irradiance where none is measured, and the lumped structure where the "
-    "geometry is a guess"
-)
+_WOULD_HELP = "more days to tune on with heat that varies, and irradiance where none is measured"
 
 
 def beside_sentence(mae: float, yardsticks: Yardsticks) -> str:

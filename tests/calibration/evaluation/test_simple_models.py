@@ -1,12 +1,16 @@
 """Yardsticks: what anyone fits in an hour, on the runs of an evaluation and without their targets."""
 
+import json
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import pandas as pd
 import pytest
 
-from calibration.evaluation.case_model import CaseModel, case_model
+from calibration import calibrate
+from calibration.errors import CalibrationError
+from calibration.evaluation.case_model import CaseModel, case_model, evaluate_case
 from calibration.evaluation.intervals import Interval, default_intervals
 from calibration.evaluation.n_step import Evaluation, EvaluationSettings
 from calibration.evaluation.simple_models import rest_of, with_yardsticks
@@ -81,3 +85,19 @@ def test_a_model_that_is_beaten_is_not_yet_useful() -> None:
     assert "not yet useful" in beside_sentence(0.45, yardsticks)
     assert "coupled 2R2C" in beside_sentence(0.45, yardsticks)
     assert "beats them all" in beside_sentence(0.3, yardsticks)
+
+
+def test_simple_models_see_what_the_calibration_was_tuned_on(case: Case, tmp_path: Path) -> None:
+    (tuned,), (judged,) = default_intervals(case)
+    short = Interval(tuned.start, tuned.start + pd.Timedelta(days=4))
+    result = calibrate(case, [short], [judged], settings={"starts": 1, "yardsticks": True})
+    path = tmp_path / "calibration.json"
+    path.write_text(json.dumps(result.to_dict()), encoding="utf-8")
+    again = evaluate_case(case, [judged], parameters=path).yardsticks
+    own = result.calibrated["held_out"].yardsticks
+    assert again is not None and own is not None
+    assert (again.persistence, again.arx, again.rc) == (own.persistence, own.arx, own.rc)
+    for entries in ([{"start": "2023-03-01"}], [{"start": "2023-03-01", "end": "2023-03-05"}], 3):
+        path.write_text(json.dumps({**result.to_dict(), "intervals": {"tuning": entries}}), encoding="utf-8")
+        with pytest.raises(CalibrationError, match=r"intervals\.tuning: expected what `calibrate` writes"):
+            evaluate_case(case, [judged], parameters=path)
