@@ -113,6 +113,7 @@ class EffectSignals:
         row = {name: values[k : k + 1] for name, values in self._ahead.series.items()}
         brought = heat[None]
         row |= {"supply_flow": flow[None], "supply_heat": brought, "heat": brought}
+        row["commanded"] = np.zeros((1, len(self._now.building.commanded)))  # all heat is the plant's own
         self._now.put(self._ahead.stamps[k : k + 1], row)
 
     def known(self, k: int) -> FloatArray:

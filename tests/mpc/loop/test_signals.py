@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from mpc.loop.signals import EffectSignals, scenario_inputs
 from mpc.loop.simulated import SimulatedPlant
 from mpc.scenario.scenario import Scenario
 from thermal import Building, build_network
+from thermal.case.building import Commanded
 from thermal.effects.catalogue import chosen
 from thermal.inputs.signals import signal_values
 from thermal.system.system import HvacSystem
@@ -76,3 +78,14 @@ def test_a_biased_sensor_is_not_in_the_record(
     plant = drive(make_plant(model=model), 120)
     said = plant.telemetry()[f"VAV_{zone}/zone_air_temperature_sensor"].iloc[-1]
     assert said - plant.record().zone_temperature[-1, 0] == pytest.approx(1.0, abs=0.05)
+
+
+def test_a_plant_gives_its_heat_itself_where_a_case_has_only_valves(
+    building: Building, system: HvacSystem, scenario: Callable[..., Scenario]
+) -> None:
+    valve = Commanded("RAD", building.zone_names[0], "valve", ("RAD/valve",))
+    told = replace(building, commanded=(valve,))
+    network = build_network(told, dx=1.0)
+    signals = EffectSignals(network, replace(scenario(), building=told), system)
+    assert [s.name for s in network.signals] == ["valve of RAD"]
+    assert signals.at(9, np.full(12, 0.2), np.full(12, 700.0)).tolist() == [0.0]
