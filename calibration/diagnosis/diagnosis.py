@@ -12,6 +12,7 @@ from calibration.diagnosis.decide.levels import p_value
 from calibration.diagnosis.decide.verdict import Verdict, gains_of, judge
 from calibration.diagnosis.decide.where import DriftCurve, Where, drift_of, where_it_lies
 from calibration.diagnosis.handed_on import judge_handed_on, other_structures
+from calibration.diagnosis.refit.challenge import challenge
 from calibration.diagnosis.refit.comparison import Fit, ModelComparison
 from calibration.diagnosis.refit.how_far import Step, how_far
 from calibration.diagnosis.refit.refit import ACCEPTED, elsewhere, held_out
@@ -300,7 +301,10 @@ def diagnose(
         baseline = models.fit({}, [{}], baseline.built)
         errors = held_out(models, baseline)
     where = where_it_lies(models, baseline)
-    rounds = search(models, baseline, errors, [e for e in CATALOGUE if e not in untestable], progress)
+    testable = [e for e in CATALOGUE if e not in untestable]
+    rounds = search(models, baseline, errors, testable, progress)
+    models, rounds = challenge(models, rounds, testable, progress)
+    errors = rounds[0].held_out
     steps, floor = how_far(models, rounds)
     areas = {name: room.floor_area for name, room in models.anatomy.rooms.items()}
     watts = rounds[0].screening.detectable(ACCEPTED)

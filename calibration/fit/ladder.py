@@ -23,7 +23,7 @@ from thermal.parameters import Scope
 ADVANCE = 0.1
 
 #: What a building as drawn has one value of for all zones, though rooms differ in it: slabs and furniture.
-_MASSES = ("slab_heat_capacity", "slab_coupling", "furniture_heat_capacity", "furniture_coupling")
+MASSES = ("slab_heat_capacity", "slab_coupling", "furniture_heat_capacity", "furniture_coupling")
 
 #: Share of the drawing's error on left-out days below which a lumped model's says that more than masses is wrong [-].
 _WRONG = 0.5
@@ -139,8 +139,8 @@ def climb_from(
             base, wind = follows, solve(follows, fitted)
             looked.append(look("wind", wind.best, wind))
             fitted = wind.best
-    scopes: dict[str, Scope] = {p.base: "zone" for p in parameters if p.base in _MASSES}
-    if scopes and plain and drawn and len(fitted.model.network.zones) > 1:
+    scopes: dict[str, Scope] = {p.base: "zone" for p in parameters if p.base in MASSES}
+    if scopes and plain and drawn and not base.scopes and len(fitted.model.network.zones) > 1:
         zoned = solve(replace(base, scopes={**base.scopes, **scopes}), fitted)
         looked.append(look("zoned", zoned.best, zoned))
     looked.append(beside)

@@ -67,13 +67,14 @@ class Built:
         Parameters
         ----------
         known : mapping of str to float
-            Values [parameter units].
+            Values [parameter units]; a common one is that of every zone.
         strength : float
             Share of the upper end of the range [-].
         """
         parameters = self.network.parameters
         at = [p.start + strength * (p.upper - p.start) * is_strength(p.name, p.effect) for p in parameters]
-        return np.array([known.get(p.name, start) for p, start in zip(parameters, at, strict=True)])
+        common = [start if p.effect else known.get(p.base, start) for p, start in zip(parameters, at, strict=True)]
+        return np.array([known.get(p.name, start) for p, start in zip(parameters, common, strict=True)])
 
 
 def is_strength(name: str, effect: str | None) -> bool:
