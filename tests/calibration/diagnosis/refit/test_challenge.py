@@ -1,0 +1,88 @@
+"""Masses by zone against meters that are wrong by zone: twins of either kind, and what a search is told."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from calibration.diagnosis.refit import challenge as module
+from calibration.diagnosis.refit.challenge import challenge
+from calibration.diagnosis.refit.comparison import Fit, ModelComparison
+from calibration.diagnosis.screen.gains import choice_of
+from calibration.evaluation.settings import ModelSettings
+from calibration.fit.ladder import MASSES
+from thermal.case.case import Case
+from thermal.case.telemetry import Telemetry
+from thermal.pilot.building import pilot_building
+from thermal.pilot.twin import TwinRanges, TwinSettings, generate_twin
+
+
+def office(by_zone: bool) -> Case:
+    """A twin under pseudo-random setpoints, with masses of each zone's own or without."""
+    building = pilot_building(4, floor_area=150.0, zones=5, floors=1, name="office")
+    quiet = TwinRanges(disturbance_deviation=(0.01, 0.02), noise=(0.005, 0.01))
+    settings = TwinSettings(
+        days=12.0, step_seconds=900.0, dx=1.0, meter="exact", ranges=quiet, excitation="prbs",
+        scopes=dict.fromkeys(MASSES, "zone") if by_zone else None,
+    )  # fmt: skip
+    return generate_twin(building, 4, settings)[0]
+
+
+def wrong_meters(case: Case) -> Case:
+    frame = case.telemetry.frame.copy()
+    for share, device in zip((0.65, 1.4), case.building.devices, strict=False):
+        frame[f"{device.name}/supply_air_flowrate_sensor"] *= share
+    return Case(case.building, Telemetry.from_frame(frame))
+
+
+def accepted(models: ModelComparison) -> list[Any]:
+    """Rounds that accepted a gain of every meter."""
+    before, zones = models.fit({}, [{}]), models.case.building.zone_names
+    after = models.fit({"flow_gain": zones}, [before.values])
+    gain = after.evidence - before.evidence - choice_of(len(zones), len(zones))
+    return [SimpleNamespace(before=before, after=after, accepted=SimpleNamespace(gain=gain))]
+
+
+@pytest.fixture
+def told(monkeypatch: pytest.MonkeyPatch) -> list[tuple[ModelComparison, Fit]]:
+    """What another search is told to start from; a search is not what is looked at here."""
+    found: list[tuple[ModelComparison, Fit]] = []
+
+    def search(models: ModelComparison, baseline: Fit, *_: Any) -> tuple[str, ...]:
+        found.append((models, baseline))
+        return ("another",)
+
+    monkeypatch.setattr(module, "search", search)
+    monkeypatch.setattr(module, "judge", lambda *_: SimpleNamespace(name="named"))
+    return found
+
+
+def test_masses_by_zone_take_the_name_from_meters(told: list[tuple[ModelComparison, Fit]]) -> None:
+    models = ModelComparison(office(by_zone=True), ModelSettings(dx=1.0))
+    rounds = accepted(models)
+    again, found = challenge(models, rounds, ["flow_gain"])
+    assert found == ("another",)
+    ((zoned, baseline),) = told
+    assert again is zoned and set(zoned.settings.scopes) == set(MASSES)
+    assert (zoned.tuned, zoned.judged) == (models.tuned, models.judged)
+    assert not baseline.effects and baseline.evidence > rounds[0].after.evidence - 12.0
+
+
+def test_meters_that_are_wrong_keep_it(told: list[tuple[ModelComparison, Fit]]) -> None:
+    models = ModelComparison(wrong_meters(office(by_zone=False)), ModelSettings(dx=1.0))
+    rounds = accepted(models)
+    assert rounds[0].after.evidence > rounds[0].before.evidence + 12.0
+    assert challenge(models, rounds, ["flow_gain"]) == (models, tuple(rounds))
+    assert told == []
+
+
+def test_where_nothing_is_missing_or_masses_are_what_is_nothing_is_challenged(
+    told: list[tuple[ModelComparison, Fit]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    models = ModelComparison(office(by_zone=True), ModelSettings(dx=1.0))
+    rounds = accepted(models)
+    named = SimpleNamespace(**vars(rounds[0]) | {"after": SimpleNamespace(effects={"hidden_mass": ()})})
+    assert challenge(models, [named], [])[1] == (named,)
+    monkeypatch.setattr(module, "judge", lambda *_: SimpleNamespace(name="no_gap"))
+    assert challenge(models, rounds, [])[1] == tuple(rounds)
+    assert told == []
