@@ -99,7 +99,7 @@ def make(specs: list[TrialSpec], out: Path, workers: int) -> list[str]:
 def _make(options: argparse.Namespace) -> int:
     kinds = {"all": KINDS, "without": ("pair",)}.get(options.kind, (options.kind,))
     specs = [
-        draw_spec(seed, kind, confirmation=options.confirmation, days=options.days)
+        draw_spec(seed, kind, confirmation=options.confirmation, days=options.days, uneven=options.uneven)
         for seed in options.seeds
         for kind in kinds
     ]
@@ -118,6 +118,7 @@ def main() -> int:
     command.add_argument("--kind", choices=kinds, required=True, help="which effects the trials hold")
     command.add_argument("--seeds", type=seed_range, required=True, help="first and last, such as 0-19")
     command.add_argument("--confirmation", action="store_true", help="the stream of seeds that nothing is tuned on")
+    command.add_argument("--uneven", action="store_true", help="films with the wind, furniture that differs by zone")
     command.add_argument("--days", type=int, default=DAYS, help="length of the telemetry")
     command.add_argument("--workers", type=int, default=min(2, os.cpu_count() or 1), help="runs at a time")
     command.set_defaults(run=_make)

@@ -29,7 +29,9 @@ _MOST_ZONES = 18
 _SEASONS = {"winter": (12, 71), "spring": (72, 150), "summer": (152, 240), "autumn": (244, 335)}  # days of the year
 
 
-def draw_spec(seed: int, kind: Kind, *, confirmation: bool = False, days: int = DAYS) -> TrialSpec:
+def draw_spec(
+    seed: int, kind: Kind, *, confirmation: bool = False, days: int = DAYS, uneven: bool = False
+) -> TrialSpec:
     """Draw a trial.
 
     Building, weather, use and noise are drawn from stream and seed alone, so that trials of one seed differ in their
@@ -45,6 +47,8 @@ def draw_spec(seed: int, kind: Kind, *, confirmation: bool = False, days: int = 
         Draw from the stream that nothing is tuned on.
     days : int
         Length of the telemetry.
+    uneven : bool
+        Films and furniture as in other makers' offices, see `Fabric`.
 
     Raises
     ------
@@ -61,7 +65,7 @@ def draw_spec(seed: int, kind: Kind, *, confirmation: bool = False, days: int = 
         kind="null",
         days=days,
         layout=layout,
-        fabric=_fabric(stream_generator(stream, seed, _FABRIC)),
+        fabric=replace(_fabric(stream_generator(stream, seed, _FABRIC)), uneven=uneven),
         climate=_climate(stream_generator(stream, seed, _CLIMATE), days),
         use=_use(stream_generator(stream, seed, _USE)),
         effects=(),

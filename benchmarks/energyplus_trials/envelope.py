@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from energyplus_trials import fabric, model, plan, profiles
+from energyplus_trials.errors import TrialError
 from energyplus_trials.plant import Plant
 from energyplus_trials.specification import Effect
 
@@ -76,6 +77,8 @@ def longwave_sky(plant: Plant, effect: Effect) -> None:
 
 def wind_film(plant: Plant, effect: Effect) -> None:
     """Let the film outside follow the wind about the null's value."""
+    if plant.spec.fabric.uneven:
+        raise TrialError("wind_film: films of uneven offices follow the wind already")
     wind = plant.station["wind_speed_sensor"].to_numpy()
     film = plant.spec.fabric.exterior_film + effect.parameters["slope_W_s_m3_K"] * (wind - wind.mean())
     schedule = plant.add_schedule("film", np.maximum(film, 4.0))

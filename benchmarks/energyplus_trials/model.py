@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from energyplus_trials import fabric, plan, terminals
 from energyplus_trials.frame import Objects, frame
-from energyplus_trials.specification import TrialSpec
+from energyplus_trials.specification import TrialSpec, stream_generator
+
+#: Spread of the furniture of zones in uneven offices, and the purpose of its random numbers.
+_UNEVEN, _FURNITURE = 0.5, 90
 
 ZONE_OUTPUTS = {
     "temperature": ("Zone Mean Air Temperature", "{zone}"),
@@ -140,12 +144,32 @@ _FILES = tuple(
 
 
 def _climate(spec: TrialSpec) -> Objects:
-    return {
+    if spec.fabric.uneven:
+        films: Objects = {
+            "SurfaceConvectionAlgorithm:Inside": {"inside": {"algorithm": "TARP"}},
+            "SurfaceConvectionAlgorithm:Outside": {"outside": {"algorithm": "DOE-2"}},
+        }
+    else:
+        films = _constant_films(spec)
+    return films | {
         # Neither air temperature nor wind changes with height: walls see what the station measures.
         "Site:HeightVariation": {
             "height": {"wind_speed_profile_exponent": 0.0, "air_temperature_gradient_coefficient": 0.0}
         },
         "Site:WeatherStation": {"station": {"wind_speed_profile_exponent": 0.0}},
+        "ShadowCalculation": {
+            "sun": {
+                "shading_calculation_method": "PolygonClipping",
+                "shading_calculation_update_frequency_method": "Periodic",
+                "shading_calculation_update_frequency": 4,
+                "sky_diffuse_modeling_algorithm": "SimpleSkyDiffuseModeling",
+            }
+        },
+    }
+
+
+def _constant_films(spec: TrialSpec) -> Objects:
+    return {
         "SurfaceConvectionAlgorithm:Inside": {"inside": {"algorithm": spec.fabric.interior_convection}},
         "SurfaceConvectionAlgorithm:Outside": {"outside": {"algorithm": "SimpleCombined"}},
         "SurfaceProperty:ConvectionCoefficients:MultipleSurface": {
@@ -156,14 +180,6 @@ def _climate(spec: TrialSpec) -> Objects:
                 "convection_coefficient_1": spec.fabric.exterior_film,
             }
             for kind in ("AllExteriorWalls", "AllExteriorWindows", "AllExteriorRoofs")
-        },
-        "ShadowCalculation": {
-            "sun": {
-                "shading_calculation_method": "PolygonClipping",
-                "shading_calculation_update_frequency_method": "Periodic",
-                "shading_calculation_update_frequency": 4,
-                "sky_diffuse_modeling_algorithm": "SimpleSkyDiffuseModeling",
-            }
         },
     }
 
@@ -184,7 +200,9 @@ def _surfaces(spec: TrialSpec) -> Objects:
     layout, found = spec.layout, {"Zone": {}, "BuildingSurface:Detailed": {}, "Window": {}, "InternalMass": {}}
     sides = {(s.zone, s.other): s.side for s in plan.segments(layout.zones) if s.other}
     lengths = plan.panes(layout)
-    for zone in spec.zone_names:
+    spread = _UNEVEN * stream_generator(spec.stream, spec.seed, _FURNITURE).standard_normal(len(spec.zone_names))
+    shares = np.exp(spread) if spec.fabric.uneven else np.ones(len(spec.zone_names))
+    for zone, share in zip(spec.zone_names, shares.tolist(), strict=True):
         floor, name = split(zone)
         found["Zone"][zone] = {
             "volume": round(area(spec, zone) * layout.height, 6), "floor_area": round(area(spec, zone), 6),
@@ -192,7 +210,7 @@ def _surfaces(spec: TrialSpec) -> Objects:
         found["InternalMass"][f"{zone} furniture"] = {
             "construction_name": "furniture",
             "zone_or_zonelist_name": zone,
-            "surface_area": round(spec.fabric.furniture_area * area(spec, zone), 4),
+            "surface_area": round(spec.fabric.furniture_area * share * area(spec, zone), 4),
         }
         found["BuildingSurface:Detailed"] |= _slabs(spec, zone)
         for s in plan.segments(layout.zones):

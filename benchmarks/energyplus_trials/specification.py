@@ -88,6 +88,9 @@ class Fabric:
         Convection outside [W/m2/K].
     interior_convection : str
         EnergyPlus's algorithm: `TARP` depends on the temperature difference, `Simple` on the direction of heat only.
+    uneven : bool
+        Whether films are as in other makers' offices and real ones, outside by DOE-2 with the wind and inside by TARP,
+        and furniture differs from zone to zone by a factor of e^0.5.
     """
 
     wall: str
@@ -100,6 +103,7 @@ class Fabric:
     window_u_value: float
     exterior_film: float
     interior_convection: str
+    uneven: bool = False
 
 
 @dataclass(frozen=True)
@@ -231,6 +235,8 @@ class TrialSpec:
     def name(self) -> str:
         """Name of the case folder, which says nothing about the effects."""
         text = f"{self.stream}:{self.seed}:{self.kind}:{self.days}"
+        if self.fabric.uneven:
+            text += ":uneven"
         if self.kind == "without":  # a trial of several effects has as many of them
             text += f":{','.join(e.name for e in self.effects)}"
         return "trial_" + hashlib.sha256(text.encode()).hexdigest()[:10]

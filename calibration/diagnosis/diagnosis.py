@@ -9,7 +9,7 @@ from typing import Any
 import pandas as pd
 
 from calibration.diagnosis.decide.levels import p_value
-from calibration.diagnosis.decide.verdict import Verdict, gains_of, judge
+from calibration.diagnosis.decide.verdict import Verdict, doubted, gains_of, judge
 from calibration.diagnosis.decide.where import DriftCurve, Where, drift_of, where_it_lies
 from calibration.diagnosis.handed_on import judge_handed_on, other_structures
 from calibration.diagnosis.refit.challenge import challenge
@@ -18,6 +18,7 @@ from calibration.diagnosis.refit.how_far import Step, how_far
 from calibration.diagnosis.refit.refit import ACCEPTED, elsewhere, held_out
 from calibration.diagnosis.refit.search import Round, search
 from calibration.diagnosis.screen.missing import Missing, at_start, missing_heat
+from calibration.errors import CalibrationError
 from calibration.estimation.disturbance import DisturbanceModel
 from calibration.evaluation.intervals import Interval
 from calibration.evaluation.n_step import Evaluation, Progress
@@ -28,7 +29,8 @@ from calibration.results import Axes, Result, plain
 from thermal.case.case import Case
 from thermal.case.estimated import Estimated, estimate_entry
 from thermal.case.plausibility.examine import check_calibratable
-from thermal.effects.catalogue import CATALOGUE
+from thermal.effects.catalogue import CATALOGUE, like
+from thermal.errors import EffectError
 
 #: Subsystem that an effect belongs to.
 SUBSYSTEMS = {
@@ -255,6 +257,8 @@ def diagnose(
     *,
     dx: float | None = None,
     horizon: str = "6h",
+    known: Sequence[str] = (),
+    ruled_out: Sequence[str] = (),
     progress: Progress | None = None,
 ) -> Diagnosis:
     """Say where model and building disagree, which unmodelled effect causes it, and how far the gap shrinks with it.
@@ -274,6 +278,10 @@ def diagnose(
         Distance between control volumes of a plan [m]; the plan's cell size by default.
     horizon : str
         Prediction horizon, such as ``6h``.
+    known : sequence of str
+        Effects that are known to be there, in the whole building: part of the baseline, with strengths that are fitted.
+    ruled_out : sequence of str
+        Effects that are known not to be there.
     progress : callable, optional
         Called with stage, done, total.
 
@@ -281,8 +289,10 @@ def diagnose(
     ------
     CaseError
         When the case holds what cannot be true, as `buildingmpc check` says.
+    EffectError
+        When an effect is not in the catalogue, or the case cannot have one that is said to be known.
     CalibrationError
-        When an interval has no usable run.
+        When an interval has no usable run, or an effect is both known and ruled out.
 
     Examples
     --------
@@ -293,22 +303,28 @@ def diagnose(
     began = time.perf_counter()
     check_calibratable(case)
     models = ModelComparison(case, ModelSettings(dx=dx), tune, hold_out, horizon)
-    untestable = models.untestable()
-    baseline = models.fit({}, [{}])
+    given, untestable = _given(known, ruled_out), models.untestable()
+    for name in known:
+        EffectError.unless(
+            name not in untestable, f"known effect {name}", "one that the case can have", untestable.get(name)
+        )
+    untestable |= given
+    effects: dict[str, tuple[str, ...]] = {name: () for name in known}
+    baseline = models.fit(effects, [{}])
     first = errors = held_out(models, baseline)
     turns = elsewhere(baseline, first) and models.alternate(baseline.built.inputs)
     if turns:
-        baseline = models.fit({}, [{}], baseline.built)
+        baseline = models.fit(effects, [{}], baseline.built)
         errors = held_out(models, baseline)
-    where = where_it_lies(models, baseline)
     testable = [e for e in CATALOGUE if e not in untestable]
     rounds = search(models, baseline, errors, testable, progress)
     models, rounds = challenge(models, rounds, testable, progress)
-    errors = rounds[0].held_out
+    errors, where = rounds[0].held_out, where_it_lies(models, rounds[0].before)
     steps, floor = how_far(models, rounds)
     areas = {name: room.floor_area for name, room in models.anatomy.rooms.items()}
     watts = rounds[0].screening.detectable(ACCEPTED)
-    verdict = judge(rounds, untestable)
+    void = {s.effects[-1] for s in steps if s.shuffled is not None and s.shuffled <= s.after}
+    verdict = doubted(judge(rounds, untestable), void)
     # a drawing that is known to lack what nothing explains has no advance
     advance = 0.0 if verdict.name == "unexplained" else ADVANCE
     rungs, kept, left = other_structures(models, rounds[-1].after, progress, advance)
@@ -338,6 +354,18 @@ def diagnose(
         disturbance=disturbance,
         band_factors=factors,
     )
+
+
+def _given(known: Sequence[str], ruled_out: Sequence[str]) -> dict[str, str]:
+    """Say of the effects that somebody knows of why they are not sought."""
+    reasons = {}
+    for names, reason in ((known, "known to be there: part of the baseline"), (ruled_out, "ruled out beforehand")):
+        for name in names:
+            if name not in CATALOGUE:
+                raise EffectError(f"effect {name!r}", "one of the catalogue", "another name", like(name))
+            CalibrationError.unless(name not in reasons, f"effect {name}", "known or ruled out", "both")
+            reasons[name] = reason
+    return reasons
 
 
 def baseline_gap(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -71,7 +71,7 @@ def calibrate(
     settings = {
         "tune": tune or [], "hold_out": hold_out or [], "dx": dx, "horizon": horizon,
         "scheme": scheme or "implicit_euler", "objective": objective, "loss": loss, "starts": starts, "seed": seed,
-        "effects": [name.strip() for name in effects.split(",") if name.strip()],
+        "effects": _ids(effects),
         "climb": structure == "chosen", "yardsticks": True,
         "structure": {"lumped": True, "sun": True} if structure == "lumped" else {},
     }  # fmt: skip
@@ -102,6 +102,11 @@ def calibrate(
         result, report = run_calibration(case, out, force, progress, settings)
     answer(json, calibration_content(result), lambda: _show(result), report)
     return _exit_code(result)
+
+
+def _ids(text: str) -> list[str]:
+    """Read ids between commas."""
+    return [name.strip() for name in text.split(",") if name.strip()]
 
 
 def run_calibration(
@@ -221,6 +226,8 @@ def diagnose(
     ] = None,
     hold_out: Annotated[options.Intervals, options.interval("Held-out", "the last third, or every third day")] = None,
     dx: options.Dx = None,
+    effects: Annotated[str, options.value("Effects that are known to be there: part of the baseline.", "ID,...")] = "",
+    rule_out: Annotated[str, options.value("Effects that are known not to be there.", "ID,...")] = "",
     horizon: options.Horizon = "6h",
     force: options.Force = False,
     json: options.Json = False,
@@ -232,7 +239,9 @@ def diagnose(
     from mpc.reports.diagnosis import diagnosis_summary
 
     with Waiting(f"diagnose {case.name}") as progress:
-        result, report = run_diagnosis(case, out, force, progress, (tune or (), hold_out or ()), dx, horizon)
+        known, ruled_out = _ids(effects), _ids(rule_out)
+        settings = {"dx": dx, "horizon": horizon, "known": known, "ruled_out": ruled_out}
+        result, report = run_diagnosis(case, out, force, progress, (tune or (), hold_out or ()), settings)
     return answer(json, diagnosis_summary(result), lambda: _show_diagnosis(result), report)
 
 
@@ -242,8 +251,7 @@ def run_diagnosis(
     force: bool,
     progress: Progress,
     intervals: Sequence[Sequence[str]] = ((), ()),
-    dx: float | None = None,
-    horizon: str = "6h",
+    settings: Mapping[str, Any] | None = None,
 ) -> tuple[Diagnosis, Path]:
     """Diagnose a case and write what was found.
 
@@ -257,17 +265,15 @@ def run_diagnosis(
         Called with stage, done, total.
     intervals : sequence of sequence of str
         To tune and to hold out.
-    dx : float, optional
-        Distance between control volumes of a plan [m].
-    horizon : str
-        Prediction horizon.
+    settings : mapping of str to Any, optional
+        Further arguments of `diagnose`.
     """
     from calibration.diagnosis import diagnosis
     from mpc.reports.diagnosis import write_diagnosis
 
     loaded = options.open_case(case, out, force)
     tuned, judged = (options.parse_intervals(texts, loaded) for texts in intervals)
-    result = diagnosis.diagnose(loaded, tuned, judged, dx=dx, horizon=horizon, progress=progress)
+    result = diagnosis.diagnose(loaded, tuned, judged, progress=progress, **(settings or {}))
     return result, write_diagnosis(result, loaded, out, force=force)
 
 

@@ -38,6 +38,13 @@ def diagnosis_verdict(result: Diagnosis) -> str:
         From `diagnose`.
     """
     text = _verdict(result)
+    if known := list(result.rounds[0].before.effects):
+        text += f" {listed([called(e) for e in known]).capitalize()}, known to be there, is part of the baseline."
+    if result.settings.scopes:
+        text += (
+            " Slabs and furniture have values of each zone's own here: they explain what looked like another effect "
+            "while all zones shared one."
+        )
     if result.better is not None:
         own, beside = next(r.left_out_mae for r in result.rungs if r.chosen), result.rungs[0].left_out_mae
         text += (

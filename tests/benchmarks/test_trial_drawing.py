@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from collections.abc import Callable
 from types import ModuleType
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from thermal.case.building import FloorPlan, FloorPlans
@@ -23,6 +25,11 @@ def drawing(package: Callable[[str], ModuleType]) -> ModuleType:
 @pytest.fixture(scope="module")
 def plan(package: Callable[[str], ModuleType]) -> ModuleType:
     return package("energyplus_trials.plan")
+
+
+@pytest.fixture(scope="module")
+def model(package: Callable[[str], ModuleType]) -> ModuleType:
+    return package("energyplus_trials.model")
 
 
 @pytest.fixture(scope="module")
@@ -143,3 +150,18 @@ def test_twins_of_a_pair_lack_one_effect_each(drawing):
         for effect, twin in zip(spec.effects, twins, strict=True):
             assert [e for e in spec.effects if e is not effect] == list(twin.effects)
             assert twin.twin() == spec.twin()
+
+
+def test_uneven_offices_are_the_same_but_for_films_and_furniture(drawing: ModuleType, model: ModuleType) -> None:
+    even, uneven = (drawing.draw_spec(7, "null", uneven=k) for k in (False, True))
+    assert even.name != uneven.name
+    assert dataclasses.replace(uneven, fabric=dataclasses.replace(uneven.fabric, uneven=False)) == even
+    plain, other = (model.null_model(s, pd.Timestamp("2017-01-02"), pd.Timestamp("2017-01-03")) for s in (even, uneven))
+    assert "SurfaceProperty:ConvectionCoefficients:MultipleSurface" not in other
+    assert other["SurfaceConvectionAlgorithm:Outside"]["outside"]["algorithm"] == "DOE-2"
+    areas = [[m["surface_area"] for m in o["InternalMass"].values()] for o in (plain, other)]
+    shares = np.array(areas[1]) / np.array(areas[0])
+    assert len(shares) == len(even.zone_names) and 0.1 < np.std(np.log(shares)) < 1.0
+    changed = {kind for kind in plain if plain[kind] != other.get(kind)} | (set(other) - set(plain))
+    assert changed <= {"InternalMass", "SurfaceConvectionAlgorithm:Inside", "SurfaceConvectionAlgorithm:Outside",
+                       "SurfaceProperty:ConvectionCoefficients:MultipleSurface"}  # fmt: skip

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ from typer.testing import CliRunner
 
 from mpc.cli.app import app
 from thermal.data import bundled_case_path
+from thermal.effects.catalogue import CATALOGUE
 
 CASE = str(bundled_case_path())
 
@@ -72,3 +74,46 @@ def test_calibrate_takes_effects(tmp_path: Path) -> None:
     content = json.loads((out / "calibration.json").read_text(encoding="utf-8"))
     assert [e["effect"] for e in content["effects"]] == ["solar_gain"]
     assert "solar_heat_gain_coefficient" in content["parameters"]
+
+
+def test_effects_lists_the_catalogue_and_what_a_case_can_tell() -> None:
+    plain, of_case = (json.loads(run("effects", *case, "--json").stdout)["effects"] for case in ((), (CASE,)))
+    assert list(plain) == list(of_case) == list(CATALOGUE)
+    assert plain["solar_gain"]["parameters"]["solar_heat_gain_coefficient"] == {"unit": "1", "range": [0.0, 0.8]}
+    assert "untestable" not in plain["solar_gain"]
+    assert of_case["solar_gain"]["untestable"] is None
+    assert of_case["interfloor_exchange"]["untestable"] == "no zone lies above another"
+    shown = run("effects", CASE).stdout
+    assert "sun through the windows" in shown and "no zone lies above another" in shown
+
+
+def test_what_is_known_or_ruled_out_is_not_sought(tmp_path: Path) -> None:
+    out = tmp_path / "gap"
+    answer = run("diagnose", CASE, "--out", out, "--dx", "2.0", "--effects", "solar_gain", "--rule-out",
+                 "sensor_bias,clock_shift", "--json")  # fmt: skip
+    assert answer.exit_code == 0, answer.stderr
+    found = json.loads(answer.stdout)
+    by_id = {entry["effect"]: entry for entry in found["which"]}
+    assert by_id["solar_gain"]["reason"] == "known to be there: part of the baseline"
+    assert by_id["clock_shift"]["reason"] == by_id["sensor_bias"]["reason"] == "ruled out beforehand"
+    assert [by_id[name]["probability"] for name in ("solar_gain", "sensor_bias", "clock_shift")] == [0.0] * 3
+    calibration = json.loads((out / "calibration.json").read_text(encoding="utf-8"))
+    assert "solar_gain" in calibration["settings"]["effects"]
+    assert set(calibration["band_factors"]) and calibration["disturbance"]["time_constant"] > 0.0
+    assert "known to be there, is part of the baseline" in (out / "report.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("--effects", "sun"), r"it may be solar_gain \(sun through the windows\)"),
+        (("--rule-out", "sensor_bais"), "the nearest valid one is 'sensor_bias'"),
+        (("--effects", "interfloor_exchange"), "expected one that the case can have, found no zone lies above another"),
+        (("--effects", "solar_gain", "--rule-out", "solar_gain"), "expected known or ruled out, found both"),
+    ],
+)
+def test_effects_that_cannot_be_known_are_named(arguments: tuple[str, ...], message: str, tmp_path: Path) -> None:
+    answer = run("diagnose", CASE, "--out", tmp_path / "gap", "--dx", "2.0", *arguments)
+    assert answer.exit_code == 2
+    assert re.search(message, " ".join(answer.stderr.split()))
+    assert not (tmp_path / "gap").exists()

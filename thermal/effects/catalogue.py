@@ -46,6 +46,31 @@ def register_effect(effect: Effect) -> None:
     CATALOGUE[effect.id] = effect
 
 
+def like(word: str) -> str:
+    """Name the effects that a word that is none may have meant: by what they are, else by how they are spelled.
+
+    Parameters
+    ----------
+    word : str
+        What was given.
+
+    Examples
+    --------
+    >>> like("meter"), like("solar")
+    ('it may be flow_gain (a heat meter that reads wrong)', "the nearest valid one is 'solar_gain'")
+    """
+    asked = word.replace("_", " ").casefold().split()
+    parts = {e.id: f"{e.id.replace('_', ' ')} {e.title}".casefold().split() for e in CATALOGUE.values()}
+    meant = [
+        e for e, own in parts.items() if any(w == o or (len(w) > 3 and o.startswith(w)) for w in asked for o in own)
+    ]
+    spelled = nearest(word, CATALOGUE)
+    if not meant or "nearest" in spelled:
+        return spelled
+    *most, last = (f"{e} ({CATALOGUE[e].title})" for e in meant)
+    return f"it may be {', '.join(most)} or {last}" if most else f"it may be {last}"
+
+
 def chosen(effects: Iterable[str] | Mapping[str, Sequence[str]]) -> tuple[Chosen, ...]:
     """Effects to extend a network by, in the order of the catalogue.
 
@@ -69,7 +94,7 @@ def chosen(effects: Iterable[str] | Mapping[str, Sequence[str]]) -> tuple[Chosen
         EffectError.unless(not isinstance(where, str), f"effect {name}", "a sequence of zones", repr(where))
     for name in zones:
         if name not in CATALOGUE:
-            raise EffectError(f"effect {name!r}: not in the catalogue; {nearest(name, CATALOGUE)}")
+            raise EffectError(f"effect {name!r}: not in the catalogue; {like(name)}")
         lacking = [r for r in CATALOGUE[name].requires if r not in zones]
         if lacking:
             raise EffectError(f"effect {name}: modifies {', '.join(lacking)}; add that too")

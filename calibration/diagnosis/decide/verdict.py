@@ -1,7 +1,7 @@
 """Which effect: evidence of each, probabilities, groups that cannot be told apart, and the verdict."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -138,12 +138,33 @@ def judge(rounds: Sequence[Round], untestable: Mapping[str, str]) -> Verdict:
     if name == "unexplained" and chain[1:]:  # what explains a part only is there with no more than that probability
         share = float(np.clip(_explained(rounds, _left_over(rounds[-1].after)), 0.0, 1.0))
         probability = {e: share * p for e, p in probability.items()}
+    first = [r.accepted.screened.effect for r in rounds if r.accepted is not None and name in ("named", "group")]
     candidates = sorted(
         (_candidate(e, probability[e], score[e], best.get(e), rounds, untestable.get(e, "")) for e in CATALOGUE),
-        key=lambda s: (-s.probability, -last.get(s.effect, -np.inf), -s.score),
-    )
+        key=lambda s: (
+            first.index(s.effect) if s.effect in first else len(first),  # what is named, as it was found
+            -s.probability, -last.get(s.effect, -np.inf), -s.score,
+        ),
+    )  # fmt: skip
     set90 = _inside(rounds, candidates) if name in ("named", "group") else ()
     return Verdict(name, tuple(candidates), set90, dict(chain))
+
+
+def doubted(verdict: Verdict, effects: Collection[str]) -> Verdict:
+    """Cap the probability of effects whose signals explain as much on other days.
+
+    Parameters
+    ----------
+    verdict : Verdict
+        From `judge`.
+    effects : collection of str
+        Whose permutation test is void.
+    """
+    capped = (
+        replace(c, probability=min(c.probability, levels.VOID)) if c.effect in effects else c
+        for c in verdict.candidates
+    )
+    return replace(verdict, candidates=tuple(capped))
 
 
 def _inside(rounds: Sequence[Round], candidates: Sequence[Candidate]) -> tuple[str, ...]:

@@ -59,15 +59,16 @@ def challenge(
         return models, tuple(rounds)
     settings = replace(models.settings, scopes={**models.settings.scopes, **scopes})
     zoned = ModelComparison(models.case, settings, models.tuned, models.judged, models.horizon)
-    kept = {e: z for e, z in final.effects.items() if e not in _LIKE_MASSES}
-    kept = {} if len(kept) == len(final.effects) else kept
+    known = dict(rounds[0].before.effects)
+    kept = {e: z for e, z in final.effects.items() if e not in _LIKE_MASSES or e in known}
+    kept = known if len(kept) == len(final.effects) else kept
     # a name has to beat what needs none as clearly as it beat nothing; what needs none has to beat nothing so too
-    margin = ACCEPTED + _price(rounds) if final.effects else -ACCEPTED
+    margin = ACCEPTED + _price(rounds) if final.effects.keys() - known else -ACCEPTED
     try:
         other = zoned.fit(kept, [_values(final, kept)])
         if other.evidence < final.evidence - margin:
             return models, tuple(rounds)
-        baseline = other if not kept else zoned.fit({}, [_values(final, {})])
+        baseline = other if kept == known else zoned.fit(known, [_values(final, known)])
     except (ArithmeticError, np.linalg.LinAlgError, CalibrationError, ModelError):
         return models, tuple(rounds)
     return zoned, search(zoned, baseline, held_out(zoned, baseline), candidates, progress)
