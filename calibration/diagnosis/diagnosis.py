@@ -12,13 +12,13 @@ from calibration.diagnosis.decide.levels import p_value
 from calibration.diagnosis.decide.verdict import Verdict, doubted, gains_of, judge
 from calibration.diagnosis.decide.where import DriftCurve, Where, drift_of, where_it_lies
 from calibration.diagnosis.handed_on import judge_handed_on, other_structures
+from calibration.diagnosis.known import reasons_of
 from calibration.diagnosis.refit.challenge import challenge
 from calibration.diagnosis.refit.comparison import Fit, ModelComparison
 from calibration.diagnosis.refit.how_far import Step, how_far
 from calibration.diagnosis.refit.refit import ACCEPTED, elsewhere, held_out
 from calibration.diagnosis.refit.search import Round, search
 from calibration.diagnosis.screen.missing import Missing, at_start, missing_heat
-from calibration.errors import CalibrationError
 from calibration.estimation.disturbance import DisturbanceModel
 from calibration.evaluation.intervals import Interval
 from calibration.evaluation.n_step import Evaluation, Progress
@@ -29,8 +29,7 @@ from calibration.results import Axes, Result, plain
 from thermal.case.case import Case
 from thermal.case.estimated import Estimated, estimate_entry
 from thermal.case.plausibility.examine import check_calibratable
-from thermal.effects.catalogue import CATALOGUE, like
-from thermal.errors import EffectError
+from thermal.effects.catalogue import CATALOGUE
 
 #: Subsystem that an effect belongs to.
 SUBSYSTEMS = {
@@ -303,12 +302,8 @@ def diagnose(
     began = time.perf_counter()
     check_calibratable(case)
     models = ModelComparison(case, ModelSettings(dx=dx), tune, hold_out, horizon)
-    given, untestable = _given(known, ruled_out), models.untestable()
-    for name in known:
-        EffectError.unless(
-            name not in untestable, f"known effect {name}", "one that the case can have", untestable.get(name)
-        )
-    untestable |= given
+    untestable = models.untestable()
+    untestable |= reasons_of(known, ruled_out, untestable)
     effects: dict[str, tuple[str, ...]] = {name: () for name in known}
     baseline = models.fit(effects, [{}])
     first = errors = held_out(models, baseline)
@@ -354,18 +349,6 @@ def diagnose(
         disturbance=disturbance,
         band_factors=factors,
     )
-
-
-def _given(known: Sequence[str], ruled_out: Sequence[str]) -> dict[str, str]:
-    """Say of the effects that somebody knows of why they are not sought."""
-    reasons = {}
-    for names, reason in ((known, "known to be there: part of the baseline"), (ruled_out, "ruled out beforehand")):
-        for name in names:
-            if name not in CATALOGUE:
-                raise EffectError(f"effect {name!r}", "one of the catalogue", "another name", like(name))
-            CalibrationError.unless(name not in reasons, f"effect {name}", "known or ruled out", "both")
-            reasons[name] = reason
-    return reasons
 
 
 def baseline_gap(

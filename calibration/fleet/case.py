@@ -7,58 +7,37 @@ import json
 import os
 import socket
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields, replace
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar
 
 from calibration.errors import CalibrationError, ResultsExistError, WorkerLostError
-from calibration.evaluation.intervals import Interval, parse_interval
-from calibration.evaluation.settings import INTERVALS, CalibrationSettings, ModelSettings, calibration_settings
-from calibration.fit.calibrate import calibrate
-from calibration.fit.least_squares import INTERRUPTED
-from calibration.fit.result import CalibrationResult
-from calibration.results import Content, Plain, to_json, write_results
-from thermal.case.case import Case
+from calibration.fleet.job import Job, Status
+from calibration.fleet.settings import Settings
+from calibration.results import Plain, write_results
 from thermal.case.load import NAME, load_case, read_building_file
 from thermal.errors import CaseError, ThermalError
 
 #: File in the results of each case: what they were made from, and how it went.
 RECORD = "case.json"
 
-Status = Literal["calibrated", "not_converged", "failed", "lost", "interrupted"]
-
-#: Makes the files of a case's results, by name; importable by name, for it travels to the workers.
-Files = Callable[[CalibrationResult, Case], Mapping[str, Content]]
-
-
-def data_files(result: CalibrationResult, case: Case) -> dict[str, Content]:
-    """Files of a case's results with their data alone, ``calibration.json`` and ``evaluation.json``.
-
-    Parameters
-    ----------
-    result : CalibrationResult
-        From `calibrate`.
-    case : Case
-        The case it was calibrated on.
-    """
-    return {"calibration.json": result.to_dict(), "evaluation.json": result.calibrated["held_out"].to_dict()}
-
 
 @dataclass(frozen=True)
 class CaseOutcome(Plain):
-    """How one of many calibrations went.
+    """How one of many calibrations or diagnoses went.
 
     Parameters
     ----------
     case : str
         Name of the case folder, and of the folder of its results.
-    status : {"calibrated", "not_converged", "failed", "lost", "interrupted"}
-        The first two have results. A case is lost when its worker died more often than it may, and interrupted when the
-        run ended before it.
+    status : {"calibrated", "diagnosed", "not_converged", "failed", "lost", "interrupted"}
+        The first three have results. A case is lost when its worker died more often than it may, and interrupted when
+        the run ended before it.
     held_out_mae_before, held_out_mae_after : float, optional
-        Held-out error before and after calibration [K].
+        Held-out error before and after calibration [K]; of a diagnosis, of the calibrated baseline and of the model
+        that it hands on.
     seconds : float
         Wall time of loading, calibrating and writing [s]; of the run that did it, for a case that was done before.
     resumed : bool
@@ -66,7 +45,11 @@ class CaseOutcome(Plain):
     attempts : int
         How many workers began it.
     solver : mapping of str to Any, optional
-        Entry ``solver`` of its ``calibration.json``; None without results.
+        Entry ``solver`` of its ``calibration.json``; None without results, and of a diagnosis.
+    verdict : str, optional
+        Of a diagnosis.
+    effects : tuple of str
+        That it found, in order.
     error, message : str, optional
         Name and text of what went wrong.
     bad_input : bool
@@ -81,6 +64,8 @@ class CaseOutcome(Plain):
     resumed: bool = False
     attempts: int = 0
     solver: Mapping[str, Any] | None = None
+    verdict: str | None = None
+    effects: tuple[str, ...] = ()
     error: str | None = None
     message: str | None = None
     bad_input: bool = False
@@ -96,26 +81,26 @@ class CaseTask:
     case, out, running : Path
         Case folder, folder of its results, and the run's own folder beside them.
     settings : CalibrationSettings, or mapping of str to Any
-        Of `calibrate`; a mapping may have its intervals too.
+        Of the job; a mapping may have its intervals too.
     run : str
         Name of the run.
     attempt, retries : int
         How often it was given to another worker, and how often it may be.
     force : bool
-        Calibrate although there are results of an earlier run.
-    files : callable
-        Makes the files of the results.
+        Do it although there are results of an earlier run.
+    job : Job
+        What is done.
     """
 
     case: Path
     out: Path
     running: Path
-    settings: ModelSettings | Mapping[str, Any]
+    settings: Settings
     run: str
     attempt: int
     retries: int
     force: bool
-    files: Files = data_files
+    job: Job
 
     @property
     def name(self) -> str:
@@ -180,8 +165,8 @@ class CaseTask:
         return self.running / f"{self.name}.starts"
 
 
-def calibrate_one(task: CaseTask) -> CaseOutcome:
-    """Calibrate a case and write its results, whole or not at all; runs in a worker.
+def do_one(task: CaseTask) -> CaseOutcome:
+    """Calibrate or diagnose a case and write its results, whole or not at all; runs in a worker.
 
     Parameters
     ----------
@@ -189,34 +174,30 @@ def calibrate_one(task: CaseTask) -> CaseOutcome:
         The case.
     """
     try:
-        return task.finished() or _calibrate_one(task)
+        return task.finished() or _do_one(task)
     except Exception as error:  # travels as text: an error of another library may not survive being pickled
         status: Status = "lost" if isinstance(error, WorkerLostError) else "failed"
         return task.finished() or task.unfinished(status, error)
 
 
-def _calibrate_one(task: CaseTask) -> CaseOutcome:
+def _do_one(task: CaseTask) -> CaseOutcome:
     began = time.perf_counter()
     task.begin()
     files = digest(task.case)  # before it is loaded: what changes from here on counts as another case
     case = load_case(task.case)
-    intervals, settings = split_settings(task.settings)
-    read = {
-        name: [parse_interval(entry, case) if isinstance(entry, str) else entry for entry in entries]
-        for name, entries in intervals.items()
-    }
-    result = calibrate(case, read.get("tune", ()), read.get("hold_out", ()), settings=settings)
-    if result.solver.status == INTERRUPTED:  # the best so far is not what a later run should take over
+    done = task.job.work(case, task.settings)
+    if done.status == "interrupted":  # the best so far is not what a later run should take over
         return task.unfinished("interrupted")
-    contents = task.files(result, case)
-    before, after = (e["held_out"].metrics.mae for e in (result.uncalibrated, result.calibrated))
-    status: Status = "calibrated" if result.solver.success else "not_converged"
-    seconds, solver = time.perf_counter() - began, result.solver.to_dict()
-    outcome = CaseOutcome(task.name, status, before, after, seconds, attempts=len(task.starts()), solver=solver)
+    contents = task.job.files(done.result, case)
+    seconds, attempts = time.perf_counter() - began, len(task.starts())
+    outcome = CaseOutcome(
+        task.name, done.status, done.before, done.after, seconds, attempts=attempts, solver=done.solver,
+        verdict=done.verdict, effects=done.effects,
+    )  # fmt: skip
     record = {
-        "settings": check_settings(task.settings),
+        "settings": task.job.spell(task.settings),
         "files": files,
-        "version": result.version,
+        "version": version("buildingmpc"),
         "run": task.run,
         "outcome": asdict(outcome),
     }
@@ -224,58 +205,6 @@ def _calibrate_one(task: CaseTask) -> CaseOutcome:
     work = None if task.out.is_symlink() else task.running  # the run clears it away, also after a killed worker
     write_results(task.out, {**contents, RECORD: record}, task.force, work)
     return outcome
-
-
-def split_settings(
-    settings: ModelSettings | Mapping[str, Any] | None,
-) -> tuple[dict[str, Sequence[Interval | str]], CalibrationSettings]:
-    """Intervals and settings of many calibrations; refuse what `calibrate` does not take.
-
-    Parameters
-    ----------
-    settings : CalibrationSettings, mapping of str to Any, or None
-        A mapping may have the intervals too, as texts that each case reads in its own time zone.
-
-    Raises
-    ------
-    CalibrationError
-        When a name is unknown.
-    """
-    if not isinstance(settings, Mapping):
-        return {}, calibration_settings(settings)
-    intervals = {name: settings[name] for name in INTERVALS if name in settings}
-    for name, value in intervals.items():
-        if isinstance(value, str) or not isinstance(value, Sequence):
-            raise CalibrationError(f"settings.{name}: expected a list of intervals START/END, got {value!r}")
-    return intervals, calibration_settings({k: v for k, v in settings.items() if k not in intervals})
-
-
-def check_settings(settings: ModelSettings | Mapping[str, Any] | None) -> dict[str, Any]:
-    """Spell settings as a record does, with their defaults; refuse what `calibrate` does not take.
-
-    Parameters
-    ----------
-    settings : CalibrationSettings, mapping of str to Any, or None
-        As `calibrate_many` takes them.
-
-    Raises
-    ------
-    CalibrationError
-        When a name is unknown, or a value cannot be written down.
-    """
-    intervals, chosen = split_settings(settings)
-    values: dict[str, Any] = dict.fromkeys(INTERVALS, ())
-    for name, entries in intervals.items():
-        values[name] = [e if isinstance(e, str) else f"{e.start.isoformat()}/{e.end.isoformat()}" for e in entries]
-    spelled = {}
-    for name, value in {**values, **{f.name: getattr(chosen, f.name) for f in fields(chosen)}}.items():
-        try:
-            spelled[name] = json.loads(to_json({name: value}))[name]
-        except TypeError as error:
-            raise CalibrationError(
-                f"settings.{name}: expected plain values that a record can hold, got {value!r}"
-            ) from error
-    return spelled
 
 
 def earlier_outcome(case: Path, out: Path, settings: Mapping[str, Any]) -> CaseOutcome | None:
@@ -349,7 +278,8 @@ def outcome_of(record: Mapping[str, Any], out: Path) -> CaseOutcome:
     out : Path
         Folder that it lies in.
     """
-    return CaseOutcome(**{**record["outcome"], "case": out.name})
+    outcome = record["outcome"]
+    return CaseOutcome(**{**outcome, "case": out.name, "effects": tuple(outcome["effects"])})
 
 
 def digest(case: Path) -> str:

@@ -14,19 +14,11 @@ from typing import Any
 
 from calibration.errors import CalibrationError, ResultsExistError, WorkerLostError
 from calibration.evaluation.n_step import Progress
-from calibration.evaluation.settings import ModelSettings
-from calibration.fleet.case import (
-    RECORD,
-    CaseOutcome,
-    CaseTask,
-    Files,
-    calibrate_one,
-    check_settings,
-    data_files,
-    earlier_outcome,
-)
+from calibration.fleet.case import RECORD, CaseOutcome, CaseTask, do_one, earlier_outcome
 from calibration.fleet.cluster import ClusterExecutor, killed_worker
+from calibration.fleet.job import Files, Job, calibrated, data_files
 from calibration.fleet.local import LocalProcesses, available_cores
+from calibration.fleet.settings import Settings, check_settings
 from calibration.results import check_results_folder, to_json
 from thermal.case.load import NAME
 
@@ -58,7 +50,7 @@ def case_folders(folder: str | Path) -> tuple[Path, ...]:
 def calibrate_many(
     cases: Sequence[str | Path],
     out: str | Path,
-    settings: ModelSettings | Mapping[str, Any] | None = None,
+    settings: Settings | None = None,
     *,
     files: Files = data_files,
     workers: Executor | int | None = None,
@@ -120,8 +112,33 @@ def calibrate_many(
     >>> [o.case for o in outcomes if o.status != "calibrated"]  # doctest: +SKIP
     []
     """
+    job = Job(check_settings, calibrated, files)
+    return do_many(job, cases, out, settings or {}, workers, retries, force, progress)
+
+
+def do_many(
+    job: Job,
+    cases: Sequence[str | Path],
+    out: str | Path,
+    settings: Settings,
+    workers: Executor | int | None = None,
+    retries: int = 2,
+    force: bool = False,
+    progress: Progress | None = None,
+) -> tuple[CaseOutcome, ...]:
+    """Do a job with many cases, as `calibrate_many` calibrates them.
+
+    Parameters
+    ----------
+    job : Job
+        What is done.
+    cases, out, workers, retries, force, progress
+        As in `calibrate_many`.
+    settings : CalibrationSettings, or mapping of str to Any
+        Of the job.
+    """
     began = time.perf_counter()
-    spelled = check_settings(settings)
+    spelled = job.spell(settings)
     for name, value, least in (("retries", retries, 0), ("workers", workers, 1)):
         CalibrationError.unless(not isinstance(value, int) or value >= least, name, f"at least {least}", value)
     folder = _absolute(check_results_folder(out, force=True))
@@ -129,7 +146,7 @@ def calibrate_many(
     if not force:
         _refuse_other_contents(folder)
     with _claimed(folder) as running:
-        given = (running, settings or {}, running.name, 0, retries, force, files)
+        given = (running, settings, running.name, 0, retries, force, job)
         tasks = [CaseTask(path, folder / path.name, *given) for path in paths]
         there = {} if force else {t.name: earlier_outcome(t.case, t.out, spelled) for t in tasks}
         found = {name: outcome for name, outcome in there.items() if outcome is not None}
@@ -257,7 +274,7 @@ def _hand_out(waiting: list[CaseTask], pool: Executor, pending: dict[Future[Case
     trouble = pool.trouble() if isinstance(pool, ClusterExecutor) else None
     while waiting and trouble is None:
         try:
-            pending[pool.submit(calibrate_one, waiting[0])] = waiting[0]
+            pending[pool.submit(do_one, waiting[0])] = waiting[0]
         except RuntimeError as error:  # broken or shut down
             trouble = f"the executor takes no more cases: {error}"
         else:

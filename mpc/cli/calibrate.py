@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -18,8 +19,14 @@ if TYPE_CHECKING:
     from calibration.diagnosis.diagnosis import Diagnosis
     from calibration.fit.result import CalibrationResult
     from calibration.fleet.case import CaseOutcome
+    from calibration.fleet.job import Files
 
 _BUILDING = "building.yaml"
+
+Workers = Annotated[int | None, options.value("Processes that share a folder of cases; default: one a core.")]
+Scheduler = Annotated[
+    str | None, options.value("Of a dask cluster for a folder of cases, such as tcp://10.0.0.1:8786.", "ADDRESS")
+]
 
 #: Candidates on the terminal; the page and diagnosis.json have them all.
 _MOST_CANDIDATES = 5
@@ -50,12 +57,8 @@ def calibrate(
     loss: Annotated[str, options.value("linear, or pseudo_huber against outliers.", "LOSS")] = "linear",
     starts: Annotated[int, options.value("Starts of the solver; the best is kept.")] = 3,
     seed: Annotated[int, options.value("Seed of the further starts.")] = 0,
-    workers: Annotated[
-        int | None, options.value("Processes that share a folder of cases; default: one a core.")
-    ] = None,
-    scheduler: Annotated[
-        str | None, options.value("Of a dask cluster for a folder of cases, such as tcp://10.0.0.1:8786.", "ADDRESS")
-    ] = None,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
     force: options.Force = False,
     json: options.Json = False,
 ) -> int:  # fmt: skip
@@ -66,8 +69,6 @@ def calibrate(
     Example: buildingmpc calibrate cases/office --tune 2023-10-02/2023-10-16
     --hold-out 2023-10-16T00:05/2023-10-23 --out results
     """
-    from calibration.fleet.run import case_folders
-
     settings = {
         "tune": tune or [], "hold_out": hold_out or [], "dx": dx, "horizon": horizon,
         "scheme": scheme or "implicit_euler", "objective": objective, "loss": loss, "starts": starts, "seed": seed,
@@ -76,26 +77,8 @@ def calibrate(
         "structure": {"lumped": True, "sun": True} if structure == "lumped" else {},
     }  # fmt: skip
     CalibrationError.unless_known(structure, ("chosen", "drawn", "lumped"), "--structure", "chosen, drawn or lumped")
-    if workers is not None and scheduler is not None:
-        raise CalibrationError("--workers and --scheduler: expected one of them; a cluster has workers of its own")
-    if not (case / _BUILDING).exists() and (cases := case_folders(case)):
-        inside = [p for p in sorted(case.iterdir()) if p.is_dir() and p.name[0] != "."]
-        others = [p.name for p in inside if p not in cases and p != out]
-        if others:
-            complain(f"left out, for want of {_BUILDING}: {', '.join(others)}")
-        outcomes = _calibrate_many(cases, out, settings, workers, scheduler, force)
-        answer(
-            json, {"cases": {outcome.case: outcome.to_dict() for outcome in outcomes}},
-            lambda: _show_outcomes(outcomes, horizon, out),
-        )  # fmt: skip
-        if all(outcome.status == "calibrated" for outcome in outcomes):
-            return 0
-        return 2 if all(outcome.bad_input for outcome in outcomes) else 1
-    if workers is not None or scheduler is not None:
-        raise CalibrationError(
-            f"{case}: --workers and --scheduler are for a folder of cases, one folder each; expected {_BUILDING} in "
-            "some of its folders, and not beside them"
-        )
+    if cases := _cases_in(case, out, workers, scheduler):
+        return _many("calibrate", cases, out, settings, workers, scheduler, force, json)
     from mpc.reports.calibration import calibration_content
 
     with Waiting(f"calibrate {case.name}") as progress:
@@ -171,21 +154,51 @@ def _exit_code(result: CalibrationResult) -> int:
     return 1
 
 
-def _calibrate_many(
-    cases: Sequence[Path], out: Path, settings: dict[str, Any], workers: int | None, scheduler: str | None, force: bool
-) -> Sequence[CaseOutcome]:
-    """Calibrate each case into a folder of its name; one that fails is reported beside the others."""
-    from calibration.fleet.cluster import ClusterExecutor
-    from calibration.fleet.run import calibrate_many
-    from mpc.reports.calibration import calibration_files
+def _cases_in(folder: Path, out: Path, workers: int | None, scheduler: str | None) -> Sequence[Path]:
+    """Cases in a folder of cases; none where it is a case itself."""
+    from calibration.fleet.run import case_folders
 
-    files = plugins.WithPlugins(calibration_files, plugins.loaded)
+    if workers is not None and scheduler is not None:
+        raise CalibrationError("--workers and --scheduler: expected one of them; a cluster has workers of its own")
+    if (folder / _BUILDING).exists() or not (cases := case_folders(folder)):
+        if workers is not None or scheduler is not None:
+            raise CalibrationError(
+                f"{folder}: --workers and --scheduler are for a folder of cases, one folder each; expected {_BUILDING} "
+                "in some of its folders, and not beside them"
+            )
+        return ()
+    inside = [p for p in sorted(folder.iterdir()) if p.is_dir() and p.name[0] != "."]
+    others = [p.name for p in inside if p not in cases and p != out]
+    if others:
+        complain(f"left out, for want of {_BUILDING}: {', '.join(others)}")
+    return cases
+
+
+def _many(
+    what: Literal["calibrate", "diagnose"], cases: Sequence[Path], out: Path, settings: dict[str, Any],
+    workers: int | None, scheduler: str | None, force: bool, json: bool,
+) -> int:  # fmt: skip
+    """Calibrate or diagnose each case into a folder of its name; one that fails is reported beside the others."""
+    from calibration.fleet.cluster import ClusterExecutor
+
+    do: Callable[..., Sequence[CaseOutcome]]
+    files: Files
+    if what == "calibrate":
+        from calibration.fleet.run import calibrate_many
+        from mpc.reports.calibration import calibration_files
+
+        do, files = calibrate_many, calibration_files
+    else:
+        from calibration.fleet.diagnose import diagnose_many
+        from mpc.reports.diagnosis import diagnosis_files
+
+        do, files = diagnose_many, diagnosis_files
     cluster = nullcontext() if scheduler is None else ClusterExecutor(scheduler, folders=[cases[0].parent])
     try:
-        with Waiting("calibrate cases") as waiting, cluster as executor:
-            outcomes = calibrate_many(
-                cases, out, settings, files=files, workers=executor or workers, force=force,
-                progress=lambda _, done, total: waiting(f"{done} of {total}", done, total),
+        with Waiting(f"{what} cases") as waiting, cluster as executor:
+            outcomes = do(
+                cases, out, settings, files=plugins.WithPlugins(files, plugins.loaded), workers=executor or workers,
+                force=force, progress=lambda _, done, total: waiting(f"{done} of {total}", done, total),
             )  # fmt: skip
     except KeyboardInterrupt:
         complain(f"interrupted: what is finished is in {out}, and the same command goes on from there")
@@ -196,26 +209,38 @@ def _calibrate_many(
         elif outcome.solver is not None and outcome.status == "not_converged":
             name, status = outcome.solver["name"], outcome.solver["status"]
             complain(f"error: {outcome.case}: {name} did not converge: {status}; the results say so too")
-    return outcomes
+    content = {"cases": {outcome.case: outcome.to_dict() for outcome in outcomes}}
+    answer(json, content, lambda: _show_outcomes(what, outcomes, settings["horizon"], out))
+    if all(outcome.status in ("calibrated", "diagnosed") for outcome in outcomes):
+        return 0
+    return 2 if all(outcome.bad_input for outcome in outcomes) else 1
 
 
-def _show_outcomes(outcomes: Sequence[CaseOutcome], horizon: str, out: Path) -> None:
-    rows = []
+def _show_outcomes(what: str, outcomes: Sequence[CaseOutcome], horizon: str, out: Path) -> None:
+    rows: list[tuple[Any, ...]] = []
     for o in outcomes:
         status = o.error or o.status.replace("_", " ") + (", done before" if o.resumed else "")
-        rows.append((o.case, o.held_out_mae_before, o.held_out_mae_after, o.seconds, status))
-    columns = {"case": "", "before [K]": ".3f", "after [K]": ".3f", "time [s]": ".1f", "status": ""}
+        found = () if what == "calibrate" else ((o.verdict or "").replace("_", " "), ", ".join(o.effects))
+        rows.append((o.case, o.held_out_mae_before, o.held_out_mae_after, *found, o.seconds, status))
+    errors = {"before [K]": ".3f", "after [K]": ".3f"}
+    columns = {"case": "", **errors, "time [s]": ".1f", "status": ""}
+    if what == "diagnose":
+        errors = {"calibrated [K]": ".3f", "handed on [K]": ".3f"}
+        columns = {"case": "", **errors, "verdict": "", "effects": "", "time [s]": ".1f", "status": ""}
     show_table(f"Held-out error {horizon} ahead", columns, rows, more="summary.json lists them all")
+    if what == "diagnose":
+        named = Counter(effect for o in outcomes if o.verdict in ("named", "group") for effect in o.effects)
+        show_table("Found", {"effect": "", "cases": ".0f"}, named.most_common())
     say(f"Results: {out}")
 
 
 def diagnose(
-    case: options.CaseFolder,
+    case: Annotated[Path, typer.Argument(metavar="CASE", help="Case folder, or a folder of case folders.")],
     out: Annotated[
         Path,
         options.folder(
             "diagnosis.json, calibration.json of the model with the effects found, missing_watts.parquet, "
-            "predictions.parquet, report.html"
+            "predictions.parquet, report.html; of a folder of cases one such folder a case, and summary.json"
         ),
     ],
     tune: Annotated[
@@ -229,18 +254,24 @@ def diagnose(
     effects: Annotated[str, options.value("Effects that are known to be there: part of the baseline.", "ID,...")] = "",
     rule_out: Annotated[str, options.value("Effects that are known not to be there.", "ID,...")] = "",
     horizon: options.Horizon = "6h",
+    workers: Workers = None,
+    scheduler: Scheduler = None,
     force: options.Force = False,
     json: options.Json = False,
 ) -> int:
     """Say where model and building disagree, which missing effect causes it, and how far the error falls with it.
 
+    What was interrupted in a folder of cases goes on where it stopped.
+
     Example: buildingmpc diagnose cases/office --out diagnosis
     """
     from mpc.reports.diagnosis import diagnosis_summary
 
+    settings = {"dx": dx, "horizon": horizon, "known": _ids(effects), "ruled_out": _ids(rule_out)}
+    if cases := _cases_in(case, out, workers, scheduler):
+        settings |= {"tune": tune or [], "hold_out": hold_out or []}
+        return _many("diagnose", cases, out, settings, workers, scheduler, force, json)
     with Waiting(f"diagnose {case.name}") as progress:
-        known, ruled_out = _ids(effects), _ids(rule_out)
-        settings = {"dx": dx, "horizon": horizon, "known": known, "ruled_out": ruled_out}
         result, report = run_diagnosis(case, out, force, progress, (tune or (), hold_out or ()), settings)
     return answer(json, diagnosis_summary(result), lambda: _show_diagnosis(result), report)
 

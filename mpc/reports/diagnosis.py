@@ -12,6 +12,7 @@ from calibration.diagnosis.decide.verdict import Candidate
 from calibration.diagnosis.diagnosis import Diagnosis, Replay
 from calibration.diagnosis.refit.refit import ACCEPTED
 from calibration.diagnosis.refit.search import Round
+from calibration.results import Content, check_results_folder, write_results
 from mpc.reports import diagnosis_words
 from mpc.reports.diagnosis_words import accepted, alike, called, in_zones, rivals
 from mpc.reports.evaluation import command, predictions_table, subtitle
@@ -19,7 +20,7 @@ from mpc.reports.figures.diagnosis import change_panels, drift_lines, hour_bars,
 from mpc.reports.figures.errors import series_of_runs
 from mpc.reports.figures.plan import heat_maps
 from mpc.reports.figures.style import CELSIUS, Picture
-from mpc.reports.page import kelvin, listed, significant, sure, unit, write_report
+from mpc.reports.page import kelvin, listed, render, significant, sure, unit
 from thermal.case.building import FloorPlans
 from thermal.case.case import Case
 from thermal.effects.catalogue import CATALOGUE
@@ -71,14 +72,28 @@ def write_diagnosis(result: Diagnosis, case: Case, out: str | Path, force: bool 
     ResultsExistError
         When the folder holds something and ``force`` is not set.
     """
+    check_results_folder(out, force)
+    return write_results(out, diagnosis_files(result, case), force) / "report.html"
+
+
+def diagnosis_files(result: Diagnosis, case: Case) -> dict[str, Content]:
+    """Files of a diagnosis by name, see `write_diagnosis`.
+
+    Parameters
+    ----------
+    result : Diagnosis
+        From `diagnose`.
+    case : Case
+        The case it was made on.
+    """
     models = result.replays()
-    files = {
+    return {
         "diagnosis.json": diagnosis_summary(result),
         "calibration.json": result.calibration(),
         "missing_watts.parquet": _missing_table(result, models),
         "predictions.parquet": _predictions(models),
+        "report.html": render("diagnosis", _content(result, case, models)),
     }
-    return write_report(out, "diagnosis", _content(result, case, models), files, force)
 
 
 def diagnosis_summary(result: Diagnosis) -> dict[str, Any]:

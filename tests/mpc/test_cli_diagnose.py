@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -117,3 +118,23 @@ def test_effects_that_cannot_be_known_are_named(arguments: tuple[str, ...], mess
     assert answer.exit_code == 2
     assert re.search(message, " ".join(answer.stderr.split()))
     assert not (tmp_path / "gap").exists()
+
+
+def test_a_folder_of_cases_is_diagnosed_case_by_case(tmp_path: Path) -> None:
+    cases = tmp_path / "cases"
+    for name in ("one", "two"):
+        shutil.copytree(CASE, cases / name)
+    text = (cases / "two" / "building.yaml").read_text(encoding="utf-8")
+    (cases / "two" / "building.yaml").write_text(text.replace("zone: F1_N", "zone: G1_N"), encoding="utf-8")
+    settings = ("--dx", "2.0", "--workers", "1", "--rule-out", "blinds")
+    answer = run("diagnose", cases, "--out", tmp_path / "out", *settings)
+    assert answer.exit_code == 1, answer.stderr
+    assert "error: two: CaseError" in answer.stderr
+    assert "solar_gain" in answer.stdout and "named" in answer.stdout
+    assert (tmp_path / "out" / "one" / "report.html").is_file()
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))["cases"]
+    assert summary["one"]["effects"] == ["solar_gain"] and summary["two"]["status"] == "failed"
+    again = run("diagnose", cases, "--out", tmp_path / "out", *settings, "--json")
+    assert json.loads(again.stdout)["cases"]["one"]["resumed"]
+    refused = run("diagnose", cases / "one", "--out", tmp_path / "alone", "--workers", "2")
+    assert refused.exit_code == 2 and "are for a folder of cases" in refused.stderr

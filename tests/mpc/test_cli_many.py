@@ -138,7 +138,7 @@ def test_a_solver_that_does_not_converge_fails_the_run_and_keeps_the_results(
         result = calibrate(*args, **settings)
         return replace(result, solver=replace(result.solver, success=False, status="Maximum_Iterations_Exceeded"))
 
-    monkeypatch.setattr("calibration.fleet.case.calibrate", stopped)
+    monkeypatch.setattr("calibration.fleet.job.calibrate", stopped)
     shutil.copytree(cases / NAMES[0], tmp_path / "cases" / NAMES[0])
     answer = run("calibrate", tmp_path / "cases", "--out", tmp_path / "out", "--scheduler", "x", *OPTIONS)
     assert answer.exit_code == 1

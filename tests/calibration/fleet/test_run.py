@@ -17,13 +17,19 @@ import pytest
 from calibration import CalibrationSettings, Interval, calibrate, calibrate_many
 from calibration.errors import CalibrationError, ResultsExistError
 from calibration.fit.least_squares import INTERRUPTED
-from calibration.fleet.case import RECORD, CaseOutcome, CaseTask, calibrate_one, check_settings
+from calibration.fleet.case import RECORD, CaseOutcome, CaseTask, do_one
+from calibration.fleet.diagnose import diagnose_many
+from calibration.fleet.job import Job, calibrated, data_files
 from calibration.fleet.run import case_folders
+from calibration.fleet.settings import check_settings
 from mpc.reports.calibration import calibration_files
 from thermal import load_case
+from thermal.errors import EffectError
 
 SETTINGS = {"horizon": "1h", "starts": 1}
 Finished = tuple[Path, tuple[CaseOutcome, ...], int]  # results, what came back, the process that was killed
+
+JOB = Job(check_settings, calibrated, data_files)
 
 
 @pytest.fixture(scope="module")
@@ -145,7 +151,7 @@ def task(cases: Path, tmp_path: Path, **changes: Any) -> CaseTask:
     running = tmp_path / ".running" / "run"
     running.mkdir(parents=True)
     given = {"attempt": 0, "retries": 2, "force": False} | changes
-    return CaseTask(cases / "office 0", tmp_path / "office 0", running, SETTINGS, "run", **given)
+    return CaseTask(cases / "office 0", tmp_path / "office 0", running, SETTINGS, "run", job=JOB, **given)
 
 
 def test_an_executor_that_tries_again_by_itself_is_stopped(cases: Path, tmp_path: Path) -> None:
@@ -153,7 +159,7 @@ def test_an_executor_that_tries_again_by_itself_is_stopped(cases: Path, tmp_path
     given = task(cases, tmp_path)
     for _ in range(3):
         given.begin()
-    outcome = calibrate_one(given)
+    outcome = do_one(given)
     assert (outcome.status, outcome.attempts) == ("lost", 3)
     assert "its worker died 3 times (host, process: " in str(outcome.message)
 
@@ -161,7 +167,7 @@ def test_an_executor_that_tries_again_by_itself_is_stopped(cases: Path, tmp_path
 def test_a_worker_that_does_not_see_the_folder_says_so(cases: Path, tmp_path: Path) -> None:
     given = task(cases, tmp_path)
     shutil.rmtree(tmp_path / ".running")
-    outcome = calibrate_one(given)
+    outcome = do_one(given)
     assert (outcome.status, outcome.error) == ("failed", "CalibrationError")
     assert "every worker sees under the same path" in str(outcome.message)
 
@@ -169,8 +175,8 @@ def test_a_worker_that_does_not_see_the_folder_says_so(cases: Path, tmp_path: Pa
 def test_results_whose_worker_died_before_it_could_answer_are_found(one: tuple[Path, Path], tmp_path: Path) -> None:
     case, out = one
     record = json.loads((out / "office 0" / RECORD).read_text(encoding="utf-8"))
-    given = CaseTask(case, out / "office 0", out, SETTINGS, record["run"], 1, 2, True)
-    assert calibrate_one(given).status == "calibrated"
+    given = CaseTask(case, out / "office 0", out, SETTINGS, record["run"], 1, 2, True, JOB)
+    assert do_one(given).status == "calibrated"
     assert given.starts() == []
 
 
@@ -183,9 +189,9 @@ def test_the_best_so_far_of_an_interrupted_solve_is_not_kept(
         result = calibrate(*args, **settings)
         return replace(result, solver=replace(result.solver, success=False, status=INTERRUPTED))
 
-    monkeypatch.setattr("calibration.fleet.case.calibrate", stopped)
+    monkeypatch.setattr("calibration.fleet.job.calibrate", stopped)
     given = task(cases, tmp_path)
-    assert calibrate_one(given).status == "interrupted"
+    assert do_one(given).status == "interrupted"
     assert not given.out.exists()
 
 
@@ -202,6 +208,26 @@ def test_settings_are_checked_before_anything_is_done(cases: Path, tmp_path: Pat
     with pytest.raises(CalibrationError, match=message):
         calibrate_many(case_folders(cases), tmp_path / "out", settings)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_diagnoses_go_on_and_say_what_they_found(cases: Path, tmp_path: Path) -> None:
+    settings = {"horizon": "1h", "ruled_out": ["sensor_bias"], "hold_out": []}
+    two = [cases / "office 0", cases / "office 1"]
+    outcomes = diagnose_many(two, tmp_path / "out", settings, workers=1)
+    assert [(o.status, o.resumed, o.message) for o in outcomes] == [("diagnosed", False, None)] * 2
+    for o in outcomes:
+        found = json.loads((tmp_path / "out" / o.case / "diagnosis.json").read_text(encoding="utf-8"))
+        assert (o.verdict, o.held_out_mae_before) == (found["verdict"], found["gap"]["mae"])
+        assert list(o.effects) == (found["how_far"][-1]["effects"] if found["how_far"] else [])
+    again = diagnose_many(two, tmp_path / "out", settings, workers=1)
+    assert [replace(o, resumed=False) for o in again] == list(outcomes) and all(o.resumed for o in again)
+    with pytest.raises(ResultsExistError, match="other settings: ruled_out"):
+        diagnose_many(two, tmp_path / "out", {**settings, "ruled_out": []}, workers=1)
+    for wrong, message in (({"dxx": 1.0}, "diagnose takes no 'dxx'"), ({"known": ["sun"]}, "it may be solar_gain")):
+        with pytest.raises((CalibrationError, EffectError), match=message):
+            diagnose_many(two, tmp_path / "other", wrong, workers=1)
+    with pytest.raises(ResultsExistError):  # results of a calibration are something else
+        calibrate_many(two, tmp_path / "out", SETTINGS, workers=1)
 
 
 def test_settings_are_spelled_with_their_defaults() -> None:
