@@ -196,9 +196,9 @@ class Diagnosis(Result):
         return self.prediction.metrics.mae
 
     def replays(self) -> list[Replay]:
-        """Replay the calibrated baseline on the held-out intervals, and the final model where it has an effect."""
+        """Replay the calibrated baseline on the held-out intervals, and the final model where an effect was found."""
         models = [(self.rounds[0].before, self.where.missing, self.where.drift)]
-        if self.final.effects:
+        if self.steps:
             models.append((self.final, missing_heat(self.final, self.judged), drift_of(self.final, self.judged)))
         return [
             Replay(fit.evaluate(self.judged, self.horizon, trajectories=True), missing, drift)

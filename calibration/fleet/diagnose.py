@@ -96,5 +96,6 @@ def _diagnosed(case: Case, settings: Settings) -> Done:
     intervals, given = split_intervals(settings)
     tune, hold_out = read_intervals(intervals, case)
     result = diagnose(case, tune, hold_out, **given)
-    verdict, effects = result.verdict.name, tuple(result.final.effects)
+    verdict, known = result.verdict.name, given.get("known", ())
+    effects = tuple(effect for effect in result.final.effects if effect not in known)
     return Done(result, "diagnosed", result.gap, result.predicts, verdict=verdict, effects=effects)

@@ -8,6 +8,7 @@ import shutil
 from pathlib import Path
 from typing import Any
 
+import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
@@ -101,6 +102,8 @@ def test_what_is_known_or_ruled_out_is_not_sought(tmp_path: Path) -> None:
     calibration = json.loads((out / "calibration.json").read_text(encoding="utf-8"))
     assert "solar_gain" in calibration["settings"]["effects"]
     assert set(calibration["band_factors"]) and calibration["disturbance"]["time_constant"] > 0.0
+    assert not found["how_far"]  # nothing else was found, so that there is one model to show
+    assert "with_effects" not in " ".join(pd.read_parquet(out / "predictions.parquet").columns)
     assert "known to be there, is part of the baseline" in (out / "report.html").read_text(encoding="utf-8")
 
 
