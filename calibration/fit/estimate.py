@@ -119,6 +119,7 @@ def estimate(
     progress: Progress | None = None,
     model: ReducedModel | None = None,
     tuner: Tuner | None = None,
+    close: bool = False,
 ) -> Estimate:
     """Solve the problem from one start.
 
@@ -141,13 +142,15 @@ def estimate(
         Finds the disturbance model that standard errors follow, and weights where it finds fewer independent errors
         than one a day and zone. It never makes them count more: disturbances of zones are independent, while what a
         model lacks is common to them, and priors must hold against it.
+    close : bool
+        Whether the start is close by, such as the estimate of a simpler model.
 
     Returns
     -------
     Estimate
         The best so far, with the solver's status, also after Ctrl-C.
     """
-    rounds = _Rounds(problem, model or reduced_model(problem.grid, [problem.theta(z)]), tuner)
+    rounds = _Rounds(problem, model or reduced_model(problem.grid, [problem.theta(z)]), tuner, close)
     rounds.whiten(problem.theta(z))
     for number in range(ROUNDS):
         z = rounds.solve(z, 1e-2 if number == 0 else 1e-3)
@@ -161,8 +164,8 @@ def estimate(
 class _Rounds:
     """State of the rounds: how errors are weighed, the reduced model in use, and what was counted."""
 
-    def __init__(self, problem: Problem, model: ReducedModel, tuner: Tuner | None) -> None:
-        self.problem, self.model, self.tuner = problem, model, tuner
+    def __init__(self, problem: Problem, model: ReducedModel, tuner: Tuner | None, close: bool) -> None:
+        self.problem, self.model, self.tuner, self.close = problem, model, tuner, close
         self.iterations = self.evaluations = 0
         self.moved, self.settled, self.interrupted = np.inf, False, False
         self.disturbance: DisturbanceModel | None = None
@@ -191,13 +194,15 @@ class _Rounds:
             self.evaluations += 1
             return problem.weighted(model, x)
 
-        if self.last is None or problem.whitened:
+        if (self.last is None and not self.close) or problem.whitened:
             slack = _WHITENED_SLACK if problem.whitened else 1.0
             found = solve_least_squares(weighted, z, *problem.bounds, tolerance=slack * tolerance)
         else:  # close by, where Ipopt would take six evaluations for its barrier
             try:
                 found = solve_damped(weighted, z, problem.bounds, problem.prior_deviations, _LEAST_GAIN, _ENOUGH)
             except KeyboardInterrupt:
+                if self.last is None:
+                    raise
                 found = replace(self.last, success=False, status=INTERRUPTED, interrupted=True)
         self.iterations += found.iterations
         self.interrupted = found.interrupted
@@ -338,7 +343,7 @@ def tune(
 
 
 def solve_starts(
-    problem: Problem, first: ReducedModel, starts: int, seed: int, progress: Progress | None
+    problem: Problem, first: ReducedModel, starts: int, seed: int, progress: Progress | None, close: bool = False
 ) -> tuple[Estimate, list[str]]:
     """Best estimate over the starts; a start that fails costs that start only, Ctrl-C those that are left.
 
@@ -354,6 +359,8 @@ def solve_starts(
         Seed of the draws.
     progress : callable, optional
         Called with stage, done, total.
+    close : bool
+        Whether the first start is close by.
 
     Returns
     -------
@@ -379,7 +386,7 @@ def solve_starts(
             if best is not None:  # starts are weighed alike, with the disturbance of the best so far
                 known = best.disturbance
                 tuner = None if known is None else lambda *_, known=known: known
-            found = estimate(problem, z, progress, first if number == 0 else None, tuner)
+            found = estimate(problem, z, progress, first if number == 0 else None, tuner, close and number == 0)
         except (ArithmeticError, np.linalg.LinAlgError, CalibrationError, ModelError) as error:
             failures.append(f"start {number + 1}: {error}")
             continue

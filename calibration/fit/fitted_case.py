@@ -1,7 +1,7 @@
 """A case whose parameters are estimated, and the judgement of the estimate on tuning and held-out intervals."""
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from importlib.metadata import version
 
@@ -12,7 +12,7 @@ from calibration.evaluation.intervals import Interval, default_intervals, horizo
 from calibration.evaluation.n_step import HORIZONS, Evaluation, EvaluationSettings, Progress
 from calibration.evaluation.settings import CalibrationSettings
 from calibration.fit.estimate import STOPPED, Estimate, solve_starts
-from calibration.fit.left_out import LeftOut, begin_at, left_out
+from calibration.fit.left_out import Fitted, LeftOut, begin_at, left_out
 from calibration.fit.likelihood import InnovationsProblem
 from calibration.fit.problem import tuning_problem
 from calibration.fit.result import CalibrationResult, SolverReport, describe
@@ -160,7 +160,7 @@ def fit_case(
     hold_out: Sequence[Interval],
     settings: CalibrationSettings,
     progress: Progress | None = None,
-    begin: Mapping[str, float] | None = None,
+    begin: Fitted | None = None,
 ) -> FittedCase:
     """Estimate the parameters of a case; `FittedCase.result` judges them.
 
@@ -170,8 +170,8 @@ def fit_case(
         As `calibrate` takes them.
     settings : CalibrationSettings
         Model and fit.
-    begin : mapping of str to float, optional
-        Where the estimation begins, by name [parameter units]; the centres of the priors by default.
+    begin : Fitted, optional
+        A simpler model, at whose estimate this one begins; the centres of the priors by default.
 
     Raises
     ------
@@ -193,7 +193,7 @@ def fit_case(
             grid, inputs, problem.runs, problem.steps, problem.free, given, problem.scheme, loss=settings.loss,
             intervals=tuple(tuned), spin_up_seconds=settings.spin_up_seconds,
         ).at(first, given)  # fmt: skip
-    best, failures = solve_starts(problem, first, settings.starts, settings.seed, progress)
+    best, failures = solve_starts(problem, first, settings.starts, settings.seed, progress, close=begin is not None)
     before = CaseModel(case, settings.model, grid, inputs, given, "start")
     return FittedCase(before, first, best, tuple(failures), tuple(tuned), tuple(judged), settings)
 

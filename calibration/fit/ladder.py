@@ -9,7 +9,7 @@ from calibration.evaluation.n_step import Progress
 from calibration.evaluation.settings import CalibrationSettings
 from calibration.fit.fitted_case import FittedCase, fit_case, is_large, with_normalisation
 from calibration.fit.least_squares import INTERRUPTED
-from calibration.fit.left_out import Fitted, Known, LeftOut, begin_at, left_out, values_of
+from calibration.fit.left_out import Fitted, Known, LeftOut, begin_at, left_out
 from calibration.fit.problem import tuning_problem
 from calibration.fit.result import CalibrationResult, Rung
 from thermal.case.case import Case
@@ -122,8 +122,7 @@ def climb_from(
         return _Looked(name, left_out(found, given.tuned, spin_up), len(found.problem.free), fit)
 
     def solve(settings: CalibrationSettings, known: Fitted | None = None) -> FittedCase:
-        begin = None if known is None else values_of(known)
-        found = fit_case(given.case, given.tuned, given.judged, settings, progress, begin)
+        found = fit_case(given.case, given.tuned, given.judged, settings, progress, known)
         found.raise_if_interrupted()
         return found
 
@@ -173,11 +172,6 @@ class _Looked:
 
 def _begun(given: Tuned, settings: CalibrationSettings, known: Fitted) -> Known:
     """Take a structure with further parameters as it begins: at what is known of the others, and weighed like these."""
-    own = known.problem
     settings = with_normalisation(settings, given.case, given.tuned)
-    problem = begin_at(tuning_problem(given.case, given.tuned, settings), values_of(known))
-    problem = replace(
-        problem, deviation=own.deviation, effective=own.effective_size(),
-        shrinkage={**problem.shrinkage, **own.shrinkage},
-    )  # fmt: skip
+    problem = begin_at(tuning_problem(given.case, given.tuned, settings), known)
     return Known(problem, reduced_model(problem.grid, [problem.start]), problem.point(problem.start))

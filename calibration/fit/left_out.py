@@ -1,7 +1,7 @@
 """Tuning days that are left out in turn and predicted by fits of the others."""
 
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple, Protocol
 
@@ -54,20 +54,26 @@ def values_of(fitted: Fitted) -> dict[str, float]:
     return {p.name: float(v) for p, v in zip(problem.grid.network.parameters, theta, strict=True)}
 
 
-def begin_at(problem: Problem, values: Mapping[str, float]) -> Problem:
-    """Let a problem begin elsewhere.
+def begin_at(problem: Problem, known: Fitted) -> Problem:
+    """Let a problem begin at the estimate of another, weighed like that one.
 
     Parameters
     ----------
     problem : Problem
         At its own start.
-    values : mapping of str to float
-        Starts of the estimated parameters by name [parameter units]; a common one's is that of each facade or zone.
+    known : Fitted
+        With the same parameters, or some of them; a common one's estimate is that of each facade or zone.
     """
-    start, parameters = problem.start.copy(), problem.grid.network.parameters
+    start, parameters, values, own = (
+        problem.start.copy(),
+        problem.grid.network.parameters,
+        values_of(known),
+        known.problem,
+    )
     for i in problem.free:
         start[i] = values.get(parameters[i].name, values.get(parameters[i].base, start[i]))
-    return replace(problem, start=start)
+    shrinkage = {**problem.shrinkage, **own.shrinkage}
+    return replace(problem, start=start, deviation=own.deviation, effective=own.effective_size(), shrinkage=shrinkage)
 
 
 class Known(NamedTuple):
