@@ -155,12 +155,18 @@ def _closed(before: HeldOut, after: HeldOut, floor: HeldOut) -> tuple[float | No
 
 
 def _permutation_test(models: ModelComparison, r: Round, fit: Fit) -> float | None:
-    """Held-out error with the signals of the round's effect permuted by days; None where it has none that vary."""
+    """Held-out error with the signals of the round's effect permuted by days.
+
+    None where it has none that vary, or acts by conductances too, which other days do not take from it.
+    """
     built = fit.built
+    joined = [sum(not c.source for c in b.network.conductances) for b in (r.before.built, built)]
+    if joined[0] != joined[1]:
+        return None
     earlier = {s.name for s in r.before.built.network.signals}
     first = len(built.network.boundaries)
     columns = [first + i for i, s in enumerate(built.network.signals) if s.name not in earlier]
-    varying = [c for c in columns if float(np.std(built.inputs.boundary[:, c])) > 0.0]
+    varying = [c for c in columns if float(np.ptp(built.inputs.boundary[:, c])) > 0.0]
     if not varying:
         return None
     permuted = Built(built.network, built.grid, _permuted(built.inputs, varying))

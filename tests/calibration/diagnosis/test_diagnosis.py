@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from calibration.diagnosis.decide.levels import CONCENTRATED, LEFT_OF_CHANGE, LE
 from calibration.diagnosis.decide.verdict import _left_over, judge
 from calibration.diagnosis.diagnosis import Diagnosis, baseline_gap, diagnose
 from calibration.diagnosis.refit.comparison import Fit, ModelComparison
+from calibration.diagnosis.refit.how_far import _permutation_test
 from calibration.diagnosis.refit.refit import ACCEPTED, CHANCE, MATTERS, Refit, Work, _beyond_a_step, held_out
 from calibration.diagnosis.refit.search import _first
 from calibration.diagnosis.screen.screen import Screening
@@ -19,6 +21,7 @@ from calibration.evaluation.settings import ModelSettings
 from calibration.fit.least_squares import bounded_step
 from mpc.reports.diagnosis_words import where_sentence
 from thermal import Case, Telemetry
+from thermal.data import load_bundled_case
 from thermal.effects.catalogue import CATALOGUE
 from thermal.pilot.building import pilot_building
 from thermal.pilot.twin import TwinRanges, TwinSettings, generate_twin
@@ -262,3 +265,13 @@ def test_left_out_days_are_those_of_the_model_that_is_handed_on() -> None:
     lower, upper = problem.bounds
     step = bounded_step(residual, jacobian, lower - final.point, upper - final.point)
     assert np.linalg.norm(jacobian @ step) < 0.1 * np.sqrt(step.size)
+
+
+def test_what_acts_by_conductances_is_not_put_on_other_days() -> None:
+    """Loss to the ground is there on any day, so that other days say nothing of it; the sun is not."""
+    models = ModelComparison(load_bundled_case(), ModelSettings(dx=2.0))
+    before = models.fit({}, [{}])
+    for effect, tested in (("ground_exchange", False), ("solar_gain", True)):
+        fit = models.fit({effect: ()}, [before.values], evaluations=2)
+        shuffled = _permutation_test(models, SimpleNamespace(before=before), fit)  # type: ignore[arg-type]
+        assert (shuffled is not None) == tested
