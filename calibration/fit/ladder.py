@@ -126,6 +126,7 @@ def climb_from(
         found.raise_if_interrupted()
         return found
 
+    begun: dict[str, tuple[CalibrationSettings, Fitted]] = {}  # structures that are looked at before they are fitted
     source = telemetry_inputs(given.case)
     structure = Structure(lumped=True, sun=source.gives("sun"))
     lumped = solve(replace(base, structure=structure))
@@ -134,10 +135,10 @@ def climb_from(
     plain, drawn = all(p.effect is None for p in parameters), beside.left.mae >= _WRONG * looked[0].left.mae
     if plain and drawn and source.gives("wind"):
         follows = replace(base, structure=replace(base.structure, wind_films=True))
-        if look("wind", _begun(given, follows, fitted)).left.mae < looked[0].left.mae:
-            base, wind = follows, solve(follows, fitted)
-            looked.append(look("wind", wind.best, wind))
-            fitted = wind.best
+        wind = _begun(given, follows, fitted)
+        if (seen := look("wind", wind)).left.mae < looked[0].left.mae:
+            looked.append(seen)
+            begun["wind"], base, fitted = (follows, fitted), follows, wind
     scopes: dict[str, Scope] = {p.base: "zone" for p in parameters if p.base in MASSES}
     if scopes and plain and drawn and not base.scopes and len(fitted.model.network.zones) > 1:
         zoned = solve(replace(base, scopes={**base.scopes, **scopes}), fitted)
@@ -145,16 +146,17 @@ def climb_from(
     looked.append(beside)
     recurring = replace(base, structure=replace(structure, recurring=True))
     if days_of(given.tuned) >= _WEEK:
-        looked.append(look("recurring", _begun(given, recurring, lumped.best)))
+        begun["recurring"] = recurring, lumped.best
+        looked.append(look("recurring", _begun(given, *begun["recurring"])))
     best = 0
     for number, other in enumerate(looked):
         # films that follow the wind have no more parameters
         least = 0.0 if other.name == "wind" else ADVANCE if best else advance
         if other.left.mae < (1.0 - least) * looked[best].left.mae:
             best = number
-    if looked[best].name == "recurring":
-        found = solve(recurring, lumped.best)
-        looked[best] = look("recurring", found.best, found)
+    if looked[best].name in begun:
+        found = solve(*begun[looked[best].name])
+        looked[best] = look(looked[best].name, found.best, found)
     kept = looked[best]
     rungs = tuple(Rung(each.name, each.left.mae, each.parameters, each is kept) for each in looked)
     return rungs, None if kept.fit is None else replace(kept.fit, left=kept.left), kept.left
