@@ -38,8 +38,7 @@ STOPPED = "stopped by Ctrl-C"
 #: Gain of twice the cost below which a solve after the first round is done [-].
 _LEAST_GAIN = 1e-5
 
-#: Share of the gain of such a solve below which it is done as well [-], since the next one weighs errors anew. With it
-#: six lumped fits took two thirds of the evaluations, and their held-out errors changed by less than 1 %.
+#: Share of its gain below which it is done as well [-], as the next weighs anew: six lumped fits changed by under 1 %.
 _ENOUGH = 0.03
 
 #: Times by which gradients of whitened residuals may be larger at convergence [-]: an effective sample a hundred times
@@ -124,9 +123,8 @@ def estimate(
     """Solve the problem from one start.
 
     Each round solves on a reduced model, the first by Ipopt and those that begin close by with damped Gauss-Newton
-    steps, then takes the deviation of the errors (and, with a tuner, how many
-    independent observations there are in them) for the next, and reduces anew where θ has moved too far from the
-    basis; the rounds end when nothing moves.
+    steps, then takes the deviation of the errors (and, with a tuner, how many independent observations they hold) for
+    the next, and reduces anew where θ has moved too far from the basis; the rounds end when nothing moves.
 
     Parameters
     ----------
@@ -285,10 +283,8 @@ def draw_starts(problem: Problem, count: int, seed: int) -> list[FloatArray]:
     ----------
     problem : Problem
         With priors.
-    count : int
-        Number of points.
-    seed : int
-        Seed of the draws.
+    count, seed : int
+        Number of points, and seed of the draws.
     """
     rng, centre, spread = np.random.default_rng(seed), problem.centre, problem.prior_deviations
     further = [centre + 0.5 * spread * rng.standard_normal(spread.size) for _ in range(count - 1)]
@@ -353,10 +349,8 @@ def solve_starts(
         What to fit.
     first : ReducedModel
         At the problem's start.
-    starts : int
-        Number of starts.
-    seed : int
-        Seed of the draws.
+    starts, seed : int
+        Number of starts, and seed of the draws.
     progress : callable, optional
         Called with stage, done, total.
     close : bool
