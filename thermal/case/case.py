@@ -219,8 +219,7 @@ class Case:
             Shape (n_time, n_commanded), columns 0..n-1 in the order of `building.commanded`, NaN where something is
             missing; see `thermal.case.commands.command_signals`.
         """
-        temperatures, _ = estimate_temperatures(self._zone_temperatures, self.step)
-        return command_signals(self.building, self.usable, temperatures)
+        return command_signals(self.building, self.usable, self._estimated_temperatures[0])
 
     def zone_heat_estimated(self) -> pd.DataFrame:
         """Heat that each zone receives, estimated where a sensor that it follows from is dead or stuck for long.
@@ -242,8 +241,12 @@ class Case:
         return self._estimated[1]
 
     @cached_property
+    def _estimated_temperatures(self) -> tuple[pd.DataFrame, tuple[Estimated, ...]]:
+        return estimate_temperatures(self._zone_temperatures, self.step)
+
+    @cached_property
     def _estimated(self) -> tuple[pd.DataFrame, tuple[Estimated, ...]]:
-        temperatures, found = estimate_temperatures(self._zone_temperatures, self.step)
+        temperatures, found = self._estimated_temperatures
         parts = heat_parts(self.building, self.usable, temperatures)
         filled, lacking = estimate_parts(self.building, self.usable, parts, self.step)
         stages = [total_heat(self.building, stage) for stage in (parts, filled)]

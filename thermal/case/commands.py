@@ -61,18 +61,18 @@ def commanded_devices(building: Building, columns: Collection[str]) -> tuple[Com
 def _of_device(building: Building, device: Device, columns: Collection[str]) -> Iterator[Commanded]:
     if device.zone is None:
         return
-    flow, discharge, power, damper, valve = (
-        f"{device.name}/{point}" in columns
-        for point in (SUPPLY_FLOW, DISCHARGE_TEMPERATURE, HEATING_POWER, DAMPER, VALVE)
-    )
+    flow, discharge, power, damper, valve = told = _told(device, columns)
     air, water = air_column(building, device, columns), _fed(building, device, (_SUPPLY_WATER,), columns)
     if damper and not flow and air is not None:
         yield Commanded(device.name, device.zone, "damper", (f"{device.name}/{DAMPER}", air))
     if valve and not power and not (discharge and (flow or damper)):
         yield Commanded(device.name, device.zone, "valve", (f"{device.name}/{VALVE}", *([water] if water else [])))
-    if not any((flow, discharge, power, damper, valve)):
+    if not any(told):
         counter = _fed(building, device, (HEATING_POWER, GAS), columns)
-        if counter is not None and all(_is_silent(d, columns) for d in _fed_by(building, counter.partition("/")[0])):
+        if counter is None:
+            return
+        others = _fed_by(building, counter.partition("/")[0])
+        if not any(any(_told(d, columns)) for d in others):
             yield Commanded(device.name, device.zone, "counter", (counter,))
 
 
@@ -118,7 +118,7 @@ def _fed_by(building: Building, feeder: str) -> list[Device]:
     return [d for d in building.devices if d.name in reached and d.zone is not None]
 
 
-def _is_silent(device: Device, columns: Collection[str]) -> bool:
-    """Whether nothing tells what a device does, so that the counter of its feeder has to."""
+def _told(device: Device, columns: Collection[str]) -> tuple[bool, ...]:
+    """Which points of a device tell its heat: flow, discharge temperature, power, damper, valve."""
     points = (SUPPLY_FLOW, DISCHARGE_TEMPERATURE, HEATING_POWER, DAMPER, VALVE)
-    return not any(f"{device.name}/{point}" in columns for point in points)
+    return tuple(f"{device.name}/{point}" in columns for point in points)

@@ -76,8 +76,8 @@ def challenge(
 
 def _price(rounds: Sequence[Round]) -> float:
     """Evidence that the choice of zones has cost what was accepted [-]."""
-    found = [r for r in rounds if r.accepted is not None]
-    return sum(r.after.evidence - r.before.evidence - r.accepted.gain for r in found if r.accepted is not None)
+    accepted = [(r, r.accepted.gain) for r in rounds if r.accepted is not None]
+    return sum(r.after.evidence - r.before.evidence - gain for r, gain in accepted)
 
 
 def _values(fit: Fit, effects: dict[str, tuple[str, ...]]) -> dict[str, float]:
