@@ -9,8 +9,9 @@ from typing import Any
 import pandas as pd
 
 from calibration.diagnosis.decide.levels import p_value
-from calibration.diagnosis.decide.verdict import Verdict, doubted, gains_of, judge
+from calibration.diagnosis.decide.verdict import Verdict, chance_of, doubted, gains_of, judge
 from calibration.diagnosis.decide.where import DriftCurve, Where, drift_of, where_it_lies
+from calibration.diagnosis.free import drawing_fails, search_free
 from calibration.diagnosis.handed_on import judge_handed_on, other_structures
 from calibration.diagnosis.known import reasons_of
 from calibration.diagnosis.refit.challenge import challenge
@@ -19,6 +20,7 @@ from calibration.diagnosis.refit.how_far import Step, how_far
 from calibration.diagnosis.refit.refit import ACCEPTED, elsewhere, held_out
 from calibration.diagnosis.refit.search import Round, search
 from calibration.diagnosis.screen.missing import Missing, at_start, missing_heat
+from calibration.diagnosis.screen.regular import Regular
 from calibration.estimation.disturbance import DisturbanceModel
 from calibration.evaluation.intervals import Interval
 from calibration.evaluation.n_step import Evaluation, Progress
@@ -107,6 +109,9 @@ class Diagnosis(Result):
         Unmeasured heat and sensor noise of the final model, where that is handed on.
     band_factors : mapping of str to float
         What the filter's deviation is multiplied by for bands of its predictions, by zone [-].
+    left_over : Regular or None
+        What comes back of the final model's errors, where the drawing does not hold and effects were sought about a
+        free structure: `settings` then is of that one.
     """
 
     case: str
@@ -132,6 +137,7 @@ class Diagnosis(Result):
     estimated: tuple[Estimated, ...] = ()
     disturbance: DisturbanceModel | None = None
     band_factors: Mapping[str, float] = field(default_factory=dict)
+    left_over: Regular | None = None
 
     @property
     def final(self) -> Fit:
@@ -180,6 +186,7 @@ class Diagnosis(Result):
             "combinations": [{"effects": list(e), "probability": p} for e, p in self.verdict.combinations.items()],
             "how_far": [s.to_dict() for s in self.steps],
             "rounds": [r.to_dict() | {"worth": gains_of(r)} for r in self.rounds],
+            **({} if self.left_over is None else {"left_over": plain(self.left_over)}),
             "prediction": {"rungs": plain(self.rungs), "held_out_mae": self.predicts, "carried": plain(carried)},
             "intervals": {
                 "tuning": plain(self.tuned),
@@ -314,15 +321,22 @@ def diagnose(
     testable = [e for e in CATALOGUE if e not in untestable]
     rounds = search(models, baseline, errors, testable, progress)
     models, rounds = challenge(models, rounds, testable, progress)
+    about_drawing = judge(rounds, untestable).name
+    # a drawing that is known to lack what nothing explains has no advance
+    advance = 0.0 if about_drawing == "unexplained" else ADVANCE
+    rungs, kept, left = other_structures(models, rounds[-1].after, progress, advance)
+    left_over = None
+    if kept is not None and about_drawing != "no_gap" and drawing_fails(rungs, kept):  # names make up for it
+        free = search_free(models, kept, known, ruled_out, progress)
+        models, rounds, untestable, left_over, kept = (
+            free.models, free.rounds, free.untestable, free.left_over, free.kept,
+        )  # fmt: skip
     errors, where = rounds[0].held_out, where_it_lies(models, rounds[0].before)
     steps, floor = how_far(models, rounds)
     areas = {name: room.floor_area for name, room in models.anatomy.rooms.items()}
     watts = rounds[0].screening.detectable(ACCEPTED)
     void = {s.effects[-1] for s in steps if s.shuffled is not None and s.shuffled <= s.after}
-    verdict = doubted(judge(rounds, untestable), void)
-    # a drawing that is known to lack what nothing explains has no advance
-    advance = 0.0 if verdict.name == "unexplained" else ADVANCE
-    rungs, kept, left = other_structures(models, rounds[-1].after, progress, advance)
+    verdict = doubted(judge(rounds, untestable, left_over), void)
     better = None if kept is None else replace(kept.result(began, progress), rungs=rungs)
     prediction, disturbance, factors = judge_handed_on(models, rounds[-1].after, better, left)
     return Diagnosis(
@@ -332,7 +346,7 @@ def diagnose(
         steps=steps,
         gap=errors.mae,
         floor=floor,
-        p_value=p_value(max(gains_of(rounds[0]).values())),
+        p_value=p_value(max(gains_of(rounds[0]).values())) if left_over is None else chance_of(rounds[0]),
         detectable={zone: w * areas[zone] for zone, w in watts.items()},
         rounds=rounds,
         tuned=tuple(models.tuned),
@@ -348,6 +362,7 @@ def diagnose(
         estimated=case.estimated,
         disturbance=disturbance,
         band_factors=factors,
+        left_over=left_over,
     )
 
 

@@ -152,7 +152,8 @@ class TwoNode:
         rate, shape = np.maximum(rate, 1e-12), root[:, None] * modes
         decay = np.exp(-rate * data.step)
         boundary = data.boundary - _REFERENCE
-        into = np.hstack([data.heat + boundary @ air_out.T + data.sun * aperture + gain, boundary @ mass_out.T])
+        lit = data.sun * aperture if data.sun.size else 0.0
+        into = np.hstack([data.heat + boundary @ air_out.T + lit + gain, boundary @ mass_out.T])
         held = self._spun_up(runs, into[:, nz:], diagonal[nz:], between)
         started = np.where(np.isfinite(data.known), data.known, data.held)[runs.starts] - _REFERENCE
         state = np.hstack([started, held[runs.starts - runs.begin]]) / root @ modes
@@ -188,7 +189,7 @@ def _sizes(data: TwoNodeData) -> list[int]:
 
 def _split(data: TwoNodeData, point: FloatArray) -> list[FloatArray]:
     parts = np.split(point, np.cumsum(_sizes(data))[:-1])
-    return [*(np.exp(p) for p in parts[:6]), parts[6] if parts[6].size else np.zeros(1), parts[7]]
+    return [*(np.exp(p) for p in parts[:6]), *parts[6:]]
 
 
 def fit_two_node(data: TwoNodeData, runs: Sequence[Runs], steps: int) -> TwoNode:

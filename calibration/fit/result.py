@@ -86,7 +86,7 @@ class Rung(Plain):
 
     Parameters
     ----------
-    name : {"drawn", "named", "wind", "zoned", "lumped", "recurring"}
+    name : {"drawn", "named", "wind", "zoned", "lumped", "recurring", "shifted"}
         As drawn, with what a diagnosis named, with films that follow the wind, with slabs and furniture by zone,
         lumped, or lumped with a gain that recurs from day to day.
     left_out_mae : float

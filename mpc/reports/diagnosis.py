@@ -15,6 +15,7 @@ from calibration.diagnosis.refit.search import Round
 from calibration.results import Content, check_results_folder, write_results
 from mpc.reports import diagnosis_words
 from mpc.reports.diagnosis_words import accepted, alike, called, in_zones, rivals
+from mpc.reports.drift_words import drift_sentence
 from mpc.reports.evaluation import command, predictions_table, subtitle
 from mpc.reports.figures.diagnosis import change_panels, drift_lines, hour_bars, missing_lines
 from mpc.reports.figures.errors import series_of_runs
@@ -286,7 +287,7 @@ def _where(result: Diagnosis, case: Case, replayed: Sequence[Replay]) -> dict[st
             for p in sorted(parts, key=lambda p: p.predictions - p.share)[:_MOST_PARTS]
         ],
         "hours": hour_bars(where.hours),
-        "drift_sentence": diagnosis_words.drift_sentence(names[1], *(r.drift for r in replayed)),
+        "drift_sentence": drift_sentence(names[1], *(r.drift for r in replayed)),
         "drift": drift_lines(drifts),
     }
 

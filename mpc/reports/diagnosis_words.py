@@ -6,10 +6,11 @@ import numpy as np
 
 from calibration.diagnosis.decide.levels import LARGEST_GROUP
 from calibration.diagnosis.decide.verdict import Candidate, group_of
-from calibration.diagnosis.decide.where import DriftCurve, Where
+from calibration.diagnosis.decide.where import Where
 from calibration.diagnosis.diagnosis import Diagnosis
 from calibration.diagnosis.refit.refit import WINDOWS, Refit
 from mpc.reports.evaluation import beside_sentence, carried_sentence, structure_words
+from mpc.reports.free_words import comes_back, free_sentence, known_effects
 from mpc.reports.page import duration, estimated_sentences, kelvin, listed, percent, sure, watts
 from thermal.effects.catalogue import CATALOGUE
 
@@ -21,9 +22,6 @@ _LIKELY = 0.5
 
 #: Probability from which another effect of a group is worth telling from the likeliest [-].
 _RIVAL = 0.05
-
-#: Share of the last value from which the growth of an error counts as levelled off [-].
-_LEVEL = 0.8
 
 #: More zones than this are counted, not named.
 _MOST_NAMED = 4
@@ -37,15 +35,15 @@ def diagnosis_verdict(result: Diagnosis) -> str:
     result : Diagnosis
         From `diagnose`.
     """
-    text = _verdict(result)
-    if known := list(result.rounds[0].before.effects):
+    text = free_sentence(result) + _verdict(result)
+    if known := known_effects(result):
         text += f" {listed([called(e) for e in known]).capitalize()}, known to be there, is part of the baseline."
     if result.settings.scopes:
         text += (
             " Slabs and furniture have values of each zone's own here: they explain what looked like another effect "
             "while all zones shared one."
         )
-    if result.better is not None:
+    if result.better is not None and result.left_over is None:
         own, beside = next(r.left_out_mae for r in result.rungs if r.chosen), result.rungs[0].left_out_mae
         text += (
             f" For prediction and control take the building {structure_words(result.rungs)}, which calibration.json "
@@ -262,6 +260,7 @@ def _no_gap(result: Diagnosis) -> str:
     if found := accepted(result):
         names = listed([called(r.screened.effect, r.screened.zones) for r in found])
         text += f" A trace of {names} explains too little of the error to be named."
+    text += comes_back(result)
     sizes = [w for w in result.detectable.values() if np.isfinite(w)]
     if not sizes:
         return text
@@ -284,10 +283,12 @@ def _unexplained(result: Diagnosis) -> str:
                 f"about equally well, among them {names}. {error}."
             )
         part = f"{listed([called(r.screened.effect) for r in found])} would be a part of it, and not enough"
-        how_far = _how_far(result, len(found))
+        how_far = _how_far(result, len(found)) + comes_back(result)
         return f"The model leaves something out that no effect we know of explains: {part}. {how_far}"
     text = f"The model leaves something out that no effect we know of explains. {error}"
-    if result.floor < result.gap:
+    if result.left_over is not None:
+        text += f".{comes_back(result)}".rstrip(".")
+    elif result.floor < result.gap:
         text += f", and {kelvin(result.gap - result.floor)} K of it follow time of day, zone or outdoor temperature"
     return f"{text}. The best single guess is {called(best.effect)} ({sure(best.probability)}): not enough to name it."
 
@@ -333,66 +334,3 @@ def alternating_sentence(result: Diagnosis) -> str:
         "The telemetry's last third shows other weather or use than the days before it: a baseline tuned on these "
         f"misses it by {kelvin(result.last_third)} K. So tuning and held-out days alternate."
     )
-
-
-def drift_sentence(found: str, before: DriftCurve, after: DriftCurve | None = None) -> str:
-    """Say what the growth of the error tells.
-
-    Parameters
-    ----------
-    found : str
-        What the final model is called, such as ``with the effect found``.
-    before : DriftCurve
-        Of the calibrated model.
-    after : DriftCurve, optional
-        Of the final model, where it has an effect.
-    """
-    text = f"Left to itself, the calibrated model's error {growth_words(before)}; it is {end_words(before)}."
-    if after is None:
-        return text
-    if after.kind == before.kind != "hump":
-        slope = f"{max(0.0, after.slope):.2f}"
-        return f"{text} {found.capitalize()} it grows alike (slope {slope}) and is {end_words(after)}."
-    return f"{text} {found.capitalize()} it {growth_words(after)}; it is {end_words(after)}."
-
-
-def growth_words(curve: DriftCurve) -> str:
-    """Say how the error of free runs grows and what makes it so.
-
-    Parameters
-    ----------
-    curve : DriftCurve
-        Of a model.
-    """
-    how = f"slope {max(0.0, curve.slope):.2f}"
-    if curve.hump is not None:
-        at, top, low = curve.hump
-        return (
-            f"is largest {duration(at)} after the start ({kelvin(top)} K) and then falls to {kelvin(low)} K, as "
-            "where the mass of air and furniture is wrong or a sensor lags"
-        )
-    if curve.kind == "sensors":
-        cause = "as where readings are off, or air has yet to mix after a switch"
-        return f"is there from the first step and hardly grows ({how}), {cause}"
-    if curve.kind == "random":
-        return f"grows with the square root of time at first ({how}), as where heat comes and goes at random"
-    return f"grows nearly in proportion to time at first ({how}), as where heat is missing for hours on end"
-
-
-def end_words(curve: DriftCurve) -> str:
-    """Say where the error of free runs ends, and how soon it is near that.
-
-    Parameters
-    ----------
-    curve : DriftCurve
-        Of a model.
-    """
-    last, span = float(curve.rms[-1]), f"{curve.seconds[-1] / 3600.0:g} hours"
-    near = float(curve.seconds[int(np.argmax(curve.rms >= _LEVEL * last))])
-    ends = f"{kelvin(last)} K after {span}"
-    if near <= curve.seconds[0] or curve.kind in ("sensors", "hump"):
-        return ends
-    if near > 0.5 * curve.seconds[-1]:
-        return f"{ends}, and still grows there"
-    about = f"{near / 3600.0:.0f} hours" if near >= 5400.0 else duration(near)
-    return f"{ends}, four fifths of which it has after {about}"

@@ -11,6 +11,7 @@ from calibration.diagnosis.refit.comparison import Fit
 from calibration.diagnosis.refit.refit import ACCEPTED, Refit, promising
 from calibration.diagnosis.refit.search import Round
 from calibration.diagnosis.screen.gains import Gain
+from calibration.diagnosis.screen.regular import Regular
 from thermal.effects.catalogue import CATALOGUE
 
 #: Standard deviations from the estimate to an end of a 90 % interval [-].
@@ -106,7 +107,7 @@ class Verdict:
     combinations: Mapping[tuple[str, ...], float]
 
 
-def judge(rounds: Sequence[Round], untestable: Mapping[str, str]) -> Verdict:
+def judge(rounds: Sequence[Round], untestable: Mapping[str, str], left_over: Regular | None = None) -> Verdict:
     """Judge what the rounds of a search found.
 
     Parameters
@@ -115,6 +116,9 @@ def judge(rounds: Sequence[Round], untestable: Mapping[str, str]) -> Verdict:
         Of the search.
     untestable : mapping of str to str
         Effects that the case cannot tell, with the reason.
+    left_over : Regular, optional
+        What comes back of the errors of the last model, where that says whether something is left over; their size by
+        default.
     """
     probability: dict[str, float] = dict.fromkeys(CATALOGUE, 0.0)
     score: dict[str, float] = dict.fromkeys(CATALOGUE, -np.inf)
@@ -134,9 +138,9 @@ def judge(rounds: Sequence[Round], untestable: Mapping[str, str]) -> Verdict:
             chain.append((tuple(r.before.effects), real * none))
             real *= 1.0 - none
     chain.append((tuple(rounds[-1].after.effects), real))
-    name = _name(rounds)
+    name = _name(rounds, left_over)
     if name == "unexplained" and chain[1:]:  # what explains a part only is there with no more than that probability
-        share = float(np.clip(_explained(rounds, _left_over(rounds[-1].after)), 0.0, 1.0))
+        share = float(np.clip(_explained(rounds, left_over), 0.0, 1.0))
         probability = {e: share * p for e, p in probability.items()}
     first = [r.accepted.screened.effect for r in rounds if r.accepted is not None and name in ("named", "group")]
     candidates = sorted(
@@ -201,25 +205,31 @@ def group_of(r: Round, effect: str) -> tuple[str, ...]:
     return tuple(alike)
 
 
-def _name(rounds: Sequence[Round]) -> VerdictName:
-    first, final = rounds[0], rounds[-1].after
-    left_over = _left_over(final)
-    enough = levels.EXPLAINED_OF_MUCH if left_over else levels.EXPLAINED
+def _name(rounds: Sequence[Round], left_over: Regular | None) -> VerdictName:
+    first = rounds[0]
+    much = _left_over(rounds[-1].after) if left_over is None else left_over.counts
+    enough = levels.EXPLAINED_OF_MUCH if much else levels.EXPLAINED
     if first.accepted is not None and _explained(rounds, left_over) >= enough:
         size = len(group_of(first, first.accepted.screened.effect))
         if size <= levels.LARGEST_GROUP:
             return "named" if size == 1 else "group"
         return "unexplained"
-    gap = first.accepted is not None or first.generic.gain > levels.GENERIC_GAP or left_over
-    return "unexplained" if gap else "no_gap"
+    shows = left_over is None and first.generic.gain > levels.GENERIC_GAP
+    return "unexplained" if first.accepted is not None or shows or much else "no_gap"
 
 
-def _explained(rounds: Sequence[Round], left_over: bool) -> float:
-    """Share of the squared error that is explained: where it was fitted, or held out unless much is left over."""
+def _explained(rounds: Sequence[Round], left_over: Regular | None) -> float:
+    """Share of the squared error that is explained: where it was fitted, or held out unless much is left over.
+
+    Where it is known what comes back of the rest, the share of that and of what was explained.
+    """
     first, last = rounds[0], rounds[-1]
-    tuning = last.after.found.mean_square / first.before.found.mean_square
+    before, after = first.before.found.mean_square, last.after.found.mean_square
+    if left_over is not None:
+        return (before - after) / max(before - after + left_over.explains * left_over.counts, 1e-12)
+    tuning = after / before
     held_out = (last.after_held_out.mae / first.held_out.mae) ** 2
-    return 1.0 - (tuning if left_over else min(tuning, held_out))
+    return 1.0 - (tuning if _left_over(last.after) else min(tuning, held_out))
 
 
 def _left_over(fit: Fit) -> bool:
@@ -277,6 +287,21 @@ def gains_of(r: Round) -> dict[str, float]:
     """
     gains = {g.effect: g.gain if promising(r.before, g.share) else min(g.gain, levels.SMALL) for g in r.gains}
     return gains | {x.screened.effect: _evidence(x) for x in r.refits} | _led(r)
+
+
+def chance_of(r: Round) -> float:
+    """Bound the probability of as large a gain where nothing is missing, from the evidence alone [-].
+
+    A Bayes factor exceeds B with a probability of 1/B at most where its denominator is true (Ville 1939, Markov's
+    inequality); with several effects, of their number over B.
+
+    Parameters
+    ----------
+    r : Round
+        Of the search.
+    """
+    gains = gains_of(r)
+    return float(min(1.0, len(gains) * np.exp(-max(gains.values()))))
 
 
 def levelled(r: Round) -> dict[str, float]:

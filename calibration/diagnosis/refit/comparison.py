@@ -1,7 +1,7 @@
 """Comparison of models of one case: with some effects of the catalogue each, fitted to the same telemetry."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -196,6 +196,8 @@ class ModelComparison:
         As in `calibration.calibrate`.
     horizon : str
         Prediction horizon.
+    weights : Problem, optional
+        Whose errors count as many and whose groups spread as far; one error a day and zone by default.
     """
 
     case: Case
@@ -203,6 +205,7 @@ class ModelComparison:
     tune: Sequence[Interval] = ()
     hold_out: Sequence[Interval] = ()
     horizon: str = "6h"
+    weights: Problem | None = None
 
     def __post_init__(self) -> None:
         self.tuned, self.judged = intervals.default_intervals(self.case, self.tune, self.hold_out)
@@ -284,7 +287,11 @@ class ModelComparison:
         steps = horizon_steps(self.horizon, built.inputs.step)
         runs = tuning_runs(built.inputs, self.tuned, steps, self.settings.spin_up_seconds)
         free = tuple(range(len(theta)))
-        return Problem(built.grid, built.inputs, runs, steps, free, theta, self.settings.stepping)
+        problem = Problem(built.grid, built.inputs, runs, steps, free, theta, self.settings.stepping)
+        if self.weights is None:
+            return problem
+        known = self.weights
+        return replace(problem, effective=known.effective_size(), shrinkage=known.shrinkage, capped=known.capped)
 
     def fit(
         self,

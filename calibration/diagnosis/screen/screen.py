@@ -11,22 +11,18 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 
 from calibration.diagnosis.refit.comparison import Fit, ModelComparison, is_strength
+from calibration.diagnosis.screen.drivers import BIN, BINS, OUTDOOR
 from calibration.diagnosis.screen.gains import Gain, choice_of
 from thermal._types import BoolArray, FloatArray, IntArray
 from thermal.effects.catalogue import CATALOGUE
 from thermal.effects.effect import PAIR, Chosen, Effect, EffectBuilder, strength
-from thermal.inputs.provider import InputProvider
-from thermal.inputs.signals import CONSTANT, Signal
+from thermal.inputs.signals import CONSTANT
 from thermal.model.reduce import FEW_SHIFTS, SHIFTS, reduced_model
 from thermal.parameters import Parameter
-
-#: Hours of a bin of the day.
-_BIN = 3
 
 #: Heat that is plausible in a bin [W/m2], and per kelvin of outdoor temperature [W/m2/K].
 _HEAT, _PER_KELVIN = 20.0, 1.0
@@ -49,23 +45,12 @@ _MOST_ZONES = 24
 _TIGHTNESS = (0.003, 0.01, 0.03, 0.1, 0.3)
 
 
-def _hours(drivers: InputProvider, first: int) -> FloatArray:
-    hour = np.asarray(drivers.stamps.hour)
-    return ((hour >= first) & (hour < first + _BIN)).astype(float)
-
-
-def _outdoor(drivers: InputProvider) -> FloatArray:
-    return np.asarray(drivers.outdoor - drivers.outdoor.mean())
-
-
 def _build(builder: EffectBuilder) -> None:
-    outdoor = Signal("outdoor temperature about its mean", "K", _outdoor, ("outdoor",))
     for room in builder.rooms:
-        for first in range(0, 24, _BIN):
-            signal = Signal(f"{first} to {first + _BIN} h", "1", partial(_hours, first=first))
-            builder.heat_air(room, builder.parameter(f"heat_from_{first:02d}"), signal, room.floor_area)
+        for number, signal in enumerate(BINS):
+            builder.heat_air(room, builder.parameter(f"heat_from_{BIN * number:02d}"), signal, room.floor_area)
         builder.heat_air(room, builder.parameter(ZONE_HEAT, zone=room.name), CONSTANT, room.floor_area)
-        builder.heat_air(room, builder.parameter("heat_by_outdoor", zone=room.name), outdoor, room.floor_area)
+        builder.heat_air(room, builder.parameter("heat_by_outdoor", zone=room.name), OUTDOOR, room.floor_area)
 
 
 #: Constant heat of a zone [W/m2], by which the smallest detectable watts are told.
@@ -83,7 +68,7 @@ GENERIC = Effect(
     parameters=(
         *(
             strength(f"heat_from_{first:02d}", "W/m^2", _HEAT, _SOURCE, "generic", -_HEAT)
-            for first in range(0, 24, _BIN)
+            for first in range(0, 24, BIN)
         ),
         strength(ZONE_HEAT, "W/m^2", _HEAT, _SOURCE, "generic", -_HEAT),
         strength("heat_by_outdoor", "W/m^2/K", _PER_KELVIN, _SOURCE, "generic", -_PER_KELVIN),

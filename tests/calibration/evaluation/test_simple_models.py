@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 
@@ -62,6 +63,19 @@ def test_nothing_is_fitted_to_what_is_held_out(model: CaseModel, case: Case) -> 
     plain, changed = (_judged(m, case, [day])[0].yardsticks for m in (model, later))
     assert plain is not None and changed is not None
     assert plain.to_dict() == changed.to_dict()
+
+
+def test_one_zone_without_irradiance_has_its_yardsticks(model: CaseModel, case: Case) -> None:
+    name = case.building.zone_names[0]
+    zone = np.full_like(model.inputs.zone, np.nan)
+    zone[:, 0] = model.inputs.zone[:, 0]
+    frame = case.telemetry.frame
+    dark = frame.drop(columns=[c for c in frame if "irradiance" in c])
+    dark_case = replace(case, telemetry=replace(case.telemetry, frame=dark), judged=None)
+    alone = replace(model, case=dark_case, inputs=replace(model.inputs, zone=zone))
+    found = _judged(alone, dark_case)[0].yardsticks
+    assert found is not None and found.rc is not None and found.arx is not None, name
+    assert found.rc < 0.5 * found.persistence
 
 
 def test_without_tuning_days_only_persistence_is_left(model: CaseModel, case: Case) -> None:

@@ -4,6 +4,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from calibration.evaluation.intervals import default_intervals
@@ -29,8 +30,8 @@ def climbed(case: Case) -> CalibrationResult:
 
 
 def test_what_predicts_left_out_days_better_is_kept(climbed: CalibrationResult) -> None:
-    drawn, wind, zoned, lumped = climbed.rungs
-    assert [rung.name for rung in climbed.rungs] == ["drawn", "wind", "zoned", "lumped"]
+    drawn, wind, zoned, lumped, shifted = climbed.rungs
+    assert [rung.name for rung in climbed.rungs] == ["drawn", "wind", "zoned", "lumped", "shifted"]
     assert zoned.parameters > drawn.parameters == wind.parameters
     assert wind.left_out_mae < drawn.left_out_mae  # or it would not have been fitted
     simpler = min(wind.left_out_mae, zoned.left_out_mae)
@@ -38,8 +39,27 @@ def test_what_predicts_left_out_days_better_is_kept(climbed: CalibrationResult) 
     assert climbed.settings.structure.lumped == lumped.chosen
     # the bundled building has sun, which the drawing leaves to an effect
     assert lumped.chosen
+    # its clocks are right
+    assert shifted.parameters == lumped.parameters + 2
+    assert shifted.left_out_mae > 0.95 * lumped.left_out_mae
     plain = climbed.to_dict()
-    assert [rung["name"] for rung in plain["rungs"]] == ["drawn", "wind", "zoned", "lumped"]
+    assert [rung["name"] for rung in plain["rungs"]] == [rung.name for rung in climbed.rungs]
+
+
+def test_heat_that_is_stamped_too_early_is_moved(case: Case) -> None:
+    frame = case.telemetry.frame.copy()
+    heat = [c for c in frame if c.endswith(("/supply_air_flowrate_sensor", "/discharge_air_temperature_sensor"))]
+    steps = round(2400.0 / case.step)
+    frame[heat] = frame[heat].shift(-steps).ffill()
+    early = replace(case, telemetry=replace(case.telemetry, frame=frame), judged=None)
+    result = calibrate(early, settings={**QUICK, "climb": True})
+    assert [rung.name for rung in result.rungs if rung.chosen] == ["shifted"]
+    shift = next(p for p in result.parameters if p.name == "heat_clock_shift")
+    assert shift.standard_error is not None
+    assert 3.0 * shift.standard_error < shift.value < steps * case.step / 3600.0  # by the first term of its series
+    left = next(rung.left_out_mae for rung in result.rungs if rung.name == "lumped")
+    assert next(rung.left_out_mae for rung in result.rungs if rung.chosen) < 0.95 * left
+    assert "with heat and weather moved in time" in calibration_verdict(result)
 
 
 def test_films_that_follow_the_wind_are_kept_without_an_advance(case: Case, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -51,7 +71,8 @@ def test_films_that_follow_the_wind_are_kept_without_an_advance(case: Case, monk
     assert "outside films that follow the wind" in calibration_verdict(result)
     frame = case.telemetry.frame.drop(columns="weather_station/wind_speed_sensor")
     still = replace(case, telemetry=replace(case.telemetry, frame=frame), judged=None)
-    assert [r.name for r in calibrate(still, settings={**QUICK, "climb": True}).rungs] == ["drawn", "zoned", "lumped"]
+    names = [r.name for r in calibrate(still, settings={**QUICK, "climb": True}).rungs]
+    assert names[:3] == ["drawn", "zoned", "lumped"]
 
 
 def test_before_is_what_the_drawing_says(case: Case, climbed: CalibrationResult) -> None:
@@ -66,7 +87,8 @@ def test_held_out_days_have_no_say(case: Case, climbed: CalibrationResult) -> No
     _, (held_out,) = default_intervals(case)
     frame = case.telemetry.frame.copy()
     warm = [c for c in frame.columns if c.endswith("/zone_air_temperature_sensor")]
-    frame.loc[frame.index >= held_out.start, warm] += 3.0
+    # heat that is moved in time is told from its change, to which the step after belongs
+    frame.loc[frame.index > held_out.start + pd.Timedelta(seconds=case.step), warm] += 3.0
     other = replace(case, telemetry=replace(case.telemetry, frame=frame), judged=None)
     again = calibrate(other, settings={**QUICK, "climb": True})
     assert again.rungs == climbed.rungs
@@ -101,14 +123,14 @@ def test_left_out_days_make_bands(climbed: CalibrationResult) -> None:
 
 def test_a_gain_that_recurs_is_kept_where_it_predicts_better(case: Case, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(ladder, "_WEEK", 3.0)
-    *_, lumped, recurring = calibrate(case, settings={**QUICK, "climb": True}).rungs
+    *_, lumped, recurring, _ = calibrate(case, settings={**QUICK, "climb": True}).rungs
     further = recurring.parameters - lumped.parameters
     assert (recurring.name, further) == ("recurring", 6 * len(case.building.zone_names))
     assert recurring.chosen == (recurring.left_out_mae < 0.9 * lumped.left_out_mae)
     # it predicts days left out worse here, with five of them to learn from
     monkeypatch.setattr(ladder, "ADVANCE", -1.0)
     result = calibrate(case, settings={**QUICK, "climb": True})
-    assert [rung.chosen for rung in result.rungs] == [False] * 4 + [True]
+    assert [rung.chosen for rung in result.rungs] == [False] * 4 + [True, False]
     assert result.settings.structure.recurring
     assert "recurs from day to day" in calibration_verdict(result)
     # with more freedom the days that were fitted are followed more closely

@@ -13,7 +13,7 @@ from calibration.diagnosis.decide.where import DriftCurve, drift_of
 from calibration.diagnosis.refit.comparison import ModelComparison
 from calibration.errors import NotEnoughDataError
 from calibration.evaluation.settings import ModelSettings
-from mpc.reports.diagnosis_words import drift_sentence, end_words, growth_words
+from mpc.reports.drift_words import drift_sentence, end_words, growth_words
 from thermal.pilot.building import pilot_building
 from thermal.pilot.twin import TwinRanges, TwinSettings, generate_twin
 

@@ -1,0 +1,57 @@
+"""What a diagnosis says where a drawing does not hold, so that effects were sought about a free structure."""
+
+from calibration.diagnosis.diagnosis import Diagnosis
+from calibration.fit.ladder import CLOCK
+from mpc.reports.evaluation import structure_words
+from mpc.reports.page import kelvin, listed
+
+#: Share of the squared error from which a kind of heat is named [-], and most kinds that are.
+_SHOWN, _MOST = 0.05, 2
+
+
+def free_sentence(result: Diagnosis) -> str:
+    """Say that the drawing does not hold, and what the rest is about; nothing where it does.
+
+    Parameters
+    ----------
+    result : Diagnosis
+        From `diagnose`.
+    """
+    if result.left_over is None:
+        return ""
+    own, drawn = next(r.left_out_mae for r in result.rungs if r.chosen), result.rungs[0].left_out_mae
+    return (
+        f"The drawing does not hold: the building {structure_words(result.rungs)} misses tuning days that were left "
+        f"out by {kelvin(own)} K, as drawn by {kelvin(drawn)} K. calibration.json holds it, and effects were sought "
+        "about it. "
+    )
+
+
+def comes_back(result: Diagnosis) -> str:
+    """Say what is left of the error, and what it answers to; nothing where that was not judged.
+
+    Parameters
+    ----------
+    result : Diagnosis
+        From `diagnose`.
+    """
+    left = result.left_over
+    if left is None:
+        return ""
+    if not left.counts:
+        return " What is left of it does not come back on other days with weather or clock: much of it is chance."
+    most = [kind for kind in sorted(left.shares, key=lambda k: -left.shares[k]) if left.shares[kind] > _SHOWN]
+    to = f", most of all with {listed(most[:_MOST])}" if most else ""
+    return f" {kelvin(left.fall)} K of what is left come back on days that were left out{to}."
+
+
+def known_effects(result: Diagnosis) -> list[str]:
+    """Name effects of the baseline that somebody knew of, and that are no part of a free structure.
+
+    Parameters
+    ----------
+    result : Diagnosis
+        From `diagnose`.
+    """
+    moved = result.left_over is not None and any(r.chosen and r.name == "shifted" for r in result.rungs)
+    return [e for e in result.rounds[0].before.effects if not (moved and e == CLOCK)]

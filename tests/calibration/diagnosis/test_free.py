@@ -1,0 +1,122 @@
+"""Diagnosis of a building whose drawing is wrong: sought about a free structure, which needs no name for that."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from calibration.diagnosis.decide.verdict import chance_of, judge
+from calibration.diagnosis.diagnosis import Diagnosis, baseline_gap, diagnose
+from calibration.diagnosis.free import drawing_fails
+from calibration.diagnosis.refit.comparison import Fit, ModelComparison
+from calibration.diagnosis.screen.regular import Regular, regular
+from calibration.evaluation.settings import ModelSettings
+from calibration.fit.result import Rung
+from mpc.reports.diagnosis_words import diagnosis_verdict
+from thermal import Case, Telemetry
+from thermal.case.building import GROUND, OUTDOOR, Building, Layer, Surface, ZoneEntry, ZoneTable
+from thermal.pilot.building import pilot_building
+from thermal.pilot.twin import TwinRanges, TwinSettings, generate_twin
+
+#: A wall that no building has.
+THIN = (Layer(thickness=0.1, conductivity=0.5, density=300.0, heat_capacity=800.0),)
+
+
+@cache
+def twin() -> Case:
+    """Half a month of an office of four zones, quiet but for its thermostats."""
+    building = pilot_building(3, floor_area=120.0, zones=4, floors=1, name="office")
+    quiet = TwinRanges(disturbance_deviation=(0.05, 0.1), noise=(0.005, 0.01))
+    settings = TwinSettings(days=15.0, step_seconds=900.0, dx=1.0, meter="exact", ranges=quiet)
+    return generate_twin(building, 3, settings)[0]
+
+
+def drawn_wrongly(building: Building) -> Building:
+    """The same zones, a quarter as large, joined to nothing but outdoor and ground."""
+    rooms = ModelSettings(dx=1.0).network(building).anatomy.rooms
+    zones, surfaces = [], []
+    for name in building.zone_names:
+        area = rooms[name].floor_area / 4.0
+        zones.append(ZoneEntry(name=name, volume=2.7 * area, floor_area=area))
+        wall = {"kind": "wall", "other": OUTDOOR, "area": 30.0, "azimuth": 0.0}
+        floor = {"kind": "floor", "other": GROUND, "area": area}
+        for part in (wall, floor):
+            surfaces.append(Surface(name=f"{part['kind']} {name}", zone=name, construction="thin", **part))
+    return replace(building, geometry=ZoneTable(tuple(zones), tuple(surfaces), {"thin": THIN}))
+
+
+@cache
+def diagnosed() -> Diagnosis:
+    return diagnose(Case(drawn_wrongly(twin().building), twin().telemetry))
+
+
+def test_a_wrong_drawing_is_said_to_be_wrong_and_the_search_goes_on_without_it() -> None:
+    found = diagnosed()
+    drawn, *others = found.rungs
+    assert next(r for r in others if r.chosen).left_out_mae < 0.9 * drawn.left_out_mae
+    assert found.settings.structure.lumped
+    assert found.left_over is not None and not found.left_over.counts
+    assert found.verdict.name != "unexplained"
+    assert found.gap < 0.3 < baseline_gap(Case(drawn_wrongly(twin().building), twin().telemetry))
+    assert found.better is not None and found.better.settings.structure.lumped
+    assert dict(found.better.settings.effects) == found.final.effects
+    assert found.predicts <= found.gap
+    content = found.to_dict()
+    assert content["left_over"]["shares"].keys() == found.left_over.shares.keys()
+    assert content["gap"]["p_value"] == chance_of(found.rounds[0])
+    assert diagnosis_verdict(found).startswith("The drawing does not hold")
+
+
+def test_what_is_left_is_said_to_come_back_or_not() -> None:
+    found = replace(diagnosed(), rounds=diagnosed().rounds[-1:])
+    nothing = replace(found, verdict=replace(found.verdict, name="no_gap"))
+    assert "does not come back" in diagnosis_verdict(nothing)
+    back = Regular(fall=0.2, sure=5.0, explains=0.1, shares={"sun": 0.5, "wind": 0.01})
+    shown = replace(found, verdict=replace(found.verdict, name="unexplained"), left_over=back)
+    assert "0.20 K of what is left come back on days that were left out, most of all with sun." in diagnosis_verdict(
+        shown
+    )
+
+
+def test_the_chance_of_a_gain_is_that_of_bayes_factors() -> None:
+    (r, *_) = diagnosed().rounds
+    most = max(g.gain for g in r.gains)
+    assert chance_of(r) == pytest.approx(min(1.0, len(r.gains) * np.exp(-most)), rel=0.5)
+    strong = replace(r, gains=tuple(replace(g, gain=12.0) for g in r.gains[:1]), refits=())
+    assert chance_of(strong) <= np.exp(-3.0)
+
+
+def test_what_is_left_over_decides_where_it_was_judged() -> None:
+    rounds = diagnosed().rounds[-1:]
+    shows = Regular(fall=0.2, sure=5.0, explains=0.1, shares={"sun": 0.5})
+    assert judge(rounds, {}, shows).name == "unexplained"
+    assert judge(rounds, {}, replace(shows, sure=1.0)).name == "no_gap"
+    assert judge(rounds, {}, replace(shows, fall=0.01)).name == "no_gap"
+
+
+def test_a_structure_that_is_hardly_better_leaves_the_drawing_in_place() -> None:
+    rungs = (Rung("drawn", 0.2, 13, False), Rung("lumped", 0.19, 100, True))
+    assert not drawing_fails(rungs, None)
+
+
+def baseline(case: Case) -> tuple[ModelComparison, Fit]:
+    models = ModelComparison(case, ModelSettings(dx=1.0))
+    return models, models.fit({}, [{}])
+
+
+def test_nothing_comes_back_where_nothing_is_missing() -> None:
+    found = regular(*baseline(twin()))
+    assert not found.counts
+    assert found.fall < 0.01
+
+
+def test_heat_that_is_missing_at_night_comes_back_with_the_time_of_day() -> None:
+    frame = twin().telemetry.frame.copy()
+    flows = [c for c in frame if c.endswith("/supply_air_flowrate_sensor")]
+    hours = np.asarray(frame.index.hour)
+    frame.loc[(hours >= 3) & (hours < 6), flows] = 0.0
+    found = regular(*baseline(Case(twin().building, Telemetry.from_frame(frame))))
+    assert found.counts
+    assert max(found.shares, key=lambda kind: found.shares[kind]) == "time of day"
+    assert found.shares["time of day"] > 0.3
