@@ -1,8 +1,8 @@
 """Blind trials of the diagnosis on measured buildings: as they are, and with a known fault put into their telemetry.
 
 Nobody knows all that a measured building holds, so each is its own twin: effects that the diagnosis of the case as it
-is accepts are the building's, and of the others what is put in must come first. A spoil counts where it raises the held-out error of the
-calibrated baseline by 0.05 K over that of the twin. Telemetry is spoilt in these ways:
+is accepts are the building's, and of the others what is put in must come first. A spoil counts where it raises the
+held-out error of the calibrated baseline by 0.05 K over that of the twin. Telemetry is spoilt in these ways:
 
 - ``sensor_bias``, ``sensor_lag``: one zone's sensor reads too much or too little, or follows slowly;
 - ``clock_shift``: the weather station's clock is off, by an hour or by as many steps as can be seen;

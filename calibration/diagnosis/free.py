@@ -10,10 +10,15 @@ from calibration.diagnosis.refit.search import Round, search
 from calibration.diagnosis.screen.regular import Regular, regular
 from calibration.evaluation.n_step import Progress
 from calibration.fit.fitted_case import FittedCase, fit_case
-from calibration.fit.ladder import ADVANCE
 from calibration.fit.left_out import Known, values_of
 from calibration.fit.result import Rung
 from thermal.effects.catalogue import CATALOGUE
+
+#: Share by which a free structure must predict left-out days better than the building as drawn with what was found [-].
+#: Of 32 blind trials of offices that were answered with a name or left unexplained one is better by 13 %, one by 12,
+#: the others by 6 at most; of the Twin House N2, whose names were wrong in part, by 25; of three measured houses by 40
+#: to 90.
+FAILS = 0.2
 
 
 @dataclass(frozen=True)
@@ -53,7 +58,7 @@ def drawing_fails(rungs: Sequence[Rung], kept: FittedCase | None) -> bool:
     """
     if kept is None or not kept.settings.structure.lumped:
         return False
-    return next(r for r in rungs if r.chosen).left_out_mae < (1.0 - ADVANCE) * rungs[0].left_out_mae
+    return next(r for r in rungs if r.chosen).left_out_mae < (1.0 - FAILS) * rungs[0].left_out_mae
 
 
 def search_free(
