@@ -335,7 +335,7 @@ def diagnose(
     steps, floor = how_far(models, rounds)
     areas = {name: room.floor_area for name, room in models.anatomy.rooms.items()}
     watts = rounds[0].screening.detectable(ACCEPTED)
-    void = {s.effects[-1] for s in steps if s.shuffled is not None and s.shuffled <= s.after}
+    void = {s.effects[-1] for s in steps if s.void}
     verdict = doubted(judge(rounds, untestable, left_over), void)
     better = None if kept is None else replace(kept.result(began, progress), rungs=rungs)
     prediction, disturbance, factors = judge_handed_on(models, rounds[-1].after, better, left)

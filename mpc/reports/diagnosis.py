@@ -237,7 +237,7 @@ def _waterfall(result: Diagnosis) -> list[tuple[str, float, float]]:
 
 
 def _test_sentences(result: Diagnosis) -> list[str]:
-    """Say what permuted signals and the runner-up make of the error."""
+    """Say what permuted signals, halves of the days and the runner-up make of the effects."""
     sentences = []
     for i, (step, r) in enumerate(zip(result.steps, result.rounds, strict=False)):
         name = called(step.effects[-1])
@@ -247,6 +247,11 @@ def _test_sentences(result: Diagnosis) -> list[str]:
             sentences.append(
                 f"With the signals behind {name} put on other days the error is {kelvin(step.shuffled)} K instead of "
                 f"{kelvin(step.after)} K: {verdict}."
+            )
+        if not step.repeats:
+            sentences.append(
+                f"The two halves of the tuning days do not agree on {name}: be careful with this effect; what is there "
+                "in one half only is no part of the building, or acts in another way."
             )
         others = [x for x in r.refits if x is not r.accepted]
         if step.runner_up is not None and others and (i == 0 or step.runner_up < step.after):

@@ -38,7 +38,7 @@ TEMPERATURE = 2.0
 #: to [-].
 SMALL, DOUBTFUL = 4.0, 1.0
 
-#: Most probability of an effect whose signals explain as much when they are put on other days [-].
+#: Most probability of an effect whose signals explain as much on other days, or that does not repeat [-].
 VOID = 0.5
 
 #: Probability from which an effect belongs to the 90 % set [-].

@@ -155,14 +155,14 @@ def judge(rounds: Sequence[Round], untestable: Mapping[str, str], left_over: Reg
 
 
 def doubted(verdict: Verdict, effects: Collection[str]) -> Verdict:
-    """Cap the probability of effects whose signals explain as much on other days.
+    """Cap the probability of effects whose signals explain as much on other days, or that do not repeat.
 
     Parameters
     ----------
     verdict : Verdict
         From `judge`.
     effects : collection of str
-        Whose permutation test is void.
+        Whose tests are void.
     """
     capped = (
         replace(c, probability=min(c.probability, levels.VOID)) if c.effect in effects else c

@@ -1,4 +1,4 @@
-"""How far the gap shrinks: held-out errors before and after each effect, the floor, permutation test, runner-up."""
+"""How far the gap shrinks: held-out errors by effect, the floor, permutation test, runner-up, halves of the days."""
 
 from collections.abc import Sequence
 from contextlib import suppress
@@ -11,6 +11,7 @@ import pandas as pd
 from calibration.diagnosis.refit.comparison import Built, Fit, ModelComparison
 from calibration.diagnosis.refit.fit import solve
 from calibration.diagnosis.refit.refit import HeldOut, held_out
+from calibration.diagnosis.refit.repeat import DISAGREE, agreement
 from calibration.diagnosis.refit.search import Round
 from calibration.diagnosis.screen.screen import GENERIC
 from calibration.errors import HorizonError, NotEnoughDataError
@@ -46,6 +47,9 @@ class Step:
     shuffled, runner_up : float or None
         Held-out error with the signals of the last effect permuted by days, and with the effect that came next in its
         place [K]; None where there is no such test.
+    halves : float or None
+        Probability of estimates of the last effect that differ so much between the halves of the tuning days [-]; None
+        where these cannot be halved.
     bounds : tuple of str
         Baseline parameters on a bound with the effects.
     """
@@ -58,7 +62,19 @@ class Step:
     interval: tuple[float, float] | None
     shuffled: float | None
     runner_up: float | None
+    halves: float | None
     bounds: tuple[str, ...]
+
+    @property
+    def void(self) -> bool:
+        """Whether the last effect explains as much on other days, or is another in each half of the tuning days."""
+        permuted = self.shuffled is not None and self.shuffled <= self.after
+        return permuted or not self.repeats
+
+    @property
+    def repeats(self) -> bool:
+        """Whether the halves of the tuning days agree on the last effect, or cannot tell."""
+        return self.halves is None or self.halves >= DISAGREE
 
     def to_dict(self) -> dict[str, Any]:
         """Entry of ``how_far`` in ``diagnosis.json``."""
@@ -69,7 +85,7 @@ class Step:
             "floor": self.floor,
             "share_closed": self.share_closed,
             "interval": self.interval,
-            "placebo": {"shuffled": self.shuffled, "runner_up": self.runner_up},
+            "placebo": {"shuffled": self.shuffled, "runner_up": self.runner_up, "halves": self.halves},
             "on_bound": self.bounds,
         }
 
@@ -89,7 +105,7 @@ def how_far(models: ModelComparison, rounds: Sequence[Round]) -> tuple[tuple[Ste
     tuple
         The steps, and the floor under the held-out error of the calibrated baseline [K].
     """
-    before, floor = rounds[0].held_out, _floor_of(models, rounds[-1])
+    before, floor, agree = rounds[0].held_out, _floor_of(models, rounds[-1]), agreement(rounds[-1].after)
     steps = []
     for r in rounds:
         if r.accepted is None:
@@ -99,7 +115,7 @@ def how_far(models: ModelComparison, rounds: Sequence[Round]) -> tuple[tuple[Ste
         share, interval = _closed(before, after, floor)
         steps.append(Step(
             tuple(fit.effects), before.mae, after.mae, floor.mae, share, interval, _permutation_test(models, r, fit),
-            runner_up, _on_bound(fit),
+            runner_up, agree.get(r.accepted.screened.effect), _on_bound(fit),
         ))  # fmt: skip
     return tuple(steps), floor.mae
 

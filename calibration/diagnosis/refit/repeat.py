@@ -1,0 +1,74 @@
+"""Does it repeat? An effect of a building has the same strengths in both halves of the tuning days."""
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.stats import chi2
+
+from calibration.diagnosis.refit.comparison import Fit, is_strength
+from calibration.fit.least_squares import bounded_step
+from calibration.fit.problem import Problem
+from thermal._types import FloatArray
+from thermal.model.reduce import ReducedModel
+
+#: Probability below which two halves do not agree [-].
+DISAGREE = 0.01
+
+#: Newton steps from the estimate of all days.
+_STEPS = 2
+
+
+def agreement(fit: Fit) -> dict[str, float]:
+    """Probability of estimates that differ so much, or more, between the halves where an effect is steady, by effect.
+
+    Newton steps from the estimate of all days, every parameter free, give those of each half; their difference is held
+    against its covariance (Wald test). An effect whose strengths no half can tell agrees with anything.
+
+    Parameters
+    ----------
+    fit : Fit
+        With effects.
+
+    Returns
+    -------
+    dict of str to float
+        By effect [-]; none where the tuning days cannot be halved.
+    """
+    problem = replace(fit.problem, deviation=float(np.sqrt(fit.found.mean_square)))
+    halves = _halves(problem)
+    if halves is None or not fit.effects:
+        return {}
+    (one, spread), (other, spread_of_other) = (_estimate(half, fit.model, fit.point) for half in halves)
+    apart, covariance = one - other, spread + spread_of_other
+    found = {}
+    for effect in fit.effects:
+        own = [i for i, p in enumerate(problem.parameters) if p.effect == effect and is_strength(p.name, effect)]
+        block = covariance[np.ix_(own, own)] + 1e-12 * np.eye(len(own))
+        found[effect] = float(chi2.sf(apart[own] @ np.linalg.solve(block, apart[own]), len(own)))
+    return found
+
+
+def _halves(problem: Problem) -> tuple[Problem, Problem] | None:
+    """Split the runs at the middle of the tuning runs."""
+    starts = np.sort(np.concatenate([r.starts for r in problem.runs]))
+    if starts.size < 2:
+        return None
+    middle, made = starts[starts.size // 2], []
+    for late in (False, True):
+        runs = tuple(replace(r, starts=r.starts[(r.starts >= middle) == late]) for r in problem.runs)
+        runs = tuple(r for r in runs if r.starts.size)
+        share = sum(r.starts.size for r in runs) / starts.size
+        made.append(replace(problem, runs=runs, effective=share * problem.effective_size()))
+    return made[0], made[1]
+
+
+def _estimate(half: Problem, model: ReducedModel, point: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Estimate of a half, and the covariance that its data give it, priors holding."""
+    bounds = np.array(half.bounds)
+    for _ in range(_STEPS):
+        residual, jacobian = half.weighted(model, point)
+        point = np.clip(point + bounded_step(residual, jacobian, *(bounds - point)), *bounds)
+    data = half.weighted(model, point)[1][: -point.size]
+    prior = np.linalg.inv(half.prior_covariance())
+    held = np.linalg.inv(data.T @ data + prior)
+    return point, np.asarray(held @ (data.T @ data) @ held)
