@@ -8,11 +8,12 @@ from typing import Any
 
 import pandas as pd
 
+from calibration.diagnosis.correction import CORRECTED, Correction, correct
 from calibration.diagnosis.decide.levels import p_value
 from calibration.diagnosis.decide.verdict import Verdict, chance_of, doubted, gains_of, judge
 from calibration.diagnosis.decide.where import DriftCurve, Where, drift_of, where_it_lies
 from calibration.diagnosis.free import drawing_fails, search_free
-from calibration.diagnosis.handed_on import judge_handed_on, other_structures
+from calibration.diagnosis.handed_on import fit_content, judge_handed_on, other_structures, with_correction
 from calibration.diagnosis.known import reasons_of
 from calibration.diagnosis.refit.challenge import challenge
 from calibration.diagnosis.refit.comparison import Fit, ModelComparison
@@ -26,7 +27,7 @@ from calibration.evaluation.intervals import Interval
 from calibration.evaluation.n_step import Evaluation, Progress
 from calibration.evaluation.settings import ModelSettings
 from calibration.fit.ladder import ADVANCE
-from calibration.fit.result import CalibrationResult, Rung, SolverReport, effect_entries
+from calibration.fit.result import CalibrationResult, Rung, SolverReport
 from calibration.results import Axes, Result, plain
 from thermal.case.case import Case
 from thermal.case.estimated import Estimated, estimate_entry
@@ -112,6 +113,8 @@ class Diagnosis(Result):
     left_over : Regular or None
         What comes back of the final model's errors, where the drawing does not hold and effects were sought about a
         free structure: `settings` then is of that one.
+    correction : Correction or None
+        The baseline with heat of unknown cause, where no effect explains what is missing and such heat is certified.
     """
 
     case: str
@@ -138,11 +141,18 @@ class Diagnosis(Result):
     disturbance: DisturbanceModel | None = None
     band_factors: Mapping[str, float] = field(default_factory=dict)
     left_over: Regular | None = None
+    correction: Correction | None = None
 
     @property
     def final(self) -> Fit:
         """Model with all accepted effects."""
         return self.rounds[-1].after
+
+    @property
+    def taken(self) -> Fit:
+        """What is handed on where no other structure predicts better: `final`, or the model with missing heat."""
+        corrected = any(r.chosen and r.name == CORRECTED for r in self.rungs)
+        return self.correction.fit if self.correction is not None and corrected else self.final
 
     @property
     def subsystem(self) -> str:
@@ -187,6 +197,7 @@ class Diagnosis(Result):
             "how_far": [s.to_dict() for s in self.steps],
             "rounds": [r.to_dict() | {"worth": gains_of(r)} for r in self.rounds],
             **({} if self.left_over is None else {"left_over": plain(self.left_over)}),
+            **({} if self.correction is None else {"correction": self.correction.to_dict()}),
             "prediction": {"rungs": plain(self.rungs), "held_out_mae": self.predicts, "carried": plain(carried)},
             "intervals": {
                 "tuning": plain(self.tuned),
@@ -216,22 +227,15 @@ class Diagnosis(Result):
         """Contents of the ``calibration.json`` of the final model, or of a structure that predicts better."""
         if self.better is not None:
             return self.better.to_dict()
-        final, found = self.final, self.final.found
-        parameters, status = final.describe(), "settled" if found.converged else "evaluations used up"
-        intervals = {"tuning": self.tuned, "held_out": self.judged}
-        before, after = (
-            {name: fit.evaluate(part, self.horizon).metrics for name, part in intervals.items()}
-            for fit in (at_start(self.rounds[0].before), final)
-        )
+        fit, found = self.taken, self.taken.found
+        status = "settled" if found.converged else "evaluations used up"
         content: dict[str, Any] = plain({
-            "parameters": parameters, "uncalibrated": before, "calibrated": after,
-            "effects": effect_entries(final.effects, parameters),
+            **fit_content(fit, at_start(self.rounds[0].before), self.tuned, self.judged, self.horizon),
             "solver": SolverReport("gauss_newton", status, found.converged, found.evaluations, self.seconds, 1,
                                    evaluations=found.evaluations, settled=found.converged),
-            "intervals": intervals, "objective": "multi_step", "horizon": self.horizon,
-            "settings": replace(self.settings, effects=dict(final.effects)), "zones": final.built.network.zones,
-            "case": self.case, "version": self.version, "seed": self.seed, **estimate_entry(self.estimated),
-            "disturbance": self.disturbance, "band_factors": self.band_factors,
+            "settings": replace(self.settings, effects=dict(fit.effects)), "case": self.case, "version": self.version,
+            "seed": self.seed, **estimate_entry(self.estimated), "disturbance": self.disturbance,
+            "band_factors": self.band_factors,
         })  # fmt: skip
         return content
 
@@ -337,33 +341,21 @@ def diagnose(
     watts = rounds[0].screening.detectable(ACCEPTED)
     void = {s.effects[-1] for s in steps if s.void}
     verdict = doubted(judge(rounds, untestable, left_over), void)
-    better = None if kept is None else replace(kept.result(began, progress), rungs=rungs)
-    prediction, disturbance, factors = judge_handed_on(models, rounds[-1].after, better, left)
+    correction = correct(models, rounds[0].before, errors, floor) if verdict.name == "unexplained" else None
+    rungs, left = with_correction(models, correction, rungs, left)
+    taken = correction.fit if correction is not None and rungs[-1].chosen else None
+    better = None if kept is None or taken is not None else replace(kept.result(began, progress), rungs=rungs)
+    prediction, disturbance, factors = judge_handed_on(models, taken or rounds[-1].after, better, left)
     return Diagnosis(
-        case=case.building.name,
-        verdict=verdict,
-        where=where,
-        steps=steps,
-        gap=errors.mae,
-        floor=floor,
+        case=case.building.name, verdict=verdict, where=where, steps=steps, gap=errors.mae, floor=floor.mae,
         p_value=p_value(max(gains_of(rounds[0]).values())) if left_over is None else chance_of(rounds[0]),
-        detectable={zone: w * areas[zone] for zone, w in watts.items()},
-        rounds=rounds,
-        tuned=tuple(models.tuned),
-        judged=tuple(models.judged),
-        seconds=time.perf_counter() - began,
-        version=version("buildingmpc"),
-        settings=replace(models.settings, normalisation=models.drivers.normalisation),
-        horizon=horizon,
-        last_third=first.mae if turns else None,
-        rungs=rungs,
-        better=better,
-        prediction=prediction,
-        estimated=case.estimated,
-        disturbance=disturbance,
-        band_factors=factors,
-        left_over=left_over,
-    )
+        detectable={zone: w * areas[zone] for zone, w in watts.items()}, rounds=rounds, tuned=tuple(models.tuned),
+        judged=tuple(models.judged), seconds=time.perf_counter() - began, version=version("buildingmpc"),
+        settings=replace(models.settings, normalisation=models.drivers.normalisation), horizon=horizon,
+        last_third=first.mae if turns else None, rungs=rungs, better=better, prediction=prediction,
+        estimated=case.estimated, disturbance=disturbance, band_factors=factors, left_over=left_over,
+        correction=correction,
+    )  # fmt: skip
 
 
 def baseline_gap(

@@ -1,19 +1,23 @@
 """What a diagnosis hands on for prediction: its final model, or the same building in another structure."""
 
+from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
+from calibration.diagnosis.correction import CORRECTED, Correction
 from calibration.diagnosis.refit.comparison import Fit, ModelComparison
 from calibration.estimation.bands import Forecaster
 from calibration.estimation.disturbance import DisturbanceModel
+from calibration.evaluation.intervals import Interval
 from calibration.evaluation.n_step import Evaluation, EvaluationSettings, Progress
 from calibration.evaluation.simple_models import with_yardsticks
 from calibration.fit.estimate import tune
 from calibration.fit.fitted_case import FittedCase, is_large
 from calibration.fit.ladder import climb_from
-from calibration.fit.left_out import Known, LeftOut
-from calibration.fit.result import CalibrationResult, Rung
+from calibration.fit.left_out import Known, LeftOut, left_out
+from calibration.fit.result import CalibrationResult, Rung, effect_entries
 
 
 def other_structures(
@@ -40,9 +44,75 @@ def other_structures(
     if is_large(final.built.network.zones):
         return (), None, None
     name = "named" if final.effects else "drawn"
-    # the fit has found its deviation beside its parameters
-    problem = replace(final.problem, deviation=float(np.sqrt(final.found.mean_square)))
-    return climb_from(name, Known(problem, final.model, final.point), models, progress, advance)
+    return climb_from(name, known_of(final), models, progress, advance)
+
+
+def known_of(fit: Fit) -> Known:
+    """Give what calibrations know of a fit, which has found its deviation beside its parameters.
+
+    Parameters
+    ----------
+    fit : Fit
+        Any.
+    """
+    problem = replace(fit.problem, deviation=float(np.sqrt(fit.found.mean_square)))
+    return Known(problem, fit.model, fit.point)
+
+
+def with_correction(
+    models: ModelComparison, correction: Correction | None, rungs: tuple[Rung, ...], left: LeftOut | None
+) -> tuple[tuple[Rung, ...], LeftOut | None]:
+    """Let a corrected model stand beside the others, and hand it on where it predicts left-out days best.
+
+    Parameters
+    ----------
+    models : ModelComparison
+        The case and its days.
+    correction : Correction or None
+        A model with heat of unknown cause.
+    rungs : tuple of Rung
+        The others.
+    left : LeftOut or None
+        Days left out by what is kept of these.
+
+    Returns
+    -------
+    tuple
+        All of them, and the days left out by what is kept.
+    """
+    if correction is None:
+        return rungs, left
+    found = left_out(known_of(correction.fit), models.tuned, models.settings.spin_up_seconds)
+    kept = found.mae < min((r.left_out_mae for r in rungs if r.chosen), default=np.inf)
+    others = tuple(replace(r, chosen=r.chosen and not kept) for r in rungs)
+    return (*others, Rung(CORRECTED, found.mae, len(correction.fit.problem.free), kept)), found if kept else left
+
+
+def fit_content(
+    fit: Fit, before: Fit, tuned: Sequence[Interval], judged: Sequence[Interval], horizon: str
+) -> dict[str, Any]:
+    """Contents of the ``calibration.json`` of a fit, but for what names case, settings and program.
+
+    Parameters
+    ----------
+    fit : Fit
+        What is handed on.
+    before : Fit
+        The baseline at its start.
+    tuned, judged : sequence of Interval
+        Where it was fitted, and where it is judged.
+    horizon : str
+        Prediction horizon.
+    """
+    parameters, intervals = fit.describe(), {"tuning": tuned, "held_out": judged}
+    uncalibrated, calibrated = (
+        {name: f.evaluate(part, horizon).metrics for name, part in intervals.items()} for f in (before, fit)
+    )
+    return {
+        "parameters": parameters, "uncalibrated": uncalibrated, "calibrated": calibrated,
+        "effects": effect_entries(fit.effects, parameters), "intervals": intervals, "objective": "multi_step",
+        "horizon": horizon, "zones": fit.built.network.zones,
+    }  # fmt: skip
 
 
 def judge_handed_on(

@@ -11,7 +11,7 @@ import numpy as np
 from calibration.errors import CalibrationError
 from thermal._types import FloatArray
 from thermal.case.building import Building
-from thermal.effects.catalogue import CATALOGUE, chosen
+from thermal.effects.catalogue import chosen, is_effect
 from thermal.errors import ModelError, nearest
 from thermal.inputs.normalisation import Normalisation
 from thermal.model.case_replay import LEAST_SPIN_UP, SPIN_UP
@@ -240,7 +240,7 @@ def read_settings(path: str | Path) -> dict[str, Any]:
     if not isinstance(scopes, dict) or not set(scopes.values()) <= set(get_args(Scope)):
         raise refuse("settings.scopes", f"a mapping to {', '.join(get_args(Scope))}", scopes)
     lists = isinstance(effects, dict) and all(isinstance(zones, list) for zones in effects.values())
-    if not lists or not set(effects) <= set(CATALOGUE):
+    if not lists or not all(is_effect(name) for name in effects):
         raise refuse("settings.effects", "a mapping from effects of the catalogue to lists of zones", effects)
     if "structure" in settings:
         entry, names = settings["structure"], sorted(f.name for f in fields(Structure))

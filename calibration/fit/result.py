@@ -18,7 +18,7 @@ from calibration.identifiability.information import DETERMINED, Information
 from calibration.results import Axes, Plain, Result, draw_rows, plain
 from thermal._types import FloatArray
 from thermal.case.estimated import estimate_entry
-from thermal.effects.catalogue import CATALOGUE
+from thermal.effects.catalogue import effect_of
 from thermal.parameters import Parameter
 
 #: A bound counts as hit within this share of the range, on the estimation scale [-].
@@ -273,7 +273,7 @@ def effect_entries(
     """
     entries = []
     for name, zones in effects.items():
-        own = {p.name for p in CATALOGUE[name].parameters}
+        own = {p.name for p in effect_of(name).parameters}
         values = {p.name: {"value": p.value, "unit": p.unit} for p in parameters if p.name.partition("@")[0] in own}
         entries.append({"effect": name, "zones": list(zones), "parameters": values})
     return entries

@@ -14,6 +14,7 @@ from calibration.diagnosis.refit.refit import ACCEPTED
 from calibration.diagnosis.refit.search import Round
 from calibration.results import Content, check_results_folder, write_results
 from mpc.reports import diagnosis_words
+from mpc.reports.correction_words import correction_sentence, driver_rows
 from mpc.reports.diagnosis_words import accepted, alike, called, in_zones, rivals
 from mpc.reports.drift_words import drift_sentence
 from mpc.reports.evaluation import command, predictions_table, subtitle
@@ -165,6 +166,8 @@ def _content(result: Diagnosis, case: Case, replayed: Sequence[Replay]) -> dict[
         **_where(result, case, replayed),
         "waterfall": _waterfall(result),
         "tests": _test_sentences(result),
+        "drivers": driver_rows(result),
+        "corrected": correction_sentence(result),
         "panels": change_panels(models, evaluations[0].zones, errors),
         **_statistics(result),
         "span": (case.stamps[0], case.stamps[-1], case.step),

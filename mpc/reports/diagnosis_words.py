@@ -9,10 +9,11 @@ from calibration.diagnosis.decide.verdict import Candidate, group_of
 from calibration.diagnosis.decide.where import Where
 from calibration.diagnosis.diagnosis import Diagnosis
 from calibration.diagnosis.refit.refit import WINDOWS, Refit
+from mpc.reports.correction_words import correction_sentence
 from mpc.reports.evaluation import beside_sentence, carried_sentence, structure_words
 from mpc.reports.free_words import comes_back, free_sentence, known_effects
 from mpc.reports.page import duration, estimated_sentences, kelvin, listed, percent, sure, watts
-from thermal.effects.catalogue import CATALOGUE
+from thermal.effects.catalogue import CATALOGUE, effect_of, is_effect
 
 #: What an effect is called where its title would read oddly after "leaves out".
 _CALLED = {"hidden_mass": "mass that stores heat"}
@@ -62,7 +63,7 @@ def _verdict(result: Diagnosis) -> str:
     if result.verdict.name == "no_gap":
         return _no_gap(result)
     if result.verdict.name == "unexplained":
-        return _unexplained(result)
+        return _unexplained(result) + correction_sentence(result)
     found = accepted(result)
     if result.verdict.name == "group":
         first, *others = found
@@ -146,7 +147,7 @@ def called(effect: str, zones: Sequence[str] = ()) -> str:
     >>> called("sensor_bias", ["F1_N"]), called("an_effect_of_ones_own")
     ('a zone sensor that reads wrong, in zone F1_N', 'an effect of ones own')
     """
-    title = CATALOGUE[effect].title if effect in CATALOGUE else ""
+    title = effect_of(effect).title if is_effect(effect) else ""
     name = _CALLED.get(effect, title) or effect.replace("_", " ")
     return f"{name}, {in_zones(zones)}" if zones else name
 

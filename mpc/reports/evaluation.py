@@ -129,6 +129,7 @@ _STRUCTURES = {
     "zoned": "as drawn, with slabs and furniture of each zone's own",
     "lumped": "lumped into air and mass a zone",
     "recurring": "lumped into air and mass a zone, with a gain that recurs from day to day",
+    "corrected": "with heat of unknown cause",
     "shifted": "lumped into air and mass a zone, with heat and weather moved in time",
 }
 

@@ -4,6 +4,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from thermal.effects import air, envelope, gains, metering
 from thermal.effects.effect import Chosen, Effect
+from thermal.effects.unknown import UNKNOWN
 from thermal.errors import EffectError, nearest
 from thermal.parameters import PARAMETERS
 
@@ -33,9 +34,9 @@ def register_effect(effect: Effect) -> None:
     EffectError
         When its id or the name of a parameter is taken, or it modifies an effect that is not there.
     """
-    taken = {p.name for e in CATALOGUE.values() for p in e.parameters} | set(PARAMETERS)
+    taken = {p.name for e in (*CATALOGUE.values(), *UNKNOWN.values()) for p in e.parameters} | set(PARAMETERS)
     names = [p.name for p in effect.parameters]
-    clashes = [effect.id] if effect.id in CATALOGUE else [name for name in names if name in taken]
+    clashes = [effect.id] if is_effect(effect.id) else [name for name in names if name in taken]
     if clashes:
         raise EffectError(f"effect {effect.id}", "a name of its own", repr(clashes[0]), "call it otherwise")
     if absent := [r for r in effect.requires if r not in CATALOGUE]:
@@ -44,6 +45,40 @@ def register_effect(effect: Effect) -> None:
         expected = "a strength that starts at 0 first, all with this effect's id"
         raise EffectError(f"effect {effect.id}: parameters", expected, f"{names}")
     CATALOGUE[effect.id] = effect
+
+
+def is_effect(name: str) -> bool:
+    """Whether there is an effect of this id, of the catalogue or of unknown cause.
+
+    Parameters
+    ----------
+    name : str
+        Id.
+    """
+    return name in CATALOGUE or name in UNKNOWN
+
+
+def effect_of(name: str) -> Effect:
+    """Give the effect of this id, of the catalogue or of unknown cause.
+
+    Parameters
+    ----------
+    name : str
+        Id.
+
+    Raises
+    ------
+    EffectError
+        When there is none.
+
+    Examples
+    --------
+    >>> effect_of("solar_gain").zonal, effect_of("heat_by_wind").title
+    (False, 'heat of unknown cause with wind')
+    """
+    if not is_effect(name):
+        raise EffectError(f"effect {name!r}: not in the catalogue; {like(name)}")
+    return CATALOGUE[name] if name in CATALOGUE else UNKNOWN[name]
 
 
 def like(word: str) -> str:
@@ -93,9 +128,8 @@ def chosen(effects: Iterable[str] | Mapping[str, Sequence[str]]) -> tuple[Chosen
     for name, where in zones.items():
         EffectError.unless(not isinstance(where, str), f"effect {name}", "a sequence of zones", repr(where))
     for name in zones:
-        if name not in CATALOGUE:
-            raise EffectError(f"effect {name!r}: not in the catalogue; {like(name)}")
-        lacking = [r for r in CATALOGUE[name].requires if r not in zones]
+        lacking = [r for r in effect_of(name).requires if r not in zones]
         if lacking:
             raise EffectError(f"effect {name}: modifies {', '.join(lacking)}; add that too")
-    return tuple(Chosen(e, tuple(zones[e.id])) for e in CATALOGUE.values() if e.id in zones)
+    known = (*CATALOGUE.values(), *UNKNOWN.values())
+    return tuple(Chosen(e, tuple(zones[e.id])) for e in known if e.id in zones)

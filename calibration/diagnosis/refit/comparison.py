@@ -17,7 +17,7 @@ from calibration.fit.problem import Problem, tuning_runs
 from calibration.fit.result import ParameterEstimate, describe_parameters
 from thermal._types import FloatArray
 from thermal.case.case import Case
-from thermal.effects.catalogue import CATALOGUE, chosen
+from thermal.effects.catalogue import CATALOGUE, chosen, effect_of, is_effect
 from thermal.inputs.normalisation import fit_normalisation
 from thermal.inputs.provider import InputProvider, telemetry_inputs
 from thermal.model.case_replay import Inputs, replay_inputs
@@ -89,7 +89,7 @@ def is_strength(name: str, effect: str | None) -> bool:
     """
     if effect is None:
         return False
-    kinds = {p.name: p for p in CATALOGUE[effect].parameters} if effect in CATALOGUE else {}
+    kinds = {p.name: p for p in effect_of(effect).parameters} if is_effect(effect) else {}
     kind = kinds.get(name.partition("@")[0])
     return kind is None or (kind.scale == "linear" and kind.start == 0.0 and kind.name not in _SHIFTS)
 

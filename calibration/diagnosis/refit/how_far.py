@@ -90,7 +90,7 @@ class Step:
         }
 
 
-def how_far(models: ModelComparison, rounds: Sequence[Round]) -> tuple[tuple[Step, ...], float]:
+def how_far(models: ModelComparison, rounds: Sequence[Round]) -> tuple[tuple[Step, ...], HeldOut]:
     """Measure what each accepted effect closes of the gap.
 
     Parameters
@@ -103,7 +103,7 @@ def how_far(models: ModelComparison, rounds: Sequence[Round]) -> tuple[tuple[Ste
     Returns
     -------
     tuple
-        The steps, and the floor under the held-out error of the calibrated baseline [K].
+        The steps, and the floor under the held-out errors of the calibrated baseline.
     """
     before, floor, agree = rounds[0].held_out, _floor_of(models, rounds[-1]), agreement(rounds[-1].after)
     steps = []
@@ -112,12 +112,12 @@ def how_far(models: ModelComparison, rounds: Sequence[Round]) -> tuple[tuple[Ste
             break
         after, fit = r.accepted.held_out, r.accepted.fit
         runner_up = next((x.held_out.mae for x in r.refits if x is not r.accepted), None)
-        share, interval = _closed(before, after, floor)
+        share, interval = closed(before, after, floor)
         steps.append(Step(
             tuple(fit.effects), before.mae, after.mae, floor.mae, share, interval, _permutation_test(models, r, fit),
             runner_up, agree.get(r.accepted.screened.effect), _on_bound(fit),
         ))  # fmt: skip
-    return tuple(steps), floor.mae
+    return tuple(steps), floor
 
 
 def _floor_of(models: ModelComparison, last: Round) -> HeldOut:
@@ -156,8 +156,14 @@ def _on_bound(fit: Fit) -> tuple[str, ...]:
     return tuple(name for (name, effect), c in zip(names, close, strict=True) if c and effect is None)
 
 
-def _closed(before: HeldOut, after: HeldOut, floor: HeldOut) -> tuple[float | None, tuple[float, float] | None]:
-    """Share of the gap that is closed with its interval; None where the gap is within two standard errors."""
+def closed(before: HeldOut, after: HeldOut, floor: HeldOut) -> tuple[float | None, tuple[float, float] | None]:
+    """Share of the gap that is closed with its interval; None where the gap is within two standard errors.
+
+    Parameters
+    ----------
+    before, after, floor : HeldOut
+        Errors without and with what closes it, and those that cannot be helped.
+    """
     common = np.intersect1d(np.intersect1d(before.days, after.days), floor.days)
     parts = [(e.daily[np.isin(e.days, common)], e.weight[np.isin(e.days, common)]) for e in (before, after, floor)]
     drawn = np.random.default_rng(0).integers(common.size, size=(_RESAMPLES, common.size))

@@ -13,20 +13,13 @@ import numpy as np
 
 from calibration.diagnosis.refit.comparison import Fit, ModelComparison
 from calibration.diagnosis.refit.refit import MATTERS
-from calibration.diagnosis.screen.drivers import BINS, OUTDOOR, SKY, SUNS, WEEKEND, WIND
+from calibration.diagnosis.screen.unknown_heat import DailyErrors, daily_errors
 from calibration.results import Plain
-from thermal._types import BoolArray, FloatArray
-from thermal.effects.effect import Chosen, Effect, EffectBuilder, strength
-from thermal.inputs.provider import InputProvider
-from thermal.inputs.signals import CONSTANT, Signal
-from thermal.model.reduce import reduced_model
+from thermal._types import BoolArray, FloatArray, IntArray
+from thermal.effects.unknown import ANSWERS_TO
 
 #: Parts of the tuning days, each left out once.
 _PARTS = 4
-
-#: Heat that is plausible [W/m2]: in a bin of the day or always; per kelvin, per 100 W/m2 of sun or of sky, and per
-#: 10 m/s K of wind and how much warmer it is indoors.
-_HEAT, _PER_KELVIN, _PER_WEATHER = 20.0, 1.0, 10.0
 
 #: Standard errors over days that the best of eight choices of heat must reach [-]: 5 % over all of them.
 _SURE = 2.5
@@ -34,7 +27,10 @@ _SURE = 2.5
 #: Sizes that such heat may have over what is plausible [-]: the one that predicts best counts.
 _TIGHTNESS = (0.003, 0.01, 0.03, 0.1, 0.3, 1.0)
 
-_SOURCE = "any cause: loads and losses of offices stay within"
+#: Heat that is looked for.
+_KINDS = (
+    "heat_always", "heat_by_hour", "heat_at_weekends", "heat_by_cold", "heat_by_sun", "heat_by_wind", "heat_by_sky",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -74,99 +70,38 @@ def regular(models: ModelComparison, fit: Fit) -> Regular:
     fit : Fit
         The model.
     """
-    kinds = _kinds(models.drivers)
-    heat = _effect(kinds)
-    built = models.build(fit.effects, (Chosen(heat),))
-    theta = built.theta(fit.values)
-    problem, model = models.problem(built, theta), reduced_model(built.grid, [theta])
-    errors, days, jacobians = [], [], []
-    for runs in problem.runs:
-        error, slopes = problem.errors(model, theta, runs, slopes=True)
-        middle = built.inputs.stamps[runs.starts + problem.steps // 2].normalize().asi8
-        known = np.isfinite(error)
-        errors.append(error[known])
-        days.append(np.broadcast_to(middle[:, None, None], error.shape)[known])
-        jacobians.append((np.asarray(slopes) * problem.slopes(theta))[known])
-    table = _Table(np.concatenate(errors), np.concatenate(days), np.concatenate(jacobians), problem.effective_size())
-    parameters = built.network.parameters
-    own: BoolArray = np.array([p.effect != heat.id for p in parameters])
-    prior = np.array([p.prior_deviation for p in parameters])
-    base = np.array([p.base for p in parameters])
-    inside = {kind: np.isin(base, [_name(kind, n) for n in range(len(s))]) for kind, s in kinds.items()}
-    found = {kind: table.left_out(own, np.asarray(columns), prior) for kind, columns in inside.items()}
-    shares = {kind: max(0.0, float(gained.sum())) / float(before.sum()) for kind, (before, gained) in found.items()}
-    before, gained = max((*found.values(), table.left_out(own, ~own, prior)), key=lambda f: float(f[1].sum()))
-    size, explains = (max(0.0, float(part.sum())) / table.error.size for part in (before, gained))
+    table = daily_errors(models, fit.effects, fit.values, kinds=_KINDS)
+    own = table.own
+    found = {kind: _left_out(table, table.of(kind)) for kind in table.kinds}
+    shares = {
+        ANSWERS_TO[kind]: max(0.0, float(gained.sum())) / float(before.sum())
+        for kind, (before, gained) in found.items()
+    }
+    before, gained = max((*found.values(), _left_out(table, ~own)), key=lambda f: float(f[1].sum()))
+    size, explains = (max(0.0, float(part.sum())) / float(table.size.sum()) for part in (before, gained))
     spread = float(gained.std(ddof=1) / np.sqrt(gained.size)) if gained.size > 1 else np.inf
     fall = float(np.sqrt(size) - np.sqrt(size - explains))
     return Regular(fall, float(gained.mean()) / max(spread, 1e-300), explains, shares)
 
 
-@dataclass(frozen=True)
-class _Table:
-    """Errors [K] with their days and derivatives, and how many independent ones they are."""
+def _left_out(table: DailyErrors, heat: BoolArray) -> tuple[FloatArray, FloatArray]:
+    """Squared error of each day that is left out, and how far heat of the best size lowers it [K²]."""
+    days = table.days.size
+    part = np.arange(days) * min(_PARTS, days) // days
+    scale = table.count / float(table.squared.sum())
+    own, both = np.flatnonzero(table.own), np.concatenate([np.flatnonzero(table.own), np.flatnonzero(heat)])
+    precision = np.array([table.parameters[i].prior_deviation for i in both]) ** -2.0
+    units = np.eye(len(table.parameters))
 
-    error: FloatArray
-    day: FloatArray
-    jacobian: FloatArray
-    count: float
+    def errors(some: IntArray, fitted: BoolArray, held: FloatArray) -> FloatArray:
+        return table.after(units[:, some] @ table.solve(fitted, units[:, some], held, scale))
 
-    def left_out(self, own: BoolArray, heat: BoolArray, prior: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Squared error of each day that is left out, and how far heat of the best size lowers it [K²]."""
-        days, index = np.unique(self.day, return_inverse=True)
-        part = np.arange(days.size) * min(_PARTS, days.size) // days.size
-        scale = self.count / float(np.sum(self.error**2))
-        before, after = np.zeros(self.error.size), np.zeros((len(_TIGHTNESS), self.error.size))
-        both = np.concatenate([np.flatnonzero(own), np.flatnonzero(heat)])
-        size = int(own.sum())
-        for p in range(part.max() + 1):
-            out = part[index] == p
-            inside, beside = self.jacobian[~out][:, both], self.jacobian[out][:, both]
-            gram, score = inside.T @ inside, -inside.T @ self.error[~out]
-            precision = prior[both] ** -2.0 / scale
-            alone = np.linalg.solve(gram[:size, :size] + np.diag(precision[:size]), score[:size])
-            before[out] = self.error[out] + beside[:, :size] @ alone
-            for k, tightness in enumerate(_TIGHTNESS):
-                held = np.concatenate([precision[:size], precision[size:] / tightness**2])
-                after[k, out] = self.error[out] + beside @ np.linalg.solve(gram + np.diag(held), score)
-        squared = np.asarray(np.bincount(index, before**2), dtype=float)
-        gained = np.array([squared - np.bincount(index, a**2) for a in after])
-        return squared, gained[int(np.argmax(gained.sum(axis=1)))]
-
-
-def _kinds(inputs: InputProvider) -> dict[str, list[tuple[Signal, float]]]:
-    """Signals that heat may answer to, by kind, with the heat that is plausible per unit."""
-    kinds = {
-        "always": [(CONSTANT, _HEAT)],
-        "time of day": [(s, _HEAT) for s in BINS],
-        "weekends": [(WEEKEND, _HEAT)],
-        "outdoor temperature": [(OUTDOOR, _PER_KELVIN)],
-        "sun": [(s, _PER_WEATHER) for s in SUNS],
-        "wind": [(WIND, _PER_WEATHER)],
-        "sky": [(SKY, _PER_WEATHER)],
-    }
-    return {kind: own for kind, own in kinds.items() if not inputs.lacks(own[0][0].inputs)}
-
-
-def _name(kind: str, number: int) -> str:
-    return f"heat by {kind} {number}"
-
-
-def _effect(kinds: dict[str, list[tuple[Signal, float]]]) -> Effect:
-    """Heat of each zone by every signal."""
-    signals = {_name(kind, n): s for kind, own in kinds.items() for n, s in enumerate(own)}
-
-    def build(builder: EffectBuilder) -> None:
-        for room in builder.rooms:
-            for name, (signal, _) in signals.items():
-                builder.heat_air(room, builder.parameter(name, zone=room.name), signal, room.floor_area)
-
-    identity = "regular"
-    parameters = tuple(
-        strength(name, f"W/m^2/({signal.unit})", most, _SOURCE, identity, -most)
-        for name, (signal, most) in signals.items()
-    )
-    return Effect(
-        id=identity, title="heat that comes back", equation="A Σ_k p_k s_k", source=_SOURCE, acts_on="air of each zone",
-        confounders=(), separated_by="", parameters=parameters, build=build, zonal=True,
-    )  # fmt: skip
+    before, after = np.zeros(days), np.zeros((len(_TIGHTNESS), days))
+    for p in range(part.max() + 1):
+        out = part == p
+        before[out] = errors(own, ~out, precision[: own.size])[out]
+        for k, tightness in enumerate(_TIGHTNESS):
+            held = np.concatenate([precision[: own.size], precision[own.size :] / tightness**2])
+            after[k, out] = errors(both, ~out, held)[out]
+    gained = before - after
+    return before, gained[int(np.argmax(gained.sum(axis=1)))]

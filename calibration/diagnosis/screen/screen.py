@@ -15,12 +15,13 @@ from dataclasses import replace
 import numpy as np
 
 from calibration.diagnosis.refit.comparison import Fit, ModelComparison, is_strength
-from calibration.diagnosis.screen.drivers import BIN, BINS, OUTDOOR
 from calibration.diagnosis.screen.gains import Gain, choice_of
 from thermal._types import BoolArray, FloatArray, IntArray
 from thermal.effects.catalogue import CATALOGUE
 from thermal.effects.effect import PAIR, Chosen, Effect, EffectBuilder, strength
-from thermal.inputs.signals import CONSTANT
+from thermal.effects.unknown import BIN, BINS
+from thermal.inputs.provider import InputProvider
+from thermal.inputs.signals import CONSTANT, Signal
 from thermal.model.reduce import FEW_SHIFTS, SHIFTS, reduced_model
 from thermal.parameters import Parameter
 
@@ -38,6 +39,13 @@ _LITTLE = 1e-3
 #: Order of the reduced model of a large building.
 _LARGEST_ORDER = 700
 
+
+def _about_mean(inputs: InputProvider) -> FloatArray:
+    return np.asarray(inputs.outdoor - inputs.outdoor.mean())
+
+
+_OUTDOOR = Signal("outdoor temperature about its mean", "K", _about_mean, ("outdoor",))
+
 #: Most zones in which effects of single zones are sought.
 _MOST_ZONES = 24
 
@@ -50,7 +58,7 @@ def _build(builder: EffectBuilder) -> None:
         for number, signal in enumerate(BINS):
             builder.heat_air(room, builder.parameter(f"heat_from_{BIN * number:02d}"), signal, room.floor_area)
         builder.heat_air(room, builder.parameter(ZONE_HEAT, zone=room.name), CONSTANT, room.floor_area)
-        builder.heat_air(room, builder.parameter("heat_by_outdoor", zone=room.name), OUTDOOR, room.floor_area)
+        builder.heat_air(room, builder.parameter("heat_by_outdoor", zone=room.name), _OUTDOOR, room.floor_area)
 
 
 #: Constant heat of a zone [W/m2], by which the smallest detectable watts are told.

@@ -16,6 +16,7 @@ from mpc.reports.figures.style import Picture, keys_below, lines_over_time, pane
 from mpc.reports.page import in_words
 from thermal._types import FloatArray
 from thermal.effects.catalogue import CATALOGUE
+from thermal.effects.unknown import UNKNOWN
 from thermal.parameters import PARAMETERS, Parameter
 
 #: More rows than this are not drawn; the table has them all.
@@ -127,7 +128,7 @@ def _paper_mark(axes: Axes, row: int, at: float, above: bool) -> None:
 
 def _scale(p: ParameterEstimate) -> Parameter:
     """Range and scale of estimation of an estimate; a parameter of one zone has those of its kind."""
-    kinds = PARAMETERS | {q.name: q for effect in CATALOGUE.values() for q in effect.parameters}
+    kinds = PARAMETERS | {q.name: q for e in (CATALOGUE | UNKNOWN).values() for q in e.parameters}
     kind = kinds.get(p.name.partition("@")[0])
     if kind is None or p.lower is None or p.upper is None:
         return Parameter(p.name, p.unit, p.start, p.lower or p.value / 2, p.upper or p.value * 2, p.source)

@@ -16,7 +16,8 @@ from mpc.scenario.gains import RADIANT_SHARES, InternalGains
 from mpc.scenario.occupancy import RandomOccupancy
 from mpc.scenario.weather import Weather
 from thermal import Building, build_network
-from thermal.effects.catalogue import CATALOGUE, chosen
+from thermal.effects.catalogue import CATALOGUE, chosen, effect_of
+from thermal.effects.unknown import UNKNOWN
 from thermal.errors import EffectError
 from thermal.inputs.provider import telemetry_inputs
 from thermal.inputs.signals import signal_values
@@ -26,6 +27,8 @@ from thermal.system.system import HvacSystem
 
 #: Effects that a plant cannot have, and what is said.
 REFUSED = {"clock_shift": "leave that effect out", "neighbour": "every side has windows"}
+#: Heat that the day of these runs, a Monday, has none of.
+ON_OTHER_DAYS = {"heat_at_weekends"}
 #: Effects that only show where a terminal is driven hard.
 AT_FULL_LOAD = {"capacity_limit"}
 STEPS = 192
@@ -50,7 +53,7 @@ def spring() -> Weather:
 def strengths(ids: tuple[str, ...]) -> dict[str, float]:
     """Each effect's strengths at the ends of their ranges, its shapes in the middle."""
     network = build_network(house(), dx=1.0, effects=chosen(list(ids)))
-    lead = {e.parameters[0].name for e in CATALOGUE.values()}
+    lead = {e.parameters[0].name for e in (CATALOGUE | UNKNOWN).values()}
     return {p.name: p.upper if p.name.split("@")[0] in lead else p.start for p in network.parameters if p.effect in ids}
 
 
@@ -79,11 +82,10 @@ def plain(model: PlantKind = "reduced") -> np.ndarray:
     return run(model=model).record().zone_temperature
 
 
-@pytest.mark.parametrize("name", [i for i in CATALOGUE if i not in REFUSED])
+@pytest.mark.parametrize("name", [i for i in CATALOGUE | UNKNOWN if i not in REFUSED.keys() | ON_OTHER_DAYS])
 def test_an_effect_that_is_on_moves_the_zones_and_energy_closes(name: str) -> None:
-    ids = (*CATALOGUE[name].requires, name)
-    plant = run(ids, hard=name in AT_FULL_LOAD)
-    hard, others = name in AT_FULL_LOAD, CATALOGUE[name].requires
+    hard, others = name in AT_FULL_LOAD, effect_of(name).requires
+    plant = run((*others, name), hard=hard)
     before = run(others, hard=hard).record().zone_temperature if others or hard else plain()
     assert np.abs(plant.record().zone_temperature - before).max() > 0.01
 

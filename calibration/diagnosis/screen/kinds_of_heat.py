@@ -1,0 +1,115 @@
+"""Kinds of heat of unknown cause that may be missing: what it answers to, in which zones, how large it may be."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from calibration.diagnosis.screen.unknown_heat import DailyErrors
+from thermal._types import FloatArray
+from thermal.effects.effect import Chosen
+from thermal.effects.unknown import OUTER, PLANES, SUN, UNKNOWN, tied
+from thermal.network.topology import VERTICAL, Anatomy, direction_of
+
+
+@dataclass(frozen=True)
+class Kind:
+    """Heat of one kind in some zones, one strength a signal for all of them, as large as the evidence has it.
+
+    Parameters
+    ----------
+    effect : str
+        Key of `UNKNOWN`.
+    weights : mapping of str to ndarray, shape (n_signal,)
+        Its heat by the floor area in every zone, over that of the strengths [-].
+    how : str
+        By floor area or by outer area.
+    tightness : float
+        Plausible heat over that of `UNKNOWN` [-].
+    """
+
+    effect: str
+    weights: Mapping[str, FloatArray]
+    how: str = "floor"
+    tightness: float = 1.0
+
+    @property
+    def name(self) -> str:
+        """What its parameters are called by."""
+        return f"{self.effect} by the {self.how} of {', '.join(self.weights)}"
+
+    @property
+    def chosen(self) -> Chosen:
+        """The effect, with strengths that its zones share."""
+        return Chosen(tied(self.effect, self.name, self.weights, self.tightness))
+
+
+def candidates(table: DailyErrors, anatomy: Anatomy) -> list[Kind]:
+    """Every kind of heat in every group of zones by the floor area, and what comes from outdoors by the outer area.
+
+    Parameters
+    ----------
+    table : DailyErrors
+        With the kinds that the case can tell.
+    anatomy : Anatomy
+        Of the building.
+    """
+    found: list[Kind] = []
+    for effect in table.kinds:
+        count = len(UNKNOWN[effect].parameters)
+        found.extend(Kind(effect, dict.fromkeys(zones, np.ones(count))) for zones in _groups(anatomy))
+        outer = _outer(anatomy, PLANES if effect == SUN else ()) if effect in OUTER else {}
+        found.extend([Kind(effect, outer, "outer area")] if outer else [])
+    return found
+
+
+def _outer(anatomy: Anatomy, planes: Sequence[tuple[float, float]]) -> dict[str, FloatArray]:
+    """Outer area over the floor's of the zones that have some, on each plane or in all, over the mean of these [-]."""
+    found = {}
+    for zone, room in anatomy.rooms.items():
+        walls = [(direction_of(z), area) for (of, z), area in anatomy.facades.items() if of == zone]
+        roof = anatomy.under_roof.get(zone, 0.0)
+        by_plane = [
+            roof if tilt < VERTICAL / 2.0 else sum(a for side, a in walls if side == direction_of(azimuth))
+            for azimuth, tilt in planes
+        ]
+        area = np.array(by_plane or [roof + sum(a for _, a in walls)])
+        if area.any():
+            found[zone] = area / room.floor_area
+    mean = np.mean([a.sum() for a in found.values()]) if found else 1.0
+    return {zone: ratio / mean for zone, ratio in found.items()}
+
+
+def _groups(anatomy: Anatomy) -> list[tuple[str, ...]]:
+    """Zones that may have something in common: every one, all, those outside, inside, on the ground, under the roof."""
+    zones = tuple(anatomy.rooms)
+    outside = {zone for zone, _ in anatomy.facades}
+    parts = [
+        zones, [z for z in zones if z in outside], [z for z in zones if z not in outside],
+        [z for z in zones if z in anatomy.on_ground], [z for z in zones if z in anatomy.under_roof],
+    ]  # fmt: skip
+    return list(dict.fromkeys([*((z,) for z in zones), *(tuple(part) for part in parts if part)]))
+
+
+def evidence(table: DailyErrors, kind: Kind, left: FloatArray, pull: FloatArray) -> float:
+    """Logarithm of the Bayes factor of some heat, where errors are normal and of known size [-].
+
+    Parameters
+    ----------
+    table : DailyErrors
+        Whose parameters are meant.
+    kind : Kind
+        The heat.
+    left : ndarray, shape (n_parameter, n_parameter)
+        Products of the derivatives that the model's own parameters cannot imitate, over the errors' size [-].
+    pull : ndarray, shape (n_parameter,)
+        Products of these and of the errors, with the sign by which these fall [-].
+    """
+    names = [p.name for p in UNKNOWN[kind.effect].parameters]
+    basis = np.zeros((len(table.parameters), len(names)))
+    for i, p in enumerate(table.parameters):
+        if p.effect == kind.effect and (zone := str(p.member)) in kind.weights:
+            signal = names.index(p.base)
+            basis[i, signal] = kind.tightness * p.prior_deviation * kind.weights[zone][signal]
+    hessian, score = basis.T @ left @ basis + np.eye(basis.shape[1]), pull @ basis
+    return float(0.5 * score @ np.linalg.solve(hessian, score) - 0.5 * np.linalg.slogdet(hessian)[1])
