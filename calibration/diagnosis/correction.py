@@ -75,7 +75,7 @@ class Driver:
     p_value : float
         Least probability, over its zones and the halves, of lowering other days' errors so much by chance [-].
     share : float
-        Of the squared error that comes back without it [-].
+        Of what all of them explain of the squared error, by this one alone [-].
     """
 
     effect: str
@@ -111,6 +111,8 @@ class Correction:
         Of the gap over its floor, on these days [-]; None where there is no gap to close.
     interval : tuple of float, or None
         Of 90 % [-].
+    watts : mapping of str to float
+        Root mean square of all such heat together, by zone [W].
     tried : int
         Kinds of heat in zones that were tested.
     """
@@ -121,14 +123,17 @@ class Correction:
     after: HeldOut
     share_closed: float | None
     interval: tuple[float, float] | None
+    watts: dict[str, float]
     tried: int
 
     def to_dict(self) -> dict[str, Any]:
         """``correction`` in ``diagnosis.json``."""
+        zones = dict.fromkeys(z for d in self.drivers for z in d.zones)
         return {
-            "drivers": [d.to_dict() for d in self.drivers], "held_out_mae_before": self.before.mae,
-            "held_out_mae_after": self.after.mae, "share_closed": self.share_closed, "interval": self.interval,
-            "tested": self.tried, "false_discovery_rate": 2.0 * FALSE,
+            "drivers": [d.to_dict() for d in self.drivers], "zones": list(zones), "watts_rms": self.watts,
+            "held_out_mae_before": self.before.mae, "held_out_mae_after": self.after.mae,
+            "share_closed": self.share_closed, "interval": self.interval, "tested": self.tried,
+            "false_discovery": 2.0 * FALSE,
         }  # fmt: skip
 
 
@@ -189,7 +194,19 @@ def correct(models: ModelComparison, fit: Fit, before: HeldOut, floor: HeldOut) 
         return None
     share, interval = closed(before, after, floor)
     least = {e: min(p for k, p in certified.values() if k.effect == e) for e in {k.effect for k in kinds}}
-    return Correction(_drivers(models, fit, work, least), made, before, after, share, interval, tried)
+    drivers = _drivers(models, fit, work, least)
+    return Correction(drivers, made, before, after, share, interval, _watts(models, made), tried)
+
+
+def _watts(models: ModelComparison, fit: Fit) -> dict[str, float]:
+    """Root mean square of all heat of unknown cause by zone [W]."""
+    heat: dict[str, FloatArray] = {}
+    for effect in (e for e in UNKNOWN if e in fit.effects):
+        for zone in fit.effects[effect]:
+            strengths = [fit.values[p.of("zone", zone).name] for p in UNKNOWN[effect].parameters]
+            area = models.anatomy.rooms[zone].floor_area
+            heat[zone] = heat.get(zone, 0.0) + heat_of(effect, zone, area, models.drivers) @ strengths
+    return {zone: float(np.sqrt(np.mean(of**2))) for zone, of in heat.items()}
 
 
 def _days(problem: Problem) -> IntArray:
@@ -301,8 +318,7 @@ def _drivers(models: ModelComparison, fit: Fit, work: _Work, p_values: Mapping[s
     found = []
     for effect, zones in _zones(work.kinds).items():
         own = [k for k in work.kinds if k.effect == effect]
-        rest = tuple(k for k in work.kinds if k.effect != effect)
-        without = _fit(models, fit, rest, days, work.values).found.mean_square
+        alone = _fit(models, fit, tuple(own), days, work.values).found.mean_square
         watts, interval, mean = {}, {}, {}
         for zone in zones:
             unit = heat_of(effect, zone, models.anatomy.rooms[zone].floor_area, models.drivers)
@@ -316,6 +332,6 @@ def _drivers(models: ModelComparison, fit: Fit, work: _Work, p_values: Mapping[s
             low, high = np.quantile(np.sqrt(np.einsum("di,ij,dj->d", sizes, square, sizes)), (0.05, 0.95))
             watts[zone], mean[zone] = float(np.sqrt(heat @ square @ heat)), float((unit @ heat).mean())
             interval[zone] = float(low), float(high)
-        share = (without - work.found.mean_square) / max(before - work.found.mean_square, 1e-300)
-        found.append(Driver(effect, zones, watts, interval, mean, p_values[effect], max(0.0, float(share))))
+        share = float(np.clip((before - alone) / max(before - work.found.mean_square, 1e-300), 0.0, 1.0))
+        found.append(Driver(effect, zones, watts, interval, mean, p_values[effect], share))
     return tuple(sorted(found, key=lambda d: -d.share))

@@ -165,6 +165,7 @@ class Diagnosis(Result):
     def to_dict(self) -> dict[str, Any]:
         """Contents of ``diagnosis.json`` but for its sentence, which `mpc.reports` adds."""
         w, simple, carried = self.where, self.prediction.yardsticks, self.prediction.carried
+        halves = {s.effects[-1]: s.halves.to_dict() for s in self.steps if s.halves is not None}
         return {
             "verdict": self.verdict.name,
             "gap": {
@@ -191,13 +192,13 @@ class Diagnosis(Result):
                           "kind": w.drift.kind},
                 "groups": {s.name: s.to_dict() for s in w.groups},
             },
-            "which": [c.to_dict() for c in self.verdict.candidates],
+            "which": [c.to_dict() | {"repeats": plain(halves.get(c.effect))} for c in self.verdict.candidates],
             "set90": self.verdict.set90,
             "combinations": [{"effects": list(e), "probability": p} for e, p in self.verdict.combinations.items()],
             "how_far": [s.to_dict() for s in self.steps],
             "rounds": [r.to_dict() | {"worth": gains_of(r)} for r in self.rounds],
             **({} if self.left_over is None else {"left_over": plain(self.left_over)}),
-            **({} if self.correction is None else {"correction": self.correction.to_dict()}),
+            "correction": None if self.correction is None else self.correction.to_dict(),
             "prediction": {"rungs": plain(self.rungs), "held_out_mae": self.predicts, "carried": plain(carried)},
             "intervals": {
                 "tuning": plain(self.tuned),

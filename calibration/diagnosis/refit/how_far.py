@@ -11,7 +11,7 @@ import pandas as pd
 from calibration.diagnosis.refit.comparison import Built, Fit, ModelComparison
 from calibration.diagnosis.refit.fit import solve
 from calibration.diagnosis.refit.refit import HeldOut, held_out
-from calibration.diagnosis.refit.repeat import DISAGREE, agreement
+from calibration.diagnosis.refit.repeat import Repeats, agreement
 from calibration.diagnosis.refit.search import Round
 from calibration.diagnosis.screen.screen import GENERIC
 from calibration.errors import HorizonError, NotEnoughDataError
@@ -47,9 +47,8 @@ class Step:
     shuffled, runner_up : float or None
         Held-out error with the signals of the last effect permuted by days, and with the effect that came next in its
         place [K]; None where there is no such test.
-    halves : float or None
-        Probability of estimates of the last effect that differ so much between the halves of the tuning days [-]; None
-        where these cannot be halved.
+    halves : Repeats or None
+        The last effect in the two halves of the tuning days; None where these cannot be halved.
     bounds : tuple of str
         Baseline parameters on a bound with the effects.
     """
@@ -62,7 +61,7 @@ class Step:
     interval: tuple[float, float] | None
     shuffled: float | None
     runner_up: float | None
-    halves: float | None
+    halves: Repeats | None
     bounds: tuple[str, ...]
 
     @property
@@ -74,7 +73,7 @@ class Step:
     @property
     def repeats(self) -> bool:
         """Whether the halves of the tuning days agree on the last effect, or cannot tell."""
-        return self.halves is None or self.halves >= DISAGREE
+        return self.halves is None or self.halves.agrees
 
     def to_dict(self) -> dict[str, Any]:
         """Entry of ``how_far`` in ``diagnosis.json``."""
@@ -85,7 +84,7 @@ class Step:
             "floor": self.floor,
             "share_closed": self.share_closed,
             "interval": self.interval,
-            "placebo": {"shuffled": self.shuffled, "runner_up": self.runner_up, "halves": self.halves},
+            "placebo": {"shuffled": self.shuffled, "runner_up": self.runner_up},
             "on_bound": self.bounds,
         }
 

@@ -1,6 +1,7 @@
 """Does it repeat? An effect of a building has the same strengths in both halves of the tuning days."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy.stats import chi2
@@ -8,6 +9,7 @@ from scipy.stats import chi2
 from calibration.diagnosis.refit.comparison import Fit, is_strength
 from calibration.fit.least_squares import bounded_step
 from calibration.fit.problem import Problem
+from calibration.results import Plain
 from thermal._types import FloatArray
 from thermal.model.reduce import ReducedModel
 
@@ -18,8 +20,33 @@ DISAGREE = 0.01
 _STEPS = 2
 
 
-def agreement(fit: Fit) -> dict[str, float]:
-    """Probability of estimates that differ so much, or more, between the halves where an effect is steady, by effect.
+@dataclass(frozen=True)
+class Repeats(Plain):
+    """An effect in the two halves of the tuning days.
+
+    Parameters
+    ----------
+    probability : float
+        Of strengths that differ so much, or more, where the effect is the same in both [-].
+    estimates : tuple of dict
+        Its strengths by name in the first half and in the second [parameter units].
+    """
+
+    probability: float
+    estimates: tuple[dict[str, float], dict[str, float]]
+
+    @property
+    def agrees(self) -> bool:
+        """Whether the halves agree, or cannot tell."""
+        return self.probability >= DISAGREE
+
+    def to_dict(self) -> dict[str, Any]:
+        """``repeats`` of an effect in ``diagnosis.json``."""
+        return {"agrees": self.agrees, "probability": self.probability, "estimates": list(self.estimates)}
+
+
+def agreement(fit: Fit) -> dict[str, Repeats]:
+    """Estimate the strengths of each effect from either half of the tuning days, and judge whether they agree.
 
     Newton steps from the estimate of all days, every parameter free, give those of each half; their difference is held
     against its covariance (Wald test). An effect whose strengths no half can tell agrees with anything.
@@ -31,8 +58,8 @@ def agreement(fit: Fit) -> dict[str, float]:
 
     Returns
     -------
-    dict of str to float
-        By effect [-]; none where the tuning days cannot be halved.
+    dict of str to Repeats
+        By effect; none where the tuning days cannot be halved.
     """
     problem = replace(fit.problem, deviation=float(np.sqrt(fit.found.mean_square)))
     halves = _halves(problem)
@@ -40,11 +67,13 @@ def agreement(fit: Fit) -> dict[str, float]:
         return {}
     (one, spread), (other, spread_of_other) = (_estimate(half, fit.model, fit.point) for half in halves)
     apart, covariance = one - other, spread + spread_of_other
-    found = {}
+    found, thetas = {}, [problem.theta(point) for point in (one, other)]
     for effect in fit.effects:
         own = [i for i, p in enumerate(problem.parameters) if p.effect == effect and is_strength(p.name, effect)]
         block = covariance[np.ix_(own, own)] + 1e-12 * np.eye(len(own))
-        found[effect] = float(chi2.sf(apart[own] @ np.linalg.solve(block, apart[own]), len(own)))
+        chance = float(chi2.sf(apart[own] @ np.linalg.solve(block, apart[own]), len(own)))
+        first, second = ({problem.parameters[i].name: float(t[problem.free[i]]) for i in own} for t in thetas)
+        found[effect] = Repeats(chance, (first, second))
     return found
 
 

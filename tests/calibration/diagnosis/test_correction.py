@@ -111,8 +111,10 @@ def _whole(found: Diagnosis, out: Path) -> None:
     assert found.correction is not None
     page = write_diagnosis(found, draughty(), out / "d").read_text(encoding="utf-8")
     assert "<h2>Heat of unknown cause</h2>" in page
-    first = diagnosis_summary(found)["correction"]["drivers"][0]
+    told = diagnosis_summary(found)["correction"]
+    first = told["drivers"][0]
     assert first["effect"] == "heat_by_wind" and first["answers_to"] == "wind"
+    assert set(told["watts_rms"]) == set(told["zones"]) and told["false_discovery"] == 0.1
     content = json.loads((out / "d" / "calibration.json").read_text(encoding="utf-8"))
     assert {e["effect"] for e in content["effects"]} == {d.effect for d in found.correction.drivers}
     assert set(content["settings"]["effects"]) <= set(UNKNOWN)

@@ -15,7 +15,7 @@ from calibration.diagnosis.diagnosis import Diagnosis, baseline_gap, diagnose
 from calibration.diagnosis.refit.comparison import Fit, ModelComparison
 from calibration.diagnosis.refit.how_far import _permutation_test
 from calibration.diagnosis.refit.refit import ACCEPTED, CHANCE, MATTERS, Refit, Work, _beyond_a_step, held_out
-from calibration.diagnosis.refit.repeat import DISAGREE, agreement
+from calibration.diagnosis.refit.repeat import DISAGREE, Repeats, agreement
 from calibration.diagnosis.refit.search import _first
 from calibration.diagnosis.screen.screen import Screening
 from calibration.evaluation.settings import ModelSettings
@@ -91,18 +91,21 @@ def test_how_far_closes_the_gap_and_permuted_signals_do_not() -> None:
     assert step.floor <= step.after < step.before == found.gap
     assert step.shuffled is not None and step.shuffled > step.after
     assert step.repeats and not step.void
-    assert replace(step, shuffled=step.after).void and replace(step, halves=0.001).void
+    assert replace(step, shuffled=step.after).void and replace(step, halves=Repeats(0.001, ({}, {}))).void
 
 
 def test_a_meter_that_is_wrong_all_the_time_repeats_and_one_that_is_wrong_for_a_week_does_not() -> None:
     always = diagnosed(twin().building.zone_names[1]).final
     effect = next(iter(always.effects))
-    assert agreement(always)[effect] > 0.05
+    found = agreement(always)[effect]
+    assert found.probability > 0.05 and found.agrees
+    whole = {name: always.values[name] for name in found.estimates[0]}
+    assert all(each == pytest.approx(whole, abs=0.1) for each in found.estimates) and whole
     frame = changed(twin().building.zone_names[1]).telemetry.frame.copy()
     late = frame.index > frame.index[len(frame) // 3]
     frame.loc[late] = twin().telemetry.frame.loc[late]
     models = ModelComparison(Case(twin().building, Telemetry.from_frame(frame)), ModelSettings(dx=1.0))
-    assert agreement(models.fit(always.effects, [{}]))[effect] < DISAGREE
+    assert agreement(models.fit(always.effects, [{}]))[effect].probability < DISAGREE
 
 
 def test_the_file_holds_every_effect_and_what_the_contract_asks() -> None:
