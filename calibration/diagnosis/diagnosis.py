@@ -12,6 +12,7 @@ from calibration.diagnosis.correction import CORRECTED, Correction, correct
 from calibration.diagnosis.decide.levels import p_value
 from calibration.diagnosis.decide.verdict import Verdict, chance_of, doubted, gains_of, judge
 from calibration.diagnosis.decide.where import DriftCurve, Where, drift_of, where_it_lies
+from calibration.diagnosis.faults import Fault, mend, with_faults
 from calibration.diagnosis.free import drawing_fails, search_free
 from calibration.diagnosis.handed_on import fit_content, judge_handed_on, other_structures, with_correction
 from calibration.diagnosis.known import reasons_of
@@ -115,6 +116,8 @@ class Diagnosis(Result):
         free structure: `settings` then is of that one.
     correction : Correction or None
         The baseline with heat of unknown cause, where no effect explains what is missing and such heat is certified.
+    faults : tuple of Fault
+        Of the telemetry, which were mended before anything else: all the rest is about the mended case.
     """
 
     case: str
@@ -142,6 +145,7 @@ class Diagnosis(Result):
     band_factors: Mapping[str, float] = field(default_factory=dict)
     left_over: Regular | None = None
     correction: Correction | None = None
+    faults: tuple[Fault, ...] = ()
 
     @property
     def final(self) -> Fit:
@@ -158,6 +162,8 @@ class Diagnosis(Result):
     def subsystem(self) -> str:
         """Part of the building that the first accepted effect belongs to; ``none`` where nothing is accepted."""
         first = self.rounds[0].accepted
+        if self.faults:
+            return "sensor"
         if first is None:
             return "unknown" if self.verdict.name == "unexplained" else "none"
         return SUBSYSTEMS.get(first.screened.effect, "envelope")
@@ -169,7 +175,7 @@ class Diagnosis(Result):
         return {
             "verdict": self.verdict.name,
             "gap": {
-                "mae": self.gap,
+                "mae": self.faults[0].before.held_out if self.faults else self.gap,
                 "floor": self.floor,
                 "p_value": self.p_value,
                 "smallest_detectable_watts": self.detectable,
@@ -195,9 +201,10 @@ class Diagnosis(Result):
             "which": [c.to_dict() | {"repeats": plain(halves.get(c.effect))} for c in self.verdict.candidates],
             "set90": self.verdict.set90,
             "combinations": [{"effects": list(e), "probability": p} for e, p in self.verdict.combinations.items()],
-            "how_far": [s.to_dict() for s in self.steps],
+            "how_far": [*(f.how_far(self.floor) for f in self.faults), *(s.to_dict() for s in self.steps)],
             "rounds": [r.to_dict() | {"worth": gains_of(r)} for r in self.rounds],
             **({} if self.left_over is None else {"left_over": plain(self.left_over)}),
+            "faults": plain([f.to_dict() for f in self.faults]),
             "correction": None if self.correction is None else self.correction.to_dict(),
             "prediction": {"rungs": plain(self.rungs), "held_out_mae": self.predicts, "carried": plain(carried)},
             "intervals": {
@@ -313,6 +320,8 @@ def diagnose(
     """
     began = time.perf_counter()
     check_calibratable(case)
+    faults = mend(case, tune, hold_out, {"dx": dx, "horizon": horizon}, progress)
+    case = faults[-1].mended if faults else case
     models = ModelComparison(case, ModelSettings(dx=dx), tune, hold_out, horizon)
     untestable = models.untestable()
     untestable |= reasons_of(known, ruled_out, untestable)
@@ -341,7 +350,7 @@ def diagnose(
     areas = {name: room.floor_area for name, room in models.anatomy.rooms.items()}
     watts = rounds[0].screening.detectable(ACCEPTED)
     void = {s.effects[-1] for s in steps if s.void}
-    verdict = doubted(judge(rounds, untestable, left_over), void)
+    verdict = with_faults(doubted(judge(rounds, untestable, left_over), void), faults)
     correction = correct(models, rounds[0].before, errors, floor) if verdict.name == "unexplained" else None
     rungs, left = with_correction(models, correction, rungs, left)
     taken = correction.fit if correction is not None and rungs[-1].chosen else None
@@ -355,7 +364,7 @@ def diagnose(
         settings=replace(models.settings, normalisation=models.drivers.normalisation), horizon=horizon,
         last_third=first.mae if turns else None, rungs=rungs, better=better, prediction=prediction,
         estimated=case.estimated, disturbance=disturbance, band_factors=factors, left_over=left_over,
-        correction=correction,
+        correction=correction, faults=faults,
     )  # fmt: skip
 
 

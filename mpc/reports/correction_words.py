@@ -38,6 +38,24 @@ def correction_sentence(result: Diagnosis) -> str:
     return text + (" For prediction and control calibration.json holds it." if taken else "")
 
 
+def faults_sentence(result: Diagnosis) -> str:
+    """Say what is wrong with the telemetry itself, and how far the error falls once that is mended.
+
+    Parameters
+    ----------
+    result : Diagnosis
+        From `diagnose`.
+    """
+    if not result.faults:
+        return ""
+    told = [
+        f"{f.seen.what[0].upper()}{f.seen.what[1:]}. With that put right tuning days that are left out are missed by "
+        f"{kelvin(f.after.left_out)} K instead of {kelvin(f.before.left_out)} K. Advice: {f.seen.advice}. "
+        for f in result.faults
+    ]
+    return f"The telemetry itself is wrong. {''.join(told)}All that follows is about the mended telemetry. "
+
+
 def driver_rows(result: Diagnosis) -> list[dict[str, Any]]:
     """Rows of the page's table of heat of unknown cause.
 

@@ -193,7 +193,7 @@ def _candidate_entry(result: Diagnosis, c: Candidate) -> dict[str, Any]:
         "probability": c.probability,
         "accepted": fitted is not None,
         "where": in_zones(c.zones if fitted is None else fitted.screened.zones),
-        "acts_on": CATALOGUE[c.effect].acts_on,
+        "acts_on": CATALOGUE[c.effect].acts_on if c.effect in CATALOGUE else "readings",
         "values": [] if fitted is None else _values(result, c.effect),
         "alike": listed(others, "or") if others else "",
         "separate_by": c.separate_by,
@@ -202,6 +202,8 @@ def _candidate_entry(result: Diagnosis, c: Candidate) -> dict[str, Any]:
 
 def _values(result: Diagnosis, effect: str) -> list[str]:
     """Spell the parameters of an effect as the final model has them."""
+    if effect not in CATALOGUE:
+        return []
     own = {p.name for p in CATALOGUE[effect].parameters}
     found = [p for p in result.final.describe() if p.name.partition("@")[0] in own]
     spelled = []
@@ -226,9 +228,11 @@ def _measure_next(result: Diagnosis) -> list[tuple[str, str]]:
     if result.verdict.name == "no_gap":
         return []
     names = [r.screened.effect for r in accepted(result)]
-    for name in list(names) or [result.verdict.candidates[0].effect]:
+    faults = [(called(f.effect, f.zones).capitalize(), f.seen.advice) for f in result.faults]
+    for name in list(names) or ([] if faults else [result.verdict.candidates[0].effect]):
         names += [e for e in (name, *rivals(result, name)[:LARGEST_GROUP]) if e not in names]
-    return [(called(e).capitalize(), CATALOGUE[e].separated_by) for e in names if CATALOGUE[e].separated_by]
+    told = [(called(e).capitalize(), CATALOGUE[e].separated_by) for e in names if CATALOGUE[e].separated_by]
+    return [*faults, *told]
 
 
 def _waterfall(result: Diagnosis) -> list[tuple[str, float, float]]:

@@ -9,7 +9,7 @@ from calibration.diagnosis.decide.verdict import Candidate, group_of
 from calibration.diagnosis.decide.where import Where
 from calibration.diagnosis.diagnosis import Diagnosis
 from calibration.diagnosis.refit.refit import WINDOWS, Refit
-from mpc.reports.correction_words import correction_sentence
+from mpc.reports.correction_words import correction_sentence, faults_sentence
 from mpc.reports.evaluation import beside_sentence, carried_sentence, structure_words
 from mpc.reports.free_words import comes_back, free_sentence, known_effects
 from mpc.reports.page import duration, estimated_sentences, kelvin, listed, percent, sure, watts
@@ -36,7 +36,7 @@ def diagnosis_verdict(result: Diagnosis) -> str:
     result : Diagnosis
         From `diagnose`.
     """
-    text = free_sentence(result) + _verdict(result)
+    text = faults_sentence(result) + free_sentence(result) + _verdict(result)
     if known := known_effects(result):
         text += f" {listed([called(e) for e in known]).capitalize()}, known to be there, is part of the baseline."
     if result.settings.scopes:
@@ -60,10 +60,10 @@ def diagnosis_verdict(result: Diagnosis) -> str:
 
 def _verdict(result: Diagnosis) -> str:
     """Say which effect is missing, and how far the error falls with it."""
-    if result.verdict.name == "no_gap":
-        return _no_gap(result)
     if result.verdict.name == "unexplained":
         return _unexplained(result) + correction_sentence(result)
+    if result.verdict.name == "no_gap" or not accepted(result):  # a fault of the telemetry may be named
+        return _no_gap(result)
     found = accepted(result)
     if result.verdict.name == "group":
         first, *others = found

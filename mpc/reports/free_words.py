@@ -1,5 +1,8 @@
 """What a diagnosis says where a drawing does not hold, so that effects were sought about a free structure."""
 
+from dataclasses import replace
+
+from calibration.diagnosis.correction import CORRECTED
 from calibration.diagnosis.diagnosis import Diagnosis
 from calibration.fit.ladder import CLOCK
 from mpc.reports.evaluation import structure_words
@@ -19,11 +22,14 @@ def free_sentence(result: Diagnosis) -> str:
     """
     if result.left_over is None:
         return ""
-    own, drawn = next(r.left_out_mae for r in result.rungs if r.chosen), result.rungs[0].left_out_mae
+    others = [r for r in result.rungs if r.name != CORRECTED]
+    best = min(others, key=lambda r: r.left_out_mae)
+    free = [replace(r, chosen=r is best) for r in others] if len(others) < len(result.rungs) else others
+    own, drawn = next(r.left_out_mae for r in free if r.chosen), result.rungs[0].left_out_mae
     return (
-        f"The drawing does not hold: the building {structure_words(result.rungs)} misses tuning days that were left "
-        f"out by {kelvin(own)} K, as drawn by {kelvin(drawn)} K. calibration.json holds it, and effects were sought "
-        "about it. "
+        f"The drawing does not hold: the building {structure_words(free)} misses tuning days that were left "
+        f"out by {kelvin(own)} K, as drawn by {kelvin(drawn)} K."
+        f"{' calibration.json holds it, and effects' if free is others else ' Effects'} were sought about it. "
     )
 
 

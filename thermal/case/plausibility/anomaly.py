@@ -31,6 +31,8 @@ class Anomaly:
         What was seen, with numbers, in a sentence.
     advice
         What to do about it.
+    moved
+        By how much the stamps of the columns have to be moved [h]; 0 unless it is a clock that is wrong throughout.
     """
 
     kind: str
@@ -41,6 +43,7 @@ class Anomaly:
     end: pd.Timestamp
     what: str
     advice: str
+    moved: float = 0.0
 
     def __str__(self) -> str:
         """Sentence: what, how sure, what to do."""

@@ -122,7 +122,7 @@ def clock_errors(case: Case) -> Iterator[Anomaly]:
         )  # fmt: skip
         sure: Certainty = "certain" if explained >= 2.0 * LEAST_EXPLAINED_DAILY * len(run) else "likely"
         advice += "; see whether the other columns are off as well, and move the stamps"
-        yield Anomaly("clock", "warning", sure, (column,), inside[0], inside[-1], what, advice)
+        yield Anomaly("clock", "warning", sure, (column,), inside[0], inside[-1], what, advice, shift if whole else 0.0)
 
 
 def contradictions(location: Location, stamps: pd.DatetimeIndex, step: float, measured: FloatArray) -> FloatArray:

@@ -1,0 +1,95 @@
+"""Faults of the telemetry that it shows itself: mended where days that are left out are predicted better for it."""
+
+from dataclasses import replace
+from functools import cache
+from types import SimpleNamespace
+from typing import cast
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from calibration.diagnosis.decide.verdict import Candidate, Verdict
+from calibration.diagnosis.diagnosis import Diagnosis
+from calibration.diagnosis.faults import Errors, Fault, mend, suspected, with_faults
+from mpc.reports.correction_words import faults_sentence
+from thermal import Case
+from thermal.data import load_bundled_case
+
+SETTINGS = {"dx": 2.0, "horizon": "6h"}
+
+
+def changed(frame: pd.DataFrame) -> Case:
+    case = load_bundled_case()
+    return Case(case.building, replace(case.telemetry, frame=frame))
+
+
+@cache
+def late() -> Case:
+    """The bundled case with a weather station whose clock is two hours behind."""
+    case = load_bundled_case()
+    frame = case.telemetry.frame.copy()
+    weather = [str(c) for c in frame if str(c).startswith(f"{case.building.weather_station}/")]
+    frame[weather] = frame[weather].shift(24).bfill()
+    return changed(frame)
+
+
+@cache
+def swapped() -> tuple[Case, tuple[str, str]]:
+    """The bundled case with the sensors of two zones exchanged."""
+    case = load_bundled_case()
+    frame, zones = case.telemetry.frame.copy(), ("F1_N", "F1_S")
+    columns = [c for zone in zones for c in frame if str(c).endswith("/zone_air_temperature_sensor")
+               and str(c).partition("/")[0] in {zone, *(d.name for d in case.building.devices_of(zone))}]  # fmt: skip
+    assert len(columns) == 2
+    frame[columns] = frame[columns[::-1]].to_numpy()
+    return changed(frame), zones
+
+
+def test_a_clock_that_is_late_is_put_right_and_the_error_falls() -> None:
+    (fault,) = mend(late(), (), (), SETTINGS)
+    assert (fault.effect, fault.hours, fault.zones) == ("clock_shift", -2.0, ())
+    assert fault.after.left_out < 0.95 * fault.before.left_out and fault.to_dict()["hours"] == -2.0
+    frames = [case.telemetry.frame.iloc[:-48] for case in (fault.mended, load_bundled_case())]
+    pd.testing.assert_frame_equal(*frames)
+
+
+def test_exchanged_sensors_are_put_back() -> None:
+    case, zones = swapped()
+    found = [f for f in suspected(case) if f.effect == "swapped_sensors"]
+    assert [set(f.zones) for f in found] == [set(zones)]
+    pd.testing.assert_frame_equal(found[0].mended.telemetry.frame, load_bundled_case().telemetry.frame)
+
+
+def test_nothing_is_mended_where_nothing_is_wrong() -> None:
+    assert mend(load_bundled_case(), (), (), SETTINGS) == ()
+
+
+def test_what_predicts_no_better_is_left_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    errors = iter([(1.0, 1.1), (0.97, 1.0)])
+
+    def calibrated(*_: object, **__: object) -> object:
+        left, held = next(errors)
+        rung = SimpleNamespace(chosen=True, left_out_mae=left)
+        return SimpleNamespace(
+            rungs=[rung], calibrated={"held_out": SimpleNamespace(metrics=SimpleNamespace(mae=held))}
+        )
+
+    monkeypatch.setattr("calibration.diagnosis.faults.calibrate", calibrated)
+    assert mend(late(), (), (), SETTINGS) == ()
+
+
+def test_a_fault_comes_first_and_is_named() -> None:
+    (fault,) = [replace(f, before=Errors(0.8, 0.6), after=Errors(0.4, 0.3)) for f in suspected(late())]
+    other = Candidate("solar_gain", 0.1, 1.0, ("solar_gain",), (), {}, 1.0, "")
+    own = replace(other, effect="clock_shift")
+    verdict = with_faults(Verdict("no_gap", (other, own), (), {}), [fault])
+    assert verdict.name == "named" and [c.effect for c in verdict.candidates] == ["clock_shift", "solar_gain"]
+    first = verdict.candidates[0]
+    assert first.probability > 0.9 and first.parameters["weather_moved"].value == -2.0
+    assert with_faults(replace(verdict, name="unexplained"), [fault]).name == "unexplained"
+    assert with_faults(verdict, []) is verdict
+    assert fault.how_far(0.1)["share_closed"] == pytest.approx(0.6)
+    text = faults_sentence(cast(Diagnosis, SimpleNamespace(faults=(fault,))))
+    assert "-2 h" in text and "0.40 K instead of 0.80 K" in text
+    assert np.isnan(Fault("clock_shift", (), 1.0, fault.seen, late()).before.held_out)
