@@ -37,9 +37,6 @@ from energyplus_trials.drawing import draw_spec
 from energyplus_trials.errors import TrialError
 from energyplus_trials.specification import TrialSpec
 from energyplus_trials.trial import make_trial
-from sklearn.exceptions import ConvergenceWarning
-from sklearn.gaussian_process import GaussianProcessRegressor
-from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
 
 from calibration.diagnosis.correction import correct
 from calibration.diagnosis.refit.comparison import Fit, ModelComparison
@@ -101,6 +98,10 @@ def elsewhere(folder: Path, models: ModelComparison, fit: Fit) -> float:
 
 def learnt(models: ModelComparison, fit: Fit) -> float:
     """Held-out error beside a Gaussian process that learns the errors of the tuning days [K]."""
+    from sklearn.exceptions import ConvergenceWarning
+    from sklearn.gaussian_process import GaussianProcessRegressor
+    from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
+
     (known, errors), (new, left) = (_samples(models, fit, part) for part in (models.tuned, models.judged))
     rng, corrected = np.random.default_rng(0), np.empty_like(left)
     kernel = ConstantKernel(1.0) * RBF(np.ones(known.shape[1])) + WhiteKernel(0.1)
