@@ -22,6 +22,7 @@ from calibration.diagnosis.refit.how_far import closed
 from calibration.diagnosis.refit.refit import CHANCE, MATTERS, HeldOut, growth, held_out
 from calibration.diagnosis.screen.kinds_of_heat import Kind, candidates, evidence
 from calibration.diagnosis.screen.unknown_heat import daily_errors, days_of_runs
+from calibration.fit.fitted_case import is_large
 from calibration.fit.problem import Problem
 from thermal._types import FloatArray, IntArray
 from thermal.effects.unknown import ANSWERS_TO, UNKNOWN, heat_of
@@ -158,7 +159,7 @@ class _Work:
 
 
 def correct(models: ModelComparison, fit: Fit, before: HeldOut, floor: HeldOut) -> Correction | None:
-    """Give a model the heat of unknown cause that is certified; None where none is.
+    """Give a model the heat of unknown cause that is certified; None where none is, or the building is large.
 
     Parameters
     ----------
@@ -173,7 +174,7 @@ def correct(models: ModelComparison, fit: Fit, before: HeldOut, floor: HeldOut) 
     """
     days = np.unique(_days(fit.problem))
     turn = np.arange(days.size) // _TURN % 2 == 0
-    if min(turn.sum(), (~turn).sum()) < _LEAST_DAYS:
+    if min(turn.sum(), (~turn).sum()) < _LEAST_DAYS or is_large(fit.built.network.zones):
         return None
     certified: dict[str, tuple[Kind, float]] = {}
     tried = 0
@@ -245,18 +246,12 @@ def _pursue(models: ModelComparison, fit: Fit, days: IntArray) -> _Work:
         prior = np.linalg.inv(work.problem.prior_covariance())
         across = scale * gram[:, own] @ np.linalg.inv(scale * gram[np.ix_(own, own)] + prior)
         left, pull = scale * (gram - across @ gram[own]), -scale * (score - across @ score[own])
-        best, kind = max(
-            (
-                (evidence(table, k, left, pull), k)
-                for base in candidates(table, models.anatomy)
-                if base.name not in known
-                for k in (replace(base, tightness=t) for t in _TIGHTNESS)
-            ),
-            key=lambda f: f[0], default=(-np.inf, None),
-        )  # fmt: skip
-        if kind is None or best < _CHOSEN:
+        bases = [base for base in candidates(table, models.anatomy) if base.name not in known]
+        kinds = [replace(base, tightness=t) for base in bases for t in _TIGHTNESS]
+        worth = [evidence(table, kind, left, pull) for kind in kinds]
+        if max(worth, default=0.0) < _CHOSEN:
             break
-        work = _fit(models, fit, (*work.kinds, kind), days, work.values)
+        work = _fit(models, fit, (*work.kinds, kinds[int(np.argmax(worth))]), days, work.values)
     return work
 
 
@@ -283,7 +278,8 @@ def _test(
         rest = tuple(k for k in work.kinds if k is not kind)
         gained = errors(_fit(models, fit, rest, days, work.values)) - with_all
         p.append(float(ttest_1samp(gained, 0.0, alternative="greater").pvalue) if np.ptp(gained) else 1.0)
-    return list(zip(p, false_discovery_control(np.array(p)).tolist(), strict=True))
+    p = np.nan_to_num(p, nan=1.0).tolist()
+    return list(zip(p, false_discovery_control(p).tolist(), strict=True))
 
 
 def _untied(models: ModelComparison, fit: Fit, work: _Work) -> Fit:
