@@ -20,7 +20,8 @@ from thermal import (
     replay_inputs,
     spin_up,
 )
-from thermal.effects.catalogue import CATALOGUE, chosen
+from thermal.effects.catalogue import CATALOGUE, chosen, effect_of
+from thermal.effects.unknown import UNKNOWN
 from thermal.errors import ModelError
 from thermal.inputs.provider import telemetry_inputs
 from thermal.inputs.signals import signal_values
@@ -33,12 +34,12 @@ FloatArray = NDArray[np.float64]
 CaseOf = Callable[[str], Case]
 
 KINDS = ("plan", "table")
-EFFECTS = tuple(CATALOGUE)
+EFFECTS = (*CATALOGUE, *UNKNOWN)
 STARTS, STEPS = np.array([100, 220]), 24
 
 
 def with_effects(case: Case, *ids: str) -> ThermalNetwork:
-    wanted = [*ids, *(r for name in ids for r in CATALOGUE[name].requires)]
+    wanted = [*ids, *(r for name in ids for r in effect_of(name).requires)]
     return build_network(case.building, effects=chosen(wanted))
 
 
