@@ -209,6 +209,12 @@ def read(out: Path) -> dict[str, tuple[dict[str, Any], Trial]]:
         twin = float("nan") if as_is is None else gap_of(as_is)
         own = {c for step in (as_is or answer)["how_far"] for c in step["effects"]} if not null else set()
         answer = {**answer, "which": [c for c in answer["which"] if c["effect"] not in own]}
+        if (
+            own
+            and {c for step in answer["how_far"] for c in step["effects"]} <= own
+            and answer["verdict"] != "unexplained"
+        ):
+            answer["verdict"] = "no_gap"  # nothing but what the building is known to have
         found[name] = label, Trial(
             name, "null" if null else "single", () if null else (frozenset(right),), () if null else (label["kind"],),
             1.0, frozenset(label["zones"]), unexplained, () if null else (twin,), answer, True, label["numbers"],
