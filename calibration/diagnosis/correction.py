@@ -155,7 +155,8 @@ class _Work:
 
     def strengths(self, kind: Kind) -> FloatArray:
         """Strengths of one of its kinds, one a signal [parameter units]."""
-        return np.array([self.values[p.name] for p in kind.chosen.effect.parameters])
+        own = [self.values[p.name] for p in kind.chosen.effect.parameters]
+        return np.array(own * (len(UNKNOWN[kind.effect].parameters) if kind.joined else 1))
 
 
 def correct(models: ModelComparison, fit: Fit, before: HeldOut, floor: HeldOut) -> Correction | None:
@@ -321,7 +322,9 @@ def _drivers(models: ModelComparison, fit: Fit, work: _Work, p_values: Mapping[s
             sizes, heat = np.zeros((_DRAWS, unit.shape[1])), np.zeros(unit.shape[1])
             for kind in own:
                 weight = kind.weights.get(zone, np.zeros(unit.shape[1]))
-                at = [names.index(p.name) for p in kind.chosen.effect.parameters]
+                at = [names.index(p.name) for p in kind.chosen.effect.parameters] * (
+                    unit.shape[1] if kind.joined else 1
+                )
                 heat += weight * work.strengths(kind)
                 sizes += weight * (work.strengths(kind) + normal[:, at])
             square = unit.T @ unit / len(unit)

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
 
+import casadi as ca
 import numpy as np
 
 from thermal._types import FloatArray
@@ -105,10 +106,16 @@ def _heat(effect: str, room: Room) -> list[tuple[Signal, float]]:
     return [(signal, room.floor_area) for signal in _DRIVERS[effect][1]]
 
 
+def _give(builder: EffectBuilder, effect: str, room: Room, value: ca.SX, signal: Signal, area: float) -> None:
+    """Give heat to a zone: the sun's to what it falls on, by the surfaces, all other to the air."""
+    (builder.heat_surfaces if effect == SUN else builder.heat_air)(room, value, signal, area)
+
+
 def _build(builder: EffectBuilder) -> None:
+    effect = builder.effect.id
     for room in builder.rooms:
-        for p, (signal, area) in zip(builder.effect.parameters, _heat(builder.effect.id, room), strict=True):
-            builder.heat_air(room, builder.parameter(p.name, zone=room.name), signal, area)
+        for p, (signal, area) in zip(builder.effect.parameters, _heat(effect, room), strict=True):
+            _give(builder, effect, room, builder.parameter(p.name, zone=room.name), signal, area)
 
 
 def _effect(name: str, answers_to: str, signals: tuple[Signal, ...], most: float) -> Effect:
@@ -119,7 +126,8 @@ def _effect(name: str, answers_to: str, signals: tuple[Signal, ...], most: float
     )
     return Effect(
         id=name, title=f"heat of unknown cause with {answers_to}", equation="A Σ_k p_k s_k", source=_SOURCE,
-        acts_on="air of each zone", confounders=(), separated_by="", parameters=parameters, build=_build, zonal=True,
+        acts_on="surfaces of each zone" if name == SUN else "air of each zone", confounders=(), separated_by="",
+        parameters=parameters, build=_build, zonal=True,
     )  # fmt: skip
 
 
@@ -135,8 +143,8 @@ UNKNOWN[METERED] = Effect(
 ANSWERS_TO = {name: words for name, (words, _, _) in _DRIVERS.items()} | {METERED: "metered heat"}
 
 
-def tied(effect: str, name: str, weights: Mapping[str, FloatArray], tightness: float) -> Effect:
-    """Heat of unknown cause whose strengths some zones share, one a signal.
+def tied(effect: str, name: str, weights: Mapping[str, FloatArray], tightness: float, joined: bool = False) -> Effect:
+    """Heat of unknown cause whose strengths some zones share, one a signal or one for all.
 
     Parameters
     ----------
@@ -148,19 +156,22 @@ def tied(effect: str, name: str, weights: Mapping[str, FloatArray], tightness: f
         Its heat by the floor area in every zone, over that of the strengths [-].
     tightness : float
         Plausible heat over that of `UNKNOWN` [-].
+    joined : bool
+        Whether all signals share the first one's strength.
     """
     of = UNKNOWN[effect]
     parameters = tuple(
         replace(p, name=f"{p.name}, {name}", lower=tightness * p.lower, upper=tightness * p.upper, effect=name)
-        for p in of.parameters
+        for p in of.parameters[: 1 if joined else None]
     )
+    shared = parameters * (len(of.parameters) if joined else 1)
 
     def build(builder: EffectBuilder) -> None:
         for zone, weight in weights.items():
             room = builder.anatomy.rooms[zone]
-            for p, (signal, area), share in zip(parameters, _heat(effect, room), weight.tolist(), strict=True):
+            for p, (signal, area), share in zip(shared, _heat(effect, room), weight.tolist(), strict=True):
                 if share:
-                    builder.heat_air(room, builder.parameter(p.name) * share, signal, area)
+                    _give(builder, effect, room, builder.parameter(p.name) * share, signal, area)
 
     return replace(of, id=name, parameters=parameters, build=build, zonal=False)
 

@@ -1,6 +1,6 @@
 """Kinds of heat of unknown cause that may be missing: what it answers to, in which zones, how large it may be."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,6 +24,8 @@ class Kind:
         Its heat by the floor area in every zone, over that of the strengths [-].
     how : str
         By floor area or by outer area.
+    joined : bool
+        Whether all signals share one strength, as the sun on all facades does.
     tightness : float
         Plausible heat over that of `UNKNOWN` [-].
     """
@@ -31,6 +33,7 @@ class Kind:
     effect: str
     weights: Mapping[str, FloatArray]
     how: str = "floor"
+    joined: bool = False
     tightness: float = 1.0
 
     @property
@@ -41,7 +44,7 @@ class Kind:
     @property
     def chosen(self) -> Chosen:
         """The effect, with strengths that its zones share."""
-        return Chosen(tied(self.effect, self.name, self.weights, self.tightness))
+        return Chosen(tied(self.effect, self.name, self.weights, self.tightness, self.joined))
 
 
 def candidates(table: DailyErrors, anatomy: Anatomy) -> list[Kind]:
@@ -58,25 +61,55 @@ def candidates(table: DailyErrors, anatomy: Anatomy) -> list[Kind]:
     for effect in table.kinds:
         count = len(UNKNOWN[effect].parameters)
         found.extend(Kind(effect, dict.fromkeys(zones, np.ones(count))) for zones in _groups(anatomy))
-        outer = _outer(anatomy, PLANES if effect == SUN else ()) if effect in OUTER else {}
-        found.extend([Kind(effect, outer, "outer area")] if outer else [])
+        if effect == SUN:
+            found.extend(_sunlit(anatomy))
+        elif effect in OUTER:
+            walls = {zone: np.array([sum(areas)]) for zone, areas in _outer(anatomy).items() if any(areas)}
+            found.extend([Kind(effect, _by_floor(anatomy, walls), "outer area")] if walls else [])
     return found
 
 
-def _outer(anatomy: Anatomy, planes: Sequence[tuple[float, float]]) -> dict[str, FloatArray]:
-    """Outer area over the floor's of the zones that have some, on each plane or in all, over the mean of these [-]."""
-    found = {}
-    for zone, room in anatomy.rooms.items():
-        walls = [(direction_of(z), area) for (of, z), area in anatomy.facades.items() if of == zone]
-        roof = anatomy.under_roof.get(zone, 0.0)
-        by_plane = [
-            roof if tilt < VERTICAL / 2.0 else sum(a for side, a in walls if side == direction_of(azimuth))
-            for azimuth, tilt in planes
-        ]
-        area = np.array(by_plane or [roof + sum(a for _, a in walls)])
-        if area.any():
-            found[zone] = area / room.floor_area
-    mean = np.mean([a.sum() for a in found.values()]) if found else 1.0
+def _sunlit(anatomy: Anatomy) -> list[Kind]:
+    """Sun on the outer area with a strength a plane, and with one for all of it, for all facades, for all windows."""
+    outer, windows = _outer(anatomy), {zone: [0.0] * len(PLANES) for zone in anatomy.rooms}
+    for pane in anatomy.panes:
+        for k, (azimuth, tilt) in enumerate(PLANES):
+            if tilt > 0.0 and direction_of(pane.azimuth) == direction_of(azimuth):
+                windows[pane.zone][k] += pane.area
+    walls = {
+        zone: [a * (tilt > 0.0) for a, (_, tilt) in zip(areas, PLANES, strict=True)] for zone, areas in outer.items()
+    }
+    kinds = (
+        ("outer area", outer, False),
+        ("outer area", outer, True),
+        ("facades", walls, True),
+        ("windows", windows, True),
+    )
+    found = []
+    for how, areas, joined in kinds:
+        there = {zone: np.array(area) for zone, area in areas.items() if any(area)}
+        if there:
+            found.append(Kind(SUN, _by_floor(anatomy, there), f"{how}{' at once' if joined else ''}", joined))
+    return found
+
+
+def _outer(anatomy: Anatomy) -> dict[str, list[float]]:
+    """Outer area of every zone on each plane of the sun [m2]."""
+    found = {zone: [0.0] * len(PLANES) for zone in anatomy.rooms}
+    for k, (azimuth, tilt) in enumerate(PLANES):
+        if tilt < VERTICAL / 2.0:
+            for zone, area in anatomy.under_roof.items():
+                found[zone][k] += area
+        else:
+            for (zone, side), area in anatomy.facades.items():
+                found[zone][k] += area * (direction_of(side) == direction_of(azimuth))
+    return found
+
+
+def _by_floor(anatomy: Anatomy, areas: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+    """Areas over the floor's, over the mean of that over these zones [-]."""
+    found = {zone: area / anatomy.rooms[zone].floor_area for zone, area in areas.items()}
+    mean = float(np.mean([a.sum() for a in found.values()]))
     return {zone: ratio / mean for zone, ratio in found.items()}
 
 
@@ -111,5 +144,7 @@ def evidence(table: DailyErrors, kind: Kind, left: FloatArray, pull: FloatArray)
         if p.effect == kind.effect and (zone := str(p.member)) in kind.weights:
             signal = names.index(p.base)
             basis[i, signal] = kind.tightness * p.prior_deviation * kind.weights[zone][signal]
+    if kind.joined:
+        basis = basis.sum(axis=1, keepdims=True)
     hessian, score = basis.T @ left @ basis + np.eye(basis.shape[1]), pull @ basis
     return float(0.5 * score @ np.linalg.solve(hessian, score) - 0.5 * np.linalg.slogdet(hessian)[1])

@@ -29,11 +29,12 @@ def entering(case: Case, effect: Chosen, values: dict[str, float]) -> dict[str, 
     with_it, without = (
         -np.asarray(SymbolicModel(network).matrices(network.values(v)).flow @ full) for v in (values, none)
     )
-    rooms = network.anatomy.rooms
-    assert np.abs(with_it - without).sum() == pytest.approx(
-        sum(np.abs((with_it - without)[room.air]).sum() for room in rooms.values())
-    )
-    return {name: float((with_it - without)[room.air].sum()) for name, room in rooms.items()}
+    heat = with_it - without
+    found = {name: float(heat[network.zone == k].sum()) for k, name in enumerate(network.zones)}
+    assert heat.sum() == pytest.approx(sum(found.values()), rel=1e-9, abs=1e-9)
+    inside = {"radiant"} if effect.effect.acts_on.startswith("surfaces") else {"air"}
+    assert {str(k) for k in network.kind[heat != 0.0]} <= inside
+    return found
 
 
 @pytest.mark.parametrize("name", UNKNOWN)
