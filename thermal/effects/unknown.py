@@ -121,7 +121,9 @@ def _build(builder: EffectBuilder) -> None:
 def _effect(name: str, answers_to: str, signals: tuple[Signal, ...], most: float) -> Effect:
     single = len(signals) == 1
     parameters = tuple(
-        strength(name if single else f"{name}_{n}", f"W/m^2/({s.unit})", most, _SOURCE, name, -most)
+        strength(
+            name if single else f"{name}_{n}", f"W/m^2/({s.unit})", most, _SOURCE, name, 0.0 if name == SUN else -most
+        )
         for n, s in enumerate(signals)
     )
     return Effect(

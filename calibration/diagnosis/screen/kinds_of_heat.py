@@ -147,4 +147,11 @@ def evidence(table: DailyErrors, kind: Kind, left: FloatArray, pull: FloatArray)
     if kind.joined:
         basis = basis.sum(axis=1, keepdims=True)
     hessian, score = basis.T @ left @ basis + np.eye(basis.shape[1]), pull @ basis
+    inside = np.ones(basis.shape[1], dtype=bool)
+    while kind.effect == SUN and inside.any():  # the sun takes no heat away
+        below = np.flatnonzero(inside)[np.linalg.solve(hessian[np.ix_(inside, inside)], score[inside]) < 0.0]
+        if not below.size:
+            break
+        inside[below] = False
+    hessian, score = hessian[np.ix_(inside, inside)], score[inside]
     return float(0.5 * score @ np.linalg.solve(hessian, score) - 0.5 * np.linalg.slogdet(hessian)[1])
