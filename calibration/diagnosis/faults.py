@@ -88,10 +88,10 @@ class Fault:
         Parameters
         ----------
         floor : float
-            Under the errors of the mended case [K].
+            Under the errors of the mended case as drawn [K]; another structure may have less.
         """
         before, after = self.before.held_out, self.after.held_out
-        share = (before - after) / (before - floor) if before > floor else None
+        share = (before - after) / (before - min(floor, after)) if before > floor else None
         return {
             "effects": [self.effect], "held_out_mae_before": before, "held_out_mae_after": after,
             "floor": floor, "share_closed": share, "interval": None,

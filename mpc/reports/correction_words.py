@@ -49,11 +49,11 @@ def faults_sentence(result: Diagnosis) -> str:
     if not result.faults:
         return ""
     told = [
-        f"{f.seen.what[0].upper()}{f.seen.what[1:]}. With that put right tuning days that are left out are missed by "
-        f"{kelvin(f.after.left_out)} K instead of {kelvin(f.before.left_out)} K. Advice: {f.seen.advice}. "
+        f"{f.seen.what}. With that put right tuning days that are left out are missed by {kelvin(f.after.left_out)} K "
+        f"instead of {kelvin(f.before.left_out)} K. Advice: {f.seen.advice}."
         for f in result.faults
     ]
-    return f"The telemetry itself is wrong. {''.join(told)}All that follows is about the mended telemetry. "
+    return f"The telemetry itself is wrong: {' And '.join(told)} All that follows is about the mended telemetry. "
 
 
 def driver_rows(result: Diagnosis) -> list[dict[str, Any]]:
