@@ -243,6 +243,4 @@ def _answer(out: Path, spec: TrialSpec, file: Path) -> str:
 
 
 if __name__ == "__main__":
-    for thread in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-        os.environ.setdefault(thread, "1")
     main()

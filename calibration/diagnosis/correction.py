@@ -23,6 +23,7 @@ from calibration.diagnosis.refit.refit import CHANCE, MATTERS, HeldOut, growth, 
 from calibration.diagnosis.screen.kinds_of_heat import Kind, candidates, evidence
 from calibration.diagnosis.screen.unknown_heat import daily_errors, days_of_runs
 from calibration.fit.fitted_case import is_large
+from calibration.fit.left_out import on_runs, values_of
 from calibration.fit.problem import Problem
 from thermal._types import FloatArray, IntArray
 from thermal.effects.unknown import ANSWERS_TO, UNKNOWN, heat_of
@@ -149,9 +150,12 @@ class _Work:
     found: Found
 
     @property
+    def point(self) -> FloatArray:
+        return self.found.point
+
+    @property
     def values(self) -> dict[str, float]:
-        theta = self.problem.theta(self.found.point)
-        return {p.name: float(v) for p, v in zip(self.built.network.parameters, theta, strict=True)}
+        return values_of(self)
 
     def strengths(self, kind: Kind) -> FloatArray:
         """Strengths of one of its kinds, one a signal [parameter units]."""
@@ -219,9 +223,7 @@ def _days(problem: Problem) -> IntArray:
 def _on(problem: Problem, days: IntArray) -> Problem:
     """Take the tuning runs of some days."""
     inside = [np.isin(days_of_runs(problem, r), days) for r in problem.runs]
-    runs = tuple(replace(r, starts=r.starts[own]) for r, own in zip(problem.runs, inside, strict=True) if own.any())
-    share = float(np.concatenate(inside).mean())
-    return replace(problem, runs=runs, effective=share * problem.effective_size())
+    return on_runs(problem, [replace(r, starts=r.starts[own]) for r, own in zip(problem.runs, inside, strict=True)])
 
 
 def _fit(

@@ -44,19 +44,7 @@ def other_structures(
     if is_large(final.built.network.zones):
         return (), None, None
     name = "named" if final.effects else "drawn"
-    return climb_from(name, known_of(final), models, progress, advance)
-
-
-def known_of(fit: Fit) -> Known:
-    """Give what calibrations know of a fit, which has found its deviation beside its parameters.
-
-    Parameters
-    ----------
-    fit : Fit
-        Any.
-    """
-    problem = replace(fit.problem, deviation=float(np.sqrt(fit.found.mean_square)))
-    return Known(problem, fit.model, fit.point)
+    return climb_from(name, Known(final.weighed, final.model, final.point), models, progress, advance)
 
 
 def with_correction(
@@ -82,10 +70,11 @@ def with_correction(
     """
     if correction is None:
         return rungs, left
-    found = left_out(known_of(correction.fit), models.tuned, models.settings.spin_up_seconds)
+    made = correction.fit
+    found = left_out(Known(made.weighed, made.model, made.point), models.tuned, models.settings.spin_up_seconds)
     kept = found.mae < min((r.left_out_mae for r in rungs if r.chosen), default=np.inf)
     others = tuple(replace(r, chosen=r.chosen and not kept) for r in rungs)
-    return (*others, Rung(CORRECTED, found.mae, len(correction.fit.problem.free), kept)), found if kept else left
+    return (*others, Rung(CORRECTED, found.mae, len(made.problem.free), kept)), found if kept else left
 
 
 def fit_content(

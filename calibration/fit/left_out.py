@@ -140,21 +140,49 @@ def left_out(fitted: Fitted, tuned: Sequence[Interval], spin_up_seconds: float) 
             left = select_runs(problem.inputs, part, problem.steps, spin_up=spin_up_seconds)
         except NotEnoughDataError:
             continue
-        rest = tuple(runs for runs in kept if runs.starts.size)
-        if not rest or not left.starts.size:
+        fold = on_runs(problem, kept)
+        if not fold.runs or not left.starts.size:
             continue
-        share = sum(r.starts.size for r in rest) / sum(r.starts.size for r in problem.runs)
-        fold = replace(problem, runs=rest, effective=share * problem.effective_size())
-        point, bounds = fitted.point, np.array(problem.bounds)
-        for _ in range(_STEPS):
-            residual, jacobian = fold.weighted(model, point)
-            point = np.clip(point + bounded_step(residual, jacobian, *(bounds - point)), *bounds)
-        theta = fold.theta(point)
+        theta = fold.theta(newton(fold, model, fitted.point))
         error, _ = fold.errors(model, theta, left, slopes=False)
         parts.append(part)
         thetas.append(theta)
         errors.append(error[:, -1])
     return LeftOut(tuple(parts), tuple(thetas), np.concatenate(errors))
+
+
+def on_runs(problem: Problem, runs: Sequence[Runs]) -> Problem:
+    """Take a problem of some of its runs, whose errors count in proportion.
+
+    Parameters
+    ----------
+    problem : Problem
+        Of all of them.
+    runs : sequence of Runs
+        Parts of its own; those without a run are left out.
+    """
+    some = tuple(r for r in runs if r.starts.size)
+    share = sum(r.starts.size for r in some) / sum(r.starts.size for r in problem.runs)
+    return replace(problem, runs=some, effective=share * problem.effective_size())
+
+
+def newton(problem: Problem, model: ReducedModel, point: FloatArray) -> FloatArray:
+    """Fit some of the runs by a few Newton steps from the estimate of all, (n_free,) on the estimation scale [-].
+
+    Parameters
+    ----------
+    problem : Problem
+        Of these runs.
+    model : ReducedModel
+        Accurate at the estimate.
+    point : ndarray, shape (n_free,)
+        The estimate on the estimation scale [-].
+    """
+    bounds = np.array(problem.bounds)
+    for _ in range(_STEPS):
+        residual, jacobian = problem.weighted(model, point)
+        point = np.clip(point + bounded_step(residual, jacobian, *(bounds - point)), *bounds)
+    return point
 
 
 def _parts(tuned: Sequence[Interval]) -> list[Interval]:

@@ -2,7 +2,6 @@
 
 from typing import Any
 
-from calibration.diagnosis.correction import CORRECTED
 from calibration.diagnosis.diagnosis import Diagnosis
 from mpc.reports.page import kelvin, listed, percent, watts
 from thermal.effects.unknown import ANSWERS_TO
@@ -34,8 +33,7 @@ def correction_sentence(result: Diagnosis) -> str:
         f"{kelvin(found.after.mae)} K with it"
     )
     text += f", {percent(min(found.share_closed, 1.0))} of what could be closed." if found.share_closed else "."
-    taken = any(r.chosen and r.name == CORRECTED for r in result.rungs)
-    return text + (" For prediction and control calibration.json holds it." if taken else "")
+    return text + (" For prediction and control calibration.json holds it." if result.taken is found.fit else "")
 
 
 def faults_sentence(result: Diagnosis) -> str:

@@ -130,6 +130,11 @@ class Fit:
         return self.problem.theta(self.found.point)
 
     @property
+    def weighed(self) -> Problem:
+        """The problem with the deviation of its errors, which the fit has found beside its parameters."""
+        return replace(self.problem, deviation=float(np.sqrt(self.found.mean_square)))
+
+    @property
     def point(self) -> FloatArray:
         """The estimate on the estimation scale, (n_free,) [-]."""
         return self.found.point

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from calibration.diagnosis.refit.comparison import Fit, is_strength
-from calibration.fit.least_squares import bounded_step
+from calibration.fit.left_out import newton, on_runs
 from calibration.fit.problem import Problem
 from calibration.results import Plain
 from thermal._types import FloatArray
@@ -15,9 +15,6 @@ from thermal.model.reduce import ReducedModel
 
 #: Probability below which two halves do not agree [-].
 DISAGREE = 0.01
-
-#: Newton steps from the estimate of all days.
-_STEPS = 2
 
 
 @dataclass(frozen=True)
@@ -61,7 +58,7 @@ def agreement(fit: Fit) -> dict[str, Repeats]:
     dict of str to Repeats
         By effect; none where the tuning days cannot be halved.
     """
-    problem = replace(fit.problem, deviation=float(np.sqrt(fit.found.mean_square)))
+    problem = fit.weighed
     halves = _halves(problem)
     if halves is None or not fit.effects:
         return {}
@@ -84,19 +81,13 @@ def _halves(problem: Problem) -> tuple[Problem, Problem] | None:
         return None
     middle, made = starts[starts.size // 2], []
     for late in (False, True):
-        runs = tuple(replace(r, starts=r.starts[(r.starts >= middle) == late]) for r in problem.runs)
-        runs = tuple(r for r in runs if r.starts.size)
-        share = sum(r.starts.size for r in runs) / starts.size
-        made.append(replace(problem, runs=runs, effective=share * problem.effective_size()))
+        made.append(on_runs(problem, [replace(r, starts=r.starts[(r.starts >= middle) == late]) for r in problem.runs]))
     return made[0], made[1]
 
 
 def _estimate(half: Problem, model: ReducedModel, point: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Estimate of a half, and the covariance that its data give it, priors holding."""
-    bounds = np.array(half.bounds)
-    for _ in range(_STEPS):
-        residual, jacobian = half.weighted(model, point)
-        point = np.clip(point + bounded_step(residual, jacobian, *(bounds - point)), *bounds)
+    point = newton(half, model, point)
     data = half.weighted(model, point)[1][: -point.size]
     prior = np.linalg.inv(half.prior_covariance())
     held = np.linalg.inv(data.T @ data + prior)
