@@ -7,7 +7,7 @@ from importlib.metadata import version
 
 from calibration.errors import CalibrationError
 from calibration.estimation.bands import Forecaster
-from calibration.evaluation.case_model import CaseModel, GridCheck
+from calibration.evaluation.case_model import CaseModel
 from calibration.evaluation.intervals import Interval, default_intervals, horizon_steps, select_runs
 from calibration.evaluation.n_step import HORIZONS, Evaluation, EvaluationSettings, Progress
 from calibration.evaluation.settings import CalibrationSettings
@@ -19,6 +19,7 @@ from calibration.fit.result import CalibrationResult, SolverReport, describe
 from calibration.identifiability.information import information_of
 from thermal.case.case import Case
 from thermal.inputs.normalisation import fit_normalisation
+from thermal.model.matrices import SymbolicModel
 from thermal.model.reduce import ReducedModel, reduced_model
 
 #: Zones beyond which no days are left out and no lumped structure is fitted: that has some ten parameters a zone.
@@ -91,7 +92,8 @@ class FittedCase:
         after = replace(
             before, theta=best.theta, source="estimate", disturbance=best.disturbance, band_factors=self._band_factors()
         )
-        calibrated, check = self._evaluated(after, best.model, progress)
+        quick, check = after.certified(self.judged[0], horizon_steps(chosen.horizon, after.inputs.step), best.model)
+        calibrated = self._evaluated(after, quick, progress)
         seconds, solve = time.perf_counter() - began, best.solve
         network, information = before.grid.network, information_of(best)
         return CalibrationResult(
@@ -127,7 +129,7 @@ class FittedCase:
         progress : callable, optional
             Called with stage, done, total.
         """
-        return self._evaluated(self.model, self.reduced, progress)[0]
+        return self._evaluated(self.model, self.reduced, progress)  # exact where it was made
 
     def _band_factors(self) -> dict[str, float]:
         """Make bands of predictions, where days were left out or somebody wants to know how good the model is."""
@@ -142,16 +144,14 @@ class FittedCase:
         return forecaster.factors(left.parts, left.thetas)
 
     def _evaluated(
-        self, model: CaseModel, reduced: ReducedModel, progress: Progress | None
-    ) -> tuple[dict[str, Evaluation], GridCheck]:
-        """Errors on both kinds of interval, at other horizons too where held out, and the check of the reduced one."""
-        horizon = self.settings.horizon
-        quick, check = model.certified(self.judged[0], horizon_steps(horizon, model.inputs.step), reduced)
-        errors = {}
+        self, model: CaseModel, quick: SymbolicModel, progress: Progress | None
+    ) -> dict[str, Evaluation]:
+        """Errors on both kinds of interval, at other horizons too where held out."""
+        horizon, errors = self.settings.horizon, {}
         for name, part in (("tuning", self.tuned), ("held_out", self.judged)):
             settings = EvaluationSettings(horizon, True, HORIZONS if name == "held_out" else ())
             errors[name] = model.evaluate(quick, part, settings, progress)
-        return errors, check
+        return errors
 
 
 def fit_case(

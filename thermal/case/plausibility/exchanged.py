@@ -6,7 +6,7 @@ from itertools import combinations
 import numpy as np
 import pandas as pd
 
-from thermal._types import FloatArray
+from thermal._types import BoolArray, FloatArray, IntArray
 from thermal.case.building import OUTDOOR
 from thermal.case.case import Case
 from thermal.case.plausibility.anomaly import Anomaly, Certainty
@@ -126,6 +126,7 @@ def heat_gains(case: Case, temperatures: pd.DataFrame, outdoor: pd.Series) -> Fl
     outside, zones = places[:, -1], places[:, :-1]
     gains = np.zeros((places.shape[1],) * 2)
     heated = np.flatnonzero([np.isfinite(q).any() and np.nanstd(q) > 0.0 for q in heat.T])
+    heats = np.isfinite(heat[2:, heated]) & np.isfinite(heat[1:-1, heated])
     one = np.ones(len(places))
     for i, own in enumerate(places.T):
         rest = np.delete(zones, i, axis=1) if zones.shape[1] > 1 and i < zones.shape[1] else zones
@@ -133,22 +134,44 @@ def heat_gains(case: Case, temperatures: pd.DataFrame, outdoor: pd.Series) -> Fl
         parts = [one[2:], own[1:-1], own[:-2], others[1:-1], others[2:] - others[1:-1], outside[1:-1], light[2:]]
         base, target = np.column_stack(parts), own[2:] - own[1:-1]
         known = np.isfinite(np.column_stack([base, target])).all(axis=1)
-        for j in heated:
-            full = np.column_stack([base, heat[2:, j], heat[1:-1, j]])
-            valid = known & np.isfinite(full).all(axis=1)
-            if valid.sum() >= LEAST_STEPS:
-                without, _ = _residuals(base[valid], target[valid])
-                left, slopes = _residuals(full[valid], target[valid])
-                warms = (slopes[-2:].sum() if case.step > BLOCK else slopes[-2]) > 0.0
-                gains[i, j] = 0.5 * valid.sum() * np.log(without / left) if warms else 0.0
+        for mine, there in _alike(known[:, None] & heats):
+            if there.sum() >= LEAST_STEPS:
+                further = (heat[first:last, heated[mine]][there] for first, last in ((2, None), (1, -1)))
+                without, left, slopes = _beside(base[there], target[there], *further)
+                warms = (slopes.sum(axis=1) if case.step > BLOCK else slopes[:, 0]) > 0.0
+                gains[i, heated[mine]] = np.where(warms, 0.5 * there.sum() * np.log(without / left), 0.0)
     return gains
 
 
-def _residuals(of: FloatArray, target: FloatArray) -> tuple[float, FloatArray]:
-    """Sum of squares that a regression leaves, and its coefficients."""
-    scale = np.maximum(np.abs(of).max(axis=0), 1e-12)
-    slopes = np.linalg.lstsq(of / scale, target, rcond=None)[0]
-    return float(np.sum((target - of / scale @ slopes) ** 2)) + 1e-12, slopes
+def _alike(valid: BoolArray) -> Iterator[tuple[IntArray, BoolArray]]:
+    """Columns that hold at the same rows, and these rows."""
+    groups: dict[bytes, list[int]] = {}
+    for j, column in enumerate(np.packbits(valid, axis=0).T):
+        groups.setdefault(column.tobytes(), []).append(j)
+    for mine in groups.values():
+        yield np.array(mine), valid[:, mine[0]]
+
+
+def _beside(
+    base: FloatArray, target: FloatArray, first: FloatArray, second: FloatArray
+) -> tuple[float, FloatArray, FloatArray]:
+    """Squares that a regression leaves without and with each pair of further regressors, and the pairs' slopes.
+
+    By what the base leaves of target and pairs (Frisch and Waugh 1933, doi:10.2307/1907330).
+    """
+    vectors, sizes, _ = np.linalg.svd(base / np.maximum(np.abs(base).max(axis=0), 1e-12), full_matrices=False)
+    vectors = vectors[:, sizes > 1e-12 * sizes[0]]
+
+    def beyond(values: FloatArray) -> FloatArray:
+        return np.asarray(values - vectors @ (vectors.T @ values))
+
+    rest = beyond(target)
+    pair = [beyond(each / np.maximum(np.abs(each).max(axis=0), 1e-12)) for each in (first, second)]
+    gram = np.array([[np.sum(a * b, axis=0) for b in pair] for a in pair]).transpose(2, 0, 1)
+    pull = np.array([rest @ each for each in pair]).T
+    slopes = np.einsum("jab,jb->ja", np.linalg.pinv(gram, rcond=1e-12, hermitian=True), pull)
+    left = np.sum((rest[:, None] - slopes[:, 0] * pair[0] - slopes[:, 1] * pair[1]) ** 2, axis=0)
+    return float(rest @ rest) + 1e-12, left + 1e-12, slopes
 
 
 def _supplied(case: Case, reference: pd.Series) -> pd.DataFrame:
