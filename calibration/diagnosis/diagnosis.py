@@ -9,7 +9,6 @@ from typing import Any
 import pandas as pd
 
 from calibration.diagnosis.correction import CORRECTED, Correction, correct
-from calibration.diagnosis.decide.levels import p_value
 from calibration.diagnosis.decide.verdict import Verdict, chance_of, doubted, gains_of, judge
 from calibration.diagnosis.decide.where import DriftCurve, Where, drift_of, where_it_lies
 from calibration.diagnosis.faults import Fault, mend, with_faults
@@ -19,8 +18,8 @@ from calibration.diagnosis.known import reasons_of
 from calibration.diagnosis.refit.challenge import challenge
 from calibration.diagnosis.refit.comparison import Fit, ModelComparison
 from calibration.diagnosis.refit.how_far import Step, how_far
-from calibration.diagnosis.refit.refit import ACCEPTED, elsewhere, held_out
-from calibration.diagnosis.refit.search import Round, search
+from calibration.diagnosis.refit.refit import elsewhere, held_out
+from calibration.diagnosis.refit.search import Round, accepted_from, search
 from calibration.diagnosis.screen.missing import Missing, at_start, missing_heat
 from calibration.diagnosis.screen.regular import Regular
 from calibration.estimation.disturbance import DisturbanceModel
@@ -348,7 +347,7 @@ def diagnose(
     errors, where = rounds[0].held_out, where_it_lies(models, rounds[0].before)
     steps, floor = how_far(models, rounds)
     areas = {name: room.floor_area for name, room in models.anatomy.rooms.items()}
-    watts = rounds[0].screening.detectable(ACCEPTED)
+    watts = rounds[0].screening.detectable(accepted_from(rounds[0].own))
     void = {s.effects[-1] for s in steps if s.void}
     verdict = with_faults(doubted(judge(rounds, untestable, left_over), void), faults)
     correction = correct(models, rounds[0].before, errors, floor) if verdict.name == "unexplained" else None
@@ -358,7 +357,7 @@ def diagnose(
     prediction, disturbance, factors = judge_handed_on(models, taken or rounds[-1].after, better, left)
     return Diagnosis(
         case=case.building.name, verdict=verdict, where=where, steps=steps, gap=errors.mae, floor=floor.mae,
-        p_value=p_value(max(gains_of(rounds[0]).values())) if left_over is None else chance_of(rounds[0]),
+        p_value=chance_of(rounds[0]),
         detectable={zone: w * areas[zone] for zone, w in watts.items()}, rounds=rounds, tuned=tuple(models.tuned),
         judged=tuple(models.judged), seconds=time.perf_counter() - began, version=version("buildingmpc"),
         settings=replace(models.settings, normalisation=models.drivers.normalisation), horizon=horizon,

@@ -3,13 +3,16 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from calibration.diagnosis.known import reasons_of
 from calibration.diagnosis.refit.comparison import ModelComparison
-from calibration.diagnosis.refit.refit import held_out
+from calibration.diagnosis.refit.refit import beyond_a_step, held_out
 from calibration.diagnosis.refit.search import Round, search
 from calibration.diagnosis.screen.regular import Regular, regular
 from calibration.evaluation.n_step import Progress
 from calibration.fit.fitted_case import FittedCase, fit_case
+from calibration.fit.ladder import CLOCK
 from calibration.fit.left_out import Known, values_of
 from calibration.fit.result import Rung
 from thermal.effects.catalogue import CATALOGUE
@@ -19,6 +22,10 @@ from thermal.effects.catalogue import CATALOGUE
 #: the others by 6 at most; of the Twin House N2, whose names were wrong in part, by 25; of three measured houses by 40
 #: to 90.
 FAILS = 0.2
+
+
+#: Name of a gain that recurs.
+GAINS = "internal_gains"
 
 
 @dataclass(frozen=True)
@@ -72,7 +79,8 @@ def search_free(
 
     How many independent errors it has is what its calibration found of their correlation. The errors of a building that
     people live in are larger than those of an office whose heat is all metered, so that only what comes back counts as
-    left over.
+    left over. What the structure itself has found and the catalogue has a name for is sought by its name: a gain that
+    recurs from day to day, and weather or heat that is moved by more than a step of the telemetry.
 
     Parameters
     ----------
@@ -85,21 +93,29 @@ def search_free(
     progress : callable, optional
         Called with stage, done, total.
     """
-    chosen = kept.settings
-    settings = replace(
-        models.settings, structure=chosen.structure, scopes=chosen.scopes, normalisation=chosen.normalisation
-    )
-    free = ModelComparison(
-        models.case, settings, models.tuned, models.judged, models.horizon, weights=kept.best.problem
-    )
-    untestable = free.untestable()
-    untestable |= reasons_of(known, ruled_out, untestable) | dict.fromkeys(chosen.effects, "part of the structure")
-    baseline = free.fit({**chosen.effects, **{e: () for e in known}}, [values_of(kept.best)])
-    rounds = search(free, baseline, held_out(free, baseline), [e for e in CATALOGUE if e not in untestable], progress)
-    final = rounds[-1].after
+    chosen, whole = kept.settings, kept.settings.structure
+    found = kept.best
+    moved = beyond_a_step(found.problem, found.theta, np.sqrt(np.diag(found.covariance)), CLOCK)
+    gains = whole.recurring and GAINS not in ruled_out
+    structures = [replace(whole, recurring=False)] if gains else []  # a name for what recurs, where it is one
+    for structure in (*structures, whole):
+        settings = replace(
+            models.settings, structure=structure, scopes=chosen.scopes, normalisation=chosen.normalisation
+        )
+        free = ModelComparison(
+            models.case, settings, models.tuned, models.judged, models.horizon, weights=kept.best.problem
+        )
+        own = {e: z for e, z in chosen.effects.items() if e != CLOCK or not moved}
+        untestable = free.untestable()
+        untestable |= reasons_of(known, ruled_out, untestable) | dict.fromkeys(own, "part of the structure")
+        testable = [e for e in CATALOGUE if e not in untestable]
+        baseline = free.fit({**own, **{e: () for e in known}}, [values_of(kept.best)])
+        rounds = search(free, baseline, held_out(free, baseline), testable, progress)
+        final = rounds[-1].after
+        if structure is whole or GAINS in final.effects:
+            break
     if final.effects.keys() != baseline.effects.keys():
         known_fit = Known(final.problem, final.model, final.point)
-        kept = fit_case(
-            models.case, models.tuned, models.judged, replace(chosen, effects=dict(final.effects)), progress, known_fit
-        )
+        further = replace(chosen, structure=structure, effects=dict(final.effects))
+        kept = fit_case(models.case, models.tuned, models.judged, further, progress, known_fit)
     return Free(free, rounds, untestable, regular(free, final), kept)

@@ -15,7 +15,7 @@ from calibration.evaluation.yardsticks import Yardsticks
 from thermal._types import FloatArray, IntArray
 from thermal.case.case import Case
 from thermal.inputs.normalisation import Normalisation
-from thermal.inputs.provider import telemetry_inputs
+from thermal.inputs.provider import IRRADIANCE, telemetry_inputs
 from thermal.model.case_replay import SPIN_UP, Inputs
 from thermal.network.commands import nominal_heat
 from thermal.network.topology import Anatomy
@@ -151,7 +151,7 @@ class _SimpleModels:
         provider = telemetry_inputs(case, Normalisation())
         if _GLOBAL in provider.series:
             self.sun = np.nan_to_num(provider.series[_GLOBAL])[:, None]
-        elif provider.gives("sun"):
+        elif provider.measured(IRRADIANCE):
             self.sun = np.nan_to_num(provider.sun.horizontal)[:, None]
         else:
             self.sun = np.empty((len(inputs), 0))

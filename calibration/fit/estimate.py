@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from calibration.errors import CalibrationError
 from calibration.estimation.disturbance import DisturbanceModel
 from calibration.estimation.innovations import TuningSettings, air_volumes, tune_disturbance
 from calibration.evaluation.n_step import Progress
@@ -15,8 +14,6 @@ from calibration.fit.least_squares import INTERRUPTED, LeastSquaresResult, solve
 from calibration.fit.precision import Precision, precision, unexplained
 from calibration.fit.problem import FIRST_DEVIATION, Problem
 from thermal._types import FloatArray
-from thermal.errors import ModelError
-from thermal.model.matrices import SymbolicModel
 from thermal.model.reduce import ReducedModel, reduced_model
 
 #: Most rounds, and the change of the estimate in standard errors that ends them [-].
@@ -31,9 +28,6 @@ _SIZE_TOLERANCE = 0.1
 
 #: Share by which numbers of the disturbance change in a round below which they are kept from there on [-].
 _SAME_DISTURBANCE = 0.05
-
-#: What is said of a start that Ctrl-C ended.
-STOPPED = "stopped by Ctrl-C"
 
 #: Share of the cost by which a step of a solve after the first round must lower it to go on [-]: of a thousand
 #: independent errors a tenth of a standard error.
@@ -51,11 +45,7 @@ _LEAST_DEVIATION = 0.02
 
 #: Zones beyond which a building is large: a basis is made at one θ, as one of two is twice as slow, and the disturbance
 #: tuned on a model of the order that follows; 123 zones take minutes with the five hundred states of a calibration.
-_MOST_ZONES, _TUNING_ORDER = 40, 300
-
-#: By how much a further start of a large building must promise a lower cost for a solve of all its states [-]: odds of
-#: three to one, where two optima are apart by tens.
-_BETTER = 1.0
+MOST_ZONES, TUNING_ORDER = 40, 300
 
 #: Finds the unmeasured heat and the sensors' noise at θ, from what is known of them.
 Tuner = Callable[[Problem, ReducedModel, FloatArray, DisturbanceModel | None], DisturbanceModel]
@@ -178,7 +168,7 @@ class _Rounds:
         self.last: LeastSquaresResult | None = None
         self.known: Precision | None = None  # at the θ of the last solve
         self.most = replace(problem, effective=None).effective_size() if problem.capped else np.inf
-        self.large = problem.inputs.zone.shape[1] > _MOST_ZONES
+        self.large = problem.inputs.zone.shape[1] > MOST_ZONES
 
     def weigh(self, theta: FloatArray) -> None:
         """Weigh errors by what they are at θ, where that is more than is usual.
@@ -293,53 +283,6 @@ def _shrinkage(problem: Problem, z: FloatArray, solve: LeastSquaresResult | None
     return found
 
 
-def draw_starts(problem: Problem, count: int, seed: int) -> list[FloatArray]:
-    """Draw points on the estimation scale: the given θ, then draws from the prior at half its spread.
-
-    Parameters
-    ----------
-    problem : Problem
-        With priors.
-    count, seed : int
-        Number of points, and seed of the draws.
-    """
-    rng, centre, spread = np.random.default_rng(seed), problem.centre, problem.prior_deviations
-    further = [centre + 0.5 * spread * rng.standard_normal(spread.size) for _ in range(count - 1)]
-    return [problem.point(problem.start), *further]
-
-
-def compensated_start(problem: Problem, z: FloatArray, model: SymbolicModel) -> FloatArray:
-    """Where the data alone would go: a fit with priors a tenth as strong, from which a compensated optimum is seen.
-
-    Where physics is missing, parameters compensate for it, often as far as a bound (six of eight in the paper); a
-    second optimum with the priors may lie on the way back.
-
-    Parameters
-    ----------
-    problem : Problem
-        What to fit.
-    z : ndarray, shape (n_free,)
-        Start on the estimation scale [-].
-    model : SymbolicModel
-        Reduced there.
-    """
-    bold = replace(problem, effective=10.0 * problem.effective_size())
-    return solve_least_squares(lambda x: bold.weighted(model, x), z, *problem.bounds, tolerance=1e-1, iterations=15).x
-
-
-def _explored(best: Estimate, z: FloatArray) -> FloatArray | None:
-    """Where a further start leads on a model of few states; None where that is no better than the best so far.
-
-    A solve of a large building takes minutes, and nearly all starts lead to one optimum.
-    """
-    problem = best.problem
-    small = reduced_model(problem.grid, [problem.theta(z)], order=_TUNING_ORDER)
-    found = solve_least_squares(lambda x: problem.weighted(small, x), z, *problem.bounds, tolerance=1e-1)
-    theta = problem.theta(found.x)
-    there, _ = problem.weighted(reduced_model(problem.grid, [theta]), found.x)
-    return found.x if 0.5 * float(there @ there) < best.solve.cost - _BETTER else None
-
-
 def tune(
     problem: Problem, model: ReducedModel, theta: FloatArray, known: DisturbanceModel | None = None
 ) -> DisturbanceModel:
@@ -356,7 +299,7 @@ def tune(
     known : DisturbanceModel, optional
         Where to start, such as what was found at a θ close by.
     """
-    large = len(model.network.zones) > _MOST_ZONES
+    large = len(model.network.zones) > MOST_ZONES
     settings = TuningSettings(
         problem.scheme,
         covariance="steady",  # where sensors come and go exact gains take ten times as long
@@ -364,70 +307,5 @@ def tune(
         start=known,
         curvature=False,
     )
-    small = reduced_model(problem.grid, [theta], order=_TUNING_ORDER) if large else model
+    small = reduced_model(problem.grid, [theta], order=TUNING_ORDER) if large else model
     return tune_disturbance(small, theta, problem.inputs, problem.fitted, settings).disturbance
-
-
-def solve_starts(
-    problem: Problem, first: ReducedModel, starts: int, seed: int, progress: Progress | None, close: bool = False
-) -> tuple[Estimate, list[str]]:
-    """Best estimate over the starts; a start that fails costs that start only, Ctrl-C those that are left.
-
-    Parameters
-    ----------
-    problem : Problem
-        What to fit.
-    first : ReducedModel
-        At the problem's start.
-    starts, seed : int
-        Number of starts, and seed of the draws.
-    progress : callable, optional
-        Called with stage, done, total.
-    close : bool
-        Whether the first start is close by.
-
-    Returns
-    -------
-    tuple
-        The best, and what was wrong with the starts that failed.
-
-    Raises
-    ------
-    CalibrationError
-        When every start failed.
-    """
-    best: Estimate | None = None
-    failures = []
-    draws = draw_starts(problem, max(1, starts - 1), seed)
-    large = len(first.network.zones) > _MOST_ZONES
-    for number in range(starts):
-        try:
-            if number == 1:
-                begun = best.problem if best is not None else problem
-                small = reduced_model(problem.grid, [first.theta], order=_TUNING_ORDER) if large else first
-                z = compensated_start(begun, problem.point(problem.start), small)
-            else:
-                z = draws[max(0, number - 1)]
-            tuner: Tuner | None = tune
-            if best is not None:  # starts are weighed alike, with the disturbance of the best so far
-                known = best.disturbance
-                tuner = None if known is None else lambda *_, known=known: known
-                if large and (z := _explored(best, z)) is None:
-                    continue
-            found = estimate(problem, z, progress, first if number == 0 else None, tuner, close and number == 0)
-        except (ArithmeticError, np.linalg.LinAlgError, CalibrationError, ModelError) as error:
-            failures.append(f"start {number + 1}: {error}")
-            continue
-        except KeyboardInterrupt:
-            if best is None:
-                raise
-            failures.append(f"start {number + 1}: {STOPPED}")
-            break
-        if best is None or found.better_than(best):
-            best = found
-        if found.solve.interrupted:
-            failures.append(f"start {number + 1}: {STOPPED}")
-            break
-    if best is None:
-        raise CalibrationError(f"every start failed: {'; '.join(failures)}")
-    return best, failures

@@ -11,11 +11,12 @@ from calibration.evaluation.case_model import CaseModel
 from calibration.evaluation.intervals import Interval, default_intervals, horizon_steps, select_runs
 from calibration.evaluation.n_step import HORIZONS, Evaluation, EvaluationSettings, Progress
 from calibration.evaluation.settings import CalibrationSettings
-from calibration.fit.estimate import STOPPED, Estimate, solve_starts
+from calibration.fit.estimate import Estimate
 from calibration.fit.left_out import Fitted, LeftOut, begin_at, left_out
 from calibration.fit.likelihood import InnovationsProblem
 from calibration.fit.problem import tuning_problem
 from calibration.fit.result import CalibrationResult, SolverReport, describe
+from calibration.fit.starts import STOPPED, solve_starts
 from calibration.identifiability.information import information_of
 from thermal.case.case import Case
 from thermal.inputs.normalisation import fit_normalisation

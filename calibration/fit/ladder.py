@@ -13,7 +13,7 @@ from calibration.fit.left_out import Fitted, Known, LeftOut, begin_at, left_out
 from calibration.fit.problem import tuning_problem
 from calibration.fit.result import CalibrationResult, Rung
 from thermal.case.case import Case
-from thermal.inputs.provider import telemetry_inputs
+from thermal.inputs.provider import IRRADIANCE, telemetry_inputs
 from thermal.model.reduce import reduced_model
 from thermal.network.structure import BASELINE, Structure
 from thermal.parameters import Scope
@@ -133,7 +133,7 @@ def climb_from(
 
     begun: dict[str, tuple[CalibrationSettings, Fitted]] = {}  # structures that are looked at before they are fitted
     source = telemetry_inputs(given.case)
-    structure = Structure(lumped=True, sun=source.gives("sun"))
+    structure = Structure(lumped=True, sun=source.measured(IRRADIANCE))
     lumped = solve(replace(base, structure=structure))
     looked, beside = [look(name, fitted)], look("lumped", lumped.best, lumped)
     parameters = fitted.problem.grid.network.parameters

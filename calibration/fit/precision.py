@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 
 from calibration.estimation.disturbance import DisturbanceModel
 from calibration.fit.likelihood import InnovationsProblem
@@ -173,30 +174,56 @@ def unexplained(
     """
     if isinstance(problem, InnovationsProblem):
         return _repeated(problem, model, theta)
-    inputs, keep = problem.inputs, problem.keep
-    n_zone = inputs.zone.shape[1]
-    rng = np.random.default_rng(seed)
-    stay, push = disturbance.discrete(inputs.step)
+    observed = problem.residuals_only(model, theta)
+    (made,) = drawn_errors(problem, model, theta, disturbance, 1, seed)
+    return float(np.mean(observed**2) / np.mean(made**2))
+
+
+def drawn_errors(
+    problem: Problem, model: SymbolicModel, theta: FloatArray, disturbance: DisturbanceModel, draws: int, seed: int = 0
+) -> FloatArray:
+    """Draw errors of the tuning runs that unmeasured heat and sensor noise make, shape (n_draw, n_error) [K].
+
+    Heat goes on from run to run; each run starts from zones that are as wrong as their readings.
+
+    Parameters
+    ----------
+    problem : Problem
+        What was fitted.
+    model : SymbolicModel
+        Reduced.
+    theta : ndarray, shape (n_parameter,)
+        Where [parameter units].
+    disturbance : DisturbanceModel
+        Heat and noise.
+    draws, seed : int
+        Number of draws, and their seed.
+    """
+    inputs, keep, step = problem.inputs, problem.keep, problem.inputs.step
+    n_zone, rng = inputs.zone.shape[1], np.random.default_rng(seed)
+    stay, push = disturbance.discrete(step)
+    size, kick, noise = (
+        np.broadcast_to(np.asarray(v), (n_zone,)) for v in (disturbance.deviation, push, disturbance.sensor_deviation)
+    )
     matrices = model.matrices(theta)
     held: NDArray[np.bool_] = np.asarray(np.isfinite(inputs.held).all(axis=0))
-    entry = matrices.modal.held_response(held, inputs.step)
-    noise = np.broadcast_to(np.asarray(disturbance.sensor_deviation), (n_zone,))
-    observed, made = [], []
+    entry = matrices.modal.held_response(held, step)
+    parts = []
     for runs in problem.runs:
-        error, _ = problem.errors(model, theta, runs, slopes=False)
-        draws = (n_zone, runs.starts.size)
-        heat = np.empty((problem.steps, *draws))
-        heat[0] = np.broadcast_to(np.asarray(disturbance.deviation), (n_zone,))[:, None] * rng.standard_normal(draws)
-        for k in range(1, problem.steps):
-            heat[k] = stay * heat[k - 1] + np.broadcast_to(push, (n_zone,))[:, None] * rng.standard_normal(draws)
-        start = entry @ (noise[held, None] * rng.standard_normal((int(held.sum()), runs.starts.size)))
-        still = np.zeros((problem.steps, matrices.n_boundary, runs.starts.size))
-        drawn, _ = matrices.modal.run(start, still, heat, keep, inputs.step, problem.scheme)
-        drawn = drawn + noise * rng.standard_normal(drawn.shape)
-        seen = np.isfinite(error)
-        observed.append(error[seen])
-        made.append(drawn[seen])
-    return float(np.mean(np.concatenate(observed) ** 2) / np.mean(np.concatenate(made) ** 2))
+        seen = np.isfinite(problem.errors(model, theta, runs, slopes=False)[0])
+        rows, m = runs.starts + np.arange(1, problem.steps + 1)[:, None], runs.starts.size
+        first, length = int(rows.min()), int(rows.max() - rows.min()) + 1
+        still = np.zeros((problem.steps, matrices.n_boundary, m))
+        made = np.empty((draws, int(seen.sum())))
+        for d in range(draws):
+            shocks = kick * rng.standard_normal((length, n_zone))
+            shocks[0] = size * rng.standard_normal(n_zone)
+            heat = lfilter([1.0], [1.0, -stay], shocks, axis=0)[rows - first].transpose(0, 2, 1)
+            start = entry @ (noise[held, None] * rng.standard_normal((int(held.sum()), m)))
+            error, _ = matrices.modal.run(start, still, heat, keep, step, problem.scheme)
+            made[d] = (error + noise * rng.standard_normal(error.shape))[seen]
+        parts.append(made)
+    return np.concatenate(parts, axis=1)
 
 
 def _repeated(problem: InnovationsProblem, model: SymbolicModel, theta: FloatArray) -> float:

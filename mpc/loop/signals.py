@@ -12,8 +12,9 @@ from mpc.scenario.scenario import Scenario
 from thermal._types import FloatArray
 from thermal.case.points import OUTDOOR_TEMPERATURE
 from thermal.effects.effect import Chosen
+from thermal.inputs.live import LiveInputs
 from thermal.inputs.normalisation import WIND, Normalisation, usual_temperatures
-from thermal.inputs.provider import HVAC_INPUTS, InputProvider, LiveInputs
+from thermal.inputs.provider import HVAC_INPUTS, InputProvider
 from thermal.inputs.signals import Signal, zone_signal
 from thermal.network.build import Extension
 from thermal.network.graph import GraphBuilder

@@ -10,8 +10,7 @@ import pandas as pd
 from calibration.diagnosis.decide.levels import GENERIC_GAP, LARGEST_GROUP
 from calibration.diagnosis.decide.verdict import Candidate
 from calibration.diagnosis.diagnosis import Diagnosis, Replay
-from calibration.diagnosis.refit.refit import ACCEPTED
-from calibration.diagnosis.refit.search import Round
+from calibration.diagnosis.refit.search import Round, accepted_from
 from calibration.results import Content, check_results_folder, write_results
 from mpc.reports import diagnosis_words
 from mpc.reports.correction_words import correction_sentence, driver_rows
@@ -309,7 +308,7 @@ def _statistics(result: Diagnosis) -> dict[str, Any]:
     first, final = ({p.name: p for p in f.describe()} for f in (result.rounds[0].before, result.final))
     nothing = dict.fromkeys(("where", "score", "retained_share"))
     return {
-        "limits": (ACCEPTED, GENERIC_GAP),
+        "limits": (accepted_from(result.rounds[0].own), GENERIC_GAP),
         "rounds": [_round(r) for r in result.rounds],
         "effects": [
             vars(c) | {"name": called(c.effect), "where": in_zones(c.zones), "sure": sure(c.probability)}

@@ -65,6 +65,8 @@ class Effect:
     shifts : tuple of str
         Parameters that move telemetry in time [h]. Up to a step they say how a value is spread over its own step, which
         telemetry cannot tell from the effect.
+    roughly : bool
+        Whether a rough estimate of what it needs is enough to tell that it is there.
     level : str
         Parameter that the effect's heat per unit of strength is linear in, so that what it is matters as much as the
         strength; empty where there is none.
@@ -85,6 +87,7 @@ class Effect:
     applies: Callable[[Anatomy], str | None] | None = None
     shifts: tuple[str, ...] = ()
     level: str = ""
+    roughly: bool = False
 
     def untestable(self, inputs: InputProvider, anatomy: Anatomy) -> str | None:
         """Say why a case cannot tell whether the effect is there; None when it can.
@@ -96,7 +99,7 @@ class Effect:
         anatomy : Anatomy
             Of its building.
         """
-        missing = [point for point in self.needs if not inputs.measured(point)]
+        missing = [p for p in self.needs if not (inputs.measured(p) or (self.roughly and inputs.estimates(p)))]
         if missing:
             return f"not measured: {', '.join(missing)}"
         return None if self.applies is None else self.applies(anatomy)

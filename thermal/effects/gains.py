@@ -19,6 +19,7 @@ _USUAL_TRANSMITTANCE = 0.6
 _DRAWN_AT = (100.0, 200.0, 300.0, 400.0)
 
 PRESENCE = Signal("presence", "1", attrgetter("occupancy"), ("occupancy",))
+AT_HOME = Signal("presence at home", "1", attrgetter("at_home"), ("at_home",))
 
 
 def _through(inputs: InputProvider, azimuth: float, tilt: float, threshold: float = -1.0) -> FloatArray:
@@ -70,9 +71,10 @@ def _build_opaque(builder: EffectBuilder) -> None:
 
 
 def _build_people(builder: EffectBuilder) -> None:
-    peak, shift, base = (builder.parameter(n) for n in ("internal_gain", "internal_gain_delay", "base_load"))
+    names = ("internal_gain", "internal_gain_delay", "internal_gain_at_home", "base_load")
+    peak, shift, home, base = (builder.parameter(n) for n in names)
     arrival = Signal("coming and going", "1/h", attrgetter("occupancy_rate"), ("occupancy_rate",))
-    for value, signal in ((peak, PRESENCE), (-peak * shift, arrival), (base, CONSTANT)):
+    for value, signal in ((peak, PRESENCE), (-peak * shift, arrival), (home, AT_HOME), (base, CONSTANT)):
         for room in builder.rooms:
             builder.heat_air(room, value, signal, 0.5 * room.floor_area)
             builder.heat_surfaces(room, value, signal, 0.5 * room.floor_area)

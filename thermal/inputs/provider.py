@@ -24,7 +24,7 @@ from thermal.inputs.normalisation import (
     fit_normalisation,
     supply_air,
 )
-from thermal.inputs.sun import Sun, suffices, sun_of
+from thermal.inputs.sun import Sun, estimated_sun, suffices, sun_of
 
 #: Stefan-Boltzmann constant [W/m2/K4].
 STEFAN_BOLTZMANN = 5.670374419e-8
@@ -35,14 +35,21 @@ _USUAL_WIND = 3.0
 #: Hours of a working day unless occupancy is measured, and how long people take to come and go [h].
 _WORK, _RAMP = (8.0, 18.0), 1.0
 
+#: Hours in which people are awake at home, on working days and on days off [h].
+_MORNING, _EVENING, _DAY_OFF = (6.0, 8.0), (17.0, 23.0), (7.0, 23.0)
+
 #: Points of the weather station that inputs are made of.
 IRRADIANCE, INFRARED = "direct_normal_irradiance_sensor", "horizontal_infrared_irradiance_sensor"
 
+#: Telemetry from which what is not measured is estimated [s].
+_LEAST_ESTIMATED = 172800.0
+
 #: Inputs with their units; a ``_rate`` is a change by the hour, of several stamps.
 INPUTS: dict[str, str] = {
-    "outdoor": "K", "wind": "m/s", "sky": "W/m^2", "sun": "W/m^2", "occupancy": "1", "usual": "K", "openings": "1",
-    "through_windows": "K*m/s", "heat": "W", "airflow": "kg/s", "supply_flow": "kg/s", "supply_heat": "W",
-    "radiant_gains": "W", "outdoor_rate": "K/h", "occupancy_rate": "1/h", "heat_rate": "W/h", "commanded": "1",
+    "outdoor": "K", "wind": "m/s", "sky": "W/m^2", "sun": "W/m^2", "occupancy": "1", "at_home": "1", "usual": "K",
+    "openings": "1", "through_windows": "K*m/s", "heat": "W", "airflow": "kg/s", "supply_flow": "kg/s",
+    "supply_heat": "W", "radiant_gains": "W", "outdoor_rate": "K/h", "occupancy_rate": "1/h", "heat_rate": "W/h",
+    "commanded": "1",
 }  # fmt: skip
 
 #: Inputs that depend on what the HVAC system does: telemetry and a running plant know them, nobody else.
@@ -51,7 +58,7 @@ HVAC_INPUTS = frozenset({"heat", "airflow", "supply_flow", "supply_heat", "heat_
 #: Series that inputs are made of where these are not of the same name.
 _SERIES: dict[str, tuple[str, ...]] = {
     "wind": (WIND,), "sky": (INFRARED, "outdoor"), "sun": (IRRADIANCE,), "through_windows": ("outdoor",),
-    "occupancy": (), "usual": (), "openings": (),
+    "occupancy": (), "at_home": (), "usual": (), "openings": (),
 }  # fmt: skip
 
 
@@ -123,6 +130,17 @@ class InputProvider:
         """
         return suffices(self.weather) if point == IRRADIANCE else point in self.series
 
+    def estimates(self, point: str) -> bool:
+        """Whether a point of the weather station is not measured, and follows roughly from what is.
+
+        Parameters
+        ----------
+        point : str
+            Point type; irradiance follows from the daily range of the outdoor temperature, over two days at least.
+        """
+        known = "outdoor" in self.series and len(self.stamps) * self.step >= _LEAST_ESTIMATED
+        return known and point == IRRADIANCE and not self.measured(point)
+
     def gives(self, name: str) -> bool:
         """Whether the source has what an input is made of.
 
@@ -142,6 +160,8 @@ class InputProvider:
             return len(self.stamps) > 1 and self.gives(name.removesuffix("_rate"))
         if name in ("usual", "through_windows") and not self.normalisation.usual:
             return False
+        if name == "sun" and self.estimates(IRRADIANCE):
+            return True
         return all(self.measured(series) for series in _SERIES.get(name, (name,)))
 
     def lacks(self, names: Iterable[str]) -> tuple[str, ...]:
@@ -250,8 +270,10 @@ class InputProvider:
 
     @cached_property
     def sun(self) -> Sun:
-        """Sun's place and irradiances."""
+        """Sun's place and irradiances, estimated where none are measured."""
         self.need("sun")
+        if self.estimates(IRRADIANCE):
+            return estimated_sun(self.building.location, self.stamps, self.step, self.outdoor)
         return sun_of(self.building.location, self.stamps, self.step, self.weather)
 
     @cached_property
@@ -271,9 +293,20 @@ class InputProvider:
         if most is not None and "people" in self.series:
             people = self.series["people"]
             return np.asarray(people / most) if most > 0.0 else np.zeros(len(people))
-        rise = np.clip((self.clock - _WORK[0]) / _RAMP + 0.5, 0.0, 1.0)
-        fall = np.clip((_WORK[1] - self.clock) / _RAMP + 0.5, 0.0, 1.0)
-        return np.where(self._middle.day_of_week < 5, rise * fall, 0.0)
+        return np.where(self._middle.day_of_week < 5, self._within(*_WORK), 0.0)
+
+    @cached_property
+    def at_home(self) -> FloatArray:
+        """Presence of people in a home while they are awake, shape (n_time,) [-]; 0 where people are counted."""
+        if self.normalisation.people is not None and "people" in self.series:
+            return np.zeros(len(self.stamps))
+        working = np.maximum(self._within(*_MORNING), self._within(*_EVENING))
+        return np.where(self._middle.day_of_week < 5, working, self._within(*_DAY_OFF))
+
+    def _within(self, first: float, last: float) -> FloatArray:
+        """Whether the clock is between two hours, people coming and going within one."""
+        rise = np.clip((self.clock - first) / _RAMP + 0.5, 0.0, 1.0)
+        return np.asarray(rise * np.clip((last - self.clock) / _RAMP + 0.5, 0.0, 1.0))
 
     @property
     def _middle(self) -> pd.DatetimeIndex:
@@ -300,47 +333,6 @@ class InputProvider:
     outdoor_rate = _input("outdoor_rate", "Change of the outdoor temperature, shape (n_time,) [K/h].")
     occupancy_rate = _input("occupancy_rate", "Change of the presence of people, shape (n_time,) [1/h].")
     heat_rate = _input("heat_rate", "Change of the metered heat of the zones, shape (n_time, n_zone) [W/h].")
-
-
-class LiveInputs(InputProvider):
-    """Inputs of one step at a time, as they are measured; what takes several stamps it cannot give.
-
-    Parameters
-    ----------
-    building : Building
-        Zones and location.
-    step : float
-        Length of a step [s].
-    normalisation : Normalisation
-        Constants that some inputs are counted by.
-
-    Examples
-    --------
-    >>> from thermal.data import load_bundled_case
-    >>> case = load_bundled_case()
-    >>> now = LiveInputs(case.building, case.step, Normalisation())
-    >>> now.put(case.stamps[:1], {"outdoor": np.array([273.15])})
-    >>> now.values("outdoor", "K").tolist(), now.gives("outdoor_rate")
-    ([273.15], False)
-    """
-
-    def __init__(self, building: Building, step: float, normalisation: Normalisation) -> None:
-        super().__init__(building, pd.DatetimeIndex([]), step, {}, normalisation, "live feed")
-
-    def put(self, stamp: pd.DatetimeIndex, row: Mapping[str, FloatArray]) -> None:
-        """Take in a row of the feed in the place of the last one.
-
-        Parameters
-        ----------
-        stamp : DatetimeIndex, length 1
-            End of the step.
-        row : mapping of str to ndarray
-            Series as in `InputProvider`, shape (1,) or (1, n_zone) [units of `INPUTS`].
-        """
-        for name in (*INPUTS, "weather"):
-            self.__dict__.pop(name, None)  # what was made of the last row
-        self.stamps, self.series = stamp, row
-        self.openings = np.zeros((1, len(self.zones)))
 
 
 def telemetry_inputs(case: Case, normalisation: Normalisation | None = None) -> InputProvider:

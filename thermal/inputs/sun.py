@@ -23,6 +23,11 @@ _INCIDENCE = 0.13
 #: Below this altitude the sun counts as set: beams divided by its sine are noise [deg].
 _LOWEST = 3.0
 
+#: Sun that reaches the ground, of that outside of the atmosphere, per root of the daily range of outdoor temperature
+#: [K^-1/2]: 0.16 inland, 0.19 by the sea (Hargreaves; Allen et al. 1998, FAO Irrigation and Drainage Paper 56, eq. 50);
+#: and its least and most, of a dark and of a clear day [-] (the same, eqs. 35 and 37).
+_BY_RANGE, _DARK, _CLEAR = 0.175, 0.15, 0.75
+
 _NORMAL = "direct_normal_irradiance_sensor"
 _DIFFUSE = "diffuse_horizontal_irradiance_sensor"
 _GLOBAL = "global_horizontal_irradiance_sensor"
@@ -134,11 +139,8 @@ def sun_of(location: Location, stamps: pd.DatetimeIndex, step: float, weather: p
     EffectError
         When what is measured does not tell beam and diffuse apart.
     """
-    from pvlib import irradiance, solarposition
-
     middle = stamps - pd.Timedelta(seconds=step / 2.0)
-    place = solarposition.get_solarposition(middle, location.latitude, location.longitude, location.elevation)
-    altitude = place["elevation"].to_numpy(dtype=float)
+    azimuth, altitude = _place(location, middle)
     rise = np.sin(np.radians(altitude))
     known = _irradiances(weather)
     seen = {name: np.maximum(weather[name].fillna(0.0).to_numpy(dtype=float), 0.0) for name in known}
@@ -153,8 +155,51 @@ def sun_of(location: Location, stamps: pd.DatetimeIndex, step: float, weather: p
     elif diffuse is not None:
         normal = np.where(up, np.maximum(total - diffuse, 0.0) / np.maximum(rise, np.sin(np.radians(_LOWEST))), 0.0)
     else:
-        split = irradiance.erbs(total, 90.0 - altitude, np.asarray(middle.day_of_year))
-        normal, diffuse = (np.nan_to_num(np.asarray(split[k], dtype=float)) for k in ("dni", "dhi"))
-    return Sun(
-        place["azimuth"].to_numpy(dtype=float), altitude, np.asarray(normal), np.asarray(diffuse), np.asarray(total)
-    )
+        normal, diffuse = _split(total, altitude, middle)
+    return Sun(azimuth, altitude, np.asarray(normal), np.asarray(diffuse), np.asarray(total))
+
+
+def estimated_sun(location: Location, stamps: pd.DatetimeIndex, step: float, outdoor: FloatArray) -> Sun:
+    """Sun at the middle of each step where no irradiance is measured: days whose temperature swings far are clear.
+
+    ``G = G_0 sin h k √(T_max - T_min)`` with the extremes of each local day (Hargreaves; Allen et al. 1998, FAO
+    Irrigation and Drainage Paper 56, eq. 50): how bright a day is, not how clouds pass.
+
+    Parameters
+    ----------
+    location : Location
+        Of the building.
+    stamps : DatetimeIndex
+        Ends of the steps, in the building's time zone.
+    step : float
+        Their length [s].
+    outdoor : ndarray, shape (n_time,)
+        Outdoor temperature [K].
+    """
+    from pvlib import irradiance
+
+    middle = stamps - pd.Timedelta(seconds=step / 2.0)
+    azimuth, altitude = _place(location, middle)
+    days = pd.Series(outdoor).groupby(np.asarray(middle.normalize().asi8))
+    spread = (days.transform("max") - days.transform("min")).to_numpy(dtype=float)
+    above = np.asarray(irradiance.get_extra_radiation(middle.day_of_year), dtype=float)
+    clear = np.clip(_BY_RANGE * np.sqrt(spread), _DARK, _CLEAR)
+    total = np.where(altitude > 0.0, clear * above * np.sin(np.radians(altitude)), 0.0)
+    return Sun(azimuth, altitude, *_split(total, altitude, middle), total)
+
+
+def _place(location: Location, middle: pd.DatetimeIndex) -> tuple[FloatArray, FloatArray]:
+    """Azimuth and altitude of the sun [deg]."""
+    from pvlib import solarposition
+
+    place = solarposition.get_solarposition(middle, location.latitude, location.longitude, location.elevation)
+    return place["azimuth"].to_numpy(dtype=float), place["elevation"].to_numpy(dtype=float)
+
+
+def _split(total: FloatArray, altitude: FloatArray, middle: pd.DatetimeIndex) -> tuple[FloatArray, FloatArray]:
+    """Split the global irradiance into beam and diffuse, by Erbs, Klein and Duffie (1982) [W/m2]."""
+    from pvlib import irradiance
+
+    split = irradiance.erbs(total, 90.0 - altitude, np.asarray(middle.day_of_year))
+    normal, diffuse = (np.nan_to_num(np.asarray(split[k], dtype=float)) for k in ("dni", "dhi"))
+    return normal, diffuse

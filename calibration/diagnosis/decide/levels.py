@@ -1,10 +1,4 @@
-"""Levels of the verdict: what null cases and trials of known causes say of gains; see `benchmarks/blind_trials.py`."""
-
-import json
-from importlib.resources import files
-from typing import Any
-
-import numpy as np
+"""Levels of the verdict, beside those that each case's own nulls give; see `benchmarks/blind_trials.py`."""
 
 #: Gain of generic heat above which a gap is there though no effect of the catalogue explains it [-].
 GENERIC_GAP = 8.0
@@ -43,40 +37,3 @@ VOID = 0.5
 
 #: Probability from which an effect belongs to the 90 % set [-].
 IN_SET = 0.1
-
-_NULLS: dict[str, Any] = json.loads(
-    (files("calibration.diagnosis.decide") / "null_levels.json").read_text(encoding="utf-8")
-)
-
-#: Largest gains of the first round in development cases without any missing effect, in order [-]: made by
-#: ``benchmarks/blind_trials.py levels``.
-NULL_GAINS: tuple[float, ...] = tuple(_NULLS["largest"])
-
-
-def usual(effect: str) -> float:
-    """Largest gain that an effect reaches in cases without any missing effect, 0 at least [-].
-
-    Parameters
-    ----------
-    effect : str
-        Its id; 0 for one that no null case could tell.
-    """
-    return float(max(0.0, *_NULLS["gains"].get(effect, (0.0,))))
-
-
-def p_value(gain: float) -> float:
-    """Probability that a case without any missing effect shows so large a gain [-].
-
-    The share of null cases that do, and beyond all of these an exponential tail with their mean excess over the median.
-
-    Parameters
-    ----------
-    gain : float
-        Largest gain of the first round [-].
-    """
-    nulls = np.array(NULL_GAINS)
-    above = int(np.count_nonzero(nulls >= gain))
-    if above:
-        return (1 + above) / (1 + nulls.size)
-    excess = nulls[nulls > np.median(nulls)] - np.median(nulls)
-    return float(np.exp(-(gain - nulls.max()) / excess.mean()) / (1 + nulls.size))

@@ -8,8 +8,8 @@ import numpy as np
 
 from calibration.diagnosis.decide import levels
 from calibration.diagnosis.refit.comparison import Fit
-from calibration.diagnosis.refit.refit import ACCEPTED, Refit, promising
-from calibration.diagnosis.refit.search import Round
+from calibration.diagnosis.refit.refit import Refit, promising
+from calibration.diagnosis.refit.search import Round, accepted_from
 from calibration.diagnosis.screen.gains import Gain
 from calibration.diagnosis.screen.regular import Regular
 from thermal.effects.catalogue import CATALOGUE
@@ -128,7 +128,7 @@ def judge(rounds: Sequence[Round], untestable: Mapping[str, str], left_over: Reg
     chain: list[tuple[tuple[str, ...], float]] = []
     for r in rounds:
         gains = gains_of(r)
-        found, none = probabilities(levelled(r))
+        found, none = probabilities(levelled(r), accepted_from(r.own))
         for effect, gain in gains.items():
             probability[effect] = max(probability[effect], real * found[effect])
             if gain > score[effect]:
@@ -190,13 +190,14 @@ def group_of(r: Round, effect: str) -> tuple[str, ...]:
     gains = raw(r)
     own = next((g for g in r.gains if g.effect == effect), None)
     alike = [effect]
-    if gains[effect] <= ACCEPTED:  # what hardly gains is not there, whatever else looks like it
+    level = accepted_from(r.own)
+    if gains[effect] <= level:  # what hardly gains is not there, whatever else looks like it
         return (effect,)
     for g in r.gains:
         if g.effect == effect:
             continue
         near = abs(gains[g.effect] - gains[effect]) < levels.APART
-        rival = gains[g.effect] > ACCEPTED and (
+        rival = gains[g.effect] > level and (
             (own is not None and abs(r.screening.cosine(own, g)) > levels.ALIKE)
             or (g.effect in CATALOGUE[effect].confounders and gains[g.effect] > levels.RIVAL * gains[effect])
         )
@@ -214,7 +215,7 @@ def _name(rounds: Sequence[Round], left_over: Regular | None) -> VerdictName:
         if size <= levels.LARGEST_GROUP:
             return "named" if size == 1 else "group"
         return "unexplained"
-    shows = left_over is None and first.generic.gain > levels.GENERIC_GAP
+    shows = left_over is None and first.generic.gain > max(levels.GENERIC_GAP, first.own.generic_level)
     return "unexplained" if first.accepted is not None or shows or much else "no_gap"
 
 
@@ -290,18 +291,20 @@ def gains_of(r: Round) -> dict[str, float]:
 
 
 def chance_of(r: Round) -> float:
-    """Bound the probability of as large a gain where nothing is missing, from the evidence alone [-].
+    """Bound the probability of as large a gain where nothing is missing [-].
 
-    A Bayes factor exceeds B with a probability of 1/B at most where its denominator is true (Ville 1939, Markov's
-    inequality); with several effects, of their number over B.
+    By the case's own nulls, and by what holds for any evidence: a Bayes factor exceeds B with a probability of 1/B at
+    most where its denominator is true (Ville 1939, Markov's inequality), with several effects of their number over B.
+    The larger of the two counts.
 
     Parameters
     ----------
     r : Round
-        Of the search.
+        The first of the search.
     """
     gains = gains_of(r)
-    return float(min(1.0, len(gains) * np.exp(-max(gains.values()))))
+    most = max(gains.values())
+    return float(max(min(1.0, len(gains) * np.exp(-most)), r.own.p_value(most)))
 
 
 def levelled(r: Round) -> dict[str, float]:
@@ -327,7 +330,7 @@ def beyond(r: Round) -> dict[str, float]:
     r : Round
         Of the search.
     """
-    return {e: gain - levels.usual(e) * bool(r.before.effects) for e, gain in raw(r).items()}
+    return {e: gain - r.own.usual(e) * bool(r.before.effects) for e, gain in raw(r).items()}
 
 
 def raw(r: Round) -> dict[str, float]:
@@ -355,21 +358,23 @@ def _led(r: Round) -> dict[str, float]:
         return {}
     mine = r.accepted.screened.effect
     if r.pair is not None:
-        return {mine: r.pair.gain - ACCEPTED}
+        return {mine: r.pair.gain - accepted_from(r.own)}
     most = max((x for x in r.refits if x.counts), key=lambda x: x.gain, default=r.accepted)
     return {most.screened.effect: r.accepted.gain, mine: most.gain} if most.gain > r.accepted.gain else {}
 
 
-def probabilities(gains: Mapping[str, float]) -> tuple[dict[str, float], float]:
+def probabilities(gains: Mapping[str, float], level: float) -> tuple[dict[str, float], float]:
     """Share of each effect against all others and none, and that of none, whose gain is that at which effects count.
 
     Parameters
     ----------
     gains : mapping of str to float
         By effect, such as `levelled` [-].
+    level : float
+        Gain from which an effect is accepted [-].
     """
-    top = max(*gains.values(), ACCEPTED)
+    top = max(*gains.values(), level)
     weight = {effect: float(np.exp((gain - top) / levels.TEMPERATURE)) for effect, gain in gains.items()}
-    none = float(np.exp((ACCEPTED - top) / levels.TEMPERATURE))
+    none = float(np.exp((level - top) / levels.TEMPERATURE))
     whole = sum(weight.values()) + none
     return {effect: w / whole for effect, w in weight.items()}, none / whole

@@ -13,7 +13,7 @@ from calibration.diagnosis.refit.fit import solve
 from calibration.diagnosis.refit.refit import HeldOut, held_out
 from calibration.diagnosis.refit.repeat import Repeats, agreement
 from calibration.diagnosis.refit.search import Round
-from calibration.diagnosis.screen.screen import GENERIC
+from calibration.diagnosis.screen.generic import GENERIC
 from calibration.errors import HorizonError, NotEnoughDataError
 from thermal.effects.effect import Chosen
 from thermal.model.case_replay import Inputs

@@ -15,6 +15,7 @@ from calibration.diagnosis.screen.gains import Gain, choice_of
 from calibration.diagnosis.screen.openings import openings_beyond
 from calibration.diagnosis.screen.screen import Screening
 from calibration.errors import CalibrationError
+from calibration.fit.problem import Problem
 from thermal._types import FloatArray, IntArray
 from thermal.effects.catalogue import CATALOGUE
 from thermal.errors import ModelError
@@ -34,7 +35,8 @@ _PROMISING = 0.25
 #: differs from day to day by chance disproves nothing.
 NO_WORSE, CHANCE = 0.005, 1.645
 
-#: Gain of the fit from which an effect is accepted [-]; of 60 null cases one has more, and counts.
+#: Gain of the fit from which an effect is accepted [-], unless the case's own nulls show more. They hold what is random
+#: in a case, and not what its structure lacks: of 60 EnergyPlus offices without any effect one has more, and counts.
 ACCEPTED = 6.0
 
 #: Held-out mean absolute error over the root mean square of the tuning errors above which they are errors of other
@@ -177,12 +179,15 @@ class Work:
         Its held-out errors.
     made : Screening
         All effects by tangents.
+    level : float
+        Gain from which an effect is accepted [-].
     """
 
     models: ModelComparison
     fit: Fit
     held_out: HeldOut
     made: Screening
+    level: float = ACCEPTED
 
     @property
     def accepted(self) -> dict[str, float]:
@@ -223,8 +228,8 @@ class Work:
         errors = held_out(self.models, anew)
         grown, error = growth(self.held_out, errors)
         worse = grown > NO_WORSE + CHANCE * error
-        counts = gain > ACCEPTED * len(gains) and not worse and max(fall, -grown) > MATTERS
-        counts = counts and all(_beyond_a_step(anew, g.effect) for g in gains)
+        counts = gain > self.level * len(gains) and not worse and max(fall, -grown) > MATTERS
+        counts = counts and all(beyond_a_step(anew.problem, anew.theta, anew.deviations, g.effect) for g in gains)
         return Refit(gains[-1], anew, gain, fall, errors, worse, counts)
 
 
@@ -241,11 +246,24 @@ def promising(fit: Fit, share: float) -> bool:
     return float(np.sqrt(fit.found.mean_square) * (1.0 - np.sqrt(1.0 - share))) > _PROMISING * MATTERS
 
 
-def _beyond_a_step(fit: Fit, effect: str) -> bool:
-    """Whether what an effect moves in time, if anything, is moved by more than a step of telemetry, and surely so."""
-    shifts, step = CATALOGUE[effect].shifts, fit.built.inputs.step / 3600.0
-    at = [i for i, p in enumerate(fit.problem.parameters) if p.name in shifts]
-    return not at or bool(np.any(np.abs(fit.theta[at]) - CHANCE * fit.deviations[at] > step))
+def beyond_a_step(problem: Problem, theta: FloatArray, deviations: FloatArray, effect: str) -> bool:
+    """Whether what an effect moves in time, if anything, is moved by more than a step of telemetry, and surely so.
+
+    Parameters
+    ----------
+    problem : Problem
+        Of a model with the effect.
+    theta : ndarray, shape (n_parameter,)
+        Estimate [parameter units].
+    deviations : ndarray, shape (n_free,)
+        Its standard errors on the estimation scale [-].
+    effect : str
+        Id of the effect.
+    """
+    shifts, step = CATALOGUE[effect].shifts, problem.inputs.step / 3600.0
+    at = [k for k, p in enumerate(problem.parameters) if p.name in shifts]
+    moved = np.abs(theta[[problem.free[k] for k in at]]) - CHANCE * deviations[at]
+    return not at or bool(np.any(moved > step))
 
 
 def _places(fit: Fit, effect: str) -> int:

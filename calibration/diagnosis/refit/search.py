@@ -15,6 +15,7 @@ from calibration.diagnosis.decide.levels import APART
 from calibration.diagnosis.refit.comparison import Fit, ModelComparison
 from calibration.diagnosis.refit.refit import ACCEPTED, WINDOWS, HeldOut, Refit, Work, look_again, promising
 from calibration.diagnosis.screen.gains import Gain
+from calibration.diagnosis.screen.own_nulls import OwnNulls, own_nulls
 from calibration.diagnosis.screen.screen import Screening, screen
 from calibration.evaluation.n_step import Progress
 from thermal.effects.catalogue import CATALOGUE
@@ -53,6 +54,8 @@ class Round:
         Effects fitted anew, the best first.
     accepted : Refit or None
         What the next round starts from.
+    own : OwnNulls
+        What the case shows where nothing is missing, of the first round.
     pair : Refit or None
         The other effect of a pair by which the accepted one was found, fitted with it; its gain is that of both.
     """
@@ -64,6 +67,7 @@ class Round:
     generic: Gain
     refits: tuple[Refit, ...]
     accepted: Refit | None
+    own: OwnNulls
     pair: Refit | None = None
 
     @property
@@ -132,33 +136,53 @@ def search(
         Called with stage, done, total.
     """
     done: list[Round] = []
-    fit, ahead = baseline, None
+    ahead: Refit | None = None
+    own: OwnNulls | None = None
+    fit = baseline
     while len(done) < ROUNDS:
         if progress is not None:
             progress("diagnose", len(done), ROUNDS)
         open_ = [e for e in candidates if all(r in fit.effects for r in CATALOGUE[e].requires)]
         made, gains, generic = screen(models, fit, open_)
+        if own is not None:
+            made.jacobian = None
         exchanged = _exchanged(models, done, made, open_)
         if exchanged is not None:
             done[-2:] = [exchanged]
             fit, errors, ahead = exchanged.after, exchanged.after_held_out, exchanged.pair
             continue
-        work = Work(models, fit, errors, made)
+        work = Work(models, fit, errors, made, ACCEPTED if own is None else accepted_from(own))
         refits = _refits(work, gains, ahead)
         refits = look_again(work, gains, refits, _first(errors, refits))
         best = _first(errors, refits)
+        if own is None:
+            own = own_nulls(made, fit if best is None else best.fit, open_)
+            work = replace(work, level=accepted_from(own))
+            refits = [replace(r, counts=r.counts and r.gain > work.level) for r in refits]
+            best = _first(errors, refits)
         chosen = _best_pair(work, gains, refits, best) if ahead is None else None
         pair = None
         if chosen is not None:
             best, pair = chosen
             refits = sorted({id(r): r for r in (*refits, best)}.values(), key=lambda r: -r.gain)
-        done.append(Round(fit, errors, made, tuple(gains), generic, tuple(refits), best, pair))
+        done.append(Round(fit, errors, made, tuple(gains), generic, tuple(refits), best, own, pair))
         if best is None:
             break
         fit, errors, ahead = best.fit, best.held_out, pair
     if progress is not None:
         progress("diagnose", ROUNDS, ROUNDS)
     return tuple(done)
+
+
+def accepted_from(own: OwnNulls) -> float:
+    """Gain from which an effect is accepted: more than what a case without it shows, by chance or by its structure [-].
+
+    Parameters
+    ----------
+    own : OwnNulls
+        Of the case.
+    """
+    return max(ACCEPTED, own.level)
 
 
 def _first(before: HeldOut, refits: Sequence[Refit]) -> Refit | None:
@@ -247,7 +271,7 @@ def _best_pair(
     if not kept:
         return None
     both, pair = max(kept, key=lambda k: k[0].gain)
-    if both.gain < single + ACCEPTED or (best is not None and _within(best, pair)):
+    if both.gain < single + work.level or (best is not None and _within(best, pair)):
         return None
     known = {r.screened.effect: r for r in refits if r.screened.zones == pair.first.zones}
     first = known.get(pair.first.effect) or work.refit([pair.first], work.made.promised(pair.first))
@@ -308,7 +332,7 @@ def _exchanged(
     other = max((less.of(e) for e in free), key=lambda g: g.gain, default=None)
     if other is None or other.gain < less.of(first.effect).gain - APART:
         return None
-    work = Work(models, before.before, before.held_out, before.screening)
+    work = Work(models, before.before, before.held_out, before.screening, accepted_from(before.own))
     both = work.weighed([first, second.screened], second.fit)
     instead = work.refit([second.screened, other], less.promised(other))
     if instead is None or not instead.counts or not _better(before.held_out, instead, both):

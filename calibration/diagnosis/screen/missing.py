@@ -99,12 +99,10 @@ def missing_heat(
     ``Var = r² V + D Σ D'``: V is the smoother's variance of a step, r from `averaged_deviation`, Σ the covariance of
     the parameters, D the sensitivities of the heat that the measured temperatures ask for.
     """
-    network, inputs, model = fit.built.network, fit.built.inputs, fit.model
-    many = len(network.zones) > _MANY_ZONES
-    if many and model.order > _ORDER:
-        model = reduced_model(fit.built.grid, [fit.theta], order=_ORDER)
+    network, inputs = fit.built.network, fit.built.inputs
+    many, model = len(network.zones) > _MANY_ZONES, _small(fit)
     settings = FilterSettings(fit.settings.stepping, "steady" if many else "exact", fit.settings.spin_up_seconds)
-    disturbance = _tuned(fit, model, near)
+    disturbance = tuned_disturbance(fit, near, model)
     parts, measured = [], np.isfinite(inputs.zone)
     for interval in intervals:
         filtered = filter_interval(model, fit.theta, inputs, interval, disturbance, settings)
@@ -136,8 +134,28 @@ def at_start(fit: Fit) -> Fit:
     return replace(fit, model=model, found=replace(fit.found, point=point))
 
 
-def _tuned(fit: Fit, model: ReducedModel, near: DisturbanceModel | None) -> DisturbanceModel:
-    """Size and course of the missing heat and noise of the sensors, on the last of what was fitted."""
+def _small(fit: Fit) -> ReducedModel:
+    """Model of a fit, of as many states as can be smoothed by."""
+    if len(fit.built.network.zones) > _MANY_ZONES and fit.model.order > _ORDER:
+        return reduced_model(fit.built.grid, [fit.theta], order=_ORDER)
+    return fit.model
+
+
+def tuned_disturbance(
+    fit: Fit, near: DisturbanceModel | None = None, model: ReducedModel | None = None
+) -> DisturbanceModel:
+    """Size and course of the missing heat and noise of the sensors, on the last of what was fitted.
+
+    Parameters
+    ----------
+    fit : Fit
+        With the parameters.
+    near : DisturbanceModel, optional
+        Where to begin.
+    model : ReducedModel, optional
+        Accurate there, where it is at hand.
+    """
+    model = model or _small(fit)
     many, last = len(model.network.zones) > _MANY_ZONES, fit.problem.fitted[-1]
     latest = last.end - pd.Timedelta(seconds=_TUNED_MANY if many else _TUNED)
     interval = Interval(max(last.start, latest), last.end)

@@ -16,19 +16,12 @@ import numpy as np
 
 from calibration.diagnosis.refit.comparison import Fit, ModelComparison, is_strength
 from calibration.diagnosis.screen.gains import Gain, choice_of
+from calibration.diagnosis.screen.generic import GENERIC, TIGHTNESS, ZONE_HEAT
 from thermal._types import BoolArray, FloatArray, IntArray
 from thermal.effects.catalogue import CATALOGUE
-from thermal.effects.effect import PAIR, Chosen, Effect, EffectBuilder, strength
-from thermal.effects.unknown import BIN, BINS
-from thermal.inputs.provider import InputProvider
-from thermal.inputs.signals import CONSTANT, Signal
+from thermal.effects.effect import PAIR, Chosen
 from thermal.model.reduce import FEW_SHIFTS, SHIFTS, reduced_model
 from thermal.parameters import Parameter
-
-#: Heat that is plausible in a bin [W/m2], and per kelvin of outdoor temperature [W/m2/K].
-_HEAT, _PER_KELVIN = 20.0, 1.0
-
-_SOURCE = "any cause: loads and losses of offices stay within"
 
 #: Sweeps of the quadratic programme, and the change of an estimate in prior deviations that ends them [-].
 _SWEEPS, _TOLERANCE = 200, 1e-6
@@ -39,51 +32,8 @@ _LITTLE = 1e-3
 #: Order of the reduced model of a large building.
 _LARGEST_ORDER = 700
 
-
-def _about_mean(inputs: InputProvider) -> FloatArray:
-    return np.asarray(inputs.outdoor - inputs.outdoor.mean())
-
-
-_OUTDOOR = Signal("outdoor temperature about its mean", "K", _about_mean, ("outdoor",))
-
 #: Most zones in which effects of single zones are sought.
 _MOST_ZONES = 24
-
-#: Sizes that generic heat may have over its prior's [-]; the likeliest counts (empirical Bayes).
-_TIGHTNESS = (0.003, 0.01, 0.03, 0.1, 0.3)
-
-
-def _build(builder: EffectBuilder) -> None:
-    for room in builder.rooms:
-        for number, signal in enumerate(BINS):
-            builder.heat_air(room, builder.parameter(f"heat_from_{BIN * number:02d}"), signal, room.floor_area)
-        builder.heat_air(room, builder.parameter(ZONE_HEAT, zone=room.name), CONSTANT, room.floor_area)
-        builder.heat_air(room, builder.parameter("heat_by_outdoor", zone=room.name), _OUTDOOR, room.floor_area)
-
-
-#: Constant heat of a zone [W/m2], by which the smallest detectable watts are told.
-ZONE_HEAT = "heat_of_zone"
-
-#: Heat at every time of day, and in each zone constantly and with outdoor temperature.
-GENERIC = Effect(
-    id="generic",
-    title="heat of unknown cause",
-    equation="A (Σ_b p_b 1[t in b] + p_z + p_T,z (T_out - mean))",
-    source="generic regressors of an omnibus test",
-    acts_on="air of each zone",
-    confounders=(),
-    separated_by="",
-    parameters=(
-        *(
-            strength(f"heat_from_{first:02d}", "W/m^2", _HEAT, _SOURCE, "generic", -_HEAT)
-            for first in range(0, 24, BIN)
-        ),
-        strength(ZONE_HEAT, "W/m^2", _HEAT, _SOURCE, "generic", -_HEAT),
-        strength("heat_by_outdoor", "W/m^2/K", _PER_KELVIN, _SOURCE, "generic", -_PER_KELVIN),
-    ),
-    build=_build,
-    zonal=True,
-)
 
 
 class Screening:
@@ -99,11 +49,14 @@ class Screening:
         Effects to screen.
     """
 
+    #: Sensitivities of the tuning errors to every strength, (n_error, n_parameter), until they are let go.
+    jacobian: FloatArray | None
+
     def __init__(self, models: ModelComparison, fit: Fit, candidates: Sequence[str]) -> None:
         here = _worst_zones(fit)
         lacking = {e: here if CATALOGUE[e].zonal else () for e in candidates if e not in fit.effects}
         built = models.build({**fit.effects, **lacking}, (Chosen(GENERIC, here),))
-        self._elsewhere = len(built.network.zones) - len(here) if here else 0
+        self.elsewhere = len(built.network.zones) - len(here) if here else 0
         own: tuple[Parameter, ...] = built.network.parameters
         self._levels = {p.effect: p for p in own if p.effect in lacking and p.name == CATALOGUE[p.effect].level}
         levels = {p.name: (p.lower, p.upper) for p in self._levels.values()}
@@ -120,6 +73,7 @@ class Screening:
             jacobian = np.column_stack([jacobian, jacobian[:, i] + (high - low) / little[i]])
         self._twins = {len(own) + k: i for k, i in enumerate(twice)}
         self.parameters = (*own, *(replace(own[i], name=f"{own[i].name} at the other end") for i in twice))
+        self.jacobian = jacobian
         error = fit.problem.residuals_only(fit.model, fit.theta)
         self.count = problem.effective_size()
         self.scale: float = self.count / float(np.sum(error**2))
@@ -143,6 +97,21 @@ class Screening:
         self.score = self._slope - turn.T @ pull
         self.gram = self._whole - self._whole[:, known] @ turn
 
+    def scores_of(self, errors: FloatArray) -> FloatArray:
+        """Scores of other errors of the same runs, each as large as those of the fit, (n_draw, n_parameter) [-].
+
+        Parameters
+        ----------
+        errors : ndarray, shape (n_draw, n_error)
+            They [K].
+        """
+        if self.jacobian is None:
+            raise ValueError("screening: the sensitivities have been let go")
+        # each draw has the deviation that it is weighed by, as the fit has
+        size = np.sqrt(self.count / self.scale / np.sum(errors**2, axis=1))
+        slopes = -self.scale * (size[:, None] * errors) @ self.jacobian
+        return np.asarray(slopes - slopes[:, self._known] @ self._turn)
+
     def without(self, effect: str) -> Screening:
         """Screening of the model less one of its effects, by tangents: what is left in it makes up for that.
 
@@ -153,7 +122,7 @@ class Screening:
         """
         left = self._known & np.array([p.effect != effect for p in self.parameters])
         move = np.zeros(len(self.parameters))
-        strengths = self._strengths(effect)
+        strengths = self.strengths_of(effect)
         move[strengths] = -self._point[strengths]
         away = (self._point - self._start)[left]
         hessian = self._whole[np.ix_(left, left)] + np.diag(self.prior[left] ** -2.0)
@@ -176,21 +145,36 @@ class Screening:
         effect : str
             Its id.
         """
-        index = self._strengths(effect)
         if effect == GENERIC.id:
-            return self._likeliest(index)
+            return self._likeliest()
         if not CATALOGUE[effect].zonal:
-            return self._gain(effect, index, ())
-        members: dict[str, list[int]] = {}
-        for i in index:
-            members.setdefault(self.parameters[i].member or "", []).append(int(i))
-        everywhere = members.pop("", [])  # a strength that all zones share
-        silent = [name for name, mine in members.items() if not self._whole[mine, mine].any()]
-        members = {name: mine for name, mine in members.items() if name not in silent or len(silent) == len(members)}
-        found = [self._grow(effect, {name: np.array(i) for name, i in members.items()})] if members else []
-        if everywhere:
-            found.append(self._gain(effect, np.array(everywhere), ()))
+            return self._gain(effect, self.strengths_of(effect), ())
+        members, everywhere = self.members_of(effect)
+        found = [self._grow(effect, members)] if members else []
+        if everywhere.size:
+            found.append(self._gain(effect, everywhere, ()))
         return max(found, key=lambda g: g.gain)
+
+    def members_of(self, effect: str) -> tuple[dict[str, IntArray], IntArray]:
+        """Positions of an effect's strengths by zone or pair of zones, those that show nothing left out.
+
+        Parameters
+        ----------
+        effect : str
+            Id of one that may be in some zones only.
+
+        Returns
+        -------
+        tuple
+            By zone or pair, and those that all zones share.
+        """
+        members: dict[str, list[int]] = {}
+        for i in self.strengths_of(effect):
+            members.setdefault(self.parameters[i].member or "", []).append(int(i))
+        everywhere = members.pop("", [])
+        silent = [name for name, mine in members.items() if not self._whole[mine, mine].any()]
+        shown = {n: np.array(i) for n, i in members.items() if n not in silent or len(silent) == len(members)}
+        return shown, np.array(everywhere, dtype=np.int64)
 
     def promised(self, *gains: Gain) -> dict[str, float]:
         """Parameters where the tangents point: the effects' strengths, and what the fitted ones then would be.
@@ -267,12 +251,17 @@ class Screening:
                 found[p.member] = float(np.sqrt(2.0 * (gain + occam) / information))
         return found
 
-    def _likeliest(self, index: IntArray) -> Gain:
-        """Find the likeliest generic heat, of any size: by time, by zone, by outdoor temperature, or all of them."""
+    def generic_families(self) -> list[IntArray]:
+        """Positions of generic heat: of all of it, by zone, by outdoor temperature, by time."""
+        index = self.strengths_of(GENERIC.id)
         kinds = np.array([self.parameters[i].base for i in index])
         families = [index, *(index[kinds == k] for k in np.unique(kinds) if not k.startswith("heat_from"))]
         families.append(index[np.char.startswith(kinds, "heat_from")])
-        sizes = [self._gain(GENERIC.id, f, (), tightness=t) for f in families for t in _TIGHTNESS]
+        return families
+
+    def _likeliest(self) -> Gain:
+        """Find the likeliest generic heat, of any kind and size."""
+        sizes = [self._gain(GENERIC.id, f, (), tightness=t) for f in self.generic_families() for t in TIGHTNESS]
         return max(sizes, key=lambda g: g.gain)
 
     def _named(
@@ -292,13 +281,20 @@ class Screening:
         errors = {name: float(np.sqrt(row @ covariance @ row)) for name, row in rows.items()}
         return values, errors
 
-    def _strengths(self, effect: str) -> IntArray:
+    def strengths_of(self, effect: str) -> IntArray:
+        """Positions of an effect's strengths.
+
+        Parameters
+        ----------
+        effect : str
+            Its id.
+        """
         own = ((i, self.parameters[self._twins.get(i, i)]) for i in range(len(self.parameters)))
         return np.array([i for i, p in own if p.effect == effect and is_strength(p.name, effect)], dtype=np.int64)
 
     def _grow(self, effect: str, members: Mapping[str, IntArray]) -> Gain:
         """Add zones, or pairs of them, as long as each more than pays for having been chosen among all."""
-        places = len(members) + self._elsewhere
+        places = len(members) + self.elsewhere
         alone = {name: self._gain(effect, index, (name,)).gain for name, index in members.items()}
         order = sorted(members, key=lambda name: -alone[name])
         chosen: list[str] = []

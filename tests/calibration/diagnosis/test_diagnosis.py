@@ -14,7 +14,7 @@ from calibration.diagnosis.decide.verdict import _left_over, judge
 from calibration.diagnosis.diagnosis import Diagnosis, baseline_gap, diagnose
 from calibration.diagnosis.refit.comparison import Fit, ModelComparison
 from calibration.diagnosis.refit.how_far import _permutation_test
-from calibration.diagnosis.refit.refit import ACCEPTED, CHANCE, MATTERS, Refit, Work, _beyond_a_step, held_out
+from calibration.diagnosis.refit.refit import ACCEPTED, CHANCE, MATTERS, Refit, Work, beyond_a_step, held_out
 from calibration.diagnosis.refit.repeat import DISAGREE, Repeats, agreement
 from calibration.diagnosis.refit.search import _first
 from calibration.diagnosis.screen.screen import Screening
@@ -217,11 +217,14 @@ def test_telemetry_is_shifted_only_by_more_than_one_of_its_steps() -> None:
         point[[heat, weather]] = by_heat, by_weather
         return replace(found.fit, found=replace(found.fit.found, point=point))
 
-    assert not _beyond_a_step(moved(0.9 * step, 0.0), "clock_shift")
-    assert not _beyond_a_step(moved(step + 0.9 * error[heat], -0.9 * step), "clock_shift")
-    assert _beyond_a_step(moved(-step - 1.1 * error[heat], 0.0), "clock_shift")
-    assert _beyond_a_step(moved(0.0, step + 1.1 * error[weather]), "clock_shift")
-    assert _beyond_a_step(baseline, "solar_gain")  # moves nothing in time
+    def beyond(fit: Fit, effect: str = "clock_shift") -> bool:
+        return beyond_a_step(fit.problem, fit.theta, found.fit.deviations, effect)
+
+    assert not beyond(moved(0.9 * step, 0.0))
+    assert not beyond(moved(step + 0.9 * error[heat], -0.9 * step))
+    assert beyond(moved(-step - 1.1 * error[heat], 0.0))
+    assert beyond(moved(0.0, step + 1.1 * error[weather]))
+    assert beyond(baseline, "solar_gain")  # moves nothing in time
     evident = replace(found.fit, evidence=baseline.evidence + 50.0, found=replace(found.fit.found, mean_square=0.0))
     weighed = work.weighed([gain], evident)
     assert weighed.gain > ACCEPTED

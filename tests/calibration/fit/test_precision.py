@@ -12,11 +12,10 @@ from numpy.typing import NDArray
 from calibration import Interval
 from calibration.estimation.disturbance import DisturbanceModel
 from calibration.evaluation.intervals import select_runs
-from calibration.fit.precision import Precision, precision, unexplained
+from calibration.fit.precision import Precision, drawn_errors, precision, unexplained
 from calibration.fit.problem import Problem, thin
 from thermal import SymbolicModel, build_network, load_bundled_case, reduced_model, replay_inputs
 from thermal.model.reduce import ReducedModel
-from thermal.model.step import IMPLICIT_EULER
 
 FloatArray = NDArray[np.float64]
 
@@ -37,37 +36,17 @@ def reduced() -> ReducedModel:
 
 
 def drawn_gradients(disturbance: DisturbanceModel, count: int) -> FloatArray:
-    """Gradient ``J'e`` of errors that come from drawn heat through the building, run by run, (count, n_free)."""
+    """Gradient ``J'e`` of errors that come from drawn heat through the building, (count, n_free)."""
     p, model = problem(), reduced()
-    rng = np.random.default_rng(3)
-    (runs,) = p.runs
-    error, slopes = p.errors(model, p.start, runs, slopes=True)
-    assert slopes is not None
-    jacobian = np.where(np.isfinite(error)[..., None], slopes * p.slopes(p.start), 0.0)
-    stay, push = disturbance.discrete(p.inputs.step)
-    matrices = model.matrices(p.start)
-    first, last = int(runs.starts[0]), int(runs.starts[-1]) + p.steps
-    still = np.zeros((p.steps, matrices.n_boundary, runs.starts.size))
-    start = np.zeros((matrices.n, runs.starts.size))
-    found = []
-    for _ in range(count):
-        heat = np.empty((last - first + 1, 5))
-        heat[0] = np.asarray(disturbance.deviation) * rng.standard_normal(5)
-        for k in range(1, len(heat)):
-            heat[k] = stay * heat[k - 1] + push * rng.standard_normal(5)
-        rows = runs.starts - first + np.arange(1, p.steps + 1)[:, None]
-        means, _ = matrices.modal.run(
-            start, still, heat[rows].transpose(0, 2, 1), p.keep, p.inputs.step, IMPLICIT_EULER
-        )
-        found.append(np.einsum("rkzi,rkz->i", jacobian, means))
-    return np.array(found)
+    errors = drawn_errors(p, model, p.start, disturbance, count, seed=3)
+    return np.asarray(errors @ p.turned(model, p.start)[1])
 
 
 def test_gradient_covariance_is_that_of_drawn_heat() -> None:
     """400 draws of the heat over all runs; its correlation from run to run included."""
-    disturbance = DisturbanceModel(np.array([50.0, 100.0, 80.0, 60.0, 120.0]), 4 * 3600.0, 1e-9)
+    disturbance = DisturbanceModel(np.array([50.0, 100.0, 80.0, 60.0, 120.0]), 4 * 3600.0, 0.02)
     known = precision(problem(), reduced(), problem().start, disturbance)
-    memory = precision(problem(), reduced(), problem().start, replace(disturbance, deviation=1e-9 * np.ones(5)))
+    memory = precision(problem(), reduced(), problem().start, replace(disturbance, deviation=1e-9 * np.ones(5), sensor_deviation=1e-9))
     wanted = np.cov(drawn_gradients(disturbance, 400).T, bias=True)
     found = known.score - memory.score
     root = np.linalg.inv(np.linalg.cholesky(found))

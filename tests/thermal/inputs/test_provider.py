@@ -12,8 +12,9 @@ import pytest
 
 from thermal import Case, Telemetry
 from thermal.errors import EffectError
+from thermal.inputs.live import LiveInputs
 from thermal.inputs.normalisation import WIND, Normalisation, fit_normalisation, usual_temperatures
-from thermal.inputs.provider import INFRARED, INPUTS, IRRADIANCE, InputProvider, LiveInputs, telemetry_inputs
+from thermal.inputs.provider import INFRARED, INPUTS, IRRADIANCE, InputProvider, telemetry_inputs
 from thermal.inputs.signals import Signal, signal_values
 
 CaseOf = Callable[[str], Case]
@@ -94,7 +95,7 @@ def test_supply_air_is_flow_and_heat_above_the_zone(lively_case: CaseOf) -> None
 
 @pytest.mark.parametrize(
     ("point", "use"),
-    [(WIND, lambda d: d.wind), (INFRARED, lambda d: d.sky), (IRRADIANCE, lambda d: d.sun)],
+    [(WIND, lambda d: d.wind), (INFRARED, lambda d: d.sky)],
 )
 def test_what_is_not_measured_is_said_by_name(
     lively_case: CaseOf, point: str, use: Callable[[InputProvider], object]
@@ -103,6 +104,20 @@ def test_what_is_not_measured_is_said_by_name(
     assert not drivers.measured(point)
     with pytest.raises(EffectError, match=f"expected {point}"):
         use(drivers)
+
+
+def test_a_sun_that_nobody_measures_is_estimated_over_days_and_refused_within_one(lively_case: CaseOf) -> None:
+    drivers = telemetry_inputs(changed(lively_case("plan"), **{f"weather_station/{IRRADIANCE}": None}))
+    assert not drivers.measured(IRRADIANCE)
+    days = pd.date_range("2023-06-20 01:00", periods=72, freq="h", tz="Europe/Berlin")
+    swing = 290.0 + 6.0 * np.sin(2.0 * np.pi * (days.hour - 9.0) / 24.0)
+    series, none = {"outdoor": np.asarray(swing)}, Normalisation()
+    long = InputProvider(drivers.building, days, 3600.0, series, none)
+    assert long.gives("sun") and long.estimates(IRRADIANCE) and long.sun.horizontal.max() > 300.0
+    short = InputProvider(drivers.building, days[:24], 3600.0, {"outdoor": series["outdoor"][:24]}, none)
+    assert not short.gives("sun")
+    with pytest.raises(EffectError, match=f"expected {IRRADIANCE}"):
+        _ = short.sun
 
 
 def test_beam_follows_from_global_and_diffuse(lively_case: CaseOf) -> None:

@@ -9,7 +9,7 @@ from pvlib import irradiance, solarposition
 
 from thermal.case.building import Location
 from thermal.errors import EffectError
-from thermal.inputs.sun import Sun, incidence_modifier, sun_of
+from thermal.inputs.sun import Sun, estimated_sun, incidence_modifier, sun_of
 
 MUNICH = Location(latitude=48.0, longitude=12.0, elevation=690.0, timezone="Europe/Berlin")
 NORMAL, DIFFUSE, GLOBAL = (
@@ -127,3 +127,22 @@ def test_incidence_modifier_of_known_angles() -> None:
 def test_a_sun_below_the_horizon_does_not_shine_through_glass() -> None:
     sun = Sun(*(np.array([v]) for v in (180.0, -10.0, 0.0, 0.0, 0.0)))
     assert sun.through_glass(180.0, 90.0)[0] == 0.0
+
+
+def test_a_day_by_its_range_of_temperature_as_in_fao_56_example_15() -> None:
+    # Allen et al. (1998), example 15: Lyon, 45.72 N, July: Ra 40.6 MJ/m2/d, 26.6 and 14.8 degC, Rs 22.3 with 0.16
+    lyon = Location(latitude=45.72, longitude=4.95, elevation=200.0, timezone="Europe/Paris")
+    stamps = pd.date_range("2023-07-15", periods=145, freq="10min", tz="Etc/GMT-1")[1:]
+    outdoor = 293.85 - 5.9 * np.cos(2.0 * np.pi * (np.arange(144) + 0.5) / 144.0)
+    sun = estimated_sun(lyon, stamps, 600.0, outdoor)
+    total = sun.horizontal.sum() * 600.0 / 1e6
+    assert total == pytest.approx(22.3 * 0.175 / 0.16, rel=0.02)
+    assert (sun.horizontal[sun.altitude < 0.0] == 0.0).all()
+    up = sun.altitude > 5.0
+    assert (sun.normal * np.sin(np.radians(sun.altitude)) + sun.diffuse)[up] == pytest.approx(sun.horizontal[up], rel=1e-6)
+
+
+def test_a_day_without_a_swing_is_dark_and_one_with_a_large_one_no_brighter_than_clear() -> None:
+    place, stamps = MUNICH, days("2023-06-20", 25)[1:]
+    flat, wide = (estimated_sun(place, stamps, 3600.0, v * np.sin(np.arange(24.0) / 4.0)).horizontal for v in (0.0, 30.0))
+    assert wide.max() / flat.max() == pytest.approx(0.75 / 0.15, rel=1e-6)

@@ -42,7 +42,7 @@ def screening(signatures: FloatArray, errors: FloatArray, fitted: Mapping[str, f
     made.prior = np.array([p.prior_deviation for p in made.parameters])
     made.lower = np.array([p.lower for p in made.parameters])
     made.upper = np.array([p.upper for p in made.parameters])
-    made._elsewhere = 0
+    made.elsewhere = 0
     made._levels, made._twins = {}, {}
     made._whole, made._slope = made.scale * signatures.T @ signatures, -made.scale * signatures.T @ errors
     made._start, made._point = np.zeros(len(NAMES)), np.array([(fitted or {}).get(name, 0.0) for name in NAMES])
