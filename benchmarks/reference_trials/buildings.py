@@ -10,6 +10,7 @@ from typing import Any
 
 from mpc.adapters.energyplus.input import InputFile, building_path, entity, read_input
 from reference_trials.errors import TrialError
+from thermal.case.building import Airflow
 
 Content = dict[str, dict[str, dict[str, Any]]]
 
@@ -106,7 +107,10 @@ def source(key: str) -> InputFile:
     for heater in content.get("WaterHeater:Mixed", {}).values():
         if heater.get("ambient_temperature_indicator") == "Zone":  # its losses would be heat of the zone
             heater.pop("ambient_temperature_zone_name", None)
-            heater |= {"ambient_temperature_indicator": "Schedule", "ambient_temperature_schedule_name": "trial ambient"}
+            heater |= {
+                "ambient_temperature_indicator": "Schedule",
+                "ambient_temperature_schedule_name": "trial ambient",
+            }
             heater |= {"off_cycle_loss_fraction_to_zone": 0.0, "on_cycle_loss_fraction_to_zone": 0.0}
             content.setdefault("Schedule:Constant", {})["trial ambient"] = {"hourly_value": 20.0}
     return InputFile(content, read.name)
@@ -157,3 +161,26 @@ def served(building: InputFile) -> tuple[str, ...]:
         Of `source`.
     """
     return tuple(dict.fromkeys(inlet.zone for inlet in inlets(building)))
+
+
+def airflows(building: InputFile) -> tuple[Airflow, ...]:
+    """Find where return air passes through a plenum.
+
+    Parameters
+    ----------
+    building : InputFile
+        Of `source`.
+    """
+    rooms = {
+        node.lower(): fields["zone_name"].lower()
+        for fields in building.of_type("ZoneHVAC:EquipmentConnections").values()
+        for node in building.nodes(fields.get("zone_return_air_node_or_nodelist_name", ""))
+    }
+    entries = [(i.zone.lower(), i) for i in inlets(building)]
+    return tuple(
+        Airflow(source=entity(i.zone), target=entity(plenum["zone_name"]), device=i.device, fraction=1.0)
+        for plenum in building.of_type("AirLoopHVAC:ReturnPlenum").values()
+        for node in plenum["nodes"]
+        for zone, i in entries
+        if zone == rooms.get(node["inlet_node_name"].lower())
+    )

@@ -9,7 +9,7 @@ import pandas as pd
 from scipy.signal import lfilter
 
 from mpc.adapters.energyplus.input import InputFile, entity
-from reference_trials.buildings import inlets
+from reference_trials.buildings import inlets, served
 from reference_trials.plant import AIR_HEAT_CAPACITY, Run
 from reference_trials.specification import WHERE, Effect, Spec, generator
 from thermal.case.building import ZoneTable
@@ -39,7 +39,7 @@ def resolve(spec: Spec, building: InputFile, table: ZoneTable) -> tuple[Effect, 
 def _resolve(
     name: str, s: float, rng: np.random.Generator, building: InputFile, table: ZoneTable, spec: Spec
 ) -> Effect:
-    areas = {zone.name: zone.floor_area for zone in table.zones}
+    areas = areas_of(building, table)
     zones = list(areas)
     sign = float(rng.choice([-1.0, 1.0]))
     if name == "sensor_bias":
@@ -61,9 +61,8 @@ def _resolve(
     if name == "hidden_mass":
         return Effect(name, s, (), {"area_m2": {own[z]: round(MASS * s * a, 2) for z, a in areas.items()}})
     if name == "zone_mixing":
-        beside = sorted({tuple(sorted((f.zone, f.other))) for f in table.surfaces if f.other in areas} - {
-            (z, z) for z in zones
-        })  # fmt: skip
+        pairs = {tuple(sorted((f.zone, f.other))) for f in table.surfaces if {f.zone, f.other} <= set(areas)}
+        beside = sorted(pairs - {(z, z) for z in zones})
         count = min(int(rng.integers(1, 4)), len(beside))
         doors = [beside[int(k)] for k in np.sort(rng.choice(len(beside), count, replace=False))]
         between = [(own[a], own[b]) for a, b in doors]
@@ -88,7 +87,7 @@ class Readings:
     rooms : dict of str to str
         Zone of each device, as the case calls it.
     areas : dict of str to float
-        Floor area by zone [m2].
+        Floor area of the zones that have conditioned air [m2].
     step : float
         [s]
     """
@@ -132,7 +131,7 @@ def _bias(readings: Readings, effect: Effect) -> None:
 def _lag(readings: Readings, effect: Effect) -> None:
     """First-order lag, exact for a temperature that is constant in a step."""
     keep = np.exp(-readings.step / effect.parameters["time_constant_s"])
-    for zone in readings.areas:
+    for zone in readings.temperature:
         true = readings.temperature[zone].to_numpy()
         readings.temperature[zone] = lfilter([1.0 - keep], [1.0, -keep], true, zi=[keep * true[0]])[0]
 
@@ -169,6 +168,20 @@ _FAULTS: dict[str, Callable[[Readings, Effect], None]] = {
     "sensor_bias": _bias, "sensor_lag": _lag, "flow_gain": _gain, "duct_loss": _duct, "valve_leak": _leak,
     "clock_shift": _clock,
 }  # fmt: skip
+
+
+def areas_of(building: InputFile, table: ZoneTable) -> dict[str, float]:
+    """Floor area of each zone that has conditioned air, as the case calls it [m2].
+
+    Parameters
+    ----------
+    building : InputFile
+        Of `buildings.source`.
+    table : ZoneTable
+        Its zones.
+    """
+    conditioned = {entity(zone) for zone in served(building)}
+    return {zone.name: zone.floor_area for zone in table.zones if zone.name in conditioned}
 
 
 def zones_of(building: InputFile) -> dict[str, str]:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import json
 import sqlite3
-from collections.abc import Iterable
-from contextlib import closing
+from collections.abc import Iterable, Iterator
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from datetime import date, timedelta
 from functools import cache
@@ -20,7 +20,7 @@ from mpc.adapters.energyplus.process import EnergyPlusProcess, Job, run_energypl
 from mpc.errors import EnergyPlusError
 from reference_trials.buildings import Content, inlets, served, source
 from reference_trials.errors import TrialError
-from reference_trials.specification import RUN_IN_DAYS, WEATHER, YEAR, Spec
+from reference_trials.specification import RUN_IN_DAYS, WEATHER, YEAR, Spaces, Spec
 from thermal.case.building import ZoneTable
 
 STATION = {
@@ -73,18 +73,20 @@ class Run:
 
 
 @cache
-def geometry(building: str) -> ZoneTable:
+def geometry(building: str, spaces: Spaces) -> ZoneTable:
     """Find areas, volumes, layers and neighbours of a building, as EnergyPlus has them with everything on.
 
     Parameters
     ----------
     building : str
         Key of `REFERENCES`.
+    spaces : str
+        How plenums and attics are in the table, see `Spec`.
     """
     file = source(building)
     content = file.with_period(date(YEAR, 1, 2), 1, 6)
     content["Output:SQLite"] = {"Output:SQLite 1": {"option_type": "SimpleAndTabular"}}
-    zones = served(file)
+    zones = tuple(file.of_type("Zone")) if spaces == "zones" else served(file)
     others = tuple(z for z in file.of_type("Zone") if z not in zones)
     with _told(building):
         job = Job(json.dumps(content), "in.epJSON", weather_path(WEATHER[0]), stepped=False)
@@ -155,15 +157,10 @@ def _run(spec: Spec, means: NDArray[np.float64], stamps: pd.DatetimeIndex, file:
     return Run(temperature, table(np.where(flowing, flow, 0.0), devices), discharge, heating, cooling, station, balance)
 
 
-class _told:
+@contextmanager
+def _told(name: str) -> Iterator[None]:
     """Turn an error of EnergyPlus into one of a trial."""
-
-    def __init__(self, name: str) -> None:
-        self.name = name
-
-    def __enter__(self) -> None:
-        pass
-
-    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
-        if isinstance(error, EnergyPlusError):
-            raise TrialError(f"{self.name}: {error}") from error
+    try:
+        yield
+    except EnergyPlusError as error:
+        raise TrialError(f"{name}: {error}") from error

@@ -14,6 +14,7 @@ import numpy as np
 from reference_trials.buildings import REFERENCES
 
 Kind = Literal["null", "single"]
+Spaces = Literal["boundaries", "zones"]
 KINDS: tuple[Kind, ...] = ("null", "single")
 DAYS = 21
 #: Before the telemetry, after EnergyPlus' own warm-up [d].
@@ -107,6 +108,9 @@ class Spec:
         First day of the telemetry, ISO 8601.
     steps_per_hour : int
         Steps of simulation and telemetry.
+    spaces : str
+        How plenums and attics, which no air is conditioned for, are in the case: ``boundaries``, whose air is measured,
+        or ``zones`` without a device.
     sensors : Sensors
         Their noise.
     wanted : tuple of (str, float)
@@ -121,6 +125,7 @@ class Spec:
     weather: str
     start: str
     steps_per_hour: int
+    spaces: Spaces
     sensors: Sensors
     wanted: tuple[tuple[str, float], ...] = ()
 
@@ -178,7 +183,7 @@ def draw_spec(seed: int, kind: Kind, *, confirmation: bool = False, days: int = 
     Parameters
     ----------
     seed : int
-        Number of the trial in its stream, at least 0; buildings take turns.
+        Number of the trial in its stream, at least 0; buildings take turns, and so do `Spec.spaces`.
     kind : {"null", "single"}
         No effect, or one.
     confirmation : bool
@@ -203,6 +208,7 @@ def draw_spec(seed: int, kind: Kind, *, confirmation: bool = False, days: int = 
         weather=str(rng.choice(WEATHER)),
         start=start.isoformat(),
         steps_per_hour=int(rng.choice([12, 6, 4], p=[0.5, 0.3, 0.2])),
+        spaces=("boundaries", "zones")[seed // len(REFERENCES) % 2],
         sensors=_sensors(_generator(stream, seed, _SENSORS)),
     )  # fmt: skip
     if kind == "null":

@@ -14,7 +14,7 @@ import pandas as pd
 from mpc.adapters.energyplus.input import entity, weather_path
 from mpc.scenario.weather_files import read_epw
 from reference_trials import effects, plant
-from reference_trials.buildings import inlets, source
+from reference_trials.buildings import airflows, inlets, source
 from reference_trials.errors import TrialError
 from reference_trials.specification import NOISE, Effect, Spec, generator
 from reference_trials.variant import variant
@@ -57,17 +57,18 @@ def make_trial(spec: Spec, cases: Path, sealed: Path) -> bool:
     if case.exists() and label.exists():
         return False
     began = time.perf_counter()
-    building, table = source(spec.building), plant.geometry(spec.building)
+    building, table = source(spec.building), plant.geometry(spec.building, spec.spaces)
     held = effects.resolve(spec, building, table)
     run = plant.simulate(spec, variant(building, held))
     account = check(spec, run, held)
-    rooms, areas = effects.zones_of(building), {z.name: z.floor_area for z in table.zones}
+    rooms, areas = effects.zones_of(building), effects.areas_of(building, table)
     readings = effects.Readings(run, rooms, areas, 3600.0 / spec.steps_per_hour)
     effects.apply_faults(readings, held)
     frame = telemetry(spec, readings, run)
     devices = tuple(Device(name=i.device, type=i.kind, zone=entity(i.zone)) for i in inlets(building))
     place = read_epw(weather_path(spec.weather)).location
-    drawn = Building(spec.name, place, 0.0, table, devices, geometry_quality="surveyed")
+    passes = airflows(building) if spec.spaces == "zones" else ()
+    drawn = Building(spec.name, place, 0.0, table, devices, passes, geometry_quality="surveyed")
     stamped = frame.tz_localize(place.timezone).rename_axis("timestamp")
     told = {"seconds": round(time.perf_counter() - began, 1), **account}
     _seal(label, spec.label(held, told))
@@ -99,15 +100,16 @@ def check(spec: Spec, run: plant.Run, held: tuple[Effect, ...]) -> dict[str, Any
     TrialError
         Metered heat is off, the account does not close, or what is switched off is there.
     """
-    table = {z.name: z.floor_area for z in plant.geometry(spec.building).zones}
-    rooms = {i.device: i.zone for i in inlets(source(spec.building))}
+    building = source(spec.building)
+    areas = effects.areas_of(building, plant.geometry(spec.building, spec.spaces))
+    rooms = {i.device: i.zone for i in inlets(building)}
     inside = run.temperature[list(rooms.values())].to_numpy()
     by_device = run.flow * plant.AIR_HEAT_CAPACITY * (run.discharge - inside)
     metered = by_device.T.groupby(rooms).sum().T
     delivered = run.balance["delivered"]
     deviation = {}
     for zone in metered:
-        scale = max(float(delivered[zone].abs().mean()), LEAST_HEAT * table[entity(zone)])
+        scale = max(float(delivered[zone].abs().mean()), LEAST_HEAT * areas[entity(zone)])
         deviation[zone] = float((metered[zone] - delivered[zone]).abs().mean()) / scale
     worst = max(deviation, key=lambda z: deviation[z])
     if not deviation[worst] <= HEAT_TOLERANCE:
@@ -137,7 +139,9 @@ def telemetry(spec: Spec, readings: effects.Readings, run: plant.Run) -> pd.Data
         For the set points.
     """
     rng, sensors, n = generator(spec, NOISE), spec.sensors, len(readings.station)
-    columns = {f"weather_station/{p}": values.to_numpy() for p, values in effects.station_values(readings.station).items()}
+    columns = {
+        f"weather_station/{p}": values.to_numpy() for p, values in effects.station_values(readings.station).items()
+    }
     outdoor = "weather_station/outside_air_temperature_sensor"
     columns[outdoor] = columns[outdoor] + rng.normal(0.0, sensors.outdoor_noise, n)
     for zone in readings.temperature:

@@ -103,9 +103,7 @@ def _outer_layers(content: Content, strength: float) -> None:
     """Give constructions that look outdoors an outer layer that absorbs that share of what it does."""
     constructions = content["Construction"]
     names = {name.lower(): name for name in constructions}
-    layers = {
-        name.lower(): (kind, name) for kind in ("Material", "Material:NoMass") for name in content.get(kind, {})
-    }
+    layers = {name.lower(): (kind, name) for kind in ("Material", "Material:NoMass") for name in content.get(kind, {})}
     for surface in _surfaces(content):
         if surface["outside_boundary_condition"] != "Outdoors":
             continue
