@@ -14,6 +14,10 @@ from reference_trials.specification import Effect
 EXTERIOR_FILM = 15.0
 #: What takes the place of a solar absorptance, and of a solar heat gain coefficient, that is to be none [-].
 NO_ABSORPTANCE, NO_TRANSMITTANCE = 0.001, 0.01
+#: Between slab and ground where they are to exchange no heat [m2K/W]: 10 K drive 0.1 W/m2.
+INSULATION = 100.0
+#: The concrete that EnergyPlus gives a slab which is described by its perimeter's loss (Engineering Reference).
+_SLAB = {"roughness": "MediumRough", "thickness": 0.15, "conductivity": 1.95, "density": 2240.0, "specific_heat": 900.0}
 
 _GAINS = {
     "People": "number_of_people_schedule_name",
@@ -174,11 +178,37 @@ def _scale(fields: dict[str, Any], names: tuple[str, ...], factor: float) -> Non
             fields[name] *= factor
 
 
+def _layers(construction: Mapping[str, str]) -> list[str]:
+    """List the layers of a construction from outside to inside."""
+    inner = sorted((k for k in construction if k.startswith("layer_")), key=lambda k: int(k.removeprefix("layer_")))
+    return [construction["outside_layer"], *(construction[k] for k in inner)]
+
+
 def _no_ground(content: Content) -> None:
+    """Put insulation that lets nothing through between slab and ground.
+
+    EnergyPlus' own adiabatic surfaces have the room on both sides, so that half of their mass would be missing. Of a
+    slab that is described by the loss at its perimeter, EnergyPlus' concrete remains.
+    """
+    materials, constructions = content.setdefault("Material:NoMass", {}), content["Construction"]
+    materials["trial insulation"] = {"roughness": "Rough", "thermal_resistance": INSULATION}
+    slabs = {name.lower() for name in content.pop("Construction:FfactorGroundFloor", {})}
+    if slabs:
+        content.setdefault("Material", {})["trial slab"] = dict(_SLAB)
+    names = {name.lower(): name for name in constructions}
     for surface in _surfaces(content):
-        if surface["outside_boundary_condition"].startswith("Ground"):
-            surface["outside_boundary_condition"] = "Adiabatic"
-            surface.pop("outside_boundary_condition_object", None)
+        own = surface["construction_name"].lower()
+        if not surface["outside_boundary_condition"].startswith("Ground"):
+            if own in slabs:  # a floor without a perimeter, which EnergyPlus has as adiabatic
+                constructions["trial slab inside"] = {"outside_layer": "trial slab"}
+                surface["construction_name"] = "trial slab inside"
+            continue
+        surface["outside_boundary_condition"] = "Ground"
+        surface.pop("outside_boundary_condition_object", None)
+        made = f"{own} insulated"
+        layers = ["trial slab"] if own in slabs else _layers(constructions[names[own]])
+        constructions[made] = {"outside_layer": "trial insulation"} | {f"layer_{k}": v for k, v in enumerate(layers, 2)}
+        surface["construction_name"] = made
 
 
 #: What the building has, off and on.

@@ -34,7 +34,7 @@ def small() -> InputFile:
     content: dict[str, dict[str, dict[str, Any]]] = {
         "Zone": {"room": {}},
         "BuildingSurface:Detailed": {"wall": wall, "floor": floor},
-        "Construction": {"outer": {"outside_layer": "Brick"}, "slab": {"outside_layer": "brick"}},
+        "Construction": {"outer": {"outside_layer": "Brick"}, "slab": {"layer_2": "carpet", "outside_layer": "brick"}},
         "Material": {"brick": {"solar_absorptance": 0.6}},
         "WindowMaterial:SimpleGlazingSystem": {"glass": {"u_factor": 2.0, "solar_heat_gain_coefficient": 0.4}},
         "People": {"some": {"number_of_people_schedule_name": "day", "floor_area_per_person": 10.0}},
@@ -76,7 +76,10 @@ def test_a_label_has_what_scoring_reads(trials, script):
 def test_a_null_has_nothing_that_the_baseline_leaves_out(trials, small):
     null = trials("variant").variant(small, ())
     wall, floor = (null["BuildingSurface:Detailed"][name] for name in ("wall", "floor"))
-    assert wall["sun_exposure"] == "NoSun" and floor["outside_boundary_condition"] == "Adiabatic"
+    assert wall["sun_exposure"] == "NoSun"
+    assert null["Construction"][floor["construction_name"]] == {
+        "outside_layer": "trial insulation", "layer_2": "brick", "layer_3": "carpet"
+    }  # fmt: skip
     only_design = trials("variant").DESIGN_ONLY
     assert null["People"]["some"]["number_of_people_schedule_name"] == only_design
     assert null["Lights"]["some"]["schedule_name"] == only_design
@@ -94,7 +97,7 @@ def test_an_effect_is_the_buildings_own_times_its_strength(trials, small):
         "schedule_name": "day", "air_changes_per_hour": 0.75
     }  # fmt: skip
     grounded = variant(small, (effect("ground_exchange", 1.0),))
-    assert grounded["BuildingSurface:Detailed"]["floor"]["outside_boundary_condition"] == "Ground"
+    assert grounded["BuildingSurface:Detailed"]["floor"]["construction_name"] == "slab"
 
 
 @pytest.mark.parametrize(("name", "glass", "wall"), [("solar_gain", 0.2, 0.001), ("solar_opaque", 0.01, 0.3)])
@@ -105,7 +108,7 @@ def test_the_sun_goes_where_the_effect_is(trials, small, name, glass, wall):
     layer = made["Construction"][surface["construction_name"]]["outside_layer"]
     assert made["Material"][layer]["solar_absorptance"] == wall and surface["sun_exposure"] == "SunExposed"
     assert made["Material"]["brick"]["solar_absorptance"] == 0.6  # what looks inside keeps its own
-    assert made["BuildingSurface:Detailed"]["floor"]["construction_name"] == "slab"
+    assert made["BuildingSurface:Detailed"]["floor"]["construction_name"] == "slab insulated"
 
 
 def test_faults_change_what_is_reported_by_what_the_label_says(trials):
