@@ -45,6 +45,31 @@ def small() -> InputFile:
     return InputFile(content, "small")
 
 
+def test_air_is_metered_where_it_enters_and_followed_into_a_plenum(trials):
+    content: dict[str, dict[str, dict[str, Any]]] = {
+        "Zone": {"Room": {}, "plenum": {}},
+        "NodeList": {"room inlets": {"nodes": [{"node_name": "box out"}, {"node_name": "coil out"}]}},
+        "ZoneHVAC:EquipmentConnections": {"1": {
+            "zone_name": "ROOM", "zone_air_inlet_node_or_nodelist_name": "room inlets",
+            "zone_return_air_node_or_nodelist_name": "room return",
+        }},
+        "AirTerminal:SingleDuct:VAV:Reheat": {"box": {"air_outlet_node_name": "BOX OUT"}},
+        "ZoneHVAC:FourPipeFanCoil": {"coil": {"air_outlet_node_name": "coil out"}},
+        "AirLoopHVAC:ReturnPlenum": {"p": {"zone_name": "plenum", "nodes": [{"inlet_node_name": "Room return"}]}},
+    }  # fmt: skip
+    buildings, building = trials("buildings"), InputFile(content, "made up")
+    assert [(i.device, i.kind, i.node) for i in buildings.inlets(building)] == [
+        ("VAV_Room", "vav", "box out"), ("FCU_Room", "fan_coil", "coil out")
+    ]  # fmt: skip
+    assert buildings.served(building) == ("Room",)
+    assert [(a.source, a.target, a.device, a.fraction) for a in buildings.airflows(building)] == [
+        ("Room", "plenum", "VAV_Room", 1.0), ("Room", "plenum", "FCU_Room", 1.0)
+    ]  # fmt: skip
+    del content["ZoneHVAC:FourPipeFanCoil"]
+    with pytest.raises(trials("errors").TrialError, match="expected a device whose air enters Room at 'coil out'"):
+        buildings.inlets(building)
+
+
 def test_building_weather_and_sensors_depend_on_the_seed_alone(trials):
     draw = trials("specification").draw_spec
     for seed in range(16):

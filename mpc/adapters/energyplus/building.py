@@ -228,7 +228,8 @@ def _surface(
         behind = zones[faces[face.behind].zone].name
         other = entity(behind)
         if other == own:  # its own back, or the same storey again: nothing leaves there
-            # The table lets both faces look at the zone, of which EnergyPlus counts one.
+            # The table lets both faces look at the zone; EnergyPlus' area is all that does (its Input Output Reference,
+            # `InternalMass`).
             kind, area = "wall", area / 2.0
         elif behind in served and face.behind < face.number:
             return None
