@@ -90,12 +90,12 @@ def _surfaces(content: Content) -> list[dict[str, Any]]:
 
 
 def _sun(content: Content, held: Mapping[str, Effect]) -> None:
-    """Let the sun through glass, on walls, on both, or on nothing."""
+    """Let the sun through glass, on walls, on both, or on next to nothing.
+
+    Surfaces stay exposed: EnergyPlus 25.2 computes windows of walls without sun with numbers left from elsewhere, so
+    that heat comes and goes with the outputs that are asked for.
+    """
     glass, walls = held.get("solar_gain"), held.get("solar_opaque")
-    if glass is None and walls is None:  # windows take their exposure from the wall that they are in
-        for surface in _surfaces(content):
-            surface["sun_exposure"] = "NoSun"
-        return
     for pane in content.get("WindowMaterial:SimpleGlazingSystem", {}).values():
         share = pane["solar_heat_gain_coefficient"]
         pane["solar_heat_gain_coefficient"] = NO_TRANSMITTANCE if glass is None else min(share * glass.strength, 0.85)

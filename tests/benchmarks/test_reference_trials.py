@@ -101,7 +101,9 @@ def test_a_label_has_what_scoring_reads(trials, script):
 def test_a_null_has_nothing_that_the_baseline_leaves_out(trials, small):
     null = trials("variant").variant(small, ())
     wall, floor = (null["BuildingSurface:Detailed"][name] for name in ("wall", "floor"))
-    assert wall["sun_exposure"] == "NoSun"
+    assert null["WindowMaterial:SimpleGlazingSystem"]["glass"]["solar_heat_gain_coefficient"] == 0.01
+    outer = null["Construction"][wall["construction_name"]]["outside_layer"]
+    assert null["Material"][outer]["solar_absorptance"] == 0.001
     assert null["Construction"][floor["construction_name"]] == {
         "outside_layer": "trial insulation", "layer_2": "brick", "layer_3": "carpet"
     }  # fmt: skip
@@ -161,6 +163,24 @@ def test_faults_change_what_is_reported_by_what_the_label_says(trials):
     ducted = read("duct_loss", ntu=np.log(2.0)).discharge["VAV_a"]  # the void is at 16 degC
     np.testing.assert_allclose(ducted, [20.0, 64.0, 64.0, 64.0])
     np.testing.assert_allclose(read("clock_shift", (), steps=1).station["wind_speed_sensor"], [1.0, 1.0, 2.0, 3.0])
+
+
+@pytest.mark.energyplus
+@needs_energyplus
+def test_what_is_asked_for_changes_nothing(trials, monkeypatch):
+    """Windows without sun made heat come and go with the outputs that were asked for."""
+    spec = trials("specification").replace(
+        trials("specification").draw_spec(5, "null", days=2),
+        steps_per_hour=4,
+        weather=trials("specification").WEATHER[0],
+    )
+    plant, building = trials("plant"), trials("buildings").source("restaurant")
+    content = trials("variant").variant(building, ())
+    whole = plant.simulate(spec, content)
+    monkeypatch.setattr(plant, "BALANCE", {"delivered": plant.BALANCE["delivered"]})
+    fewer = plant.simulate(spec, content)
+    pd.testing.assert_frame_equal(whole.balance["delivered"], fewer.balance["delivered"], rtol=1e-6)
+    pd.testing.assert_frame_equal(whole.temperature, fewer.temperature, rtol=1e-9)
 
 
 @pytest.mark.energyplus
