@@ -16,7 +16,7 @@ import numpy as np
 from _code import code
 from _table import markdown, publish, write
 from _trial_scores import LEAST_GAP, Trial, gap_of, score, trial_of
-from energyplus_trials.drawing import draw_spec, without
+from energyplus_trials.drawing import draw_spec, twins_of
 
 NAME = "blind_trials"
 CASES, SEALED, ANSWERS, GAPS = "cases", "sealed", "answers", "gaps"
@@ -155,10 +155,11 @@ def read_trials(out: Path) -> list[Trial]:
 
 def _twins(label: Mapping[str, Any]) -> list[str]:
     """Names of the trials of the same seed without each of a trial's effects."""
+    if "twins" in label:
+        return list(label["twins"])
+    # offices made before labels named them
     spec = draw_spec(label["seed"], label["kind"], confirmation=bool(label["stream"]), days=label["days"])
-    if len(spec.effects) > 1:
-        return [twin.name for twin in without(spec)]
-    return [spec.twin().name for _ in spec.effects]
+    return [twin.name for twin in twins_of(spec)]
 
 
 def report(out: Path, published: bool) -> str:
@@ -201,6 +202,9 @@ def report(out: Path, published: bool) -> str:
     page = f"{short}\n{detail}"
     plain = {**scored, "rates": {name: r.to_dict() for name, r in scored["rates"].items()}}
     write(out, NAME, page, plain, published=False)
+    worlds = {t.world for t in trials}
+    if published and worlds != {"office"}:
+        raise SystemExit(f"{out}: expected offices, found trials of {', '.join(sorted(worlds))}; publish with `worlds`")
     if published and len(_kinds(trials)) > 1:
         publish(NAME, short)
         publish(f"{NAME}_detail", detail)

@@ -82,6 +82,10 @@ class Trial:
         Whether its seed is one that nothing is tuned on.
     numbers : mapping
         Of the first effect, as its generator has them.
+    world : str
+        Which maker's buildings it is of.
+    building : str
+        What kind of building it is, as its maker calls it.
     """
 
     name: str
@@ -95,6 +99,8 @@ class Trial:
     answer: Mapping[str, Any]
     confirmation: bool = False
     numbers: Mapping[str, Any] = field(default_factory=dict)
+    world: str = "office"
+    building: str = ""
 
     @property
     def shown(self) -> tuple[frozenset[str], ...]:
@@ -211,6 +217,8 @@ def trial_of(name: str, label: Mapping[str, Any], answer: Mapping[str, Any], twi
         answer,
         bool(label["stream"]),
         dict(effects[0].get("parameters", {})) if effects else {},
+        label.get("world", "office"),
+        label.get("building", ""),
     )
 
 

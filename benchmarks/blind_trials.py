@@ -1,5 +1,7 @@
-"""Blind trials of the diagnosis: offices in EnergyPlus with effects switched on one by one, in pairs, or not at all.
+"""Blind trials of the diagnosis: buildings with effects switched on one by one, in pairs, or not at all.
 
+There are several worlds of buildings, made by packages that share no code for the building: `office`, offices drawn
+from a seed in EnergyPlus (`energyplus_trials`), and `reference`, EnergyPlus' reference buildings (`reference_trials`).
 `make` draws trials from seeds and makes them. What the diagnosis may see goes to `DIR/cases/NAME`, what a trial truly
 holds to `DIR/sealed/NAME.json`; names tell nothing. Seeds of development and of confirmation are streams of their own,
 so that no trial of one is ever in the other; trials of one seed share building, weather, use and noise, so that the
@@ -16,6 +18,8 @@ Run from the repository's root, in an environment with Python 3.11 or newer::
     python benchmarks/blind_trials.py diagnose --out results/blind
     python benchmarks/blind_trials.py score --out results/blind
     python benchmarks/blind_trials.py levels --out results/blind    # null levels, from development seeds only
+    python benchmarks/blind_trials.py make --world reference --out results/reference --kind all --seeds 0-9
+    python benchmarks/blind_trials.py worlds --out results/blind results/reference    # one table of several worlds
 
 `diagnose` answers each trial in a process of its own, which gets the case folder and nothing else; `score` opens the
 seals of what is answered. Pairs less one effect are needed for their gap only, which `gaps` measures in a tenth of the
@@ -29,15 +33,14 @@ from __future__ import annotations
 import argparse
 import os
 import time
+from collections.abc import Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, as_completed
 from pathlib import Path
 
 from _null_levels import make_levels
 from _trial_answers import CASES, SEALED, answer_all, measure_gaps, report
-from energyplus_trials.drawing import DAYS, draw_spec, without
-from energyplus_trials.errors import EnergyPlusMissingError, TrialError
-from energyplus_trials.specification import KINDS, TrialSpec
-from energyplus_trials.trial import make_trial
+from _trial_worlds import report_worlds
+from _worlds import PACKAGES, Drawn, World, world
 
 
 def seed_range(text: str) -> range:
@@ -58,24 +61,26 @@ def seed_range(text: str) -> range:
     return found
 
 
-def make(specs: list[TrialSpec], out: Path, workers: int) -> list[str]:
+def make(maker: World, specs: Sequence[Drawn], out: Path, workers: int) -> list[str]:
     """Make trials that are not there yet and return the names of those that failed.
 
-    Each runs EnergyPlus in a process of its own; the threads only wait for them.
+    Simulators run in processes of their own; the threads only wait for them.
 
     Parameters
     ----------
-    specs : list of TrialSpec
+    maker : World
+        Makes them.
+    specs : sequence of Drawn
         What to make.
     out : Path
         Folder of cases and sealed labels.
     workers : int
-        EnergyPlus runs at a time.
+        Runs at a time.
     """
     failed = []
     with ThreadPoolExecutor(workers) as pool:
-        tasks: dict[Future[bool], TrialSpec] = {
-            pool.submit(make_trial, spec, out / CASES, out / SEALED): spec for spec in specs
+        tasks: dict[Future[bool], Drawn] = {
+            pool.submit(maker.make, spec, out / CASES, out / SEALED): spec for spec in specs
         }
         began = time.perf_counter()
         try:
@@ -83,9 +88,9 @@ def make(specs: list[TrialSpec], out: Path, workers: int) -> list[str]:
                 spec, outcome = tasks[task], "there already"
                 try:
                     outcome = "made" if task.result() else outcome
-                except EnergyPlusMissingError as error:
+                except maker.MISSING as error:
                     raise SystemExit(str(error)) from error
-                except TrialError as error:  # the others are worth having
+                except maker.FAILED as error:  # the others are worth having
                     failed.append(spec.name)
                     outcome = f"FAILED: {error}"
                 seconds = time.perf_counter() - began
@@ -97,15 +102,21 @@ def make(specs: list[TrialSpec], out: Path, workers: int) -> list[str]:
 
 
 def _make(options: argparse.Namespace) -> int:
-    kinds = {"all": KINDS, "without": ("pair",)}.get(options.kind, (options.kind,))
+    maker = world(options.world)
+    kinds = tuple(k for k in maker.KINDS if k != "without") if options.kind == "all" else (options.kind,)
+    if not set(kinds) <= set(maker.KINDS):
+        raise SystemExit(f"--kind: expected one of {', '.join(maker.KINDS)} of the world {options.world!r}, "
+                         f"found {options.kind!r}")  # fmt: skip
+    if options.uneven and options.world != "office":
+        raise SystemExit(f"--uneven: expected the world 'office', found {options.world!r}; leave it out")
+    more = {"uneven": True} if options.uneven else {}
     specs = [
-        draw_spec(seed, kind, confirmation=options.confirmation, days=options.days, uneven=options.uneven)
+        spec
         for seed in options.seeds
         for kind in kinds
+        for spec in maker.draw(seed, kind, confirmation=options.confirmation, days=options.days or maker.DAYS, **more)
     ]
-    if options.kind == "without":
-        specs = [twin for spec in specs for twin in without(spec)]
-    return 1 if make(specs, options.out, options.workers) else 0
+    return 1 if make(maker, specs, options.out, options.workers) else 0
 
 
 def main() -> int:
@@ -114,12 +125,13 @@ def main() -> int:
     commands = parser.add_subparsers(required=True)
     command = commands.add_parser("make", help="make trials and seal their labels")
     command.add_argument("--out", type=Path, required=True, help="folder of cases and sealed labels")
-    kinds = (*KINDS, "all", "without")
+    command.add_argument("--world", choices=sorted(PACKAGES), default="office", help="which buildings")
+    kinds = ("null", "single", "pair", "outside", "without", "all")
     command.add_argument("--kind", choices=kinds, required=True, help="which effects the trials hold")
     command.add_argument("--seeds", type=seed_range, required=True, help="first and last, such as 0-19")
     command.add_argument("--confirmation", action="store_true", help="the stream of seeds that nothing is tuned on")
-    command.add_argument("--uneven", action="store_true", help="films with the wind, furniture that differs by zone")
-    command.add_argument("--days", type=int, default=DAYS, help="length of the telemetry")
+    command.add_argument("--uneven", action="store_true", help="offices: films with the wind, uneven furniture")
+    command.add_argument("--days", type=int, help="length of the telemetry, the world's own where left out")
     command.add_argument("--workers", type=int, default=min(2, os.cpu_count() or 1), help="runs at a time")
     command.set_defaults(run=_make)
     command = commands.add_parser("diagnose", help="diagnose trials that have no answer yet, one process each")
@@ -136,6 +148,10 @@ def main() -> int:
     command.add_argument("--out", type=Path, required=True, help="folder of the trials")
     command.add_argument("--publish", action="store_true", help="replace the table between its marks")
     command.set_defaults(run=_score)
+    command = commands.add_parser("worlds", help="score answered trials of several folders by world")
+    command.add_argument("--out", type=Path, required=True, nargs="+", help="folders of the trials")
+    command.add_argument("--publish", action="store_true", help="replace the table between its marks")
+    command.set_defaults(run=_worlds)
     command = commands.add_parser("levels", help="write the levels of answered development nulls into the package")
     command.add_argument("--out", type=Path, required=True, help="folder of the trials")
     command.set_defaults(run=_levels)
@@ -150,6 +166,11 @@ def _levels(options: argparse.Namespace) -> int:
 
 def _score(options: argparse.Namespace) -> int:
     print(report(options.out, options.publish))
+    return 0
+
+
+def _worlds(options: argparse.Namespace) -> int:
+    print(report_worlds(options.out, options.publish))
     return 0
 
 

@@ -85,6 +85,17 @@ def without(spec: TrialSpec) -> tuple[TrialSpec, ...]:
     return tuple(replace(spec, kind="without", effects=tuple(effects)) for effects in left)
 
 
+def twins_of(spec: TrialSpec) -> tuple[TrialSpec, ...]:
+    """For each effect of a trial, the same trial without it.
+
+    Parameters
+    ----------
+    spec : TrialSpec
+        Of any kind.
+    """
+    return without(spec) if len(spec.effects) > 1 else tuple(spec.twin() for _ in spec.effects)
+
+
 def _layout(rng: np.random.Generator) -> Layout:
     zones = plan.draw_zones(rng)
     floors = min(int(rng.choice([1, 2, 3], p=[0.35, 0.4, 0.25])), _MOST_ZONES // len(zones))

@@ -15,6 +15,7 @@ import pandas as pd
 import yaml
 
 from energyplus_trials import climate, model, plan, readings
+from energyplus_trials.drawing import twins_of
 from energyplus_trials.errors import TrialGeometryError
 from energyplus_trials.specification import TrialSpec
 from thermal.case.load import load_case
@@ -101,7 +102,8 @@ def write_label(sealed: Path, spec: TrialSpec, run: Mapping[str, Any]) -> Path:
         What was measured while it was made.
     """
     sealed.mkdir(parents=True, exist_ok=True)
-    label = json.loads(spec.to_json()) | {"run": run}
+    twins = [twin.name for twin in twins_of(spec)]
+    label = json.loads(spec.to_json()) | {"world": "office", "twins": twins, "run": run}
     path = sealed / f"{spec.name}.json"
     part = path.with_suffix(".part")
     part.write_text(json.dumps(label, indent=1, default=_plain) + "\n", encoding="utf-8")

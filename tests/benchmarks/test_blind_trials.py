@@ -27,8 +27,8 @@ def trials(package: Callable[[str], ModuleType]) -> Callable[[str], ModuleType]:
 
 @pytest.fixture(scope="module")
 def command(trials, script: Callable[[str], ModuleType]) -> ModuleType:
-    trials("trial")
-    for name in ("_table", "_code", "_trial_scores", "_trial_answers", "_null_levels"):
+    trials("world")
+    for name in ("_table", "_code", "_trial_scores", "_trial_answers", "_trial_worlds", "_null_levels", "_worlds"):
         script(name)
     return script("blind_trials")
 
@@ -74,13 +74,17 @@ def test_the_label_holds_the_whole_truth(trials, small, tmp_path):
     assert path.name == f"{spec.name}.json" and label["name"] == spec.name
     assert label["effects"][0]["name"] == "sensor_bias"
     assert label["effects"][0]["parameters"]["bias_K"] == dict(spec.effects[0].parameters["bias_K"])
+    assert label["world"] == "office" and label["twins"] == [small.twin().name]
     assert label["layout"]["floors"] == 1 and label["run"] == {"seconds": 1.0}
 
 
 def test_only_trials_of_which_two_effects_show_are_asked_for(trials, script, command, tmp_path):
     """Three pairs: both effects leave a gap, one does, and one whose twin was not measured."""
     answers = script("_trial_answers")
-    specs = [trials("drawing").draw_spec(seed, "pair") for seed in range(3)]
+    office = command.world("office")
+    specs = [spec for seed in range(3) for spec in office.draw(seed, "pair")]
+    pairs_less_one = [spec for seed in range(3) for spec in office.draw(seed, "without")]
+    assert pairs_less_one == [twin for spec in specs for twin in trials("drawing").without(spec)]
     (tmp_path / "gaps").mkdir()
     for spec, least in zip(specs, (0.06, 0.04, None), strict=True):
         trials("folder").write_label(tmp_path / "sealed", spec, {})
@@ -99,7 +103,7 @@ def test_only_trials_of_which_two_effects_show_are_asked_for(trials, script, com
 @needs_energyplus
 def test_a_trial_is_a_case_that_tells_nothing(trials, command, small, tmp_path):
     spec = trials("draw_effects").with_effect(small, "internal_gains", np.random.default_rng(0), 1.0)
-    assert command.make([spec], tmp_path, 1) == []
+    assert command.make(command.world("office"), [spec], tmp_path, 1) == []
     folder: Path = tmp_path / "cases" / spec.name
     case = load_case(folder)
     assert set(case.building.zone_names) == set(spec.zone_names) and case.step == 300.0
