@@ -173,9 +173,9 @@ def _fabric(rng: np.random.Generator) -> Fabric:
 
 
 def _heating(rng: np.random.Generator, house: House) -> Heating:
-    emitter = str(rng.choice(["convector", "radiator", "floor"], p=[0.3, 0.5, 0.2]))
-    control = "on_off" if rng.random() < (0.7 if emitter == "convector" else 0.35) else "proportional"
-    radiant, lag = {"convector": (0.1, 120.0), "radiator": (0.3, 900.0), "floor": (0.3, 900.0)}[emitter]
+    emitter = str(rng.choice(["electric", "radiator", "floor"], p=[0.3, 0.5, 0.2]))
+    control = "on_off" if rng.random() < (0.7 if emitter == "electric" else 0.35) else "proportional"
+    radiant, lag = {"electric": (0.2, 600.0), "radiator": (0.3, 900.0), "floor": (0.3, 900.0)}[emitter]
     halls = [room.name for room in house.rooms if room.name in ("hall", "landing", "store", "utility")]
     bare = tuple(name for name in halls if rng.random() < 0.4)
     return Heating(

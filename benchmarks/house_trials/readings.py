@@ -125,7 +125,7 @@ def device(spec: HouseSpec, zone: str) -> str:
     """
     if zone == WHOLE:
         return "BOILER"
-    return f"{'HEATER' if spec.heating.emitter == 'convector' else 'CIRCUIT'}_{zone}"
+    return f"{'HEATER' if spec.heating.emitter == 'electric' else 'CIRCUIT'}_{zone}"
 
 
 def measured_places(spec: HouseSpec) -> tuple[str, ...]:

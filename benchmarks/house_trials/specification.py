@@ -114,11 +114,11 @@ class Heating:
     Parameters
     ----------
     emitter : str
-        `convector`, `radiator` or `floor`: heated floors in the lowest rooms, radiators in the others.
+        `electric`, `radiator` or `floor`: heated floors in the lowest rooms, radiators in the others.
     radiant : float
-        Share of the heat of convectors and radiators that surfaces get [-].
+        Share of the heat of electric heaters and radiators that surfaces get [-].
     lag : float
-        Time constant of convectors and radiators [s].
+        Time constant of electric heaters and radiators [s].
     control : str
         `on_off` or `proportional`. Heated floors are on or off.
     band : float
