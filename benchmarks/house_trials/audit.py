@@ -1,4 +1,4 @@
-"""What flows in a trial's house by EnergyPlus's own account: which terms there are, and that they balance room by room."""
+"""What flows in a trial's house by EnergyPlus's own account: which terms there are, and that rooms balance."""
 
 from __future__ import annotations
 
@@ -21,8 +21,14 @@ _AIR = {
     "sun_through_glass": "Enclosure Windows Total Transmitted Solar Radiation Rate",
 }
 _CONDUCTION = "Surface Inside Face Conduction Heat Transfer Rate"
-_WINDOW, _ON_WINDOW = "Surface Window Net Heat Transfer Rate", "Surface Inside Face Internal Gains Radiation Heat Gain Rate"
-_SUN, _FILM = "Surface Outside Face Solar Radiation Heat Gain Rate", "Surface Outside Face Convection Heat Transfer Coefficient"
+_WINDOW, _ON_WINDOW = (
+    "Surface Window Net Heat Transfer Rate",
+    "Surface Inside Face Internal Gains Radiation Heat Gain Rate",
+)
+_SUN, _FILM = (
+    "Surface Outside Face Solar Radiation Heat Gain Rate",
+    "Surface Outside Face Convection Heat Transfer Coefficient",
+)
 
 
 @dataclass(frozen=True)
@@ -37,8 +43,9 @@ class Audit:
     air : dict
         What is left of each room's air balance, as a share of the mean heat that is given to a heated room [-].
     house : float
-        What is left over the run of heat given, brought by air, stored in air, and conducted through or into everything that
-        rooms look at, as a share of the heat given [-]. What pipes give to a floor passes its inner face as conduction.
+        What is left over the run of heat given, brought by air, stored in air, and conducted through or into everything
+        that rooms look at, as a share of the heat given [-]. What pipes give a floor passes its inner
+        face as conduction.
     """
 
     terms: dict[str, float]
@@ -61,7 +68,11 @@ def audit(house: Plant) -> Audit:
     variables: list[Variable] = [("site", "sky", "Site Sky Temperature", "Environment")]
     variables += [(room, f"air {ours}", name, room) for room in rooms for ours, name in _AIR.items()]
     variables += [(name, "conduction", _CONDUCTION, name) for name in opaque]
-    panes = ((name, ours, full, name) for name in objects["Window"] for ours, full in (("window", _WINDOW), ("lit", _ON_WINDOW)))
+    panes = (
+        (name, ours, full, name)
+        for name in objects["Window"]
+        for ours, full in (("window", _WINDOW), ("lit", _ON_WINDOW))
+    )
     variables += panes
     variables += [(name, ours, full, name) for name in outer for ours, full in (("sun", _SUN), ("film", _FILM))]
     results = plant.simulate(house, variables)
@@ -78,7 +89,11 @@ def _account(house: Plant, results: plant.Results, first: int) -> Audit:
     scale = float(given.mean().mean())
     air = {name: of(f"air {name}") for name in _AIR}
     terms = {name: float(values.abs().mean().mean()) for name, values in air.items()}
-    terms |= {"heat": scale, "sun_on_walls": float(of("sun").abs().mean().mean()), "film": float(of("film").std().mean())}
+    terms |= {
+        "heat": scale,
+        "sun_on_walls": float(of("sun").abs().mean().mean()),
+        "film": float(of("film").std().mean()),
+    }
     terms["sky"] = float((rows["site", "outside_air_temperature_sensor"] - rows["site", "sky"]).abs().mean())
     left = sum((air[name] for name in ("gains", "surfaces", "rooms", "outdoor_air", "system")), -air["storage"])
     radiant = sum(
@@ -86,6 +101,11 @@ def _account(house: Plant, results: plant.Results, first: int) -> Audit:
         pd.Series(0.0, given.index),
     )
     brought = sum((air[name] for name in ("gains", "outdoor_air", "system")), -air["storage"]).sum(axis=1) + radiant
-    through = of("conduction").sum(axis=1) + (of("window") - of("lit")).sum(axis=1)  # a window's own account lacks the latter
+    # A window's own account lacks what heaters radiate to it.
+    through = of("conduction").sum(axis=1) + (of("window") - of("lit")).sum(axis=1)
     share = left.abs().mean() / scale
-    return Audit(terms, {str(k): float(v) for k, v in share.items()}, float(abs(np.mean(brought + through))) / (scale * given.shape[1]))
+    return Audit(
+        terms,
+        {str(k): float(v) for k, v in share.items()},
+        float(abs(np.mean(brought + through))) / (scale * given.shape[1]),
+    )

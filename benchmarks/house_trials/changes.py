@@ -25,7 +25,7 @@ def apply_changes(plant: Plant) -> None:
     plant : Plant
         The null; changed.
     """
-    for effect in plant.spec.effects:
+    for effect in (*plant.spec.known, *plant.spec.effects):
         change = _CHANGES.get(effect.name)
         if change is not None:
             change(plant, effect)
@@ -70,9 +70,10 @@ def _infiltration(plant: Plant, effect: Effect) -> None:
         flow = effect.parameters["changes_per_hour"] * spec.room(room).area * spec.house.height / 3600.0
         if effect.form == "stack":  # flow = leakage / 1000 * (C_s dT)^0.5, [cm2] and [m3/s]
             plant.add(
-                "ZoneInfiltration:EffectiveLeakageArea", f"{room} leak", zone_or_space_name=room, schedule_name=schedule,
-                effective_air_leakage_area=float(1000.0 * flow / np.sqrt(0.000145 * 15.0)), stack_coefficient=0.000145,
-                wind_coefficient=1e-9,
+                "ZoneInfiltration:EffectiveLeakageArea", f"{room} leak", zone_or_space_name=room,
+                schedule_name=schedule,
+                effective_air_leakage_area=float(1000.0 * flow / np.sqrt(0.000145 * 15.0)),
+                stack_coefficient=0.000145, wind_coefficient=1e-9,
             )  # fmt: skip
             continue
         plant.add(
@@ -88,7 +89,9 @@ def _internal_gains(plant: Plant, effect: Effect) -> None:
     spec, rng = plant.spec, np.random.default_rng(effect.parameters["seed"])
     who, hour = plant.people, np.asarray(plant.starts.hour + plant.starts.minute / 60.0)
     heat = {room: 0.4 * spec.room(room).area * rng.uniform(0.5, 1.5) * np.ones(hour.size) for room in spec.zone_names}
-    beds = [r for r in spec.zone_names if r in ("bedroom", "child", "nursery", "loft", "study")] or [spec.zone_names[-1]]
+    beds = [r for r in spec.zone_names if r in ("bedroom", "child", "nursery", "loft", "study")] or [
+        spec.zone_names[-1]
+    ]
     cook, sit = ("kitchen" if "kitchen" in heat else spec.zone_names[0]), spec.zone_names[0]
     for bed in beds:
         heat[bed] += 70.0 * who.home * (1.0 - who.awake) / len(beds)
@@ -209,7 +212,7 @@ def _open_area(plant: Plant, room: str, name: str, area: float, schedule: str, h
 
 
 def _stove(plant: Plant, effect: Effect) -> None:
-    """A fire on some evenings, which cools down over an hour."""
+    """Light a fire on some evenings, which cools down over an hour."""
     rng = np.random.default_rng(effect.parameters["seed"])
     fire = people.now_and_then(rng, len(plant.station), 0.5, (1.5, 4.0), 18.0)
     kept, heat = np.exp(-1.0 / people.STEPS_PER_HOUR), np.zeros(fire.size)

@@ -41,6 +41,24 @@ def draw_effects(null: HouseSpec, kind: Kind, rng: np.random.Generator) -> House
     return spec
 
 
+def known_effects(null: HouseSpec, rng: np.random.Generator) -> tuple[Effect, ...]:
+    """Return what every house that people live in has: sun through glass, and leakage at a constant rate.
+
+    Parameters
+    ----------
+    null : HouseSpec
+        The house.
+    rng : Generator
+        Random numbers of this purpose.
+    """
+    strengths = np.exp(rng.uniform(*np.log(STRENGTHS), 2)).round(3)
+    sun, leakage = (
+        CATALOGUE["solar_gain"](null, rng, float(strengths[0])),
+        _infiltration("constant")(null, rng, float(strengths[1])),
+    )
+    return sun, leakage
+
+
 def with_effect(spec: HouseSpec, name: str, rng: np.random.Generator, strength: float | None = None) -> HouseSpec:
     """Return the trial with one effect more.
 
@@ -71,6 +89,8 @@ def possible(spec: HouseSpec, name: str) -> bool:
     name : str
         Of the effect.
     """
+    if spec.has(name) or (name == "infiltration_by_direction" and spec.has("infiltration")):
+        return False  # the diagnosis knows of it
     if name == "ground_exchange":
         return spec.house.bottom == "ground"
     if name == "neighbour":
@@ -142,7 +162,7 @@ def _whole(name: str, form: str, answers: tuple[str, ...] = (), most: float = np
 
 
 def _in_rooms(name: str, form: str, answers: tuple[str, ...], rooms: tuple[str, ...], **typical: float) -> Draw:
-    """Return the draw of an effect that sits in certain rooms, such as a bath; in the first room where there is none."""
+    """Return the draw of an effect that sits in a certain room, such as a bath, or in the first one."""
 
     def draw(spec: HouseSpec, rng: np.random.Generator, s: float) -> Effect:
         there = tuple(name for name in spec.zone_names if name in rooms) or spec.zone_names[:1]
@@ -206,7 +226,9 @@ def _gain(*forms: str) -> Draw:
 
 def _limit(spec: HouseSpec, rng: np.random.Generator, s: float) -> Effect:
     rooms = _some(rng, heated(spec), 2)
-    return Effect("capacity_limit", "heater", s, rooms, {"lost_share": round(min(0.4 * s, 0.7), 3)}, ("capacity_limit",))
+    return Effect(
+        "capacity_limit", "heater", s, rooms, {"lost_share": round(min(0.4 * s, 0.7), 3)}, ("capacity_limit",)
+    )
 
 
 def _clock(spec: HouseSpec, rng: np.random.Generator, s: float) -> Effect:

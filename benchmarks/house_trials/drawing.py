@@ -17,7 +17,7 @@ from energyplus_trials.specification import (
     stream_generator,
 )
 
-from house_trials.draw_effects import draw_effects
+from house_trials.draw_effects import draw_effects, known_effects
 from house_trials.specification import SIDES, Fabric, Heating, House, HouseSpec, Room, Sensors
 
 DAYS = 21
@@ -36,7 +36,9 @@ _LEAST_SIDE = 2.0  # [m]
 _GRID = 0.1  # [m]
 
 
-def draw_spec(seed: int, kind: Kind, *, confirmation: bool = False, days: int = DAYS) -> HouseSpec:
+def draw_spec(
+    seed: int, kind: Kind, *, confirmation: bool = False, days: int = DAYS, lived_in: bool = False
+) -> HouseSpec:
     """Draw a trial.
 
     All but the effects is drawn from stream and seed alone, so that the null of a seed is the twin of its other trials.
@@ -51,6 +53,8 @@ def draw_spec(seed: int, kind: Kind, *, confirmation: bool = False, days: int = 
         Draw from the stream that nothing is tuned on.
     days : int
         Length of the telemetry.
+    lived_in : bool
+        Let sun through the windows and air through the cracks, and tell the diagnosis of the two.
 
     Raises
     ------
@@ -81,6 +85,8 @@ def draw_spec(seed: int, kind: Kind, *, confirmation: bool = False, days: int = 
         people=int(rng(_PEOPLE).integers(2**31)),
         effects=(),
     )
+    if lived_in:
+        null = replace(null, known=known_effects(null, rng(_EFFECTS, len(KINDS))))
     return draw_effects(null, kind, rng(_EFFECTS, KINDS.index(kind)))
 
 
@@ -130,7 +136,11 @@ def _cut(rng: np.random.Generator, width: float, depth: float, count: int) -> li
         w, e, s, n = parts.pop(int(np.argmax([(p[1] - p[0]) * (p[3] - p[2]) for p in parts])))
         low, high = (w, e) if e - w >= n - s else (s, n)
         least = min(_LEAST_SIDE, 0.4 * (high - low))
-        at = round(round(float(np.clip(low + rng.uniform(0.32, 0.68) * (high - low), low + least, high - least)) / _GRID) * _GRID, 1)
+        at = round(
+            round(float(np.clip(low + rng.uniform(0.32, 0.68) * (high - low), low + least, high - least)) / _GRID)
+            * _GRID,
+            1,
+        )
         parts += [(w, at, s, n), (at, e, s, n)] if e - w >= n - s else [(w, e, s, at), (w, e, at, n)]
     return parts
 
@@ -138,7 +148,10 @@ def _cut(rng: np.random.Generator, width: float, depth: float, count: int) -> li
 def _doorway(rng: np.random.Generator, rooms: list[Room]) -> tuple[str, ...]:
     """Two rooms of the lowest floor between which there is no door."""
     pairs = [
-        (a.name, b.name) for k, a in enumerate(rooms) for b in rooms[k + 1 :] if a.floor == b.floor == 0 and _beside(a, b)
+        (a.name, b.name)
+        for k, a in enumerate(rooms)
+        for b in rooms[k + 1 :]
+        if a.floor == b.floor == 0 and _beside(a, b)
     ]
     return pairs[int(rng.integers(len(pairs)))] if pairs and rng.random() < 0.5 else ()
 
@@ -224,5 +237,3 @@ def _climate(rng: np.random.Generator, days: int) -> Climate:
         warmer=round(float(rng.uniform(-3.0, 9.0) - usual), 2),
         swing=round(float(rng.uniform(0.85, 1.15)), 3),
     )
-
-

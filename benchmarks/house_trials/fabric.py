@@ -7,7 +7,7 @@ from typing import Any
 from house_trials.faces import Face
 from house_trials.specification import Fabric
 
-# Conductivity [W/m/K], density [kg/m3], heat capacity [J/kg/K]: design values of ISO 10456 and makers' of aerated blocks.
+# Conductivity [W/m/K], density [kg/m3], heat capacity [J/kg/K]: design values, ISO 10456.
 MATERIALS = {
     "plaster": (0.57, 1300.0, 1000.0),
     "gypsum board": (0.25, 900.0, 1000.0),

@@ -134,7 +134,12 @@ def _outside(house: House, room: Room) -> Iterator[Face]:
     west, east = min(r.west for r in house.rooms), max(r.east for r in house.rooms)
     south, north = min(r.south for r in house.rooms), max(r.north for r in house.rooms)
     low = bottom(house, room.floor)
-    outer = {"west": room.west == west, "east": room.east == east, "south": room.south == south, "north": room.north == north}
+    outer = {
+        "west": room.west == west,
+        "east": room.east == east,
+        "south": room.south == south,
+        "north": room.north == north,
+    }
     for side in SIDES:
         if outer[side]:
             start, end = _edges(room)[side]
@@ -156,7 +161,7 @@ def _flat(room: Room, z: float, *, up: bool) -> tuple[Point, ...]:
 
 
 def _partition(house: House, a: Room, b: Room) -> Iterator[Face]:
-    """The wall between two rooms of one floor that share a side."""
+    """Yield the wall between two rooms of one floor, as each of them sees it."""
     if a.floor != b.floor:
         return
     low, opposite = bottom(house, a.floor), {"east": "west", "west": "east", "north": "south", "south": "north"}
@@ -164,7 +169,10 @@ def _partition(house: House, a: Room, b: Room) -> Iterator[Face]:
         if getattr(a, side) != getattr(b, other):
             continue
         across = ("south", "north") if side in ("east", "west") else ("west", "east")
-        start, end = max(getattr(a, across[0]), getattr(b, across[0])), min(getattr(a, across[1]), getattr(b, across[1]))
+        start, end = (
+            max(getattr(a, across[0]), getattr(b, across[0])),
+            min(getattr(a, across[1]), getattr(b, across[1])),
+        )
         if end - start < _LEAST:
             continue
         line = getattr(a, side)
@@ -176,9 +184,11 @@ def _partition(house: House, a: Room, b: Room) -> Iterator[Face]:
 
 
 def _between_floors(house: House, a: Room, b: Room) -> Iterator[Face]:
-    """What two rooms share that lie one above the other."""
+    """Yield what two rooms share that lie one above the other."""
     lower, upper = sorted((a, b), key=lambda room: room.floor)
-    shared = Room("", lower.floor, max(a.west, b.west), min(a.east, b.east), max(a.south, b.south), min(a.north, b.north))
+    shared = Room(
+        "", lower.floor, max(a.west, b.west), min(a.east, b.east), max(a.south, b.south), min(a.north, b.north)
+    )
     if upper.floor - lower.floor != 1 or min(shared.east - shared.west, shared.north - shared.south) < _LEAST:
         return
     low, high = bottom(house, upper.floor) - STRUCTURE, bottom(house, upper.floor)

@@ -56,7 +56,9 @@ def building(spec: HouseSpec) -> dict[str, Any]:
     place = spec.climate
     zones = (WHOLE,) if spec.heating.meter == "house" else heated(spec)
     kind = "electric_heater" if spec.heating.emitter == "electric" else "radiator"
-    units = readings.UNITS if spec.sensors.counted else {k: v for k, v in readings.UNITS.items() if "occupancy" not in k}
+    units = (
+        readings.UNITS if spec.sensors.counted else {k: v for k, v in readings.UNITS.items() if "occupancy" not in k}
+    )
     content = {
         "format": 3,
         "name": spec.name,

@@ -16,9 +16,9 @@ DARK = 0.001  # [-], solar absorptance of a surface that the sun does not warm; 
 _INSIDE = 0.6  # [-], solar absorptance of surfaces inside
 _COLD_DAY = 31.0  # [K] between rooms and outdoors, that heaters are sized for
 _AIR_CHANGE = 0.4  # [1/h], by which a designer sizes them
-_FILES = ("mtr", "eso", "eio", "tabular", "sqlite", "json", "audit", "zone_sizing", "system_sizing", "dxf", "bnd", "rdd",
-          "mdd", "mtd", "shd", "dfs", "glhe", "delightin", "delighteldmp", "delightdfdmp", "edd", "dbg", "perflog", "sln",
-          "sci", "wrl", "screen", "tarcog", "extshd")  # fmt: skip
+_FILES = ("mtr", "eso", "eio", "tabular", "sqlite", "json", "audit", "zone_sizing", "system_sizing", "dxf", "bnd",
+          "rdd", "mdd", "mtd", "shd", "dfs", "glhe", "delightin", "delighteldmp", "delightdfdmp", "edd", "dbg",
+          "perflog", "sln", "sci", "wrl", "screen", "tarcog", "extshd")  # fmt: skip
 
 
 def null_model(spec: HouseSpec, first: pd.Timestamp, last: pd.Timestamp) -> Objects:
@@ -113,7 +113,7 @@ def heater_schedule(spec: HouseSpec, room: str) -> str:
 
 def _settings(spec: HouseSpec) -> Objects:
     # Surfaces see the air of the last step, and the air the surfaces of this one. Where air jumps by kelvins with every
-    # switch and films follow it (TARP), walls get a tenth more heat than the air gives; with constant films they get the same.
+    # switch and films follow it (TARP), walls get a tenth more heat than the air gives; with constant films the same.
     switched = spec.heating.control == "on_off" and any(not on_floor(spec, room) for room in heated(spec))
     return {
         "Building": {
@@ -163,7 +163,7 @@ def materials(spec: HouseSpec, outside: float, more: dict[str, fabric.Layers] | 
     """
     found = fabric.constructions(spec.fabric)
     reversed_ = {name: layers[::-1] for name, layers in found.items()}
-    # On the ground no heat passes: mirrored at the back, a floor is one half of something that is the same on both sides.
+    # On the ground no heat passes: mirrored at the back, a floor is one half of what is the same on both sides.
     reversed_["floor on ground"] = (*found["lowest floor"], *found["lowest floor"][::-1])
     reversed_["slab from above"] = found["slab"]
     reversed_ |= {name: layers[::-1] for name, layers in (more or {}).items()}
@@ -243,7 +243,7 @@ def polygon(points: tuple[Point, ...]) -> dict[str, Any]:
 
 
 def _surface(spec: HouseSpec, face: Face) -> dict[str, Any]:
-    """What is behind a surface decides on its construction and boundary."""
+    """Return a surface, whose construction and boundary follow from what is behind it."""
     name, outdoor = fabric.construction_of(face), face.other == "outdoor"
     boundary: dict[str, Any] = {"outside_boundary_condition": "Outdoors"}
     if face.other in spec.zone_names:

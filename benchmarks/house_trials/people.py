@@ -51,7 +51,7 @@ def household(spec: HouseSpec, starts: pd.DatetimeIndex) -> Household:
     rng = np.random.default_rng([spec.people, 0])
     count, days = int(rng.integers(1, 5)), len(starts) // (24 * STEPS_PER_HOUR)
     hour = np.asarray(starts.hour + starts.minute / 60.0).reshape(days, -1)
-    workday = np.asarray(starts.dayofweek < 5).reshape(days, -1)[:, 0]
+    workday = np.asarray(starts.day_of_week < 5).reshape(days, -1)[:, 0]
     home, awake = np.zeros_like(hour), np.zeros_like(hour)
     for _ in range(count):
         works, leaves, returns = rng.random() < 0.75, rng.uniform(7.0, 8.8), rng.uniform(14.5, 18.0)

@@ -32,10 +32,12 @@ OUTPUTS = {
 }
 _FLOOR = "Zone Radiant HVAC Heating Rate"
 _WORKER = Path(__file__).with_name("worker.py")
-# What EnergyPlus may say of every house of this kind, and why it does no harm: results leave through the runtime interface,
-# not through files; volumes are given; the wet bulb, that of very dry air too, is used for nothing.
+# What EnergyPlus may say of every house of this kind, and why it does no harm: results leave through the runtime
+# interface, not through files; volumes are given; not every construction is used; the wet bulb, that of very dry air
+# too, is used for nothing.
 _EXPECTED = re.compile(
-    r"No reporting elements have been requested|CalculateZoneVolume|PsyTwbFnTdbWPb|\(PsyPsatFnTemp\)|nominally unused constructions|^$"
+    r"No reporting elements have been requested|CalculateZoneVolume|PsyTwbFnTdbWPb|\(PsyPsatFnTemp\)"
+    r"|nominally unused constructions|^$"
 )
 # Entity and name that we give it, and EnergyPlus's name and key.
 Variable = tuple[str, str, str, str]
@@ -210,7 +212,9 @@ def _run(folder: Path, plant: Plant, variables: Sequence[Variable]) -> tuple[Ser
     (folder / "in.epJSON").write_text(json.dumps(plant.objects), encoding="utf-8")
     drive = np.column_stack(list(plant.drive.values())) if plant.drive else np.zeros((len(weather), 0))
     rooms = [plant.spec.zone_names.index(room) for room in plant.heaters]
-    np.savez(folder / "drive.npz", names=np.array(list(plant.drive)), values=drive, set_points=plant.set_points[:, rooms])
+    np.savez(
+        folder / "drive.npz", names=np.array(list(plant.drive)), values=drive, set_points=plant.set_points[:, rooms]
+    )
     job = {
         "input": str(folder / "in.epJSON"), "weather": str(folder / "in.epw"), "out": str(folder / "out"),
         "drive": str(folder / "drive.npz"), "result": str(folder / "result.npz"), "rows": len(weather),

@@ -177,7 +177,8 @@ def check_run(plant: Plant, results: Results) -> float:
         off = float(np.abs(told - wanted).mean()) / scale
         if not off <= HEAT_TOLERANCE:
             raise EnergyPlusRunError(
-                f"{spec.name}: heat of {room} is off by {off:.2%} of {scale:.0f} W; at most {HEAT_TOLERANCE:.0%} is expected"
+                f"{spec.name}: heat of {room} is off by {off:.2%} of {scale:.0f} W; "
+                f"at most {HEAT_TOLERANCE:.0%} is expected"
             )
         largest = max(largest, off)
     return largest

@@ -57,8 +57,8 @@ class House:
     glazing : dict
         Glazed share of the rooms' walls by side [-]; 0 where a side has no window.
     top, bottom : str
-        What lies above the top rooms, `outdoor` or `attic`, and below the lowest, `ground` or `cellar`. Attic and cellar are
-        measured.
+        What lies above the top rooms, `outdoor` or `attic`, and below the lowest, `ground` or `cellar`. Attic and
+        cellar are measured.
     doorway : tuple of str
         Two rooms between which there is no door; empty where there is none.
     """
@@ -197,8 +197,8 @@ class HouseSpec:
         Seed of those who live there.
     effects : tuple of Effect
         What the house holds beside walls, windows, slabs, furniture and metered heat.
-    known : tuple of str
-        Effects that the diagnosis is told of.
+    known : tuple of Effect
+        Further effects, which the diagnosis is told of and which twins have too.
     """
 
     stream: int
@@ -212,14 +212,14 @@ class HouseSpec:
     climate: Climate
     people: int
     effects: tuple[Effect, ...]
-    known: tuple[str, ...] = ()
+    known: tuple[Effect, ...] = ()
 
     @property
     def name(self) -> str:
         """Name of the case folder, which says nothing about the effects."""
         text = f"house:{self.stream}:{self.seed}:{self.kind}:{self.days}"
         if self.known:
-            text += f":{','.join(self.known)} known"
+            text += f":{','.join(e.name for e in self.known)} known"
         if self.kind == "without":  # a trial of several effects has as many of them
             text += f":{','.join(e.name for e in self.effects)}"
         return "trial_" + hashlib.sha256(text.encode()).hexdigest()[:10]
@@ -241,8 +241,7 @@ class HouseSpec:
 
     def twin(self) -> HouseSpec:
         """Return the same trial without its effects: the null of the same seed."""
-        kept = tuple(effect for effect in self.effects if effect.name in self.known)
-        return replace(self, kind="null", effects=kept)
+        return replace(self, kind="null", effects=())
 
     def has(self, name: str) -> bool:
         """Tell whether an effect of this name is on.
@@ -252,7 +251,7 @@ class HouseSpec:
         name : str
             Of the effect.
         """
-        return any(effect.name == name for effect in self.effects)
+        return any(effect.name == name for effect in (*self.known, *self.effects))
 
     def to_json(self) -> str:
         """Write the trial down, truth included."""

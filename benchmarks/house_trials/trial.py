@@ -94,8 +94,8 @@ def build(spec: HouseSpec) -> plant.Plant:
 def surroundings(spec: HouseSpec, station: pd.DataFrame) -> dict[str, Series]:
     """Return the temperatures of attic and cellar, shape (n_time,) [degC].
 
-    An attic follows the air outdoors within three hours, warmed by the house below and by the sun on its tiles; a cellar
-    hardly follows it and drifts.
+    An attic follows the air outdoors within three hours, warmed by the house below and by the sun on its tiles; a
+    cellar hardly follows it and drifts.
 
     Parameters
     ----------

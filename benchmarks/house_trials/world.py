@@ -1,4 +1,4 @@
-"""This package as a world of blind trials."""
+"""The package as a world of blind trials."""
 
 from __future__ import annotations
 
@@ -18,7 +18,9 @@ KINDS: tuple[Kind, ...] = (*specification.KINDS, "without")
 FAILED, MISSING = TrialError, EnergyPlusMissingError
 
 
-def draw(seed: int, kind: Kind, *, confirmation: bool = False, days: int = DAYS) -> list[HouseSpec]:
+def draw(
+    seed: int, kind: Kind, *, confirmation: bool = False, days: int = DAYS, lived_in: bool = False
+) -> list[HouseSpec]:
     """Draw the trial of a seed and kind, or the twins of its pair less one effect.
 
     Parameters
@@ -31,8 +33,11 @@ def draw(seed: int, kind: Kind, *, confirmation: bool = False, days: int = DAYS)
         Draw from the stream that nothing is tuned on.
     days : int
         Length of the telemetry [d].
+    lived_in : bool
+        With sun through glass and constant leakage, which the diagnosis is to be told of.
     """
-    spec = draw_spec(seed, "pair" if kind == "without" else kind, confirmation=confirmation, days=days)
+    drawn = "pair" if kind == "without" else kind
+    spec = draw_spec(seed, drawn, confirmation=confirmation, days=days, lived_in=lived_in)
     return list(without(spec)) if kind == "without" else [spec]
 
 
