@@ -1,4 +1,4 @@
-"""This package as a world of blind trials."""
+"""Offices of this package as a world of blind trials."""
 
 from __future__ import annotations
 

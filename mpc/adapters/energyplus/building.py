@@ -136,7 +136,8 @@ def _described(path: Path, weather: Path) -> EnergyPlusBuilding:
     with closing(sqlite3.connect(":memory:")) as database:
         database.deserialize(files["eplusout.sql"])
         rows = database.execute("SELECT CompName, Description, Value FROM ComponentSizes").fetchall()
-        building = _building_of(database, source, layout, weather)
+        table = zone_table(database, source, layout.zones, layout.others)
+    building = Building(entity(source.name), read_epw(weather).location, 0.0, table, _devices(layout))
     sizes = {(str(name).upper(), str(what)): float(value) for name, what, value in rows}
     meters = tuple(_METER.findall(files["eplusout.mdd"].decode("latin-1")))
     return EnergyPlusBuilding(source, weather, layout, building, sizes, meters)
@@ -169,22 +170,35 @@ class _Zone(NamedTuple):
     multiplier: float
 
 
-def _building_of(database: sqlite3.Connection, source: InputFile, layout: PlantLayout, weather: Path) -> Building:
-    """Zone table from EnergyPlus' output of a run; zones that no terminal serves are measured boundaries."""
-    names = {zone.upper(): zone for zone in (*layout.zones, *layout.others)}
+def zone_table(
+    database: sqlite3.Connection, source: InputFile, served: tuple[str, ...], others: tuple[str, ...]
+) -> ZoneTable:
+    """Make the zone table of a building from EnergyPlus' own account of a run.
+
+    Parameters
+    ----------
+    database : sqlite3.Connection
+        Output of the run, ``Output:SQLite`` with the option ``SimpleAndTabular``.
+    source : InputFile
+        What EnergyPlus read.
+    served : tuple of str
+        Zones of the table.
+    others : tuple of str
+        Zones that are measured boundaries.
+    """
+    names = {zone.upper(): zone for zone in (*served, *others)}
     rows = database.execute("SELECT ZoneIndex, ZoneName, Volume, FloorArea, Multiplier * ListMultiplier FROM Zones")
     zones = {int(i): _Zone(names[name.upper()], v * m, a * m, float(m)) for i, name, v, a, m in rows}
     by_name = {zone.name: zone for zone in zones.values()}
     entries = tuple(
         ZoneEntry(name=entity(name), volume=by_name[name].volume, floor_area=by_name[name].floor_area)
-        for name in layout.zones
+        for name in served
     )
     faces = {int(row[0]): _Face(*row) for row in database.execute(_QUERY)}
-    surfaces = [s for face in faces.values() if (s := _surface(face, faces, zones, source, set(layout.zones)))]
+    surfaces = [s for face in faces.values() if (s := _surface(face, faces, zones, source, set(served)))]
     used = {s.construction for s in surfaces if s.construction}
     layers = {name: stack for name, stack in _constructions(database).items() if name in used}
-    table = ZoneTable(entries, tuple(surfaces), layers)
-    return Building(entity(source.name), read_epw(weather).location, 0.0, table, _devices(layout))
+    return ZoneTable(entries, tuple(surfaces), layers)
 
 
 def _devices(layout: PlantLayout) -> tuple[Device, ...]:
@@ -214,7 +228,9 @@ def _surface(
         behind = zones[faces[face.behind].zone].name
         other = entity(behind)
         if other == own:  # its own back, or the same storey again: nothing leaves there
-            kind = "wall"
+            # The table lets both faces look at the zone; EnergyPlus' area is all that does (its Input Output Reference,
+            # `InternalMass`).
+            kind, area = "wall", area / 2.0
         elif behind in served and face.behind < face.number:
             return None
     azimuth = face.azimuth if other == _OUTDOOR and kind == "wall" else None

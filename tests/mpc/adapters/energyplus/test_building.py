@@ -46,6 +46,10 @@ def test_the_zone_table_has_the_floor_areas_and_glass_of_the_reference_building(
     partitions = [s for s in table.surfaces if s.kind == "wall" and s.other in office.building.zone_names]
     assert len({frozenset((s.zone, s.other, str(s.area))) for s in partitions if s.other != s.zone}) == 24
     assert sum(s.area for s in table.surfaces if s.kind == "ceiling") == pytest.approx(4982.0, abs=1.0)
+    # both faces of mass inside a zone look at it; together they are what EnergyPlus has
+    inside = sum(2.0 * s.area for s in table.surfaces if s.other == s.zone)
+    masses = office.source.of_type("InternalMass").values()
+    assert inside == pytest.approx(sum(m["surface_area"] for m in masses), rel=1e-6)
     assert office.building.measured_boundaries == office.layout.others
 
 
