@@ -94,7 +94,8 @@ def possible(spec: HouseSpec, name: str) -> bool:
     if name == "ground_exchange":
         return spec.house.bottom == "ground"
     if name == "neighbour":
-        return 0.0 in spec.house.glazing.values()
+        # a typical house has windows on all sides, none of which can be a party wall
+        return 0.0 in spec.house.glazing.values() and spec.sensors.quality != "generic"
     if name == "unmeasured_attic":
         return spec.house.top == "attic"
     if name == "meter_at_boiler":
