@@ -110,9 +110,9 @@ def draw_change(building: Building, seed: int, pairs: list[tuple[str, str]]) -> 
 def make_year(seed: int, changed: bool) -> tuple[Case, Change]:
     """Make a year of telemetry, and say what changed."""
     rng = np.random.default_rng([seed, 12])
-    zones = int(rng.integers(4, 8))
+    zones = int(rng.integers(4, 6))
     building = pilot_building(
-        seed, floor_area=float(rng.uniform(28.0, 45.0)) * zones, zones=zones, floors=1 + int(zones > 5),
+        seed, floor_area=float(rng.uniform(28.0, 45.0)) * zones, zones=zones, floors=1,
         name=f"year_{seed}_{'change' if changed else 'null'}",
     )  # fmt: skip
     weather = _weather(building, seed, rng)

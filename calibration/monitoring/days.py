@@ -34,7 +34,7 @@ MAY_CHANGE = (
 )  # fmt: skip
 
 #: Heat that names no cause: where it explains a change best, the change is of unknown cause.
-NO_CAUSE = ("heat_always", "heat_by_cold", "heat_by_occupancy", "heat_by_hour")
+NO_CAUSE = ("heat_always", "heat_by_cold", "heat_by_occupancy")
 
 #: Effects that a fit of the first weeks has in it where the case can tell them: any office has windows, leaks, people.
 USUAL = ("solar_gain", "infiltration", "internal_gains")

@@ -25,13 +25,13 @@ from calibration.monitoring.filter import Innovation
 from thermal._types import FloatArray, IntArray
 
 #: Days since when a change is sought: each of the last ones, then one in three, up to the longest [d].
-_EACH, _THIRD, _LONGEST = 14, 3, 30
+_EACH, _THIRD, _LONGEST = 14, 3, 21
 
 #: Sizes of a change over the deviation of its prior [-]; their evidence is averaged.
 _SIZES = (1.0, 0.3)
 
 #: Prior weight of heat that names no cause, beside all that have a name [-].
-_UNKNOWN = 0.05
+_UNKNOWN = 0.01
 
 #: Effects that rarely begin from one day to the next, and their prior weight beside others [-]: stations are moved,
 #: rooms are furnished, sensors wrapped and ducts come apart far less often than valves leak and windows stay open.
@@ -43,7 +43,7 @@ _ENDS = 0.5
 
 #: Days over which scores are correlated, days that have no say yet [d], and what a ratio of variances is taken for
 #: before there are days, with the number of days that this counts for [-, d].
-_LAGS, _UNSEEN, _AT_FIRST = 14, 14, (2.0, 14)
+_LAGS, _UNSEEN, _AT_FIRST = 14, 14, (3.0, 14)
 
 
 @dataclass(frozen=True)
@@ -236,6 +236,20 @@ class Watch:
         self._top = np.maximum(self._top, self.log_ratio - before)
         return self._judge()
 
+    def size(self, start: int, number: int) -> float:
+        """Likeliest size of a change since a day [estimation scale].
+
+        Parameters
+        ----------
+        start : int
+            Since when.
+        number : int
+            Which of those that are sought.
+        """
+        row = int(np.argmin(np.abs(self.starts - start)))
+        sharp = self._information[row, number] + self._deviation[number] ** -2.0
+        return float(self._score[row, number] / sharp)
+
     def _renew(self, day: int) -> None:
         """Let go of starts that are too long ago, and begin a new one."""
         age = day - self.starts
@@ -265,7 +279,8 @@ class Watch:
     def _judge(self) -> Alarm:
         """Weigh all changes and starts."""
         share = _ENDS if self.ends else 0.0
-        weight = np.concatenate([(1.0 - share) * self.what.weight, np.full(len(self.ends), share / max(1, len(self.ends)))])
+        ends = np.full(len(self.ends), share / max(1, len(self.ends)))
+        weight = np.concatenate([(1.0 - share) * self.what.weight, ends])
         with np.errstate(divide="ignore"):
             told = self.log_ratio - np.maximum(0.0, self._top - self.cap) + np.log(weight)
         whole = float(logsumexp(told))
