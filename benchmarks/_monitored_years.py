@@ -9,7 +9,6 @@ walls, a cold sky and wind on its films, which the model that watches lacks.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
@@ -21,6 +20,7 @@ from calibration.estimation.state_space import REFERENCE, state_space
 from thermal import Building, Case
 from thermal.case.building import FloorPlans
 from thermal.effects.catalogue import chosen
+from thermal.errors import ThermalError
 from thermal.inputs.normalisation import Normalisation
 from thermal.inputs.provider import InputProvider
 from thermal.inputs.signals import signal_values
@@ -39,6 +39,9 @@ Array = NDArray[np.float64]
 
 STEP, DAYS, RUN_IN = 1800.0, 364, 14
 START = "2023-01-02"
+
+#: Floor areas that are tried, each a hundredth larger.
+_ATTEMPTS = 20
 
 #: What the plant has beside walls and air [parameter units], each drawn between two values; the second ones are what no
 #: model that watches has.
@@ -111,16 +114,14 @@ def make_year(seed: int, changed: bool) -> tuple[Case, Change]:
     """Make a year of telemetry, and say what changed."""
     rng = np.random.default_rng([seed, 12])
     zones = int(rng.integers(4, 6))
-    building = pilot_building(
-        seed, floor_area=float(rng.uniform(28.0, 45.0)) * zones, zones=zones, floors=1,
-        name=f"year_{seed}_{'change' if changed else 'null'}",
-    )  # fmt: skip
+    building = _drawn_building(seed, float(rng.uniform(28.0, 45.0)) * zones, zones)
     weather = _weather(building, seed, rng)
     plant = _Plant(building, weather, seed, rng)
     change = draw_change(building, seed, plant.pairs) if changed else Change()
     plant.change = change
     plans = building.geometry
-    assert isinstance(plans, FloorPlans)
+    if not isinstance(plans, FloorPlans):
+        raise TypeError(f"expected floor plans, found {type(plans).__name__}")
     noise = float(rng.choice([0.03, 0.06]))
     sensors = TelemetrySettings(seed, float(RUN_IN), building.weather_station, noise, float(rng.choice([0.02, 0.1])))
     telemetry = generate_telemetry(plant, plans, weather, sensors)
@@ -128,8 +129,20 @@ def make_year(seed: int, changed: bool) -> tuple[Case, Change]:
     return Case(building, replace(telemetry, frame=frame)), change
 
 
+def _drawn_building(seed: int, floor_area: float, zones: int) -> Building:
+    """Draw an office of a floor area that whole cells can have, close to the one that is asked for."""
+    for attempt in range(_ATTEMPTS):
+        try:
+            area = floor_area * (1.0 + 0.01 * attempt)
+            return pilot_building(seed, floor_area=area, zones=zones, floors=1, name=f"year_{seed}")
+        except ThermalError:
+            if attempt + 1 == _ATTEMPTS:
+                raise
+    raise AssertionError("unreachable")
+
+
 def _weather(building: Building, seed: int, rng: np.random.Generator) -> pd.DataFrame:
-    """A mild climate made colder, with a wider year, by as much as is drawn."""
+    """Make a mild climate colder, with a wider year, by as much as is drawn."""
     begin = str((pd.Timestamp(START) - pd.Timedelta(days=RUN_IN)).date())
     weather = generate_weather(
         seed, start=begin, days=DAYS + RUN_IN, step_seconds=STEP, location=building.location,
@@ -291,6 +304,3 @@ def _people(rng: np.random.Generator, index: pd.DatetimeIndex, zones: int) -> Ar
         there = (hour[rows, None] >= come) & (hour[rows, None] < leave)
         present[rows] = there * many
     return present
-
-
-Maker = Callable[[int, bool], tuple[Case, Change]]

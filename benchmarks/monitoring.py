@@ -109,7 +109,8 @@ def report(out: Path, published: bool) -> str:
         lines.append(["median delay, years not noticed as infinite", f"{middle:.0f} days" if np.isfinite(middle) else
                       "infinite", f"{len(noticed)} of {len(changed)} noticed"])
         lines.append(["noticed within 5 days", *_share(sum(d <= 5 for d in delays), len(changed))])
-        lines.append(["right first, of all changes", *_share(sum(r.get("right", False) for r in changed), len(changed))])
+        right = sum(r.get("right", False) for r in changed)
+        lines.append(["right first, of all changes", *_share(right, len(changed))])
         lines.append(["right first, of those noticed", *_share(sum(r["right"] for r in noticed), len(noticed))])
         lines.append(["zone right, of right names", *_share(sum(r["place"] for r in noticed if r["right"]),
                                                             sum(r["right"] for r in noticed))])

@@ -196,31 +196,29 @@ class _Walk:
             if alarm.log_evidence > self.threshold:
                 self.pending = day
         if self.pending is not None:
-            self._settle(day, alarm)
+            self._settle(day, alarm, self.watch, self.pending)
 
     def _sizes(self, state: State) -> list[float]:
         n = len(self.events)
         return state.mean[state.mean.size - n :].tolist() if n else []
 
-    def _settle(self, day: int, alarm: Alarm) -> None:
+    def _settle(self, day: int, alarm: Alarm, watch: Watch, noticed: int) -> None:
         """Close what is over at once; name what is new once there are days enough."""
-        assert self.watch is not None and self.pending is not None
         over = int(np.argmax(alarm.ends)) if alarm.ends.size else -1
         if over >= 0 and alarm.ends[over] > _CLOSES:
-            self._close(self.lasting[over], alarm.start, day)
+            self._close(self.lasting[over], alarm.start, day, noticed)
             return
-        if day - self.pending < NAMING_DAYS and day + 1 < len(self.days):
+        if day - noticed < NAMING_DAYS and day + 1 < len(self.days):
             return
         if alarm.log_evidence < self.threshold:  # a few days unlike others look like a change and do not last
-            self.withdrawn.append(self.pending)
+            self.withdrawn.append(noticed)
             self._watch_anew(day)
             return
-        number, event = self._named(alarm, day)
-        size = self.watch.size(alarm.start, number)
+        number, event = self._named(alarm, day, watch, noticed)
         for k in self.lasting:
             same = self.events[k].effect == event.effect and self.events[k].zones == event.zones
-            if same and size * self.events[k].size < 0.0 and 2.0 * abs(size) > abs(self.events[k].size):
-                self._close(k, alarm.start, day)
+            if same and event.size * self.events[k].size < 0.0 and 2.0 * abs(event.size) > abs(self.events[k].size):
+                self._close(k, alarm.start, day, noticed)
                 return
         self.events.append(event)
         self.places.append(number)
@@ -229,8 +227,7 @@ class _Walk:
         self.filter = self.filter.with_changes([*self.filter.changes, Found(column, alarm.start, None, deviation)])
         self._go_back(alarm.start, day)
 
-    def _close(self, which: int, end: int, day: int) -> None:
-        noticed = day if self.pending is None else self.pending
+    def _close(self, which: int, end: int, day: int, noticed: int) -> None:
         self.events[which] = replace(self.events[which], end=end, end_alarm=noticed)
         changes = list(self.filter.changes)
         changes[which] = replace(changes[which], end=end)
@@ -246,7 +243,7 @@ class _Walk:
     def _watch_anew(self, day: int) -> None:
         self.watched_from, self.watch, self.pending = day + 1, None, None
 
-    def _named(self, alarm: Alarm, day: int) -> tuple[int, Event]:
+    def _named(self, alarm: Alarm, day: int, watch: Watch, noticed: int) -> tuple[int, Event]:
         """Tell the likeliest effect, then where it is; its strength by its place among what is sought."""
         columns = [self.days.columns[k] for k in self.what.which]
         names = [UNKNOWN_CAUSE if c.is_unknown else str(c.effect) for c in columns]
@@ -257,12 +254,11 @@ class _Walk:
         best = next(iter(ranked))
         number = int(np.argmax(np.where(np.array(names) == best, alarm.share, -1.0)))
         column = columns[number]
-        assert self.watch is not None and self.pending is not None
         return number, Event(
             effect=best, zones=column.zones, parameter=column.name, unit=column.unit,
-            size=self.watch.size(alarm.start, number), deviation=float("nan"), probability=ranked[best],
+            size=watch.size(alarm.start, number), deviation=float("nan"), probability=ranked[best],
             probabilities={name: share for name, share in ranked.items() if share >= 0.01}, since=alarm.start,
-            alarm=self.pending, named=day, log_evidence=alarm.log_evidence,
+            alarm=noticed, named=day, log_evidence=alarm.log_evidence,
         )  # fmt: skip
 
     def course(self) -> Course:
@@ -279,5 +275,7 @@ class _Walk:
                      "deviation": float(spread[k])}
             for k, c in enumerate(columns) if not c.is_unknown
         }  # fmt: skip
-        return Course(tuple(events), tuple(self.withdrawn), self.evidence, self.size, self.carried, self.threshold, parameters)
+        return Course(
+            tuple(events), tuple(self.withdrawn), self.evidence, self.size, self.carried, self.threshold, parameters
+        )
 

@@ -1,7 +1,7 @@
-"""What each day of the telemetry says: errors of runs, and what they would be for a unit of everything that may change.
+"""What each day of the telemetry says: errors of runs, and what a unit of all that may change would do to them.
 
-The calibrated model is run from midnight to midnight in runs of the horizon, with every effect of the catalogue in it at
-strength 0, so that the sensitivities of its errors to all strengths come from the code that calibration uses. A day is
+The calibrated model is run from midnight to midnight in runs of the horizon, with every effect of the catalogue in it
+at strength 0, so that the sensitivities of its errors to all strengths come from the code that calibration uses. A day is
 then a vector of errors and a matrix, and all that follows is linear algebra.
 """
 
@@ -136,7 +136,7 @@ class Days:
     @property
     def days_off(self) -> BoolArray:
         """Which days are Saturdays and Sundays."""
-        return np.asarray(self.dates.dayofweek >= 5)
+        return np.asarray(self.dates.day_of_week >= 5)
 
 
 def days_of_case(
@@ -202,7 +202,8 @@ class _Replay:
         self.model = reduced_model(built.grid, [theta], shifts=SHIFTS)
         self.problem = models.problem(built, theta)
         self.scale = self.problem.slopes(theta)
-        self.flow = models.drivers.supply_flow if models.drivers.gives("supply_flow") else np.zeros_like(built.inputs.heat)
+        metered = models.drivers.gives("supply_flow")
+        self.flow = models.drivers.supply_flow if metered else np.zeros_like(built.inputs.heat)
         steps = self.problem.steps
         self.kept = np.searchsorted(self.problem.keep, sorted({max(1, steps // 2), steps}))
         self.kept = np.unique(np.minimum(self.kept, self.problem.keep.size - 1))

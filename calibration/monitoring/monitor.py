@@ -141,7 +141,8 @@ class Monitoring(Result):
     def weekly(self) -> pd.DataFrame:
         """Mean errors by week from the first day on, as `daily` has them, and of each zone [K]."""
         errors = pd.DataFrame(np.abs(self.days.errors), index=self.days.dates).T.groupby(self.days.zone).mean().T
-        table = pd.concat([self.daily()[["mae", "mae_carried"]], errors.set_axis(list(self.days.zones), axis=1)], axis=1)
+        errors = errors.set_axis(list(self.days.zones), axis=1)
+        table = pd.concat([self.daily()[["mae", "mae_carried"]], errors], axis=1)
         weeks = table.groupby(np.arange(len(table)) // 7).mean()
         weeks.index = pd.DatetimeIndex(self.days.dates[::7], name="timestamp")
         return weeks

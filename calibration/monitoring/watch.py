@@ -92,7 +92,7 @@ def sought(columns: Sequence[Column]) -> Sought:
     unknown = np.array([columns[k].is_unknown for k in which], dtype=bool)
     weight = np.zeros(len(which))
     for known, whole in ((~unknown, 1.0 - _UNKNOWN), (unknown, _UNKNOWN)):
-        for effect in (names := np.unique(effects[known])):
+        for effect in np.unique(effects[known]):
             of = effects == effect
             weight[of] = whole * (_RARE if effect in RARELY else 1.0) / np.count_nonzero(of)
         weight[known] *= whole / max(weight[known].sum(), 1e-300)
@@ -103,9 +103,9 @@ class Dispersion:
     """How much more the days vary in the direction of each change than the filter's noise says: the case's own level.
 
     A model that lacks how people come and go, or a season, errs in these directions day after day. With the score u_d
-    and the information i_d of a change that begins on day d, both of which belong to one day, the variance of their sum
-    is ``Σ_d Σ_l w_l u_d u_d-l`` with Bartlett's weights (Newey and West 1987, doi:10.2307/1913610), which the noise says
-    is ``Σ_d i_d``. Scores and information of the watch are divided by the ratio, 1 at least: a quasi-likelihood.
+    and the information i_d of a change that begins on day d, both of one day, the variance of their sum is
+    ``Σ_d Σ_l w_l u_d u_d-l`` with Bartlett's weights (Newey and West 1987, doi:10.2307/1913610), which the noise says is
+    ``Σ_d i_d``. Scores and information of the watch are divided by the ratio, 1 at least: a quasi-likelihood.
 
     Parameters
     ----------

@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Any
 
 from calibration.monitoring.course import UNKNOWN_CAUSE, Event
+from calibration.monitoring.days import USUAL
 from calibration.monitoring.monitor import Monitoring
 from mpc.reports.diagnosis_words import called, in_zones
 from mpc.reports.figures.monitoring import time_line
@@ -99,7 +100,9 @@ def _what(event: Event) -> str:
     """Call a change by what it is, and whether there is more or less of it."""
     if event.effect == UNKNOWN_CAUSE:
         return f"{'more' if event.size > 0 else 'less'} heat of unknown cause"
-    return f"{called(event.effect)} {'up' if event.size > 0 else 'down'}"
+    if event.effect in USUAL:  # there from the beginning, so that it can also become less
+        return f"{called(event.effect)}, {'more' if event.size > 0 else 'less'} than before"
+    return called(event.effect)
 
 
 def _when(found: Monitoring, event: Event) -> str:
