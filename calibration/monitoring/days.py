@@ -1,8 +1,8 @@
 """What each day of the telemetry says: errors of runs, and what a unit of all that may change would do to them.
 
 The calibrated model is run from midnight to midnight in runs of the horizon, with every effect of the catalogue in it
-at strength 0, so that the sensitivities of its errors to all strengths come from the code that calibration uses. A day is
-then a vector of errors and a matrix, and all that follows is linear algebra.
+at strength 0, so that the sensitivities of its errors to all strengths come from the code that calibration uses. A day
+is then a vector of errors and a matrix, and all that follows is linear algebra.
 """
 
 from __future__ import annotations
@@ -183,12 +183,12 @@ def days_of_case(
         if p.base == "sensor_bias" and p.member is not None:
             onset[..., i] = replay.onset_of_bias(built.network.zones.index(p.member), errors, slopes[..., i])
     n_error = errors[0].size
-    slopes, onset = slopes.reshape(len(dates), n_error, -1), onset.reshape(ONSET, n_error, -1)
+    by_day, at_onset = slopes.reshape(len(dates), n_error, -1), onset.reshape(ONSET, n_error, -1)
     columns = [_column(p, v, p.effect in effects or p.effect is None) for p, v in zip(own, theta, strict=True)]
-    told = np.abs(slopes).max(axis=(0, 1)) > 0.0
+    told = np.abs(by_day).max(axis=(0, 1)) > 0.0
     return Days(
-        dates, errors.reshape(len(dates), -1), slopes[..., told],
-        tuple(c for c, t in zip(columns, told, strict=True) if t), onset[..., told],
+        dates, errors.reshape(len(dates), -1), by_day[..., told],
+        tuple(c for c, t in zip(columns, told, strict=True) if t), at_onset[..., told],
         np.broadcast_to(np.arange(replay.shape[-1]), replay.shape).ravel(), built.network.zones,
     )  # fmt: skip
 
@@ -210,7 +210,8 @@ class _Replay:
         self.every = steps * built.inputs.step
         self.shape = max(1, int(86400.0 // self.every)), self.kept.size, len(built.network.zones)
         stamps = built.inputs.stamps
-        self.dates = pd.date_range(stamps[0].normalize(), stamps[-1].normalize(), freq="D")
+        last = stamps[-1] - pd.Timedelta(seconds=built.inputs.step)  # a stamp ends its step
+        self.dates = pd.date_range(stamps[0].normalize(), last.normalize(), freq="D")
 
     def with_slopes(self, part: slice) -> tuple[FloatArray, FloatArray]:
         """Errors of some days (n_day, n_run, n_kept, n_zone) [K], and their derivatives on the estimation scale."""

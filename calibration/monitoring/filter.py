@@ -77,7 +77,7 @@ class Innovation:
     observe : ndarray, shape (n_seen, n_state)
         What states do to them [K].
     gain : ndarray, shape (n_state, n_seen)
-        What they do to the states.
+        What they do to the states [units of the states per K].
     root : ndarray, shape (n_seen, n_seen)
         Lower Cholesky factor of the covariance of the innovations, the size of the noise in it [K].
     white : ndarray, shape (n_seen,)
@@ -103,7 +103,7 @@ class State:
     mean : ndarray, shape (n_state,)
         States [estimation scale and K].
     covariance : ndarray, shape (n_state, n_state)
-        Of them.
+        Of them [products of their units].
     """
 
     mean: FloatArray
@@ -124,6 +124,8 @@ class DayFilter:
         See `LEVEL_WALK` [-].
     changes : sequence of Found
         That were found, in order.
+    sizes : dict of int to float
+        Mean square of each day's innovations over what the reference days have [-]; filled as days are taken in.
     """
 
     days: Days

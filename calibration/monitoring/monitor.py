@@ -15,10 +15,9 @@ import pandas as pd
 from calibration.diagnosis.known import reasons_of
 from calibration.diagnosis.refit.comparison import ModelComparison
 from calibration.errors import CalibrationError, NotEnoughDataError
-from calibration.evaluation.case_model import load_parameters, read_settings
 from calibration.evaluation.intervals import Interval
 from calibration.evaluation.n_step import Progress
-from calibration.evaluation.settings import ModelSettings
+from calibration.evaluation.settings import ModelSettings, load_parameters, read_settings
 from calibration.monitoring.course import Course, Event, follow
 from calibration.monitoring.days import MAY_CHANGE, NO_CAUSE, USUAL, Days, days_of_case
 from calibration.results import Axes, Result, plain
@@ -157,7 +156,8 @@ class Monitoring(Result):
     def _draw(self, axes: Axes) -> None:
         self.daily()["mae_carried"].plot(ax=axes, ylabel="mean absolute error (K)")
         for event in self.events:
-            axes.axvspan(self.date(event.since), self.date(event.end or len(self.days)), alpha=0.2)
+            ends = [self.date(event.since), self.date(event.end or len(self.days))]
+            axes.fill_between(ends, 0.0, 1.0, transform=axes.get_xaxis_transform(), alpha=0.2)
 
 
 def monitor(

@@ -104,8 +104,8 @@ class Dispersion:
 
     A model that lacks how people come and go, or a season, errs in these directions day after day. With the score u_d
     and the information i_d of a change that begins on day d, both of one day, the variance of their sum is
-    ``Σ_d Σ_l w_l u_d u_d-l`` with Bartlett's weights (Newey and West 1987, doi:10.2307/1913610), which the noise says is
-    ``Σ_d i_d``. Scores and information of the watch are divided by the ratio, 1 at least: a quasi-likelihood.
+    ``Σ_d Σ_l w_l u_d u_d-l`` with Bartlett's weights (Newey and West 1987, doi:10.2307/1913610). The noise says that it
+    is ``Σ_d i_d``. Scores and information of the watch are divided by the ratio, 1 at least: a quasi-likelihood.
 
     Parameters
     ----------
