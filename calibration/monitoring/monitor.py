@@ -154,10 +154,10 @@ class Monitoring(Result):
         return f"{self.case}, {len(self.days)} days, {len(self.events)} changes, {len(self.open_events)} open"
 
     def _draw(self, axes: Axes) -> None:
-        self.daily()["mae_carried"].plot(ax=axes, ylabel="mean absolute error (K)")
+        axes.plot(np.arange(len(self.days)), self.course.carried)
+        axes.set(xlabel="day", ylabel="mean absolute error (K)")
         for event in self.events:
-            ends = [self.date(event.since), self.date(event.end or len(self.days))]
-            axes.fill_between(ends, 0.0, 1.0, transform=axes.get_xaxis_transform(), alpha=0.2)
+            axes.axvspan(event.since, event.end or len(self.days), alpha=0.2)
 
 
 def monitor(
