@@ -17,6 +17,7 @@ from mpc.cli.doctor import doctor
 from mpc.cli.effects import effects
 from mpc.cli.evaluate import check, evaluate, simulate
 from mpc.cli.imports import import_devices, import_plan, import_telemetry
+from mpc.cli.monitor import monitor
 from mpc.cli.options import switch, value
 from mpc.cli.serve import label, serve
 from mpc.plugins import load_plugins
@@ -96,7 +97,7 @@ def _report(error: Exception, command: str) -> int:
 
 for _command in (
     *(demo, doctor, check, import_plan, import_devices, import_telemetry, label),
-    *(simulate, evaluate, calibrate, diagnose, effects, control, compare, serve),
+    *(simulate, evaluate, calibrate, diagnose, monitor, effects, control, compare, serve),
 ):
     app.command()(_guarded(_command))
 

@@ -72,7 +72,7 @@ def calibrate(
     settings = {
         "tune": tune or [], "hold_out": hold_out or [], "dx": dx, "horizon": horizon,
         "scheme": scheme or "implicit_euler", "objective": objective, "loss": loss, "starts": starts, "seed": seed,
-        "effects": _ids(effects),
+        "effects": options.ids(effects),
         "climb": structure == "chosen", "yardsticks": True,
         "structure": {"lumped": True, "sun": True} if structure == "lumped" else {},
     }  # fmt: skip
@@ -85,11 +85,6 @@ def calibrate(
         result, report = run_calibration(case, out, force, progress, settings)
     answer(json, calibration_content(result), lambda: _show(result), report)
     return _exit_code(result)
-
-
-def _ids(text: str) -> list[str]:
-    """Read ids between commas."""
-    return [name.strip() for name in text.split(",") if name.strip()]
 
 
 def run_calibration(
@@ -267,7 +262,7 @@ def diagnose(
     """
     from mpc.reports.diagnosis import diagnosis_summary
 
-    settings = {"dx": dx, "horizon": horizon, "known": _ids(effects), "ruled_out": _ids(rule_out)}
+    settings = {"dx": dx, "horizon": horizon, "known": options.ids(effects), "ruled_out": options.ids(rule_out)}
     if cases := _cases_in(case, out, workers, scheduler):
         settings |= {"tune": tune or [], "hold_out": hold_out or []}
         return _many("diagnose", cases, out, settings, workers, scheduler, force, json)

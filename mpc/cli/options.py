@@ -124,6 +124,17 @@ def parse_intervals(texts: Sequence[str] | None, case: Case) -> list[Interval]:
     return [parse_interval(text, case) for text in texts or ()]
 
 
+def ids(text: str) -> list[str]:
+    """Read ids between commas.
+
+    Parameters
+    ----------
+    text : str
+        As it was given.
+    """
+    return [name.strip() for name in text.split(",") if name.strip()]
+
+
 def spread(command: Callable[..., int]) -> Callable[..., int]:
     """Make options of the fields of a command's first argument, a dataclass.
 

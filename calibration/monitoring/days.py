@@ -1,0 +1,285 @@
+"""What each day of the telemetry says: errors of runs, and what a unit of all that may change would do to them.
+
+The calibrated model is run from midnight to midnight in runs of the horizon, with every effect of the catalogue in it
+at strength 0, so that the sensitivities of its errors to all strengths come from the code that calibration uses. A day
+is then a vector of errors and a matrix, and all that follows is linear algebra.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pandas as pd
+
+from calibration.diagnosis.refit.comparison import Built, ModelComparison, is_strength
+from calibration.errors import NotEnoughDataError
+from calibration.evaluation.intervals import Interval, Runs, select_runs
+from calibration.evaluation.n_step import Progress
+from thermal._types import BoolArray, FloatArray, IntArray
+from thermal.effects.catalogue import effect_of
+from thermal.effects.effect import PAIR
+from thermal.effects.unknown import UNKNOWN
+from thermal.model.case_replay import Inputs
+from thermal.model.reduce import SHIFTS, reduced_model
+from thermal.parameters import Parameter
+from thermal.units import AIR_HEAT_CAPACITY
+
+#: Effects that may begin or end from one day to the next. Walls, roofs, grounds, films and neighbours do not: their
+#: strengths are learnt as the seasons show them, like the parameters of the baseline.
+MAY_CHANGE = (
+    "solar_gain", "infiltration", "window_opening", "internal_gains", "hidden_mass", "zone_mixing", "wrong_station",
+    "clock_shift", "flow_gain", "duct_loss", "capacity_limit", "valve_leak", "sensor_bias", "sensor_lag",
+)  # fmt: skip
+
+#: Heat that names no cause: where it explains a change best, the change is of unknown cause.
+NO_CAUSE = ("heat_always", "heat_by_cold", "heat_by_occupancy")
+
+#: Effects that a fit of the first weeks has in it where the case can tell them: any office has windows, leaks, people.
+USUAL = ("solar_gain", "infiltration", "internal_gains")
+
+#: Strengths whose errors are far from linear in them, and where the secant is taken that stands for their tangent
+#: [parameter units]: at little lost capacity only the hours of the largest load count, and an open door evens out what
+#: its tangent takes for a heat that never ends.
+_SECANTS = {"capacity_lost": 0.35, "door_airflow": 0.1}
+
+#: Deviation of a strength that no fit had, before the data, over that of a diagnosis [-]: most of what may be wrong is
+#: not, and what is wrong from the first day on shows in the first weeks.
+_SELDOM = 0.3
+
+#: Days after a sensor has begun to read wrong in which the walls behind do not know of it yet [d].
+ONSET = 6
+
+#: Telemetry whose runs share a spin-up [d]: bounds the memory that sensitivities take.
+_CHUNK = 28
+
+
+@dataclass(frozen=True)
+class Column:
+    """A number that errors depend on.
+
+    Parameters
+    ----------
+    name : str
+        Of the parameter.
+    unit : str
+        Its unit.
+    effect : str or None
+        Effect that it belongs to; None for the baseline.
+    zones : tuple of str
+        Where; empty for the whole building.
+    deviation : float
+        Standard deviation of a change of it on the estimation scale, before the data [-].
+    spread : float
+        Standard deviation of what it was from the beginning [-].
+    away : float
+        Centre of its prior, counted from where the model is [-].
+    value : float
+        Where the model is [parameter unit].
+    may_change : bool
+        Whether it may change from one day to the next.
+    from_zero : bool
+        Whether it can only grow, as the strength of what is absent at first.
+    """
+
+    name: str
+    unit: str
+    effect: str | None
+    zones: tuple[str, ...]
+    deviation: float
+    spread: float
+    away: float
+    value: float
+    may_change: bool
+    from_zero: bool
+
+    @property
+    def is_unknown(self) -> bool:
+        """Whether it names no cause."""
+        return self.effect in UNKNOWN
+
+
+@dataclass(frozen=True)
+class Days:
+    """Errors of every day, and their derivatives.
+
+    Parameters
+    ----------
+    dates : DatetimeIndex, length n_day
+        Local midnights at which the days begin.
+    errors : ndarray, shape (n_day, n_error)
+        Simulated minus measured zone temperatures [K]; NaN where there is none.
+    slopes : ndarray, shape (n_day, n_error, n_column)
+        Their derivatives on the estimation scale [K].
+    columns : tuple of Column
+        What they are derivatives by.
+    onset : ndarray, shape (n_onset, n_error, n_column)
+        What is to be added to the derivatives on the first days of a change, the day of the change first [K].
+    zone : ndarray of int, shape (n_error,)
+        Zone of each error.
+    zones : tuple of str
+        Names of the zones.
+    """
+
+    dates: pd.DatetimeIndex
+    errors: FloatArray
+    slopes: FloatArray
+    columns: tuple[Column, ...]
+    onset: FloatArray
+    zone: IntArray
+    zones: tuple[str, ...]
+
+    def __len__(self) -> int:
+        return len(self.dates)
+
+    @property
+    def days_off(self) -> BoolArray:
+        """Which days are Saturdays and Sundays."""
+        return np.asarray(self.dates.day_of_week >= 5)
+
+
+def days_of_case(
+    models: ModelComparison,
+    effects: Mapping[str, Sequence[str]],
+    values: Mapping[str, float],
+    candidates: Sequence[str],
+    progress: Progress | None = None,
+) -> Days:
+    """Run the model over all the telemetry, with the sensitivities to all that may be or change.
+
+    Parameters
+    ----------
+    models : ModelComparison
+        The case.
+    effects : mapping of str to sequence of str
+        Effects of the calibrated model, with their zones.
+    values : mapping of str to float
+        Its parameters by name [parameter units].
+    candidates : sequence of str
+        Effects that it lacks, and that the case can tell.
+    progress : callable, optional
+        Called with stage, done, total.
+
+    Raises
+    ------
+    NotEnoughDataError
+        When no day has a usable run.
+    """
+    built = models.build({**effects, **{e: () for e in candidates if e not in effects}})
+    theta = built.theta(values)
+    replay = _Replay(models, built, theta)
+    own, dates = built.network.parameters, replay.dates
+    errors, slopes = np.full((len(dates), *replay.shape), np.nan), np.zeros((len(dates), *replay.shape, len(theta)))
+    chunks = range(0, len(dates), _CHUNK)
+    for number, begin in enumerate(chunks):
+        if progress is not None:
+            progress("run the days", number, len(chunks))
+        part = slice(begin, min(begin + _CHUNK, len(dates)))
+        errors[part], slopes[part] = replay.with_slopes(part)
+    NotEnoughDataError.unless(np.isfinite(errors).any(), "telemetry", "a day with a run of the horizon", "none")
+    onset = np.zeros((ONSET, *replay.shape, len(theta)))
+    for i, p in enumerate(own):
+        if p.base == "sensor_bias" and p.member is not None:
+            onset[..., i] = replay.onset_of_bias(built.network.zones.index(p.member), errors, slopes[..., i])
+    n_error = errors[0].size
+    by_day, at_onset = slopes.reshape(len(dates), n_error, -1), onset.reshape(ONSET, n_error, -1)
+    columns = [_column(p, v, p.effect in effects or p.effect is None) for p, v in zip(own, theta, strict=True)]
+    told = np.abs(by_day).max(axis=(0, 1)) > 0.0
+    return Days(
+        dates, errors.reshape(len(dates), -1), by_day[..., told],
+        tuple(c for c, t in zip(columns, told, strict=True) if t), at_onset[..., told],
+        np.broadcast_to(np.arange(replay.shape[-1]), replay.shape).ravel(), built.network.zones,
+    )  # fmt: skip
+
+
+class _Replay:
+    """Runs of the model from midnight to midnight, half way and at their end."""
+
+    def __init__(self, models: ModelComparison, built: Built, theta: FloatArray) -> None:
+        self.built, self.theta, self.spin_up = built, theta, models.settings.spin_up_seconds
+        # a basis of this θ alone interpolates tangents too, as in a screening
+        self.model = reduced_model(built.grid, [theta], shifts=SHIFTS)
+        self.problem = models.problem(built, theta)
+        self.scale = self.problem.slopes(theta)
+        metered = models.drivers.gives("supply_flow")
+        self.flow = models.drivers.supply_flow if metered else np.zeros_like(built.inputs.heat)
+        steps = self.problem.steps
+        self.kept = np.searchsorted(self.problem.keep, sorted({max(1, steps // 2), steps}))
+        self.kept = np.unique(np.minimum(self.kept, self.problem.keep.size - 1))
+        self.every = steps * built.inputs.step
+        self.shape = max(1, int(86400.0 // self.every)), self.kept.size, len(built.network.zones)
+        stamps = built.inputs.stamps
+        last = stamps[-1] - pd.Timedelta(seconds=built.inputs.step)  # a stamp ends its step
+        self.dates = pd.date_range(stamps[0].normalize(), last.normalize(), freq="D")
+
+    def with_slopes(self, part: slice) -> tuple[FloatArray, FloatArray]:
+        """Errors of some days (n_day, n_run, n_kept, n_zone) [K], and their derivatives on the estimation scale."""
+        errors, slopes = self._run(part, self.theta, self.built.inputs, slopes=True)
+        for i, p in enumerate(self.built.network.parameters):
+            if (at := _SECANTS.get(p.base)) is not None:
+                there = self.theta + (np.arange(self.theta.size) == i) * at
+                slopes[..., i] = np.nan_to_num(self._run(part, there, self.built.inputs)[0] - errors) / at
+        return errors, slopes * self.scale
+
+    def onset_of_bias(self, zone: int, errors: FloatArray, slopes: FloatArray) -> FloatArray:
+        """First days of a sensor that begins to read 1 K more, (n_onset, n_run, n_kept, n_zone) [K], less later ones.
+
+        The walls behind do not know of it at first, while the model holds them at what the sensor says. This passes
+        within days, alike at any time of the year, and is taken from one midnight in the middle of the telemetry.
+        """
+        begin = len(self.dates) // 2
+        part = slice(begin, begin + ONSET)
+        if part.stop > len(self.dates):
+            return np.zeros((ONSET, *self.shape))
+        inputs = self.built.inputs
+        rows = np.asarray(inputs.stamps > self.dates[begin])
+        step = rows[:, None] & (np.arange(self.shape[-1]) == zone)
+        warmer = replace(
+            inputs, zone=inputs.zone + step, bridged=inputs.bridged + step, held=inputs.held + step,
+            heat=inputs.heat - AIR_HEAT_CAPACITY * self.flow * step,
+        )  # fmt: skip
+        moved = self._run(part, self.theta, warmer)[0] - errors[part]
+        return np.nan_to_num(-moved - slopes[part])
+
+    def _run(
+        self, part: slice, theta: FloatArray, inputs: Inputs, slopes: bool = False
+    ) -> tuple[FloatArray, FloatArray]:
+        """Run some days; NaN where there is no run."""
+        dates = self.dates[part]
+        errors = np.full((len(dates), *self.shape), np.nan)
+        moved = np.zeros((*errors.shape, theta.size)) if slopes else np.zeros(0)
+        interval = Interval(dates[0], dates[-1] + pd.DateOffset(days=1))
+        problem = replace(self.problem, inputs=inputs)
+        try:
+            runs = select_runs(inputs, interval, problem.steps, inputs.step, self.spin_up)
+        except NotEnoughDataError:
+            return errors, moved
+        day, place, starts = self._places(runs, dates)
+        if starts.size:
+            found, by_theta = problem.errors(self.model, theta, Runs(runs.begin, starts, runs.skipped), slopes)
+            errors[day, place] = found[:, self.kept]
+            if by_theta is not None:
+                moved[day, place] = np.where(np.isfinite(found[:, self.kept, :, None]), by_theta[:, self.kept], 0.0)
+        return errors, moved
+
+    def _places(self, runs: Runs, dates: pd.DatetimeIndex) -> tuple[IntArray, IntArray, IntArray]:
+        """Day and place in it of the runs that tile the days from midnight on, and their starts."""
+        stamps = self.built.inputs.stamps[runs.starts]
+        seconds = np.asarray(stamps.hour * 3600 + stamps.minute * 60 + stamps.second)
+        place = seconds // self.every
+        day = dates.get_indexer(stamps.normalize())
+        chosen = (seconds % self.every == 0) & (place < self.shape[0]) & (day >= 0)
+        return day[chosen], place[chosen].astype(np.int64), runs.starts[chosen]
+
+
+def _column(p: Parameter, value: float, present: bool) -> Column:
+    """Tell what a parameter is to a monitoring."""
+    zonal = effect_of(p.effect).zonal if p.effect is not None else False
+    zones = tuple(p.member.split(PAIR)) if zonal and p.member is not None else ()
+    changes = is_strength(p.name, p.effect) and p.effect in (*MAY_CHANGE, *NO_CAUSE)
+    return Column(
+        p.name, p.unit, p.effect, zones, p.prior_deviation, p.prior_deviation * (1.0 if present else _SELDOM),
+        p.transform(p.start) - p.transform(value), float(value),
+        may_change=changes, from_zero=not present and p.lower == 0.0,
+    )  # fmt: skip

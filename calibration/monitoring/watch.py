@@ -1,0 +1,290 @@
+"""Watch over innovations: for everything that may change, and every day since when, how much likelier the days are.
+
+A change of p since day τ moves the innovations of later days by G p, where G follows from the filter: what it has made
+of the change so far is in its states (Willsky and Jones 1976, doi:10.1109/TAC.1976.1101146),
+
+    G_d = J_d - H_d F_d,   F_d+1 = F_d + K_d G_d,   S = Σ Gᵀ V⁻¹ ν,   I = Σ Gᵀ V⁻¹ G                             (M2)
+
+With p ~ N(0, σ²) before the data the likelihood ratio has the mean ``E = (1 + σ² I)^-½ exp(½ S² / (I + σ^-2))``, whose
+expectation is 1 while nothing changes. The sum of the ratios over all τ, weighted over all that may change, is the
+e-detector of Shiryaev and Roberts, and an alarm where it exceeds A comes on average after A days or more while nothing
+has changed (Shin, Ramdas and Rinaldo 2024, doi:10.51387/23-NEJSDS51), whatever the number of changes that are sought.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import solve_triangular
+from scipy.special import log_ndtr, logsumexp
+
+from calibration.monitoring.days import Column, Days
+from calibration.monitoring.filter import Innovation
+from thermal._types import FloatArray, IntArray
+
+#: Days since when a change is sought: each of the last ones, then one in three, up to the longest [d].
+_EACH, _THIRD, _LONGEST = 14, 3, 21
+
+#: Sizes of a change over the deviation of its prior [-]; their evidence is averaged.
+_SIZES = (1.0, 0.3)
+
+#: Prior weight of heat that names no cause, beside all that have a name [-].
+_UNKNOWN = 0.01
+
+#: Effects that rarely begin from one day to the next, and their prior weight beside others [-]: stations are moved,
+#: rooms are furnished, sensors wrapped and ducts come apart far less often than valves leak and windows stay open.
+RARELY, _RARE = ("wrong_station", "hidden_mass", "sensor_lag", "duct_loss"), 0.1
+
+#: Prior weight of the end of each change that was found, beside all that may begin [-].
+_ENDS = 0.5
+
+
+#: Days over which scores are correlated, days that have no say yet [d], and what a ratio of variances is taken for
+#: before there are days, with the number of days that this counts for [-, d].
+_LAGS, _UNSEEN, _AT_FIRST = 14, 14, (3.0, 14)
+
+
+@dataclass(frozen=True)
+class Sought:
+    """What may change.
+
+    Parameters
+    ----------
+    columns : tuple of Column
+        All columns of the days.
+    which : ndarray of int, shape (n_sought,)
+        Those that may change.
+    weight : ndarray, shape (n_sought,)
+        Probability of each before the data [-], in sum 1.
+    """
+
+    columns: tuple[Column, ...]
+    which: IntArray
+    weight: FloatArray
+
+    def shown(self, days: Days, day: int, innovation: Innovation) -> FloatArray:
+        """Show what a unit of each change does to a day's errors, (n_seen, n_sought) [K].
+
+        Parameters
+        ----------
+        days : Days
+            With their derivatives.
+        day : int
+            Which.
+        innovation : Innovation
+            Of the day.
+        """
+        return np.asarray(-days.slopes[day][innovation.seen][:, self.which])
+
+
+def sought(columns: Sequence[Column]) -> Sought:
+    """Share the probability before the data among effects, and in each among its zones and strengths.
+
+    Parameters
+    ----------
+    columns : sequence of Column
+        Of the days.
+    """
+    which = np.array([k for k, c in enumerate(columns) if c.may_change], dtype=np.int64)
+    effects = np.array([columns[k].effect for k in which])
+    unknown = np.array([columns[k].is_unknown for k in which], dtype=bool)
+    weight = np.zeros(len(which))
+    for known, whole in ((~unknown, 1.0 - _UNKNOWN), (unknown, _UNKNOWN)):
+        for effect in np.unique(effects[known]):
+            of = effects == effect
+            weight[of] = whole * (_RARE if effect in RARELY else 1.0) / np.count_nonzero(of)
+        weight[known] *= whole / max(weight[known].sum(), 1e-300)
+    return Sought(tuple(columns), which, weight / weight.sum())
+
+
+class Dispersion:
+    """How much more the days vary in the direction of each change than the filter's noise says: the case's own level.
+
+    A model that lacks how people come and go, or a season, errs in these directions day after day. With the score u_d
+    and the information i_d of a change that begins on day d, both of one day, the variance of their sum is
+    ``Σ_d Σ_l w_l u_d u_d-l`` with Bartlett's weights (Newey and West 1987, doi:10.2307/1913610). The noise says that it
+    is ``Σ_d i_d``. Scores and information of the watch are divided by the ratio, 1 at least: a quasi-likelihood.
+
+    Parameters
+    ----------
+    n_day, n_sought : int
+        Days of the telemetry, and what may change.
+    """
+
+    def __init__(self, n_day: int, n_sought: int) -> None:
+        self.score, self.information = np.zeros((n_day, n_sought)), np.zeros((n_day, n_sought))
+
+    def put(self, day: int, own: FloatArray, innovation: Innovation) -> None:
+        """Keep what a day says of changes that begin on it; a day that is filtered anew is replaced.
+
+        Parameters
+        ----------
+        day : int
+            Its number.
+        own : ndarray, shape (n_seen, n_sought)
+            What a unit of each change does to its errors [K].
+        innovation : Innovation
+            Of the filter.
+        """
+        white = solve_triangular(innovation.root, own, lower=True)
+        self.score[day], self.information[day] = innovation.white @ white, (white**2).sum(axis=0)
+
+    def at(self, day: int) -> FloatArray:
+        """Ratio of the variances by the days up to two weeks before, shape (n_sought,) [-].
+
+        Parameters
+        ----------
+        day : int
+            Whose changes of the last two weeks have no say.
+        """
+        last = max(0, day - _UNSEEN)
+        u, i = self.score[:last], self.information[:last]
+        variance = (u**2).sum(axis=0)
+        for lag in range(1, min(_LAGS, last - 1) + 1):
+            variance = variance + 2.0 * (1.0 - lag / (_LAGS + 1.0)) * (u[lag:] * u[:-lag]).sum(axis=0)
+        usual = i.sum(axis=0) / max(1, last)
+        return np.asarray(np.maximum(1.0, (variance + _AT_FIRST[0] * _AT_FIRST[1] * usual)
+                                     / np.maximum(i.sum(axis=0) + _AT_FIRST[1] * usual, 1e-12)))  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Alarm:
+    """What the evidence says on a day.
+
+    Parameters
+    ----------
+    log_evidence : float
+        Logarithm of the e-detector [-].
+    start : int
+        Likeliest day since when.
+    share : ndarray, shape (n_sought,)
+        Probability of each change, given that there is one [-].
+    ends : ndarray, shape (n_end,)
+        That of the end of each change that was found [-].
+    """
+
+    log_evidence: float
+    start: int
+    share: FloatArray
+    ends: FloatArray
+
+
+class Watch:
+    """Evidence for changes, day by day.
+
+    Parameters
+    ----------
+    what : Sought
+        What may change.
+    n_state : int
+        States of the filter.
+    cap : float
+        Most that a single day may add to the logarithm of the evidence of a change [-].
+    dispersion : Dispersion
+        What scores and information are divided by.
+    ends : sequence of (int, float)
+        Changes that were found, by their place among what is sought, with their sizes [estimation scale].
+    """
+
+    def __init__(
+        self,
+        what: Sought,
+        n_state: int,
+        dispersion: Dispersion,
+        cap: float = np.inf,
+        ends: Sequence[tuple[int, float]] = (),
+    ) -> None:
+        self.what, self.cap, self.dispersion, self.ends = what, cap, dispersion, list(ends)
+        self.starts = np.zeros(0, dtype=np.int64)
+        k = what.which.size
+        self._moved = np.zeros((n_state, 0, k))
+        self._score, self._information = np.zeros((0, k)), np.zeros((0, k))
+        self._top = np.zeros((0, k + len(self.ends)))
+        self._deviation = np.array([what.columns[i].deviation for i in what.which])
+        self._grows = np.array([what.columns[i].from_zero for i in what.which], dtype=bool)
+        self.log_ratio = np.zeros((0, k + len(self.ends)))
+
+    def take(self, day: int, days: Days, innovation: Innovation) -> Alarm:
+        """Take in a day.
+
+        Parameters
+        ----------
+        day : int
+            Its number.
+        days : Days
+            With the derivatives of its errors.
+        innovation : Innovation
+            Of the filter.
+        """
+        self._renew(day)
+        n, t, k = self._moved.shape
+        own = self.what.shown(days, day, innovation)
+        self.dispersion.put(day, own, innovation)
+        shown = own[:, None, :] - (innovation.observe @ self._moved.reshape(n, -1)).reshape(-1, t, k)
+        for number, age in enumerate(day - self.starts):
+            if age < len(days.onset):
+                shown[:, number] -= days.onset[age][innovation.seen][:, self.what.which]
+        flat = shown.reshape(len(own), -1)
+        self._moved += (innovation.gain @ flat).reshape(n, t, k)
+        white = solve_triangular(innovation.root, flat, lower=True)
+        self._score += (innovation.white @ white).reshape(t, k)
+        self._information += (white**2).sum(axis=0).reshape(t, k)
+        before = self.log_ratio
+        self.log_ratio = self._ratios(self.dispersion.at(day))
+        self._top = np.maximum(self._top, self.log_ratio - before)
+        return self._judge()
+
+    def size(self, start: int, number: int) -> float:
+        """Likeliest size of a change since a day [estimation scale].
+
+        Parameters
+        ----------
+        start : int
+            Since when.
+        number : int
+            Which of those that are sought.
+        """
+        row = int(np.argmin(np.abs(self.starts - start)))
+        sharp = self._information[row, number] + self._deviation[number] ** -2.0
+        return float(self._score[row, number] / sharp)
+
+    def _renew(self, day: int) -> None:
+        """Let go of starts that are too long ago, and begin a new one."""
+        age = day - self.starts
+        kept = (age < _EACH) | ((self.starts % _THIRD == 0) & (age < _LONGEST))
+        self.starts = np.append(self.starts[kept], day)
+        new = np.zeros((self._moved.shape[0], 1, self._moved.shape[2]))
+        self._moved = np.concatenate([self._moved[:, kept], new], axis=1)
+        for name in ("_score", "_information", "_top", "log_ratio"):
+            held = getattr(self, name)
+            setattr(self, name, np.vstack([held[kept], np.zeros((1, held.shape[1]))]))
+
+    def _ratios(self, ratio_of_variances: FloatArray) -> FloatArray:
+        """Logarithms of the likelihood ratios, by start and change; the ends of earlier changes last."""
+        score, information = self._score / ratio_of_variances, self._information / ratio_of_variances
+        parts = []
+        for size in _SIZES:
+            spread = size * self._deviation
+            sharp = information + spread**-2.0
+            ratio = 0.5 * score**2 / sharp - 0.5 * np.log1p(information * spread**2)
+            # half of the normal distribution where a strength can only grow
+            ratio = ratio + np.where(self._grows, np.log(2.0) + log_ndtr(score / np.sqrt(sharp)), 0.0)
+            parts.append(ratio)
+        begun = logsumexp(np.array(parts), axis=0) - np.log(len(parts))
+        over = [-size * score[:, [i]] - 0.5 * size**2 * information[:, [i]] for i, size in self.ends]
+        return np.hstack([begun, *over])
+
+    def _judge(self) -> Alarm:
+        """Weigh all changes and starts."""
+        share = _ENDS if self.ends else 0.0
+        ends = np.full(len(self.ends), share / max(1, len(self.ends)))
+        weight = np.concatenate([(1.0 - share) * self.what.weight, ends])
+        with np.errstate(divide="ignore"):
+            told = self.log_ratio - np.maximum(0.0, self._top - self.cap) + np.log(weight)
+        whole = float(logsumexp(told))
+        probability = np.exp(logsumexp(told, axis=0) - whole)
+        k = self.what.which.size
+        start = int(self.starts[np.argmax(logsumexp(told, axis=1))])
+        return Alarm(whole, start, probability[:k], probability[k:])

@@ -1,0 +1,51 @@
+"""Time line of a monitoring: changes, evidence, errors."""
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from calibration.monitoring.monitor import Monitoring
+from mpc.reports.figures import style
+from mpc.reports.figures.style import MEASURED, MUTED, SIMULATED, WARNING, Picture, picture, styled
+
+
+@styled
+def time_line(found: Monitoring) -> list[Picture]:
+    """Draw changes with their beginnings and ends, the evidence by day with its threshold, and the errors by week.
+
+    Parameters
+    ----------
+    found : Monitoring
+        From `monitor`.
+    """
+    events, daily, weekly = found.events, found.daily(), found.weekly()
+    figure = Figure(figsize=(10.0, 4.6 + 0.3 * len(events)), layout="constrained")
+    bars, evidence, error = figure.subplots(
+        3, 1, sharex=True, gridspec_kw={"height_ratios": [0.5 + 0.3 * max(1, len(events)), 1.5, 1.5]}
+    )
+    x = style.lines_over_time(error, found.days.dates, ticks=13)
+    watched = x[min(found.settings.reference_days, len(x) - 1)]
+    bars.axvspan(x[0], watched, color=MUTED, alpha=0.2)
+    bars.text(x[0], -0.5, " reference days", va="center", fontsize=8)
+    for row, e in enumerate(events):
+        begin, end = x[min(e.since, len(x) - 1)], x[-1] if e.end is None else x[min(e.end, len(x) - 1)]
+        bars.barh(row, end - begin, left=begin, height=0.6, color=WARNING if e.end is None else SIMULATED)
+        bars.plot(x[min(e.alarm, len(x) - 1)], row, "k|", markersize=10)
+        words = f"{e.effect} {', '.join(e.zones)} "
+        late = begin > x[0] + 0.5 * (x[-1] - x[0])
+        bars.text(begin if late else end, row, words if late else f" {words}", va="center", fontsize=8,
+                  ha="right" if late else "left", clip_on=not late and e.end is not None)  # fmt: skip
+        if not late and e.end is None:  # a bar to the end has no room behind it
+            bars.texts[-1].set(x=begin, ha="right", text=words)
+    bars.set(title="What has changed; a stroke is the day on which it was noticed", yticks=[])
+    bars.set_ylim(max(1, len(events)) - 0.4, -1.0)
+    evidence.plot(x, np.maximum(daily["log_evidence"].to_numpy(), -5.0), color=MEASURED, linewidth=0.9)
+    evidence.axhline(found.course.threshold, color=WARNING, linestyle="--", linewidth=0.9)
+    evidence.set(title="Evidence that something has changed, dashed: alarm", ylabel="log evidence [-]")
+    evidence.set_ylim(-6.0, 3.0 * found.course.threshold)
+    weeks = style.day_numbers(weekly.index)  # type: ignore[arg-type]
+    error.step(weeks, weekly["mae"], where="post", color=MUTED, label="model of the reference days")
+    error.step(weeks, weekly["mae_carried"], where="post", color=MEASURED, label="carried on, a day ahead")
+    error.set(title="Mean absolute error by week", ylabel="[K]")
+    error.set_ylim(bottom=0.0)
+    error.legend(fontsize=8, loc="upper left")
+    return [picture(figure, "Changes, evidence by day and errors by week, over time")]

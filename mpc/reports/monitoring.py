@@ -1,0 +1,110 @@
+"""What a monitoring leaves behind: its words, its page and its files."""
+
+from pathlib import Path
+from typing import Any
+
+from calibration.monitoring.course import UNKNOWN_CAUSE, Event
+from calibration.monitoring.days import USUAL
+from calibration.monitoring.monitor import Monitoring
+from mpc.reports.diagnosis_words import called, in_zones
+from mpc.reports.figures.monitoring import time_line
+from mpc.reports.page import counted, listed, significant, sure, unit, write_report
+from thermal.effects.catalogue import CATALOGUE
+
+#: Events that the verdict names.
+_MOST = 3
+
+
+def write_monitoring(found: Monitoring, out: str | Path, *, force: bool = False) -> Path:
+    """Write ``monitoring.json``, ``weekly.parquet``, ``daily.parquet`` and ``report.html``.
+
+    Parameters
+    ----------
+    found : Monitoring
+        From `monitor`.
+    out : str or Path
+        Folder, made if need be.
+    force : bool
+        Replace earlier results.
+
+    Returns
+    -------
+    Path
+        The page.
+    """
+    content = {
+        "case": found.case, "verdict": monitoring_verdict(found), "events": event_rows(found),
+        "figures": time_line(found), "span": (found.days.dates[0], found.days.dates[-1]),
+        "reference": found.settings.reference_days, "threshold": found.course.threshold,
+        "withdrawn": [f"{found.date(day):%Y-%m-%d}" for day in found.course.withdrawn],
+        "untestable": [f"{called(e)}: {reason}" for e, reason in found.untestable.items()],
+        "parameters": found.parameters,
+    }  # fmt: skip
+    files = {
+        "monitoring.json": monitoring_summary(found), "weekly.parquet": found.weekly(), "daily.parquet": found.daily(),
+    }  # fmt: skip
+    return write_report(out, "monitoring", content, files, force)
+
+
+def monitoring_summary(found: Monitoring) -> dict[str, Any]:
+    """Contents of ``monitoring.json``.
+
+    Parameters
+    ----------
+    found : Monitoring
+        From `monitor`.
+    """
+    return {"sentence": monitoring_verdict(found), **found.to_dict()}
+
+
+def monitoring_verdict(found: Monitoring) -> str:
+    """Say in plain words what has changed, and since when.
+
+    Parameters
+    ----------
+    found : Monitoring
+        From `monitor`.
+    """
+    watched = counted(len(found.days) - found.settings.reference_days, "day")
+    if not found.events:
+        return f"Nothing has changed in {watched} that were watched."
+    told = [f"{_what(e)} ({in_zones(e.zones)}), {_when(found, e)}" for e in found.events[-_MOST:]]
+    more = len(found.events) - len(told)
+    text = f"In {watched} that were watched: {listed(told)}."
+    return text + (f" {counted(more, 'earlier change')} beside." if more else "")
+
+
+def event_rows(found: Monitoring) -> list[dict[str, Any]]:
+    """Rows of the table of changes.
+
+    Parameters
+    ----------
+    found : Monitoring
+        From `monitor`.
+    """
+    rows = []
+    for e in found.events:
+        others = [f"{called(name)} {sure(p)}" for name, p in e.probabilities.items() if name != e.effect]
+        rows.append({
+            "since": f"{found.date(e.since):%Y-%m-%d}",
+            "until": "lasts" if e.end is None else f"{found.date(e.end):%Y-%m-%d}",
+            "what": _what(e), "where": in_zones(e.zones), "sure": sure(e.probability),
+            "size": f"{significant(e.size, 2)} ± {significant(1.645 * e.deviation, 2)} {unit(e.unit)}",
+            "noticed": f"{found.date(e.alarm):%Y-%m-%d}", "others": "; ".join(others) or "–",
+            "told_apart": CATALOGUE[e.effect].separated_by if e.effect in CATALOGUE else "",
+        })  # fmt: skip
+    return rows
+
+
+def _what(event: Event) -> str:
+    """Call a change by what it is, and whether there is more or less of it."""
+    if event.effect == UNKNOWN_CAUSE:
+        return f"{'more' if event.size > 0 else 'less'} heat of unknown cause"
+    if event.effect in USUAL:  # there from the beginning, so that it can also become less
+        return f"{called(event.effect)}, {'more' if event.size > 0 else 'less'} than before"
+    return called(event.effect)
+
+
+def _when(found: Monitoring, event: Event) -> str:
+    since = f"since {found.date(event.since):%Y-%m-%d}"
+    return since if event.end is None else f"{since}, over on {found.date(event.end):%Y-%m-%d}"

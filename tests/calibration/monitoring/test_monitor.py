@@ -1,0 +1,77 @@
+"""A twin whose heat meter begins to read wrong: found on its day and named; its page; bad input."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from calibration.errors import CalibrationError, NotEnoughDataError
+from calibration.monitoring.monitor import Monitoring, MonitorSettings, monitor
+from mpc.reports.monitoring import monitoring_verdict, write_monitoring
+from thermal.case.case import Case
+from thermal.data import load_bundled_case
+from thermal.errors import EffectError
+from thermal.pilot.twin import TwinRanges, TwinSettings, generate_twin
+
+DAYS, REFERENCE, CHANGED = 42, 21, 31
+SETTINGS = MonitorSettings(reference_days=REFERENCE, dx=2.0, known=())
+
+
+@pytest.fixture(scope="module")
+def quiet() -> Case:
+    ranges = TwinRanges((0.5, 0.5), (7200.0, 7200.0), (0.02, 0.02))
+    settings = TwinSettings(days=float(DAYS), spin_up_days=3.0, step_seconds=3600.0, dx=2.0, ranges=ranges)
+    return generate_twin(load_bundled_case().building, 1, settings)[0]
+
+
+@pytest.fixture(scope="module")
+def spoilt(quiet: Case) -> tuple[Case, str]:
+    zone = quiet.building.zone_names[0]
+    frame = quiet.telemetry.frame.copy()
+    # from the change on 1.3 times the heat enters that the meter says
+    rows = frame.index >= frame.index[0].normalize() + pd.DateOffset(days=CHANGED)
+    frame.loc[rows, f"VAV_{zone}/supply_air_flowrate_sensor"] /= 1.3
+    return Case(quiet.building, replace(quiet.telemetry, frame=frame)), zone
+
+
+@pytest.fixture(scope="module")
+def found(spoilt: tuple[Case, str]) -> Monitoring:
+    return monitor(spoilt[0], settings=SETTINGS)
+
+
+def test_the_change_is_found_on_its_day_and_named(found: Monitoring, spoilt: tuple[Case, str]) -> None:
+    event = found.events[0]
+    assert (event.effect, event.zones) == ("flow_gain", (spoilt[1],))
+    assert abs(event.since - CHANGED) <= 1
+    assert event.alarm - CHANGED <= 5
+    assert event.size == pytest.approx(0.3, abs=0.06)
+
+
+def test_a_quiet_twin_is_quiet(quiet: Case) -> None:
+    result = monitor(quiet, settings=SETTINGS)
+    assert result.events == ()
+    assert monitoring_verdict(result) == f"Nothing has changed in {len(result.days) - REFERENCE} days that were watched."
+
+
+def test_files(found: Monitoring, tmp_path: Path) -> None:
+    page = write_monitoring(found, tmp_path / "out")
+    content = json.loads((page.parent / "monitoring.json").read_text(encoding="utf-8"))
+    assert content["events"][0]["effect"] == "flow_gain"
+    assert content["events"][0]["since"].startswith(f"{found.date(found.events[0].since):%Y-%m-%d}")
+    weekly = pd.read_parquet(page.parent / "weekly.parquet")
+    assert set(found.days.zones) <= set(weekly)
+    assert weekly["mae_carried"].iloc[REFERENCE // 7 :].notna().all()
+    assert "flow_gain" in page.read_text(encoding="utf-8") or "heat meter" in page.read_text(encoding="utf-8")
+
+
+def test_bad_input(quiet: Case) -> None:
+    with pytest.raises(NotEnoughDataError, match="60 reference days and a week"):
+        monitor(quiet, settings=replace(SETTINGS, reference_days=60))
+    with pytest.raises(CalibrationError, match="reference_days"):
+        monitor(quiet, settings=replace(SETTINGS, reference_days=3))
+    with pytest.raises((CalibrationError, EffectError), match="flow_gian"):
+        monitor(quiet, settings=replace(SETTINGS, ruled_out=("flow_gian",)))

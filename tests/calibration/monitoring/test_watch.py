@@ -1,0 +1,146 @@
+"""Run length and delay of the detector on days whose law is known, and the course from a change to its end."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from calibration.monitoring.course import follow
+from calibration.monitoring.days import ONSET, Column, Days
+from calibration.monitoring.filter import DayFilter, noise_of
+from calibration.monitoring.watch import Dispersion, Watch, sought
+
+N_ERROR, REFERENCE = 6, 30
+
+
+def column(name: str, effect: str | None, changes: bool, zones: tuple[str, ...] = ()) -> Column:
+    """Make a column whose prior is one unit wide."""
+    return Column(name, "1", effect, zones, 1.0, 0.3, 0.0, 0.0, changes, False)
+
+
+def made(seed: int, n_day: int, shift: float = 0.0, start: int = 0, end: int = 10**6) -> Days:
+    """Make white days about what is expected, with a change of the first of two strengths."""
+    rng = np.random.default_rng(seed)
+    slopes = np.zeros((n_day, N_ERROR, 3))
+    slopes[:, :3, 0] = slopes[:, 3:, 1] = 1.0
+    slopes[:, :, 2] = rng.standard_normal((n_day, N_ERROR))
+    columns = (column("valve_leak@A", "valve_leak", True, ("A",)), column("flow_gain@B", "flow_gain", True, ("B",)),
+               column("window_u_value", None, False))  # fmt: skip
+    errors = 0.5 * rng.standard_normal((n_day, N_ERROR))
+    lasts = (np.arange(n_day) >= start) & (np.arange(n_day) < end)
+    # errors are simulated minus measured: what the model lacks takes the sign of its derivative the other way
+    errors -= shift * lasts[:, None] * slopes[:, :, 0]
+    dates = pd.date_range("2023-01-02", periods=n_day, freq="D", tz="UTC")
+    return Days(dates, errors, slopes, columns, np.zeros((ONSET, N_ERROR, 3)), np.repeat([0, 1], 3), ("A", "B"))
+
+
+def first_alarms(threshold: float, seeds: range, n_day: int) -> list[float]:
+    """First days on which the evidence exceeds a threshold while nothing changes; infinite where it never does."""
+    found = []
+    for seed in seeds:
+        days = made(seed, n_day)
+        filtered, what = DayFilter(days, 0.25 * np.eye(N_ERROR)), sought(days.columns)
+        state, dispersion = filtered.start(), Dispersion(n_day, what.which.size)
+        watch, first = Watch(what, state.mean.size, dispersion), np.inf
+        for day in range(n_day):
+            state, innovation = filtered.step(state, day)
+            assert innovation is not None
+            if watch.take(day, days, innovation).log_evidence > threshold:
+                first = float(day)
+                break
+        found.append(first)
+    return found
+
+
+def test_mean_run_length_is_at_least_the_stated_one() -> None:
+    """ARL >= A for the Shiryaev-Roberts sum (Shin, Ramdas and Rinaldo 2024), here with A = 20 days."""
+    stated = 20.0
+    runs = np.minimum(first_alarms(np.log(stated), range(12), 60), 60.0)
+    assert runs.mean() > stated
+
+
+def test_filter_innovations_are_white_where_days_are() -> None:
+    days = made(1, 120)
+    filtered = DayFilter(days, 0.25 * np.eye(N_ERROR))
+    state, white = filtered.start(), []
+    for day in range(len(days)):
+        state, innovation = filtered.step(state, day)
+        assert innovation is not None
+        white.append(innovation.white)
+    squared = np.mean(np.array(white[20:]) ** 2)
+    assert squared == pytest.approx(1.0, abs=4.0 * np.sqrt(2.0 / (100 * N_ERROR)))
+
+
+def test_noise_is_found() -> None:
+    found = np.diag(noise_of(made(2, 200), 200))
+    assert found == pytest.approx(np.full(N_ERROR, 0.25), rel=0.4)
+
+
+def test_information_of_a_new_change_is_that_of_least_squares() -> None:
+    """On the day of a change score and information are jᵀ V⁻¹ ν and jᵀ V⁻¹ j."""
+    days = made(3, 5)
+    filtered, what = DayFilter(days, 0.25 * np.eye(N_ERROR)), sought(days.columns)
+    state = filtered.start()
+    watch = Watch(what, state.mean.size, Dispersion(5, 2))
+    for day in range(4):
+        state, innovation = filtered.step(state, day)
+        assert innovation is not None
+        watch.take(day, days, innovation)
+    own = -days.slopes[3][:, :2]
+    expected = np.linalg.solve(innovation.root @ innovation.root.T, own)
+    assert watch._information[-1] == pytest.approx(np.sum(own * expected, axis=0))
+    assert watch._score[-1] == pytest.approx(expected.T @ innovation.left)
+
+
+def test_delay_is_near_lordens_bound() -> None:
+    """No detector of mean run length A is sooner than log A / I on average, I the divergence a day (Lorden 1971)."""
+    threshold, shift = 14.0, 1.2
+    delays = []
+    for seed in range(4):
+        course = follow(made(seed, 120, shift, start=70), REFERENCE, threshold=threshold)
+        hits = [e for e in course.events if e.alarm >= 70]
+        assert hits
+        delays.append(hits[0].alarm - 69)
+    divergence = 0.5 * shift**2 * 3 / 0.25
+    bound = threshold / divergence
+    assert bound < np.mean(delays) < 4.0 * bound
+
+
+def test_a_change_is_dated_named_sized_and_closed() -> None:
+    course = follow(made(7, 160, 1.5, start=70, end=110), REFERENCE)
+    assert len(course.events) == 1
+    event = course.events[0]
+    assert (event.effect, event.zones) == ("valve_leak", ("A",))
+    assert abs(event.since - 70) <= 1
+    assert event.alarm - 70 <= 5
+    assert event.size == pytest.approx(1.5, abs=4.0 * event.deviation)
+    assert event.end is not None
+    assert abs(event.end - 110) <= 2
+
+
+def test_quiet_days_are_quiet() -> None:
+    course = follow(made(8, 160), REFERENCE)
+    assert course.events == ()
+    assert course.withdrawn == ()
+    assert np.isfinite(course.evidence[REFERENCE:]).all()
+    assert np.isnan(course.evidence[:REFERENCE]).all()
+
+
+def test_a_single_day_raises_no_alarm() -> None:
+    days = made(9, 100)
+    days.errors[70] += 20.0
+    assert follow(days, REFERENCE).events == ()
+
+
+def test_what_is_ruled_out_is_not_named() -> None:
+    course = follow(made(7, 110, 1.5, start=70), REFERENCE, ruled_out=["valve_leak"])
+    assert all(e.effect != "valve_leak" for e in course.events)
+
+
+def test_days_without_telemetry_are_passed_over() -> None:
+    days = made(7, 110, 1.5, start=70)
+    days.errors[60:66] = np.nan
+    days.errors[80, :2] = np.nan
+    event = follow(days, REFERENCE).events[0]
+    assert event.effect == "valve_leak"
