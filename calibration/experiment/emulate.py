@@ -1,0 +1,262 @@
+"""Telemetry of an experiment before it is carried out: days of the past as they would have been with its setpoints.
+
+The weather and the use are those of measured days. A member's model says what the zones' temperatures and the metered
+heat would be where terminals follow the setpoints within the heat that they were seen to give.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import pandas as pd
+
+from calibration.diagnosis.refit.comparison import ModelComparison
+from calibration.experiment.members import Member
+from calibration.experiment.schedule import COOLING, HEATING, Schedule
+from thermal._types import FloatArray
+from thermal.case.case import Case
+from thermal.case.commands import air_column
+from thermal.case.points import HEATING_POWER, SUPPLY_FLOW, ZONE_TEMPERATURE
+from thermal.case.telemetry import Telemetry
+from thermal.inputs.provider import HVAC_INPUTS, InputProvider, telemetry_inputs
+from thermal.model.case_replay import Inputs, replay_inputs, spin_up
+from thermal.model.step import Stepper
+from thermal.units import AIR_HEAT_CAPACITY
+
+#: Share of the time in which a zone's heat is below what counts as the most that its terminal gives [-].
+_MOST = 0.99
+
+#: Heat of a zone per floor area below which its terminal does not work [W/m2].
+_IDLE = 0.5
+
+#: Times that signals made of the metered heat follow the heat that they change: the third changes it by under 1 %
+#: where they are a third of it, the most that a meter is off.
+_TIMES = 3
+
+#: Bins of a zone's heat by which its terminal's flow is known.
+_BINS = 24
+
+
+@dataclass(frozen=True)
+class Emulated:
+    """Days of the past with an experiment's setpoints.
+
+    Parameters
+    ----------
+    case : Case
+        Telemetry from the spin-up on.
+    drivers : InputProvider
+        Inputs of effects made of it.
+    zone, heat : ndarray, shape (n_time, n_zone)
+        Temperatures [K] and metered heat [W] of the experiment's steps.
+    """
+
+    case: Case
+    drivers: InputProvider
+    zone: FloatArray
+    heat: FloatArray
+
+
+class Emulator:
+    """Emulates experiments on some measured days.
+
+    Parameters
+    ----------
+    models : ModelComparison
+        The case.
+    start : Timestamp
+        When the days begin that an experiment is put on.
+    hours : float
+        Their length [h].
+    """
+
+    def __init__(self, models: ModelComparison, start: pd.Timestamp, hours: float) -> None:
+        self.models, self.start, self.hours = models, start, hours
+        end = start + pd.Timedelta(hours=hours)
+        before = pd.Timedelta(seconds=models.settings.spin_up_seconds)
+        self.case = models.case.slice(start - before, end)
+        self.first = int(self.case.stamps.searchsorted(start, side="right"))
+        self.stamps = self.case.stamps[self.first :]
+        self.zones = models.case.building.zone_names
+        self.measured = self.case.zone_temperatures().interpolate(limit_direction="both").to_numpy(dtype=float)
+        self.heat = self.case.zone_heat_estimated().interpolate(limit_direction="both").fillna(0.0).to_numpy(dtype=float)
+        self.device = {zone: self._device(zone) for zone in self.zones}
+        areas = {name: room.floor_area for name, room in models.anatomy.rooms.items()}
+        self.idle = _IDLE * np.array([areas[z] for z in self.zones])
+
+    def _device(self, zone: str) -> tuple[str, str, str] | None:
+        """Columns of the flow and discharge temperature of a zone's terminal, or twice that of its power."""
+        building, columns = self.models.case.building, set(self.models.case.telemetry.frame.columns)
+        for device in building.devices_of(zone):
+            flow, power = f"{device.name}/{SUPPLY_FLOW}", f"{device.name}/{HEATING_POWER}"
+            discharge = air_column(building, device, columns)
+            if flow in columns and discharge in columns:
+                return device.name, flow, str(discharge)
+            if power in columns:
+                return device.name, power, power
+        return None
+
+    @property
+    def movable(self) -> tuple[str, ...]:
+        """Zones whose heat a terminal gives and a meter tells."""
+        known = np.isfinite(self.measured).all(axis=0)
+        return tuple(z for z, seen in zip(self.zones, known, strict=True) if seen and self.device[z] is not None)
+
+    @cached_property
+    def _whole(self) -> tuple[FloatArray, pd.DataFrame]:
+        return self.models.case.zone_heat().to_numpy(dtype=float), self.models.case.usable
+
+    @cached_property
+    def capacity(self) -> tuple[FloatArray, FloatArray]:
+        """Least and most heat that each zone was given, shape (n_zone,) each [W]."""
+        heat = np.nan_to_num(self._whole[0])
+        low, high = (np.quantile(heat, q, axis=0) for q in (1.0 - _MOST, _MOST))
+        return np.minimum(low, 0.0), np.maximum(high, 0.0)
+
+    @cached_property
+    def flows(self) -> Mapping[str, tuple[FloatArray, FloatArray]]:
+        """Heat [W] and flow [kg/s] of each air terminal, in order of the heat."""
+        heat, frame = self._whole
+        found = {}
+        for i, zone in enumerate(self.zones):
+            device = self.device[zone]
+            if device is None or device[1].endswith(HEATING_POWER):
+                continue
+            pair = np.column_stack([heat[:, i], frame[device[1]].to_numpy(dtype=float)])
+            pair = pair[np.isfinite(pair).all(axis=1)]
+            parts = np.array_split(pair[np.argsort(pair[:, 0], kind="stable")], _BINS)
+            centres = np.array([np.median(part, axis=0) for part in parts if len(part)])
+            found[zone] = centres[:, 0], centres[:, 1]
+        return found
+
+    @cached_property
+    def usual(self) -> FloatArray:
+        """Heating and cooling setpoints as they were: the measured temperatures where nobody tells, (n, n_zone, 2)."""
+        frame, rows = self.case.usable, slice(self.first, None)
+        found = np.repeat(self.measured[rows, :, None], 2, axis=2)
+        for i, zone in enumerate(self.zones):
+            device = self.device[zone]
+            for k, point in enumerate((HEATING, COOLING)):
+                names = [f"{e}/{point}" for e in (zone, device[0] if device else "") if f"{e}/{point}" in frame]
+                if names:
+                    found[:, i, k] = frame[names[0]].ffill().bfill().to_numpy(dtype=float)[rows]
+        return found
+
+    def run(self, member: Member, schedule: Schedule) -> Emulated:
+        """Emulate an experiment in a building that is as a member's model is.
+
+        Parameters
+        ----------
+        member : Member
+            Its model.
+        schedule : Schedule
+            Of the experiment, which begins with these days.
+        """
+        asked = schedule.setpoints(self.stamps, self.case.step, self.zones)
+        network = member.fit.built.network
+        made = self._with(self.measured[self.first :], self.heat[self.first :], schedule)
+        follows = any(HVAC_INPUTS & set(s.inputs) for s in network.signals)
+        for _ in range(_TIMES if follows else 1):
+            made = self._with(*self._closed(member, replay_inputs(made.case, network, made.drivers), asked), schedule)
+        if follows:  # with the signals of this heat, for a signal that jumps settles on nothing
+            inputs = replay_inputs(made.case, network, made.drivers)
+            made = self._with(*self._closed(member, inputs, asked, made.heat), schedule)
+        return made
+
+    def _closed(
+        self, member: Member, inputs: Inputs, asked: FloatArray, given: FloatArray | None = None
+    ) -> tuple[FloatArray, FloatArray]:
+        """Temperatures and heat where terminals follow setpoints, or of given heat, with the signals as they are."""
+        fit, first = member.fit, self.first
+        matrices = fit.model.matrices(fit.theta)
+        before = np.array([first - 1])
+        usual_inputs = replace(inputs, held=self.case.zone_temperatures().ffill().bfill().to_numpy(dtype=float))
+        states, _ = spin_up(matrices, usual_inputs, 0, before)
+        stepper, n = Stepper(matrices, inputs.step, fit.settings.stepping), len(self.zones)
+        unit = np.hstack([np.zeros((n, 1)), np.eye(n)])
+        low, high = self.capacity
+        moved = np.isfinite(asked[:, :, 0])
+        still = np.array([z not in self.movable for z in self.zones])
+        zone, heat = np.empty((len(asked), n)), np.empty((len(asked), n))
+        for k in range(len(asked)):
+            row = first + k
+            columns = np.repeat(states, n + 1, axis=1)
+            ends, means, _, _ = stepper.advance(
+                columns, np.repeat(inputs.boundary[row][:, None], n + 1, axis=1), 1000.0 * unit,
+                np.repeat(inputs.airflow[row][:, None], n + 1, axis=1) if inputs.airflow.shape[1] else None,
+            )  # fmt: skip
+            seen = np.asarray(matrices.output @ ends)
+            alone, gain = seen[:, 0], (seen[:, 1:] - seen[:, :1]) / 1000.0
+            usual = self.heat[row]
+            pair = np.where(moved[k][:, None], asked[k], self.measured[row][:, None])
+            idle = (~moved[k] & (np.abs(usual) < self.idle)) | still
+            q = given[k] if given is not None else _followed(alone, gain, pair, np.minimum(low, usual), np.maximum(high, usual), np.where(idle, usual, np.nan))
+            states = ends[:, :1] + (ends[:, 1:] - ends[:, :1]) @ q[:, None] / 1000.0
+            zone[k] = means[:, 0] + (means[:, 1:] - means[:, :1]) @ q / 1000.0
+            heat[k] = q
+        return zone, heat
+
+    def _with(self, zone: FloatArray, heat: FloatArray, schedule: Schedule) -> Emulated:
+        """Telemetry that shows given temperatures and heat."""
+        frame, rows = self.case.telemetry.frame.copy(), self.stamps
+        handlers = [d.name for d in self.case.building.devices if d.type == "ahu"]
+        supply = schedule.setpoints(rows, self.case.step, handlers, supply=True)[:, :, 0]
+        warmer = np.nanmean(supply, axis=1) if np.isfinite(supply).any() else None
+        for i, name in enumerate(self.zones):
+            entities = [name, *(d.name for d in self.case.building.devices_of(name))]
+            for column in (f"{e}/{ZONE_TEMPERATURE}" for e in entities):
+                if column in frame:
+                    frame.loc[rows, column] = zone[:, i]
+            if self.device[name] is None:
+                continue
+            _, flow, discharge = self.device[name]  # type: ignore[misc]
+            changed = np.abs(heat[:, i] - self.heat[self.first :, i]) > 1.0
+            if name not in self.flows:
+                own = frame.loc[rows, flow].to_numpy(dtype=float)
+                frame.loc[rows, flow] = own + heat[:, i] - self.heat[self.first :, i]
+                continue
+            rate = frame.loc[rows, flow].to_numpy(dtype=float).copy()
+            most = max(float(self.flows[name][1].max()), 1e-6)
+            runs, least = rate > 0.02 * most, float(self.flows[name][1][self.flows[name][1] > 0.02 * most].min())
+            rate = np.where(changed, np.interp(heat[:, i], *self.flows[name]), rate)
+            rate = np.where(runs, np.maximum(rate, least), rate)  # an air handler that runs brings air, called or not
+            if warmer is not None:
+                needed = -heat[:, i] / AIR_HEAT_CAPACITY / np.maximum(zone[:, i] - warmer, 1.0)
+                rate = np.where(np.isfinite(warmer) & (heat[:, i] < -self.idle[i]), np.minimum(needed, most), rate)
+            rate = np.where(np.abs(heat[:, i]) > 1.0, np.maximum(rate, 0.05 * most), rate)
+            frame.loc[rows, flow] = rate
+            frame.loc[rows, discharge] = zone[:, i] + heat[:, i] / AIR_HEAT_CAPACITY / np.maximum(rate, 1e-9)
+        case = Case(self.case.building, Telemetry(frame, self.case.step, self.case.telemetry.missing_rows),
+                    judged=self.case.quality)  # fmt: skip
+        return Emulated(case, telemetry_inputs(case, self.models.drivers.normalisation), zone, heat)
+
+
+def _followed(
+    alone: FloatArray, gain: FloatArray, pair: FloatArray, low: FloatArray, high: FloatArray, fixed: FloatArray
+) -> FloatArray:
+    """Heat by which zones come within their setpoints at the end of a step, as far as their terminals can, (n_zone,).
+
+    Parameters
+    ----------
+    alone : ndarray, shape (n_zone,)
+        Temperatures without heat [K].
+    gain : ndarray, shape (n_zone, n_zone)
+        What heat adds to them [K/W].
+    pair : ndarray, shape (n_zone, 2)
+        Heating and cooling setpoints [K].
+    low, high : ndarray, shape (n_zone,)
+        Least and most heat [W].
+    fixed : ndarray, shape (n_zone,)
+        Heat of zones that follow nothing [W], NaN for the others.
+    """
+    heat = np.where(np.isfinite(fixed), fixed, 0.0)
+    free, own = ~np.isfinite(fixed), np.diag(gain)
+    for _ in range(3):  # zones hardly heat each other within a step
+        for i in np.flatnonzero(free):
+            rest = float(alone[i] + gain[i] @ heat - own[i] * heat[i])
+            target = min(max(rest, pair[i, 0]), pair[i, 1])
+            heat[i] = min(max((target - rest) / own[i], low[i]), high[i])
+    return heat
+
+

@@ -1,0 +1,202 @@
+"""Moves that a building can make without harm, from which an experiment is put together."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pandas as pd
+
+from calibration.experiment.schedule import BAND, Move
+from thermal._types import BoolArray, FloatArray
+from thermal.case.building import Building
+from thermal.network.topology import Anatomy
+
+#: Distance that setpoints keep from the edge of the comfort band [K]: terminals without integral action rest up to
+#: half of their throttling range from them (ASHRAE Handbook, Fundamentals 2017, ch. 7).
+MARGIN = 0.5
+
+#: How far beyond the band of occupied hours zones are driven while nobody is in [K]: what an ordinary system gets to
+#: in some hours, and back from before people come.
+BEYOND = 3.0
+
+#: Hours before people come in which zones are back where they like it [h].
+LEAD = 3.0
+
+#: How long setpoints hold where they go to and fro [h]: shorter than walls take to follow, longer than air does.
+TURNS = (1.0, 3.0)
+
+#: Longer than any experiment [h]: setpoints that stay.
+_LONG = 1e4
+
+
+@dataclass(frozen=True)
+class Comfort:
+    """Band of temperatures on the steps of an experiment.
+
+    Parameters
+    ----------
+    lower, upper : ndarray, shape (n_time,)
+        Its edges [K].
+    """
+
+    lower: FloatArray
+    upper: FloatArray
+
+    @property
+    def occupied(self) -> BoolArray:
+        """Whether people are in: where the band is at its narrowest."""
+        width = self.upper - self.lower
+        return np.asarray(width <= width.min() + 1e-9)
+
+    def discomfort(self, zone: FloatArray, step: float) -> FloatArray:
+        """Distance from the band over time, shape (n_zone,) [K h].
+
+        Parameters
+        ----------
+        zone : ndarray, shape (n_time, n_zone)
+            Temperatures [K].
+        step : float
+            Time step [s].
+        """
+        off = np.maximum(self.lower[:, None] - zone, zone - self.upper[:, None])
+        return np.asarray(np.maximum(off, 0.0).sum(axis=0) * step / 3600.0)
+
+
+def office_comfort(stamps: pd.DatetimeIndex, step: float) -> Comfort:
+    """Comfort of an office: 21 to 24 degC on weekdays from 6 to 19 h, 15 to 30 degC else.
+
+    Those of BOPTEST's multi-zone office (Blum et al. 2021, doi:10.1080/19401493.2021.1986574).
+
+    Parameters
+    ----------
+    stamps : DatetimeIndex, length n_time
+        Ends of the steps, local to the building.
+    step : float
+        Their length [s].
+    """
+    middle = stamps - pd.Timedelta(seconds=step / 2.0)
+    hour = np.asarray(middle.hour + middle.minute / 60.0)
+    people = (np.asarray(middle.day_of_week) < 5) & (hour >= 6.0) & (hour < 19.0)
+    return Comfort(np.where(people, 294.15, 288.15), np.where(people, 297.15, 303.15))
+
+
+def places(building: Building, anatomy: Anatomy, movable: Sequence[str], members: Sequence[Sequence[str]]) -> dict[str, tuple[str, ...]]:
+    """Zones that are moved together, by what they are called.
+
+    Parameters
+    ----------
+    building : Building
+        With its floors.
+    anatomy : Anatomy
+        With facades and what lies on what.
+    movable : sequence of str
+        Zones with a terminal.
+    members : sequence of sequence of str
+        Zones of each member of the group.
+    """
+    found: dict[str, Sequence[str]] = {"all zones": building.zone_names}
+    above = {high for _, high in anatomy.stacked}
+    if above:
+        found["the lower floors"] = [z for z in building.zone_names if z not in above]
+        found["the upper floors"] = sorted(above)
+    for zones in members:
+        if zones:
+            found[", ".join(zones[:4])] = zones
+    outside = {zone for zone, _ in anatomy.facades}
+    found["zones at a facade"] = [z for z in building.zone_names if z in outside]
+    found["every other zone"] = building.zone_names[::2]
+    chosen: dict[str, tuple[str, ...]] = {}
+    for name, zones in found.items():
+        here = tuple(z for z in building.zone_names if z in zones and z in movable)
+        if here and here not in chosen.values():
+            chosen[name] = here
+    return chosen
+
+
+def moves(
+    where: Mapping[str, tuple[str, ...]], handlers: Sequence[str], comfort: Comfort, hours: FloatArray, supply: tuple[float, float] | None
+) -> list[Move]:
+    """Give all single moves.
+
+    Parameters
+    ----------
+    where : mapping of str to tuple of str
+        Zones by name, `places`.
+    handlers : sequence of str
+        Air handlers whose supply air can be set.
+    comfort : Comfort
+        Band on the steps.
+    hours : ndarray, shape (n_time,)
+        Middle of each step from the beginning [h].
+    supply : tuple of float or None
+        Coldest and warmest supply air [K]; None where it is not set.
+    """
+    people = comfort.occupied
+    width = comfort.upper - comfort.lower
+    tight = int(np.argmin(width))
+    low, high = float(comfort.lower[tight]) + MARGIN, float(comfort.upper[tight]) - MARGIN
+    free = _spans(~_soon(people, hours), hours)
+    loose = int(np.argmax(width))
+    coldest = max(low - BEYOND, float(comfort.lower[loose]) + MARGIN)
+    warmest = min(high + BEYOND, float(comfort.upper[loose]) - MARGIN)
+    whole = ((0.0, float(hours[-1] + hours[0])),)
+    found = []
+    for name, zones in where.items():
+        kinds = [
+            (f"hold {name} warm by day and night", (high,), _LONG, whole),
+            (f"hold {name} cool by day and night", (low,), _LONG, whole),
+            *((f"move {name} to and fro every {t:g} h", (high, low), t, whole) for t in TURNS),
+        ]
+        if free:
+            kinds += [
+                (f"hold {name} warm while nobody is in", (warmest,), _LONG, free),
+                (f"let {name} cool while nobody is in", (coldest,), _LONG, free),
+                *((f"move {name} to and fro every {t:g} h while nobody is in", (warmest, coldest), t, free)
+                  for t in TURNS),
+            ]  # fmt: skip
+        for title, levels, every, spans in kinds:
+            pairs = tuple((v - BAND / 2.0, v + BAND / 2.0) for v in levels)
+            found.append(Move(title, zones, pairs, every, spans))
+    if supply is not None and handlers:
+        cold, warm = supply
+        title = "supply air warm and cold in turns of 3 h"
+        found.append(Move(title, tuple(handlers), ((warm, warm), (cold, cold)), 3.0, whole, supply=True))
+    return found
+
+
+def shortened(move: Move, share: float) -> Move:
+    """Give the last part of a move: the same, for a share of its hours.
+
+    Parameters
+    ----------
+    move : Move
+        Any.
+    share : float
+        Of its hours [-], 0 to 1.
+    """
+    left, spans = share * move.hours, []
+    for first, last in reversed(move.spans):
+        if left <= 1e-9:
+            break
+        taken = min(left, last - first)
+        spans.append((last - taken, last))
+        left -= taken
+    return replace(move, spans=tuple(reversed(spans)))
+
+
+def _soon(people: BoolArray, hours: FloatArray) -> BoolArray:
+    """Whether people are in, or come within the hours that zones take to be back."""
+    step = float(hours[1] - hours[0]) if hours.size > 1 else 1.0
+    found = people.copy()
+    for k in range(1, round(LEAD / step) + 1):
+        found[:-k] |= people[k:]
+    return found
+
+
+def _spans(inside: BoolArray, hours: FloatArray) -> tuple[tuple[float, float], ...]:
+    """First and last hours of the parts in which something is so, of 2 h at least."""
+    half = hours[0]
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], inside, [False]]).astype(int)))
+    parts = zip(edges[::2], edges[1::2], strict=True)
+    found = ((float(hours[a] - half), float(hours[b - 1] + half)) for a, b in parts)
+    return tuple(part for part in found if part[1] - part[0] >= 2.0)
