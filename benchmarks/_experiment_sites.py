@@ -11,7 +11,7 @@ from mpc.loop.simulated import SimulatedPlant
 from mpc.scenario.gains import InternalGains
 from thermal.case.building import Building
 from thermal.data import load_bundled_case
-from thermal.effects.catalogue import chosen
+from thermal.effects.catalogue import CATALOGUE, chosen
 from thermal.network.build import build_network
 from thermal.pilot.weather import MOUNTAIN_VIEW
 
@@ -25,6 +25,41 @@ NO_GAINS = InternalGains(0.0, 0.0, 0.0, 0.0)
 
 #: Months in which telemetry begins: winter, spring and summer, by the seed.
 STARTS = ("2023-01-09", "2023-04-10", "2023-07-10")
+
+
+#: Zones of the bundled office, and of each zone another one beside it.
+_ZONES = ("F1_N", "F1_W", "F1_C", "F1_E", "F1_S")
+_BESIDE = ("F1_C + F1_W", "F1_C + F1_N", "F1_C + F1_E", "F1_C + F1_S", "F1_N + F1_W")
+
+#: Strengths that leave a gap in most seeds [parameter units], by parameter; a share of 0.75 to 1.25 is drawn.
+STRENGTHS: dict[str, tuple[str, float]] = {
+    "flow_gain": ("flow_gain", 0.22), "duct_loss": ("duct_ntu", 0.22), "sensor_bias": ("sensor_bias", 0.9),
+    "valve_leak": ("valve_leak", 8.0), "hidden_mass": ("hidden_heat_capacity", 7e4), "zone_mixing": ("door_airflow", 0.15),
+    "internal_gains": ("base_load", 4.0), "ground_exchange": ("ground_u_value", 0.5), "roof_exchange": ("roof_u_value", 0.5),
+    "infiltration": ("infiltration_rate", 0.7), "thermal_bridge": ("thermal_bridge_u_value", 0.75),
+}  # fmt: skip
+
+
+def draw_site(seed: int, effect: str) -> "Site":
+    """Draw a site with one effect.
+
+    Parameters
+    ----------
+    seed : int
+        Of everything.
+    effect : str
+        One of `STRENGTHS`.
+    """
+    name, size = STRENGTHS[effect]
+    rng = np.random.default_rng([seed, 43])
+    value = float(size * rng.uniform(0.75, 1.25))
+    if effect == "zone_mixing":
+        pair = _BESIDE[seed % len(_BESIDE)]
+        return Site(seed, {effect: tuple(pair.split(" + "))}, {f"{name}@{pair}": value})
+    if not CATALOGUE[effect].zonal:
+        return Site(seed, {effect: ()}, {name: value})
+    zones = tuple(_ZONES[(seed + k) % len(_ZONES)] for k in range(2 if effect in ("flow_gain", "duct_loss") else 1))
+    return Site(seed, {effect: zones}, {f"{name}@{zone}": value for zone in zones})
 
 
 @dataclass(frozen=True)

@@ -23,6 +23,7 @@ from thermal.inputs.provider import HVAC_INPUTS, InputProvider, telemetry_inputs
 from thermal.model.case_replay import Inputs, replay_inputs, spin_up
 from thermal.model.step import Stepper
 from thermal.units import AIR_HEAT_CAPACITY
+from thermal.units import REFERENCE_TEMPERATURE as _REFERENCE
 
 #: Share of the time in which a zone's heat is below what counts as the most that its terminal gives [-].
 _MOST = 0.99
@@ -173,6 +174,8 @@ class Emulator:
         before = np.array([first - 1])
         usual_inputs = replace(inputs, held=self.case.zone_temperatures().ffill().bfill().to_numpy(dtype=float))
         states, _ = spin_up(matrices, usual_inputs, 0, before)
+        # signals are counted from the reference temperature, as differences of temperatures are
+        states, boundary = states - _REFERENCE * matrices.uniform[:, None], inputs.boundary - _REFERENCE
         stepper, n = Stepper(matrices, inputs.step, fit.settings.stepping), len(self.zones)
         unit = np.hstack([np.zeros((n, 1)), np.eye(n)])
         low, high = self.capacity
@@ -183,17 +186,17 @@ class Emulator:
             row = first + k
             columns = np.repeat(states, n + 1, axis=1)
             ends, means, _, _ = stepper.advance(
-                columns, np.repeat(inputs.boundary[row][:, None], n + 1, axis=1), 1000.0 * unit,
+                columns, np.repeat(boundary[row][:, None], n + 1, axis=1), 1000.0 * unit,
                 np.repeat(inputs.airflow[row][:, None], n + 1, axis=1) if inputs.airflow.shape[1] else None,
             )  # fmt: skip
-            seen = np.asarray(matrices.output @ ends)
+            seen = np.asarray(matrices.output @ ends) + _REFERENCE
             alone, gain = seen[:, 0], (seen[:, 1:] - seen[:, :1]) / 1000.0
             usual = self.heat[row]
             pair = np.where(moved[k][:, None], asked[k], self.measured[row][:, None])
             idle = (~moved[k] & (np.abs(usual) < self.idle)) | still
             q = given[k] if given is not None else _followed(alone, gain, pair, np.minimum(low, usual), np.maximum(high, usual), np.where(idle, usual, np.nan))
             states = ends[:, :1] + (ends[:, 1:] - ends[:, :1]) @ q[:, None] / 1000.0
-            zone[k] = means[:, 0] + (means[:, 1:] - means[:, :1]) @ q / 1000.0
+            zone[k] = _REFERENCE + means[:, 0] + (means[:, 1:] - means[:, :1]) @ q / 1000.0
             heat[k] = q
         return zone, heat
 

@@ -15,9 +15,9 @@ from thermal.network.topology import Anatomy
 #: half of their throttling range from them (ASHRAE Handbook, Fundamentals 2017, ch. 7).
 MARGIN = 0.5
 
-#: How far beyond the band of occupied hours zones are driven while nobody is in [K]: what an ordinary system gets to
-#: in some hours, and back from before people come.
-BEYOND = 3.0
+#: How far below and above the band of occupied hours zones are driven while nobody is in [K]: from as cool to as warm
+#: as thermostats are set (18 to 26 degC, ranges of `thermal.components.thermostat`), and back before people come.
+BEYOND = (3.0, 2.5)
 
 #: Hours before people come in which zones are back where they like it [h].
 LEAD = 3.0
@@ -137,8 +137,8 @@ def moves(
     low, high = float(comfort.lower[tight]) + MARGIN, float(comfort.upper[tight]) - MARGIN
     free = _spans(~_soon(people, hours), hours)
     loose = int(np.argmax(width))
-    coldest = max(low - BEYOND, float(comfort.lower[loose]) + MARGIN)
-    warmest = min(high + BEYOND, float(comfort.upper[loose]) - MARGIN)
+    coldest = max(low - BEYOND[0], float(comfort.lower[loose]) + MARGIN)
+    warmest = min(high + BEYOND[1], float(comfort.upper[loose]) - MARGIN)
     whole = ((0.0, float(hours[-1] + hours[0])),)
     found = []
     for name, zones in where.items():
