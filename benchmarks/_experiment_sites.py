@@ -113,7 +113,7 @@ class Site:
         weather = pilot_weather(self.seed, self.start, self.days + 14, 600.0)
         settings = PlantSettings(
             dx=DX, noise=SensorNoise(), gains=NO_GAINS, effects=chosen(self.effects), parameters=self.parameters(),
-            seed=self.seed, step_seconds=600.0,
+            seed=self.seed, step_seconds=600.0, pressures=True,
         )  # fmt: skip
         return simulated_plant(self.building, weather, start, end, settings)
 

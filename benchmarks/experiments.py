@@ -157,7 +157,7 @@ def report(out: Path, published: bool) -> str:
         wrong = sum(r["experiment"]["verdict"] == "named" and not r["experiment"]["right"] for r in mine)
         hopeless = [r for r in mine if r["design"]["verdict"] == "hopeless"]
         extra = [max(0.0, max(_beyond(r))) for r in mine]
-        lines.append([effect, len(mine), str(Rate(hits, len(mine))), str(Rate(null, len(mine))), wrong,
+        lines.append([effect, len(mine), _shown(hits, len(mine)), _shown(null, len(mine)), wrong,
                       f"{len(hopeless)}, {sum(r['experiment']['right'] for r in hopeless)} of them right",
                       float(np.median([r["design"]["cost"] for r in mine])), f"{max(extra):.2f}"])  # fmt: skip
     head = (f"{len(rows)} sites, of which {len(asked)} end with a group or a name under 90 %; the effect is in the "
@@ -168,8 +168,8 @@ def report(out: Path, published: bool) -> str:
     tail = ""
     if told:
         hits, null = (sum(r[k]["right"] for r in told) for k in ("experiment", "usual"))
-        tail = (f"\nOf the {len(told)} where the design promised better than even odds, {Rate(hits, len(told))} become one right "
-                f"name, under usual operation {Rate(null, len(told))}.\n")  # fmt: skip
+        tail = (f"\nOf the {len(told)} where the design promised better than even odds, {_shown(hits, len(told))} become one right "
+                f"name, under usual operation {_shown(null, len(told))}.\n")  # fmt: skip
     failures = [r for r in asked if not r["experiment"]["right"]]
     listed = "".join(
         f"- {r['effect']} (seed {r['seed']}), asked of {', '.join(r['members'])}: {_reason(r)}\n" for r in failures
@@ -179,6 +179,12 @@ def report(out: Path, published: bool) -> str:
     if published:
         publish(NAME, table)
     return table
+
+
+def _shown(hits: int, of: int) -> str:
+    """A share with its 95 % interval (Wilson)."""
+    low, high = Rate(hits, of).interval
+    return f"{hits} of {of} ({low:.0%} to {high:.0%})"
 
 
 def _beyond(row: Mapping[str, Any]) -> list[float]:

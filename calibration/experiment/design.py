@@ -1,7 +1,7 @@
 """Design of an experiment: the cheapest moves after which one of a group's effects can be named."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -13,10 +13,10 @@ from calibration.evaluation.intervals import Interval
 from calibration.evaluation.n_step import Progress
 from calibration.evaluation.settings import ModelSettings
 from calibration.experiment.emulate import Emulated, Emulator
-from calibration.experiment.library import Comfort, moves, office_comfort, places, shortened
+from calibration.experiment.library import PRESSURES, Comfort, Lever, moves, office_comfort, places, shortened
 from calibration.experiment.members import Member, Question, comparison, fit_members, midnight_after
-from calibration.experiment.odds import CHANCE, ODDS, Separation, chance_of, needed, separation
-from calibration.experiment.schedule import SUPPLY_AIR, Move, Schedule
+from calibration.experiment.odds import CHANCE, ODDS, Separation, chance_of, needed, seen_before, separation
+from calibration.experiment.schedule import STATIC_PRESSURE, SUPPLY_AIR, Move, Schedule
 from calibration.results import plain
 from thermal._types import FloatArray
 from thermal.case.case import Case
@@ -56,8 +56,6 @@ class DesignSettings:
         Of heat and of cold given to the zones [money/kWh], 0 or more.
     comfort : callable
         Gives the band on stamps with a step.
-    supply : tuple of float or None
-        Coldest and warmest supply air [K]; None leaves it as it is.
     horizon : str
         Of the predictions by which models are compared.
     """
@@ -68,7 +66,6 @@ class DesignSettings:
     odds: float = ODDS
     prices: tuple[float, float] = PRICES
     comfort: Callable[[pd.DatetimeIndex, float], Comfort] = office_comfort
-    supply: tuple[float, float] | None = _SUPPLY
     horizon: str = "6h"
 
     def __post_init__(self) -> None:
@@ -226,8 +223,7 @@ def design_experiment(
     models = comparison(case, question, model or ModelSettings())
     members = fit_members(models, question)
     start = given.start or midnight_after(case)
-    days = _like(case, start, given.hours)
-    search = _Search(models, members, given, days, progress)
+    search = _Search(models, members, given, _like(case, start, given.hours), progress)
     best, usual = search.run()
     return Experiment(
         case.building.name, question, given, tuple(members), best, usual, start, search.interval, case.step,
@@ -268,7 +264,10 @@ class _Search:
 
     def run(self) -> tuple[Trial, Trial]:
         """Give the best trial, and that of usual operation."""
-        self.usual = usual = self.trial(())
+        self.usual = self.trial(())
+        past = sum((i.end - i.start).total_seconds() for i in self.models.tuned)
+        told = seen_before(self.members, 3600.0 * self.given.hours / past)
+        self.usual = usual = replace(self.usual, separation=replace(self.usual.separation, log_odds=told))
         single = self._library()
         self.total = len(single) + 3 * _BEST
         first = self.members[:1]
@@ -286,22 +285,31 @@ class _Search:
 
     def _partners(self, own: Sequence[Move], rough: Sequence[tuple[Trial, Move]]) -> list[Move]:
         """Moves of other zones, or of other points, the best first."""
-        taken = {(z, m.supply) for m in own for z in m.zones}
-        apart = [m for _, m in rough if not taken & {(z, m.supply) for z in m.zones}]
+        taken = {(z, m.point) for m in own for z in m.zones}
+        apart = [m for _, m in rough if not taken & {(z, m.point) for z in m.zones}]
         return (apart or [m for _, m in rough])[:_BEST]
 
     def _library(self) -> list[Move]:
         building, frame = self.models.case.building, self.models.case.telemetry.frame
         where = places(building, self.models.anatomy, self.emulator.movable, [m.zones for m in self.members])
-        handlers = [d.name for d in building.devices if d.type == "ahu" and f"{d.name}/{SUPPLY_AIR}" in frame]
         hours = (np.arange(len(self.emulator.stamps)) + 0.5) * self.step / 3600.0
-        return moves(where, handlers, self.comfort, hours, self.given.supply)
+        levers = {}
+        for point in (SUPPLY_AIR, STATIC_PRESSURE):
+            names = tuple(d.name for d in building.devices if d.type == "ahu" and f"{d.name}/{point}" in frame)
+            if names and point == SUPPLY_AIR:
+                levers[point] = Lever("supply air cold and warm", names, _SUPPLY)
+            elif names:
+                usual = float(frame[[f"{n}/{point}" for n in names]].median().median())
+                levers[point] = Lever("duct at full and low pressure", names, tuple(r * usual for r in PRESSURES))
+        week = pd.date_range(self.days, periods=7 * 24, freq="h")
+        return moves(where, self.comfort, self.given.comfort(week, 3600.0).narrowest, hours, levers)
 
     def trial(self, moves: tuple[Move, ...], true: Sequence[Member] | None = None) -> Trial:
         """Weigh a schedule, were each of some members true."""
         schedule = Schedule(self.days, self.given.hours, moves)
         emulated = {m.effect: self.emulator.run(m, schedule) for m in (true or self.members)}
-        found = separation(emulated, self.members, self.interval, self.given.horizon)
+        usual = next(iter(emulated.values())) if self.usual is None else next(iter(self.usual.emulated.values()))
+        found = separation(emulated, usual, self.members, self.interval, self.given.horizon)
         spent = [self._spent(effect, made) for effect, made in emulated.items()]
         cost, energy = max(spent) if spent else (0.0, 0.0)
         off = np.max([self._discomfort(effect, made) for effect, made in emulated.items()], axis=0)

@@ -13,7 +13,7 @@ import pandas as pd
 
 from calibration.diagnosis.refit.comparison import ModelComparison
 from calibration.experiment.members import Member
-from calibration.experiment.schedule import COOLING, HEATING, Schedule
+from calibration.experiment.schedule import COOLING, HEATING, STATIC_PRESSURE, SUPPLY_AIR, Schedule
 from thermal._types import FloatArray
 from thermal.case.case import Case
 from thermal.case.commands import air_column
@@ -84,6 +84,7 @@ class Emulator:
         self.heat = self.case.zone_heat_estimated().interpolate(limit_direction="both").fillna(0.0).to_numpy(dtype=float)
         self.device = {zone: self._device(zone) for zone in self.zones}
         areas = {name: room.floor_area for name, room in models.anatomy.rooms.items()}
+        self._usual_of: dict[str, Emulated] = {}
         self.idle = _IDLE * np.array([areas[z] for z in self.zones])
 
     def _device(self, zone: str) -> tuple[str, str, str] | None:
@@ -147,6 +148,9 @@ class Emulator:
     def run(self, member: Member, schedule: Schedule) -> Emulated:
         """Emulate an experiment in a building that is as a member's model is.
 
+        What the member's model changes by with the schedule is added to what was measured: where it errs in usual
+        operation, telemetry has told that already. Without moves the telemetry is as it was.
+
         Parameters
         ----------
         member : Member
@@ -154,6 +158,18 @@ class Emulator:
         schedule : Schedule
             Of the experiment, which begins with these days.
         """
+        zone, heat = self.measured[self.first :], self.heat[self.first :]
+        if not schedule.moves:
+            return self._with(zone, heat, schedule)
+        if member.effect not in self._usual_of:
+            self._usual_of[member.effect] = self._raw(member, replace(schedule, moves=()))
+        usual, made = self._usual_of[member.effect], self._raw(member, schedule)
+        low, high = self.capacity
+        changed = np.clip(heat + made.heat - usual.heat, np.minimum(low, heat), np.maximum(high, heat))
+        return self._with(zone + made.zone - usual.zone, changed, schedule)
+
+    def _raw(self, member: Member, schedule: Schedule) -> Emulated:
+        """Telemetry by a member's model alone."""
         asked = schedule.setpoints(self.stamps, self.case.step, self.zones)
         network = member.fit.built.network
         made = self._with(self.measured[self.first :], self.heat[self.first :], schedule)
@@ -200,12 +216,18 @@ class Emulator:
             heat[k] = q
         return zone, heat
 
+    def _of_handlers(self, schedule: Schedule, handlers: list[str], point: str) -> FloatArray | None:
+        """Setpoint of the air handlers on the steps, NaN where it is as usual, shape (n_time,) [K] or [Pa]."""
+        if not any(m.point == point for m in schedule.moves):
+            return None
+        values = schedule.setpoints(self.stamps, self.case.step, handlers, point)[:, :, 0]
+        return np.asarray(np.where(np.isfinite(values).any(axis=1), np.nanmax(np.nan_to_num(values, nan=-1.0), axis=1), np.nan))
+
     def _with(self, zone: FloatArray, heat: FloatArray, schedule: Schedule) -> Emulated:
         """Telemetry that shows given temperatures and heat."""
         frame, rows = self.case.telemetry.frame.copy(), self.stamps
         handlers = [d.name for d in self.case.building.devices if d.type == "ahu"]
-        supply = schedule.setpoints(rows, self.case.step, handlers, supply=True)[:, :, 0]
-        warmer = np.nanmean(supply, axis=1) if np.isfinite(supply).any() else None
+        warmer, pressure = (self._of_handlers(schedule, handlers, point) for point in (SUPPLY_AIR, STATIC_PRESSURE))
         for i, name in enumerate(self.zones):
             entities = [name, *(d.name for d in self.case.building.devices_of(name))]
             for column in (f"{e}/{ZONE_TEMPERATURE}" for e in entities):
@@ -224,6 +246,9 @@ class Emulator:
             runs, least = rate > 0.02 * most, float(self.flows[name][1][self.flows[name][1] > 0.02 * most].min())
             rate = np.where(changed, np.interp(heat[:, i], *self.flows[name]), rate)
             rate = np.where(runs, np.maximum(rate, least), rate)  # an air handler that runs brings air, called or not
+            if pressure is not None:  # dampers are open as far as they go, and flow falls with the root of the pressure
+                usual = float(frame[[f"{h}/{STATIC_PRESSURE}" for h in handlers]].median().median())
+                rate = np.where(np.isfinite(pressure), np.minimum(rate, most * np.sqrt(pressure / usual)), rate)
             if warmer is not None:
                 needed = -heat[:, i] / AIR_HEAT_CAPACITY / np.maximum(zone[:, i] - warmer, 1.0)
                 rate = np.where(np.isfinite(warmer) & (heat[:, i] < -self.idle[i]), np.minimum(needed, most), rate)

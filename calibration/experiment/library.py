@@ -23,15 +23,37 @@ BEYOND = (3.0, 2.5)
 LEAD = 3.0
 
 #: How long setpoints hold where they go to and fro [h]: shorter than walls take to follow, longer than air does.
-TURNS = (1.0, 3.0)
+TURNS = (1.0, 3.0, 12.0)
+
+#: Pressures of a duct against that of usual operation [-]: half of the air at the most.
+PRESSURES = (1.0, 0.25)
 
 #: Longer than any experiment [h]: setpoints that stay.
 _LONG = 1e4
 
 
 @dataclass(frozen=True)
+class Lever:
+    """A setpoint of air handlers that an experiment may change.
+
+    Parameters
+    ----------
+    title : str
+        In plain words.
+    handlers : tuple of str
+        Air handlers.
+    levels : tuple of float
+        Values in turn [K] or [Pa].
+    """
+
+    title: str
+    handlers: tuple[str, ...]
+    levels: tuple[float, ...]
+
+
+@dataclass(frozen=True)
 class Comfort:
-    """Band of temperatures on the steps of an experiment.
+    """Band of temperatures on some steps.
 
     Parameters
     ----------
@@ -43,10 +65,10 @@ class Comfort:
     upper: FloatArray
 
     @property
-    def occupied(self) -> BoolArray:
-        """Whether people are in: where the band is at its narrowest."""
-        width = self.upper - self.lower
-        return np.asarray(width <= width.min() + 1e-9)
+    def narrowest(self) -> tuple[float, float]:
+        """Edges where they are closest, as they are while people are in [K]."""
+        at = int(np.argmin(self.upper - self.lower))
+        return float(self.lower[at]), float(self.upper[at])
 
     def discomfort(self, zone: FloatArray, step: float) -> FloatArray:
         """Distance from the band over time, shape (n_zone,) [K h].
@@ -114,27 +136,27 @@ def places(building: Building, anatomy: Anatomy, movable: Sequence[str], members
 
 
 def moves(
-    where: Mapping[str, tuple[str, ...]], handlers: Sequence[str], comfort: Comfort, hours: FloatArray, supply: tuple[float, float] | None
-) -> list[Move]:
+    where: Mapping[str, tuple[str, ...]], comfort: Comfort, band: tuple[float, float], hours: FloatArray,
+    levers: Mapping[str, Lever],
+) -> list[Move]:  # fmt: skip
     """Give all single moves.
 
     Parameters
     ----------
     where : mapping of str to tuple of str
         Zones by name, `places`.
-    handlers : sequence of str
-        Air handlers whose supply air can be set.
     comfort : Comfort
         Band on the steps.
+    band : tuple of float
+        Its edges while people are in [K].
     hours : ndarray, shape (n_time,)
         Middle of each step from the beginning [h].
-    supply : tuple of float or None
-        Coldest and warmest supply air [K]; None where it is not set.
+    levers : mapping of str to Lever
+        What can be set of air handlers, by point.
     """
-    people = comfort.occupied
     width = comfort.upper - comfort.lower
-    tight = int(np.argmin(width))
-    low, high = float(comfort.lower[tight]) + MARGIN, float(comfort.upper[tight]) - MARGIN
+    people = width <= band[1] - band[0] + 1e-9
+    low, high = band[0] + MARGIN, band[1] - MARGIN
     free = _spans(~_soon(people, hours), hours)
     loose = int(np.argmax(width))
     coldest = max(low - BEYOND[0], float(comfort.lower[loose]) + MARGIN)
@@ -157,10 +179,9 @@ def moves(
         for title, levels, every, spans in kinds:
             pairs = tuple((v - BAND / 2.0, v + BAND / 2.0) for v in levels)
             found.append(Move(title, zones, pairs, every, spans))
-    if supply is not None and handlers:
-        cold, warm = supply
-        title = "supply air warm and cold in turns of 3 h"
-        found.append(Move(title, tuple(handlers), ((warm, warm), (cold, cold)), 3.0, whole, supply=True))
+    for point, lever in levers.items():
+        pairs = tuple((v, v) for v in lever.levels)
+        found.append(Move(f"{lever.title} in turns of 3 h", lever.handlers, pairs, 3.0, whole, point))
     return found
 
 

@@ -114,13 +114,20 @@ class Separation:
         return chance_of(self.least)
 
 
-def separation(emulated: Mapping[str, Emulated], members: Sequence[Member], interval: Interval, horizon: str) -> Separation:
+def separation(
+    emulated: Mapping[str, Emulated], usual: Emulated, members: Sequence[Member], interval: Interval, horizon: str
+) -> Separation:
     """Expect what an experiment says of each pair of members.
+
+    What they differ by on the same days in usual operation is no part of it: the telemetry that they were fitted to has
+    told that already.
 
     Parameters
     ----------
     emulated : mapping of str to Emulated
         The experiment were each member true, by effect.
+    usual : Emulated
+        The days as they were.
     members : sequence of Member
         All of them.
     interval : Interval
@@ -129,23 +136,40 @@ def separation(emulated: Mapping[str, Emulated], members: Sequence[Member], inte
         Of the predictions by which models are compared.
     """
     log_odds, swing = {}, {}
+    before = {m.effect: _errors(m, _problem(m, usual, interval, horizon)) for m in members}
     for true, made in emulated.items():
         at = {m.effect: _problem(m, made, interval, horizon) for m in members}
         own = next(m for m in members if m.effect == true)
-        reference = at[true].residuals_only(own.fit.model, own.fit.theta)
+        reference = _errors(own, at[true]) - before[true]
         for other in (m for m in members if m.effect != true):
             problem, fit = at[other.effect], other.fit
             error, slopes = problem.residuals(fit.model, fit.theta)
-            size = own.fit.found.mean_square
-            weight = float(np.sqrt(problem.effective_size() / error.size / size))
+            weight = float(np.sqrt(problem.effective_size() / error.size / own.fit.found.mean_square))
             count = fit.problem.effective_size() + problem.effective_size()
-            jacobian = fit.found.jacobian
-            pair = (true, other.effect)
-            log_odds[pair] = expected_log_odds(
-                error - reference, slopes * problem.slopes(fit.theta), jacobian.T @ jacobian, weight, count
-            )
-            swing[pair] = float(np.sqrt(np.mean((error - reference) ** 2)))
+            jacobian, pair = fit.found.jacobian, (true, other.effect)
+            differ = error - before[other.effect] - reference
+            precision, turned = jacobian.T @ jacobian, slopes * problem.slopes(fit.theta)
+            log_odds[pair] = expected_log_odds(differ, turned, precision, weight, count)
+            swing[pair] = float(np.sqrt(np.mean(differ**2)))
     return Separation(log_odds, swing)
+
+
+def seen_before(members: Sequence[Member], share: float) -> dict[tuple[str, str], float]:
+    """Log odds that so much more of usual operation brings, at the rate of the telemetry so far [-].
+
+    Parameters
+    ----------
+    members : sequence of Member
+        Fitted to the telemetry so far.
+    share : float
+        Length of what is to come over its length [-].
+    """
+    value = {m.effect: m.fit.evidence for m in members}
+    return {(a, b): share * max(0.0, value[a] - value[b]) for a in value for b in value if a != b}
+
+
+def _errors(member: Member, problem: Problem) -> FloatArray:
+    return problem.residuals_only(member.fit.model, member.fit.theta)
 
 
 def _problem(member: Member, made: Emulated, interval: Interval, horizon: str) -> Problem:

@@ -174,31 +174,29 @@ def diagnose_further(
         Called with stage, done, total.
     """
     settings = model or ModelSettings()
+    apart = [i if i.end < interval.start else replace(i, end=interval.start - pd.Timedelta(seconds=case.step)) for i in question.judged]
     found = diagnose(
-        case, (*question.tuned, interval), question.judged, dx=settings.dx, known=known, ruled_out=ruled_out,
+        case, (*question.tuned, interval), apart, dx=settings.dx, known=known, ruled_out=ruled_out,
         progress=progress,
     )  # fmt: skip
     outcome = weigh_experiment(case, question, interval, settings, odds)
     return replace(found, verdict=narrowed(found.verdict, outcome)), outcome
 
 
-def joined(before: pd.DataFrame, after: pd.DataFrame, start: pd.Timestamp) -> pd.DataFrame:
-    """Telemetry of the past followed by that of an experiment, in the columns of the past.
+def joined(before: pd.DataFrame, after: pd.DataFrame) -> pd.DataFrame:
+    """Telemetry of the past and what follows it, in the columns of the past.
 
     Parameters
     ----------
     before, after : DataFrame
         Telemetry of both [library's units].
-    start : Timestamp
-        When the experiment begins: later stamps are its own.
 
     Raises
     ------
     CalibrationError
-        When the experiment's telemetry lacks columns of the past.
+        When the later telemetry lacks columns of the past.
     """
     lacking = [str(c) for c in before.columns if c not in after.columns]
     advice = "record the same points"
     CalibrationError.unless(not lacking, "telemetry of the experiment", "all points of the case", lacking[:3], advice)
-    parts = before.loc[before.index <= start], after.loc[after.index > start, before.columns]
-    return pd.concat(parts)
+    return pd.concat([before, after.loc[after.index > before.index[-1], before.columns]])

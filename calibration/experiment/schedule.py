@@ -11,7 +11,10 @@ from thermal._types import BoolArray, FloatArray
 
 #: Point types of a schedule.
 HEATING, COOLING = "zone_air_heating_temperature_setpoint", "zone_air_cooling_temperature_setpoint"
-SUPPLY_AIR = "supply_air_temperature_setpoint"
+SUPPLY_AIR, STATIC_PRESSURE = "supply_air_temperature_setpoint", "supply_air_static_pressure_setpoint"
+
+#: Unit of each point.
+UNITS = {HEATING: "K", COOLING: "K", SUPPLY_AIR: "K", STATIC_PRESSURE: "Pa"}
 
 #: Distance between heating and cooling setpoint of a zone that is held at a temperature [K]: terminals must not heat
 #: and cool in turns.
@@ -29,13 +32,13 @@ class Move:
     zones : tuple of str
         Zones, or air handlers, whose setpoints are set.
     pairs : tuple of tuple of float
-        Heating and cooling setpoint, one pair after another [K]; of supply air the setpoint twice.
+        Heating and cooling setpoint, one pair after another [K]; of an air handler the setpoint twice [K] or [Pa].
     every : float
         How long each pair holds [h].
     spans : tuple of tuple of float
         First and last hour of each part, counted from the beginning of the experiment [h]; the turns go on within.
-    supply : bool
-        Whether it sets the supply air of air handlers.
+    point : str
+        Point of air handlers that it sets; the setpoints of zones by default.
     """
 
     title: str
@@ -43,7 +46,7 @@ class Move:
     pairs: tuple[tuple[float, float], ...]
     every: float
     spans: tuple[tuple[float, float], ...]
-    supply: bool = False
+    point: str = ""
 
     @property
     def hours(self) -> float:
@@ -75,7 +78,7 @@ class Move:
         """Entry of ``moves`` in ``experiment.json``."""
         return {
             "title": self.title, "zones": list(self.zones), "pairs": [list(p) for p in self.pairs],
-            "every_hours": self.every, "spans_hours": [list(s) for s in self.spans], "supply_air": self.supply,
+            "every_hours": self.every, "spans_hours": [list(s) for s in self.spans], "point": self.point or "setpoints",
         }  # fmt: skip
 
 
@@ -102,8 +105,8 @@ class Schedule:
         """When it is over."""
         return self.start + pd.Timedelta(hours=self.hours)
 
-    def setpoints(self, stamps: pd.DatetimeIndex, step: float, names: Sequence[str], supply: bool = False) -> FloatArray:
-        """Give setpoints of steps, NaN where they are as usual: shape (n_time, n_name, 2) [K].
+    def setpoints(self, stamps: pd.DatetimeIndex, step: float, names: Sequence[str], point: str = "") -> FloatArray:
+        """Give setpoints of steps, NaN where they are as usual: shape (n_time, n_name, 2) [K] or [Pa].
 
         Parameters
         ----------
@@ -113,12 +116,12 @@ class Schedule:
             Their length [s].
         names : sequence of str
             Zones, or air handlers.
-        supply : bool
-            Whether the setpoints of supply air are asked for.
+        point : str
+            Of air handlers; the setpoints of zones by default.
         """
         hours = (stamps - self.start) / pd.Timedelta(hours=1) - step / 7200.0
         found = np.full((len(stamps), len(names), 2), np.nan)
-        for move in (m for m in self.moves if m.supply == supply):
+        for move in (m for m in self.moves if m.point == point):
             acts, pair = move.pair_at(np.asarray(hours, dtype=float))
             acts &= (hours >= 0.0) & (hours < self.hours)
             at = [i for i, name in enumerate(names) if name in move.zones]
@@ -142,16 +145,17 @@ class Schedule:
         count = round(self.hours * 3600.0 / step)
         ends = pd.DatetimeIndex([self.start + pd.Timedelta(seconds=step * (k + 1)) for k in range(count)])
         rows: list[tuple[pd.Timestamp, str, float, str]] = []
-        for supply, points in ((False, (HEATING, COOLING)), (True, (SUPPLY_AIR,))):
-            names = list(dict.fromkeys(z for m in self.moves if m.supply == supply for z in m.zones))
-            values = self.setpoints(ends, step, names, supply)
+        for kind in dict.fromkeys(m.point for m in self.moves):
+            points = (kind,) if kind else (HEATING, COOLING)
+            names = list(dict.fromkeys(z for m in self.moves if m.point == kind for z in m.zones))
+            values = self.setpoints(ends, step, names, kind)
             for i, name in enumerate(names):
                 for k, point in enumerate(points):
                     course = np.append(values[:, i, k], np.nan)
                     before = np.append(np.nan, course[:-1])
                     changed = ~((course == before) | (np.isnan(course) & np.isnan(before)))
                     rows += [
-                        (self.start + pd.Timedelta(seconds=step * int(j)), f"{name}/{point}", float(course[j]), "K")
+                        (self.start + pd.Timedelta(seconds=step * int(j)), f"{name}/{point}", float(course[j]), UNITS[point])
                         for j in np.flatnonzero(changed)
                     ]
         frame = pd.DataFrame(rows, columns=["time", "point", "value", "unit"])

@@ -1,6 +1,5 @@
 """What the design of an experiment leaves behind: numbers, schedule, expected temperatures, and a page."""
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -9,6 +8,7 @@ import pandas as pd
 from calibration.experiment.design import Experiment
 from calibration.experiment.odds import chance_of
 from calibration.experiment.outcome import Outcome
+from calibration.experiment.schedule import STATIC_PRESSURE, SUPPLY_AIR, Move
 from calibration.results import Content
 from mpc.reports.diagnosis_words import called
 from mpc.reports.figures.style import Picture, keys_below, lines_over_time, panel, picture, styled
@@ -35,7 +35,10 @@ def experiment_files(found: Experiment, case: Case, outcome: Outcome | None = No
     """
     content = found.to_dict() | {"outcome": None if outcome is None else outcome.to_dict()}
     rows = found.schedule.rows(found.step)
-    rows = rows.assign(value=(rows["value"] - _FREEZING).round(2), unit="degC", time=[t.isoformat() for t in rows["time"]])
+    warm = rows["unit"] == "K"
+    rows["value"] = (rows["value"] - np.where(warm, _FREEZING, 0.0)).round(2)
+    rows["unit"] = rows["unit"].where(~warm, "degC")
+    rows["time"] = [t.isoformat() for t in rows["time"]]
     return {
         "experiment.json": content,
         "schedule.csv": rows.to_csv(index=False, lineterminator="\n"),
@@ -115,16 +118,17 @@ def steps_of(found: Experiment) -> list[tuple[str, str, str]]:
     for move in found.schedule.moves:
         for first, last in move.spans:
             begin, end = (found.start + pd.Timedelta(hours=h) for h in (first, last))
-            rows.append((f"{begin:%a %d %b %H:%M} to {end:%a %d %b %H:%M}", listed(move.zones), _what(move.pairs, move.every, move.supply)))
+            rows.append((f"{begin:%a %d %b %H:%M} to {end:%a %d %b %H:%M}", listed(move.zones), _what(move)))
     return rows
 
 
-def _what(pairs: Sequence[tuple[float, float]], every: float, supply: bool) -> str:
-    levels = [f"{np.mean(pair) - _FREEZING:.1f} °C" for pair in pairs]
-    thing = "supply air at " if supply else "hold at "
-    if len(levels) == 1:
-        return thing + levels[0]
-    return f"{thing}{listed(levels)} in turns of {duration(3600.0 * every)}"
+def _what(move: Move) -> str:
+    """What a move does, in plain words."""
+    pressure = move.point == STATIC_PRESSURE
+    levels = [f"{np.mean(p):.0f} Pa" if pressure else f"{np.mean(p) - _FREEZING:.1f} °C" for p in move.pairs]
+    thing = {"": "hold at", SUPPLY_AIR: "supply air at", STATIC_PRESSURE: "duct pressure at"}[move.point]
+    turns = f" in turns of {duration(3600.0 * move.every)}" if len(levels) > 1 else ""
+    return f"{thing} {listed(levels)}{turns}"
 
 
 def _content(found: Experiment, case: Case, outcome: Outcome | None) -> dict[str, Any]:

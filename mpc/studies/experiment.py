@@ -163,7 +163,7 @@ def carry_out(case: Case, schedule: Schedule, site: Site, progress: Callable[[st
     after = plant.telemetry()  # type: ignore[attr-defined]
     found = f"it ends at {after.index[-1]}"
     PlantError.unless(after.index[-1] >= schedule.end, "site", f"a run to {schedule.end}", found)
-    frame = joined(case.telemetry.frame, after.loc[: schedule.end], schedule.start)
+    frame = joined(case.telemetry.frame, after.loc[: schedule.end])
     _same_building(case, after)
     return Case(case.building, Telemetry.from_frame(frame, where="experiment"))
 
