@@ -34,8 +34,10 @@ _BESIDE = ("F1_C + F1_W", "F1_C + F1_N", "F1_C + F1_E", "F1_C + F1_S", "F1_N + F
 #: Strengths that leave a gap in most seeds [parameter units], by parameter; a share of 0.75 to 1.25 is drawn.
 STRENGTHS: dict[str, tuple[str, float]] = {
     "flow_gain": ("flow_gain", 0.22), "duct_loss": ("duct_ntu", 0.22), "sensor_bias": ("sensor_bias", 0.9),
-    "valve_leak": ("valve_leak", 8.0), "hidden_mass": ("hidden_heat_capacity", 7e4), "zone_mixing": ("door_airflow", 0.15),
-    "internal_gains": ("base_load", 4.0), "ground_exchange": ("ground_u_value", 0.5), "roof_exchange": ("roof_u_value", 0.5),
+    "valve_leak": ("valve_leak", 8.0), "hidden_mass": ("hidden_heat_capacity", 7e4),
+    "zone_mixing": ("door_airflow", 0.15),
+    "internal_gains": ("base_load", 4.0), "ground_exchange": ("ground_u_value", 0.5),
+    "roof_exchange": ("roof_u_value", 0.5),
     "infiltration": ("infiltration_rate", 0.7), "thermal_bridge": ("thermal_bridge_u_value", 0.75),
 }  # fmt: skip
 

@@ -168,7 +168,8 @@ def report(out: Path, published: bool) -> str:
     tail = ""
     if told:
         hits, null = (sum(r[k]["right"] for r in told) for k in ("experiment", "usual"))
-        tail = (f"\nOf the {len(told)} where the design promised better than even odds, {_shown(hits, len(told))} become one right "
+        tail = (f"\nOf the {len(told)} where the design promised better than even odds, "
+                f"{_shown(hits, len(told))} become one right "
                 f"name, under usual operation {_shown(null, len(told))}.\n")  # fmt: skip
     failures = [r for r in asked if not r["experiment"]["right"]]
     listed = "".join(
@@ -182,7 +183,7 @@ def report(out: Path, published: bool) -> str:
 
 
 def _shown(hits: int, of: int) -> str:
-    """A share with its 95 % interval (Wilson)."""
+    """Spell a share with its 95 % interval (Wilson)."""
     low, high = Rate(hits, of).interval
     return f"{hits} of {of} ({low:.0%} to {high:.0%})"
 

@@ -31,6 +31,9 @@ PRICES = (0.10, 0.10)
 #: Best single moves that are judged for every member, and combined.
 _BEST = 4
 
+#: Log odds that are enough, over those that name one [-]: a mean of 12 is over 6 with a probability of 89 %.
+_ENOUGH = 2.0
+
 #: Shares of a move's hours that are tried once a design is good enough [-].
 _SHARES = (0.75, 0.5, 0.25)
 
@@ -103,11 +106,6 @@ class Trial:
     energy: float
     discomfort: FloatArray
 
-    @property
-    def least(self) -> float:
-        """Expected log odds of the two that are hardest to tell apart [-]."""
-        return self.separation.least
-
 
 @dataclass(frozen=True)
 class Experiment:
@@ -159,7 +157,12 @@ class Experiment:
     @property
     def chance(self) -> float:
         """Probability that it names one of the members, were it as the models say [-]."""
-        return chance_of(self.best.least, self.settings.odds)
+        return self.best.separation.chance(self.question.prior, self.settings.odds)
+
+    @property
+    def usual_chance(self) -> float:
+        """The same of as many hours of usual operation."""
+        return self.usual.separation.chance(self.question.prior, self.settings.odds)
 
     @property
     def verdict(self) -> str:
@@ -181,9 +184,10 @@ class Experiment:
         worst = dict(zip(self.zones, self.best.discomfort.tolist(), strict=True))
         return {
             "verdict": self.verdict, "chance": self.chance,
-            "usual_chance": chance_of(self.usual.least, self.settings.odds),
+            "usual_chance": self.usual_chance,
             "odds": self.settings.odds, "log_odds_needed": needed(self.settings.odds), "pairs": pairs,
             "members": {m.effect: {"zones": list(m.zones), "title": CATALOGUE[m.effect].title} for m in self.members},
+            "prior": dict(self.question.prior),
             "known": {e: list(z) for e, z in self.question.known.items()},
             "start": self.start.isoformat(), "end": self.schedule.end.isoformat(), "hours": self.schedule.hours,
             "moves": [m.to_dict() for m in self.best.schedule.moves],
@@ -223,7 +227,7 @@ def design_experiment(
     models = comparison(case, question, model or ModelSettings())
     members = fit_members(models, question)
     start = given.start or midnight_after(case)
-    search = _Search(models, members, given, _like(case, start, given.hours), progress)
+    search = _Search(models, members, question.prior, given, _like(case, start, given.hours), progress)
     best, usual = search.run()
     return Experiment(
         case.building.name, question, given, tuple(members), best, usual, start, search.interval, case.step,
@@ -241,7 +245,9 @@ def _like(case: Case, start: pd.Timestamp, hours: float) -> pd.Timestamp:
         begin = (last - length).normalize()
     enough = begin >= first
     expected = f"a day and {hours:g} h more of telemetry"
-    CalibrationError.unless(enough, "experiment", expected, f"{first - pd.Timedelta(days=1)} to {last}", "give fewer hours")
+    CalibrationError.unless(
+        enough, "experiment", expected, f"{first - pd.Timedelta(days=1)} to {last}", "give fewer hours"
+    )
     return begin
 
 
@@ -249,11 +255,11 @@ class _Search:
     """Greedy search over moves, then shorter ones."""
 
     def __init__(
-        self, models: ModelComparison, members: Sequence[Member], given: DesignSettings, days: pd.Timestamp,
-        progress: Progress | None,
+        self, models: ModelComparison, members: Sequence[Member], prior: Mapping[str, float], given: DesignSettings,
+        days: pd.Timestamp, progress: Progress | None,
     ) -> None:  # fmt: skip
         self.models, self.members, self.given, self.days, self.progress = models, members, given, days, progress
-        self.emulator = Emulator(models, days, given.hours)
+        self.prior, self.emulator = prior, Emulator(models, days, given.hours)
         self.step = models.case.step
         self.interval = Interval(days, days + pd.Timedelta(hours=given.hours))
         self.comfort = given.comfort(self.emulator.stamps, self.step)
@@ -272,7 +278,7 @@ class _Search:
         self.total = len(single) + 3 * _BEST
         first = self.members[:1]
         rough = [(t, m) for m in single if self.admissible(t := self.trial((m,), first))]
-        rough.sort(key=lambda pair: (-min(pair[0].least, 2.0 * needed(self.given.odds)), pair[0].cost))
+        rough.sort(key=lambda pair: (-self.worth(pair[0]), pair[0].cost))
         top = [m for _, m in rough[:_BEST]]
         trials = [usual, *(self.trial((m,)) for m in top)]
         best = self._first(trials)
@@ -284,7 +290,7 @@ class _Search:
         return (self._shorter(best) if self.enough(best) else best), usual
 
     def _partners(self, own: Sequence[Move], rough: Sequence[tuple[Trial, Move]]) -> list[Move]:
-        """Moves of other zones, or of other points, the best first."""
+        """Give moves of other zones, or of other points, the best first."""
         taken = {(z, m.point) for m in own for z in m.zones}
         apart = [m for _, m in rough if not taken & {(z, m.point) for z in m.zones}]
         return (apart or [m for _, m in rough])[:_BEST]
@@ -337,15 +343,19 @@ class _Search:
         """Whether a schedule spares people."""
         return bool(trial.discomfort.max() <= self.given.discomfort)
 
+    def worth(self, trial: Trial) -> float:
+        """Give what a schedule says, up to what is enough [-]."""
+        return trial.separation.worth(self.prior, _ENOUGH * needed(self.given.odds))
+
     def enough(self, trial: Trial) -> bool:
         """Whether a schedule is likely to name one of the members."""
-        return chance_of(trial.least, self.given.odds) >= CHANCE
+        return trial.separation.chance(self.prior, self.given.odds) >= CHANCE
 
     def _first(self, trials: Sequence[Trial]) -> Trial:
         """Of those that are enough the cheapest, else the one that says most."""
         allowed = [t for t in trials if self.admissible(t)]
         good = [t for t in allowed if self.enough(t)]
-        return min(good, key=lambda t: t.cost) if good else max(allowed, key=lambda t: t.least)
+        return min(good, key=lambda t: t.cost) if good else max(allowed, key=self.worth)
 
     def _shorter(self, best: Trial) -> Trial:
         """Shorten moves as long as the design is enough and gets no dearer; fewer hours at the same cost are better."""

@@ -81,7 +81,9 @@ class Emulator:
         self.stamps = self.case.stamps[self.first :]
         self.zones = models.case.building.zone_names
         self.measured = self.case.zone_temperatures().interpolate(limit_direction="both").to_numpy(dtype=float)
-        self.heat = self.case.zone_heat_estimated().interpolate(limit_direction="both").fillna(0.0).to_numpy(dtype=float)
+        self.heat = (
+            self.case.zone_heat_estimated().interpolate(limit_direction="both").fillna(0.0).to_numpy(dtype=float)
+        )
         self.device = {zone: self._device(zone) for zone in self.zones}
         areas = {name: room.floor_area for name, room in models.anatomy.rooms.items()}
         self._usual_of: dict[str, Emulated] = {}
@@ -210,7 +212,13 @@ class Emulator:
             usual = self.heat[row]
             pair = np.where(moved[k][:, None], asked[k], self.measured[row][:, None])
             idle = (~moved[k] & (np.abs(usual) < self.idle)) | still
-            q = given[k] if given is not None else _followed(alone, gain, pair, np.minimum(low, usual), np.maximum(high, usual), np.where(idle, usual, np.nan))
+            q = (
+                given[k]
+                if given is not None
+                else _followed(
+                    alone, gain, pair, np.minimum(low, usual), np.maximum(high, usual), np.where(idle, usual, np.nan)
+                )
+            )
             states = ends[:, :1] + (ends[:, 1:] - ends[:, :1]) @ q[:, None] / 1000.0
             zone[k] = _REFERENCE + means[:, 0] + (means[:, 1:] - means[:, :1]) @ q / 1000.0
             heat[k] = q
@@ -221,7 +229,9 @@ class Emulator:
         if not any(m.point == point for m in schedule.moves):
             return None
         values = schedule.setpoints(self.stamps, self.case.step, handlers, point)[:, :, 0]
-        return np.asarray(np.where(np.isfinite(values).any(axis=1), np.nanmax(np.nan_to_num(values, nan=-1.0), axis=1), np.nan))
+        return np.asarray(
+            np.where(np.isfinite(values).any(axis=1), np.nanmax(np.nan_to_num(values, nan=-1.0), axis=1), np.nan)
+        )
 
     def _with(self, zone: FloatArray, heat: FloatArray, schedule: Schedule) -> Emulated:
         """Telemetry that shows given temperatures and heat."""
@@ -286,5 +296,3 @@ def _followed(
             target = min(max(rest, pair[i, 0]), pair[i, 1])
             heat[i] = min(max((target - rest) / own[i], low[i]), high[i])
     return heat
-
-

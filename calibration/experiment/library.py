@@ -102,7 +102,9 @@ def office_comfort(stamps: pd.DatetimeIndex, step: float) -> Comfort:
     return Comfort(np.where(people, 294.15, 288.15), np.where(people, 297.15, 303.15))
 
 
-def places(building: Building, anatomy: Anatomy, movable: Sequence[str], members: Sequence[Sequence[str]]) -> dict[str, tuple[str, ...]]:
+def places(
+    building: Building, anatomy: Anatomy, movable: Sequence[str], members: Sequence[Sequence[str]]
+) -> dict[str, tuple[str, ...]]:
     """Zones that are moved together, by what they are called.
 
     Parameters

@@ -1,7 +1,9 @@
 """Members of a group: the effects that a diagnosis cannot tell apart, each with a model that explains the past."""
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,6 +21,10 @@ from thermal.errors import ModelError
 #: Evaluations of the fit of a member: it starts at the best one's parameters.
 _EVALUATIONS = 10
 
+#: Least weight of a member's probability [-]: a group says that its members cannot be told apart, however sure the
+#: first of it looks; the same from which an effect belongs to the 90 % set.
+_LEAST = IN_SET
+
 
 @dataclass(frozen=True)
 class Question:
@@ -32,12 +38,15 @@ class Question:
         Effects that are in the model whichever of them it is.
     tuned, judged : tuple of Interval
         Where models were fitted and judged.
+    prior : mapping of str to float
+        Probability of each member before the experiment; they sum to 1 [-].
     """
 
     members: Mapping[str, tuple[str, ...]]
     known: Mapping[str, tuple[str, ...]]
     tuned: tuple[Interval, ...]
     judged: tuple[Interval, ...]
+    prior: Mapping[str, float]
 
 
 @dataclass(frozen=True)
@@ -101,8 +110,45 @@ def question_of(case: Case, diagnosis: Mapping[str, Any], members: Sequence[str]
     zones = tuple(first["zones"])
     where = {e: tuple(which[e]["zones"]) or (zones if CATALOGUE[e].zonal else ()) for e in chosen}
     kept = {e: tuple(which[e]["zones"]) for e in accepted if e in which and e not in chosen}
-    return Question({e: _inside(e, z, case) for e, z in where.items()},
-                    {e: _inside(e, z, case) for e, z in kept.items()}, *intervals)  # fmt: skip
+    weight = {e: max(float(which[e]["probability"]), _LEAST) for e in chosen}
+    prior = {e: w / sum(weight.values()) for e, w in weight.items()}
+    return Question(
+        {e: _inside(e, z, case) for e, z in where.items()}, {e: _inside(e, z, case) for e, z in kept.items()},
+        *intervals, prior,
+    )  # fmt: skip
+
+
+def read_experiment(path: Path, case: Case) -> tuple[Question, Interval, float]:
+    """Read what an experiment was to answer, when it was, and the odds from which one is named.
+
+    Parameters
+    ----------
+    path : Path
+        ``experiment.json``.
+    case : Case
+        Telemetry that holds it.
+
+    Raises
+    ------
+    CalibrationError
+        When the file is not what `buildingmpc experiment` writes for this case.
+    """
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+        name, odds = content["case"], float(content["odds"])
+        where = {e: tuple(map(str, entry["zones"])) for e, entry in content["members"].items()}
+        known = {e: tuple(map(str, zones)) for e, zones in content["known"].items()}
+        parts = [
+            tuple(Interval(*(local_timestamp(i[end], case.building) for end in ("start", "end"))) for i in found)
+            for found in (*(content["intervals"][key] for key in ("tuning", "held_out")), [content])
+        ]
+        prior = {e: float(content["prior"][e]) for e in where}
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        expected = "experiment.json as `buildingmpc experiment` writes it"
+        raise CalibrationError(str(path), expected, repr(error)) from error
+    same = name == case.building.name
+    CalibrationError.unless(same, str(path), f"an experiment for {case.building.name!r}", f"one for {name!r}")
+    return Question(where, known, parts[0], parts[1], prior), parts[2][0], odds
 
 
 def _inside(effect: str, zones: tuple[str, ...], case: Case) -> tuple[str, ...]:
@@ -110,7 +156,9 @@ def _inside(effect: str, zones: tuple[str, ...], case: Case) -> tuple[str, ...]:
     return tuple(z for z in case.building.zone_names if z in zones) if CATALOGUE[effect].zonal else ()
 
 
-def comparison(case: Case, question: Question, settings: ModelSettings, further: Sequence[Interval] = ()) -> ModelComparison:
+def comparison(
+    case: Case, question: Question, settings: ModelSettings, further: Sequence[Interval] = ()
+) -> ModelComparison:
     """Give what fits the members' models.
 
     Parameters
@@ -128,7 +176,9 @@ def comparison(case: Case, question: Question, settings: ModelSettings, further:
     return ModelComparison(case, plain, (*question.tuned, *further), question.judged)
 
 
-def fit_members(models: ModelComparison, question: Question, starts: Mapping[str, Mapping[str, float]] = {}) -> list[Member]:  # noqa: B006
+def fit_members(
+    models: ModelComparison, question: Question, starts: Mapping[str, Mapping[str, float]] | None = None
+) -> list[Member]:
     """Fit the model of each member to the telemetry.
 
     Parameters
@@ -148,7 +198,7 @@ def fit_members(models: ModelComparison, question: Question, starts: Mapping[str
     found: list[Member] = []
     common = None if starts else models.fit(question.known, [{}]).values
     for effect, zones in question.members.items():
-        begin = dict(starts.get(effect, common or {}))
+        begin = dict((starts or {}).get(effect, common or {}))
         try:
             fit = models.fit({**question.known, effect: zones}, [begin], evaluations=_EVALUATIONS)
         except (ArithmeticError, np.linalg.LinAlgError, ModelError):

@@ -7,9 +7,9 @@ import numpy as np
 from scipy.stats import norm
 
 from calibration.diagnosis.decide.levels import TEMPERATURE
+from calibration.evaluation.intervals import Interval, horizon_steps
 from calibration.experiment.emulate import Emulated
 from calibration.experiment.members import Member
-from calibration.evaluation.intervals import Interval, horizon_steps
 from calibration.fit.problem import Problem, tuning_runs
 from thermal._types import FloatArray
 from thermal.model.case_replay import replay_inputs
@@ -54,7 +54,7 @@ def chance_of(expected: float, odds: float = ODDS) -> float:
 def expected_log_odds(
     difference: FloatArray, slopes: FloatArray, precision: FloatArray, weight: float, count: float = np.inf
 ) -> float:
-    """Expected logarithm of the Bayes factor of the true model against another [-].
+    """Expect the logarithm of the Bayes factor of the true model against another [-].
 
     ``d = min_z ½ w² |δ + J z|² + ½ zᵀ H z``: what the other's errors exceed the true one's by, once its parameters have
     followed as far as their precision H lets them. With as many independent errors of unknown size it counts as
@@ -103,15 +103,43 @@ class Separation:
     log_odds: Mapping[tuple[str, str], float]
     swing: Mapping[tuple[str, str], float]
 
-    @property
-    def least(self) -> float:
-        """Of the two that are hardest to tell apart [-]."""
-        return min(self.log_odds.values())
+    def least(self, true: str) -> float:
+        """Give the expected log odds against the other that is hardest to tell from one, were that there [-].
 
-    @property
-    def chance(self) -> float:
-        """Probability that the experiment names one, whichever of them it is [-]."""
-        return chance_of(self.least)
+        Parameters
+        ----------
+        true : str
+            The one.
+        """
+        return min(v for (a, _), v in self.log_odds.items() if a == true)
+
+    def chance(self, prior: Mapping[str, float], odds: float = ODDS) -> float:
+        """Probability that the experiment names the one that is there [-].
+
+        Parameters
+        ----------
+        prior : mapping of str to float
+            Probability of each member [-].
+        odds : float
+            Above 1 [-].
+        """
+        true = dict.fromkeys(a for a, _ in self.log_odds)
+        whole = sum(prior[e] for e in true)
+        return float(sum(prior[e] / whole * chance_of(self.least(e), odds) for e in true))
+
+    def worth(self, prior: Mapping[str, float], enough: float) -> float:
+        """Mean of the least log odds, each counted up to what is enough: what a search climbs [-].
+
+        Parameters
+        ----------
+        prior : mapping of str to float
+            Probability of each member [-].
+        enough : float
+            Log odds that are enough [-].
+        """
+        true = dict.fromkeys(a for a, _ in self.log_odds)
+        whole = sum(prior[e] for e in true)
+        return float(sum(prior[e] / whole * min(self.least(e), enough) for e in true))
 
 
 def separation(

@@ -174,7 +174,10 @@ def diagnose_further(
         Called with stage, done, total.
     """
     settings = model or ModelSettings()
-    apart = [i if i.end < interval.start else replace(i, end=interval.start - pd.Timedelta(seconds=case.step)) for i in question.judged]
+    apart = [
+        i if i.end < interval.start else replace(i, end=interval.start - pd.Timedelta(seconds=case.step))
+        for i in question.judged
+    ]
     found = diagnose(
         case, (*question.tuned, interval), apart, dx=settings.dx, known=known, ruled_out=ruled_out,
         progress=progress,

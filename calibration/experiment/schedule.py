@@ -155,7 +155,12 @@ class Schedule:
                     before = np.append(np.nan, course[:-1])
                     changed = ~((course == before) | (np.isnan(course) & np.isnan(before)))
                     rows += [
-                        (self.start + pd.Timedelta(seconds=step * int(j)), f"{name}/{point}", float(course[j]), UNITS[point])
+                        (
+                            self.start + pd.Timedelta(seconds=step * int(j)),
+                            f"{name}/{point}",
+                            float(course[j]),
+                            UNITS[point],
+                        )
                         for j in np.flatnonzero(changed)
                     ]
         frame = pd.DataFrame(rows, columns=["time", "point", "value", "unit"])

@@ -36,7 +36,9 @@ def experiment(
     hours: Annotated[float, options.value("Longest length [h].", "H")] = 48.0,
     discomfort: Annotated[float, options.value("Most discomfort of a zone beyond usual [K h].", "KH")] = 0.5,
     odds: Annotated[float, options.value("Odds from which one is named.", "N")] = 20.0,
-    prices: Annotated[str, options.value("Of a kWh of heat, and of cold, given to the zones.", "HEAT,COLD")] = "0.10,0.10",
+    prices: Annotated[
+        str, options.value("Of a kWh of heat, and of cold, given to the zones.", "HEAT,COLD")
+    ] = "0.10,0.10",
     dx: options.Dx = None,
     run: Annotated[
         str | None,
@@ -122,11 +124,9 @@ def _carry_out(
 
     longer = carry_out(case, found.schedule, site, progress)
     interval = Interval(found.schedule.start, found.schedule.end)
-    result, outcome = diagnose_further(
-        longer, found.question, interval, model, found.settings.odds, progress=progress
-    )
+    result, outcome = diagnose_further(longer, found.question, interval, model, found.settings.odds, progress=progress)
     save_case(longer, out / "case", overwrite=force)
-    write_diagnosis(result, longer, out / "diagnosis", force=force)
+    write_diagnosis(result, longer, out / "diagnosis", force=force, experiment=outcome.to_dict())
     return outcome
 
 

@@ -70,7 +70,7 @@ def expected_table(found: Experiment) -> pd.DataFrame:
 
 
 def _stamps(found: Experiment) -> pd.DatetimeIndex:
-    """Ends of the steps of the experiment, at the time when it is to be carried out."""
+    """Give the ends of the steps of the experiment, at the time when it is to be carried out."""
     count = len(next(iter(found.best.emulated.values())).zone)
     steps = pd.to_timedelta(np.arange(1, count + 1) * found.step, unit="s")
     return pd.DatetimeIndex(found.start + steps).rename("timestamp")
@@ -87,14 +87,14 @@ def experiment_verdict(found: Experiment, outcome: Outcome | None = None) -> str
         Of the experiment.
     """
     names = listed([called(m.effect) for m in found.members], "or")
-    usual = percent(chance_of(found.usual.least, found.settings.odds))
+    usual, chance = percent(found.usual_chance), percent(found.chance)
     if found.verdict == "hopeless":
-        text = (f"Nothing that this building can do in {duration(3600 * found.settings.hours)} tells apart whether it is "
-                f"{names}: the best admissible experiment would name one with a chance of {percent(found.chance)}. "
-                f"Measure instead: {listed(found.instead, 'or')}.")  # fmt: skip
+        text = f"Nothing that this building can do in {duration(3600 * found.settings.hours)} tells apart whether it "
+        text += f"is {names}: the best admissible experiment would name one with a chance of {chance}. "
+        text += f"Measure instead: {'; or '.join(found.instead)}."
     else:
-        text = (f"{duration(3600 * found.schedule.hours).capitalize()} from {clock(found.start)} on tell whether it is {names}, "
-                f"with a chance of {percent(found.chance)} (as many hours of usual operation: {usual}).")  # fmt: skip
+        text = f"{duration(3600 * found.schedule.hours).capitalize()} from {clock(found.start)} on tell whether it is "
+        text += f"{names}, with a chance of {chance} (as many hours of usual operation: {usual})."
     if outcome is None:
         return text
     if outcome.named is None:
@@ -123,7 +123,7 @@ def steps_of(found: Experiment) -> list[tuple[str, str, str]]:
 
 
 def _what(move: Move) -> str:
-    """What a move does, in plain words."""
+    """Say what a move does, in plain words."""
     pressure = move.point == STATIC_PRESSURE
     levels = [f"{np.mean(p):.0f} Pa" if pressure else f"{np.mean(p) - _FREEZING:.1f} °C" for p in move.pairs]
     thing = {"": "hold at", SUPPLY_AIR: "supply air at", STATIC_PRESSURE: "duct pressure at"}[move.point]
@@ -143,7 +143,7 @@ def _content(found: Experiment, case: Case, outcome: Outcome | None) -> dict[str
     return {
         "case": case.building.name, "verdict": experiment_verdict(found, outcome),
         "subtitle": f"{clock(found.start)} to {clock(found.schedule.end)}", "found": found,
-        "chance": found.chance, "usual": chance_of(found.usual.least, found.settings.odds), "pairs": pairs,
+        "chance": found.chance, "usual": found.usual_chance, "pairs": pairs,
         "steps": steps_of(found), "worst": worst, "cost": significant(found.best.cost, 2),
         "energy": significant(found.best.energy, 2), "pictures": _pictures(found), "said": said,
         "odds": significant(found.settings.odds), "hopeless": found.verdict == "hopeless",

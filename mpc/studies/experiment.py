@@ -127,7 +127,9 @@ def open_site(name: str) -> Site:
     return found
 
 
-def carry_out(case: Case, schedule: Schedule, site: Site, progress: Callable[[str, int, int], None] | None = None) -> Case:
+def carry_out(
+    case: Case, schedule: Schedule, site: Site, progress: Callable[[str, int, int], None] | None = None
+) -> Case:
     """Carry out an experiment on a simulated site.
 
     Parameters
@@ -153,8 +155,14 @@ def carry_out(case: Case, schedule: Schedule, site: Site, progress: Callable[[st
     """
     plant, usual = site(case, schedule.end)
     names = tuple(a.name for a in plant.actuators)
-    controller: Controller = Scheduled(schedule, FixedSetpoints(usual, plant.actuators).at_hour(0.0), names, plant.control_step)
-    seen, rows, total = plant.reset(), 0, max(1, round((schedule.end - case.stamps[0]).total_seconds() / plant.control_step))
+    controller: Controller = Scheduled(
+        schedule, FixedSetpoints(usual, plant.actuators).at_hour(0.0), names, plant.control_step
+    )
+    seen, rows, total = (
+        plant.reset(),
+        0,
+        max(1, round((schedule.end - case.stamps[0]).total_seconds() / plant.control_step)),
+    )
     while not plant.finished:
         seen = plant.step(controller.step(seen, None))
         rows += 1
