@@ -146,7 +146,8 @@ def _content(found: Experiment, case: Case, outcome: Outcome | None) -> dict[str
         "chance": found.chance, "usual": found.usual_chance, "pairs": pairs,
         "steps": steps_of(found), "worst": worst, "cost": significant(found.best.cost, 2),
         "energy": significant(found.best.energy, 2), "pictures": _pictures(found), "said": said,
-        "odds": significant(found.settings.odds), "hopeless": found.verdict == "hopeless",
+        "odds": f"{found.settings.odds:g}", "hopeless": found.verdict == "hopeless",
+        "fine": found.verdict != "hopeless",
         "days": f"{clock(found.days.start)} to {clock(found.days.end)}",
     }  # fmt: skip
 

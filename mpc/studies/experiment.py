@@ -179,10 +179,10 @@ def carry_out(
 def _same_building(case: Case, after: pd.DataFrame) -> None:
     """Refuse a site whose past is not that of the case."""
     columns = [c for c in case.telemetry.frame if str(c).endswith(f"/{ZONE_TEMPERATURE}") and c in after]
-    both = case.telemetry.frame[columns].join(after[columns], how="inner", rsuffix=" of the site")
-    if not len(both):
+    shared = case.telemetry.frame.index.intersection(after.index)
+    if not len(shared):
         raise PlantError("site", "a run that begins with the telemetry", f"one that begins at {after.index[0]}")
-    off = both[columns].to_numpy() - both[[f"{c} of the site" for c in columns]].to_numpy()
+    off = case.telemetry.frame.loc[shared, columns].to_numpy() - after.loc[shared, columns].to_numpy()
     size = float(np.sqrt(np.nanmean(off**2)))
     PlantError.unless(size <= _SAME, "site", "the telemetry of the case on its days", f"{size:.2f} K from it")
 
