@@ -315,7 +315,7 @@ class _Search:
         schedule = Schedule(self.days, self.given.hours, moves)
         emulated = {m.effect: self.emulator.run(m, schedule) for m in (true or self.members)}
         usual = next(iter(emulated.values())) if self.usual is None else next(iter(self.usual.emulated.values()))
-        found = separation(emulated, usual, self.members, self.interval, self.given.horizon)
+        found = separation(self.emulator, emulated, usual, self.members, self.interval, self.given.horizon)
         spent = [self._spent(effect, made) for effect, made in emulated.items()]
         cost, energy = max(spent) if spent else (0.0, 0.0)
         off = np.max([self._discomfort(effect, made) for effect, made in emulated.items()], axis=0)

@@ -15,11 +15,10 @@ from calibration.diagnosis.refit.comparison import ModelComparison
 from calibration.experiment.members import Member
 from calibration.experiment.schedule import COOLING, HEATING, STATIC_PRESSURE, SUPPLY_AIR, Schedule
 from thermal._types import FloatArray
-from thermal.case.case import Case
 from thermal.case.commands import air_column
-from thermal.case.points import HEATING_POWER, SUPPLY_FLOW, ZONE_TEMPERATURE
-from thermal.case.telemetry import Telemetry
+from thermal.case.points import HEATING_POWER, SUPPLY_FLOW
 from thermal.inputs.provider import HVAC_INPUTS, InputProvider, telemetry_inputs
+from thermal.inputs.signals import signal_values
 from thermal.model.case_replay import Inputs, replay_inputs, spin_up
 from thermal.model.step import Stepper
 from thermal.units import AIR_HEAT_CAPACITY
@@ -35,6 +34,12 @@ _IDLE = 0.5
 #: where they are a third of it, the most that a meter is off.
 _TIMES = 3
 
+#: Share of its largest flow from which a terminal brings air [-], as for `valve_leak`.
+_RUNS = 0.02
+
+#: Inputs that no experiment changes.
+_UNMOVED = frozenset({"sun", "sky", "wind", "usual", "occupancy", "through_windows", "occupancy_rate", "outdoor_rate"})
+
 #: Bins of a zone's heat by which its terminal's flow is known.
 _BINS = 24
 
@@ -45,15 +50,12 @@ class Emulated:
 
     Parameters
     ----------
-    case : Case
-        Telemetry from the spin-up on.
     drivers : InputProvider
-        Inputs of effects made of it.
+        Inputs of effects, from the spin-up on.
     zone, heat : ndarray, shape (n_time, n_zone)
         Temperatures [K] and metered heat [W] of the experiment's steps.
     """
 
-    case: Case
     drivers: InputProvider
     zone: FloatArray
     heat: FloatArray
@@ -84,6 +86,8 @@ class Emulator:
         self.heat = (
             self.case.zone_heat_estimated().interpolate(limit_direction="both").fillna(0.0).to_numpy(dtype=float)
         )
+        self.base = telemetry_inputs(self.case, models.drivers.normalisation)
+        self._replays: dict[str, Inputs] = {}
         self.device = {zone: self._device(zone) for zone in self.zones}
         areas = {name: room.floor_area for name, room in models.anatomy.rooms.items()}
         self._usual_of: dict[str, Emulated] = {}
@@ -177,9 +181,9 @@ class Emulator:
         made = self._with(self.measured[self.first :], self.heat[self.first :], schedule)
         follows = any(HVAC_INPUTS & set(s.inputs) for s in network.signals)
         for _ in range(_TIMES if follows else 1):
-            made = self._with(*self._closed(member, replay_inputs(made.case, network, made.drivers), asked), schedule)
+            made = self._with(*self._closed(member, self.inputs(member, made), asked), schedule)
         if follows:  # with the signals of this heat, for a signal that jumps settles on nothing
-            inputs = replay_inputs(made.case, network, made.drivers)
+            inputs = self.inputs(member, made)
             made = self._with(*self._closed(member, inputs, asked, made.heat), schedule)
         return made
 
@@ -233,41 +237,71 @@ class Emulator:
             np.where(np.isfinite(values).any(axis=1), np.nanmax(np.nan_to_num(values, nan=-1.0), axis=1), np.nan)
         )
 
+    def inputs(self, member: Member, made: Emulated) -> Inputs:
+        """Give the inputs of a member's replay of emulated telemetry.
+
+        Parameters
+        ----------
+        member : Member
+            Its model.
+        made : Emulated
+            The telemetry.
+        """
+        network = member.fit.built.network
+        if member.effect not in self._replays:
+            self._replays[member.effect] = replay_inputs(self.case, network, self.base)
+        base, rows = self._replays[member.effect], slice(self.first, None)
+        zone, bridged, held, boundary = (v.copy() for v in (base.zone, base.bridged, base.held, base.boundary))
+        for series in (zone, bridged, held):
+            series[rows] = np.where(np.isfinite(series[rows]), made.zone, np.nan)
+        if network.signals:
+            boundary[:, -len(network.signals) :] = _REFERENCE + signal_values(network.signals, made.drivers)
+        told, airflow = made.drivers.series, base.airflow
+        return replace(
+            base, zone=zone, bridged=bridged, held=held, boundary=boundary, heat=told["heat"],
+            airflow=told["airflow"] if airflow.shape[1] else airflow,
+        )  # fmt: skip
+
     def _with(self, zone: FloatArray, heat: FloatArray, schedule: Schedule) -> Emulated:
-        """Telemetry that shows given temperatures and heat."""
-        frame, rows = self.case.telemetry.frame.copy(), self.stamps
-        handlers = [d.name for d in self.case.building.devices if d.type == "ahu"]
-        warmer, pressure = (self._of_handlers(schedule, handlers, point) for point in (SUPPLY_AIR, STATIC_PRESSURE))
+        """Make inputs that tell of given temperatures and heat."""
+        building, rows, base = self.case.building, slice(self.first, None), self.base
+        handlers = [d.name for d in building.devices if d.type == "ahu"]
+        levels = [self._of_handlers(schedule, handlers, point) for point in (SUPPLY_AIR, STATIC_PRESSURE)]
+        names = ("heat", "supply_flow", "supply_heat", "airflow")
+        made = {name: base.series[name].copy() for name in names}
+        made["heat"][rows] = heat
         for i, name in enumerate(self.zones):
-            entities = [name, *(d.name for d in self.case.building.devices_of(name))]
-            for column in (f"{e}/{ZONE_TEMPERATURE}" for e in entities):
-                if column in frame:
-                    frame.loc[rows, column] = zone[:, i]
-            if self.device[name] is None:
-                continue
-            _, flow, discharge = self.device[name]  # type: ignore[misc]
-            changed = np.abs(heat[:, i] - self.heat[self.first :, i]) > 1.0
-            if name not in self.flows:
-                own = frame.loc[rows, flow].to_numpy(dtype=float)
-                frame.loc[rows, flow] = own + heat[:, i] - self.heat[self.first :, i]
-                continue
-            rate = frame.loc[rows, flow].to_numpy(dtype=float).copy()
-            most = max(float(self.flows[name][1].max()), 1e-6)
-            runs, least = rate > 0.02 * most, float(self.flows[name][1][self.flows[name][1] > 0.02 * most].min())
-            rate = np.where(changed, np.interp(heat[:, i], *self.flows[name]), rate)
-            rate = np.where(runs, np.maximum(rate, least), rate)  # an air handler that runs brings air, called or not
-            if pressure is not None:  # dampers are open as far as they go, and flow falls with the root of the pressure
-                usual = float(frame[[f"{h}/{STATIC_PRESSURE}" for h in handlers]].median().median())
-                rate = np.where(np.isfinite(pressure), np.minimum(rate, most * np.sqrt(pressure / usual)), rate)
-            if warmer is not None:
-                needed = -heat[:, i] / AIR_HEAT_CAPACITY / np.maximum(zone[:, i] - warmer, 1.0)
-                rate = np.where(np.isfinite(warmer) & (heat[:, i] < -self.idle[i]), np.minimum(needed, most), rate)
-            rate = np.where(np.abs(heat[:, i]) > 1.0, np.maximum(rate, 0.05 * most), rate)
-            frame.loc[rows, flow] = rate
-            frame.loc[rows, discharge] = zone[:, i] + heat[:, i] / AIR_HEAT_CAPACITY / np.maximum(rate, 1e-9)
-        case = Case(self.case.building, Telemetry(frame, self.case.step, self.case.telemetry.missing_rows),
-                    judged=self.case.quality)  # fmt: skip
-        return Emulated(case, telemetry_inputs(case, self.models.drivers.normalisation), zone, heat)
+            if name in self.flows:
+                own = made["supply_flow"][rows, i].copy()
+                rate = self._rate(i, own, zone[:, i], heat[:, i], *levels)
+                made["supply_flow"][rows, i] = rate
+                made["supply_heat"][rows, i] += heat[:, i] - self.heat[rows, i]
+                for k, airflow in enumerate(building.airflows):
+                    if airflow.device == self.device[name][0]:  # type: ignore[index]
+                        made["airflow"][rows, k] += airflow.fraction * (rate - own)
+        drivers = InputProvider(building, base.stamps, base.step, {**base.series, **made}, base.normalisation)
+        kept = {key: value for key, value in vars(base).items() if key in _UNMOVED}
+        vars(drivers).update(kept)
+        return Emulated(drivers, zone, heat)
+
+    def _rate(
+        self, i: int, own: FloatArray, zone: FloatArray, heat: FloatArray, warmer: FloatArray | None,
+        pressure: FloatArray | None,
+    ) -> FloatArray:  # fmt: skip
+        """Flow of a zone's terminal that gives some heat, from what it was with the measured one [kg/s]."""
+        levels, flows = self.flows[self.zones[i]]
+        most = max(float(flows.max()), 1e-6)
+        least = float(flows[flows > _RUNS * most].min(initial=most))
+        rate = np.where(np.abs(heat - self.heat[self.first :, i]) > 1.0, np.interp(heat, levels, flows), own)
+        rate = np.where(own > _RUNS * most, np.maximum(rate, least), rate)  # what runs brings air, called or not
+        if pressure is not None:  # dampers are open as far as they go, and flow falls with the root of the pressure
+            columns = [c for c in self.case.telemetry.frame if str(c).endswith(f"/{STATIC_PRESSURE}")]
+            usual = float(self.case.telemetry.frame[columns].median().median())
+            rate = np.where(np.isfinite(pressure), np.minimum(rate, most * np.sqrt(pressure / usual)), rate)
+        if warmer is not None:
+            needed = -heat / AIR_HEAT_CAPACITY / np.maximum(zone - warmer, 1.0)
+            rate = np.where(np.isfinite(warmer) & (heat < -self.idle[i]), np.minimum(needed, most), rate)
+        return np.asarray(np.where(np.abs(heat) > 1.0, np.maximum(rate, 0.05 * most), rate))
 
 
 def _followed(

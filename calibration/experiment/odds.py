@@ -8,11 +8,10 @@ from scipy.stats import norm
 
 from calibration.diagnosis.decide.levels import TEMPERATURE
 from calibration.evaluation.intervals import Interval, horizon_steps
-from calibration.experiment.emulate import Emulated
+from calibration.experiment.emulate import Emulated, Emulator
 from calibration.experiment.members import Member
 from calibration.fit.problem import Problem, tuning_runs
 from thermal._types import FloatArray
-from thermal.model.case_replay import replay_inputs
 
 #: Odds from which one of two models is named: evidence is *strong* from 20 to 1 on (Kass and Raftery 1995,
 #: doi:10.1080/01621459.1995.10476572).
@@ -143,7 +142,12 @@ class Separation:
 
 
 def separation(
-    emulated: Mapping[str, Emulated], usual: Emulated, members: Sequence[Member], interval: Interval, horizon: str
+    emulator: Emulator,
+    emulated: Mapping[str, Emulated],
+    usual: Emulated,
+    members: Sequence[Member],
+    interval: Interval,
+    horizon: str,
 ) -> Separation:
     """Expect what an experiment says of each pair of members.
 
@@ -152,6 +156,8 @@ def separation(
 
     Parameters
     ----------
+    emulator : Emulator
+        Of the days.
     emulated : mapping of str to Emulated
         The experiment were each member true, by effect.
     usual : Emulated
@@ -164,9 +170,9 @@ def separation(
         Of the predictions by which models are compared.
     """
     log_odds, swing = {}, {}
-    before = {m.effect: _errors(m, _problem(m, usual, interval, horizon)) for m in members}
+    before = {m.effect: _errors(m, _problem(emulator, m, usual, interval, horizon)) for m in members}
     for true, made in emulated.items():
-        at = {m.effect: _problem(m, made, interval, horizon) for m in members}
+        at = {m.effect: _problem(emulator, m, made, interval, horizon) for m in members}
         own = next(m for m in members if m.effect == true)
         reference = _errors(own, at[true]) - before[true]
         for other in (m for m in members if m.effect != true):
@@ -200,10 +206,10 @@ def _errors(member: Member, problem: Problem) -> FloatArray:
     return problem.residuals_only(member.fit.model, member.fit.theta)
 
 
-def _problem(member: Member, made: Emulated, interval: Interval, horizon: str) -> Problem:
+def _problem(emulator: Emulator, member: Member, made: Emulated, interval: Interval, horizon: str) -> Problem:
     """Errors of a member's model on emulated telemetry."""
     fit = member.fit
-    inputs = replay_inputs(made.case, fit.built.network, made.drivers)
+    inputs = emulator.inputs(member, made)
     steps = horizon_steps(horizon, inputs.step)
     runs = tuning_runs(inputs, [interval], steps, fit.settings.spin_up_seconds)
     return Problem(fit.built.grid, inputs, runs, steps, fit.problem.free, fit.theta, fit.settings.stepping)

@@ -86,10 +86,10 @@ def test_what_a_member_emulates_it_predicts(case: Case) -> None:
     for made in moved.values():
         assert (made.zone.mean(axis=0) - usual.zone.mean(axis=0))[0] > 0.2
         assert made.heat.sum() > usual.heat.sum()
-    found = separation(moved, usual, members, window, "6h")
+    found = separation(emulator, moved, usual, members, window, "6h")
     assert set(found.log_odds) == {("flow_gain", "valve_leak"), ("valve_leak", "flow_gain")}
     assert all(v > 0.0 for v in found.log_odds.values())
-    same = separation({"flow_gain": usual}, usual, members, window, "6h")
+    same = separation(emulator, {"flow_gain": usual}, usual, members, window, "6h")
     assert same.log_odds["flow_gain", "valve_leak"] == pytest.approx(0.0, abs=1e-9)
 
 
