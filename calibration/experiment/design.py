@@ -298,7 +298,7 @@ class _Search:
     def _library(self) -> list[Move]:
         building, frame = self.models.case.building, self.models.case.telemetry.frame
         where = places(building, self.models.anatomy, self.emulator.movable, [m.zones for m in self.members])
-        hours = (np.arange(len(self.emulator.stamps)) + 0.5) * self.step / 3600.0
+        hours = np.asarray((np.arange(len(self.emulator.stamps)) + 0.5) * self.step / 3600.0, dtype=np.float64)
         levers = {}
         for point in (SUPPLY_AIR, STATIC_PRESSURE):
             names = tuple(d.name for d in building.devices if d.type == "ahu" and f"{d.name}/{point}" in frame)

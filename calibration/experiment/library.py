@@ -166,7 +166,7 @@ def moves(
     whole = ((0.0, float(hours[-1] + hours[0])),)
     found = []
     for name, zones in where.items():
-        kinds = [
+        kinds: list[tuple[str, tuple[float, ...], float, tuple[tuple[float, float], ...]]] = [
             (f"hold {name} warm by day and night", (high,), _LONG, whole),
             (f"hold {name} cool by day and night", (low,), _LONG, whole),
             *((f"move {name} to and fro every {t:g} h", (high, low), t, whole) for t in TURNS),

@@ -89,10 +89,10 @@ def question_of(case: Case, diagnosis: Mapping[str, Any], members: Sequence[str]
     try:
         which = {str(entry["effect"]): entry for entry in diagnosis["which"]}
         name, first = diagnosis["case"], diagnosis["which"][0]
-        intervals = [
+        tuned, judged = (
             tuple(Interval(*(local_timestamp(i[end], case.building) for end in ("start", "end"))) for i in found)
             for found in (diagnosis["intervals"][key] for key in ("tuning", "held_out"))
-        ]
+        )
         accepted = [str(step["effects"][-1]) for step in diagnosis["how_far"] if step["effects"]]
     except (KeyError, IndexError, TypeError, AttributeError) as error:
         raise CalibrationError("diagnosis", "what `buildingmpc diagnose` writes", f"{error!r} is missing") from error
@@ -114,7 +114,7 @@ def question_of(case: Case, diagnosis: Mapping[str, Any], members: Sequence[str]
     prior = {e: w / sum(weight.values()) for e, w in weight.items()}
     return Question(
         {e: _inside(e, z, case) for e, z in where.items()}, {e: _inside(e, z, case) for e, z in kept.items()},
-        *intervals, prior,
+        tuned, judged, prior,
     )  # fmt: skip
 
 

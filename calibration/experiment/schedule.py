@@ -124,8 +124,8 @@ class Schedule:
         for move in (m for m in self.moves if m.point == point):
             acts, pair = move.pair_at(np.asarray(hours, dtype=float))
             acts &= (hours >= 0.0) & (hours < self.hours)
-            at = [i for i, name in enumerate(names) if name in move.zones]
-            found[np.ix_(acts, at)] = pair[acts][:, None, :]
+            for i in (i for i, name in enumerate(names) if name in move.zones):
+                found[acts, i] = pair[acts]
         return found
 
     def rows(self, step: float) -> pd.DataFrame:
