@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from calibration.diagnosis.decide.levels import TEMPERATURE
-from calibration.diagnosis.decide.verdict import Candidate, Verdict
+from calibration.diagnosis.decide.verdict import Candidate, Verdict, VerdictName
 from calibration.diagnosis.diagnosis import Diagnosis, diagnose
 from calibration.errors import CalibrationError
 from calibration.evaluation.intervals import Interval
@@ -145,7 +145,7 @@ def narrowed(verdict: Verdict, outcome: Outcome) -> Verdict:
     order = sorted(moved, key=lambda c: (c.effect != named, -c.probability if c.effect in share else 0.0))
     head = order[0]
     rest = [c for c in moved if c.effect != named]
-    name = "named" if len(head.group) == 1 else "group"
+    name: VerdictName = "named" if len(head.group) == 1 else "group"
     set90 = tuple(e for e in verdict.set90 if e == named or e not in share)
     return replace(verdict, name=name, candidates=(head, *rest), set90=set90 if named in set90 else (named, *set90))
 

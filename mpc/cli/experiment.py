@@ -109,7 +109,8 @@ def _settings(start: str | None, case: Any, numbers: Mapping[str, float], prices
     except ValueError as error:
         raise CalibrationError("--prices", "two numbers, such as 0.08,0.12", repr(prices)) from error
     begin = None if start is None else local_timestamp(start, case.building)
-    return DesignSettings(start=begin, prices=(heat, cold), **numbers)
+    hours, discomfort, odds = (numbers[key] for key in ("hours", "discomfort", "odds"))
+    return DesignSettings(begin, hours, discomfort, odds, (heat, cold))
 
 
 def _carry_out(
