@@ -10,16 +10,12 @@ from typing import Any, Protocol
 import numpy as np
 import pandas as pd
 
-from calibration.experiment.library import Comfort
 from calibration.experiment.outcome import joined
 from calibration.experiment.schedule import Schedule
 from mpc.errors import PlantError
 from mpc.loop.plant import Controller, Measurements, Plant
 from mpc.loop.run import FixedSetpoints
 from mpc.scenario.forecast import Forecast
-from mpc.scenario.grid import StepGrid
-from mpc.scenario.occupancy import ComfortBand
-from thermal.case.building import Building
 from thermal.case.case import Case
 from thermal.case.points import ZONE_TEMPERATURE
 from thermal.case.telemetry import Telemetry
@@ -58,8 +54,11 @@ class Scheduled:
         Actuators that the plant has.
     control_step : float
         Time between two actions [s].
+
+    Attributes
+    ----------
     changes : DataFrame
-        Rows of the schedule.
+        Setpoints from each change on, a column a point [K] or [Pa]; -1 where the building's own automation has it.
     """
 
     schedule: Schedule
@@ -185,24 +184,3 @@ def _same_building(case: Case, after: pd.DataFrame) -> None:
     off = case.telemetry.frame.loc[shared, columns].to_numpy() - after.loc[shared, columns].to_numpy()
     size = float(np.sqrt(np.nanmean(off**2)))
     PlantError.unless(size <= _SAME, "site", "the telemetry of the case on its days", f"{size:.2f} K from it")
-
-
-def comfort_of(band: ComfortBand, building: Building) -> Callable[[pd.DatetimeIndex, float], Comfort]:
-    """Give the comfort of a band as a design takes it.
-
-    Parameters
-    ----------
-    band : ComfortBand
-        Occupied hours and temperatures.
-    building : Building
-        Where it is.
-    """
-
-    def comfort(stamps: pd.DatetimeIndex, step: float) -> Comfort:
-        start = stamps[0] - pd.Timedelta(seconds=step)
-        grid = StepGrid.between(start.isoformat(), stamps[-1].isoformat(), step, building)
-        share = band.occupied_share(grid)
-        edges = [np.where(share > 0.0, band.occupied[k], band.unoccupied[k]) for k in (0, 1)]
-        return Comfort(*edges)
-
-    return comfort

@@ -8,14 +8,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from calibration.experiment.library import office_comfort
 from calibration.experiment.schedule import COOLING, HEATING, Move, Schedule
 from mpc.errors import PlantError
 from mpc.loop.make import PlantSettings, pilot_weather, simulated_plant
 from mpc.loop.plant import Plant
 from mpc.loop.run import FixedSetpoints
-from mpc.scenario.occupancy import ComfortBand
-from mpc.studies.experiment import Site, carry_out, comfort_of, open_site
+from mpc.studies.experiment import Site, carry_out, open_site
 from thermal.case.case import Case
 from thermal.data import load_bundled_case
 from thermal.pilot.weather import MOUNTAIN_VIEW
@@ -83,9 +81,3 @@ def test_a_site_in_a_file(tmp_path: Path) -> None:
     (tmp_path / "mine.py").write_text("def site(case, end):\n    return 'plant', {}\n", encoding="utf-8")
     found = open_site(f"{tmp_path / 'mine.py'}:site")
     assert found(None, None) == ("plant", {})  # type: ignore[arg-type]
-
-
-def test_the_comfort_of_a_band_is_the_office_by_default() -> None:
-    stamps = pd.date_range("2023-01-13", periods=4 * 24, freq="30min", tz=MOUNTAIN_VIEW.timezone)[1:]
-    one, other = comfort_of(ComfortBand(), BUILDING)(stamps, 1800.0), office_comfort(stamps, 1800.0)
-    assert np.array_equal(one.lower, other.lower) and np.array_equal(one.upper, other.upper)
