@@ -248,6 +248,10 @@ def diagnose(
     dx: options.Dx = None,
     effects: Annotated[str, options.value("Effects that are known to be there: part of the baseline.", "ID,...")] = "",
     rule_out: Annotated[str, options.value("Effects that are known not to be there.", "ID,...")] = "",
+    experiment: Annotated[
+        Path | None,
+        options.file("experiment.json of one in the telemetry: its days tune, and say which of the group it is."),
+    ] = None,
     horizon: options.Horizon = "6h",
     workers: Workers = None,
     scheduler: Scheduler = None,
@@ -264,11 +268,37 @@ def diagnose(
 
     settings = {"dx": dx, "horizon": horizon, "known": options.ids(effects), "ruled_out": options.ids(rule_out)}
     if cases := _cases_in(case, out, workers, scheduler):
+        CalibrationError.unless(experiment is None, "--experiment", "one case", f"a folder of {len(cases)}")
         settings |= {"tune": tune or [], "hold_out": hold_out or []}
         return _many("diagnose", cases, out, settings, workers, scheduler, force, json)
     with Waiting(f"diagnose {case.name}") as progress:
-        result, report = run_diagnosis(case, out, force, progress, (tune or (), hold_out or ()), settings)
+        if experiment is not None:
+            own = not tune and not hold_out
+            CalibrationError.unless(own, "--experiment", "no other intervals", "--tune or --hold-out")
+            result, report = _after_experiment(case, out, force, progress, experiment, settings)
+        else:
+            result, report = run_diagnosis(case, out, force, progress, (tune or (), hold_out or ()), settings)
     return answer(json, diagnosis_summary(result), lambda: _show_diagnosis(result), report)
+
+
+def _after_experiment(
+    case: Path, out: Path, force: bool, progress: Progress, experiment: Path, settings: Mapping[str, Any]
+) -> tuple[Diagnosis, Path]:
+    """Diagnose telemetry that holds an experiment, and write what was found."""
+    from calibration.evaluation.settings import ModelSettings
+    from calibration.experiment.members import read_experiment
+    from calibration.experiment.outcome import diagnose_further
+    from mpc.reports.diagnosis import write_diagnosis
+
+    loaded = options.open_case(case, out, force)
+    question, interval, odds = read_experiment(experiment, loaded)
+    CalibrationError.unless(settings["horizon"] == "6h", "--experiment", "the horizon 6h", settings["horizon"])
+    result, outcome = diagnose_further(
+        loaded, question, interval, ModelSettings(dx=settings["dx"]), odds, settings["known"], settings["ruled_out"],
+        progress,
+    )  # fmt: skip
+    progress("experiment", 1, 1)
+    return result, write_diagnosis(result, loaded, out, force=force, experiment=outcome.to_dict())
 
 
 def run_diagnosis(

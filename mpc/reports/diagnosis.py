@@ -1,6 +1,6 @@
 """What a diagnosis leaves behind: its numbers, the final model, and a page for those who run the building."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -46,7 +46,9 @@ _MOST_GAINS, _MOST_ALIKE = 10, 6
 _NOTABLE = 3.0
 
 
-def write_diagnosis(result: Diagnosis, case: Case, out: str | Path, force: bool = False) -> Path:
+def write_diagnosis(
+    result: Diagnosis, case: Case, out: str | Path, force: bool = False, experiment: Mapping[str, Any] | None = None
+) -> Path:
     """Write what a diagnosis found: numbers, series, the final model and a page.
 
     Files are ``diagnosis.json``, ``calibration.json`` of the model with all accepted effects, ``missing_watts.parquet``
@@ -62,6 +64,8 @@ def write_diagnosis(result: Diagnosis, case: Case, out: str | Path, force: bool 
         Folder, made if need be.
     force : bool
         Replace earlier results.
+    experiment : mapping, optional
+        What an experiment said that the telemetry holds, entry ``experiment`` of ``diagnosis.json``.
 
     Returns
     -------
@@ -74,7 +78,10 @@ def write_diagnosis(result: Diagnosis, case: Case, out: str | Path, force: bool 
         When the folder holds something and ``force`` is not set.
     """
     check_results_folder(out, force)
-    return write_results(out, diagnosis_files(result, case), force) / "report.html"
+    files = diagnosis_files(result, case)
+    if experiment is not None:
+        files["diagnosis.json"] = diagnosis_summary(result) | {"experiment": dict(experiment)}
+    return write_results(out, files, force) / "report.html"
 
 
 def diagnosis_files(result: Diagnosis, case: Case) -> dict[str, Content]:

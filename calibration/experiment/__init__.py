@@ -1,0 +1,1 @@
+"""Experiments that tell apart what the telemetry of a building cannot."""

@@ -1,0 +1,115 @@
+"""Designs on the bundled case: what they keep to, what they promise, and pairs that nothing separates."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from calibration.errors import CalibrationError
+from calibration.evaluation.intervals import Interval
+from calibration.evaluation.settings import ModelSettings
+from calibration.experiment import design as design_module
+from calibration.experiment.design import DesignSettings, Experiment, design_experiment
+from calibration.experiment.emulate import Emulator
+from calibration.experiment.library import office_comfort
+from calibration.experiment.members import Question, comparison, fit_members, question_of, read_experiment
+from calibration.experiment.odds import separation
+from calibration.experiment.schedule import Move, Schedule
+from thermal.case.case import Case
+from thermal.case.telemetry import Telemetry
+from thermal.data import load_bundled_case
+
+MODEL = ModelSettings(dx=3.0)
+WARM = Move("warm by night", ("F1_N", "F1_S"), ((297.0, 297.5),), 1e4, ((0.0, 3.0), (19.0, 24.0)))
+
+
+@pytest.fixture(scope="module")
+def case() -> Case:
+    """Give the bundled case by the half hour."""
+    found = load_bundled_case()
+    frame = found.telemetry.frame.resample("30min", closed="right", label="right").mean()
+    return Case(found.building, Telemetry.from_frame(frame.iloc[:-1]))
+
+
+def asked(case: Case, **members: tuple[str, ...]) -> Question:
+    """Ask which of some effects it is."""
+    stamps = case.stamps
+    parts = (Interval(stamps[0], stamps[6 * 48]),), (Interval(stamps[6 * 48 + 1], stamps[-1]),)
+    return Question(members, {}, *parts, dict.fromkeys(members, 1.0 / len(members)))
+
+
+def designed(case: Case, monkeypatch: pytest.MonkeyPatch, question: Question, **given: Any) -> Experiment:
+    """Design with one move to choose."""
+    own = design_module.moves
+    monkeypatch.setattr(design_module, "moves", lambda *a: own(*a)[:1])
+    return design_experiment(case, question, DesignSettings(hours=12.0, **given), MODEL)
+
+
+def test_a_pair_that_acts_alike_is_said_to_be_hopeless(case: Case, monkeypatch: pytest.MonkeyPatch) -> None:
+    # a bridge and a constant exchange of air are one regressor: cold times a constant
+    found = designed(case, monkeypatch, asked(case, infiltration=(), thermal_bridge=()))
+    assert found.verdict == "hopeless" and found.chance < 0.5
+    content = json.loads(json.dumps(found.to_dict()))
+    assert len(content["measure_instead"]) == 2 and content["hours"] == 12.0
+
+
+def test_a_design_keeps_to_what_it_may(case: Case, monkeypatch: pytest.MonkeyPatch) -> None:
+    found = designed(case, monkeypatch, asked(case, flow_gain=("F1_N",), sensor_bias=("F1_N",)), discomfort=0.1)
+    assert found.best.discomfort.max() <= 0.1
+    stamps = pd.date_range(found.start, found.schedule.end, freq="30min")[1:]
+    comfort = office_comfort(stamps, 1800.0)
+    values = found.schedule.setpoints(stamps, 1800.0, found.zones).mean(axis=2)
+    known = np.isfinite(values)
+    assert (np.where(known, values, comfort.lower[:, None]) >= comfort.lower[:, None]).all()
+    assert (np.where(known, values, comfort.upper[:, None]) <= comfort.upper[:, None]).all()
+    # its energy is heat and cold beyond usual operation, of the member that needs most, and its cost their prices
+    kwh, heats = (
+        case.step / 3.6e6,
+        [[t.emulated[e].heat for t in (found.best, found.usual)] for e in found.best.emulated],
+    )
+    more = max(float((np.abs(now) - np.abs(before)).sum()) * kwh for now, before in heats)
+    assert found.best.energy == pytest.approx(more) and found.best.cost == pytest.approx(0.1 * more)
+
+
+def test_what_a_member_emulates_it_predicts(case: Case) -> None:
+    question = asked(case, flow_gain=("F1_N",), valve_leak=("F1_N",))
+    models = comparison(case, question, MODEL)
+    members = fit_members(models, question)
+    start = case.stamps[47].normalize() + pd.Timedelta(days=2)
+    emulator, window = Emulator(models, start, 24.0), Interval(start, start + pd.Timedelta(hours=24))
+    usual = emulator.run(members[0], Schedule(start, 24.0))
+    assert np.allclose(usual.zone, emulator.measured[emulator.first :])
+    moved = {m.effect: emulator.run(m, Schedule(start, 24.0, (WARM,))) for m in members}
+    for made in moved.values():
+        assert (made.zone.mean(axis=0) - usual.zone.mean(axis=0))[0] > 0.2
+        assert made.heat.sum() > usual.heat.sum()
+    found = separation(emulator, moved, usual, members, window, "6h")
+    assert set(found.log_odds) == {("flow_gain", "valve_leak"), ("valve_leak", "flow_gain")}
+    assert all(v > 0.0 for v in found.log_odds.values())
+    same = separation(emulator, {"flow_gain": usual}, usual, members, window, "6h")
+    assert same.log_odds["flow_gain", "valve_leak"] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_bad_questions_and_settings_are_refused(case: Case, tmp_path: Path) -> None:
+    ends = {"start": case.stamps[0].isoformat(), "end": case.stamps[-1].isoformat()}
+    one = {"effect": "solar_gain", "probability": 0.99, "group": ["solar_gain"], "zones": [], "testable": True}
+    content = {
+        "case": "bundled_case", "verdict": "named", "which": [one], "how_far": [],
+        "intervals": {"tuning": [ends], "held_out": [ends]},
+    }  # fmt: skip
+    with pytest.raises(CalibrationError, match="two effects or more"):
+        question_of(case, content)
+    with pytest.raises(CalibrationError, match="one of the case"):
+        question_of(case, content | {"case": "another"})
+    with pytest.raises(CalibrationError, match="what `buildingmpc diagnose` writes"):
+        question_of(case, {})
+    with pytest.raises(CalibrationError, match="flow_gain"):
+        question_of(case, content, ["solar_gain", "flow_gin"])
+    with pytest.raises(CalibrationError, match="hours"):
+        DesignSettings(hours=1.0)
+    (tmp_path / "experiment.json").write_text("{}", encoding="utf-8")
+    with pytest.raises(CalibrationError, match="buildingmpc experiment"):
+        read_experiment(tmp_path / "experiment.json", case)
