@@ -17,7 +17,6 @@ Run from the repository's root, in an environment with Python 3.11 or newer::
     python benchmarks/blind_trials.py gaps --out results/blind
     python benchmarks/blind_trials.py diagnose --out results/blind
     python benchmarks/blind_trials.py score --out results/blind
-    python benchmarks/blind_trials.py levels --out results/blind    # null levels, from development seeds only
     python benchmarks/blind_trials.py make --world reference --out results/reference --kind all --seeds 0-9
     python benchmarks/blind_trials.py worlds --out results/blind results/reference    # one table of several worlds
 
@@ -37,7 +36,6 @@ from collections.abc import Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, as_completed
 from pathlib import Path
 
-from _null_levels import make_levels
 from _trial_answers import CASES, SEALED, answer_all, measure_gaps, report
 from _trial_worlds import report_worlds
 from _worlds import PACKAGES, Drawn, World, world
@@ -152,16 +150,8 @@ def main() -> int:
     command.add_argument("--out", type=Path, required=True, nargs="+", help="folders of the trials")
     command.add_argument("--publish", action="store_true", help="replace the table between its marks")
     command.set_defaults(run=_worlds)
-    command = commands.add_parser("levels", help="write the levels of answered development nulls into the package")
-    command.add_argument("--out", type=Path, required=True, help="folder of the trials")
-    command.set_defaults(run=_levels)
     options = parser.parse_args()
     return int(options.run(options))
-
-
-def _levels(options: argparse.Namespace) -> int:
-    print(make_levels(options.out))
-    return 0
 
 
 def _score(options: argparse.Namespace) -> int:

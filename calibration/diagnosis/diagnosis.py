@@ -12,7 +12,7 @@ from calibration.diagnosis.correction import CORRECTED, Correction, correct
 from calibration.diagnosis.decide.verdict import Verdict, chance_of, doubted, gains_of, judge
 from calibration.diagnosis.decide.where import DriftCurve, Where, drift_of, where_it_lies
 from calibration.diagnosis.faults import Fault, mend, with_faults
-from calibration.diagnosis.free import drawing_fails, search_free
+from calibration.diagnosis.free import drawing_fails, search_free, with_recurring
 from calibration.diagnosis.handed_on import fit_content, judge_handed_on, other_structures, with_correction
 from calibration.diagnosis.known import reasons_of
 from calibration.diagnosis.refit.challenge import challenge
@@ -338,7 +338,7 @@ def diagnose(
     # a drawing that is known to lack what nothing explains has no advance
     advance = 0.0 if about_drawing == "unexplained" else ADVANCE
     rungs, kept, left = other_structures(models, rounds[-1].after, progress, advance)
-    left_over = None
+    left_over, free = None, None
     if kept is not None and about_drawing != "no_gap" and drawing_fails(rungs, kept):  # names make up for it
         free = search_free(models, kept, known, ruled_out, progress)
         models, rounds, untestable, left_over, kept = (
@@ -349,7 +349,8 @@ def diagnose(
     areas = {name: room.floor_area for name, room in models.anatomy.rooms.items()}
     watts = rounds[0].screening.detectable(accepted_from(rounds[0].own))
     void = {s.effects[-1] for s in steps if s.void}
-    verdict = with_faults(doubted(judge(rounds, untestable, left_over), void), faults)
+    verdict = doubted(judge(rounds, untestable, left_over), void)
+    verdict = with_faults(verdict if free is None else with_recurring(verdict, free, rungs), faults)
     correction = correct(models, rounds[0].before, errors, floor) if verdict.name == "unexplained" else None
     rungs, left = with_correction(models, correction, rungs, left)
     taken = correction.fit if correction is not None and rungs[-1].chosen else None

@@ -115,8 +115,10 @@ def solve_starts(
             if best is not None:  # starts are weighed alike, with the disturbance of the best so far
                 known = best.disturbance
                 tuner = None if known is None else lambda *_, known=known: known
-                if large and (z := _explored(best, z)) is None:
+                explored = _explored(best, z) if large else z
+                if explored is None:
                     continue
+                z = explored
             found = estimate(problem, z, progress, first if number == 0 else None, tuner, close and number == 0)
         except (ArithmeticError, np.linalg.LinAlgError, CalibrationError, ModelError) as error:
             failures.append(f"start {number + 1}: {error}")

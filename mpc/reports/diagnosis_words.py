@@ -254,8 +254,9 @@ def _how_far(result: Diagnosis, found: int) -> str:
 
 
 def _no_gap(result: Diagnosis) -> str:
+    begin = "Beyond that, these" if result.verdict.name == "named" else "These"
     text = (
-        f"These data show nothing that the model leaves out. {ahead(result).capitalize()}, on days that it was not "
+        f"{begin} data show nothing that the model leaves out. {ahead(result).capitalize()}, on days that it was not "
         f"fitted to, the calibrated model misses the measured zone temperatures by {kelvin(result.gap)} K on average."
     )
     if found := accepted(result):

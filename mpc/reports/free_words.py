@@ -4,6 +4,7 @@ from dataclasses import replace
 
 from calibration.diagnosis.correction import CORRECTED
 from calibration.diagnosis.diagnosis import Diagnosis
+from calibration.diagnosis.free import GAINS, recurs
 from calibration.fit.ladder import CLOCK
 from mpc.reports.evaluation import structure_words
 from mpc.reports.page import kelvin, listed
@@ -26,10 +27,15 @@ def free_sentence(result: Diagnosis) -> str:
     best = min(others, key=lambda r: r.left_out_mae)
     free = [replace(r, chosen=r is best) for r in others] if len(others) < len(result.rungs) else others
     own, drawn = next(r.left_out_mae for r in free if r.chosen), result.rungs[0].left_out_mae
+    found = recurs(result.rungs) if result.verdict.candidates[0].effect == GAINS else None
+    gains = "" if found is None else (
+        "Heat that recurs from day to day, with a course of its own in each zone, is missing: most likely people and "
+        f"what they use. It lowers the error of those days from {kelvin(found[0])} to {kelvin(found[1])} K. "
+    )  # fmt: skip
     return (
         f"The drawing does not hold: the building {structure_words(free)} misses tuning days that were left "
         f"out by {kelvin(own)} K, as drawn by {kelvin(drawn)} K."
-        f"{' calibration.json holds it, and effects' if free is others else ' Effects'} were sought about it. "
+        f"{' calibration.json holds it, and effects' if free is others else ' Effects'} were sought about it. {gains}"
     )
 
 

@@ -229,7 +229,9 @@ class Work:
         grown, error = growth(self.held_out, errors)
         worse = grown > NO_WORSE + CHANCE * error
         counts = gain > self.level * len(gains) and not worse and max(fall, -grown) > MATTERS
-        counts = counts and all(beyond_a_step(anew.problem, anew.theta, anew.deviations, g.effect) for g in gains)
+        counts = counts and all(
+            beyond_a_step(anew.problem, anew.theta, anew.deviations, CATALOGUE[g.effect].shifts) for g in gains
+        )
         return Refit(gains[-1], anew, gain, fall, errors, worse, counts)
 
 
@@ -246,8 +248,8 @@ def promising(fit: Fit, share: float) -> bool:
     return float(np.sqrt(fit.found.mean_square) * (1.0 - np.sqrt(1.0 - share))) > _PROMISING * MATTERS
 
 
-def beyond_a_step(problem: Problem, theta: FloatArray, deviations: FloatArray, effect: str) -> bool:
-    """Whether what an effect moves in time, if anything, is moved by more than a step of telemetry, and surely so.
+def beyond_a_step(problem: Problem, theta: FloatArray, deviations: FloatArray, shifts: Sequence[str]) -> bool:
+    """Whether what is moved in time, if anything, is moved by more than a step of telemetry, and surely so.
 
     Parameters
     ----------
@@ -257,10 +259,10 @@ def beyond_a_step(problem: Problem, theta: FloatArray, deviations: FloatArray, e
         Estimate [parameter units].
     deviations : ndarray, shape (n_free,)
         Its standard errors on the estimation scale [-].
-    effect : str
-        Id of the effect.
+    shifts : sequence of str
+        Parameters that move it.
     """
-    shifts, step = CATALOGUE[effect].shifts, problem.inputs.step / 3600.0
+    step = problem.inputs.step / 3600.0
     at = [k for k, p in enumerate(problem.parameters) if p.name in shifts]
     moved = np.abs(theta[[problem.free[k] for k in at]]) - CHANCE * deviations[at]
     return not at or bool(np.any(moved > step))

@@ -218,7 +218,7 @@ def test_telemetry_is_shifted_only_by_more_than_one_of_its_steps() -> None:
         return replace(found.fit, found=replace(found.fit.found, point=point))
 
     def beyond(fit: Fit, effect: str = "clock_shift") -> bool:
-        return beyond_a_step(fit.problem, fit.theta, found.fit.deviations, effect)
+        return beyond_a_step(fit.problem, fit.theta, found.fit.deviations, CATALOGUE[effect].shifts)
 
     assert not beyond(moved(0.9 * step, 0.0))
     assert not beyond(moved(step + 0.9 * error[heat], -0.9 * step))

@@ -10,7 +10,7 @@ import pytest
 
 from calibration.diagnosis.decide.verdict import chance_of, judge
 from calibration.diagnosis.diagnosis import Diagnosis, baseline_gap, diagnose
-from calibration.diagnosis.free import drawing_fails
+from calibration.diagnosis.free import Free, drawing_fails, recurs, with_recurring
 from calibration.diagnosis.refit.comparison import Fit, ModelComparison
 from calibration.diagnosis.screen.regular import Regular, regular
 from calibration.evaluation.settings import ModelSettings
@@ -126,3 +126,21 @@ def test_heat_that_is_missing_at_night_comes_back_with_the_time_of_day() -> None
     assert found.counts
     assert max(found.shares, key=lambda kind: found.shares[kind]) == "time of day"
     assert found.shares["time of day"] > 0.3
+
+
+@pytest.mark.parametrize(("recurring", "named"), [(0.5, True), (0.61, False)])
+def test_heat_that_recurs_in_each_zone_is_peoples_where_it_takes_much_of_the_error_away(
+    recurring: float, named: bool
+) -> None:
+    found = replace(diagnosed(), rounds=diagnosed().rounds[-1:])
+    verdict = judge(found.rounds, {}, found.left_over)
+    structure = SimpleNamespace(settings=SimpleNamespace(structure=SimpleNamespace(recurring=True)))
+    free = cast(Free, SimpleNamespace(kept=structure, rounds=found.rounds))
+    rungs = [Rung(n, e, 10, n == "recurring") for n, e in (("drawn", 2.0), ("lumped", 1.0), ("recurring", recurring))]
+    assert recurs(rungs) == ((1.0, recurring) if named else None)
+    told = with_recurring(verdict, free, rungs)
+    assert (told.candidates[0].effect == "internal_gains") == named
+    assert (told.name == "named") == named
+    assert {c.effect for c in told.candidates} == {c.effect for c in verdict.candidates}
+    structure.settings.structure.recurring = False  # another structure predicts better
+    assert with_recurring(verdict, free, rungs) == verdict

@@ -15,6 +15,7 @@ from calibration.diagnosis.refit.comparison import ModelComparison
 from calibration.diagnosis.refit.refit import ACCEPTED, MATTERS, Work, held_out, promising
 from calibration.diagnosis.refit.search import Round, _best_pair, _exchanged, _refits, nominate
 from calibration.diagnosis.screen.gains import Gain, choice_of
+from calibration.diagnosis.screen.own_nulls import OwnNulls
 from calibration.diagnosis.screen.screen import Screening
 from calibration.evaluation.settings import ModelSettings
 from thermal import Case, Telemetry
@@ -29,6 +30,9 @@ NAMES = ("roof_exchange", "ground_exchange", "interfloor_exchange", "infiltratio
 
 #: Share by which a meter reads too low, and by how much a sensor reads too high [-, K]: each is hardly seen alone.
 ERROR, BIAS = 0.21, 0.48
+
+#: Own nulls that show nothing.
+NONE = OwnNulls(np.zeros(1), {}, np.zeros(1))
 
 #: Errors, and their deviation [K].
 COUNT, NOISE = 300, 0.1
@@ -217,7 +221,7 @@ def test_what_promises_to_matter_little_is_not_fitted() -> None:
             assert _best_pair(work, gains, (), None) is None
             surely = tuple(replace(g, gain=50.0) for g in gains)
             assert _refits(work, surely, None) == []
-            told = Round(work.fit, work.held_out, made, surely, surely[0], (), None)
+            told = Round(work.fit, work.held_out, made, surely, surely[0], (), None, NONE)
             assert set(gains_of(told).values()) == {SMALL}
 
 
@@ -236,7 +240,7 @@ def test_what_stood_for_another_effect_is_exchanged_once_the_second_is_in_the_mo
             refit = work.refit([gain], made.promised(gain))
             assert refit is not None
             generic = replace(gain, effect="generic")
-            rounds.append(Round(fit, work.held_out, made, (gain,), generic, (refit,), refit))
+            rounds.append(Round(fit, work.held_out, made, (gain,), generic, (refit,), refit, NONE))
             fit = refit.fit
         return rounds, Screening(models, fit, [n for n in names if n not in fit.effects])
 
