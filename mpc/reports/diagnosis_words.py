@@ -14,6 +14,7 @@ from mpc.reports.evaluation import beside_sentence, carried_sentence, structure_
 from mpc.reports.free_words import comes_back, free_sentence, known_effects
 from mpc.reports.page import duration, estimated_sentences, kelvin, listed, percent, sure, watts
 from thermal.effects.catalogue import CATALOGUE, effect_of, is_effect
+from thermal.inputs.provider import IRRADIANCE
 
 #: What an effect is called where its title would read oddly after "leaves out".
 _CALLED = {"hidden_mass": "mass that stores heat"}
@@ -39,6 +40,11 @@ def diagnosis_verdict(result: Diagnosis) -> str:
     text = faults_sentence(result) + free_sentence(result) + _verdict(result)
     if known := known_effects(result):
         text += f" {listed([called(e) for e in known]).capitalize()}, known to be there, is part of the baseline."
+    if "solar_gain" in result.final.effects and any(IRRADIANCE in c.reason for c in result.verdict.candidates):
+        text += (
+            " No irradiance is measured: how bright a day was is estimated from the range of the outdoor temperature, "
+            "so that the sun's size is rough."
+        )
     if result.settings.scopes:
         text += (
             " Slabs and furniture have values of each zone's own here: they explain what looked like another effect "
