@@ -7,7 +7,7 @@ import numpy as np
 
 from calibration.diagnosis.decide.verdict import Verdict
 from calibration.diagnosis.known import reasons_of
-from calibration.diagnosis.refit.comparison import ModelComparison
+from calibration.diagnosis.refit.comparison import Effects, ModelComparison
 from calibration.diagnosis.refit.refit import beyond_a_step, held_out
 from calibration.diagnosis.refit.search import Round, search
 from calibration.diagnosis.screen.regular import Regular, regular
@@ -17,6 +17,7 @@ from calibration.fit.ladder import CLOCK
 from calibration.fit.left_out import Known, values_of
 from calibration.fit.result import Rung
 from thermal.effects.catalogue import CATALOGUE
+from thermal.network.structure import Structure
 
 #: Share by which a free structure must predict left-out days better than the building as drawn with what was found [-].
 #: Of 32 blind trials of offices that were answered with a name or left unexplained one is better by 13 %, one by 12,
@@ -109,16 +110,32 @@ def with_recurring(verdict: Verdict, free: Free, rungs: Sequence[Rung]) -> Verdi
         Structures by their errors.
     """
     structure = free.kept.settings.structure
-    if not structure.recurring or recurs(rungs) is None or GAINS in free.rounds[-1].after.effects:
-        return verdict
     own = next(c for c in verdict.candidates if c.effect == GAINS)
+    there = {r.accepted.screened.effect for r in free.rounds if r.accepted is not None}
+    plain = not structure.recurring or recurs(rungs) is None or GAINS in free.rounds[-1].after.effects
+    if plain or not own.testable or verdict.name == "unexplained":
+        return verdict
     told = replace(own, probability=_SURE, group=(GAINS,), zones=(), parameters={})
-    rest = [c for c in verdict.candidates if c is not own]
-    ahead = [c for c in rest if c.effect in free.rounds[-1].after.effects and verdict.name in ("named", "group")]
-    return replace(
-        verdict, name="named" if verdict.name == "no_gap" else verdict.name,
-        candidates=(*ahead, told, *(c for c in rest if c not in ahead)), set90=(*verdict.set90, GAINS),
+    ahead = [c for c in verdict.candidates if c.effect in there and verdict.name in ("named", "group")]
+    rest = [c for c in verdict.candidates if c is not own and c not in ahead]
+    chain = {e: (1.0 - _SURE) * p for e, p in verdict.combinations.items()}
+    chain |= {(*e, GAINS): _SURE * p for e, p in verdict.combinations.items()}
+    return Verdict(
+        "named" if verdict.name == "no_gap" else verdict.name, (*ahead, told, *rest),
+        tuple(dict.fromkeys((*verdict.set90, GAINS))), chain,
     )  # fmt: skip
+
+
+def is_recurring(verdict: Verdict) -> bool:
+    """Whether `with_recurring` has named people's heat: it has no strength of a schedule.
+
+    Parameters
+    ----------
+    verdict : Verdict
+        Of a diagnosis.
+    """
+    own = next(c for c in verdict.candidates if c.effect == GAINS)
+    return verdict.name in ("named", "group") and own.probability == _SURE and not own.parameters
 
 
 def search_free(
@@ -146,26 +163,28 @@ def search_free(
     progress : callable, optional
         Called with stage, done, total.
     """
-    chosen, whole = kept.settings, kept.settings.structure
-    found = kept.best
+    chosen, whole, found = kept.settings, kept.settings.structure, kept.best
+    said = {*known, *ruled_out}
+    attempts: list[tuple[Structure, Effects, str | None]] = [(whole, chosen.effects, None)]
     moved = beyond_a_step(found.problem, found.theta, np.sqrt(np.diag(found.covariance)), _WEATHER)
-    gains = whole.recurring and GAINS not in ruled_out
-    structures = [replace(whole, recurring=False)] if gains else []  # a name for what recurs, where it is one
-    for structure in (*structures, whole):
+    if CLOCK in chosen.effects and CLOCK not in said and moved:
+        attempts.insert(0, (whole, {e: z for e, z in chosen.effects.items() if e != CLOCK}, CLOCK))
+    if whole.recurring and GAINS not in said:
+        attempts.insert(0, (replace(whole, recurring=False), chosen.effects, GAINS))
+    for structure, own, sought in attempts:
         settings = replace(
             models.settings, structure=structure, scopes=chosen.scopes, normalisation=chosen.normalisation
         )
         free = ModelComparison(
-            models.case, settings, models.tuned, models.judged, models.horizon, weights=kept.best.problem
+            models.case, settings, models.tuned, models.judged, models.horizon, weights=found.problem
         )
-        own = {e: z for e, z in chosen.effects.items() if e != CLOCK or not moved}
         untestable = free.untestable()
         untestable |= reasons_of(known, ruled_out, untestable) | dict.fromkeys(own, "part of the structure")
         testable = [e for e in CATALOGUE if e not in untestable]
-        baseline = free.fit({**own, **{e: () for e in known}}, [values_of(kept.best)])
+        baseline = free.fit({**own, **{e: () for e in known}}, [values_of(found)])
         rounds = search(free, baseline, held_out(free, baseline), testable, progress)
         final = rounds[-1].after
-        if structure is whole or GAINS in final.effects:
+        if sought is None or sought in final.effects:
             break
     if final.effects.keys() != baseline.effects.keys():
         known_fit = Known(final.problem, final.model, final.point)

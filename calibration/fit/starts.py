@@ -66,6 +66,8 @@ def _explored(best: Estimate, z: FloatArray) -> FloatArray | None:
     problem = best.problem
     small = reduced_model(problem.grid, [problem.theta(z)], order=TUNING_ORDER)
     found = solve_least_squares(lambda x: problem.weighted(small, x), z, *problem.bounds, tolerance=1e-1)
+    if found.interrupted:
+        raise KeyboardInterrupt
     theta = problem.theta(found.x)
     there, _ = problem.weighted(reduced_model(problem.grid, [theta]), found.x)
     return found.x if 0.5 * float(there @ there) < best.solve.cost - _BETTER else None

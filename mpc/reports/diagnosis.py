@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from calibration.diagnosis.decide.levels import GENERIC_GAP, LARGEST_GROUP
-from calibration.diagnosis.decide.verdict import Candidate
+from calibration.diagnosis.decide.levels import LARGEST_GROUP
+from calibration.diagnosis.decide.verdict import Candidate, generic_from
 from calibration.diagnosis.diagnosis import Diagnosis, Replay
 from calibration.diagnosis.refit.search import Round, accepted_from
 from calibration.results import Content, check_results_folder, write_results
@@ -315,7 +315,7 @@ def _statistics(result: Diagnosis) -> dict[str, Any]:
     first, final = ({p.name: p for p in f.describe()} for f in (result.rounds[0].before, result.final))
     nothing = dict.fromkeys(("where", "score", "retained_share"))
     return {
-        "limits": (accepted_from(result.rounds[0].own), GENERIC_GAP),
+        "limits": (accepted_from(result.rounds[0].own), generic_from(result.rounds[0])),
         "rounds": [_round(r) for r in result.rounds],
         "effects": [
             vars(c) | {"name": called(c.effect), "where": in_zones(c.zones), "sure": sure(c.probability)}

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from calibration.diagnosis.correction import CORRECTED
 from calibration.diagnosis.diagnosis import Diagnosis
-from calibration.diagnosis.free import GAINS, recurs
+from calibration.diagnosis.free import is_recurring, recurs
 from calibration.fit.ladder import CLOCK
 from mpc.reports.evaluation import structure_words
 from mpc.reports.page import kelvin, listed
@@ -27,7 +27,7 @@ def free_sentence(result: Diagnosis) -> str:
     best = min(others, key=lambda r: r.left_out_mae)
     free = [replace(r, chosen=r is best) for r in others] if len(others) < len(result.rungs) else others
     own, drawn = next(r.left_out_mae for r in free if r.chosen), result.rungs[0].left_out_mae
-    found = recurs(result.rungs) if result.verdict.candidates[0].effect == GAINS else None
+    found = recurs(result.rungs) if is_recurring(result.verdict) else None
     gains = "" if found is None else (
         "Heat that recurs from day to day, with a course of its own in each zone, is missing: most likely people and "
         f"what they use. It lowers the error of those days from {kelvin(found[0])} to {kelvin(found[1])} K. "

@@ -297,9 +297,7 @@ class InputProvider:
 
     @cached_property
     def at_home(self) -> FloatArray:
-        """Presence of people in a home while they are awake, shape (n_time,) [-]; 0 where people are counted."""
-        if self.normalisation.people is not None and "people" in self.series:
-            return np.zeros(len(self.stamps))
+        """Presence of people in a home while they are awake, by the clock, shape (n_time,) [-]."""
         working = np.maximum(self._within(*_MORNING), self._within(*_EVENING))
         return np.where(self._middle.day_of_week < 5, working, self._within(*_DAY_OFF))
 

@@ -26,7 +26,7 @@ _LOWEST = 3.0
 #: Sun that reaches the ground, of that outside of the atmosphere, per root of the daily range of outdoor temperature
 #: [K^-1/2]: 0.16 inland, 0.19 by the sea (Hargreaves; Allen et al. 1998, FAO Irrigation and Drainage Paper 56, eq. 50);
 #: and its least and most, of a dark and of a clear day [-] (the same, eqs. 35 and 37).
-_BY_RANGE, _DARK, _CLEAR = 0.175, 0.15, 0.75
+_BY_RANGE, _DARK, _CLEAR = 0.175, 0.25, 0.75
 
 _NORMAL = "direct_normal_irradiance_sensor"
 _DIFFUSE = "diffuse_horizontal_irradiance_sensor"
@@ -181,7 +181,9 @@ def estimated_sun(location: Location, stamps: pd.DatetimeIndex, step: float, out
     middle = stamps - pd.Timedelta(seconds=step / 2.0)
     azimuth, altitude = _place(location, middle)
     days = pd.Series(outdoor).groupby(np.asarray(middle.normalize().asi8))
-    spread = (days.transform("max") - days.transform("min")).to_numpy(dtype=float)
+    length, range_ = days.count(), days.max() - days.min()
+    usual = float(range_[length == length.max()].median())  # of a day that is cut off the range is unknown
+    spread = range_.where(length == length.max(), usual)[np.asarray(middle.normalize().asi8)].to_numpy(dtype=float)
     above = np.asarray(irradiance.get_extra_radiation(middle.day_of_year), dtype=float)
     clear = np.clip(_BY_RANGE * np.sqrt(spread), _DARK, _CLEAR)
     total = np.where(altitude > 0.0, clear * above * np.sin(np.radians(altitude)), 0.0)

@@ -215,8 +215,19 @@ def _name(rounds: Sequence[Round], left_over: Regular | None) -> VerdictName:
         if size <= levels.LARGEST_GROUP:
             return "named" if size == 1 else "group"
         return "unexplained"
-    shows = left_over is None and first.generic.gain > max(levels.GENERIC_GAP, first.own.generic_level)
+    shows = left_over is None and first.generic.gain > generic_from(first)
     return "unexplained" if first.accepted is not None or shows or much else "no_gap"
+
+
+def generic_from(r: Round) -> float:
+    """Gain from which heat of any shape says that something is missing [-].
+
+    Parameters
+    ----------
+    r : Round
+        Of the search.
+    """
+    return max(levels.GENERIC_GAP, r.own.generic_level)
 
 
 def _explained(rounds: Sequence[Round], left_over: Regular | None) -> float:
@@ -303,7 +314,7 @@ def chance_of(r: Round) -> float:
         The first of the search.
     """
     gains = gains_of(r)
-    most = max(gains.values())
+    most = max(gains.values(), default=0.0)
     return float(max(min(1.0, len(gains) * np.exp(-most)), r.own.p_value(most)))
 
 
@@ -373,7 +384,7 @@ def probabilities(gains: Mapping[str, float], level: float) -> tuple[dict[str, f
     level : float
         Gain from which an effect is accepted [-].
     """
-    top = max(*gains.values(), level)
+    top = max([*gains.values(), level])
     weight = {effect: float(np.exp((gain - top) / levels.TEMPERATURE)) for effect, gain in gains.items()}
     none = float(np.exp((level - top) / levels.TEMPERATURE))
     whole = sum(weight.values()) + none

@@ -88,6 +88,7 @@ class Round:
             "tuning_rms": float(np.sqrt(self.before.found.mean_square)),
             "held_out_mae": self.held_out.mae,
             "generic": self.generic.gain,
+            "own_nulls": {"level": self.own.level, "generic": self.own.generic_level},
             "gains": {g.effect: {key: getattr(g, key) for key in ("gain", "zones", "share", "retained")}
                       for g in self.gains},
             "refits": {r.screened.effect: {key: getattr(r, key) for key in fitted} | {"held_out_mae": r.held_out.mae}

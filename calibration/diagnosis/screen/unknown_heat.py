@@ -13,6 +13,7 @@ from calibration.fit.problem import Problem
 from thermal._types import BoolArray, FloatArray, IntArray
 from thermal.effects.effect import Chosen
 from thermal.effects.unknown import UNKNOWN, inputs_of
+from thermal.inputs.provider import IRRADIANCE
 from thermal.model.reduce import reduced_model
 from thermal.network.build import Extension
 from thermal.parameters import Parameter
@@ -131,7 +132,9 @@ def daily_errors(
     kinds : sequence of str
         Keys of `UNKNOWN`; what the case does not measure, and what the effects have, is left out.
     """
-    told = [e for e in kinds if e not in effects and not models.drivers.lacks(inputs_of(e))]
+    drivers = models.drivers
+    unknown = {"sun"} if drivers.estimates(IRRADIANCE) else set()  # an estimate is too rough to learn a course from
+    told = [e for e in kinds if e not in effects and not drivers.lacks(inputs_of(e)) and not unknown & {*inputs_of(e)}]
     built = models.build(effects, [*further, *(Chosen(UNKNOWN[e]) for e in told)])
     theta = built.theta(values)
     problem, model = models.problem(built, theta), reduced_model(built.grid, [theta])

@@ -145,4 +145,12 @@ def test_a_day_by_its_range_of_temperature_as_in_fao_56_example_15() -> None:
 def test_a_day_without_a_swing_is_dark_and_one_with_a_large_one_no_brighter_than_clear() -> None:
     place, stamps = MUNICH, days("2023-06-20", 25)[1:]
     flat, wide = (estimated_sun(place, stamps, 3600.0, v * np.sin(np.arange(24.0) / 4.0)).horizontal for v in (0.0, 30.0))
-    assert wide.max() / flat.max() == pytest.approx(0.75 / 0.15, rel=1e-6)
+    assert wide.max() / flat.max() == pytest.approx(0.75 / 0.25, rel=1e-6)
+
+
+def test_a_day_that_is_cut_off_is_as_bright_as_the_others() -> None:
+    stamps = days("2023-06-20", 73)[1:]
+    outdoor = 290.0 + 6.0 * np.sin(2.0 * np.pi * stamps.hour / 24.0)
+    whole = estimated_sun(MUNICH, stamps, 3600.0, np.asarray(outdoor)).horizontal
+    part = estimated_sun(MUNICH, stamps[9:], 3600.0, np.asarray(outdoor)[9:]).horizontal
+    assert part == pytest.approx(whole[9:], rel=1e-6)
