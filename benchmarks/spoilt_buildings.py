@@ -143,7 +143,7 @@ SPOILS: dict[str, tuple[Spoil, tuple[str, ...], bool]] = {
     "flow_gain": (_meter, ("flow_gain",), False),
     "swapped_sensors": (_swap, ("swapped_sensors",), True),
     "unmetered_device": (_device, ("internal_gains", "valve_leak"), True),
-    "no_irradiance": (_no_sun, ("internal_gains",), True),
+    "no_irradiance": (_no_sun, ("solar_gain", "internal_gains"), True),
     "no_boundary": (_no_boundary, ("roof_exchange", "ground_exchange", "neighbour", "interfloor_exchange"), True),
 }
 
