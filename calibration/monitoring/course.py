@@ -166,6 +166,7 @@ class _Walk:
         self.day, self.watched_from = 0, reference
         self.states: list[State] = [self.filter.start()]
         self.watch: Watch | None = None
+        self.alarm: Alarm | None = None
         self.pending: int | None = None
         self.events: list[Event] = []
         self.places: list[int] = []
@@ -180,6 +181,8 @@ class _Walk:
         self.states[day + 1 :] = [ahead]
         self.day += 1
         if innovation is None:
+            if self.day == len(self.days) and self.watch is not None and self.alarm is not None:
+                self._settle_if_noticed(day, self.alarm, self.watch)  # no later day will
             return
         self.size[day], self.carried[day] = self.filter.sizes[day], float(np.mean(np.abs(innovation.left)))
         if day < self.watched_from:
@@ -195,12 +198,16 @@ class _Walk:
             self.evidence[day] = alarm.log_evidence
             if alarm.log_evidence > self.threshold:
                 self.pending = day
-        if self.pending is not None:
-            self._settle(day, alarm, self.watch, self.pending)
+        self.alarm = alarm
+        self._settle_if_noticed(day, alarm, self.watch)
 
     def _sizes(self, state: State) -> list[float]:
         n = len(self.events)
         return state.mean[state.mean.size - n :].tolist() if n else []
+
+    def _settle_if_noticed(self, day: int, alarm: Alarm, watch: Watch) -> None:
+        if self.pending is not None:
+            self._settle(day, alarm, watch, self.pending)
 
     def _settle(self, day: int, alarm: Alarm, watch: Watch, noticed: int) -> None:
         """Close what is over at once; name what is new once there are days enough."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -144,3 +146,18 @@ def test_days_without_telemetry_are_passed_over() -> None:
     days.errors[80, :2] = np.nan
     event = follow(days, REFERENCE).events[0]
     assert event.effect == "valve_leak"
+
+
+def test_an_alarm_is_named_where_the_telemetry_ends_without_a_run() -> None:
+    """Telemetry that is cut off in the small hours, or in a gap, leaves no run on its last days."""
+    whole = made(7, 74, 2.5, start=70)
+    cut = made(7, 74, 2.5, start=70)
+    cut = replace(
+        cut, dates=cut.dates.append(cut.dates[-1:] + pd.Timedelta(days=1)),
+        errors=np.vstack([cut.errors, np.full((1, N_ERROR), np.nan)]),
+        slopes=np.concatenate([cut.slopes, np.zeros((1, N_ERROR, 3))]),
+    )  # fmt: skip
+    expected, event = follow(whole, REFERENCE).events[0], follow(cut, REFERENCE).events[0]
+    assert (event.effect, event.since, event.alarm) == (expected.effect, expected.since, expected.alarm)
+    assert event.named == expected.named + 1
+    assert event.size == pytest.approx(expected.size, rel=0.01)
