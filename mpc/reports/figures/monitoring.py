@@ -5,7 +5,7 @@ from matplotlib.figure import Figure
 
 from calibration.monitoring.monitor import Monitoring
 from mpc.reports.figures import style
-from mpc.reports.figures.style import MEASURED, MUTED, SIMULATED, WARNING, Picture, picture, styled
+from mpc.reports.figures.style import MEASURED, MUTED, SIMULATED, WARNING, Picture, keys_below, picture, styled
 
 
 @styled
@@ -47,5 +47,5 @@ def time_line(found: Monitoring) -> list[Picture]:
     error.step(weeks, weekly["mae_carried"], where="post", color=MEASURED, label="carried on, a day ahead")
     error.set(title="Mean absolute error by week", ylabel="[K]")
     error.set_ylim(bottom=0.0)
-    error.legend(fontsize=8, loc="upper left")
+    keys_below(figure, 2)
     return [picture(figure, "Changes, evidence by day and errors by week, over time")]
