@@ -1,6 +1,7 @@
 """Time line of a monitoring: changes, evidence, errors."""
 
 import numpy as np
+import pandas as pd
 from matplotlib.figure import Figure
 
 from calibration.monitoring.monitor import Monitoring
@@ -42,7 +43,8 @@ def time_line(found: Monitoring) -> list[Picture]:
     evidence.axhline(found.course.threshold, color=WARNING, linestyle="--", linewidth=0.9)
     evidence.set(title="Evidence that something has changed, dashed: alarm", ylabel="log evidence [-]")
     evidence.set_ylim(-6.0, 3.0 * found.course.threshold)
-    weeks = style.day_numbers(weekly.index)  # type: ignore[arg-type]
+    weekly = pd.concat([weekly, weekly.iloc[-1:]])  # the last week goes on until the telemetry ends
+    weeks = np.append(style.day_numbers(weekly.index[:-1]), x[-1])  # type: ignore[arg-type]
     error.step(weeks, weekly["mae"], where="post", color=MUTED, label="model of the reference days")
     error.step(weeks, weekly["mae_carried"], where="post", color=MEASURED, label="carried on, a day ahead")
     error.set(title="Mean absolute error by week", ylabel="[K]")
