@@ -71,6 +71,8 @@ def monitoring_verdict(found: Monitoring) -> str:
     missed = int((~found.is_watched).sum())
     watched = counted(int(found.is_watched.sum()), "day")
     without = f" {counted(missed, 'day')} more had no usable run." if missed else ""
+    if found.silent_zones:
+        without += f" Too little was measured {in_zones(list(found.silent_zones))} on the reference days."
     if not found.events:
         return f"Nothing has changed in {watched} that were watched.{without}"
     told = [f"{_what(e)} ({in_zones(e.zones)}), {_when(found, e)}" for e in found.events[-_MOST:]]

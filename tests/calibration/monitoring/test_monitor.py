@@ -82,6 +82,7 @@ def test_a_dead_sensor_is_named(quiet: Case, tmp_path: Path) -> None:
     zone = quiet.building.zone_names[0]
     result = monitor(silenced(quiet, [zone], 0), settings=SETTINGS)
     assert list(result.silent_zones) == [zone]
+    assert monitoring_verdict(result).endswith(f"Too little was measured in zone {zone} on the reference days.")
     page = write_monitoring(result, tmp_path / "out")
     assert f"{zone}: too few measured temperatures on the reference days" in page.read_text(encoding="utf-8")
 
@@ -94,8 +95,6 @@ def test_days_without_a_run_are_told(quiet: Case) -> None:
     missed = watched["days_without_a_run"]
     expected = f"Nothing has changed in {watched['days']} days that were watched. {missed} days more had no usable run."
     assert monitoring_verdict(result) == expected
-    with pytest.raises(NotEnoughDataError, match="after the reference days"):
-        monitor(silenced(quiet, quiet.building.zone_names, REFERENCE), settings=SETTINGS)
 
 
 def test_what_is_in_the_model_is_watched(quiet: Case) -> None:

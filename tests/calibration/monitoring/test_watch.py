@@ -98,6 +98,7 @@ def test_information_of_a_new_change_is_that_of_least_squares() -> None:
         state, innovation = filtered.step(state, day)
         assert innovation is not None
         watch.take(day, days, innovation)
+    assert innovation is not None
     own = -days.slopes[3][:, :2]
     expected = np.linalg.solve(innovation.root @ innovation.root.T, own)
     assert watch._information[-1] == pytest.approx(np.sum(own * expected, axis=0))
