@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from calibration.errors import NotEnoughDataError
 from calibration.evaluation.n_step import Progress
 from calibration.monitoring.days import Days
-from calibration.monitoring.filter import DayFilter, Found, State, noise_of
+from calibration.monitoring.filter import DayFilter, Found, State, is_told, noise_of
 from calibration.monitoring.watch import Alarm, Dispersion, Sought, Watch, sought
-from thermal._types import FloatArray
+from thermal._types import BoolArray, FloatArray
 
 #: Logarithm of the evidence from which there is an alarm [-]. Were days as the filter says, the mean time between false
 #: alarms would be exp(14) days or more; days of a model that lacks physics are not, and 14 was chosen on the
@@ -95,13 +96,15 @@ class Course:
     evidence : ndarray, shape (n_day,)
         Logarithm of the evidence that something has changed [-]; NaN while nothing is watched.
     size : ndarray, shape (n_day,)
-        Mean square of the day's innovations over what is expected [-].
+        Mean square of the day's innovations over what is expected [-]; NaN where nothing was measured.
     carried : ndarray, shape (n_day,)
         Mean absolute error with the parameters and changes carried on [K].
     threshold : float
         Of the evidence [-].
     parameters : dict
         By name, where the model began and where the last day leaves it.
+    told : ndarray of bool, shape (n_error,)
+        Errors that the reference days show, and that are watched.
     """
 
     events: tuple[Event, ...]
@@ -111,6 +114,7 @@ class Course:
     carried: FloatArray
     threshold: float
     parameters: dict[str, Any]
+    told: BoolArray
 
     def daily(self, days: Days) -> pd.DataFrame:
         """Tabulate by day.
@@ -120,9 +124,10 @@ class Course:
         days : Days
             With the errors of the model as it is.
         """
-        seen = np.isfinite(days.errors).any(axis=1)
+        errors = days.errors[:, self.told]
+        seen = np.isfinite(errors).any(axis=1)
         mae = np.full(len(days), np.nan)
-        mae[seen] = np.nanmean(np.abs(days.errors[seen]), axis=1)
+        mae[seen] = np.nanmean(np.abs(errors[seen]), axis=1)
         columns = {"mae": mae, "mae_carried": self.carried, "size": self.size, "log_evidence": self.evidence}
         return pd.DataFrame(columns, index=pd.DatetimeIndex(days.dates, name="timestamp"))
 
@@ -145,14 +150,29 @@ def follow(
         Called with stage, done, total.
     threshold : float
         Logarithm of the evidence from which there is an alarm [-].
+
+    Raises
+    ------
+    NotEnoughDataError
+        When the reference days, or those after them, show too little.
     """
+    told = is_told(days, reference)
+    NotEnoughDataError.unless(
+        told.any(), f"the {reference} reference days", "a zone with runs on more than a week of them", "none",
+        "take other days, or more of them",
+    )  # fmt: skip
+    days = replace(days, errors=np.where(told, days.errors, np.nan))
+    NotEnoughDataError.unless(
+        np.isfinite(days.errors[reference:]).any(), "monitor", "a day with a usable run after the reference days",
+        f"none of {len(days) - reference}", "look for sensors that are silent, and shorten the reference",
+    )  # fmt: skip
     columns = tuple(replace(c, may_change=c.may_change and c.effect not in ruled_out) for c in days.columns)
     walk = _Walk(replace(days, columns=columns), reference, threshold)
     while walk.day < len(days):
         if progress is not None:
             progress("follow the days", walk.day, len(days))
         walk.advance()
-    return walk.course()
+    return walk.course(told)
 
 
 class _Walk:
@@ -166,6 +186,7 @@ class _Walk:
         self.day, self.watched_from = 0, reference
         self.states: list[State] = [self.filter.start()]
         self.watch: Watch | None = None
+        self.alarm: Alarm | None = None
         self.pending: int | None = None
         self.events: list[Event] = []
         self.places: list[int] = []
@@ -180,6 +201,8 @@ class _Walk:
         self.states[day + 1 :] = [ahead]
         self.day += 1
         if innovation is None:
+            if self.day == len(self.days) and self.watch is not None and self.alarm is not None:
+                self._settle_if_noticed(day, self.alarm, self.watch)  # no later day will
             return
         self.size[day], self.carried[day] = self.filter.sizes[day], float(np.mean(np.abs(innovation.left)))
         if day < self.watched_from:
@@ -195,12 +218,16 @@ class _Walk:
             self.evidence[day] = alarm.log_evidence
             if alarm.log_evidence > self.threshold:
                 self.pending = day
-        if self.pending is not None:
-            self._settle(day, alarm, self.watch, self.pending)
+        self.alarm = alarm
+        self._settle_if_noticed(day, alarm, self.watch)
 
     def _sizes(self, state: State) -> list[float]:
         n = len(self.events)
         return state.mean[state.mean.size - n :].tolist() if n else []
+
+    def _settle_if_noticed(self, day: int, alarm: Alarm, watch: Watch) -> None:
+        if self.pending is not None:
+            self._settle(day, alarm, watch, self.pending)
 
     def _settle(self, day: int, alarm: Alarm, watch: Watch, noticed: int) -> None:
         """Close what is over at once; name what is new once there are days enough."""
@@ -261,7 +288,7 @@ class _Walk:
             alarm=noticed, named=day, log_evidence=alarm.log_evidence,
         )  # fmt: skip
 
-    def course(self) -> Course:
+    def course(self, told: BoolArray) -> Course:
         """Gather what was found, with what the last day knows of its size."""
         last = self.filter.grown(self.states[-1])
         n, columns = len(self.events), self.days.columns
@@ -276,6 +303,7 @@ class _Walk:
             for k, c in enumerate(columns) if not c.is_unknown
         }  # fmt: skip
         return Course(
-            tuple(events), tuple(self.withdrawn), self.evidence, self.size, self.carried, self.threshold, parameters
-        )
+            tuple(events), tuple(self.withdrawn), self.evidence, self.size, self.carried, self.threshold, parameters,
+            told,
+        )  # fmt: skip
 

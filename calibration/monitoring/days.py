@@ -208,7 +208,7 @@ class _Replay:
         self.kept = np.searchsorted(self.problem.keep, sorted({max(1, steps // 2), steps}))
         self.kept = np.unique(np.minimum(self.kept, self.problem.keep.size - 1))
         self.every = steps * built.inputs.step
-        self.shape = max(1, int(86400.0 // self.every)), self.kept.size, len(built.network.zones)
+        self.shape = round(86400.0 / self.every), self.kept.size, len(built.network.zones)
         stamps = built.inputs.stamps
         last = stamps[-1] - pd.Timedelta(seconds=built.inputs.step)  # a stamp ends its step
         self.dates = pd.date_range(stamps[0].normalize(), last.normalize(), freq="D")

@@ -17,7 +17,7 @@ import numpy as np
 from scipy.linalg import solve_triangular
 
 from calibration.monitoring.days import Days
-from thermal._types import BoolArray, FloatArray
+from thermal._types import BoolArray, FloatArray, IntArray
 
 #: Growth of the usual error in a day over the deviation of a day's errors [-]: over a quarter of a year the level moves
 #: by half of that, as seasons do that the model knows nothing of, and a lasting change is noticed long before it is
@@ -175,7 +175,7 @@ class DayFilter:
         return State(np.concatenate([state.mean, np.zeros(m)]), covariance)
 
     def scale(self, day: int) -> float:
-        """Size of the noise by what the days before were like, 1 at least [-].
+        """Size of the noise by what the days before were like, a half at least [-].
 
         Parameters
         ----------
@@ -233,12 +233,27 @@ class DayFilter:
         return State(mean, covariance), innovation
 
 
-def noise_of(days: Days, until: int, noise: FloatArray | None = None, quiet: Sequence[int] = ()) -> FloatArray:
+def is_told(days: Days, until: int) -> BoolArray:
+    """Which errors the reference days show often enough to tell what is usual of them, shape (n_error,).
+
+    Parameters
+    ----------
+    days : Days
+        The telemetry.
+    until : int
+        Days before this one are the reference.
+    """
+    return np.asarray(np.isfinite(days.errors[:until]).sum(axis=0) > _FEWEST)
+
+
+def noise_of(days: Days, until: int) -> FloatArray:
     """Covariance of a day's errors about what is expected of it (n_error, n_error) [K²].
 
     Expectation-maximisation by the filter (Shumway and Stoffer 1982, doi:10.1111/j.1467-9892.1982.tb00349.x): what is
     left of a day's errors after its own correction, and what the states are unsure of; correlations are shrunk towards
-    none by as much as the number of days asks for (Schäfer and Strimmer 2005, doi:10.2202/1544-6115.1175).
+    none by as much as the number of days asks for (Schäfer and Strimmer 2005, doi:10.2202/1544-6115.1175). Each error
+    counts on the days that have it: variances are those of these days, and correlations are lowered by the share of
+    days on which only one of two was seen, so that the matrix stays positive definite.
 
     Parameters
     ----------
@@ -246,37 +261,41 @@ def noise_of(days: Days, until: int, noise: FloatArray | None = None, quiet: Seq
         The telemetry.
     until : int
         Days before this one are used.
-    noise : ndarray, shape (n_error, n_error), optional
-        Where to begin [K²]; the variances of the errors by default.
-    quiet : sequence of int
-        Days that count; all by default.
     """
     errors = days.errors[:until]
-    found = np.diag(np.maximum(np.nanvar(errors, axis=0), _LEAST_NOISE**2)) if noise is None else noise
-    counted = set(quiet or range(until))
+    counts = np.isfinite(errors).sum(axis=0)
+    variance = np.nanvar(np.where(counts > 0, errors, 0.0), axis=0)
+    found = np.diag(np.maximum(variance, _LEAST_NOISE**2))
     for _ in range(_ROUNDS):
-        filtered, left, unsure = DayFilter(days, found), [], np.zeros_like(found)
+        filtered, left, unsure = DayFilter(days, found), np.zeros_like(errors), np.zeros_like(found)
         state = filtered.start()
         for day in range(until):
             ahead, innovation = filtered.step(state, day)
-            if innovation is not None and innovation.seen.all() and day in counted:
-                left.append(innovation.left - innovation.observe @ (innovation.gain @ innovation.left))
+            if innovation is not None:
+                seen = innovation.seen
+                left[day, seen] = innovation.left - innovation.observe @ (innovation.gain @ innovation.left)
                 known = innovation.observe @ state.covariance @ innovation.observe.T
-                unsure += known - innovation.observe @ innovation.gain @ known
+                unsure[np.ix_(seen, seen)] += known - innovation.observe @ innovation.gain @ known
             state = ahead
-        if len(left) > _FEWEST:
-            found = _shrunk(np.array(left), unsure / len(left))
+        if counts.max() > _FEWEST:
+            found = _shrunk(left, unsure, counts)
     return found
 
 
-def _shrunk(left: FloatArray, unsure: FloatArray) -> FloatArray:
-    """Covariance about zero with what is unsure beside, correlations shrunk towards none."""
-    n = len(left)
-    covariance = left.T @ left / n + unsure
+def _shrunk(left: FloatArray, unsure: FloatArray, counts: IntArray) -> FloatArray:
+    """Covariance about zero with the sum of what is unsure beside, correlations shrunk towards none.
+
+    What is left is 0 where nothing was seen; errors were seen on as many days as `counts` says.
+    """
+    n = int(counts.max())
+    days = np.sqrt(np.maximum(counts, 1))
+    covariance = (left.T @ left + unsure) / np.outer(days, days)
     spread = np.sqrt(np.maximum(np.diag(covariance), _LEAST_NOISE**2))
     standard, correlation = left / spread, covariance / np.outer(spread, spread)
     products = standard[:, :, None] * standard[:, None, :]
-    variance = ((products - products.mean(axis=0)) ** 2).sum(axis=0) / (n * (n - 1))
+    middle = products.sum(axis=0) / n
+    squares = (products**2).sum(axis=0) - n * middle**2
+    variance = squares * n / ((n - 1) * np.outer(days, days) ** 2)
     apart = ~np.eye(len(spread), dtype=bool)
     share = float(np.clip(variance[apart].sum() / max((correlation[apart] ** 2).sum(), 1e-12), 0.0, 1.0))
     shrunk = np.where(apart, (1.0 - share) * correlation, 1.0)

@@ -14,13 +14,14 @@ import pandas as pd
 
 from calibration.diagnosis.known import reasons_of
 from calibration.diagnosis.refit.comparison import ModelComparison
-from calibration.errors import CalibrationError, NotEnoughDataError
-from calibration.evaluation.intervals import Interval
+from calibration.errors import CalibrationError, HorizonError, NotEnoughDataError
+from calibration.evaluation.intervals import Interval, horizon_steps
 from calibration.evaluation.n_step import Progress
 from calibration.evaluation.settings import ModelSettings, load_parameters, read_settings
 from calibration.monitoring.course import Course, Event, follow
 from calibration.monitoring.days import MAY_CHANGE, NO_CAUSE, USUAL, Days, days_of_case
 from calibration.results import Axes, Result, plain
+from thermal._types import BoolArray
 from thermal.case.case import Case
 from thermal.effects.catalogue import CATALOGUE
 from thermal.inputs.normalisation import fit_normalisation
@@ -42,12 +43,12 @@ class MonitorSettings:
     reference_days : int
         First days of the telemetry, which are taken for sound: model and noise are those of these days [d].
     horizon : str
-        Of the runs, a part of a day such as ``6h``.
+        Of the runs: divides a day, such as ``6h``.
     dx : float, optional
         Distance between control volumes of a plan [m]; the plan's cell size by default.
     known : sequence of str, optional
         Effects that the fit of the reference days has in it; sun, leakage and people by default, as far as the case can
-        tell them.
+        tell them. Not beside a calibration, which has its own.
     ruled_out : sequence of str
         Effects that are known not to change.
     """
@@ -99,6 +100,22 @@ class Monitoring(Result):
     version: str = field(default_factory=lambda: version("buildingmpc"))
 
     @property
+    def is_watched(self) -> BoolArray:
+        """Which days after the reference have a run, shape (n_day - reference_days,)."""
+        return np.asarray(np.isfinite(self.course.size[self.settings.reference_days :]))
+
+    @property
+    def silent_zones(self) -> dict[str, str]:
+        """Zones that could not be watched, or not at all times of the day, with the reason."""
+        reasons = {}
+        for number, zone in enumerate(self.days.zones):
+            told = self.course.told[self.days.zone == number]
+            if not told.all():
+                part = "" if not told.any() else f" at {np.count_nonzero(~told)} of {told.size} times of the day"
+                reasons[zone] = f"too few measured temperatures on the reference days{part}"
+        return reasons
+
+    @property
     def open_events(self) -> tuple[Event, ...]:
         """Changes that last until the end of the telemetry."""
         return tuple(e for e in self.events if e.end is None)
@@ -120,7 +137,8 @@ class Monitoring(Result):
             "events": [self._event(e) for e in self.events],
             "withdrawn": [self.date(day) for day in course.withdrawn],
             "watched": {"from": self.date(self.settings.reference_days), "to": self.days.dates[-1],
-                        "days": int(np.isfinite(course.evidence).sum())},
+                        "days": int(self.is_watched.sum()), "days_without_a_run": int((~self.is_watched).sum()),
+                        "silent_zones": self.silent_zones},
             "reference": self.reference, "threshold": course.threshold,
             "run_length_days": float(np.exp(course.threshold)),
             "parameters": course.parameters, "untestable": self.untestable, "model": self.parameters,
@@ -183,11 +201,16 @@ def monitor(
     Raises
     ------
     NotEnoughDataError
-        When no week is left to watch.
+        When no week is left to watch, or too few temperatures were measured.
     CalibrationError
-        When a setting is out of range, the building has more than 40 zones, or an effect is not of the catalogue.
+        When a setting is out of range, `parameters` and known effects are given together, the building has more than 40
+        zones, or an effect is not of the catalogue.
     """
     began, chosen = time.perf_counter(), settings or MonitorSettings()
+    CalibrationError.unless(
+        parameters is None or chosen.known is None, "monitor", "a calibration or effects to fit", "both",
+        "a calibration has its effects in it; leave one of the two out",
+    )  # fmt: skip
     reference = _reference(case, chosen)
     CalibrationError.unless(
         len(case.building.zone_names) <= _MOST_ZONES, "monitor", f"at most {_MOST_ZONES} zones",
@@ -200,7 +223,8 @@ def monitor(
     models.drivers = telemetry_inputs(case, fit_normalisation(case, [(reference.start, reference.end)]))
     models.drivers.openings = np.ones_like(models.drivers.openings)
     untestable = models.untestable()
-    untestable |= reasons_of(chosen.known or (), chosen.ruled_out, untestable)
+    said = reasons_of(chosen.known or (), chosen.ruled_out, untestable)
+    untestable |= {e: said[e] for e in chosen.ruled_out}
     if parameters is not None:
         network = given.network(case.building)
         theta = load_parameters(parameters, network)
@@ -210,6 +234,8 @@ def monitor(
         known = chosen.known if chosen.known is not None else [e for e in USUAL if e not in untestable]
         fit = models.fit({name: () for name in known}, [{}])
         values, effects = fit.values, dict(fit.effects)
+    # what is in the model is watched like all else
+    untestable = {e: why for e, why in untestable.items() if e not in effects or e in chosen.ruled_out}
     candidates = [e for e in CATALOGUE if e not in untestable and not (set(CATALOGUE[e].requires) - set(effects))]
     days = days_of_case(models, effects, values, [*candidates, *NO_CAUSE], progress)
     course = follow(days, chosen.reference_days, chosen.ruled_out, progress)
@@ -225,6 +251,9 @@ def _reference(case: Case, settings: MonitorSettings) -> Interval:
     """First days of the telemetry."""
     days = settings.reference_days
     CalibrationError.unless(days >= _FEWEST_DAYS, "reference_days", f"{_FEWEST_DAYS} or more", days)
+    every = horizon_steps(settings.horizon, case.step) * case.step
+    divides = 86400.0 % every == 0.0
+    HorizonError.unless(divides, "horizon", "a duration that divides a day, such as 6h", settings.horizon)
     stamps = case.stamps
     end = stamps[0].normalize() + pd.DateOffset(days=days)
     whole = (stamps[-1] - stamps[0]) / pd.Timedelta(days=1)

@@ -20,7 +20,7 @@ def monitor(
     ] = None,
     reference_days: Annotated[int, options.value("First days, which are taken for sound.")] = 42,
     effects: Annotated[
-        str, options.value("Effects that the reference days are fitted with; default: sun, leakage, people.", "ID,...")
+        str, options.value("Effects of the fit, without --parameters; default: sun, leakage, people.", "ID,...")
     ] = "",
     rule_out: Annotated[str, options.value("Effects that are known not to change.", "ID,...")] = "",
     horizon: options.Horizon = "6h",

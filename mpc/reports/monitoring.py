@@ -37,7 +37,10 @@ def write_monitoring(found: Monitoring, out: str | Path, *, force: bool = False)
         "figures": time_line(found), "span": (found.days.dates[0], found.days.dates[-1]),
         "reference": found.settings.reference_days, "threshold": found.course.threshold,
         "withdrawn": [f"{found.date(day):%Y-%m-%d}" for day in found.course.withdrawn],
-        "untestable": [f"{called(e)}: {reason}" for e, reason in found.untestable.items()],
+        "untestable": [
+            *(f"{zone}: {reason}" for zone, reason in found.silent_zones.items()),
+            *(f"{called(e)}: {reason}" for e, reason in found.untestable.items()),
+        ],
         "parameters": found.parameters,
     }  # fmt: skip
     files = {
@@ -65,13 +68,17 @@ def monitoring_verdict(found: Monitoring) -> str:
     found : Monitoring
         From `monitor`.
     """
-    watched = counted(len(found.days) - found.settings.reference_days, "day")
+    missed = int((~found.is_watched).sum())
+    watched = counted(int(found.is_watched.sum()), "day")
+    without = f" {counted(missed, 'day')} more had no usable run." if missed else ""
+    if found.silent_zones:
+        without += f" Too little was measured {in_zones(list(found.silent_zones))} on the reference days."
     if not found.events:
-        return f"Nothing has changed in {watched} that were watched."
+        return f"Nothing has changed in {watched} that were watched.{without}"
     told = [f"{_what(e)} ({in_zones(e.zones)}), {_when(found, e)}" for e in found.events[-_MOST:]]
     more = len(found.events) - len(told)
     text = f"In {watched} that were watched: {listed(told)}."
-    return text + (f" {counted(more, 'earlier change')} beside." if more else "")
+    return text + (f" {counted(more, 'earlier change')} beside." if more else "") + without
 
 
 def event_rows(found: Monitoring) -> list[dict[str, Any]]:

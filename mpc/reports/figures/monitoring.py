@@ -1,11 +1,12 @@
 """Time line of a monitoring: changes, evidence, errors."""
 
 import numpy as np
+import pandas as pd
 from matplotlib.figure import Figure
 
 from calibration.monitoring.monitor import Monitoring
 from mpc.reports.figures import style
-from mpc.reports.figures.style import MEASURED, MUTED, SIMULATED, WARNING, Picture, picture, styled
+from mpc.reports.figures.style import MEASURED, MUTED, SIMULATED, WARNING, Picture, keys_below, picture, styled
 
 
 @styled
@@ -42,10 +43,11 @@ def time_line(found: Monitoring) -> list[Picture]:
     evidence.axhline(found.course.threshold, color=WARNING, linestyle="--", linewidth=0.9)
     evidence.set(title="Evidence that something has changed, dashed: alarm", ylabel="log evidence [-]")
     evidence.set_ylim(-6.0, 3.0 * found.course.threshold)
-    weeks = style.day_numbers(weekly.index)  # type: ignore[arg-type]
+    weekly = pd.concat([weekly, weekly.iloc[-1:]])  # the last week goes on until the telemetry ends
+    weeks = np.append(style.day_numbers(weekly.index[:-1]), x[-1])  # type: ignore[arg-type]
     error.step(weeks, weekly["mae"], where="post", color=MUTED, label="model of the reference days")
     error.step(weeks, weekly["mae_carried"], where="post", color=MEASURED, label="carried on, a day ahead")
     error.set(title="Mean absolute error by week", ylabel="[K]")
     error.set_ylim(bottom=0.0)
-    error.legend(fontsize=8, loc="upper left")
+    keys_below(figure, 2)
     return [picture(figure, "Changes, evidence by day and errors by week, over time")]

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 
-from calibration.errors import CalibrationError, NotEnoughDataError
+from calibration.errors import CalibrationError, HorizonError, NotEnoughDataError
 from calibration.monitoring.monitor import Monitoring, MonitorSettings, monitor
 from mpc.reports.monitoring import monitoring_verdict, write_monitoring
 from thermal.case.case import Case
@@ -68,7 +70,45 @@ def test_files(found: Monitoring, tmp_path: Path) -> None:
     assert "flow_gain" in page.read_text(encoding="utf-8") or "heat meter" in page.read_text(encoding="utf-8")
 
 
+def silenced(case: Case, zones: Sequence[str], begin: int) -> Case:
+    """Take the sensors of zones away from a day on."""
+    frame = case.telemetry.frame.copy()
+    rows = frame.index >= frame.index[0].normalize() + pd.DateOffset(days=begin)
+    frame.loc[rows, [f"VAV_{zone}/zone_air_temperature_sensor" for zone in zones]] = np.nan
+    return Case(case.building, replace(case.telemetry, frame=frame))
+
+
+def test_a_dead_sensor_is_named(quiet: Case, tmp_path: Path) -> None:
+    zone = quiet.building.zone_names[0]
+    result = monitor(silenced(quiet, [zone], 0), settings=SETTINGS)
+    assert list(result.silent_zones) == [zone]
+    assert monitoring_verdict(result).endswith(f"Too little was measured in zone {zone} on the reference days.")
+    page = write_monitoring(result, tmp_path / "out")
+    assert f"{zone}: too few measured temperatures on the reference days" in page.read_text(encoding="utf-8")
+
+
+def test_days_without_a_run_are_told(quiet: Case) -> None:
+    result = monitor(silenced(quiet, quiet.building.zone_names, DAYS - 5), settings=SETTINGS)
+    watched = result.to_dict()["watched"]
+    assert watched["days"] + watched["days_without_a_run"] == len(result.days) - REFERENCE
+    assert watched["days_without_a_run"] >= 5
+    missed = watched["days_without_a_run"]
+    expected = f"Nothing has changed in {watched['days']} days that were watched. {missed} days more had no usable run."
+    assert monitoring_verdict(result) == expected
+
+
+def test_what_is_in_the_model_is_watched(quiet: Case) -> None:
+    result = monitor(quiet, settings=replace(SETTINGS, known=("internal_gains",), ruled_out=("valve_leak",)))
+    assert "internal_gains" not in result.untestable
+    assert result.untestable["valve_leak"] == "ruled out beforehand"
+
+
 def test_bad_input(quiet: Case) -> None:
+    with pytest.raises(CalibrationError, match="a calibration or effects to fit"):
+        monitor(quiet, "calibration.json", SETTINGS)
+    for horizon in ("25h", "48h", "5h"):
+        with pytest.raises(HorizonError, match="divides a day"):
+            monitor(quiet, settings=replace(SETTINGS, horizon=horizon))
     with pytest.raises(NotEnoughDataError, match="60 reference days and a week"):
         monitor(quiet, settings=replace(SETTINGS, reference_days=60))
     with pytest.raises(CalibrationError, match="reference_days"):

@@ -6,7 +6,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from calibration.monitoring.course import follow
+from calibration.errors import NotEnoughDataError
+from calibration.monitoring.course import NAMING_DAYS, follow
 from calibration.monitoring.days import ONSET, Column, Days
 from calibration.monitoring.filter import DayFilter, noise_of
 from calibration.monitoring.watch import Dispersion, Watch, sought
@@ -77,6 +78,16 @@ def test_noise_is_found() -> None:
     assert found == pytest.approx(np.full(N_ERROR, 0.25), rel=0.4)
 
 
+def test_noise_is_found_where_no_day_shows_all_errors() -> None:
+    """What the parameters explain is no noise, whichever sensor is silent."""
+    days = made(2, 200)
+    days.errors[:] -= 0.9 * days.slopes[:, :, 2]
+    days.errors[::2, -1] = days.errors[1::2, -2] = np.nan
+    found = np.diag(noise_of(days, 200))
+    assert found == pytest.approx(np.full(N_ERROR, 0.25), rel=0.4)
+    assert np.nanvar(days.errors, axis=0).min() > 2.0 * found.max()
+
+
 def test_information_of_a_new_change_is_that_of_least_squares() -> None:
     """On the day of a change score and information are jᵀ V⁻¹ ν and jᵀ V⁻¹ j."""
     days = made(3, 5)
@@ -87,6 +98,7 @@ def test_information_of_a_new_change_is_that_of_least_squares() -> None:
         state, innovation = filtered.step(state, day)
         assert innovation is not None
         watch.take(day, days, innovation)
+    assert innovation is not None
     own = -days.slopes[3][:, :2]
     expected = np.linalg.solve(innovation.root @ innovation.root.T, own)
     assert watch._information[-1] == pytest.approx(np.sum(own * expected, axis=0))
@@ -144,3 +156,36 @@ def test_days_without_telemetry_are_passed_over() -> None:
     days.errors[80, :2] = np.nan
     event = follow(days, REFERENCE).events[0]
     assert event.effect == "valve_leak"
+
+
+def test_an_alarm_is_named_where_the_telemetry_ends_without_a_run() -> None:
+    """Telemetry that is cut off in the small hours, or in a gap, leaves no run on its last days."""
+    whole, cut = (made(7, 82, 2.5, start=70) for _ in range(2))
+    cut.errors[-1] = np.nan
+    expected, event = follow(whole, REFERENCE).events[0], follow(cut, REFERENCE).events[0]
+    assert len(whole) - NAMING_DAYS < event.alarm < len(whole) - 1  # it waits for its name when the telemetry ends
+    assert (event.effect, event.since, event.alarm) == (expected.effect, expected.since, expected.alarm)
+    assert event.named == len(whole) - 1
+    assert event.size == pytest.approx(expected.size, abs=4.0 * event.deviation)
+
+
+@pytest.mark.parametrize("until", [REFERENCE, 110])
+def test_a_zone_that_the_reference_days_do_not_show_is_not_watched(until: int) -> None:
+    """The sensor is dead, or comes once the reference is over."""
+    days = made(7, 110, 1.5, start=70)
+    days.errors[:until, 3:] = np.nan
+    course = follow(days, REFERENCE)
+    assert course.told.tolist() == [True] * 3 + [False] * 3
+    assert [(e.effect, e.zones) for e in course.events] == [("valve_leak", ("A",))]
+    assert course.daily(days)["mae"].notna().all()
+
+
+def test_days_that_show_nothing_are_refused() -> None:
+    days = made(7, 60)
+    days.errors[REFERENCE:] = np.nan
+    with pytest.raises(NotEnoughDataError, match="none of 30"):
+        follow(days, REFERENCE)
+    days = made(7, 60)
+    days.errors[5:REFERENCE] = np.nan
+    with pytest.raises(NotEnoughDataError, match="30 reference days"):
+        follow(days, REFERENCE)
