@@ -22,6 +22,9 @@ BEYOND = (3.0, 2.5)
 #: Hours before people come in which zones are back where they like it [h].
 LEAD = 3.0
 
+#: Hours after an experiment in which discomfort counts [h]: people that come when zones ought to be back, and as long.
+AFTER = 2.0 * LEAD
+
 #: How long setpoints hold where they go to and fro [h]: shorter than walls take to follow, longer than air does.
 TURNS = (1.0, 3.0, 12.0)
 
@@ -148,7 +151,7 @@ def moves(
     where : mapping of str to tuple of str
         Zones by name, `places`.
     comfort : Comfort
-        Band on the steps.
+        Band on the steps, and on those after the end as far as it is known, for people may come then.
     band : tuple of float
         Its edges while people are in [K].
     hours : ndarray, shape (n_time,)
@@ -158,6 +161,7 @@ def moves(
     """
     width = comfort.upper - comfort.lower
     people = width <= band[1] - band[0] + 1e-9
+    width = width[: hours.size]
     low, high = band[0] + MARGIN, band[1] - MARGIN
     free = _spans(~_soon(people, hours), hours)
     loose = int(np.argmax(width))
@@ -213,7 +217,7 @@ def _soon(people: BoolArray, hours: FloatArray) -> BoolArray:
     found = people.copy()
     for k in range(1, round(LEAD / step) + 1):
         found[:-k] |= people[k:]
-    return found
+    return found[: hours.size]
 
 
 def _spans(inside: BoolArray, hours: FloatArray) -> tuple[tuple[float, float], ...]:

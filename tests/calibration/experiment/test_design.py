@@ -1,6 +1,7 @@
 """Designs on the bundled case: what they keep to, what they promise, and pairs that nothing separates."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,9 +13,9 @@ from calibration.errors import CalibrationError
 from calibration.evaluation.intervals import Interval
 from calibration.evaluation.settings import ModelSettings
 from calibration.experiment import design as design_module
-from calibration.experiment.design import DesignSettings, Experiment, design_experiment
-from calibration.experiment.emulate import Emulator
-from calibration.experiment.library import office_comfort
+from calibration.experiment.design import DesignSettings, Experiment, Trial, design_experiment
+from calibration.experiment.emulate import Emulated, Emulator
+from calibration.experiment.library import LEAD, office_comfort
 from calibration.experiment.members import Question, comparison, fit_members, question_of, read_experiment
 from calibration.experiment.odds import separation
 from calibration.experiment.schedule import Move, Schedule
@@ -72,6 +73,49 @@ def test_a_design_keeps_to_what_it_may(case: Case, monkeypatch: pytest.MonkeyPat
     )
     more = max(float((np.abs(now) - np.abs(before)).sum()) * kwh for now, before in heats)
     assert found.best.energy == pytest.approx(more) and found.best.cost == pytest.approx(0.1 * more)
+
+
+@pytest.mark.parametrize(
+    ("start", "hours"),
+    [
+        ("2023-03-13T13:00", 120.0),  # too long for a day of the same week before it: days are those from a Sunday on
+        ("2023-03-13T00:00", 30.0),  # people come as it ends
+    ],
+)
+def test_nobody_is_in_by_the_clock_of_the_experiment(case: Case, start: str, hours: float) -> None:
+    begin = pd.Timestamp(start, tz=case.stamps.tz)
+    models = comparison(case, asked(case, flow_gain=(), valve_leak=()), MODEL)
+    search = design_module._Search(models, (), {}, DesignSettings(hours=hours), begin, None)
+    assert (search.days.hour, search.days.minute) == (begin.hour, begin.minute)
+    found = [m for m in search._library() if "nobody" in m.title]
+    stamps = pd.date_range(begin, begin + pd.Timedelta(hours=hours + LEAD), freq="30min")[1:]
+    people = office_comfort(stamps, 1800.0).upper < 300.0
+    soon = np.array([people[k : k + 1 + int(2 * LEAD)].any() for k in range(len(people))])
+    assert found and people.any() and not people.all()
+    for move in found:
+        acts, _ = move.pair_at(np.asarray((stamps - begin) / pd.Timedelta(hours=1) - 0.25))
+        assert acts.any() and not (acts & soon).any()
+
+
+def test_discomfort_counts_after_the_end_too(case: Case) -> None:
+    begin = pd.Timestamp("2023-03-13T00:00", tz=case.stamps.tz)
+    models = comparison(case, asked(case, flow_gain=(), valve_leak=()), MODEL)
+    search = design_module._Search(models, (), {}, DesignSettings(hours=6.0), begin, None)
+    assert search.comfort.upper.min() < 300.0 and search.interval.end == search.days + pd.Timedelta(hours=6)
+    zone = np.full((len(search.comfort.lower), 1), 296.0)
+    zone[12:] += 3.0  # too warm from the end on, when people come
+    made = Emulated(None, zone, zone)  # type: ignore[arg-type]
+    search.usual = Trial(None, None, {"a": replace(made, zone=zone * 0 + 296.0)}, 0.0, 0.0, zone[0])  # type: ignore[arg-type]
+    assert search._discomfort("a", made).max() == pytest.approx((299.0 - 297.15) * 6.0)
+
+
+def test_what_is_measured_is_not_experimented_on(case: Case) -> None:
+    start = case.stamps[-1] - pd.Timedelta(minutes=30)
+    with pytest.raises(CalibrationError, match="end of the telemetry"):
+        design_experiment(case, asked(case, flow_gain=(), valve_leak=()), DesignSettings(start=start), MODEL)
+    for prices in ((1.0, float("nan")), (float("inf"), 1.0), (-1.0, 1.0)):
+        with pytest.raises(CalibrationError, match="prices"):
+            DesignSettings(prices=prices)
 
 
 def test_what_a_member_emulates_it_predicts(case: Case) -> None:
