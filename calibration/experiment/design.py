@@ -16,7 +16,7 @@ from calibration.experiment.emulate import Emulated, Emulator
 from calibration.experiment.library import AFTER, PRESSURES, Comfort, Lever, moves, office_comfort, places, shortened
 from calibration.experiment.members import Member, Question, comparison, fit_members, midnight_after
 from calibration.experiment.odds import CHANCE, ODDS, Separation, chance_of, needed, seen_before, separation
-from calibration.experiment.schedule import STATIC_PRESSURE, SUPPLY_AIR, Move, Schedule
+from calibration.experiment.schedule import COOLING, HEATING, STATIC_PRESSURE, SUPPLY_AIR, Move, Schedule
 from calibration.results import plain
 from thermal._types import FloatArray
 from thermal.case.case import Case, local_timestamp
@@ -133,6 +133,10 @@ class Experiment:
         Of the telemetry [s].
     tried : int
         Schedules that were weighed.
+    model : ModelSettings
+        Of the members' models, without effects.
+    by_hand : tuple of str
+        Zones, or air handlers, that it moves and whose setpoints the telemetry does not have.
     zones : tuple of str
         Names of the zones.
     """
@@ -147,7 +151,9 @@ class Experiment:
     days: Interval
     step: float
     tried: int
-    zones: tuple[str, ...] = field(default=())
+    model: ModelSettings = field(default_factory=ModelSettings)
+    by_hand: tuple[str, ...] = ()
+    zones: tuple[str, ...] = ()
 
     @property
     def schedule(self) -> Schedule:
@@ -194,6 +200,7 @@ class Experiment:
             "cost": self.best.cost, "energy_kwh": self.best.energy, "prices": list(self.settings.prices),
             "discomfort_kh": worst, "discomfort_allowed_kh": self.settings.discomfort,
             "measure_instead": list(self.instead) if self.verdict == "hopeless" else [],
+            "by_hand": list(self.by_hand), "settings": self.model.to_dict(),
             "days": plain(self.days), "tried": self.tried, "case": self.case,
             "intervals": {"tuning": plain(self.question.tuned), "held_out": plain(self.question.judged)},
         }  # fmt: skip
@@ -231,8 +238,21 @@ def design_experiment(
     best, usual = search.run()
     return Experiment(
         case.building.name, question, given, tuple(members), best, usual, start, search.interval, case.step,
-        search.tried, case.building.zone_names,
+        search.tried, replace(models.settings, effects={}, normalisation=None),
+        _by_hand(case, best.schedule.moves), case.building.zone_names,
     )  # fmt: skip
+
+
+def _by_hand(case: Case, moves: Sequence[Move]) -> tuple[str, ...]:
+    """Name what moves set and of which the telemetry has no setpoints: nobody knows that the automation takes them."""
+    seen, building = set(case.telemetry.frame.columns), case.building
+    found = {}
+    for move in moves:
+        points = (move.point,) if move.point else (HEATING, COOLING)
+        for name in move.zones:
+            own = [name, *(() if move.point else (d.name for d in building.devices_of(name)))]
+            found[name] = not any(f"{n}/{point}" in seen for n in own for point in points)
+    return tuple(name for name, lacks in found.items() if lacks)
 
 
 def begin_of(case: Case, settings: DesignSettings) -> pd.Timestamp:

@@ -89,12 +89,16 @@ def experiment_verdict(found: Experiment, outcome: Outcome | None = None) -> str
     names = listed([called(m.effect) for m in found.members], "or")
     usual, chance = percent(found.usual_chance), percent(found.chance)
     if found.verdict == "hopeless":
-        text = f"Nothing that this building can do in {duration(3600 * found.settings.hours)} tells apart whether it "
-        text += f"is {names}: the best admissible experiment would name one with a chance of {chance}. "
+        text = f"None of the {found.tried} schedules of setpoints that were tried for "
+        text += f"{duration(3600 * found.settings.hours)} tells apart whether it is {names}: the best admissible one "
+        text += f"would name one with a chance of {chance}. "
         text += f"Measure instead: {'; or '.join(found.instead)}."
     else:
         text = f"{duration(3600 * found.schedule.hours).capitalize()} from {clock(found.start)} on tell whether it is "
         text += f"{names}, with a chance of {chance} (as many hours of usual operation: {usual})."
+    if found.by_hand:
+        text += f" The telemetry has no setpoints of {listed(found.by_hand)}: set these by hand if need be, and record "
+        text += "what was set."
     if outcome is None:
         return text
     if outcome.named is None:
