@@ -139,7 +139,7 @@ def question_of(
         gap = diagnosis.get("verdict") != "no_gap"
         CalibrationError.unless(gap, where, "one that found a gap", "the verdict 'no_gap'", "else name --members")
         likely = [e for e, entry in which.items() if entry.probability >= IN_SET and entry.testable]
-        chosen = group if len(group) > 1 else likely
+        chosen = list(group) if len(group) > 1 else likely
     if len(chosen) < 2:
         found = f"the verdict {diagnosis.get('verdict')!r} with {first} alone"
         raise CalibrationError(where, "two effects or more that cannot be told apart", found, "name --members")
@@ -190,8 +190,8 @@ def read_experiment(path: Path, case: Case) -> Planned:
     CalibrationError.unless(len(members) > 1, f"{path}: members", "two effects or more", list(members))
     for effect in (*members, *known):
         CalibrationError.unless(effect in CATALOGUE, str(path), "effects of the catalogue", repr(effect), like(effect))
-    inside = ({e: _inside(e, z, case, str(path)) for e, z in zones.items()} for zones in (members, known))
-    return Planned(Question(*inside, tuned, judged, prior), when, odds, ModelSettings(**read_settings(path)))
+    where, kept = ({e: _inside(e, z, case, str(path)) for e, z in zones.items()} for zones in (members, known))
+    return Planned(Question(where, kept, tuned, judged, prior), when, odds, ModelSettings(**read_settings(path)))
 
 
 def without(question: Question, known: Sequence[str], ruled_out: Sequence[str]) -> Question:

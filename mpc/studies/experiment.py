@@ -147,9 +147,9 @@ def made_by(site: Site, case: Case, end: pd.Timestamp) -> tuple[Plant, Mapping[s
     expected = "a plant with actuators, control_step and telemetry(), and its usual setpoints"
     try:
         found: Any = site(case, end)
-    except Described:
-        raise
     except Exception as error:  # whatever the code of a site raises
+        if isinstance(error, Described):
+            raise
         raise PlantError("site", expected, f"{type(error).__name__}: {error}") from error
     pair = isinstance(found, tuple) and len(found) == 2 and isinstance(found[1], Mapping)
     PlantError.unless(pair, "site", expected, repr(found))
