@@ -12,14 +12,25 @@ from calibration.errors import CalibrationError
 from calibration.evaluation.intervals import Interval
 from calibration.evaluation.n_step import Progress
 from calibration.evaluation.settings import ModelSettings
+from calibration.experiment.days import begin_of, days_like
 from calibration.experiment.emulate import Emulated, Emulator
-from calibration.experiment.library import AFTER, PRESSURES, Comfort, Lever, moves, office_comfort, places, shortened
-from calibration.experiment.members import Member, Question, comparison, fit_members, midnight_after
+from calibration.experiment.library import (
+    AFTER,
+    PRESSURES,
+    Comfort,
+    Lever,
+    by_hand,
+    moves,
+    office_comfort,
+    places,
+    shortened,
+)
+from calibration.experiment.members import Member, Question, comparison, fit_members
 from calibration.experiment.odds import CHANCE, ODDS, Separation, chance_of, needed, seen_before, separation
-from calibration.experiment.schedule import COOLING, HEATING, STATIC_PRESSURE, SUPPLY_AIR, Move, Schedule
+from calibration.experiment.schedule import STATIC_PRESSURE, SUPPLY_AIR, Move, Schedule
 from calibration.results import plain
 from thermal._types import FloatArray
-from thermal.case.case import Case, local_timestamp
+from thermal.case.case import Case
 from thermal.effects.catalogue import CATALOGUE
 
 #: Longest experiment [h] and most discomfort beyond that of usual operation that a zone may have [K h].
@@ -231,7 +242,7 @@ def design_experiment(
         When the telemetry has no days to design on, or no zone can be moved.
     """
     given = settings or DesignSettings()
-    start = begin_of(case, given)
+    start = begin_of(case, given.start)
     models = comparison(case, question, model or ModelSettings())
     members = fit_members(models, question)
     search = _Search(models, members, question.prior, given, start, progress)
@@ -239,68 +250,8 @@ def design_experiment(
     return Experiment(
         case.building.name, question, given, tuple(members), best, usual, start, search.interval, case.step,
         search.tried, replace(models.settings, effects={}, normalisation=None),
-        _by_hand(case, best.schedule.moves), case.building.zone_names,
+        by_hand(case, best.schedule.moves), case.building.zone_names,
     )  # fmt: skip
-
-
-def _by_hand(case: Case, moves: Sequence[Move]) -> tuple[str, ...]:
-    """Name what moves set and of which the telemetry has no setpoints: nobody knows that the automation takes them."""
-    seen, building = set(case.telemetry.frame.columns), case.building
-    found = {}
-    for move in moves:
-        points = (move.point,) if move.point else (HEATING, COOLING)
-        for name in move.zones:
-            own = [name, *(() if move.point else (d.name for d in building.devices_of(name)))]
-            found[name] = not any(f"{n}/{point}" in seen for n in own for point in points)
-    return tuple(name for name, lacks in found.items() if lacks)
-
-
-def begin_of(case: Case, settings: DesignSettings) -> pd.Timestamp:
-    """When an experiment begins, local to the building.
-
-    Parameters
-    ----------
-    case : Case
-        With telemetry.
-    settings : DesignSettings
-        With the start that is wanted.
-
-    Raises
-    ------
-    CalibrationError
-        When that is before the end of the telemetry.
-    """
-    if settings.start is None:
-        return midnight_after(case)
-    start, last = local_timestamp(settings.start, case.building), case.stamps[-1]
-    advice = "what is measured cannot be moved any more"
-    CalibrationError.unless(
-        start >= last, "experiment: start", f"{last}, the end of the telemetry, or later", start, advice
-    )
-    return start
-
-
-def _like(case: Case, start: pd.Timestamp, hours: float) -> pd.Timestamp:
-    """When the measured days begin that an experiment is designed on: as many weeks before, or the last ones."""
-    length, first, last = pd.Timedelta(hours=hours + AFTER), case.stamps[0] + pd.Timedelta(days=1), case.stamps[-1]
-    begin = _before(start, last - length, 7)
-    if begin < first:  # other days of the week, at the same time of day: the sun is where it was
-        begin = _before(start, last - length, 1)
-    enough = begin >= first
-    expected = f"a day and {hours + AFTER:g} h more of telemetry"
-    CalibrationError.unless(
-        enough, "experiment", expected, f"{first - pd.Timedelta(days=1)} to {last}", "give fewer hours"
-    )
-    return begin
-
-
-def _before(start: pd.Timestamp, latest: pd.Timestamp, days: int) -> pd.Timestamp:
-    """Go back by so many days at a time, on the same clock."""
-    turns = max(0, (start - latest) // pd.Timedelta(days=days))
-    begin = start - pd.DateOffset(days=days * turns)
-    while begin > latest:
-        begin -= pd.DateOffset(days=days)
-    return begin
 
 
 class _Search:
@@ -310,7 +261,7 @@ class _Search:
         self, models: ModelComparison, members: Sequence[Member], prior: Mapping[str, float], given: DesignSettings,
         start: pd.Timestamp, progress: Progress | None,
     ) -> None:  # fmt: skip
-        days = _like(models.case, start, given.hours)
+        days = days_like(models.case, start, given.hours)
         self.models, self.members, self.given, self.days, self.progress = models, members, given, days, progress
         self.start, self.prior, self.emulator = start, prior, Emulator(models, days, given.hours + AFTER)
         self.step = models.case.step

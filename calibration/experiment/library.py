@@ -6,9 +6,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pandas as pd
 
-from calibration.experiment.schedule import BAND, Move
+from calibration.experiment.schedule import BAND, COOLING, HEATING, Move
 from thermal._types import BoolArray, FloatArray
 from thermal.case.building import Building
+from thermal.case.case import Case
 from thermal.network.topology import Anatomy
 
 #: Distance that setpoints keep from the edge of the comfort band [K]: terminals without integral action rest up to
@@ -209,6 +210,28 @@ def shortened(move: Move, share: float) -> Move:
         spans.append((last - taken, last))
         left -= taken
     return replace(move, spans=tuple(reversed(spans)))
+
+
+def by_hand(case: Case, moves: Sequence[Move]) -> tuple[str, ...]:
+    """Name zones, or air handlers, that moves set and of which the telemetry has no setpoints.
+
+    Nobody knows that the automation takes them.
+
+    Parameters
+    ----------
+    case : Case
+        With telemetry.
+    moves : sequence of Move
+        Of an experiment.
+    """
+    seen, building = set(case.telemetry.frame.columns), case.building
+    found = {}
+    for move in moves:
+        points = (move.point,) if move.point else (HEATING, COOLING)
+        for name in move.zones:
+            own = [name, *(() if move.point else (d.name for d in building.devices_of(name)))]
+            found[name] = not any(f"{n}/{point}" in seen for n in own for point in points)
+    return tuple(name for name, lacks in found.items() if lacks)
 
 
 def _soon(people: BoolArray, hours: FloatArray) -> BoolArray:

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-import pandas as pd
 
 from calibration.diagnosis.decide.levels import IN_SET
 from calibration.diagnosis.known import reasons_of
@@ -320,16 +319,3 @@ def fit_members(
     several = len(found) > 1 or bool(starts)
     CalibrationError.unless(several, "members", "two models that can be fitted", [m.effect for m in found])
     return found
-
-
-def midnight_after(case: Case) -> pd.Timestamp:
-    """First local midnight at or after the end of the telemetry.
-
-    Parameters
-    ----------
-    case : Case
-        With telemetry.
-    """
-    last = case.stamps[-1]
-    day = last.normalize()
-    return day if day == last else day + pd.DateOffset(days=1)

@@ -56,7 +56,8 @@ def experiment(
     """
     import pandas as pd
 
-    from calibration.experiment.design import begin_of, design_experiment
+    from calibration.experiment.days import begin_of
+    from calibration.experiment.design import design_experiment
     from calibration.experiment.members import question_of
     from calibration.results import write_results
     from mpc.reports.experiment import experiment_files, experiment_verdict
@@ -70,7 +71,7 @@ def experiment(
         from mpc.studies.experiment import made_by, open_site
 
         site = open_site(run)
-        made_by(site, loaded, begin_of(loaded, settings) + pd.Timedelta(hours=hours))
+        made_by(site, loaded, begin_of(loaded, settings.start) + pd.Timedelta(hours=hours))
     with Waiting(f"experiment {case.name}") as progress:
         found = design_experiment(loaded, question, settings, model, progress)
         outcome = None

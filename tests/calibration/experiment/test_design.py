@@ -15,7 +15,7 @@ from calibration.evaluation.settings import ModelSettings
 from calibration.experiment import design as design_module
 from calibration.experiment.design import DesignSettings, Experiment, Trial, design_experiment
 from calibration.experiment.emulate import Emulated, Emulator
-from calibration.experiment.library import LEAD, office_comfort
+from calibration.experiment.library import LEAD, by_hand, office_comfort
 from calibration.experiment.members import Question, comparison, fit_members, question_of, read_experiment, without
 from calibration.experiment.odds import separation
 from calibration.experiment.schedule import HEATING, SUPPLY_AIR, Move, Schedule
@@ -239,9 +239,9 @@ def test_what_an_experiment_was_designed_with_is_read_again(
 
 def test_what_no_telemetry_sets_is_set_by_hand(case: Case) -> None:
     supply = Move("supply", ("AHU",), ((286.0, 286.0),), 3.0, ((0.0, 6.0),), "supply_air_temperature_setpoint")
-    assert design_module._by_hand(case, (WARM, supply)) == ("F1_N", "F1_S", "AHU")
+    assert by_hand(case, (WARM, supply)) == ("F1_N", "F1_S", "AHU")
     frame = case.telemetry.frame.assign(**{
         f"{case.building.devices_of('F1_N')[0].name}/{HEATING}": 294.0, f"AHU/{SUPPLY_AIR}": 287.0,
     })  # fmt: skip
     told = Case(case.building, Telemetry.from_frame(frame))
-    assert design_module._by_hand(told, (WARM, supply)) == ("F1_S",)
+    assert by_hand(told, (WARM, supply)) == ("F1_S",)
