@@ -210,7 +210,7 @@ def without(question: Question, known: Sequence[str], ruled_out: Sequence[str]) 
     """
     told = reasons_of(known, ruled_out)
     members = {e: z for e, z in question.members.items() if e not in told}
-    advice = "without an experiment a diagnosis needs no members"
+    advice = "it has nothing left to tell: diagnose without it"
     expected = "two effects or more that are neither known nor ruled out"
     CalibrationError.unless(len(members) > 1, "members of the experiment", expected, list(members) or "none", advice)
     whole = sum(question.prior[e] for e in members)

@@ -18,6 +18,9 @@ from thermal.case.case import Case
 #: Panels of zones on a page: those whose members differ most.
 _PANELS = 4
 
+#: Places that a sentence names, where it cannot count them instead.
+_NAMED = 6
+
 _FREEZING = 273.15
 
 
@@ -97,7 +100,9 @@ def experiment_verdict(found: Experiment, outcome: Outcome | None = None) -> str
         text = f"{duration(3600 * found.schedule.hours).capitalize()} from {clock(found.start)} on tell whether it is "
         text += f"{names}, with a chance of {chance} (as many hours of usual operation: {usual})."
     if found.by_hand:
-        text += f" The telemetry has no setpoints of {listed(found.by_hand)}: set these by hand if need be, and record "
+        several = len(found.by_hand) > _NAMED
+        names = f"{len(found.by_hand)} of the places that it moves" if several else listed(found.by_hand)
+        text += f" The telemetry has no setpoints of {names}: set these by hand if need be, and record "
         text += "what was set."
     if outcome is None:
         return text

@@ -68,6 +68,8 @@ def test_experiment_writes_what_it_says(
     assert set(expected["zone"]) == {"F1_N", "F1_W", "F1_C", "F1_E", "F1_S"} and "flow_gain_usual" in expected
     rows = pd.read_csv(out / "schedule.csv")
     assert list(rows.columns) == ["time", "point", "value", "unit"]
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert bool(content["by_hand"]) == bool(content["moves"]) == ("The telemetry has no setpoints of" in page)
 
 
 @pytest.mark.parametrize(
