@@ -12,9 +12,20 @@ from calibration.errors import CalibrationError
 from calibration.evaluation.intervals import Interval
 from calibration.evaluation.n_step import Progress
 from calibration.evaluation.settings import ModelSettings
+from calibration.experiment.days import begin_of, days_like
 from calibration.experiment.emulate import Emulated, Emulator
-from calibration.experiment.library import PRESSURES, Comfort, Lever, moves, office_comfort, places, shortened
-from calibration.experiment.members import Member, Question, comparison, fit_members, midnight_after
+from calibration.experiment.library import (
+    AFTER,
+    PRESSURES,
+    Comfort,
+    Lever,
+    by_hand,
+    moves,
+    office_comfort,
+    places,
+    shortened,
+)
+from calibration.experiment.members import Member, Question, comparison, fit_members
 from calibration.experiment.odds import CHANCE, ODDS, Separation, chance_of, needed, seen_before, separation
 from calibration.experiment.schedule import STATIC_PRESSURE, SUPPLY_AIR, Move, Schedule
 from calibration.results import plain
@@ -48,7 +59,7 @@ class DesignSettings:
     Parameters
     ----------
     start : Timestamp, optional
-        When it begins; the first midnight after the telemetry by default.
+        When it begins, at the end of the telemetry or later; the first midnight after it by default.
     hours : float
         How long it lasts at most [h], 6 or more.
     discomfort : float
@@ -75,8 +86,8 @@ class DesignSettings:
         for name, low, high in (("hours", 6.0, 24.0 * 14), ("discomfort", 0.0, np.inf), ("odds", 1.0 + 1e-9, 1e9)):
             value, advice = getattr(self, name), f"{low:g} to {high:g}"
             CalibrationError.unless(low <= value <= high, f"experiment: {name}", advice, repr(value))
-        positive = min(self.prices) >= 0.0
-        CalibrationError.unless(positive, "experiment: prices", "0 or more", repr(self.prices))
+        fine = all(np.isfinite(price) and price >= 0.0 for price in self.prices)
+        CalibrationError.unless(fine, "experiment: prices", "numbers of 0 or more", repr(self.prices))
 
 
 @dataclass(frozen=True)
@@ -92,7 +103,7 @@ class Trial:
     emulated : mapping of str to Emulated
         The building's answer were each member true, by effect.
     cost : float
-        Of heat and cold beyond those of usual operation, the dearest of the members [money].
+        Of heat and cold beyond those of usual operation, until hours after it, the dearest of the members [money].
     energy : float
         Beyond that of usual operation [kWh].
     discomfort : ndarray, shape (n_zone,)
@@ -133,6 +144,10 @@ class Experiment:
         Of the telemetry [s].
     tried : int
         Schedules that were weighed.
+    model : ModelSettings
+        Of the members' models, without effects.
+    by_hand : tuple of str
+        Zones, or air handlers, that it moves and whose setpoints the telemetry does not have.
     zones : tuple of str
         Names of the zones.
     """
@@ -147,7 +162,9 @@ class Experiment:
     days: Interval
     step: float
     tried: int
-    zones: tuple[str, ...] = field(default=())
+    model: ModelSettings = field(default_factory=ModelSettings)
+    by_hand: tuple[str, ...] = ()
+    zones: tuple[str, ...] = ()
 
     @property
     def schedule(self) -> Schedule:
@@ -194,6 +211,7 @@ class Experiment:
             "cost": self.best.cost, "energy_kwh": self.best.energy, "prices": list(self.settings.prices),
             "discomfort_kh": worst, "discomfort_allowed_kh": self.settings.discomfort,
             "measure_instead": list(self.instead) if self.verdict == "hopeless" else [],
+            "by_hand": list(self.by_hand), "settings": self.model.to_dict(),
             "days": plain(self.days), "tried": self.tried, "case": self.case,
             "intervals": {"tuning": plain(self.question.tuned), "held_out": plain(self.question.judged)},
         }  # fmt: skip
@@ -224,31 +242,16 @@ def design_experiment(
         When the telemetry has no days to design on, or no zone can be moved.
     """
     given = settings or DesignSettings()
+    start = begin_of(case, given.start)
     models = comparison(case, question, model or ModelSettings())
     members = fit_members(models, question)
-    start = given.start or midnight_after(case)
-    search = _Search(models, members, question.prior, given, _like(case, start, given.hours), progress)
+    search = _Search(models, members, question.prior, given, start, progress)
     best, usual = search.run()
     return Experiment(
         case.building.name, question, given, tuple(members), best, usual, start, search.interval, case.step,
-        search.tried, case.building.zone_names,
+        search.tried, replace(models.settings, effects={}, normalisation=None),
+        by_hand(case, best.schedule.moves), case.building.zone_names,
     )  # fmt: skip
-
-
-def _like(case: Case, start: pd.Timestamp, hours: float) -> pd.Timestamp:
-    """When the measured days begin that an experiment is designed on: as many weeks before, or the last ones."""
-    length, first, last = pd.Timedelta(hours=hours), case.stamps[0] + pd.Timedelta(days=1), case.stamps[-1]
-    begin = start
-    while begin + length > last:
-        begin -= pd.DateOffset(days=7)
-    if begin < first:
-        begin = (last - length).normalize()
-    enough = begin >= first
-    expected = f"a day and {hours:g} h more of telemetry"
-    CalibrationError.unless(
-        enough, "experiment", expected, f"{first - pd.Timedelta(days=1)} to {last}", "give fewer hours"
-    )
-    return begin
 
 
 class _Search:
@@ -256,13 +259,15 @@ class _Search:
 
     def __init__(
         self, models: ModelComparison, members: Sequence[Member], prior: Mapping[str, float], given: DesignSettings,
-        days: pd.Timestamp, progress: Progress | None,
+        start: pd.Timestamp, progress: Progress | None,
     ) -> None:  # fmt: skip
+        days = days_like(models.case, start, given.hours)
         self.models, self.members, self.given, self.days, self.progress = models, members, given, days, progress
-        self.prior, self.emulator = prior, Emulator(models, days, given.hours)
+        self.start, self.prior, self.emulator = start, prior, Emulator(models, days, given.hours + AFTER)
         self.step = models.case.step
         self.interval = Interval(days, days + pd.Timedelta(hours=given.hours))
-        self.comfort = given.comfort(self.emulator.stamps, self.step)
+        # weather and use are those of the measured days; people come by the clock and the week of the real ones
+        self.comfort = given.comfort(self.emulator.stamps + (start - days), self.step)
         self.tried, self.total = 0, 1
         movable = self.emulator.movable
         CalibrationError.unless(movable, "experiment", "a zone with a terminal whose heat is metered", "none")
@@ -298,7 +303,8 @@ class _Search:
     def _library(self) -> list[Move]:
         building, frame = self.models.case.building, self.models.case.telemetry.frame
         where = places(building, self.models.anatomy, self.emulator.movable, [m.zones for m in self.members])
-        hours = np.asarray((np.arange(len(self.emulator.stamps)) + 0.5) * self.step / 3600.0, dtype=np.float64)
+        count = int((self.emulator.stamps <= self.interval.end).sum())
+        hours = np.asarray((np.arange(count) + 0.5) * self.step / 3600.0, dtype=np.float64)
         levers = {}
         for point in (SUPPLY_AIR, STATIC_PRESSURE):
             names = tuple(d.name for d in building.devices if d.type == "ahu" and f"{d.name}/{point}" in frame)
@@ -307,7 +313,7 @@ class _Search:
             elif names:
                 usual = float(frame[[f"{n}/{point}" for n in names]].median().median())
                 levers[point] = Lever("duct at full and low pressure", names, tuple(r * usual for r in PRESSURES))
-        week = pd.date_range(self.days, periods=7 * 24, freq="h")
+        week = pd.date_range(self.start, periods=7 * 24, freq="h")
         return moves(where, self.comfort, self.given.comfort(week, 3600.0).narrowest, hours, levers)
 
     def trial(self, moves: tuple[Move, ...], true: Sequence[Member] | None = None) -> Trial:
@@ -359,10 +365,10 @@ class _Search:
 
     def _shorter(self, best: Trial) -> Trial:
         """Shorten moves as long as the design is enough and gets no dearer; fewer hours at the same cost are better."""
-        for number in range(len(best.schedule.moves)):
+        for number, whole in enumerate(best.schedule.moves):
             for share in _SHARES:
                 own = list(best.schedule.moves)
-                own[number] = shortened(own[number], share)
+                own[number] = shortened(whole, share)
                 trial = self.trial(tuple(own))
                 if not (self.admissible(trial) and self.enough(trial)):
                     break

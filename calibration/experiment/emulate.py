@@ -13,7 +13,7 @@ import pandas as pd
 
 from calibration.diagnosis.refit.comparison import ModelComparison
 from calibration.experiment.members import Member
-from calibration.experiment.schedule import COOLING, HEATING, STATIC_PRESSURE, SUPPLY_AIR, Schedule
+from calibration.experiment.schedule import STATIC_PRESSURE, SUPPLY_AIR, Schedule
 from thermal._types import FloatArray
 from thermal.case.commands import air_column
 from thermal.case.points import HEATING_POWER, SUPPLY_FLOW
@@ -38,7 +38,9 @@ _TIMES = 3
 _RUNS = 0.02
 
 #: Inputs that no experiment changes.
-_UNMOVED = frozenset({"sun", "sky", "wind", "usual", "occupancy", "through_windows", "occupancy_rate", "outdoor_rate"})
+_UNMOVED = frozenset({
+    "sun", "sky", "wind", "usual", "occupancy", "at_home", "through_windows", "occupancy_rate", "outdoor_rate",
+})  # fmt: skip
 
 #: Bins of a zone's heat by which its terminal's flow is known.
 _BINS = 24
@@ -136,19 +138,6 @@ class Emulator:
             parts = np.array_split(pair[np.argsort(pair[:, 0], kind="stable")], _BINS)
             centres = np.array([np.median(part, axis=0) for part in parts if len(part)])
             found[zone] = centres[:, 0], centres[:, 1]
-        return found
-
-    @cached_property
-    def usual(self) -> FloatArray:
-        """Heating and cooling setpoints as they were: the measured temperatures where nobody tells, (n, n_zone, 2)."""
-        frame, rows = self.case.usable, slice(self.first, None)
-        found = np.repeat(self.measured[rows, :, None], 2, axis=2)
-        for i, zone in enumerate(self.zones):
-            device = self.device[zone]
-            for k, point in enumerate((HEATING, COOLING)):
-                names = [f"{e}/{point}" for e in (zone, device[0] if device else "") if f"{e}/{point}" in frame]
-                if names:
-                    found[:, i, k] = frame[names[0]].ffill().bfill().to_numpy(dtype=float)[rows]
         return found
 
     def run(self, member: Member, schedule: Schedule) -> Emulated:

@@ -6,9 +6,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pandas as pd
 
-from calibration.experiment.schedule import BAND, Move
+from calibration.experiment.schedule import BAND, COOLING, HEATING, Move
 from thermal._types import BoolArray, FloatArray
 from thermal.case.building import Building
+from thermal.case.case import Case
 from thermal.network.topology import Anatomy
 
 #: Distance that setpoints keep from the edge of the comfort band [K]: terminals without integral action rest up to
@@ -21,6 +22,9 @@ BEYOND = (3.0, 2.5)
 
 #: Hours before people come in which zones are back where they like it [h].
 LEAD = 3.0
+
+#: Hours after an experiment in which discomfort counts [h]: people that come when zones ought to be back, and as long.
+AFTER = 2.0 * LEAD
 
 #: How long setpoints hold where they go to and fro [h]: shorter than walls take to follow, longer than air does.
 TURNS = (1.0, 3.0, 12.0)
@@ -148,7 +152,7 @@ def moves(
     where : mapping of str to tuple of str
         Zones by name, `places`.
     comfort : Comfort
-        Band on the steps.
+        Band on the steps, and on those after the end as far as it is known, for people may come then.
     band : tuple of float
         Its edges while people are in [K].
     hours : ndarray, shape (n_time,)
@@ -158,6 +162,7 @@ def moves(
     """
     width = comfort.upper - comfort.lower
     people = width <= band[1] - band[0] + 1e-9
+    width = width[: hours.size]
     low, high = band[0] + MARGIN, band[1] - MARGIN
     free = _spans(~_soon(people, hours), hours)
     loose = int(np.argmax(width))
@@ -207,13 +212,35 @@ def shortened(move: Move, share: float) -> Move:
     return replace(move, spans=tuple(reversed(spans)))
 
 
+def by_hand(case: Case, moves: Sequence[Move]) -> tuple[str, ...]:
+    """Name zones, or air handlers, that moves set and of which the telemetry has no setpoints.
+
+    Nobody knows that the automation takes them.
+
+    Parameters
+    ----------
+    case : Case
+        With telemetry.
+    moves : sequence of Move
+        Of an experiment.
+    """
+    seen, building = set(case.telemetry.frame.columns), case.building
+    found = {}
+    for move in moves:
+        points = (move.point,) if move.point else (HEATING, COOLING)
+        for name in move.zones:
+            own = [name, *(() if move.point else (d.name for d in building.devices_of(name)))]
+            found[name] = not any(f"{n}/{point}" in seen for n in own for point in points)
+    return tuple(name for name, lacks in found.items() if lacks)
+
+
 def _soon(people: BoolArray, hours: FloatArray) -> BoolArray:
     """Whether people are in, or come within the hours that zones take to be back."""
     step = float(hours[1] - hours[0]) if hours.size > 1 else 1.0
     found = people.copy()
     for k in range(1, round(LEAD / step) + 1):
         found[:-k] |= people[k:]
-    return found
+    return found[: hours.size]
 
 
 def _spans(inside: BoolArray, hours: FloatArray) -> tuple[tuple[float, float], ...]:

@@ -14,7 +14,7 @@ from calibration.errors import CalibrationError
 from calibration.evaluation.intervals import Interval
 from calibration.evaluation.n_step import Progress
 from calibration.evaluation.settings import ModelSettings
-from calibration.experiment.members import Question, comparison, fit_members
+from calibration.experiment.members import Question, comparison, fit_members, without
 from calibration.experiment.odds import ODDS, needed
 from thermal.case.case import Case
 
@@ -104,9 +104,7 @@ def weigh_experiment(
     CalibrationError
         When the telemetry does not hold the experiment.
     """
-    held = case.stamps[0] <= interval.start and interval.end <= case.stamps[-1]
-    found = f"{case.stamps[0]} to {case.stamps[-1]}"
-    CalibrationError.unless(held, "experiment", f"telemetry from {interval.start} to {interval.end}", found)
+    _check_held(case, interval)
     settings = model or ModelSettings()
     past = fit_members(comparison(case, question, settings), question)
     starts = {m.effect: m.fit.values for m in past}
@@ -115,6 +113,13 @@ def weigh_experiment(
     after = {m.effect: m.fit.evidence for m in both if m.effect in before}
     CalibrationError.unless(len(after) > 1, "members", "two models that can be fitted", list(after))
     return Outcome({e: v - before[e] for e, v in after.items()}, {e: before[e] for e in after}, odds, interval)
+
+
+def _check_held(case: Case, interval: Interval) -> None:
+    """Refuse telemetry that does not hold an experiment."""
+    held = case.stamps[0] <= interval.start and interval.end <= case.stamps[-1]
+    found = f"{case.stamps[0]} to {case.stamps[-1]}"
+    CalibrationError.unless(held, "experiment", f"telemetry from {interval.start} to {interval.end}", found)
 
 
 def narrowed(verdict: Verdict, outcome: Outcome) -> Verdict:
@@ -169,11 +174,18 @@ def diagnose_further(
     odds : float
         From which one of the group is named [-].
     known, ruled_out : sequence of str
-        As in `diagnose`.
+        As in `diagnose`; those that are known are in the models of all members, and neither is a member any more.
     progress : callable, optional
         Called with stage, done, total.
+
+    Raises
+    ------
+    CalibrationError
+        When the telemetry does not hold the experiment, or fewer than two members are left.
     """
     settings = model or ModelSettings()
+    _check_held(case, interval)
+    question = without(question, known, ruled_out)
     apart = [
         i if i.end < interval.start else replace(i, end=interval.start - pd.Timedelta(seconds=case.step))
         for i in question.judged

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -250,7 +251,9 @@ def diagnose(
     rule_out: Annotated[str, options.value("Effects that are known not to be there.", "ID,...")] = "",
     experiment: Annotated[
         Path | None,
-        options.file("experiment.json of one in the telemetry: its days tune, and say which of the group it is."),
+        options.file(
+            "experiment.json of one in the telemetry: its days tune, and say which of the group it is; --dx as there."
+        ),
     ] = None,
     horizon: options.Horizon = "6h",
     workers: Workers = None,
@@ -285,17 +288,16 @@ def _after_experiment(
     case: Path, out: Path, force: bool, progress: Progress, experiment: Path, settings: Mapping[str, Any]
 ) -> tuple[Diagnosis, Path]:
     """Diagnose telemetry that holds an experiment, and write what was found."""
-    from calibration.evaluation.settings import ModelSettings
     from calibration.experiment.members import read_experiment
     from calibration.experiment.outcome import diagnose_further
     from mpc.reports.diagnosis import write_diagnosis
 
     loaded = options.open_case(case, out, force)
-    question, interval, odds = read_experiment(experiment, loaded)
+    plan = read_experiment(experiment, loaded)
     CalibrationError.unless(settings["horizon"] == "6h", "--experiment", "the horizon 6h", settings["horizon"])
+    model = plan.model if settings["dx"] is None else replace(plan.model, dx=settings["dx"])
     result, outcome = diagnose_further(
-        loaded, question, interval, ModelSettings(dx=settings["dx"]), odds, settings["known"], settings["ruled_out"],
-        progress,
+        loaded, plan.question, plan.interval, model, plan.odds, settings["known"], settings["ruled_out"], progress,
     )  # fmt: skip
     progress("experiment", 1, 1)
     return result, write_diagnosis(result, loaded, out, force=force, experiment=outcome.to_dict())

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -54,34 +54,37 @@ def experiment(
 
     Example: buildingmpc experiment cases/office --diagnosis diagnosis --out experiment
     """
+    import pandas as pd
+
+    from calibration.experiment.days import begin_of
     from calibration.experiment.design import design_experiment
     from calibration.experiment.members import question_of
+    from calibration.results import write_results
     from mpc.reports.experiment import experiment_files, experiment_verdict
 
     loaded = options.open_case(case, out, force)
     content, model = _diagnosis(diagnosis, dx)
-    question = question_of(loaded, content, [name.strip() for name in members.split(",") if name.strip()])
+    question = question_of(loaded, content, options.ids(members), model.effects)
     settings = _settings(start, loaded, {"hours": hours, "discomfort": discomfort, "odds": odds}, prices)
     site = None
     if run is not None:
-        from mpc.studies.experiment import open_site
+        from mpc.studies.experiment import made_by, open_site
 
         site = open_site(run)
+        made_by(site, loaded, begin_of(loaded, settings.start) + pd.Timedelta(hours=hours))
     with Waiting(f"experiment {case.name}") as progress:
         found = design_experiment(loaded, question, settings, model, progress)
         outcome = None
+        report = write_results(out, experiment_files(found, loaded), force) / "report.html"  # a run may fail
         if site is not None:
-            outcome = _carry_out(found, loaded, site, model, out, force, progress)
-        from calibration.results import write_results
-
-        files = experiment_files(found, loaded, outcome)
-        report = write_results(out, files, True if site is not None else force) / "report.html"
+            outcome = _carry_out(found, loaded, site, _told(content, model, question.members), out, force, progress)
+            report = write_results(out, experiment_files(found, loaded, outcome), True) / "report.html"
     numbers = found.to_dict() | {"outcome": None if outcome is None else outcome.to_dict()}
     return answer(json, numbers, lambda: _show(found, experiment_verdict(found, outcome)), report)
 
 
 def _diagnosis(path: Path, dx: float | None) -> tuple[dict[str, Any], ModelSettings]:
-    """Read a diagnosis, and the settings of the model that it was about."""
+    """Read a diagnosis, and the settings of its final model."""
     import json
 
     from calibration.errors import CalibrationError
@@ -94,8 +97,15 @@ def _diagnosis(path: Path, dx: float | None) -> tuple[dict[str, Any], ModelSetti
         raise CalibrationError(str(file), "diagnosis.json as `buildingmpc diagnose` writes it", str(error)) from error
     CalibrationError.unless(isinstance(content, Mapping), str(file), "a mapping", type(content).__name__)
     known = read_settings(file.with_name("calibration.json"))
-    kept = {key: known[key] for key in ("dx", "reach", "scheme") if key in known}
-    return content, ModelSettings(**(kept | ({} if dx is None else {"dx": dx})))
+    return content, ModelSettings(**(known | ({} if dx is None else {"dx": dx})))
+
+
+def _told(content: Mapping[str, Any], model: ModelSettings, members: Collection[str]) -> list[str]:
+    """Effects that a diagnosis was told of: those of its final model that it did not find."""
+    from thermal.effects.catalogue import CATALOGUE
+
+    found = {step["effects"][-1] for step in content["how_far"] if step["effects"]}
+    return [e for e in model.effects if e in CATALOGUE and e not in found and e not in members]
 
 
 def _settings(start: str | None, case: Any, numbers: Mapping[str, float], prices: str) -> Any:
@@ -114,7 +124,7 @@ def _settings(start: str | None, case: Any, numbers: Mapping[str, float], prices
 
 
 def _carry_out(
-    found: Experiment, case: Any, site: Any, model: ModelSettings, out: Path, force: bool, progress: Any
+    found: Experiment, case: Any, site: Any, known: Sequence[str], out: Path, force: bool, progress: Any
 ) -> Outcome:
     """Carry out an experiment, keep the telemetry, and go on with the diagnosis."""
     from calibration.evaluation.intervals import Interval
@@ -125,7 +135,9 @@ def _carry_out(
 
     longer = carry_out(case, found.schedule, site, progress)
     interval = Interval(found.schedule.start, found.schedule.end)
-    result, outcome = diagnose_further(longer, found.question, interval, model, found.settings.odds, progress=progress)
+    result, outcome = diagnose_further(
+        longer, found.question, interval, found.model, found.settings.odds, known, progress=progress
+    )
     save_case(longer, out / "case", overwrite=force)
     write_diagnosis(result, longer, out / "diagnosis", force=force, experiment=outcome.to_dict())
     return outcome

@@ -18,6 +18,9 @@ from thermal.case.case import Case
 #: Panels of zones on a page: those whose members differ most.
 _PANELS = 4
 
+#: Places that a sentence names, where it cannot count them instead.
+_NAMED = 6
+
 _FREEZING = 273.15
 
 
@@ -89,12 +92,18 @@ def experiment_verdict(found: Experiment, outcome: Outcome | None = None) -> str
     names = listed([called(m.effect) for m in found.members], "or")
     usual, chance = percent(found.usual_chance), percent(found.chance)
     if found.verdict == "hopeless":
-        text = f"Nothing that this building can do in {duration(3600 * found.settings.hours)} tells apart whether it "
-        text += f"is {names}: the best admissible experiment would name one with a chance of {chance}. "
+        text = f"None of the {found.tried} schedules of setpoints that were tried for "
+        text += f"{duration(3600 * found.settings.hours)} tells apart whether it is {names}: the best admissible one "
+        text += f"would name one with a chance of {chance}. "
         text += f"Measure instead: {'; or '.join(found.instead)}."
     else:
         text = f"{duration(3600 * found.schedule.hours).capitalize()} from {clock(found.start)} on tell whether it is "
         text += f"{names}, with a chance of {chance} (as many hours of usual operation: {usual})."
+    if found.by_hand:
+        several = len(found.by_hand) > _NAMED
+        names = f"{len(found.by_hand)} of the places that it moves" if several else listed(found.by_hand)
+        text += f" The telemetry has no setpoints of {names}: set these by hand if need be, and record "
+        text += "what was set."
     if outcome is None:
         return text
     if outcome.named is None:

@@ -19,6 +19,7 @@ from mpc.scenario.forecast import Forecast
 from thermal.case.case import Case
 from thermal.case.points import ZONE_TEMPERATURE
 from thermal.case.telemetry import Telemetry
+from thermal.errors import Described
 
 #: How far the temperatures of a site may be from those of the case on the same days, root mean square [K]: another
 #: plant, or another seed, is further off than sensors are coarse.
@@ -119,11 +120,43 @@ def open_site(name: str) -> Site:
         else:
             module = importlib.import_module(where)
         site: Any = getattr(module, function)
-    except (ImportError, AttributeError) as error:
-        raise PlantError("site", expected, f"{name!r} ({error})") from error
+    except Exception as error:  # whatever the code of a site raises
+        raise PlantError("site", expected, f"{name!r} ({type(error).__name__}: {error})") from error
     PlantError.unless(callable(site), "site", "a function of a case and an end", type(site).__name__)
     found: Site = site
     return found
+
+
+def made_by(site: Site, case: Case, end: pd.Timestamp) -> tuple[Plant, Mapping[str, float]]:
+    """Call a site and check what it gives.
+
+    Parameters
+    ----------
+    site : Site
+        Gives the plant.
+    case : Case
+        Telemetry so far.
+    end : Timestamp
+        When the run ends.
+
+    Raises
+    ------
+    PlantError
+        When it does not give a plant with telemetry, and its usual setpoints.
+    """
+    expected = "a plant with actuators, control_step and telemetry(), and its usual setpoints"
+    try:
+        found: Any = site(case, end)
+    except Exception as error:  # whatever the code of a site raises
+        if isinstance(error, Described):
+            raise
+        raise PlantError("site", expected, f"{type(error).__name__}: {error}") from error
+    pair = isinstance(found, tuple) and len(found) == 2 and isinstance(found[1], Mapping)
+    PlantError.unless(pair, "site", expected, repr(found))
+    lacking = [name for name in ("actuators", "control_step", "step", "telemetry") if not hasattr(found[0], name)]
+    PlantError.unless(not lacking, "site", expected, f"a {type(found[0]).__name__} without {', '.join(lacking)}")
+    plant, usual = found
+    return plant, usual
 
 
 def carry_out(
@@ -152,7 +185,7 @@ def carry_out(
     PlantError
         When the plant lacks an actuator, is over too soon, or is not the building that the case is of.
     """
-    plant, usual = site(case, schedule.end)
+    plant, usual = made_by(site, case, schedule.end)
     names = tuple(a.name for a in plant.actuators)
     controller: Controller = Scheduled(
         schedule, FixedSetpoints(usual, plant.actuators).at_hour(0.0), names, plant.control_step

@@ -68,6 +68,8 @@ def test_experiment_writes_what_it_says(
     assert set(expected["zone"]) == {"F1_N", "F1_W", "F1_C", "F1_E", "F1_S"} and "flow_gain_usual" in expected
     rows = pd.read_csv(out / "schedule.csv")
     assert list(rows.columns) == ["time", "point", "value", "unit"]
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert bool(content["by_hand"]) == bool(content["moves"]) == ("The telemetry has no setpoints of" in page)
 
 
 @pytest.mark.parametrize(
@@ -79,6 +81,9 @@ def test_experiment_writes_what_it_says(
         (("--odds", "0.5"), "odds"),
         (("--run", "nowhere"), "site"),
         (("--start", "2030-01-01T00:00"), "experiment"),
+        (("--start", "2023-03-10T13:00"), "end of the telemetry"),
+        (("--prices", "1,nan"), "prices"),
+        (("--members", "flow_gain,flow_gain"), "two different effects"),
     ],
 )
 def test_bad_input_is_named(case: Path, diagnosis: Path, tmp_path: Path, options: tuple[str, ...], error: str) -> None:
@@ -87,6 +92,34 @@ def test_bad_input_is_named(case: Path, diagnosis: Path, tmp_path: Path, options
     answer = run("experiment", case, "--diagnosis", diagnosis, "--out", tmp_path / "out", "--dx", "3", *options)
     assert answer.exit_code == 2 and error in answer.stderr and "Traceback" not in answer.stderr
     assert not (tmp_path / "out").exists()
+
+
+def test_a_wrong_site_is_told_before_the_design(
+    case: Path, diagnosis: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "mine.py").write_text("def site(case, end):\n    return None\n", encoding="utf-8")
+    monkeypatch.setattr(design, "design_experiment", None)
+    site = f"{tmp_path / 'mine.py'}:site"
+    answer = run("experiment", case, "--diagnosis", diagnosis, "--out", tmp_path / "out", "--dx", "3", "--run", site)
+    assert answer.exit_code == 2 and "a plant" in answer.stderr and not (tmp_path / "out").exists()
+
+
+def test_the_design_is_kept_where_a_run_fails(
+    case: Path, diagnosis: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    own = design.moves
+    monkeypatch.setattr(design, "moves", lambda *a: own(*a)[:1])
+    text = "class Plant:\n    actuators, control_step, step, telemetry = (), 1800.0, None, None\n"
+    text += "    def reset(self):\n        from mpc.errors import PlantError\n        raise PlantError('it is off')\n"
+    (tmp_path / "mine.py").write_text(f"{text}def site(case, end):\n    return Plant(), {{}}\n", encoding="utf-8")
+    site, out = f"{tmp_path / 'mine.py'}:site", tmp_path / "out"
+    calibration = {"settings": {"dx": 3.0, "effects": {"infiltration": []}, "scopes": {"window_u_value": "facade"}}}
+    (diagnosis / "calibration.json").write_text(json.dumps(calibration), encoding="utf-8")
+    answer = run("experiment", case, "--diagnosis", diagnosis, "--out", out, "--hours", "6", "--run", site)
+    assert answer.exit_code == 2, answer.stderr
+    content = json.loads((out / "experiment.json").read_text(encoding="utf-8"))
+    assert content["outcome"] is None and content["known"] == {"infiltration": []}
+    assert content["settings"]["dx"] == 3.0 and content["settings"]["scopes"] == {"window_u_value": "facade"}
 
 
 def test_no_diagnosis_and_no_experiment(case: Path, tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from mpc.errors import PlantError
 from mpc.loop.make import PlantSettings, pilot_weather, simulated_plant
 from mpc.loop.plant import Plant
 from mpc.loop.run import FixedSetpoints
-from mpc.studies.experiment import Site, carry_out, open_site
+from mpc.studies.experiment import Site, carry_out, made_by, open_site
 from thermal.case.case import Case
 from thermal.data import load_bundled_case
 from thermal.pilot.weather import MOUNTAIN_VIEW
@@ -75,6 +75,25 @@ def test_another_site_and_other_actuators_are_refused(case: Case) -> None:
 def test_sites_that_are_none(name: str) -> None:
     with pytest.raises(PlantError, match="site"):
         open_site(name)
+
+
+@pytest.mark.parametrize(
+    ("given", "error"),
+    [
+        ("'plant'", "'plant'"), ("('plant', {})", "without actuators"), ("('plant', 1)", "setpoints"),
+        ("1 / 0", "ZeroDivisionError"),
+    ],
+)  # fmt: skip
+def test_sites_that_give_no_plant(tmp_path: Path, case: Case, given: str, error: str) -> None:
+    (tmp_path / "mine.py").write_text(f"def site(case, end):\n    return {given}\n", encoding="utf-8")
+    with pytest.raises(PlantError, match=error):
+        made_by(open_site(f"{tmp_path / 'mine.py'}:site"), case, case.stamps[-1])
+
+
+def test_a_file_that_is_no_python(tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text("def site(case, end:\n", encoding="utf-8")
+    with pytest.raises(PlantError, match="SyntaxError"):
+        open_site(f"{tmp_path / 'mine.py'}:site")
 
 
 def test_a_site_in_a_file(tmp_path: Path) -> None:
