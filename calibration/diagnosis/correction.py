@@ -19,7 +19,8 @@ from scipy.stats import false_discovery_control, ttest_1samp
 from calibration.diagnosis.refit.comparison import Built, Fit, ModelComparison
 from calibration.diagnosis.refit.fit import Found, solve
 from calibration.diagnosis.refit.how_far import closed
-from calibration.diagnosis.refit.refit import CHANCE, MATTERS, HeldOut, growth, held_out
+from calibration.diagnosis.refit.refit import CHANCE, HeldOut, growth, held_out
+from calibration.diagnosis.screen.gains import MATTERS
 from calibration.diagnosis.screen.kinds_of_heat import Kind, candidates, evidence
 from calibration.diagnosis.screen.unknown_heat import daily_errors, days_of_runs
 from calibration.fit.fitted_case import is_large

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from calibration.diagnosis.refit.comparison import Fit, ModelComparison, is_strength
-from calibration.diagnosis.screen.gains import Gain, choice_of
+from calibration.diagnosis.screen.gains import MATTERS, Gain, choice_of
 from calibration.diagnosis.screen.openings import openings_beyond
 from calibration.diagnosis.screen.screen import Screening
 from calibration.errors import CalibrationError
@@ -22,10 +22,6 @@ from thermal.errors import ModelError
 
 #: Evaluations of a fit from one start.
 _EVALUATIONS = 10
-
-#: Least fall of an error by which an effect matters to predictions, of the root mean square where it is fitted or of
-#: the mean where it is held out [K].
-MATTERS = 0.03
 
 #: Share of that fall which tangents must promise for a fit to pay for its time [-]: of a hundred zones a fit takes
 #: half a minute, and their evidence is in the tens for what no prediction shows.

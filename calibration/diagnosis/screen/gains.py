@@ -9,6 +9,10 @@ from scipy.special import gammaln
 
 from thermal._types import FloatArray
 
+#: Least fall of an error by which an effect matters to predictions, of the root mean square where it is fitted or of
+#: the mean where it is held out [K].
+MATTERS = 0.03
+
 
 @dataclass(frozen=True)
 class Gain:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from calibration.diagnosis.refit.comparison import Fit, ModelComparison
-from calibration.diagnosis.refit.refit import MATTERS
+from calibration.diagnosis.screen.gains import MATTERS
 from calibration.diagnosis.screen.unknown_heat import DailyErrors, daily_errors
 from calibration.results import Plain
 from thermal._types import BoolArray, FloatArray, IntArray

@@ -14,9 +14,10 @@ from calibration.diagnosis.decide.verdict import _left_over, judge
 from calibration.diagnosis.diagnosis import Diagnosis, baseline_gap, diagnose
 from calibration.diagnosis.refit.comparison import Fit, ModelComparison
 from calibration.diagnosis.refit.how_far import _permutation_test
-from calibration.diagnosis.refit.refit import ACCEPTED, CHANCE, MATTERS, Refit, Work, beyond_a_step, held_out
+from calibration.diagnosis.refit.refit import ACCEPTED, CHANCE, Refit, Work, beyond_a_step, held_out
 from calibration.diagnosis.refit.repeat import DISAGREE, Repeats, agreement
 from calibration.diagnosis.refit.search import _first
+from calibration.diagnosis.screen.gains import MATTERS
 from calibration.diagnosis.screen.screen import Screening
 from calibration.evaluation.settings import ModelSettings
 from calibration.fit.least_squares import bounded_step

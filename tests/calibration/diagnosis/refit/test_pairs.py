@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from calibration.diagnosis.decide.levels import SMALL
 from calibration.diagnosis.decide.verdict import gains_of
 from calibration.diagnosis.refit.comparison import ModelComparison
-from calibration.diagnosis.refit.refit import ACCEPTED, MATTERS, Work, held_out, promising
+from calibration.diagnosis.refit.refit import ACCEPTED, Work, held_out, promising
 from calibration.diagnosis.refit.search import Round, _best_pair, _exchanged, _refits, nominate
-from calibration.diagnosis.screen.gains import Gain, choice_of
+from calibration.diagnosis.screen.gains import MATTERS, Gain, choice_of
 from calibration.diagnosis.screen.own_nulls import OwnNulls
 from calibration.diagnosis.screen.screen import Screening
 from calibration.evaluation.settings import ModelSettings
