@@ -210,7 +210,7 @@ def drawn_errors(
     entry = matrices.modal.held_response(held, step)
     parts = []
     for runs in problem.runs:
-        seen = np.isfinite(problem.errors(model, theta, runs, slopes=False)[0])
+        seen = np.isfinite(inputs.targets(runs.starts, keep))
         rows, m = runs.starts + np.arange(1, problem.steps + 1)[:, None], runs.starts.size
         first, length = int(rows.min()), int(rows.max() - rows.min()) + 1
         still = np.zeros((problem.steps, matrices.n_boundary, m))
