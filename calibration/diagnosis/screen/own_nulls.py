@@ -16,13 +16,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calibration.diagnosis.refit.comparison import Fit
-from calibration.diagnosis.screen.gains import MATTERS, choice_of
+from calibration.diagnosis.screen.gains import MATTERS
 from calibration.diagnosis.screen.generic import TIGHTNESS
 from calibration.diagnosis.screen.missing import tuned_disturbance
+from calibration.diagnosis.screen.programme import Explained, Grown
 from calibration.diagnosis.screen.screen import Screening
 from calibration.fit.precision import drawn_errors
 from calibration.results import Plain
-from thermal._types import BoolArray, FloatArray, IntArray
+from thermal._types import FloatArray
 from thermal.effects.catalogue import CATALOGUE
 
 #: Draws of the errors: a level of 3 % is told to within 1.7 %.
@@ -34,9 +35,6 @@ FALSE_ALARM = 0.03
 #: Longest course of heat at random [s]: what stays for days is no chance. Tuned on four days, a steady lack looks like
 #: heat that keeps for weeks (720 h in development seed 4 of the houses), and would hide the ground and what is steady.
 _LONGEST = 43200.0
-
-#: Sweeps of the quadratic programmes, and the change in prior deviations that ends them [-].
-_SWEEPS, _TOLERANCE = 60, 1e-4
 
 
 @dataclass(frozen=True)
@@ -122,85 +120,21 @@ def own_nulls(made: Screening, fit: Fit, candidates: Sequence[str]) -> OwnNulls:
 
     gains = {e: counted(*_gains_of(made, e, scores)) for e in candidates if made.strengths_of(e).size}
     sizes = [(f, t) for f in made.generic_families() for t in TIGHTNESS]
-    generic = np.max([counted(*solved(made, f, scores, tightness=t)) for f, t in sizes], axis=0)
+    heat = [made.programme.solve(f, scores, tightness=t) for f, t in sizes]
+    generic = np.max([counted(found.gain, found.share) for found in heat], axis=0)
     largest = np.max(list(gains.values()), axis=0) if gains else np.zeros(len(scores))
     return OwnNulls(np.sort(largest), gains, np.sort(generic))
 
 
 def _gains_of(made: Screening, effect: str, scores: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Gain and share of one effect in every draw: over the building, or in the zones where it explains most [-]."""
-    index = made.strengths_of(effect)
     if not CATALOGUE[effect].zonal:
-        return solved(made, index, scores)
+        whole = made.programme.solve(made.strengths_of(effect), scores)
+        return whole.gain, whole.share
     members, everywhere = made.members_of(effect)
-    found = [solved(made, everywhere, scores)] if everywhere.size else []
+    found: list[Explained | Grown] = [made.programme.solve(everywhere, scores)] if everywhere.size else []
     if members:
-        found.append(_grown(made, list(members.values()), scores))
-    gains, shares = (np.array([f[k] for f in found]) for k in (0, 1))
+        found.append(made.programme.grow(list(members.values()), scores, len(members) + made.elsewhere))
+    gains, shares = np.array([f.gain for f in found]), np.array([f.share for f in found])
     best, draws = np.argmax(gains, axis=0), np.arange(len(scores))
     return gains[best, draws], shares[best, draws]
-
-
-def _grown(made: Screening, members: Sequence[IntArray], scores: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Add zone after zone in every draw, as `Screening` does on the telemetry; gain and share, (n_draw,) [-]."""
-    index, count = np.concatenate(members), len(members)
-    owner = np.repeat(np.arange(count), [m.size for m in members])
-    alone = np.array([solved(made, m, scores)[0] for m in members]).T
-    order, rows = np.argsort(-alone, axis=1), np.arange(len(scores))
-    price = np.array([choice_of(k, count + made.elsewhere) for k in range(1, count + 1)])
-    chosen = np.zeros((len(scores), count), dtype=bool)
-    best, explained = np.full(len(scores), -np.inf), np.zeros(len(scores))
-    for turn in range(count):
-        trial = chosen.copy()
-        trial[rows, order[:, turn]] = True
-        gain, share = solved(made, index, scores, trial[:, owner])
-        gain = gain - price[trial.sum(axis=1) - 1]
-        better = gain > best
-        chosen[better], best[better], explained[better] = trial[better], gain[better], share[better]
-    return best, explained
-
-
-def solved(
-    made: Screening, index: IntArray, scores: FloatArray, active: BoolArray | None = None, tightness: float = 1.0
-) -> tuple[FloatArray, FloatArray]:
-    """Gain of some strengths in every draw, by the quadratic programme of `Screening`, and the share they explain.
-
-    Parameters
-    ----------
-    made : Screening
-        With the Gram matrix.
-    index : ndarray of int, shape (n,)
-        Positions of the strengths.
-    scores : ndarray, shape (n_draw, n_parameter)
-        Projected scores of the draws [-].
-    active : ndarray of bool, shape (n_draw, n), optional
-        Strengths that may be there in a draw; all by default.
-    tightness : float
-        Spread of the priors over their own [-].
-
-    Returns
-    -------
-    tuple of ndarray, shape (n_draw,)
-        Gain, and share of the squared error [-].
-    """
-    gram, score, prior = made.gram[np.ix_(index, index)], scores[:, index], tightness * made.prior[index]
-    lower, upper = made.lower[index], made.upper[index]
-    hessian = gram + np.diag(prior**-2.0)
-    there = np.ones(score.shape, dtype=bool) if active is None else active
-    x = np.zeros_like(score)
-    for _ in range(_SWEEPS):
-        moved = 0.0
-        for j in range(index.size):
-            new = np.clip(x[:, j] + (score[:, j] - x @ hessian[j]) / hessian[j, j], lower[j], upper[j]) * there[:, j]
-            moved = max(moved, float(np.max(np.abs(new - x[:, j]))) / float(prior[j]))
-            x[:, j] = new
-        if moved < _TOLERANCE:
-            break
-    explained = 2.0 * np.sum(score * x, axis=1) - np.sum((x @ gram) * x, axis=1)
-    share = np.clip(explained / made.count, 0.0, 0.999)
-    on = there / np.sqrt(1.0 - share)[:, None] * prior
-    occam = np.linalg.slogdet(np.eye(index.size) + on[:, :, None] * gram * on[:, None, :])[1]
-    halves = np.count_nonzero((lower == 0.0) & (x > 0.0), axis=1)
-    pull = np.sum((x / prior) ** 2, axis=1)
-    gain = -0.5 * made.count * np.log1p(-share) - 0.5 * pull - 0.5 * occam + np.log(2.0) * halves
-    return np.asarray(gain), np.asarray(share)

@@ -17,14 +17,12 @@ import numpy as np
 from calibration.diagnosis.refit.comparison import Fit, ModelComparison, is_strength
 from calibration.diagnosis.screen.gains import Gain, choice_of
 from calibration.diagnosis.screen.generic import GENERIC, TIGHTNESS, ZONE_HEAT
+from calibration.diagnosis.screen.programme import Programme
 from thermal._types import BoolArray, FloatArray, IntArray
 from thermal.effects.catalogue import CATALOGUE
 from thermal.effects.effect import PAIR, Chosen
 from thermal.model.reduce import FEW_SHIFTS, SHIFTS, reduced_model
 from thermal.parameters import Parameter
-
-#: Sweeps of the quadratic programme, and the change of an estimate in prior deviations that ends them [-].
-_SWEEPS, _TOLERANCE = 200, 1e-6
 
 #: Share of its range that a strength has where it is asked what a level changes [-].
 _LITTLE = 1e-3
@@ -96,6 +94,11 @@ class Screening:
         self._known, self._turn, self._home = known, turn, np.linalg.solve(hessian, pull)
         self.score = self._slope - turn.T @ pull
         self.gram = self._whole - self._whole[:, known] @ turn
+
+    @property
+    def programme(self) -> Programme:
+        """Of all strengths, the fitted parameters projected out."""
+        return Programme(self.gram, self.lower, self.upper, self.prior, self.count)
 
     def scores_of(self, errors: FloatArray) -> FloatArray:
         """Scores of other errors of the same runs, each as large as those of the fit, (n_draw, n_parameter) [-].
@@ -203,7 +206,9 @@ class Screening:
         """
         index = np.concatenate([first.index, second.index])
         hessian = self.gram[np.ix_(index, index)] + np.diag(self.prior[index] ** -2.0)
-        return self._weigh(index, np.linalg.solve(hessian, self.score[index]))[0] - first.choice - second.choice
+        free, there = np.linalg.solve(hessian, self.score[index]), np.ones((1, index.size), dtype=bool)
+        gain = self.programme.weigh(index, free[None], self.score[None], there).gain[0]
+        return float(gain) - first.choice - second.choice
 
     def together(self, first: Gain, second: Gain) -> tuple[Gain, Gain, float, float]:
         """Two effects with the strengths that they have together, what both gain and what they explain.
@@ -214,14 +219,15 @@ class Screening:
             With their zones.
         """
         parts = first.index, second.index
-        x, gain, share = self._solve(np.concatenate(parts))
-        found = []
-        for one, index, strengths in zip((first, second), parts, np.split(x, [parts[0].size]), strict=True):
+        both = self.programme.solve(np.concatenate(parts), self.score[None])
+        split, found = np.split(both.strengths[0], [parts[0].size]), []
+        for one, index, strengths in zip((first, second), parts, split, strict=True):
             direction = np.zeros(len(self.parameters))
             direction[index] = strengths
             named = self._named(one.effect, index, strengths, np.zeros((index.size, index.size)))[0]
             found.append(replace(one, strengths=named, direction=direction))
-        return found[0], found[1], gain - first.choice - second.choice, share
+        gain = float(both.gain[0]) - first.choice - second.choice
+        return found[0], found[1], gain, float(both.share[0])
 
     def cosine(self, first: Gain, second: Gain) -> float:
         """Cosine of the projected signatures of two effects at their estimates [-].
@@ -294,21 +300,12 @@ class Screening:
 
     def _grow(self, effect: str, members: Mapping[str, IntArray]) -> Gain:
         """Add zones, or pairs of them, as long as each more than pays for having been chosen among all."""
-        places = len(members) + self.elsewhere
-        alone = {name: self._gain(effect, index, (name,)).gain for name, index in members.items()}
-        order = sorted(members, key=lambda name: -alone[name])
-        chosen: list[str] = []
-        best: Gain | None = None
-        for name in order:
-            trial = [*chosen, name]
-            index = np.concatenate([members[m] for m in trial])
-            zones = dict.fromkeys(z for m in trial for z in m.split(PAIR))
-            found = self._gain(effect, index, tuple(zones), choice_of(len(trial), places), places)
-            if best is None or found.gain > best.gain:
-                chosen, best = trial, found
-        if best is None:
-            raise ValueError(f"{effect}: expected at least one zone")
-        return best
+        places, names = len(members) + self.elsewhere, list(members)
+        grown = self.programme.grow(list(members.values()), self.score[None], places)
+        chosen = [names[k] for k in grown.order[0] if grown.chosen[0, k]]
+        index = np.concatenate([members[name] for name in chosen])
+        zones = dict.fromkeys(z for name in chosen for z in name.split(PAIR))
+        return self._gain(effect, index, tuple(zones), choice_of(len(chosen), places), places)
 
     def _gain(
         self,
@@ -319,7 +316,8 @@ class Screening:
         places: int = 0,
         tightness: float = 1.0,
     ) -> Gain:
-        x, gain, share = self._solve(index, tightness)
+        found = self.programme.solve(index, self.score[None], tightness=tightness)
+        x, gain, share = found.strengths[0], float(found.gain[0]), float(found.share[0])
         direction = np.zeros(len(self.parameters))
         direction[index] = x
         sharper = self.gram[np.ix_(index, index)] / (1.0 - share) + np.diag(self.prior[index] ** -2.0)
@@ -328,32 +326,6 @@ class Screening:
         kept = float(along @ self.gram @ along) / whole if whole > 0.0 else 0.0
         strengths, errors = self._named(effect, index, x, np.asarray(np.linalg.inv(sharper)))
         return Gain(effect, zones, gain - choice, share, strengths, errors, kept, direction, index, places, choice)
-
-    def _solve(self, index: IntArray, tightness: float = 1.0) -> tuple[FloatArray, float, float]:
-        """Strengths, gain and share of the squared error: coordinate descent within the ranges."""
-        gram, score = self.gram[np.ix_(index, index)], self.score[index]
-        prior = tightness * self.prior[index]
-        hessian = gram + np.diag(prior**-2.0)
-        x = np.zeros(len(index))
-        for _ in range(_SWEEPS):
-            before = x.copy()
-            for j in range(len(index)):
-                step = (score[j] - hessian[j] @ x) / hessian[j, j]
-                x[j] = np.clip(x[j] + step, self.lower[index[j]], self.upper[index[j]])
-            if np.max(np.abs(x - before) / prior, initial=0.0) < _TOLERANCE:
-                break
-        return (x, *self._weigh(index, x, tightness))
-
-    def _weigh(self, index: IntArray, x: FloatArray, tightness: float = 1.0) -> tuple[float, float]:
-        """Gain of given strengths, and the share of the squared error that they explain."""
-        gram, score, prior = self.gram[np.ix_(index, index)], self.score[index], tightness * self.prior[index]
-        share = float(np.clip((2.0 * score @ x - x @ gram @ x) / self.count, 0.0, 0.999))
-        pull = float(np.sum((x / prior) ** 2))
-        sharper = gram / (1.0 - share) * np.outer(prior, prior)
-        occam = np.linalg.slogdet(np.eye(len(index)) + sharper)[1]
-        gain = -0.5 * self.count * np.log1p(-share) - 0.5 * pull - 0.5 * occam
-        gain += np.log(2.0) * np.count_nonzero((self.lower[index] == 0.0) & (x > 0.0))
-        return float(gain), share
 
 
 def _worst_zones(fit: Fit) -> tuple[str, ...]:

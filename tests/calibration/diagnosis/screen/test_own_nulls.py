@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from calibration.diagnosis.screen.own_nulls import FALSE_ALARM, OwnNulls, _gains_of, solved
+from calibration.diagnosis.screen.own_nulls import FALSE_ALARM, OwnNulls, _gains_of
 from calibration.diagnosis.screen.screen import Screening
 from thermal._types import FloatArray
 from thermal.effects.catalogue import CATALOGUE
@@ -61,10 +61,11 @@ def test_strengths_that_are_not_there_gain_and_cost_nothing() -> None:
     screening, scores = made()
     index = screening.strengths_of("flow_gain")
     none = np.zeros((DRAWS, index.size), dtype=bool)
-    assert solved(screening, index, scores, none)[0] == pytest.approx(np.zeros(DRAWS))
+    solve = screening.programme.solve
+    assert solve(index, scores, none).gain == pytest.approx(np.zeros(DRAWS))
     one = none.copy()
     one[:, 2] = True
-    assert solved(screening, index, scores, one)[0] == pytest.approx(solved(screening, index[2:3], scores)[0], abs=1e-6)
+    assert solve(index, scores, one).gain == pytest.approx(solve(index[2:3], scores).gain, abs=1e-6)
 
 
 def test_levels_hold_at_their_rate_and_go_on_beyond_the_draws() -> None:
