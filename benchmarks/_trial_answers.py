@@ -22,12 +22,14 @@ NAME = "blind_trials"
 CASES, SEALED, ANSWERS, GAPS = "cases", "sealed", "answers", "gaps"
 
 #: What answers a trial, and what only measures its gap, a tenth of the work.
-_ANSWER, _GAP = "diagnose(case).to_dict()", '{"gap": {"mae": baseline_gap(case)}}'
+_ANSWER, _GAP = "plain(seek(case).to_dict())", '{"gap": {"mae": baseline_gap(case)}}'
 #: The program of the process that answers one trial: it gets the case folder and a file to write to, and nothing else.
 _PROGRAM = """
 import json, sys
 from pathlib import Path
-from calibration.diagnosis.diagnosis import baseline_gap, diagnose
+from calibration.diagnosis.diagnosis import baseline_gap
+from calibration.diagnosis.seek import seek
+from calibration.results import plain
 from thermal import load_case
 case = load_case(sys.argv[1])
 answer = %s | {"code": sys.argv[3]}

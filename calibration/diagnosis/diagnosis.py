@@ -9,19 +9,17 @@ from typing import Any
 import pandas as pd
 
 from calibration.diagnosis.correction import CORRECTED, Correction, correct
-from calibration.diagnosis.decide.verdict import Verdict, chance_of, doubted, gains_of, judge
+from calibration.diagnosis.decide.verdict import Verdict, chance_of
 from calibration.diagnosis.decide.where import DriftCurve, Where, drift_of, where_it_lies
-from calibration.diagnosis.faults import Fault, mend, with_faults
-from calibration.diagnosis.free import drawing_fails, search_free, with_recurring
+from calibration.diagnosis.faults import Fault
 from calibration.diagnosis.handed_on import fit_content, judge_handed_on, other_structures, with_correction
-from calibration.diagnosis.known import reasons_of
-from calibration.diagnosis.refit.challenge import challenge
 from calibration.diagnosis.refit.comparison import Fit, ModelComparison
-from calibration.diagnosis.refit.how_far import Step, how_far
-from calibration.diagnosis.refit.refit import elsewhere, held_out
-from calibration.diagnosis.refit.search import Round, accepted_from, search
+from calibration.diagnosis.refit.how_far import Step
+from calibration.diagnosis.refit.refit import held_out
+from calibration.diagnosis.refit.search import Round, accepted_from
 from calibration.diagnosis.screen.missing import Missing, at_start, missing_heat
 from calibration.diagnosis.screen.regular import Regular
+from calibration.diagnosis.seek import answer_entries, seek
 from calibration.estimation.disturbance import DisturbanceModel
 from calibration.evaluation.intervals import Interval
 from calibration.evaluation.n_step import Evaluation, Progress
@@ -31,8 +29,6 @@ from calibration.fit.result import CalibrationResult, Rung, SolverReport
 from calibration.results import Axes, Result, plain
 from thermal.case.case import Case
 from thermal.case.estimated import Estimated, estimate_entry
-from thermal.case.plausibility.examine import check_calibratable
-from thermal.effects.catalogue import CATALOGUE
 
 #: Subsystem that an effect belongs to.
 SUBSYSTEMS = {
@@ -170,7 +166,6 @@ class Diagnosis(Result):
     def to_dict(self) -> dict[str, Any]:
         """Contents of ``diagnosis.json`` but for its sentence, which `mpc.reports` adds."""
         w, simple, carried = self.where, self.prediction.yardsticks, self.prediction.carried
-        halves = {s.effects[-1]: s.halves.to_dict() for s in self.steps if s.halves is not None}
         return {
             "verdict": self.verdict.name,
             "gap": {
@@ -197,13 +192,8 @@ class Diagnosis(Result):
                           "kind": w.drift.kind},
                 "groups": {s.name: s.to_dict() for s in w.groups},
             },
-            "which": [c.to_dict() | {"repeats": plain(halves.get(c.effect))} for c in self.verdict.candidates],
-            "set90": self.verdict.set90,
-            "combinations": [{"effects": list(e), "probability": p} for e, p in self.verdict.combinations.items()],
-            "how_far": [*(f.how_far(self.floor) for f in self.faults), *(s.to_dict() for s in self.steps)],
-            "rounds": [r.to_dict() | {"worth": gains_of(r)} for r in self.rounds],
+            **answer_entries(self.verdict, self.steps, self.rounds, self.faults, self.floor),
             **({} if self.left_over is None else {"left_over": plain(self.left_over)}),
-            "faults": plain([f.to_dict() for f in self.faults]),
             "correction": None if self.correction is None else self.correction.to_dict(),
             "prediction": {"rungs": plain(self.rungs), "held_out_mae": self.predicts, "carried": plain(carried)},
             "intervals": {
@@ -318,53 +308,28 @@ def diagnose(
     'solar_gain'
     """
     began = time.perf_counter()
-    check_calibratable(case)
-    faults = mend(case, tune, hold_out, {"dx": dx, "horizon": horizon}, progress)
-    case = faults[-1].mended if faults else case
-    models = ModelComparison(case, ModelSettings(dx=dx), tune, hold_out, horizon)
-    untestable = models.untestable()
-    untestable |= reasons_of(known, ruled_out, untestable)
-    effects: dict[str, tuple[str, ...]] = {name: () for name in known}
-    baseline = models.fit(effects, [{}])
-    first = errors = held_out(models, baseline)
-    turns = elsewhere(baseline, first) and models.alternate(baseline.built.inputs)
-    if turns:
-        baseline = models.fit(effects, [{}], baseline.built)
-        errors = held_out(models, baseline)
-    testable = [e for e in CATALOGUE if e not in untestable]
-    rounds = search(models, baseline, errors, testable, progress)
-    models, rounds = challenge(models, rounds, testable, progress)
-    about_drawing = judge(rounds, untestable).name
-    # a drawing that is known to lack what nothing explains has no advance
-    advance = 0.0 if about_drawing == "unexplained" else ADVANCE
-    rungs, kept, left = other_structures(models, rounds[-1].after, progress, advance)
-    left_over, free = None, None
-    if kept is not None and about_drawing != "no_gap" and drawing_fails(rungs, kept):  # names make up for it
-        free = search_free(models, kept, known, ruled_out, progress)
-        models, rounds, untestable, left_over, kept = (
-            free.models, free.rounds, free.untestable, free.left_over, free.kept,
-        )  # fmt: skip
+    found = seek(
+        case, tune, hold_out, dx=dx, horizon=horizon, known=known, ruled_out=ruled_out, progress=progress
+    )  # fmt: skip
+    models, rounds, verdict = found.models, found.rounds, found.verdict
+    rungs, kept, left = found.structures or other_structures(models, rounds[-1].after, progress, ADVANCE)
     errors, where = rounds[0].held_out, where_it_lies(models, rounds[0].before)
-    steps, floor = how_far(models, rounds)
     areas = {name: room.floor_area for name, room in models.anatomy.rooms.items()}
     watts = rounds[0].screening.detectable(accepted_from(rounds[0].own))
-    void = {s.effects[-1] for s in steps if s.void}
-    verdict = doubted(judge(rounds, untestable, left_over), void)
-    verdict = with_faults(verdict if free is None else with_recurring(verdict, free, rungs), faults)
-    correction = correct(models, rounds[0].before, errors, floor) if verdict.name == "unexplained" else None
+    correction = correct(models, rounds[0].before, errors, found.floor) if verdict.name == "unexplained" else None
     rungs, left = with_correction(models, correction, rungs, left)
     taken = correction.fit if correction is not None and rungs[-1].chosen else None
     better = None if kept is None or taken is not None else replace(kept.result(began, progress), rungs=rungs)
     prediction, disturbance, factors = judge_handed_on(models, taken or rounds[-1].after, better, left)
     return Diagnosis(
-        case=case.building.name, verdict=verdict, where=where, steps=steps, gap=errors.mae, floor=floor.mae,
+        case=case.building.name, verdict=verdict, where=where, steps=found.steps, gap=errors.mae, floor=found.floor.mae,
         p_value=chance_of(rounds[0]),
         detectable={zone: w * areas[zone] for zone, w in watts.items()}, rounds=rounds, tuned=tuple(models.tuned),
         judged=tuple(models.judged), seconds=time.perf_counter() - began, version=version("buildingmpc"),
         settings=replace(models.settings, normalisation=models.drivers.normalisation), horizon=horizon,
-        last_third=first.mae if turns else None, rungs=rungs, better=better, prediction=prediction,
-        estimated=case.estimated, disturbance=disturbance, band_factors=factors, left_over=left_over,
-        correction=correction, faults=faults,
+        last_third=found.last_third, rungs=rungs, better=better, prediction=prediction,
+        estimated=found.case.estimated, disturbance=disturbance, band_factors=factors,
+        left_over=None if found.free is None else found.free.left_over, correction=correction, faults=found.faults,
     )  # fmt: skip
 
 

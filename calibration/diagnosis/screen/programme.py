@@ -104,7 +104,8 @@ class Programme:
         for _ in range(_SWEEPS):
             moved = 0.0
             for j in moving:
-                new = np.clip(x[:, j] + (score[:, j] - x @ hessian[j]) / hessian[j, j], lower[j], upper[j]) * there[:, j]
+                best = x[:, j] + (score[:, j] - x @ hessian[j]) / hessian[j, j]
+                new = np.clip(best, lower[j], upper[j]) * there[:, j]
                 moved = max(moved, float(np.max(np.abs(new - x[:, j]))) / float(prior[j]))
                 x[:, j] = new
             if moved < _TOLERANCE:

@@ -19,8 +19,10 @@ from calibration.diagnosis.refit.repeat import DISAGREE, Repeats, agreement
 from calibration.diagnosis.refit.search import _first
 from calibration.diagnosis.screen.gains import MATTERS
 from calibration.diagnosis.screen.screen import Screening
+from calibration.diagnosis.seek import seek
 from calibration.evaluation.settings import ModelSettings
 from calibration.fit.least_squares import bounded_step
+from calibration.results import plain
 from mpc.reports.diagnosis_words import where_sentence
 from thermal import Case, Telemetry
 from thermal.data import load_bundled_case
@@ -64,6 +66,14 @@ def test_nothing_is_found_where_nothing_is_missing() -> None:
     assert found.verdict.set90 == ()
     assert max(g.gain for g in found.rounds[0].gains) < ACCEPTED
     assert found.final.effects == {}
+
+
+def test_the_answer_is_that_of_the_whole_diagnosis() -> None:
+    answer, whole = plain(seek(twin(), dx=1.0).to_dict()), plain(diagnosed(None).to_dict())
+    assert answer["gap"].items() <= whole["gap"].items()
+    for key in answer.keys() - {"gap", "seconds", "intervals"}:
+        assert answer[key] == whole[key], key
+    assert {"verdict", "which", "rounds"} <= answer.keys()
 
 
 @pytest.mark.parametrize("number", [1, 3])

@@ -1,0 +1,197 @@
+"""The answer of a diagnosis, without what follows from it: what was sought, what was found, and the verdict."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+from calibration.diagnosis.decide.verdict import Verdict, doubted, gains_of, judge
+from calibration.diagnosis.faults import Fault, mend, with_faults
+from calibration.diagnosis.free import Free, drawing_fails, search_free, with_recurring
+from calibration.diagnosis.handed_on import other_structures
+from calibration.diagnosis.known import reasons_of
+from calibration.diagnosis.refit.challenge import challenge
+from calibration.diagnosis.refit.comparison import ModelComparison
+from calibration.diagnosis.refit.how_far import Step, how_far
+from calibration.diagnosis.refit.refit import HeldOut, elsewhere, held_out
+from calibration.diagnosis.refit.search import Round, search
+from calibration.evaluation.intervals import Interval
+from calibration.evaluation.n_step import Progress
+from calibration.evaluation.settings import ModelSettings
+from calibration.fit.fitted_case import FittedCase
+from calibration.fit.ladder import ADVANCE
+from calibration.fit.left_out import LeftOut
+from calibration.fit.result import Rung
+from calibration.results import plain
+from thermal.case.case import Case
+from thermal.case.plausibility.examine import check_calibratable
+from thermal.effects.catalogue import CATALOGUE
+
+
+class Structures(NamedTuple):
+    """Other structures beside the building as drawn with what was found.
+
+    Parameters
+    ----------
+    rungs : tuple of Rung
+        All by their errors on left-out days.
+    kept : FittedCase or None
+        The one that predicts better.
+    left : LeftOut or None
+        Days left out by what is kept.
+    """
+
+    rungs: tuple[Rung, ...]
+    kept: FittedCase | None
+    left: LeftOut | None
+
+
+@dataclass(frozen=True)
+class Sought:
+    """What was sought in a case, what was found, and the verdict.
+
+    Parameters
+    ----------
+    case : Case
+        Faults of its telemetry mended.
+    models : ModelComparison
+        The models that were compared, and their days.
+    rounds : tuple of Round
+        Of the search.
+    verdict : Verdict
+        Which effect.
+    steps : tuple of Step
+        How far each accepted effect closes the gap.
+    floor : HeldOut
+        Held-out errors below which nothing found lowers them.
+    structures : Structures or None
+        Where the verdict needed them: something was found missing.
+    free : Free or None
+        What was sought about a free structure, where the drawing does not hold.
+    faults : tuple of Fault
+        Of the telemetry, which were mended before anything else.
+    last_third : float or None
+        As in `Diagnosis`.
+    seconds : float
+        CPU time [s].
+    """
+
+    case: Case
+    models: ModelComparison
+    rounds: tuple[Round, ...]
+    verdict: Verdict
+    steps: tuple[Step, ...]
+    floor: HeldOut
+    structures: Structures | None
+    free: Free | None
+    faults: tuple[Fault, ...]
+    last_third: float | None
+    seconds: float = field(compare=False)
+
+    @property
+    def gap(self) -> float:
+        """Held-out mean absolute error of the calibrated baseline, before faults were mended [K]."""
+        return self.faults[0].before.held_out if self.faults else self.rounds[0].held_out.mae
+
+    def to_dict(self) -> dict[str, Any]:
+        """Entries of ``diagnosis.json`` that tell the answer."""
+        return {
+            "verdict": self.verdict.name,
+            "gap": {"mae": self.gap, "floor": self.floor.mae},
+            **answer_entries(self.verdict, self.steps, self.rounds, self.faults, self.floor.mae),
+            "intervals": {"mae_of_last_third": self.last_third},
+            "seconds": self.seconds,
+        }
+
+
+def answer_entries(
+    verdict: Verdict, steps: Sequence[Step], rounds: Sequence[Round], faults: Sequence[Fault], floor: float
+) -> dict[str, Any]:
+    """Entries of ``diagnosis.json``: which effect, how far, and the rounds.
+
+    Parameters
+    ----------
+    verdict : Verdict
+        Which effect.
+    steps : sequence of Step
+        How far each accepted effect closes the gap.
+    rounds : sequence of Round
+        Of the search.
+    faults : sequence of Fault
+        Of the telemetry.
+    floor : float
+        Error below which nothing found lowers it [K].
+    """
+    halves = {s.effects[-1]: s.halves.to_dict() for s in steps if s.halves is not None}
+    return {
+        "which": [c.to_dict() | {"repeats": plain(halves.get(c.effect))} for c in verdict.candidates],
+        "set90": verdict.set90,
+        "combinations": [{"effects": list(e), "probability": p} for e, p in verdict.combinations.items()],
+        "how_far": [*(f.how_far(floor) for f in faults), *(s.to_dict() for s in steps)],
+        "rounds": [r.to_dict() | {"worth": gains_of(r)} for r in rounds],
+        "faults": plain([f.to_dict() for f in faults]),
+    }
+
+
+def seek(
+    case: Case,
+    tune: Sequence[Interval] = (),
+    hold_out: Sequence[Interval] = (),
+    *,
+    dx: float | None = None,
+    horizon: str = "6h",
+    known: Sequence[str] = (),
+    ruled_out: Sequence[str] = (),
+    progress: Progress | None = None,
+) -> Sought:
+    """Seek what a case's model leaves out, and judge it; `diagnose` adds what follows from the answer.
+
+    Parameters
+    ----------
+    case : Case
+        Building and telemetry.
+    tune, hold_out, dx, horizon, known, ruled_out, progress
+        As in `diagnose`.
+
+    Raises
+    ------
+    CaseError, EffectError, CalibrationError
+        As `diagnose`.
+    """
+    began = time.process_time()
+    check_calibratable(case)
+    faults = mend(case, tune, hold_out, {"dx": dx, "horizon": horizon}, progress)
+    case = faults[-1].mended if faults else case
+    models = ModelComparison(case, ModelSettings(dx=dx), tune, hold_out, horizon)
+    untestable = models.untestable()
+    untestable |= reasons_of(known, ruled_out, untestable)
+    effects: dict[str, tuple[str, ...]] = {name: () for name in known}
+    baseline = models.fit(effects, [{}])
+    first = errors = held_out(models, baseline)
+    turns = elsewhere(baseline, first) and models.alternate(baseline.built.inputs)
+    if turns:
+        baseline = models.fit(effects, [{}], baseline.built)
+        errors = held_out(models, baseline)
+    testable = [e for e in CATALOGUE if e not in untestable]
+    rounds = search(models, baseline, errors, testable, progress)
+    models, rounds = challenge(models, rounds, testable, progress)
+    about_drawing = judge(rounds, untestable).name
+    structures, free, left_over = None, None, None
+    if about_drawing != "no_gap":
+        # a drawing that is known to lack what nothing explains has no advance
+        advance = 0.0 if about_drawing == "unexplained" else ADVANCE
+        structures = Structures(*other_structures(models, rounds[-1].after, progress, advance))
+        if structures.kept is not None and drawing_fails(structures.rungs, structures.kept):  # names make up for it
+            free = search_free(models, structures.kept, known, ruled_out, progress)
+            models, rounds, untestable, left_over = free.models, free.rounds, free.untestable, free.left_over
+            structures = structures._replace(kept=free.kept)
+    steps, floor = how_far(models, rounds)
+    verdict = doubted(judge(rounds, untestable, left_over), {s.effects[-1] for s in steps if s.void})
+    if free is not None and structures is not None:
+        verdict = with_recurring(verdict, free, structures.rungs)
+    return Sought(
+        case, models, rounds, with_faults(verdict, faults), steps, floor, structures, free, faults,
+        first.mae if turns else None, time.process_time() - began,
+    )  # fmt: skip
