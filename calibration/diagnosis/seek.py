@@ -73,7 +73,7 @@ class Sought:
     faults : tuple of Fault
         Of the telemetry, which were mended before anything else.
     last_third : float or None
-        As in `Diagnosis`.
+        As in `Diagnosis` [K].
     seconds : float
         CPU time [s].
     """
@@ -152,8 +152,10 @@ def seek(
     ----------
     case : Case
         Building and telemetry.
-    tune, hold_out, dx, horizon, known, ruled_out, progress
+    tune, hold_out, horizon, known, ruled_out, progress
         As in `diagnose`.
+    dx : float, optional
+        Distance between control volumes of a plan [m]; the plan's cell size by default.
 
     Raises
     ------
