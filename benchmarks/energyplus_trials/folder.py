@@ -10,7 +10,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pandas as pd
 import yaml
 
@@ -89,27 +88,15 @@ def _check_areas(folder: Path, spec: TrialSpec) -> None:
             raise TrialGeometryError(f"{spec.name}: {zone} has {area} m2 in the case, {expected} m2 in EnergyPlus")
 
 
-def write_label(sealed: Path, spec: TrialSpec, run: Mapping[str, Any]) -> Path:
-    """Seal what the trial holds, and return the file.
+def label(spec: TrialSpec, run: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what the trial holds.
 
     Parameters
     ----------
-    sealed : Path
-        Folder of the labels, which must not be within reach of the diagnosis.
     spec : TrialSpec
         All of it.
     run : dict
         What was measured while it was made.
     """
-    sealed.mkdir(parents=True, exist_ok=True)
     twins = [twin.name for twin in twins_of(spec)]
-    label = json.loads(spec.to_json()) | {"world": "office", "twins": twins, "run": run}
-    path = sealed / f"{spec.name}.json"
-    part = path.with_suffix(".part")
-    part.write_text(json.dumps(label, indent=1, default=_plain) + "\n", encoding="utf-8")
-    os.replace(part, path)
-    return path
-
-
-def _plain(value: Any) -> Any:
-    return value.item() if isinstance(value, np.generic) else str(value)
+    return json.loads(spec.to_json()) | {"world": "office", "twins": twins, "run": run}

@@ -6,6 +6,7 @@ import time
 from pathlib import Path
 
 import pandas as pd
+from _sealed import places, seal
 
 from energyplus_trials import climate, folder, model, operation, plant, readings
 from energyplus_trials.changes import apply_changes
@@ -34,10 +35,7 @@ def make_trial(spec: TrialSpec, case_folder: Path, sealed_folder: Path) -> bool:
     TrialError
         The plant failed, or what came out is not what was asked for.
     """
-    cases, sealed = case_folder.resolve(), sealed_folder.resolve()
-    if sealed == cases or cases in sealed.parents:
-        raise ValueError(f"expected labels outside of the cases, found {sealed_folder} within {case_folder}")
-    case, label = cases / spec.name, sealed / f"{spec.name}.json"
+    case, label = places(spec.name, case_folder, sealed_folder)
     if case.exists() and label.exists():
         return False
     began = time.perf_counter()
@@ -54,7 +52,7 @@ def make_trial(spec: TrialSpec, case_folder: Path, sealed_folder: Path) -> bool:
         "heat_deviation": max(deviations.values()),
         "warnings": results.attrs["warnings"],
     }
-    folder.write_label(sealed, spec, run)
+    seal(label, folder.label(spec, run))
     if not case.exists():
         folder.write_case(case, spec, reported.telemetry())
     return True

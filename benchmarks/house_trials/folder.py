@@ -87,13 +87,11 @@ def _rounded(value: Any) -> Any:
     return float(f"{value:.5g}") if isinstance(value, float) else value
 
 
-def write_label(sealed: Path, spec: HouseSpec, twins: list[str], run: Mapping[str, Any]) -> Path:
-    """Seal what the trial holds, and return the file.
+def label(spec: HouseSpec, twins: list[str], run: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what the trial holds.
 
     Parameters
     ----------
-    sealed : Path
-        Folder of the labels, which must not be within reach of the diagnosis.
     spec : HouseSpec
         All of it.
     twins : list of str
@@ -101,18 +99,13 @@ def write_label(sealed: Path, spec: HouseSpec, twins: list[str], run: Mapping[st
     run : dict
         What was measured while it was made.
     """
-    sealed.mkdir(parents=True, exist_ok=True)
     house = spec.house
     told = f"{house.floors} floors, {len(house.rooms)} rooms, {spec.heating.emitter}, {spec.sensors.quality}"
-    label = json.loads(spec.to_json()) | {"world": "house", "building": told, "twins": twins, "run": run}
+    found: dict[str, Any] = json.loads(spec.to_json())
     if spec.heating.meter == "house":  # the case has no rooms
-        for effect in label["effects"]:
+        for effect in found["effects"]:
             effect["zones"] = [WHOLE] if effect["zones"] else []
             for key, value in effect["parameters"].items():
                 if isinstance(value, dict):
                     effect["parameters"][key] = {WHOLE: float(np.mean(list(value.values())))}
-    path = sealed / f"{spec.name}.json"
-    part = path.with_suffix(".part")
-    part.write_text(json.dumps(label, indent=1) + "\n", encoding="utf-8")
-    os.replace(part, path)
-    return path
+    return found | {"world": "house", "building": told, "twins": twins, "run": run}

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from _sealed import places, seal
 from energyplus_trials import climate
 from energyplus_trials.trial import VERSION
 from scipy.signal import lfilter
@@ -38,10 +39,7 @@ def make_trial(spec: HouseSpec, case_folder: Path, sealed_folder: Path) -> bool:
     TrialError
         The run failed, or what came out is not what was asked for.
     """
-    cases, sealed = case_folder.resolve(), sealed_folder.resolve()
-    if sealed == cases or cases in sealed.parents:
-        raise ValueError(f"expected labels outside of the cases, found {sealed_folder} within {case_folder}")
-    case, label = cases / spec.name, sealed / f"{spec.name}.json"
+    case, label = places(spec.name, case_folder, sealed_folder)
     if case.exists() and label.exists():
         return False
     began = time.perf_counter()
@@ -52,7 +50,7 @@ def make_trial(spec: HouseSpec, case_folder: Path, sealed_folder: Path) -> bool:
     apply_faults(reported)
     run = {"energyplus": VERSION, "seconds": round(time.perf_counter() - began, 2), "heat_deviation": deviation,
            "warnings": results.warnings}  # fmt: skip
-    folder.write_label(sealed, spec, twin_names(spec), run)
+    seal(label, folder.label(spec, twin_names(spec), run))
     if not case.exists():
         folder.write_case(case, spec, reported.telemetry())
     return True

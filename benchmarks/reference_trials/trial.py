@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
-import os
 import time
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
+from _sealed import places, seal
 
 from mpc.adapters.energyplus.input import entity, weather_path
 from mpc.scenario.weather_files import read_epw
@@ -51,9 +50,7 @@ def make_trial(spec: Spec, cases: Path, sealed: Path) -> bool:
     TrialError
         EnergyPlus failed, or what came out is not what was asked for.
     """
-    if sealed.resolve() == cases.resolve() or cases.resolve() in sealed.resolve().parents:
-        raise ValueError(f"expected labels outside of the cases, found {sealed} within {cases}")
-    case, label = cases / spec.name, sealed / f"{spec.name}.json"
+    case, label = places(spec.name, cases, sealed)
     if case.exists() and label.exists():
         return False
     began = time.perf_counter()
@@ -71,7 +68,7 @@ def make_trial(spec: Spec, cases: Path, sealed: Path) -> bool:
     drawn = Building(spec.name, place, 0.0, table, devices, passes, geometry_quality="surveyed")
     stamped = frame.tz_localize(place.timezone).rename_axis("timestamp")
     told = {"seconds": round(time.perf_counter() - began, 1), **account}
-    _seal(label, spec.label(held, told))
+    seal(label, spec.label(held, told))
     if not case.exists():
         save_case(Case(drawn, Telemetry.from_frame(stamped)), case)
     return True
@@ -159,10 +156,3 @@ def telemetry(spec: Spec, readings: effects.Readings, run: plant.Run) -> pd.Data
         for point, values in (("heating", run.heating), ("cooling", run.cooling)):
             columns[f"{device}/zone_air_{point}_temperature_setpoint"] = values[zone].to_numpy() + FREEZING
     return pd.DataFrame(columns, readings.station.index)
-
-
-def _seal(path: Path, label: dict[str, Any]) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_suffix(".part")
-    part.write_text(json.dumps(label, indent=1) + "\n", encoding="utf-8")
-    os.replace(part, path)

@@ -30,10 +30,11 @@ def script() -> Callable[[str], ModuleType]:
 
 
 @pytest.fixture(scope="session")
-def package() -> Callable[[str], ModuleType]:
+def package(script: Callable[[str], ModuleType]) -> Callable[[str], ModuleType]:
     """Load a module of a package that lies beside the scripts, such as `energyplus_trials.plan`."""
 
     def load(name: str) -> ModuleType:
+        script("_sealed")  # the makers seal their labels by it
         top = name.partition(".")[0]
         if top not in sys.modules:
             places = [str(SCRIPTS / top)]

@@ -61,17 +61,18 @@ def test_labels_are_not_put_where_the_diagnosis_looks(trials, small, tmp_path):
             trials("trial").make_trial(small, tmp_path / "cases", sealed)
 
 
-def test_a_trial_that_is_there_is_left_alone(trials, small, tmp_path):
-    (tmp_path / "cases" / small.name).mkdir(parents=True)
-    trials("folder").write_label(tmp_path / "sealed", small, {})
+def test_a_trial_that_is_there_is_left_alone(trials, small, script, tmp_path):
+    case, label = script("_sealed").places(small.name, tmp_path / "cases", tmp_path / "sealed")
+    case.mkdir(parents=True)
+    script("_sealed").seal(label, {})
     assert not trials("trial").make_trial(small, tmp_path / "cases", tmp_path / "sealed")
 
 
-def test_the_label_holds_the_whole_truth(trials, small, tmp_path):
+def test_the_label_holds_the_whole_truth(trials, small, script, tmp_path):
     spec = trials("draw_effects").with_effect(small, "sensor_bias", np.random.default_rng(0), 1.0)
-    path = trials("folder").write_label(tmp_path, spec, {"seconds": 1.0})
-    label = json.loads(path.read_text())
-    assert path.name == f"{spec.name}.json" and label["name"] == spec.name
+    script("_sealed").seal(tmp_path / "label.json", trials("folder").label(spec, {"seconds": 1.0}))
+    label = json.loads((tmp_path / "label.json").read_text())
+    assert label["name"] == spec.name
     assert label["effects"][0]["name"] == "sensor_bias"
     assert label["effects"][0]["parameters"]["bias_K"] == dict(spec.effects[0].parameters["bias_K"])
     assert label["world"] == "office" and label["twins"] == [small.twin().name]
@@ -87,7 +88,7 @@ def test_only_trials_of_which_two_effects_show_are_asked_for(trials, script, com
     assert pairs_less_one == [twin for spec in specs for twin in trials("drawing").without(spec)]
     (tmp_path / "gaps").mkdir()
     for spec, least in zip(specs, (0.06, 0.04, None), strict=True):
-        trials("folder").write_label(tmp_path / "sealed", spec, {})
+        script("_sealed").seal(tmp_path / "sealed" / f"{spec.name}.json", trials("folder").label(spec, {}))
         twins = trials("drawing").without(spec)
         gaps = {spec.name: 0.5, **{t.name: 0.5 - 0.06 for t in twins[:1]}}
         gaps |= {t.name: 0.5 - least for t in twins[1:] if least is not None}

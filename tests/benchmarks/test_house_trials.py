@@ -311,8 +311,7 @@ def test_a_case_loads_and_tells_nothing(trials, null, tmp_path, meter):
     assert yaml.safe_load(text)["geometry_quality"] == "surveyed"
     effects = trials("draw_effects")
     assert not [name for name in effects.CATALOGUE | effects.OUTSIDE if name in text]
-    path = trials("folder").write_label(tmp_path / "sealed", spec, trials("trial").twin_names(spec), {})
-    label = json.loads(path.read_text())
+    label = trials("folder").label(spec, trials("trial").twin_names(spec), {})
     assert label["world"] == "house" and label["twins"] == [null.twin().name]
     assert set(label["effects"][0]["zones"]) <= set(case.building.zone_names)
 
