@@ -197,9 +197,9 @@ def group_of(r: Round, effect: str) -> tuple[str, ...]:
         if g.effect == effect:
             continue
         near = abs(gains[g.effect] - gains[effect]) < levels.APART
-        rival = gains[g.effect] > level and (
+        rival = gains[g.effect] > max(level, levels.RIVAL * gains[effect]) and (
             (own is not None and abs(r.screening.cosine(own, g)) > levels.ALIKE)
-            or (g.effect in CATALOGUE[effect].confounders and gains[g.effect] > levels.RIVAL * gains[effect])
+            or g.effect in CATALOGUE[effect].confounders
         )
         if near or rival:
             alike.append(g.effect)
