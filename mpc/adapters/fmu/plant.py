@@ -106,7 +106,7 @@ class FmuPlant(SignalPlant):
     time : FmuTime
         When it runs, a control step at least.
     parameters : mapping of str to float, optional
-        Values of parameters and inputs before it begins [their declared units]; 0 and 1 of Booleans.
+        Values of parameters, inputs and start values before it begins [their declared units]; 0 and 1 of Booleans.
     drivers : mapping of str to ndarray, optional
         Values of inputs that are no actuators, one a communication step from the begin of the warm-up on [their
         declared units].
@@ -263,7 +263,8 @@ class FmuPlant(SignalPlant):
         """Find the variables of all signals."""
         unit, signals = self.unit, self.signals
         for name in self._given:
-            unit.variable(name, ("parameter", "input"), "parameter")
+            starts = getattr(unit.variables.get(name), "initial", None) in ("exact", "approx")
+            unit.variable(name, ("parameter", "input", *(("local", "output") if starts else ())), "parameter")
         needed = (self._warm + self._actions * self._parts,)
         for name, values in self._drivers.items():
             unit.variable(name, ("input",), "driver")
