@@ -1,11 +1,11 @@
 """What a controller may set, and the check of what it sets."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, get_args
 
-from mpc.errors import PlantActionError
+from mpc.errors import ControlError, PlantActionError
 from thermal.components.registry import setpoints
 from thermal.errors import describe
 from thermal.system.system import HvacSystem
@@ -127,6 +127,36 @@ def actuators_of(
         for a, key, usual in known
     ]
     return tuple(sorted(found, key=lambda actuator: not actuator.required))
+
+
+def need_actuator(who: str, wanted: Iterable[str], actuators: Iterable[Actuator], *, every: bool = False) -> None:
+    """Refuse a controller whose actuators a plant does not have: it would run and set nothing.
+
+    Parameters
+    ----------
+    who : str
+        Which controller, for the message.
+    wanted : iterable of str
+        What it sets, by ``ENTITY/POINT`` or by point for any entity.
+    actuators : iterable of Actuator
+        Of the plant.
+    every : bool
+        Whether it needs all of them, rather than one at least.
+
+    Raises
+    ------
+    ControlError
+        With the names of what is missed, and of what the plant has.
+    """
+    there = [actuator.name for actuator in actuators]
+    known = {*there, *(name.rpartition("/")[2] for name in there)}
+    named = [*wanted]
+    missed = [name for name in named if name not in known]
+    if missed and (every or len(missed) == len(named)):
+        listed = f"{', '.join(there[:8]) or 'none'}{' ...' if len(there) > 8 else ''}"
+        expected = f"{(' and ' if every else ' or ').join(missed)} among the plant's actuators"
+        advice = "map them to the plant's inputs, or take a controller that sets what there is"
+        raise ControlError(who, expected, listed, advice)
 
 
 def checked_actions(actions: Mapping[str, float], actuators: Mapping[str, Actuator]) -> dict[str, float]:
