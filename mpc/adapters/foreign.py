@@ -49,6 +49,8 @@ class ForeignSignals:
     releases : mapping of str to str
         Input that hands an actuator over while it is 1, and back to the building's own control with 0. BOPTEST's
         convention holds by default: ``X_activate`` of an input ``X_u``.
+    units : mapping of str to str
+        Units of signals whose declared one is missing or wrong.
 
     Raises
     ------
@@ -66,6 +68,7 @@ class ForeignSignals:
     kinds: Mapping[str, ActuatorKind] = field(default_factory=dict, kw_only=True)
     minimums: Mapping[str, float] = field(default_factory=dict, kw_only=True)
     releases: Mapping[str, str] = field(default_factory=dict, kw_only=True)
+    units: Mapping[str, str] = field(default_factory=dict, kw_only=True)
     _kind, _error = "a variable", PlantError
 
     def __post_init__(self) -> None:
@@ -115,6 +118,18 @@ class ForeignSignals:
                     where, f"a switch {switch!r}, without which it reaches nothing", f"the switches {listed}", advice
                 )
         return found
+
+    def unit_of(self, signal: str, declared: str | None) -> str | None:
+        """Tell the unit of a signal.
+
+        Parameters
+        ----------
+        signal : str
+            Its name.
+        declared : str or None
+            What the other program says.
+        """
+        return self.units.get(signal, declared)
 
     @property
     def powers(self) -> Mapping[str, tuple[str, ...]]:
@@ -188,7 +203,11 @@ class SignalPlant(ForeignPlant):
     signals: ForeignSignals
 
     def _map(
-        self, timezone: str, outputs: Callable[[str], Declared], inputs: Callable[[str], Declared], known: Collection[str]
+        self,
+        timezone: str,
+        outputs: Callable[[str], Declared],
+        inputs: Callable[[str], Declared],
+        known: Collection[str],
     ) -> None:
         """Find units and ranges of all signals, and the switches of the actuators among all known inputs."""
         signals = self.signals
@@ -196,13 +215,14 @@ class SignalPlant(ForeignPlant):
         self.zone_names = tuple(signals.zones)
         self._layout = PointLayout(tuple(signals.measurements), timezone)
         self._read = [
-            (name, conversion(column.rpartition("/")[2], name, outputs(name).unit))
+            (name, conversion(column.rpartition("/")[2], name, signals.unit_of(name, outputs(name).unit)))
             for column, name in signals.measurements.items()
         ]
         self._by_name: dict[str, Actuator] = {}
         self._lines: dict[str, Conversion] = {}
         for name, signal in signals.actuators.items():
             point, declared = name.rpartition("/")[2], inputs(signal)
+            declared = declared._replace(unit=signals.unit_of(signal, declared.unit))
             line = self._lines[name] = conversion(point, signal, declared.unit)
             unit = SIGNAL_UNITS[POINT_TYPES[point].quantity] if point in POINT_TYPES else declared.unit or "1"
             low, high = (None if value is None else line.into(value) for value in (declared.lowest, declared.highest))
@@ -224,7 +244,7 @@ class SignalPlant(ForeignPlant):
         return sent | {switch: float(signal in sent) for signal, switch in self._switches.items()}
 
     def _mean(self, rows: FloatArray, seconds: int) -> Measurements:
-        """Means over a control step of readings at its begin and at the ends of its parts, shape (n_part + 1, n_column).
+        """Average readings at the begin of a control step and at the ends of its parts, shape (n_part + 1, n_column).
 
         States such as temperatures lie on straight lines between readings. All else may jump when an input does, at
         the begin of the step: it is what it is at the end of each part.
@@ -237,7 +257,7 @@ class SignalPlant(ForeignPlant):
         return Measurements(self._layout, seconds, self._numbers(values))
 
     def _numbers(self, values: Mapping[str, Any]) -> FloatArray:
-        """Readings in the order of the columns, shape (n_column,) [library's units]; what is no number is NaN."""
+        """Give readings in the order of the columns, shape (n_column,) [library's units]; what is no number is NaN."""
         numbers = np.full(len(self._read), np.nan)
         for k, (name, line) in enumerate(self._read):
             value = values.get(name)

@@ -271,10 +271,11 @@ class FmuPlant(SignalPlant):
             if values.shape != needed or not np.isfinite(values).all():
                 raise PlantError(f"driver {name}", f"{needed[0]} finite values", f"shape {values.shape}")
         zones = [unit.variable(name, _READABLE, "zone", ("real",)) for name in signals.zones.values()]
-        self._zones = [(v.name, conversion(ZONE_TEMPERATURE, v.name, v.unit)) for v in zones]
+        self._zones = [(v.name, conversion(ZONE_TEMPERATURE, v.name, signals.unit_of(v.name, v.unit))) for v in zones]
         for name in (n for names in signals.powers.values() for n in names):
             variable = unit.variable(name, _READABLE, "power", ("real",))
-            PlantError.unless(variable.unit in (None, "", "W"), f"power {name}", "watts", repr(variable.unit))
+            unit_of = signals.unit_of(name, variable.unit)
+            PlantError.unless(unit_of in (None, "", "W"), f"power {name}", "watts", repr(unit_of))
 
         def output(name: str) -> Declared:
             return Declared(unit.variable(name, _READABLE, "measurement").unit)

@@ -86,7 +86,7 @@ def house_description(version: str, kinds: tuple[str, ...], dropped: tuple[str, 
         outputs = "".join(f'<Output valueReference="{k}"/>' for k in (6, 7, 8, 9, 10))
         outputs += "".join(f'<ContinuousStateDerivative valueReference="{k}"/>' for k in (2, 3))
         outputs += "".join(f'<EventIndicator valueReference="{k}"/>' for k in (0, 1))
-        return (f'<fmiModelDescription fmiVersion="3.0" modelName="house" instantiationToken="house">'
+        return ('<fmiModelDescription fmiVersion="3.0" modelName="house" instantiationToken="house">'
                 + "".join(f'<{kind} modelIdentifier="house"/>' for kind in kinds)
                 + f"<ModelVariables>{''.join(rows)}</ModelVariables><ModelStructure>{outputs}</ModelStructure>"
                 + "</fmiModelDescription>")  # fmt: skip
