@@ -105,6 +105,8 @@ class ForeignSignals:
         """
         switches, found = [name for name in inputs if name.endswith(_SWITCH)], dict[str, str]()
         for name, signal in self.actuators.items():
+            if signal not in inputs:
+                continue  # refused by name where it is looked up, or a parameter
             where, switch = f"actuator {name}: {signal!r}", self.releases.get(name, activation(signal))
             if signal.endswith(_SWITCH) and signal.replace(_SWITCH, "_u") in inputs:
                 advice = "name the input that ends in _u: it is activated while it is acted upon"

@@ -8,10 +8,10 @@ import yaml
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from thermal.errors import Described, describe, nearest
+from thermal.errors import Described, ThermalError, describe, nearest
 
 
-class _TwiceError(Exception):
+class _TwiceError(ThermalError):
     """A key that stands twice."""
 
 

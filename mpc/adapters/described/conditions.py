@@ -43,7 +43,7 @@ class SeriesSource:
 
     tables: Sequence[NamedSeries]
     ahead: Callable[[Sequence[str], StepGrid], NamedSeries] | None = None
-    _run: dict[str, NamedSeries] = field(default_factory=dict)
+    _run: dict[str, NamedSeries] = field(default_factory=dict, init=False)
 
     def prepare(self, names: Sequence[str], grid: StepGrid) -> None:
         """Run ahead once for all names that no table has.

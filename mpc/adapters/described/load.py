@@ -1,5 +1,6 @@
 """A plant of its description."""
 
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -11,7 +12,7 @@ from mpc.adapters.boptest.mapping import BoptestSignals
 from mpc.adapters.boptest.plant import BoptestPlant, BoptestSettings, BoptestTime
 from mpc.adapters.boptest.scenario import DAY, PRICE_POINTS, YearClock
 from mpc.adapters.described.conditions import SeriesSource, described_forecaster
-from mpc.adapters.described.schema import PlantFile, ServerProgram, UnitProgram, Value
+from mpc.adapters.described.schema import Period, PlantFile, ServerProgram, UnitProgram, Value
 from mpc.adapters.described.series import NamedSeries, read_table, run_ahead, unit_period, unit_tables
 from mpc.adapters.fmu.plant import FmuPlant, FmuSignals, FmuTime
 from mpc.adapters.fmu.unit import Unit
@@ -40,24 +41,6 @@ def ready_plants() -> tuple[str, ...]:
     True
     """
     return tuple(sorted(path.stem for path in READY.glob("*.yaml")))
-
-
-def read_plant_file(path: str | Path, changes: Mapping[str, Any] | None = None) -> PlantFile:
-    """Read a description.
-
-    Parameters
-    ----------
-    path : str or Path
-        A ``plant.yaml``, or a name of `ready_plants`.
-    changes : mapping of str to object, optional
-        Keys of the file in the place of its own.
-
-    Raises
-    ------
-    PlantError
-        When the file is missing, or a key or value does not fit.
-    """
-    return _read(_place(path), changes)
 
 
 def load_plant(
@@ -136,34 +119,38 @@ def _mappings(file: PlantFile) -> dict[str, Any]:
     }
 
 
-def _span(file: PlantFile, clock: YearClock) -> _Span:
-    """When a described plant runs, where its description gives the start."""
-    period = file.period
-    if isinstance(period, str):
-        raise PlantError("period", "its start and days", repr(period))
+def _span(period: Period, timezone: str) -> tuple[YearClock, _Span]:
+    """Tell the clock and the run of a period that is given by its start."""
     try:
         stamp = pd.Timestamp(period.start)
-        start = stamp.tz_convert(clock.timezone) if stamp.tzinfo else stamp.tz_localize(clock.timezone)
+        start = stamp.tz_convert(timezone) if stamp.tzinfo else stamp.tz_localize(timezone)
     except (ValueError, TypeError) as error:
         raise PlantError("period.start", "a local time such as 2023-01-09 00:00", repr(period.start)) from error
-    return _Span(clock.time(start.timestamp()), period.days * DAY, period.warm_up_days * DAY)
+    clock = YearClock(start.year, timezone)
+    return clock, _Span(clock.time(start.timestamp()), period.days * DAY, period.warm_up_days * DAY)
 
 
 def _unit_plant(file: PlantFile, program: UnitProgram, folder: Path) -> FmuPlant:
-    path, named = folder / program.file, file.period if isinstance(file.period, str) else None
+    path, zone = folder / program.file, file.location.timezone
     PlantError.unless(path.is_file(), f"plant.file {program.file}", "a functional mock-up unit", "no such file")
-    year = file.year if named else pd.Timestamp(file.period.start).year  # type: ignore[union-attr]
-    clock = YearClock(year, file.location.timezone)
-    span = _Span(*unit_period(path, named)) if named else _span(file, clock)
-    parts = max(-int(-file.control_step // program.communication_step), 1)
-    signals, start = FmuSignals(**_mappings(file)), clock.stamp(span.start)
-    actions = int(span.duration / file.control_step + 1e-9)
-    source = _source(file, program, path, folder, clock, file.control_step / parts)
-    return FmuPlant(
-        path, signals, file.control_step, FmuTime(start, span.duration, parts, span.start, span.warm_up),
+    if isinstance(file.period, str):
+        clock, span = YearClock(file.year, zone), _Span(*unit_period(path, file.period))
+    else:
+        clock, span = _span(file.period, zone)
+    parts = math.ceil(file.control_step / program.communication_step - 1e-9)
+    start, actions = clock.stamp(span.start), int(span.duration / file.control_step + 1e-9)
+    plant = FmuPlant(
+        path, FmuSignals(**_mappings(file)), file.control_step,
+        FmuTime(start, span.duration, parts, span.start, span.warm_up),
         parameters=program.parameters, interface=program.interface,
-        forecaster=described_forecaster(file, folder, source, start, actions),
     )  # fmt: skip
+    try:
+        source = _source(file, program, path, folder, clock, file.control_step / parts)
+        plant.forecaster = described_forecaster(file, folder, source, start, actions)
+    except BaseException:
+        plant.close()
+        raise
+    return plant
 
 
 def _source(
@@ -192,17 +179,22 @@ def _source(
 
 
 def _server_plant(file: PlantFile, program: ServerProgram) -> BoptestPlant:
+    zone, period, year = file.location.timezone, file.period, file.year
+    when: str | BoptestTime
+    if isinstance(period, str):
+        when = period
+    else:
+        clock, span = _span(period, zone)
+        when, year = BoptestTime(*span), clock.year
     settings = BoptestSettings(
         electricity_price=_price(file), horizon=max(round(file.forecast.hours * 3600.0 / file.control_step), 1),
-        year=file.year, timezone=file.location.timezone, timeout=program.timeout,
+        year=year, timezone=zone, timeout=program.timeout,
     )  # fmt: skip
-    clock = YearClock(file.year, file.location.timezone)
-    period: str | BoptestTime = file.period if isinstance(file.period, str) else BoptestTime(*_span(file, clock))
     brackets = {name: zone.comfort.lower for name, zone in file.zones.items() if zone.comfort}
     indices = {name: _index(edge, f"zones.{name}.comfort.lower") for name, edge in brackets.items()}
     signals = BoptestSignals(**_mappings(file), forecast_zones=indices)
     name = program.testcase or file.name
-    return BoptestPlant(program.url, name, period, file.control_step, settings, signals=signals)
+    return BoptestPlant(program.url, name, when, file.control_step, settings, signals=signals)
 
 
 def _price(file: PlantFile) -> str:

@@ -187,7 +187,7 @@ def run_ahead(
         Of parameters and inputs [their declared units].
     """
     listed, start, count = list(names), clock.time(float(grid.edges[0])), round(grid.n_steps * grid.step / step)
-    unit.start(start, values)
+    unit.start(start, values, step)
     rows = [unit.get(listed)]
     for k in range(count):
         unit.step(start + k * step, step)
@@ -209,7 +209,8 @@ def _series(table: pd.DataFrame, name: str, clock: YearClock) -> NamedSeries:
             seconds = index_seconds(stamps if stamps.tz else stamps.tz_localize(clock.timezone)).astype(float)
     except (TypeError, ValueError) as error:
         raise PlantError(f"series {name}: column {column!r}", "times", " ".join(str(error).split())) from error
-    rising = len(seconds) > 1 and bool((np.diff(seconds) > 0).all())
+    last = np.append(np.diff(seconds) != 0.0, True)  # of equal times: what holds from then on
+    rising = last.sum() > 1 and bool((np.diff(seconds[last]) > 0.0).all())
     PlantError.unless(rising, f"series {name}: column {column!r}", "two or more rising times", f"{len(seconds)} others")
     numbers = table.drop(columns=column).apply(pd.to_numeric, errors="coerce")
-    return NamedSeries(name, seconds, {str(c): numbers[c].to_numpy(dtype=float) for c in numbers})
+    return NamedSeries(name, seconds[last], {str(c): numbers[c].to_numpy(dtype=float)[last] for c in numbers})

@@ -185,7 +185,7 @@ class FmuPlant(SignalPlant):
         self._number, self._rows = -1, []
         released = dict.fromkeys(self._switches.values(), 0.0)
         first = {name: values[0] for name, values in self._drivers.items()}
-        self.unit.start(self._start - self._warm * self._step, released | self._given | first)
+        self.unit.start(self._start - self._warm * self._step, released | self._given | first, self._step)
         for k in range(-self._warm, 0):
             self._communicate(k)
         self._number = 0

@@ -106,7 +106,7 @@ class Unit:
         PlantError.unless(fits, f"FMU {self.name}: {what} {name!r}", expected, got)
         return found
 
-    def start(self, time: float, values: Mapping[str, float]) -> None:
+    def start(self, time: float, values: Mapping[str, float], longest: float = math.inf) -> None:
         """Begin anew, with another instance: not every unit can be reset.
 
         Parameters
@@ -115,6 +115,8 @@ class Unit:
             At which it begins [s].
         values : mapping of str to float
             Of parameters and inputs before it begins [their declared units].
+        longest : float
+            Longest step of our solver [s].
         """
         from mpc.adapters.fmu.stepping import CoSimulation, ModelExchange
 
@@ -127,7 +129,8 @@ class Unit:
         except Exception as error:
             raise PlantError(f"FMU {self.name}: cannot be started: {error}") from error
         self._instance, self._held = made, dict(values)
-        self._stepping = CoSimulation(made, self._fmi3) if own else ModelExchange(made, self._fmi3, self._description)
+        ours = (made, self._fmi3, self._description, longest)
+        self._stepping = CoSimulation(made, self._fmi3) if own else ModelExchange(*ours)
         self._call(self._stepping, "begin", time, lambda: self._write(values))
 
     def set(self, values: Mapping[str, float]) -> None:

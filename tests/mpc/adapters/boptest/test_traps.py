@@ -174,8 +174,7 @@ def test_a_foreign_test_case_behaves_as_a_plant(house: House, connect: Connect) 
     assert seen["zone/zone_air_temperature_sensor"] == pytest.approx(290.0 + 250.0)
     assert seen["station/wind_direction_sensor"] == pytest.approx(180.0)  # radians at the server
     seen = plant.step({"pump/supply_water_temperature_setpoint": 320.0})
-    bodies = dict(zip(house.asked, house.bodies, strict=True))
-    assert bodies["POST", "advance"] == {"oveTSet_u": 320.0, "oveTSet_activate": 1.0}
+    assert {"oveTSet_u": 320.0, "oveTSet_activate": 1.0} in house.bodies
     # the mean over the quarter of an hour, not the reading at its end
     assert seen["zone/zone_air_temperature_sensor"] == pytest.approx(290.0 + 250.0 + 0.125)
     assert seen.stamp.isoformat() == "2024-01-11T10:15:00+01:00"
@@ -202,28 +201,22 @@ def test_a_time_of_ones_own(house: House, connect: Connect) -> None:
 
 
 def test_what_is_left_out_is_released_once(house: House, connect: Connect) -> None:
-    plant = connect()
+    plant, sent = connect(), list[dict[str, Any]]()
     plant.reset()
-    sent: list[dict[str, Any]] = []
     house.trap = lambda method, what, count, body: sent.append(body) if what == "advance" else None
     both = {"pump/supply_water_temperature_setpoint": 320.0, "pump/heating_power": 0.0}
     for actions in (both, {"pump/heating_power": 500.0}, {}, {}):
         plant.step(actions)
-    active = {"oveTSet_u": 320.0, "oveTSet_activate": 1.0}
-    assert sent == [
-        {**active, "oveHea_u": 0.0, "oveHea_activate": 1.0},
-        {"oveHea_u": 500.0, "oveHea_activate": 1.0, "oveTSet_activate": 0.0},
-        {"oveHea_activate": 0.0},
-        {},
-    ]
+    first = {"oveTSet_u": 320.0, "oveTSet_activate": 1.0, "oveHea_u": 0.0, "oveHea_activate": 1.0}
+    second = {"oveHea_u": 500.0, "oveHea_activate": 1.0, "oveTSet_activate": 0.0}
+    assert sent == [first, second, {"oveHea_activate": 0.0}, {}]
 
 
 def test_an_input_without_a_switch_reaches_nothing(house: House, connect: Connect) -> None:
     known = house.answer("GET", "inputs", {})
     del known["oveHea_activate"]
     house.trap = lambda method, what, count, body: {"payload": known} if what == "inputs" else None
-    with pytest.raises(BoptestError, match=r"pump/heating_power: 'oveHea_u': expected a switch 'oveHea_activate'.*"
-                       r"found the switches oveTSet_activate"):  # fmt: skip
+    with pytest.raises(BoptestError, match="expected a switch 'oveHea_activate', .* found the switches oveTSet_activate"):
         connect()
 
 

@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { T_Z, T_F, DT_Z, DT_F, HEA_U, SET_U, T_OUT, P_HEA, Q_FLO, HEA_Y, SET_Y, AMPLITUDE, DEAF, MEAN, REALS };
+enum { T_Z, T_F, DT_Z, DT_F, HEA_U, SET_U, T_OUT, P_HEA, Q_FLO, HEA_Y, SET_Y, AMPLITUDE, DEAF, MEAN, TZ_Y, REALS };
 enum { HEA_ON, SET_ON, BOOLEANS };
 static const double C_Z = 2e6, C_F = 1e7, UA = 150.0, K = 500.0, HOUR = 3600.0, PI = 3.14159265358979323846;
 
@@ -27,6 +27,7 @@ static void schedule(House* h) {
 static void compute(House* h) {
   double* v = h->v;
   v[T_OUT] = v[MEAN] + v[AMPLITUDE] * sin(2.0 * PI * h->time / (24.0 * HOUR));
+  v[TZ_Y] = v[T_Z];
   v[SET_Y] = h->b[SET_ON] ? v[SET_U] : h->scheduled;
   v[HEA_Y] = h->b[HEA_ON] && v[DEAF] == 0.0 ? v[HEA_U] : (double)h->heats;
   v[Q_FLO] = 8000.0 * v[HEA_Y];

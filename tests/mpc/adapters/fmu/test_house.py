@@ -19,9 +19,9 @@ START = pd.Timestamp("2023-01-11", tz="Europe/Brussels")
 SPEED, SETPOINT, ZONE = "pump/speed", "zone/zone_air_heating_temperature_setpoint", "zone/zone_air_temperature_sensor"
 OUTDOOR, POWER = "station/outside_air_temperature_sensor", "pump/electrical_power_sensor"
 SIGNALS = FmuSignals(
-    {ZONE: "TZon", OUTDOOR: "weaSta_reaWeaTDryBul_y", POWER: "reaPHeaPum_y"},
+    {ZONE: "reaTZon_y", OUTDOOR: "weaSta_reaWeaTDryBul_y", POWER: "reaPHeaPum_y"},
     {SPEED: "oveHeaPumY_u", SETPOINT: "oveTSet_u"},
-    {"zone": "TZon"},
+    {"zone": "reaTZon_y"},
     ("reaPHeaPum_y",),
 )
 UA, K, C_Z, C_F = 150.0, 500.0, 2e6, 1e7  # of house.c [W/K, J/K]
@@ -112,19 +112,19 @@ def test_an_overwrite_that_reaches_nothing(make_house: Make) -> None:
     with pytest.raises(PlantError, match=r"pump/speed: 'oveHeaPumY_u': expected a switch 'oveHeaPumY_activate', without "
                        r"which it reaches nothing, found the switches oveTSet_activate; map another"):  # fmt: skip
         FmuPlant(lame, SIGNALS, 900.0, time)
-    switch = FmuSignals({}, {SPEED: "oveHeaPumY_activate"}, {"zone": "TZon"})
+    switch = FmuSignals({}, {SPEED: "oveHeaPumY_activate"}, {"zone": "reaTZon_y"})
     with pytest.raises(PlantError, match="expected an input that carries a value, found the switch of one"):
         FmuPlant(house, switch, 900.0, time)
     with pytest.raises(PlantError, match="expected a real or whole or boolean input or parameter, found Real output"):
-        FmuPlant(house, FmuSignals({}, {SPEED: "oveHeaPumY_y"}, {"zone": "TZon"}), 900.0, time)
-    other = FmuSignals({}, {SPEED: "oveHeaPumY_u"}, {"zone": "TZon"}, releases={SPEED: "oveHeaPum_activate"})
+        FmuPlant(house, FmuSignals({}, {SPEED: "oveHeaPumY_y"}, {"zone": "reaTZon_y"}), 900.0, time)
+    other = FmuSignals({}, {SPEED: "oveHeaPumY_u"}, {"zone": "reaTZon_y"}, releases={SPEED: "oveHeaPum_activate"})
     with pytest.raises(PlantError, match="expected a switch 'oveHeaPum_activate'"):
         FmuPlant(house, other, 900.0, time)
 
 
 def test_booleans_are_on_off_and_kinds_are_kept(make_house: Make) -> None:
     lame = make_house(dropped=("oveHeaPumY_u",))
-    signals = FmuSignals({}, {"pump/on": "oveHeaPumY_activate"}, {"zone": "TZon"})
+    signals = FmuSignals({}, {"pump/on": "oveHeaPumY_activate"}, {"zone": "reaTZon_y"})
     with FmuPlant(lame, signals, 900.0, FmuTime(START, 3600.0)) as plant:
         assert plant.actuators[0].kind == "on_off"
         plant.reset()
@@ -133,7 +133,7 @@ def test_booleans_are_on_off_and_kinds_are_kept(make_house: Make) -> None:
         with pytest.raises(PlantActionError, match=r"pump/on: expected 0 \(off\) or 1 \(on\) 1, found 0.5"):
             plant.step({"pump/on": 0.5})
     least = FmuSignals(
-        {}, {SPEED: "oveHeaPumY_u"}, {"zone": "TZon"}, kinds={SPEED: "modulating"}, minimums={SPEED: 0.3}
+        {}, {SPEED: "oveHeaPumY_u"}, {"zone": "reaTZon_y"}, kinds={SPEED: "modulating"}, minimums={SPEED: 0.3}
     )
     with FmuPlant(make_house(), least, 900.0, FmuTime(START, 3600.0)) as plant:
         plant.reset()

@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-HERE = Path(__file__).parent
+HERE = Path(__file__).parent / "fmu"
 
 # name, value reference, causality, variability, unit, start, range
 _REALS: list[tuple[str, int, str, str, str, float | None, tuple[float, float] | None]] = [
@@ -30,6 +30,7 @@ _REALS: list[tuple[str, int, str, str, str, float | None, tuple[float, float] | 
     ("amplitude", 11, "parameter", "fixed", "K", 0.0, None),
     ("deaf", 12, "parameter", "fixed", "1", 0.0, None),
     ("mean", 13, "parameter", "fixed", "K", 273.15, None),
+    ("reaTZon_y", 14, "output", "continuous", "K", None, None),
 ]
 _BOOLEANS = [("oveHeaPumY_activate", 100), ("oveTSet_activate", 101)]
 
@@ -83,7 +84,7 @@ def house_description(version: str, kinds: tuple[str, ...], dropped: tuple[str, 
         rows.append(f'<Boolean {common} start="false"/>' if three
                     else f'<ScalarVariable {common}><Boolean start="false"/></ScalarVariable>')  # fmt: skip
     if three:
-        outputs = "".join(f'<Output valueReference="{k}"/>' for k in (6, 7, 8, 9, 10))
+        outputs = "".join(f'<Output valueReference="{k}"/>' for k in (6, 7, 8, 9, 10, 14))
         outputs += "".join(f'<ContinuousStateDerivative valueReference="{k}"/>' for k in (2, 3))
         outputs += "".join(f'<EventIndicator valueReference="{k}"/>' for k in (0, 1))
         return ('<fmiModelDescription fmiVersion="3.0" modelName="house" instantiationToken="house">'
@@ -97,9 +98,10 @@ def house_description(version: str, kinds: tuple[str, ...], dropped: tuple[str, 
             + "</fmiModelDescription>")  # fmt: skip
 
 
-def boptest_resources(days: int = 365) -> dict[str, str]:
+@pytest.fixture(scope="session")
+def boptest_resources() -> dict[str, str]:
     """What BOPTEST's units bring: tables by seconds of the year, and what their names mean."""
-    hours = range(days * 24 + 1)
+    hours = range(365 * 24 + 1)
     day = [7 <= k % 24 < 22 for k in hours]
     tables = {
         "weather.csv": ("TDryBul,HGloHor,HDirNor,HDifHor", [f"{273.15 + k % 24},0,0,0" for k in hours]),
