@@ -92,7 +92,7 @@ def schema_error(error: ValidationError, kind: type[Described], name: str, model
 
 
 def _made(kind: type[Described], *parts: str) -> Exception:
-    error = kind(*parts)  # type: ignore[call-arg]
+    error = kind(*parts)
     return error if isinstance(error, Exception) else Exception(*parts)
 
 

@@ -268,7 +268,7 @@ class UnitProgram(Entry):
     file : str
         The ``.fmu``, relative to the description.
     interface : {"co-simulation", "model exchange"}, optional
-        How it is run; co-simulation by default, where the unit has it.
+        How it is run; model exchange by default, where the unit has it.
     parameters : mapping of str to float
         Of the unit, start values and inputs that are held [their declared units].
     communication_step : float

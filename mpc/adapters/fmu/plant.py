@@ -111,7 +111,7 @@ class FmuPlant(SignalPlant):
         Values of inputs that are no actuators, one a communication step from the begin of the warm-up on [their
         declared units].
     interface : {"co-simulation", "model exchange"}, optional
-        How it is run; co-simulation by default, where the unit has it.
+        How it is run; model exchange by default, where the unit has it.
     forecaster : Forecaster, optional
         Forecasts of a scenario whose first step begins with the run and whose steps are its control steps.
 

@@ -26,7 +26,9 @@ class Unit:
     path : Path
         The ``.fmu`` file. It holds a compiled library that is run as part of this process.
     interface : {"co-simulation", "model exchange"}, optional
-        How it is run; co-simulation by default, where the unit has it.
+        How it is run; model exchange by default, where the unit has it: the accuracy is then ours, while a
+        unit's own solver may be one explicit Euler step a communication step, as OpenModelica's is. BOPTEST's own
+        simulator, PyFMI, chooses so, too.
 
     Raises
     ------
@@ -47,7 +49,7 @@ class Unit:
             raise PlantError(f"FMU {path.name}: expected a model description of FMI, found {error}") from error
         d = self._description
         self._fmi3 = str(d.fmiVersion).startswith("3.")
-        offered: dict[Interface, Any] = {"co-simulation": d.coSimulation, "model exchange": d.modelExchange}
+        offered: dict[Interface, Any] = {"model exchange": d.modelExchange, "co-simulation": d.coSimulation}
         there = [kind for kind, part in offered.items() if part is not None]
         found = f"{' and '.join(there) or 'scheduled execution'} of FMI {d.fmiVersion}"
         expected = f"{interface or 'co-simulation or model exchange'} of FMI 2.0 or 3.0"
@@ -59,7 +61,8 @@ class Unit:
             raise PlantError(f"FMU {path.name}", f"a library for {fmpy.platform}", found)
         self.name = path.name
         self.variables: Mapping[str, Any] = {v.name: v for v in d.modelVariables}
-        self._fmpy, self._instance, self._stepping = fmpy, None, None
+        self._fmpy, self._instance = fmpy, None
+        self._stepping: Any = None
         self._held: dict[str, float] = {}
         try:
             self._folder = Path(fmpy.extract(str(path)))

@@ -92,7 +92,7 @@ class ServedUnit:
 @pytest.fixture
 def boptest_url(make_house: Any, boptest_resources: dict[str, str]) -> Iterator[str]:
     """Address of a server with the house."""
-    served, lock = ServedUnit(make_house(resources=boptest_resources)), threading.Lock()
+    served, lock = ServedUnit(make_house(kinds=("CoSimulation",), resources=boptest_resources)), threading.Lock()
 
     class Handler(BaseHTTPRequestHandler):
         def do(self) -> None:

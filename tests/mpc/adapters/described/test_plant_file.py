@@ -142,7 +142,7 @@ def test_a_server_and_the_units_file_are_the_same_plant(
 ) -> None:
     pytest.importorskip("httpx", reason="needs the extra [boptest]")
     runs, seen = [], []
-    for at in (boptest_url, make_house(resources=boptest_resources)):
+    for at in (boptest_url, make_house(kinds=("CoSimulation",), resources=boptest_resources)):
         changes = cut_to_the_house() | {"period": period}
         with load_plant("bestest_hydronic_heat_pump", at=at, changes=changes) as plant:
             runs.append(run_closed_loop(plant, Stepping(), steps=6))
