@@ -229,10 +229,10 @@ def _scenario(file: PlantFile, folder: Path, source: SeriesSource, grid: StepGri
     tariff = Tariff(
         rate(prices.electricity, "prices.electricity"), rate(prices.gas, "prices.gas"), demand, prices.currency
     )
-    emitted = file.emissions
-    carbon = emitted and CarbonIntensity(
-        rate(emitted.electricity, "emissions.electricity"), emitted.kind, rate(emitted.gas, "emissions.gas")
-    )
+    carbon = None
+    if file.emissions is not None:
+        electricity, gas = (rate(getattr(file.emissions, kind), f"emissions.{kind}") for kind in ("electricity", "gas"))
+        carbon = CarbonIntensity(electricity, file.emissions.kind, gas)
     people = {name: rate(zone.people, f"zones.{name}.people") for name, zone in file.zones.items()}
     most = {name: float(number.on(grid).max()) for name, number in people.items()}
     bands = {name: _band(zone.comfort, rate, f"zones.{name}.comfort") for name, zone in file.zones.items()}

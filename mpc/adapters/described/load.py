@@ -1,7 +1,7 @@
 """A plant of its description."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -12,8 +12,10 @@ from mpc.adapters.boptest.mapping import BoptestSignals
 from mpc.adapters.boptest.plant import BoptestPlant, BoptestSettings, BoptestTime
 from mpc.adapters.boptest.scenario import DAY, PRICE_POINTS, YearClock
 from mpc.adapters.described.conditions import SeriesSource, described_forecaster
-from mpc.adapters.described.schema import Period, PlantFile, ServerProgram, UnitProgram, Value
+from mpc.adapters.described.schema import EnergyPlusProgram, Period, PlantFile, ServerProgram, UnitProgram, Value
 from mpc.adapters.described.series import NamedSeries, read_table, run_ahead, unit_period, unit_tables
+from mpc.adapters.energyplus.input import building_path, weather_path
+from mpc.adapters.energyplus.signals import EnergyPlusRun, EnergyPlusSignalPlant, EnergyPlusSignals
 from mpc.adapters.fmu.plant import FmuPlant, FmuSignals, FmuTime
 from mpc.adapters.fmu.unit import Unit
 from mpc.errors import PlantError
@@ -45,7 +47,7 @@ def ready_plants() -> tuple[str, ...]:
 
 def load_plant(
     path: str | Path, *, at: str | Path | None = None, changes: Mapping[str, Any] | None = None
-) -> FmuPlant | BoptestPlant:
+) -> FmuPlant | BoptestPlant | EnergyPlusSignalPlant:
     """Make the plant that a description names.
 
     Parameters
@@ -59,7 +61,7 @@ def load_plant(
 
     Returns
     -------
-    FmuPlant or BoptestPlant
+    FmuPlant, BoptestPlant or EnergyPlusSignalPlant
         To be reset. Leaving a ``with`` block frees it.
 
     Raises
@@ -80,6 +82,8 @@ def load_plant(
     parsed = _read(place, given)
     if isinstance(parsed.plant, ServerProgram):
         return _server_plant(parsed, parsed.plant)
+    if isinstance(parsed.plant, EnergyPlusProgram):
+        return _energyplus(parsed, parsed.plant, place.parent)
     return _unit_plant(parsed, parsed.plant, place.parent)
 
 
@@ -151,6 +155,28 @@ def _unit_plant(file: PlantFile, program: UnitProgram, folder: Path) -> FmuPlant
         plant.close()
         raise
     return plant
+
+
+def _energyplus(file: PlantFile, program: EnergyPlusProgram, folder: Path) -> EnergyPlusSignalPlant:
+    if isinstance(file.period, str):
+        raise PlantError("period", "its start and days", repr(file.period))
+    clock, span = _span(file.period, file.location.timezone)
+    weather = _file(folder, program.weather, weather_path)
+    PlantError.unless("outputs" not in file.series, "series", ".csv files", "'outputs', which are those of a unit")
+    run = EnergyPlusRun(
+        _file(folder, program.model, building_path), weather, clock.stamp(span.start), round(file.period.days),
+        program.steps_per_hour, max(round(file.period.warm_up_days), 1),
+    )  # fmt: skip
+    tables = [read_table(folder / name, name, clock) for name in file.series]
+    known = file.model_copy(update={"weather": str(weather)}) if file.weather is None and file.prices else file
+    actions = int(span.duration / file.control_step + 1e-9)
+    forecaster = described_forecaster(known, folder, SeriesSource(tables), run.start, actions)
+    return EnergyPlusSignalPlant(run, EnergyPlusSignals(**_mappings(file)), file.control_step, forecaster)
+
+
+def _file(folder: Path, name: str, brought: Callable[[str], Path]) -> Path:
+    """Find a file of the description's folder, or one that EnergyPlus brings."""
+    return (folder / name).resolve() if (folder / name).is_file() else brought(name)
 
 
 def _source(

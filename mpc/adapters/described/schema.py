@@ -303,6 +303,27 @@ class ServerProgram(Entry):
     timeout: Positive = 600.0
 
 
+class EnergyPlusProgram(Entry):
+    """A building of EnergyPlus.
+
+    Parameters
+    ----------
+    kind : str
+        ``energyplus``.
+    model : str
+        An ``.idf`` or ``.epJSON`` file relative to the description, or one of EnergyPlus' reference buildings.
+    weather : str
+        An ``.epw`` file relative to the description, or one that EnergyPlus brings.
+    steps_per_hour : int
+        Of zones and weather, a divisor of 60.
+    """
+
+    kind: Literal["energyplus"]
+    model: Text
+    weather: Text
+    steps_per_hour: Annotated[int, Field(ge=1, le=60, strict=True)] = 12
+
+
 class PlantFile(Entry):
     """A ``plant.yaml``.
 
@@ -318,7 +339,7 @@ class PlantFile(Entry):
         Where it stands; its time zone is that of all times.
     year : int
         That seconds of the year, and periods by name, belong to.
-    plant : UnitProgram or ServerProgram
+    plant : UnitProgram, ServerProgram or EnergyPlusProgram
         What stands for the building.
     control_step : float
         Time between two actions [s].
@@ -350,7 +371,7 @@ class PlantFile(Entry):
     about: str = ""
     location: Location
     year: Annotated[int, Field(ge=1900, le=2200, strict=True)] = 2023
-    plant: Annotated[UnitProgram | ServerProgram, Field(discriminator="kind")]
+    plant: Annotated[UnitProgram | ServerProgram | EnergyPlusProgram, Field(discriminator="kind")]
     control_step: Positive
     period: Annotated[
         Annotated[Text, Tag("<name>")] | Annotated[Period, Tag("<period>")],

@@ -13,7 +13,7 @@ from scipy.interpolate import make_interp_spline
 
 from mpc.adapters.boptest.scenario import DAY, PERIOD_DAYS, WARM_UP_DAYS, YearClock
 from mpc.adapters.fmu.unit import Unit
-from mpc.errors import PlantError
+from mpc.errors import PlantError, ScenarioError
 from mpc.scenario.grid import StepGrid, index_seconds, means_of_steps, require_cover
 from thermal._types import FloatArray
 from thermal.errors import nearest
@@ -51,15 +51,17 @@ class NamedSeries:
 
         Raises
         ------
+        ScenarioError
+            When it does not cover the grid.
         PlantError
-            When it does not cover the grid, or a value is missing.
+            When a value is missing.
         """
         values, times, edges = self.values[name], self.seconds, grid.edges.astype(float)
         where = f"series {name} of {self.where}"
         bad = int((~np.isfinite(values)).sum())
         PlantError.unless(not bad, where, "a value at each time", f"{bad} missing of {len(values)}")
         last = times[-1] if lines else 2.0 * times[-1] - times[-2]
-        require_cover(grid, float(times[0]), float(last), where, PlantError)
+        require_cover(grid, float(times[0]), float(last), where, ScenarioError)
         if lines:
             integral = make_interp_spline(times - times[0], values, k=1).antiderivative()
             return np.asarray(np.diff(integral(edges - times[0])) / np.diff(edges))

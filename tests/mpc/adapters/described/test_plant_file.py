@@ -168,7 +168,7 @@ def test_means_of_series_are_exact() -> None:
     exact = [np.trapezoid(values[k * 1800 : (k + 1) * 1800 + 1]) / 1800.0 for k in range(3)]
     np.testing.assert_allclose(series.on("x", grid, lines=True), exact, rtol=1e-12)
     late = StepGrid(pd.Timestamp("2023-01-01 02:15", tz="UTC"), 1800.0, 3)
-    with pytest.raises(PlantError, match="series x of a table from"):
+    with pytest.raises(MpcError, match="series x of a table from"):
         series.on("x", late, lines=True)
 
 
