@@ -114,7 +114,7 @@ def boptest_resources() -> dict[str, str]:
         name: "\n".join([f"time,{header}", *(f"{3600 * k},{row}" for k, row in enumerate(rows))])
         for name, (header, rows) in tables.items()
     }
-    found["days.json"] = json.dumps({"peak_heat_day": 20, "typical_heat_day": 40})
+    found["days.json"] = json.dumps({"peak_heat_day": 8, "typical_heat_day": 40})
     found["config.json"] = json.dumps({"name": "house", "area": 192.0})
     return found
 

@@ -15,7 +15,7 @@ import yaml
 from mpc.adapters.boptest.scenario import YearClock
 from mpc.adapters.described.load import READY, load_plant, ready_plants
 from mpc.adapters.described.schema import PlantFile
-from mpc.adapters.described.series import NamedSeries
+from mpc.adapters.described.series import NamedSeries, unit_period
 from mpc.errors import MpcError, PlantActionError, PlantError
 from mpc.kpi.kpis import measure_kpis
 from mpc.loop.plant import Measurements
@@ -57,7 +57,7 @@ def test_the_example_of_the_guide_closes_a_loop(folder: Path) -> None:
         assert (by_name[SPEED].kind, by_name[SPEED].minimum) == ("modulating", 0.25)
         setpoint = by_name["living/zone_air_heating_temperature_setpoint"]
         assert (setpoint.lowest, setpoint.highest, setpoint.unit) == (289.15, 299.15, "K")
-        run = run_closed_loop(plant, Saving(), steps=60, forecasts=True)
+        run = run_closed_loop(plant, Saving(), steps=36, forecasts=True)
         with pytest.raises(PlantActionError, match=r"0 \(off\) or a number from 0.25 to 1"):
             plant.step({SPEED: 0.2})
         scenario = plant.forecaster.scenario
@@ -72,7 +72,7 @@ def test_the_example_of_the_guide_closes_a_loop(folder: Path) -> None:
         np.testing.assert_allclose(run.measurements["floor/heating_power_sensor"][heated == 1.0], 8000.0)
         kpis = measure_kpis(run.record, scenario)
         energy = run.measurements["heat_pump/electrical_power_sensor"].to_numpy() * 900.0 / 3.6e6
-        assert kpis.cost_tot * 120.0 == pytest.approx(float(energy @ scenario.electricity_price[:60]), rel=1e-9)
+        assert kpis.cost_tot * 120.0 == pytest.approx(float(energy @ scenario.electricity_price[:36]), rel=1e-9)
 
 
 def test_series_of_the_units_own_outputs_are_what_it_measures_later(folder: Path) -> None:
@@ -107,10 +107,11 @@ def cut_to_the_house() -> dict[str, Any]:
 def test_what_a_unit_of_boptest_brings(make_house: Make, boptest_resources: dict[str, str]) -> None:
     """Its tables, its periods: by the ready description."""
     path, changes = make_house(resources=boptest_resources), cut_to_the_house()
+    assert unit_period(path, "typical_heat_day") == (33 * 86_400.0, 14 * 86_400.0, 7 * 86_400.0)
     with load_plant("bestest_hydronic_heat_pump", at=path, changes=changes) as plant:
         seen = plant.reset()
-        assert seen.stamp == YearClock(2023, "Etc/GMT-1").stamp(13 * 86_400.0)  # a week before day 20
-        assert plant._warm * plant._step == 7 * 86_400.0 and plant._actions == 14 * 96
+        assert seen.stamp == YearClock(2023, "Etc/GMT-1").stamp(86_400.0)  # a week before day 8
+        assert plant._warm * plant._step == 86_400.0 and plant._actions == 14 * 96
         table = plant.forecast().table
         hours = np.arange(96) / 4.0 + 0.125
         # straight lines over the hours of the table but for its jump at midnight; what holds is taken as it is
@@ -196,7 +197,7 @@ EDITS: list[tuple[dict[str, Any], str]] = [
     ({"weather": {"outdoor": "spot"}}, "weather.outdoor: expected a point of the weather station, found 'outdoor'"),
     ({"period": {"start": "soon", "days": 1}}, "period.start: expected a local time such as 2023-01-09 00:00"),
     ({"period": "peak_heat_day"}, "period: expected one that house.fmu names in resources/days.json"),
-    ({"period": {"start": "2023-01-12", "days": 14}}, "spot of prices.csv from 2023-01-12"),
+    ({"period": {"start": "2023-01-12", "days": 2}}, "spot of prices.csv from 2023-01-12"),
     ({"series": ["prices.xlsx"]}, "series: expected 'unit', 'outputs' or a .csv file, found 'prices.xlsx'"),
     ({"series": ["unit"]}, "expected tables in its resources, as BOPTEST's units, found none"),
     ({"series": ["none.csv"]}, "series none.csv: expected a .csv file, found no such file"),
