@@ -13,9 +13,10 @@ import pytest
 import yaml
 
 from mpc.adapters.boptest.scenario import YearClock
-from mpc.adapters.described.load import READY, load_plant, ready_plants
+from mpc.adapters.described.load import READY, _mappings, load_plant, ready_plants
 from mpc.adapters.described.schema import PlantFile
 from mpc.adapters.described.series import NamedSeries, unit_period
+from mpc.adapters.fmu.plant import FmuSignals
 from mpc.errors import MpcError, PlantActionError, PlantError
 from mpc.kpi.kpis import measure_kpis
 from mpc.loop.plant import Measurements
@@ -174,10 +175,13 @@ def test_means_of_series_are_exact() -> None:
 
 
 def test_ready_descriptions_fit_the_schema() -> None:
-    assert ready_plants() == ("bestest_hydronic", "bestest_hydronic_heat_pump")
+    assert len(ready_plants()) == 5 and "bestest_hydronic_heat_pump" in ready_plants()
     for name in ready_plants():
         described = PlantFile.model_validate(yaml.safe_load((READY / f"{name}.yaml").read_text(encoding="utf-8")))
-        assert described.name == name and set(described.zones) == {"house"} and described.actuators
+        assert described.name == name
+        FmuSignals(**_mappings(described))  # refuses points that the case format lacks
+        assert all(entry.signal.endswith("_u") for entry in described.actuators.values())
+        assert all(signal.endswith("_y") for signals in described.energy.model_dump().values() for signal in signals)
 
 
 EDITS: list[tuple[dict[str, Any], str]] = [
@@ -219,7 +223,7 @@ def test_descriptions_that_do_not_fit(folder: Path, changes: Mapping[str, Any], 
 
 
 def test_files_that_are_none(tmp_path: Path) -> None:
-    with pytest.raises(PlantError, match=r"house.yaml: expected a description of a plant, or one of bestest_hydronic, best"):
+    with pytest.raises(PlantError, match=r"house.yaml: expected a description of a plant, or one of bestest_air, best"):
         load_plant(tmp_path / "house.yaml")
     (tmp_path / "twice.yaml").write_text("format: 1\nname: a\nname: b\n")
     with pytest.raises(PlantError, match="twice.yaml: line 3: expected a new key"):
