@@ -271,20 +271,22 @@ class FmuPlant(SignalPlant):
             if values.shape != needed or not np.isfinite(values).all():
                 raise PlantError(f"driver {name}", f"{needed[0]} finite values", f"shape {values.shape}")
         zones = [unit.variable(name, _READABLE, "zone", ("real",)) for name in signals.zones.values()]
-        self._zones = [(v.name, conversion(ZONE_TEMPERATURE, v.name, signals.unit_of(v.name, v.unit))) for v in zones]
+        units = [signals.unit_of(v.name, unit.declared(v, "unit")) for v in zones]
+        self._zones = [(v.name, conversion(ZONE_TEMPERATURE, v.name, u)) for v, u in zip(zones, units, strict=True)]
         for name in (n for names in signals.powers.values() for n in names):
             variable = unit.variable(name, _READABLE, "power", ("real",))
-            unit_of = signals.unit_of(name, variable.unit)
+            unit_of = signals.unit_of(name, unit.declared(variable, "unit"))
             PlantError.unless(unit_of in (None, "", "W"), f"power {name}", "watts", repr(unit_of))
 
         def output(name: str) -> Declared:
-            return Declared(unit.variable(name, _READABLE, "measurement").unit)
+            return Declared(unit.declared(unit.variable(name, _READABLE, "measurement"), "unit"))
 
         def input_of(name: str) -> Declared:
             v = unit.variable(name, ("input", "parameter"), "actuator")
-            low, high = (None if text is None else float(text) for text in (v.min, v.max))
+            texts = (unit.declared(v, "min"), unit.declared(v, "max"))
+            low, high = (None if text is None else float(text) for text in texts)
             on_off = v.type == "Boolean"
-            return Declared(v.unit, 0.0 if on_off else low, 1.0 if on_off else high, on_off)
+            return Declared(unit.declared(v, "unit"), 0.0 if on_off else low, 1.0 if on_off else high, on_off)
 
         self._map(str(self._time.start.tz), output, input_of, unit.inputs)
         for switch in self._switches.values():

@@ -109,6 +109,19 @@ class Unit:
         PlantError.unless(fits, f"FMU {self.name}: {what} {name!r}", expected, got)
         return found
 
+    def declared(self, variable: Any, what: str) -> str | None:
+        """Tell an attribute of a variable, its own or that of its declared type.
+
+        Parameters
+        ----------
+        variable : object
+            Of `variable`.
+        what : str
+            ``unit``, ``min`` or ``max``.
+        """
+        found = getattr(variable, what)
+        return found if found is not None else getattr(variable.declaredType, what, None)
+
     def start(self, time: float, values: Mapping[str, float], longest: float = math.inf) -> None:
         """Begin anew, with another instance: not every unit can be reset.
 

@@ -69,8 +69,10 @@ def house_description(version: str, kinds: tuple[str, ...], dropped: tuple[str, 
     for name, reference, causality, variability, unit, start, limits in _REALS:
         if name in dropped:
             continue
-        told = f' unit="{unit}"' + ("" if start is None else f' start="{start}"')
-        told += "" if limits is None else f' min="{limits[0]}" max="{limits[1]}"'
+        told = f' unit="{unit}"' + ("" if limits is None else f' min="{limits[0]}" max="{limits[1]}"')
+        if name == "oveTSet_u" and not three:  # as Modelica's tools write what a type says
+            told = ' declaredType="Temperature"'
+        told += "" if start is None else f' start="{start}"'
         derivative = {"der(TZon)": 0, "der(TFlo)": 1}.get(name)
         if derivative is not None:
             told += f' derivative="{derivative if three else derivative + 1}"'
@@ -93,7 +95,8 @@ def house_description(version: str, kinds: tuple[str, ...], dropped: tuple[str, 
                 + "</fmiModelDescription>")  # fmt: skip
     return ('<fmiModelDescription fmiVersion="2.0" modelName="house" guid="house" numberOfEventIndicators="2">'
             + "".join(f'<{kind} modelIdentifier="house"/>' for kind in kinds)
-            + f"<ModelVariables>{''.join(rows)}</ModelVariables><ModelStructure>"
+            + '<TypeDefinitions><SimpleType name="Temperature"><Real unit="K" min="278.15" max="308.15"/></SimpleType>'
+            + f"</TypeDefinitions><ModelVariables>{''.join(rows)}</ModelVariables><ModelStructure>"
             + '<Derivatives><Unknown index="3"/><Unknown index="4"/></Derivatives></ModelStructure>'
             + "</fmiModelDescription>")  # fmt: skip
 

@@ -89,6 +89,8 @@ def test_the_means_of_all_interfaces_agree(make_house: Make) -> None:
 
 
 def test_what_is_left_out_is_released(plant: FmuPlant) -> None:
+    setpoint = plant.actuators[1]
+    assert (setpoint.lowest, setpoint.highest, setpoint.unit) == (278.15, 308.15, "K")
     plant.reset()
     unit = plant.unit
     switches = ("oveHeaPumY_activate", "oveTSet_activate")
