@@ -75,12 +75,12 @@ class Actuator:
     @property
     def expected(self) -> str:
         """What is accepted, in words."""
-        low, high, unit = f"{self.lowest:g}", f"{self.highest:g}", self.unit
+        low, high, unit = f"{self.lowest:g}", f"{self.highest:g}", "" if self.unit == "1" else f" {self.unit}"
         if self.kind == "on_off":
-            return f"{low} (off) or {high} (on) {unit}"
+            return f"{low} (off) or {high} (on){unit}"
         if self.minimum is not None:
-            return f"{low} (off) or a number from {self.minimum:g} to {high} {unit}"
-        return f"a number from {low} to {high} {unit}"
+            return f"{low} (off) or a number from {self.minimum:g} to {high}{unit}"
+        return f"a number from {low} to {high}{unit}"
 
     def accepts(self, value: float) -> bool:
         """Tell whether a value may be set.
