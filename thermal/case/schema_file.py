@@ -85,6 +85,10 @@ def schema_error(error: ValidationError, kind: type[Described], name: str, model
         inner = [] if len(place) == 1 else _models(fields[str(place[0])].annotation)
         keys = [f.alias or k for one in inner or [model] for k, f in one.model_fields.items()]
         return _made(kind, describe(where, "a key of the format", repr(key), nearest(key, keys)) + more)
+    if first["type"] == "union_tag_invalid":
+        tags, tag = str(first["ctx"]["expected_tags"]), repr(first["ctx"]["tag"])
+        key = str(first["ctx"]["discriminator"]).strip("'")
+        return _made(kind, describe(f"{where}.{key}", f"one of {tags}", tag) + more)
     if first["type"] == "missing":
         return _made(kind, describe(where, "a value", "no such key") + more)
     found = found if len(found) <= 80 else found[:77] + "..."
