@@ -7,6 +7,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from mpc.adapters.described.load import load_plant
     from mpc.control.controller.controller import MpcController
     from mpc.control.controller.site import ControllerSettings
     from mpc.control.problem.horizon import Horizon
@@ -34,18 +35,19 @@ _MODULES = {
     "MpcError": "errors", "Plant": "loop.plant", "PlantSettings": "loop.make", "Scenario": "scenario.scenario",
     "SensorNoise": "loop.noise", "SimulatedPlant": "loop.simulated", "StudySettings": "studies.study",
     "Weather": "scenario.weather", "build_scenario": "scenario.scenario", "compare_controllers": "studies.run",
-    "control_model": "model", "load_plugins": "plugins", "make_controller": "studies.optimal_control",
-    "make_study": "studies.study", "measure_kpis": "kpi.kpis", "pilot_weather": "loop.make",
-    "register_controller": "studies.registry", "run_closed_loop": "loop.run", "run_controller": "studies.run",
-    "save_pilot": "loop.make", "simulated_plant": "loop.make", "weather_of_case": "scenario.weather_files",
+    "control_model": "model", "load_plant": "adapters.described.load", "load_plugins": "plugins",
+    "make_controller": "studies.optimal_control", "make_study": "studies.study", "measure_kpis": "kpi.kpis",
+    "pilot_weather": "loop.make", "register_controller": "studies.registry", "run_closed_loop": "loop.run",
+    "run_controller": "studies.run", "save_pilot": "loop.make", "simulated_plant": "loop.make",
+    "weather_of_case": "scenario.weather_files",
 }  # fmt: skip
 
 __all__ = [
     "Controller", "ControllerSettings", "FixedSetpoints", "Horizon", "Kpis", "MpcController", "MpcError", "Plant",
     "PlantSettings", "Scenario", "SensorNoise", "SimulatedPlant", "StudySettings", "Weather", "build_scenario",
-    "compare_controllers", "control_model", "load_plugins", "make_controller", "make_study", "measure_kpis",
-    "pilot_weather", "register_controller", "run_closed_loop", "run_controller", "save_pilot", "simulated_plant",
-    "weather_of_case",
+    "compare_controllers", "control_model", "load_plant", "load_plugins", "make_controller", "make_study",
+    "measure_kpis", "pilot_weather", "register_controller", "run_closed_loop", "run_controller", "save_pilot",
+    "simulated_plant", "weather_of_case",
 ]  # fmt: skip
 
 

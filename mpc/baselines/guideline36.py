@@ -8,7 +8,14 @@ import pandas as pd
 
 from mpc.control.controller.site import SitePoints, values_of
 from mpc.errors import ControlError
-from mpc.loop.actuators import COOLING_SETPOINT, HEATING_SETPOINT, SUPPLY_AIR, SUPPLY_WATER, Actuator
+from mpc.loop.actuators import (
+    COOLING_SETPOINT,
+    HEATING_SETPOINT,
+    SUPPLY_AIR,
+    SUPPLY_WATER,
+    Actuator,
+    need_actuator,
+)
 from mpc.loop.plant import Measurements
 from mpc.scenario.forecast import Forecast
 from thermal._types import FloatArray, IntArray
@@ -275,6 +282,11 @@ class Guideline36:
     settings : Guideline36Settings, optional
         Those of the guideline by default.
 
+    Raises
+    ------
+    ControlError
+        When there is no air handler for each terminal, or the plant lets none of these setpoints be set.
+
     Notes
     -----
     Fans and pumps count as proven on while their power is above zero, or not measured; off, setpoints return to SP0.
@@ -292,6 +304,8 @@ class Guideline36:
     ) -> None:
         expected = f"an air handler for each of {len(points.terminals)} terminals"
         ControlError.unless(len(serving) == len(points.terminals), "Guideline 36", expected, f"{len(serving)}")
+        water = f"{points.boiler}/{SUPPLY_WATER}"
+        need_actuator("Guideline 36", [*(f"{name}/{SUPPLY_AIR}" for name in points.air_handlers), water], actuators)
         self.points, self.settings = points, settings or Guideline36Settings()
         self._serving, n = np.asarray(serving, dtype=int), len(points.terminals)
         self._range = {a.name: (a.lowest, a.highest) for a in actuators}

@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 from mpc.baselines.guideline36 import Guideline36
 from mpc.control.controller.site import ResetRule, SitePoints, values_of
 from mpc.control.problem.channels import Channel
-from mpc.loop.actuators import SUPPLY_AIR, SUPPLY_WATER, Actuator
+from mpc.loop.actuators import SUPPLY_AIR, SUPPLY_WATER, Actuator, need_actuator
 from mpc.loop.plant import Controller
 from mpc.loop.run import FixedSetpoints
 from mpc.scenario.forecast import Forecast
@@ -41,6 +41,11 @@ def day_schedule(
     FixedSetpoints
         A controller.
 
+    Raises
+    ------
+    ControlError
+        When the plant has neither.
+
     Examples
     --------
     >>> boiler = Actuator("BOILER/supply_water_temperature_setpoint", "K", 310.0, 355.0)
@@ -48,6 +53,7 @@ def day_schedule(
     >>> [schedule.at_hour(hour)[boiler.name] for hour in (3.0, 12.0, 22.0)]
     [333.15, 355.0, 333.15]
     """
+    need_actuator("day schedule", _SUPPLY, actuators)
     used = tuple(a for a in actuators if a.name.rpartition("/")[2] in _SUPPLY)
 
     def of(water_now: float) -> dict[str, float]:
@@ -69,6 +75,11 @@ class OutdoorReset:
     rule : ResetRule, optional
         Lines of the reset.
 
+    Raises
+    ------
+    ControlError
+        When the plant has neither.
+
     Examples
     --------
     >>> air = Actuator("AHU/supply_air_temperature_setpoint", "K", 285.0, 300.0)
@@ -78,6 +89,7 @@ class OutdoorReset:
     """
 
     def __init__(self, actuators: Sequence[Actuator], weather_station: str, rule: ResetRule | None = None) -> None:
+        need_actuator("outdoor reset", _SUPPLY, actuators)
         self.rule, self._outdoor = rule or ResetRule(), f"{weather_station}/{OUTDOOR_TEMPERATURE}"
         named = [(a, a.name.rpartition("/")[2]) for a in actuators]
         self._channels = {a.name: Channel(kind, a.lowest, a.highest) for a, kind in named if kind in _SUPPLY}

@@ -1,10 +1,11 @@
 """What a controller may set, and the check of what it sets."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Literal, get_args
 
-from mpc.errors import PlantActionError
+from mpc.errors import ControlError, PlantActionError
 from thermal.components.registry import setpoints
 from thermal.errors import describe
 from thermal.system.system import HvacSystem
@@ -15,6 +16,9 @@ STATIC_PRESSURE = "supply_air_static_pressure_setpoint"
 DIFFERENTIAL_PRESSURE = "differential_pressure_setpoint"
 HEATING_SETPOINT = "zone_air_heating_temperature_setpoint"
 COOLING_SETPOINT = "zone_air_cooling_temperature_setpoint"
+
+#: Which values of its range an actuator accepts.
+ActuatorKind = Literal["continuous", "on_off", "modulating"]
 
 #: Lowest and highest value of each kind of action [K] or [Pa] where no component declares them, as in foreign plants.
 ACTION_LIMITS: Mapping[str, tuple[float, float]] = {name: a.usual for name, a in setpoints().items() if a.usual}
@@ -34,6 +38,22 @@ class Actuator:
         Range that is accepted [unit]; what lies outside is refused, never clipped.
     required : bool
         Whether every action must have it; what is left out otherwise stays as the building has it.
+    kind : {"continuous", "on_off", "modulating"}
+        Which values of the range are accepted: all of them; its two ends only; or off, the lower end, and all from
+        `minimum` on.
+    minimum : float, optional
+        Smallest value of a modulating actuator that is not off [unit].
+
+    Raises
+    ------
+    PlantActionError
+        When the kind is not known, or a modulating actuator has no minimum within its range.
+
+    Examples
+    --------
+    >>> compressor = Actuator("heat_pump/speed", "1", 0.0, 1.0, kind="modulating", minimum=0.3)
+    >>> [compressor.accepts(value) for value in (0.0, 0.1, 0.3, 1.0)]
+    [True, False, True, True]
     """
 
     name: str
@@ -41,11 +61,39 @@ class Actuator:
     lowest: float
     highest: float
     required: bool = True
+    kind: ActuatorKind = "continuous"
+    minimum: float | None = None
+
+    def __post_init__(self) -> None:
+        kinds = get_args(ActuatorKind)
+        PlantActionError.unless_known(self.kind, kinds, f"actuator {self.name}: kind", f"one of {', '.join(kinds)}")
+        least = self.lowest if self.minimum is None else self.minimum
+        fits = (self.kind == "modulating") == (self.minimum is not None) and self.lowest <= least <= self.highest
+        expected = f"a number within {self.lowest:g} to {self.highest:g} of a modulating actuator, none of others"
+        PlantActionError.unless(fits, f"actuator {self.name}: minimum", expected, repr(self.minimum))
 
     @property
     def expected(self) -> str:
         """What is accepted, in words."""
-        return f"a number from {self.lowest:g} to {self.highest:g} {self.unit}"
+        low, high, unit = f"{self.lowest:g}", f"{self.highest:g}", "" if self.unit == "1" else f" {self.unit}"
+        if self.kind == "on_off":
+            return f"{low} (off) or {high} (on){unit}"
+        if self.minimum is not None:
+            return f"{low} (off) or a number from {self.minimum:g} to {high}{unit}"
+        return f"a number from {low} to {high}{unit}"
+
+    def accepts(self, value: float) -> bool:
+        """Tell whether a value may be set.
+
+        Parameters
+        ----------
+        value : float
+            [unit of the actuator]; NaN never.
+        """
+        if self.kind == "on_off":
+            return value in (self.lowest, self.highest)
+        least = self.lowest if self.minimum is None else self.minimum
+        return least <= value <= self.highest or value == self.lowest
 
 
 def actuators_of(
@@ -81,6 +129,36 @@ def actuators_of(
     return tuple(sorted(found, key=lambda actuator: not actuator.required))
 
 
+def need_actuator(who: str, wanted: Iterable[str], actuators: Iterable[Actuator], *, every: bool = False) -> None:
+    """Refuse a controller whose actuators a plant does not have: it would run and set nothing.
+
+    Parameters
+    ----------
+    who : str
+        Which controller, for the message.
+    wanted : iterable of str
+        What it sets, by ``ENTITY/POINT`` or by point for any entity.
+    actuators : iterable of Actuator
+        Of the plant.
+    every : bool
+        Whether it needs all of them, rather than one at least.
+
+    Raises
+    ------
+    ControlError
+        With the names of what is missed, and of what the plant has.
+    """
+    there = [actuator.name for actuator in actuators]
+    known = {*there, *(name.rpartition("/")[2] for name in there)}
+    named = [*wanted]
+    missed = [name for name in named if name not in known]
+    if missed and (every or len(missed) == len(named)):
+        listed = f"{', '.join(there[:8]) or 'none'}{' ...' if len(there) > 8 else ''}"
+        expected = f"{(' and ' if every else ' or ').join(missed)} among the plant's actuators"
+        advice = "map them to the plant's inputs, or take a controller that sets what there is"
+        raise ControlError(who, expected, listed, advice)
+
+
 def checked_actions(actions: Mapping[str, float], actuators: Mapping[str, Actuator]) -> dict[str, float]:
     """Check an action by name.
 
@@ -99,7 +177,7 @@ def checked_actions(actions: Mapping[str, float], actuators: Mapping[str, Actuat
     Raises
     ------
     PlantActionError
-        When a setpoint is missing, unknown, no finite number or outside its range.
+        When a setpoint is missing, unknown, no finite number, outside its range or between its steps.
     """
     given: dict[str, float] = {}
     for name, value in actions.items():
@@ -109,7 +187,7 @@ def checked_actions(actions: Mapping[str, float], actuators: Mapping[str, Actuat
             number = float(value)
         except (TypeError, ValueError):
             number = math.nan
-        if not actuator.lowest <= number <= actuator.highest:  # NaN is in no range
+        if not actuator.accepts(number):
             raise PlantActionError(describe(f"action {name}", actuator.expected, repr(value)))
         given[name] = number
     for name, actuator in actuators.items():

@@ -19,7 +19,7 @@ from mpc.control.problem.problem import ControlProblem
 from mpc.control.solvers.sequential import SequentialSolver
 from mpc.control.solvers.uncertainty import Margin
 from mpc.errors import ControlError
-from mpc.loop.actuators import SUPPLY_AIR, SUPPLY_WATER, Actuator
+from mpc.loop.actuators import SUPPLY_AIR, SUPPLY_WATER, Actuator, need_actuator
 from mpc.loop.plant import Plant
 from mpc.loop.sensors import PlantDevices
 from mpc.loop.simulated import SimulatedPlant
@@ -158,7 +158,8 @@ def make_controller(
     Raises
     ------
     ControlError
-        When the plant is none of ours and no site is given, or its forecasts are too short.
+        When the plant is none of ours and no site is given, its forecasts are too short, or it lacks an actuator that
+        is to be set.
 
     Examples
     --------
@@ -184,6 +185,8 @@ def make_controller(
         observer = Observer(KalmanFilter(held_space(modes, ahead.control_step), unmeasured), modes)
     pressures = any(c.unit == "Pa" for c in decided)
     hvac = SmoothHvac(site.system, SMOOTHING, pressures)
+    set_by_it = points.setpoints(decided, np.zeros(len(decided)), hvac)
+    need_actuator("controller", set_by_it, plant.actuators, every=True)
     predictor = Predictor(modes, hvac, ahead, decided, unmeasured.time_constant)
     solver = SequentialSolver(ControlProblem(predictor, 2.0 * MARGIN), iterations=25)
     signals = None
@@ -233,8 +236,9 @@ def _channels(actuators: Sequence[Actuator], points: SitePoints) -> tuple[Channe
         named = [a for a in actuators if a.name in {f"{entity}/{quantity}" for entity in entities}]
         if named:
             found.append(Channel(quantity, max(a.lowest for a in named), min(a.highest for a in named)))
-    expected = f"an actuator {SUPPLY_AIR} or {SUPPLY_WATER} of {[*points.air_handlers, points.boiler]}"
-    ControlError.unless(found, "plant", expected, [a.name for a in actuators][:6])
+    if not found:
+        wanted = [*(f"{name}/{SUPPLY_AIR}" for name in points.air_handlers), f"{points.boiler}/{SUPPLY_WATER}"]
+        need_actuator("controller", wanted, actuators)
     return tuple(found)
 
 

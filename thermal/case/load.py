@@ -1,23 +1,22 @@
 """Loading a case folder: all of it, checked, or a named error."""
 
-from collections.abc import Hashable, Mapping
+from collections.abc import Mapping
 from dataclasses import fields
 from os import PathLike
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 from zoneinfo import ZoneInfo, available_timezones
 
-import yaml
-from pydantic import BaseModel, ValidationError
-from pydantic_core import ErrorDetails
+from pydantic import ValidationError
 
 from thermal.case import building as schema
 from thermal.case.building import Building, BuildingFile, FloorPlan, FloorPlans, ZoneTable
 from thermal.case.case import Case
 from thermal.case.plan import read_plan
+from thermal.case.schema_file import read_mapping, schema_error
 from thermal.case.telemetry import check_units, read_telemetry
 from thermal.case.validation import check_building, check_columns
-from thermal.errors import CaseError, ThermalError, describe, nearest
+from thermal.errors import CaseError, ThermalError, nearest
 
 NAME = "building.yaml"
 FORMAT = 3
@@ -93,20 +92,6 @@ def migrate(content: Mapping[str, Any], file: str) -> dict[str, Any]:
     return {**content, "format": FORMAT}
 
 
-class _Loader(yaml.SafeLoader):
-    """The safe loader, which also refuses a key that stands twice (plain YAML keeps the last one in silence)."""
-
-    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, Any]:
-        """Build a mapping after a look at its keys."""
-        lines: dict[str, int] = {}
-        for key, _ in node.value:
-            line = key.start_mark.line + 1
-            if key.value != "<<" and isinstance(key.value, str) and lines.setdefault(key.value, line) != line:
-                found = f"{key.value!r}, which line {lines[key.value]} holds too"
-                raise CaseError(f"{NAME}: line {line}", "a new key", found, "keep one of the two")
-        return super().construct_mapping(node, deep=deep)
-
-
 def read_building_file(folder: Path, *, with_telemetry: bool = True) -> schema.BuildingFile:
     """Read and check `building.yaml` by itself, without the files it names.
 
@@ -133,7 +118,7 @@ def read_building_file(folder: Path, *, with_telemetry: bool = True) -> schema.B
             content |= {"telemetry": content.get("telemetry") or "telemetry.parquet", "units": {}}
         parsed = schema.BuildingFile.model_validate(content)
     except ValidationError as error:
-        raise _named(error) from error
+        raise schema_error(error, CaseError, NAME, BuildingFile) from error
     _check_geometry_choice(parsed)
     _check_time_zone(parsed.location.timezone)
     return parsed
@@ -143,17 +128,7 @@ def _read_yaml(folder: Path) -> dict[str, Any]:
     if not folder.is_dir():
         found = "a file" if folder.exists() else "nothing"
         raise CaseError("path", "a case folder", found, f"give the folder that holds {NAME}")
-    path = folder / NAME
-    CaseError.unless(path.is_file(), NAME, "the description of the building", "no such file")
-    try:
-        content = yaml.load(path.read_text(encoding="utf-8-sig"), Loader=_Loader)
-    except (OSError, UnicodeDecodeError) as error:
-        raise CaseError(NAME, "YAML in UTF-8", f"{error}") from error
-    except (yaml.YAMLError, ValueError, RecursionError) as error:  # ValueError: a date such as 2023-13-45
-        raise CaseError(NAME, "YAML", " ".join(str(error).split())) from error
-    if not isinstance(content, dict):
-        raise CaseError(NAME, "a mapping of keys", f"{type(content).__name__}")
-    return content
+    return read_mapping(folder / NAME, CaseError, NAME, "the description of the building")
 
 
 def _check_time_zone(name: str) -> None:
@@ -174,46 +149,6 @@ def _check_geometry_choice(parsed: schema.BuildingFile) -> None:
         if getattr(parsed, key) is None:
             raise CaseError(f"{NAME}: {key}", "a value", "no such key", f"needed beside {plans + table}")
         CaseError.unless(getattr(parsed, key) != (), f"{NAME}: {key}", "at least one entry", "none")
-
-
-def _named(error: ValidationError) -> CaseError:
-    """Turn the first of pydantic's findings into an error of the family; say how many more there are."""
-    details = error.errors(include_url=False)
-    first, more = details[0], f" (and {len(details) - 1} more in this file)" if len(details) > 1 else ""
-    path = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in first["loc"]).removeprefix(".")
-    where, found = f"{NAME}: {path}", repr(first["input"])
-    if first["type"] == "extra_forbidden":
-        key = first["loc"][-1]
-        fields_ = schema.BuildingFile.model_fields
-        model = schema.BuildingFile if len(first["loc"]) == 1 else _models(fields_[str(first["loc"][0])].annotation)[0]
-        keys = [field.alias or name for name, field in model.model_fields.items()]
-        return CaseError(describe(where, "a key of the format", repr(key), nearest(key, keys)) + more)
-    if first["type"] == "missing":
-        return CaseError(describe(where, "a value", "no such key") + more)
-    found = found if len(found) <= 80 else found[:77] + "..."
-    return CaseError(describe(where, _expected(first), found, _advice(first)) + more)
-
-
-def _models(annotation: Any) -> list[type[BaseModel]]:
-    """List the models that stand in the annotation of a field."""
-    inner = [model for part in get_args(annotation) for model in _models(part)]
-    return inner or ([annotation] if isinstance(annotation, type) and issubclass(annotation, BaseModel) else [])
-
-
-def _expected(detail: ErrorDetails) -> str:
-    kinds = {"tuple_type": "a list", "dict_type": "a mapping", "model_type": "a mapping", "string_type": "text"}
-    return kinds.get(detail["type"], detail["msg"].removeprefix("Input should be ").replace("a valid ", "a "))
-
-
-def _advice(detail: ErrorDetails) -> str:
-    if detail["type"] == "string_type":
-        return "put it in quotes" if detail["input"] is not None else ""
-    if detail["type"] == "float_type" and isinstance(detail["input"], str):
-        return "write a plain number (YAML takes 1e-3 for text: write 1.0e-3 or 0.001)"
-    if detail["type"] == "literal_error":
-        options = str(detail["ctx"]["expected"]).replace("'", "").replace(" or ", ", ").split(", ")
-        return nearest(detail["input"], options)
-    return ""
 
 
 def load_case(path: str | PathLike[str]) -> Case:

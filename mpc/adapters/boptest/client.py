@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mpc.adapters.boptest.requests import Answer
+from mpc.adapters.foreign import SAME
 from mpc.errors import BoptestError, BoptestTimeoutError
 from thermal._types import FloatArray
 
@@ -22,7 +23,6 @@ OLDEST_VERSION, NEXT_VERSION = (0, 4), (2, 0)
 
 _CONNECT = 10.0  # s
 _FIRST_WAIT = 0.2  # s before the first repetition, doubled each time
-_SAME = 1e-6  # of a value: beyond it another was used
 _KEEP = 2.0  # s: below the 5 s after which servers such as Node's close an idle connection
 
 
@@ -220,7 +220,7 @@ def check_step(sent: Mapping[str, float], message: str, values: Any, expected: f
         raise BoptestError("time of the test", f"{expected:g} s", f"{time:g} s", "does another use it?")
     for name, value in sent.items():
         used = values.get(name)
-        if isinstance(used, int | float) and abs(used - value) > _SAME * max(abs(value), 1.0):
+        if isinstance(used, int | float) and abs(used - value) > SAME * max(abs(value), 1.0):
             raise BoptestError(f"input {name}: {value:g} was sent, the server used {used:g}: {message}")
     if "WARNING" in message:
         raise BoptestError(f"the server changed what was sent: {message}")

@@ -12,8 +12,8 @@ import pandas as pd
 from mpc.adapters.boptest.client import BoptestClient, check_step, regular, time_of
 from mpc.adapters.boptest.mapping import BoptestSignals, as_forecast, forecast_sources, own_signals
 from mpc.adapters.boptest.scenario import DAY, PERIOD_DAYS, PRICE_POINTS, YearClock
-from mpc.adapters.boptest.signals import KPI_NAMES, activation
-from mpc.adapters.foreign import Declared, SignalPlant
+from mpc.adapters.boptest.signals import KPI_NAMES
+from mpc.adapters.foreign import Declared, SignalPlant, activation
 from mpc.errors import BoptestError, PlantError
 from mpc.kpi.record import PlantRecord
 from mpc.loop.actuators import checked_actions
@@ -133,7 +133,7 @@ class BoptestPlant(SignalPlant):
             self.close()
             raise
         self._time, self._end, self._start = math.nan, math.nan, math.nan
-        self._broken = ""
+        self._broken, self._idle = "", set[str]()
 
     def close(self) -> None:
         """Stop the test, so that the server has room for another."""
@@ -157,7 +157,7 @@ class BoptestPlant(SignalPlant):
         Returns
         -------
         Measurements
-            At the start.
+            At the start, an instant.
         """
         self._seed = self._seed if seed is None else seed
         chosen = self._settings
@@ -171,7 +171,7 @@ class BoptestPlant(SignalPlant):
         else:
             answer = self._ask("PUT", "scenario", {**scenario, "time_period": self._period}).payload
             values = answer.get("time_period") if isinstance(answer, dict) else None
-        self._broken = ""
+        self._broken, self._idle = "", set(self._switches.values())
         self._start = self._time = time_of(values, "the start")
         self._end = self._find_end()
         return self._measured(values)
@@ -182,12 +182,14 @@ class BoptestPlant(SignalPlant):
         Parameters
         ----------
         actions : mapping of str to float
-            Setpoints by ``ENTITY/POINT`` [unit of the actuator]; what is left out stays as the building has it.
+            Setpoints by ``ENTITY/POINT`` [unit of the actuator]; what is left out is released: a server itself keeps an
+            input as long as it is not told otherwise.
 
         Returns
         -------
         Measurements
-            As the server has them at the end of the step.
+            Means over the step of the readings that the server has noted down, each half a minute on BOPTEST's own; of
+            a `BoptestServer` what it says at the end of the step, which are means over its own.
 
         Raises
         ------
@@ -205,19 +207,19 @@ class BoptestPlant(SignalPlant):
         PlantError.unless(not self._broken, "plant", "a reset after a step went wrong", self._broken)
         left = self._end - self._time
         PlantError.unless(not self.finished, "test", f"{self.control_step:g} s more", f"{left:g} s", "reset the plant")
-        sent = self._sent(given)
-        sent |= {activation(signal): 1.0 for signal in sent}
+        sent = {name: value for name, value in self._sent(given).items() if value or name not in self._idle}
         try:
             message, values = self._ask("POST", "advance", sent, repeat=False)
             if isinstance(values, dict) and not values:
                 self._end = self._time
                 raise BoptestError(f"the test is over at {self._time:g} s of the year: {message}")
             check_step(sent, message, values, self._time + self.control_step)
+            self._time = time_of(values, "a step")
+            self._idle = {switch for switch in self._switches.values() if not sent.get(switch)}
+            return self._measured(values) if self.signals.means else self._means_of_step()
         except BoptestError as error:
             self._broken = str(error)
             raise
-        self._time = time_of(values, "a step")
-        return self._measured(values)
 
     def forecast(self) -> Forecast:
         """Forecast the control steps from now on: weather, prices, emissions, people and comfort bands.
@@ -293,7 +295,11 @@ class BoptestPlant(SignalPlant):
         about, chosen = self._ask("GET", "name").payload or {}, self._settings
         year, timezone = about.get("year", 2023), about.get("timezone", "UTC")
         self._clock = YearClock(chosen.year or int(year), chosen.timezone or str(timezone))
-        self._map(self._clock.timezone, lambda name: _declared(outputs[name]), lambda name: _declared(inputs[name]))
+        zone = self._clock.timezone
+        self._map(zone, lambda name: _declared(outputs[name]), lambda name: _declared(inputs[name]), inputs)
+        for signal in self.signals.actuators.values():
+            switch, advice = self._switches.get(signal), "a server heeds an input while its switch is 1"
+            BoptestError.unless(switch, f"input {signal!r}", f"a switch {activation(signal)!r}", "none", advice)
         self._sources = forecast_sources(points, self.signals, chosen.electricity_price)
 
     def _set_step(self, control_step: float) -> float:
@@ -309,6 +315,14 @@ class BoptestPlant(SignalPlant):
         scenario = self._ask("GET", "scenario").payload
         told = scenario.get("end_time") if isinstance(scenario, dict) else None
         return min(self._start + own, math.inf if told is None else float(told))
+
+    def _means_of_step(self) -> Measurements:
+        """Means over the step that has ended of what the server has noted down."""
+        points = list(dict.fromkeys(self.signals.measurements.values()))
+        body = {"point_names": points, "start_time": self._time - self.control_step, "final_time": self._time}
+        _, columns = regular(self._ask("PUT", "results", body).payload, points) if points else (None, {})
+        rows = [line.offset + line.slope * columns[name] for name, line in self._read]
+        return self._mean(np.array(rows).T, self._clock.zero + round(self._time))
 
     def _measured(self, values: Mapping[str, Any]) -> Measurements:
         return self._seen(values, self._clock.zero + round(self._time))

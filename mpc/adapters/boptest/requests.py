@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 from urllib.parse import parse_qs
 
-from mpc.adapters.boptest.signals import activation
+from mpc.adapters.foreign import activation
 from mpc.errors import BoptestRequestError
 from mpc.loop.actuators import Actuator
 from thermal.errors import nearest

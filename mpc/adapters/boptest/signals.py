@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mpc.adapters.boptest.scenario import PRICE_POINTS
+from mpc.adapters.foreign import activation
 from mpc.loop.actuators import DIFFERENTIAL_PRESSURE, STATIC_PRESSURE
 from mpc.loop.conversion import SIGNAL_UNITS
 from mpc.loop.history import PlantStep
@@ -193,17 +194,6 @@ class PlantSignals:
             The step.
         """
         return [float(read(step)) for read in self._reads]
-
-
-def activation(name: str) -> str:
-    """Name the signal that activates an input.
-
-    Parameters
-    ----------
-    name : str
-        Of the input, ``<name>_u``.
-    """
-    return f"{name.removesuffix('_u')}_activate"
 
 
 def _entry(text: str, unit: str | None, lowest: float | None = None, highest: float | None = None) -> dict[str, Any]:

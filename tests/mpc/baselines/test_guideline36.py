@@ -121,3 +121,11 @@ def test_every_baseline_is_made_of_points_and_actuators(name: str) -> None:
     chosen = rule.step(Seen(0.0, (295.15,) * 4), None)
     assert set(chosen) == {a.name for a in ACTUATORS}
     assert all(a.lowest <= chosen[a.name] <= a.highest for a in ACTUATORS)
+
+
+@pytest.mark.parametrize("name", BASELINES)
+def test_a_rule_that_would_set_nothing_names_what_it_misses(name: str) -> None:
+    heat_pump = (Actuator("heat_pump/speed", "1", 0.0, 1.0),)
+    with pytest.raises(ControlError, match=r"supply_air_temperature_setpoint or .*supply_water_temperature_setpoint among "
+                       r"the plant's actuators, found heat_pump/speed; map them"):  # fmt: skip
+        BASELINES[name](POINTS, (0, 0, 0, 1), heat_pump)

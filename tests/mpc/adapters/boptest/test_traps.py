@@ -50,7 +50,8 @@ class House:
     def answer(self, method: str, what: str, body: dict[str, Any]) -> Any:
         """Payload of a request."""
         if what == "inputs":
-            return {"oveTSet_u": entry("K", 300.0, 340.0), "oveTSet_activate": entry(None), "oveHea_u": entry("W")}
+            return {"oveTSet_u": entry("K", 300.0, 340.0), "oveTSet_activate": entry(None), "oveHea_u": entry("W"),
+                    "oveHea_activate": entry(None)}  # fmt: skip
         if what == "measurements":
             power = {"reaPPum_y": entry("W"), "reaPFan_y": entry("W")}
             return {"reaTZon_y": entry("K"), "reaFlo_y": entry("kg/s"), "reaDir_y": entry("rad"), **power}
@@ -88,7 +89,8 @@ class House:
                 np.append(np.arange(body["start_time"], body["final_time"] + 1.0, 30.0), body["start_time"])
             )
             return {"time": times.tolist(), "reaTZon_y": (290.0 + times / 3600.0).tolist(),
-                    "reaPPum_y": (times - body["start_time"]).tolist(), "reaPFan_y": [100.0] * len(times)}  # fmt: skip
+                    "reaPPum_y": (times - body["start_time"]).tolist(), "reaPFan_y": [100.0] * len(times),
+                    "reaFlo_y": [0.1] * len(times), "reaDir_y": [np.pi] * len(times)}  # fmt: skip
         return {"cost_tot": 0.5, "emis_tot": 0.1, "ener_tot": 2.0, "idis_tot": None, "pdih_tot": None, "pele_tot": 0.01,
                 "pgas_tot": None, "tdis_tot": 3.0, "time_rat": None}  # fmt: skip
 
@@ -172,7 +174,9 @@ def test_a_foreign_test_case_behaves_as_a_plant(house: House, connect: Connect) 
     assert seen["zone/zone_air_temperature_sensor"] == pytest.approx(290.0 + 250.0)
     assert seen["station/wind_direction_sensor"] == pytest.approx(180.0)  # radians at the server
     seen = plant.step({"pump/supply_water_temperature_setpoint": 320.0})
-    assert house.bodies[-1] == {"oveTSet_u": 320.0, "oveTSet_activate": 1.0}
+    assert {"oveTSet_u": 320.0, "oveTSet_activate": 1.0} in house.bodies
+    # the mean over the quarter of an hour, not the reading at its end
+    assert seen["zone/zone_air_temperature_sensor"] == pytest.approx(290.0 + 250.0 + 0.125)
     assert seen.stamp.isoformat() == "2024-01-11T10:15:00+01:00"
     table = plant.forecast().table
     # readings lie on straight lines: the mean of a quarter of an hour is that of its ends; what holds is taken as it is
@@ -194,6 +198,26 @@ def test_a_time_of_ones_own(house: House, connect: Connect) -> None:
     plant.step({})
     plant.step({})
     assert plant.finished
+
+
+def test_what_is_left_out_is_released_once(house: House, connect: Connect) -> None:
+    plant, sent = connect(), list[dict[str, Any]]()
+    plant.reset()
+    house.trap = lambda method, what, count, body: sent.append(body) if what == "advance" else None
+    both = {"pump/supply_water_temperature_setpoint": 320.0, "pump/heating_power": 0.0}
+    for actions in (both, {"pump/heating_power": 500.0}, {}, {}):
+        plant.step(actions)
+    first = {"oveTSet_u": 320.0, "oveTSet_activate": 1.0, "oveHea_u": 0.0, "oveHea_activate": 1.0}
+    second = {"oveHea_u": 500.0, "oveHea_activate": 1.0, "oveTSet_activate": 0.0}
+    assert sent == [first, second, {"oveHea_activate": 0.0}, {}]
+
+
+def test_an_input_without_a_switch_reaches_nothing(house: House, connect: Connect) -> None:
+    known = house.answer("GET", "inputs", {})
+    del known["oveHea_activate"]
+    house.trap = lambda method, what, count, body: {"payload": known} if what == "inputs" else None
+    with pytest.raises(BoptestError, match="expected a switch 'oveHea_activate', .* found the switches oveTSet_activate"):
+        connect()
 
 
 def test_clipped_inputs_with_success(house: House, connect: Connect) -> None:
@@ -296,10 +320,10 @@ def test_a_measurement_of_null_is_missing(house: House, connect: Connect) -> Non
     plant = connect()
     plant.reset()
     house.trap = lambda method, what, count, body: (
-        {"payload": {**house.answer(method, what, body), "reaTZon_y": None}} if what == "advance" else None
+        {"payload": {**house.answer(method, what, body), "reaTZon_y": [None] * 32}} if what == "results" else None
     )
     seen = plant.step({})
-    assert np.isnan(seen["zone/zone_air_temperature_sensor"]) and seen["zone/supply_air_flowrate_sensor"] == 0.1
+    assert np.isnan(seen["zone/zone_air_temperature_sensor"]) and seen["zone/supply_air_flowrate_sensor"] == pytest.approx(0.1)
 
 
 def test_a_clock_that_jumps_is_another_client(house: House, connect: Connect) -> None:
