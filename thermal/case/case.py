@@ -231,6 +231,10 @@ class Case:
         """
         return self._estimated[0].copy()
 
+    def zone_temperatures_estimated(self) -> pd.DataFrame:
+        """Temperatures of the zones, estimated where a sensor is dead or stuck for long, (n_time, n_zone) [K]."""
+        return self._estimated_temperatures[0].copy()
+
     def heat_is_estimated(self) -> pd.DataFrame:
         """Whether the heat of each zone is an estimate, shape (n_time, n_zone)."""
         return self._estimated[0].notna() & self._zone_heat.isna()

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from thermal._types import FloatArray, IntArray
 from thermal.case.case import Case
-from thermal.case.estimated import LONGEST_BRIDGE
+from thermal.case.estimated import DELAY, LONGEST_BRIDGE
 from thermal.errors import ModelError
 from thermal.inputs.provider import InputProvider, telemetry_inputs
 from thermal.inputs.signals import signal_values
@@ -54,7 +54,8 @@ class Inputs:
         Measured zone temperatures [K] with the last value kept for at most 30 minutes: a start may know nothing of
         what comes after it.
     held : ndarray, shape (n_time, n_zone)
-        Measured zone temperatures [K] with the last value kept through every gap, to hold the zones at in a spin-up.
+        Measured zone temperatures [K] to hold the zones at in a spin-up, with the last value kept for a day of a gap and
+        the estimated one after it.
     complete : ndarray of bool, shape (n_time,)
         Whether heat, boundaries and airflows of this step are measured, bridged over at most 30 minutes, or
         estimated (`Case.estimated`).
@@ -175,10 +176,18 @@ def replay_inputs(case: Case, network: ThermalNetwork, provider: InputProvider |
         airflow=filled[2],
         zone=np.where(estimated, np.nan, zone.to_numpy(dtype=float)),
         bridged=(zone.ffill(limit=limit) if limit else zone).to_numpy(dtype=float),
-        held=zone.ffill().bfill().to_numpy(dtype=float),
+        held=_held(case).to_numpy(dtype=float),
         complete=complete,
         estimated=estimated,
     )
+
+
+def _held(case: Case) -> pd.DataFrame:
+    """Temperatures that zones are held at in a spin-up: measured, the last ones for a day, then the estimated ones."""
+    measured, day = case.zone_temperatures(), max(1, round(DELAY / case.telemetry.step))
+    known = measured.notna().any()  # a zone that is never measured is not held
+    late = case.zone_temperatures_estimated().where(known & (measured.ffill().notna()))
+    return measured.ffill(limit=day).fillna(late).bfill()
 
 
 def _most_missing(frames: list[pd.DataFrame]) -> str:

@@ -325,6 +325,19 @@ def test_gaps_of_a_zone_are_bridged_for_starts_and_always_for_holding(count: int
     assert [e.zone for e in case.estimated] == ([] if bridged else ["F1_W"])
 
 
+def test_a_zone_whose_sensor_died_is_held_at_its_last_value_for_a_day_and_at_the_estimate_then() -> None:
+    """At its last value for weeks, walls would follow a temperature that has long gone."""
+    whole, case = replay_inputs(case_with({}), bundled_network().network), case_with({ZONE: (100, 476)})
+    found, column = replay_inputs(case, bundled_network().network), case.building.zone_names.index("F1_W")
+    held = found.held[:, column]
+    np.testing.assert_array_equal(held[:100], whole.held[:100, column])
+    np.testing.assert_array_equal(held[100:388], held[99])
+    np.testing.assert_array_equal(held[388:], case.zone_temperatures_estimated()["F1_W"].to_numpy()[388:])
+    assert np.ptp(held[388:]) > 0.1
+    never = replay_inputs(case_with({ZONE: (0, 576)}), bundled_network().network)
+    assert np.isnan(never.held[:, column]).all()
+
+
 def test_inputs_are_the_case_s_signals() -> None:
     case = case_with({})
     found = replay_inputs(case, bundled_network().network)
