@@ -54,8 +54,8 @@ class Inputs:
         Measured zone temperatures [K] with the last value kept for at most 30 minutes: a start may know nothing of
         what comes after it.
     held : ndarray, shape (n_time, n_zone)
-        Measured zone temperatures [K] to hold the zones at in a spin-up, with the last value kept for a day of a gap and
-        the estimated one after it.
+        Measured zone temperatures [K] to hold the zones at in a spin-up; in a gap the last value for a day, and the
+        estimated one then.
     complete : ndarray of bool, shape (n_time,)
         Whether heat, boundaries and airflows of this step are measured, bridged over at most 30 minutes, or
         estimated (`Case.estimated`).
