@@ -28,7 +28,7 @@ from thermal._types import FloatArray, IntArray
 _EACH, _THIRD, _LONGEST = 14, 3, 21
 
 #: Sizes of a change over the deviation of its prior [-]; their evidence is averaged.
-_SIZES = (1.0, 0.3)
+_SIZES = (1.0, 0.3, 0.1, 0.03)
 
 #: Prior weight of heat that names no cause, beside all that have a name [-].
 _UNKNOWN = 0.01
@@ -232,9 +232,10 @@ class Watch:
         self._score += (innovation.white @ white).reshape(t, k)
         self._information += (white**2).sum(axis=0).reshape(t, k)
         before = self.log_ratio
-        self.log_ratio = self._ratios(self.dispersion.at(day))
+        varies = self.dispersion.at(day)
+        self.log_ratio = self._ratios(varies)
         self._top = np.maximum(self._top, self.log_ratio - before)
-        return self._judge()
+        return self._judge(varies)
 
     def size(self, start: int, number: int) -> float:
         """Likeliest size of a change since a day [estimation scale].
@@ -276,15 +277,18 @@ class Watch:
         over = [-size * score[:, [i]] - 0.5 * size**2 * information[:, [i]] for i, size in self.ends]
         return np.hstack([begun, *over])
 
-    def _judge(self) -> Alarm:
-        """Weigh all changes and starts."""
+    def _judge(self, varies: FloatArray) -> Alarm:
+        """Weigh all changes and starts; names are told apart by one noise, the dispersion of the likeliest change."""
         share = _ENDS if self.ends else 0.0
         ends = np.full(len(self.ends), share / max(1, len(self.ends)))
         weight = np.concatenate([(1.0 - share) * self.what.weight, ends])
         with np.errstate(divide="ignore"):
-            told = self.log_ratio - np.maximum(0.0, self._top - self.cap) + np.log(weight)
-        whole = float(logsumexp(told))
-        probability = np.exp(logsumexp(told, axis=0) - whole)
-        k = self.what.which.size
-        start = int(self.starts[np.argmax(logsumexp(told, axis=1))])
+            weight = np.log(weight)
+        told = self.log_ratio - np.maximum(0.0, self._top - self.cap) + weight
+        whole, k = float(logsumexp(told)), self.what.which.size
+        likeliest = int(np.argmax(logsumexp(told, axis=0)))
+        alike = varies[self.ends[likeliest - k][0] if likeliest >= k else likeliest]
+        named = self._ratios(np.full(k, alike)) + weight
+        probability = np.exp(logsumexp(named, axis=0) - logsumexp(named))
+        start = int(self.starts[np.argmax(logsumexp(named, axis=1))])
         return Alarm(whole, start, probability[:k], probability[k:])
