@@ -94,16 +94,14 @@ class Change:
         return asdict(self)
 
 
-def draw_change(building: Building, seed: int, pairs: list[tuple[str, str]]) -> Change:
+def draw_change(building: Building, seed: int, outside: list[str], pairs: list[tuple[str, str]]) -> Change:
     """Draw what changes: kinds take turns, half of them are mended after three to ten weeks."""
     rng = np.random.default_rng([seed, 11])
     kind = list(CHANGES)[seed % len(CHANGES)]
     effects, zonal, (low, high) = CHANGES[kind]
     size = float(rng.uniform(low, high)) * (-1.0 if kind in ("sensor_bias", "flow_gain", "clock_shift")
                                              and rng.random() < 0.5 else 1.0)  # fmt: skip
-    names = list(building.zone_names)
-    outside = [z for z in names if "_H" not in z and "_C" not in z] or names
-    zones: tuple[str, ...] = (str(rng.choice(outside if kind == "window_open" else names)),)
+    zones: tuple[str, ...] = (str(rng.choice(outside if kind == "window_open" else building.zone_names)),)
     if kind == "door_open":
         zones = pairs[int(rng.integers(len(pairs)))]
     start = int(rng.integers(56, DAYS - 84))
@@ -118,7 +116,8 @@ def make_year(seed: int, changed: bool) -> tuple[Case, Change]:
     building = _drawn_building(seed, float(rng.uniform(28.0, 45.0)) * zones, zones)
     weather = _weather(building, seed, rng)
     plant = _Plant(building, weather, seed, rng)
-    change = draw_change(building, seed, plant.pairs) if changed else Change()
+    outside = [z for z, exposed in zip(building.zone_names, plant.exposed, strict=True) if exposed]
+    change = draw_change(building, seed, outside, plant.pairs) if changed else Change()
     plant.change = change
     plans = building.geometry
     if not isinstance(plans, FloorPlans):
