@@ -15,8 +15,11 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
 
 from calibration.estimation.state_space import REFERENCE, state_space
+from calibration.monitoring.days import Days
+from calibration.monitoring.filter import DayFilter, noise_of
 from thermal import Building, Case
 from thermal.case.building import FloorPlans
 from thermal.effects.catalogue import chosen
@@ -127,6 +130,25 @@ def make_year(seed: int, changed: bool) -> tuple[Case, Change]:
     telemetry = generate_telemetry(plant, plans, weather, sensors)
     frame = _read_wrong(telemetry.frame.copy(), change, building)
     return Case(building, replace(telemetry, frame=frame)), change
+
+
+def evidence_of_oracle(changed: Days, quiet: Days, reference: int) -> Array:
+    """Evidence by day for a change of which is known what it does to the errors, on average, shape (n_day,) [-].
+
+    ``½ gᵀ V⁻¹ g`` with g what is left in the innovations of what the same year without the change differs by.
+    Thermostats take another course in it, which counts as if it were the change: an upper bound.
+    """
+    moved = np.nan_to_num(changed.errors - quiet.errors)
+    filtered = DayFilter(quiet, noise_of(quiet, reference))
+    state, evidence = filtered.start(), np.zeros(len(quiet))
+    taken = np.zeros(state.mean.size)  # what the filter makes of the change
+    for day in range(len(quiet)):
+        state, innovation = filtered.step(state, day)
+        if innovation is not None:
+            left = moved[day][innovation.seen] - innovation.observe @ taken
+            taken = taken + innovation.gain @ left
+            evidence[day] = 0.5 * np.sum(solve_triangular(innovation.root, left, lower=True) ** 2)
+    return evidence
 
 
 def _drawn_building(seed: int, floor_area: float, zones: int) -> Building:

@@ -31,15 +31,12 @@ from typing import Any
 
 import numpy as np
 from _code import code
-from _monitored_years import DAYS, make_year
+from _monitored_years import DAYS, evidence_of_oracle, make_year
 from _table import markdown, publish, write
 from blind_trials import seed_range
-from numpy.typing import NDArray
-from scipy.linalg import solve_triangular
 
 from calibration.monitoring.course import THRESHOLD
-from calibration.monitoring.filter import DayFilter, noise_of
-from calibration.monitoring.monitor import Monitoring, monitor
+from calibration.monitoring.monitor import REFERENCE_DAYS, monitor
 
 NAME = "monitoring"
 
@@ -54,22 +51,6 @@ def wilson(hits: int, of: int) -> tuple[float, float]:
     z, p = 1.959964, hits / of
     middle, half = p + z * z / (2 * of), z * np.sqrt(p * (1 - p) / of + z * z / (4 * of * of))
     return float((middle - half) / (1 + z * z / of)), float((middle + half) / (1 + z * z / of))
-
-
-def evidence_of_oracle(changed: Monitoring, quiet: Monitoring) -> NDArray[np.float64]:
-    """Evidence by day for a change of which is known what it does to the errors, on average, shape (n_day,) [-]."""
-    days, reference = quiet.days, quiet.settings.reference_days
-    moved = np.nan_to_num(changed.days.errors - days.errors)
-    filtered = DayFilter(days, noise_of(days, reference))
-    state, evidence = filtered.start(), np.zeros(len(days))
-    taken = np.zeros(state.mean.size)  # what the filter makes of the change
-    for day in range(len(days)):
-        state, innovation = filtered.step(state, day)
-        if innovation is not None:
-            left = moved[day][innovation.seen] - innovation.observe @ taken
-            taken = taken + innovation.gain @ left
-            evidence[day] = 0.5 * np.sum(solve_triangular(innovation.root, left, lower=True) ** 2)
-    return evidence
 
 
 def answer(seed: int, out: Path) -> str:
@@ -89,7 +70,8 @@ def answer(seed: int, out: Path) -> str:
         }  # fmt: skip
         labels[changed] = change.to_dict() | {"oracle": 0.0, "shows": None}
     label = labels[True]
-    evidence = np.cumsum(evidence_of_oracle(watched[True], watched[False])[label["start"] : label["end"]])
+    by_day = evidence_of_oracle(watched[True].days, watched[False].days, REFERENCE_DAYS)
+    evidence = np.cumsum(by_day[label["start"] : label["end"]])
     shows = np.flatnonzero(evidence > THRESHOLD)
     label |= {"oracle": float(evidence[-1]), "shows": label["start"] + int(shows[0]) if shows.size else None}
     for changed, name in names.items():
