@@ -232,8 +232,9 @@ class Watch:
         self._score += (innovation.white @ white).reshape(t, k)
         self._information += (white**2).sum(axis=0).reshape(t, k)
         before = self.log_ratio
-        varies = self.dispersion.at(day)
-        self.log_ratio = self._ratios(varies)
+        which = np.arange(self.log_ratio.shape[1])
+        varies = self.dispersion.at(day)[self._place(which)]
+        self.log_ratio = self._ratios(which, varies)
         self._top = np.maximum(self._top, self.log_ratio - before)
         return self._judge(varies)
 
@@ -262,33 +263,45 @@ class Watch:
             held = getattr(self, name)
             setattr(self, name, np.vstack([held[kept], np.zeros((1, held.shape[1]))]))
 
-    def _ratios(self, ratio_of_variances: FloatArray) -> FloatArray:
-        """Logarithms of the likelihood ratios, by start and change; the ends of earlier changes last."""
-        score, information = self._score / ratio_of_variances, self._information / ratio_of_variances
+    def _ratios(self, which: IntArray, varies: FloatArray) -> FloatArray:
+        """Logarithms of the likelihood ratios by start, of changes and, after them, ends of those that were found.
+
+        Each with a ratio of variances of its own.
+        """
+        at, k = self._place(which), self.what.which.size
+        score, information = self._score[:, at] / varies, self._information[:, at] / varies
         parts = []
         for size in _SIZES:
-            spread = size * self._deviation
+            spread = size * self._deviation[at]
             sharp = information + spread**-2.0
             ratio = 0.5 * score**2 / sharp - 0.5 * np.log1p(information * spread**2)
             # half of the normal distribution where a strength can only grow
-            ratio = ratio + np.where(self._grows, np.log(2.0) + log_ndtr(score / np.sqrt(sharp)), 0.0)
+            ratio = ratio + np.where(self._grows[at], np.log(2.0) + log_ndtr(score / np.sqrt(sharp)), 0.0)
             parts.append(ratio)
         begun = logsumexp(np.array(parts), axis=0) - np.log(len(parts))
-        over = [-size * score[:, [i]] - 0.5 * size**2 * information[:, [i]] for i, size in self.ends]
-        return np.hstack([begun, *over])
+        lost = np.concatenate([np.zeros(k), [size for _, size in self.ends]])[which]
+        return np.asarray(np.where(which < k, begun, -lost * score - 0.5 * lost**2 * information))
+
+    def _place(self, which: IntArray) -> IntArray:
+        """Place among what is sought of changes and ends."""
+        return np.array([*range(self.what.which.size), *(i for i, _ in self.ends)], dtype=np.int64)[which]
 
     def _judge(self, varies: FloatArray) -> Alarm:
-        """Weigh all changes and starts; names are told apart by one noise, the dispersion of the likeliest change."""
+        """Weigh all changes and starts.
+
+        Names are told apart in pairs with the likeliest change, each pair by one noise, the larger of the two: a
+        change whose direction varies a little more from day to day is no less likely to be the name.
+        """
         share = _ENDS if self.ends else 0.0
         ends = np.full(len(self.ends), share / max(1, len(self.ends)))
-        weight = np.concatenate([(1.0 - share) * self.what.weight, ends])
         with np.errstate(divide="ignore"):
-            weight = np.log(weight)
+            weight = np.log(np.concatenate([(1.0 - share) * self.what.weight, ends]))
         told = self.log_ratio - np.maximum(0.0, self._top - self.cap) + weight
-        whole, k = float(logsumexp(told)), self.what.which.size
-        likeliest = int(np.argmax(logsumexp(told, axis=0)))
-        alike = varies[self.ends[likeliest - k][0] if likeliest >= k else likeliest]
-        named = self._ratios(np.full(k, alike)) + weight
+        likeliest = np.argmax(logsumexp(told, axis=0))
+        which, k = np.arange(weight.size), self.what.which.size
+        pair = np.maximum(varies, varies[likeliest])
+        beside = logsumexp(self._ratios(np.full_like(which, likeliest), pair), axis=0)
+        named = self._ratios(which, pair) - beside + weight
         probability = np.exp(logsumexp(named, axis=0) - logsumexp(named))
         start = int(self.starts[np.argmax(logsumexp(named, axis=1))])
-        return Alarm(whole, start, probability[:k], probability[k:])
+        return Alarm(float(logsumexp(told)), start, probability[:k], probability[k:])
