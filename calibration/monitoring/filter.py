@@ -27,7 +27,8 @@ LEVEL_WALK = 0.05
 #: Deviation of what days off differ by, over that of a day's errors [-].
 _DAYS_OFF = 1.0
 
-#: Growth of a parameter in a day over the deviation of its prior [-]: a tenth in a year, as things age.
+#: Growth of a parameter in a day over the deviation of its prior [-]: a tenth in a year, as things age. Strengths that
+#: may jump do not: a window whose prior is 2 m² wide would age by the area of one left ajar, and hide it within days.
 _AGEING = 0.1 / np.sqrt(365.0)
 
 #: Squared innovation of a day over its expectation from which the day moves states by less [-]: a day unlike all others

@@ -27,7 +27,8 @@ from thermal._types import FloatArray, IntArray
 #: Days since when a change is sought: each of the last ones, then one in three, up to the longest [d].
 _EACH, _THIRD, _LONGEST = 14, 3, 21
 
-#: Sizes of a change over the deviation of its prior [-]; their evidence is averaged.
+#: Sizes of a change over the deviation of its prior [-]; their evidence is averaged. A window's prior is 2 m² wide,
+#: one left ajar has a thirtieth of it and would count as far-fetched. Half decades, so that none is far from one.
 _SIZES = (1.0, 0.3, 0.1, 0.03)
 
 #: Prior weight of heat that names no cause, beside all that have a name [-].
