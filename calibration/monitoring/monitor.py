@@ -257,8 +257,8 @@ def _with_windows(case: Case, normalisation: Normalisation) -> InputProvider:
     drivers, seasonal = telemetry_inputs(case, normalisation), telemetry_inputs(case, normalisation)
     drivers.openings = np.ones_like(drivers.openings)
     if drivers.gives("through_windows"):
-        zone = case.zone_temperatures()
-        at_this_time = zone.groupby([zone.index.hour, zone.index.minute, zone.index.second])
+        zone, stamps = case.zone_temperatures(), case.stamps
+        at_this_time = zone.groupby([stamps.hour, stamps.minute, stamps.second])
         week = at_this_time.transform(lambda of: of.shift().rolling(_SEASON, min_periods=1).mean())
         seasonal.usual = np.where(week.notna(), week, seasonal.usual)
         drivers.through_windows = seasonal.through_windows
