@@ -15,8 +15,11 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
 
 from calibration.estimation.state_space import REFERENCE, state_space
+from calibration.monitoring.days import Days
+from calibration.monitoring.filter import DayFilter, noise_of
 from thermal import Building, Case
 from thermal.case.building import FloorPlans
 from thermal.effects.catalogue import chosen
@@ -94,14 +97,13 @@ class Change:
         return asdict(self)
 
 
-def draw_change(building: Building, seed: int, pairs: list[tuple[str, str]]) -> Change:
+def draw_change(building: Building, seed: int, outside: list[str], pairs: list[tuple[str, str]]) -> Change:
     """Draw what changes: kinds take turns, half of them are mended after three to ten weeks."""
     rng = np.random.default_rng([seed, 11])
     kind = list(CHANGES)[seed % len(CHANGES)]
     effects, zonal, (low, high) = CHANGES[kind]
     size = float(rng.uniform(low, high)) * (-1.0 if kind in ("sensor_bias", "flow_gain", "clock_shift")
                                              and rng.random() < 0.5 else 1.0)  # fmt: skip
-    outside = [z for z in building.zone_names if "_H" not in z and "_C" not in z]
     zones: tuple[str, ...] = (str(rng.choice(outside if kind == "window_open" else building.zone_names)),)
     if kind == "door_open":
         zones = pairs[int(rng.integers(len(pairs)))]
@@ -117,7 +119,8 @@ def make_year(seed: int, changed: bool) -> tuple[Case, Change]:
     building = _drawn_building(seed, float(rng.uniform(28.0, 45.0)) * zones, zones)
     weather = _weather(building, seed, rng)
     plant = _Plant(building, weather, seed, rng)
-    change = draw_change(building, seed, plant.pairs) if changed else Change()
+    outside = [z for z, exposed in zip(building.zone_names, plant.exposed, strict=True) if exposed]
+    change = draw_change(building, seed, outside, plant.pairs) if changed else Change()
     plant.change = change
     plans = building.geometry
     if not isinstance(plans, FloorPlans):
@@ -127,6 +130,25 @@ def make_year(seed: int, changed: bool) -> tuple[Case, Change]:
     telemetry = generate_telemetry(plant, plans, weather, sensors)
     frame = _read_wrong(telemetry.frame.copy(), change, building)
     return Case(building, replace(telemetry, frame=frame)), change
+
+
+def evidence_of_oracle(changed: Days, quiet: Days, reference: int) -> Array:
+    """Evidence by day for a change of which is known what it does to the errors, on average, shape (n_day,) [-].
+
+    ``½ gᵀ V⁻¹ g`` with g what is left in the innovations of what the same year without the change differs by.
+    Thermostats take another course in it, which counts as if it were the change: an upper bound.
+    """
+    moved = np.nan_to_num(changed.errors - quiet.errors)
+    filtered = DayFilter(quiet, noise_of(quiet, reference))
+    state, evidence = filtered.start(), np.zeros(len(quiet))
+    taken = np.zeros(state.mean.size)  # what the filter makes of the change
+    for day in range(len(quiet)):
+        state, innovation = filtered.step(state, day)
+        if innovation is not None:
+            left = moved[day][innovation.seen] - innovation.observe @ taken
+            taken = taken + innovation.gain @ left
+            evidence[day] = 0.5 * np.sum(solve_triangular(innovation.root, left, lower=True) ** 2)
+    return evidence
 
 
 def _drawn_building(seed: int, floor_area: float, zones: int) -> Building:
@@ -228,39 +250,46 @@ class _Plant:
         day = k * STEP / 86400.0 - RUN_IN
         kind = change.kind if change.start <= day < change.end else ""
         at = [self.zone_names.index(z) for z in change.zones]
-        outdoor, wind = float(boundary_temperatures[0]), float(self.wind[k])
+        outdoor = float(boundary_temperatures[0])
         true = self.zone - self.bias
         self.bias = np.zeros(len(true))
-        cold = outdoor - true
-        n, by_wind, by_stack = self.leak
-        rate = n + by_wind * wind + by_stack * np.sqrt(np.abs(cold)) + (change.size if kind == "infiltration" else 0.0)
         heat = self._delivered(zone_heat, kind, at) + self.gains[k]
         # air of a known temperature brings more to a zone that is colder than its sensor says
         heat = heat + AIR_HEAT_CAPACITY * self._flow(zone_heat) * (self.zone - true)
-        heat = heat + self.exposed * self.air * self.volume * rate / 3600.0 * cold
         boundary = self.boundary[k].copy()
         if kind == "valve_leak":
             heat[at] += change.size * self.area[at]
-        elif kind == "window_open":
-            speed = 0.5 * np.sqrt(0.001 * wind**2 + 0.0035 * np.abs(cold[at]) + 0.01)
-            heat[at] += self.air * change.size * speed * cold[at]
         elif kind == "internal_gains":
             heat = heat + change.size * self.area
-        elif kind == "door_open":
-            flow = self.air * change.size * (true[at[1]] - true[at[0]])
-            heat[at[0]] += flow
-            heat[at[1]] -= flow
         elif kind == "blinds_down":
             boundary[self.sunny] *= 1.0 - change.size
         drives = np.concatenate([boundary, heat])
         drives[0] = outdoor - REFERENCE
         mean = self.space.observation @ self.state + self.space.feedthrough @ drives + REFERENCE
+        # air is exchanged at the temperatures of this step: at those of the last one an open door would not be stable
+        through, between = self._exchange(outdoor - true, float(self.wind[k]), kind, at)
+        by_heat, lost = self.space.feedthrough[:, -len(true) :], np.diag(through) + between
+        mean = np.linalg.solve(np.eye(len(true)) + by_heat @ lost, mean + by_heat @ (through * outdoor))
+        drives[-len(true) :] += through * outdoor - lost @ mean
         self.state = self.space.advance(self.state) + self.space.drive @ drives
         self.number += 1
         if kind == "sensor_bias":
             self.bias[at] = change.size
         self.zone = mean + self.bias
         return self.zone
+
+    def _exchange(self, cold: Array, wind: float, kind: str, at: list[int]) -> tuple[Array, Array]:
+        """Conductances of air to outdoor, (n,), and a matrix of those between zones, (n, n) [W/K]."""
+        n, by_wind, by_stack = self.leak
+        rate = n + by_wind * wind + by_stack * np.sqrt(np.abs(cold))
+        rate = rate + (self.change.size if kind == "infiltration" else 0.0)
+        through, between = self.exposed * self.air * self.volume * rate / 3600.0, np.zeros((len(cold), len(cold)))
+        if kind == "window_open":
+            speed = 0.5 * np.sqrt(0.001 * wind**2 + 0.0035 * np.abs(cold[at]) + 0.01)
+            through[at] += self.air * self.change.size * speed
+        elif kind == "door_open":
+            between[np.ix_(at, at)] += self.air * self.change.size * np.array([[1.0, -1.0], [-1.0, 1.0]])
+        return through, between
 
     def _flow(self, zone_heat: Array) -> Array:
         """Supply air of the zones [kg/s], as their terminals choose it."""

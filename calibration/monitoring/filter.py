@@ -27,7 +27,8 @@ LEVEL_WALK = 0.05
 #: Deviation of what days off differ by, over that of a day's errors [-].
 _DAYS_OFF = 1.0
 
-#: Growth of a parameter in a day over the deviation of its prior [-]: a tenth in a year, as things age.
+#: Growth of a parameter in a day over the deviation of its prior [-]: a tenth in a year, as things age. Strengths that
+#: may jump do not: a window whose prior is 2 m² wide would age by the area of one left ajar, and hide it within days.
 _AGEING = 0.1 / np.sqrt(365.0)
 
 #: Squared innovation of a day over its expectation from which the day moves states by less [-]: a day unlike all others
@@ -139,7 +140,8 @@ class DayFilter:
         self.deviation = np.sqrt(np.diag(self.noise))
         prior = np.array([c.spread for c in columns])
         one = np.ones(self.days.errors.shape[1])
-        self._drift = np.concatenate([(_AGEING * prior) ** 2, (self.walk * self.deviation) ** 2, 0.0 * one])
+        ages = np.where([c.may_change for c in columns], 0.0, _AGEING * prior)
+        self._drift = np.concatenate([ages**2, (self.walk * self.deviation) ** 2, 0.0 * one])
         away = np.array([c.away for c in columns])
         spread = np.concatenate([prior**2, self.deviation**2, (_DAYS_OFF * self.deviation) ** 2])
         self._first = State(np.concatenate([away, 0.0 * one, 0.0 * one]), np.diag(spread))

@@ -24,11 +24,14 @@ from calibration.results import Axes, Result, plain
 from thermal._types import BoolArray
 from thermal.case.case import Case
 from thermal.effects.catalogue import CATALOGUE
-from thermal.inputs.normalisation import fit_normalisation
-from thermal.inputs.provider import telemetry_inputs
+from thermal.inputs.normalisation import Normalisation, fit_normalisation
+from thermal.inputs.provider import InputProvider, telemetry_inputs
 
 #: First weeks that are taken for sound by default, and the fewest days that can be [d].
 REFERENCE_DAYS, _FEWEST_DAYS = 42, 14
+
+#: Days whose mean temperature of a zone is usual for the season [d]: a week, so that days off are in it.
+_SEASON = 7
 
 #: Zones beyond which a day has too many errors for one covariance.
 _MOST_ZONES = 40
@@ -219,9 +222,7 @@ def monitor(
     given = ModelSettings(**read_settings(parameters)) if parameters is not None else ModelSettings()
     made = replace(given, effects={}, dx=chosen.dx if chosen.dx is not None else given.dx)
     models = ModelComparison(case, made, [reference], horizon=chosen.horizon)
-    # a window of every zone stands open in the signal, so that its strength is the area that does
-    models.drivers = telemetry_inputs(case, fit_normalisation(case, [(reference.start, reference.end)]))
-    models.drivers.openings = np.ones_like(models.drivers.openings)
+    models.drivers = _with_windows(case, fit_normalisation(case, [(reference.start, reference.end)]))
     untestable = models.untestable()
     said = reasons_of(chosen.known or (), chosen.ruled_out, untestable)
     untestable |= {e: said[e] for e in chosen.ruled_out}
@@ -245,6 +246,23 @@ def monitor(
         case.building.name, course.events, course, days, reference, watched, chosen, source,
         time.perf_counter() - began,
     )  # fmt: skip
+
+
+def _with_windows(case: Case, normalisation: Normalisation) -> InputProvider:
+    """Read the inputs, and let a window of every zone stand open in them, so that its strength is the area that does.
+
+    Air leaves at what is usual for the season: the mean of the week before at the same time of the day. Temperatures of
+    the day itself would hand the model the errors that it is to be judged by.
+    """
+    drivers, seasonal = telemetry_inputs(case, normalisation), telemetry_inputs(case, normalisation)
+    drivers.openings = np.ones_like(drivers.openings)
+    if drivers.gives("through_windows"):
+        zone, stamps = case.zone_temperatures(), case.stamps
+        at_this_time = zone.groupby([stamps.hour, stamps.minute, stamps.second])
+        week = at_this_time.transform(lambda of: of.shift().rolling(_SEASON, min_periods=1).mean())
+        seasonal.usual = np.where(week.notna(), week, seasonal.usual)
+        drivers.through_windows = seasonal.through_windows
+    return drivers
 
 
 def _reference(case: Case, settings: MonitorSettings) -> Interval:

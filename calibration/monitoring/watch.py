@@ -27,8 +27,9 @@ from thermal._types import FloatArray, IntArray
 #: Days since when a change is sought: each of the last ones, then one in three, up to the longest [d].
 _EACH, _THIRD, _LONGEST = 14, 3, 21
 
-#: Sizes of a change over the deviation of its prior [-]; their evidence is averaged.
-_SIZES = (1.0, 0.3)
+#: Sizes of a change over the deviation of its prior [-]; their evidence is averaged. A window's prior is 2 m² wide,
+#: one left ajar has a thirtieth of it and would count as far-fetched. Half decades, so that none is far from one.
+_SIZES = (1.0, 0.3, 0.1, 0.03)
 
 #: Prior weight of heat that names no cause, beside all that have a name [-].
 _UNKNOWN = 0.01
@@ -232,9 +233,11 @@ class Watch:
         self._score += (innovation.white @ white).reshape(t, k)
         self._information += (white**2).sum(axis=0).reshape(t, k)
         before = self.log_ratio
-        self.log_ratio = self._ratios(self.dispersion.at(day))
+        which = np.arange(self.log_ratio.shape[1])
+        varies = self.dispersion.at(day)[self._place(which)]
+        self.log_ratio = self._ratios(which, varies)
         self._top = np.maximum(self._top, self.log_ratio - before)
-        return self._judge()
+        return self._judge(varies)
 
     def size(self, start: int, number: int) -> float:
         """Likeliest size of a change since a day [estimation scale].
@@ -261,30 +264,45 @@ class Watch:
             held = getattr(self, name)
             setattr(self, name, np.vstack([held[kept], np.zeros((1, held.shape[1]))]))
 
-    def _ratios(self, ratio_of_variances: FloatArray) -> FloatArray:
-        """Logarithms of the likelihood ratios, by start and change; the ends of earlier changes last."""
-        score, information = self._score / ratio_of_variances, self._information / ratio_of_variances
+    def _ratios(self, which: IntArray, varies: FloatArray) -> FloatArray:
+        """Logarithms of the likelihood ratios by start, of changes and, after them, ends of those that were found.
+
+        Each with a ratio of variances of its own.
+        """
+        at, k = self._place(which), self.what.which.size
+        score, information = self._score[:, at] / varies, self._information[:, at] / varies
         parts = []
         for size in _SIZES:
-            spread = size * self._deviation
+            spread = size * self._deviation[at]
             sharp = information + spread**-2.0
             ratio = 0.5 * score**2 / sharp - 0.5 * np.log1p(information * spread**2)
             # half of the normal distribution where a strength can only grow
-            ratio = ratio + np.where(self._grows, np.log(2.0) + log_ndtr(score / np.sqrt(sharp)), 0.0)
+            ratio = ratio + np.where(self._grows[at], np.log(2.0) + log_ndtr(score / np.sqrt(sharp)), 0.0)
             parts.append(ratio)
         begun = logsumexp(np.array(parts), axis=0) - np.log(len(parts))
-        over = [-size * score[:, [i]] - 0.5 * size**2 * information[:, [i]] for i, size in self.ends]
-        return np.hstack([begun, *over])
+        lost = np.concatenate([np.zeros(k), [size for _, size in self.ends]])[which]
+        return np.asarray(np.where(which < k, begun, -lost * score - 0.5 * lost**2 * information))
 
-    def _judge(self) -> Alarm:
-        """Weigh all changes and starts."""
+    def _place(self, which: IntArray) -> IntArray:
+        """Place among what is sought of changes and ends."""
+        return np.array([*range(self.what.which.size), *(i for i, _ in self.ends)], dtype=np.int64)[which]
+
+    def _judge(self, varies: FloatArray) -> Alarm:
+        """Weigh all changes and starts.
+
+        Names are told apart in pairs with the likeliest change, each pair by one noise, the larger of the two: a
+        change whose direction varies a little more from day to day is no less likely to be the name.
+        """
         share = _ENDS if self.ends else 0.0
         ends = np.full(len(self.ends), share / max(1, len(self.ends)))
-        weight = np.concatenate([(1.0 - share) * self.what.weight, ends])
         with np.errstate(divide="ignore"):
-            told = self.log_ratio - np.maximum(0.0, self._top - self.cap) + np.log(weight)
-        whole = float(logsumexp(told))
-        probability = np.exp(logsumexp(told, axis=0) - whole)
-        k = self.what.which.size
-        start = int(self.starts[np.argmax(logsumexp(told, axis=1))])
-        return Alarm(whole, start, probability[:k], probability[k:])
+            weight = np.log(np.concatenate([(1.0 - share) * self.what.weight, ends]))
+        told = self.log_ratio - np.maximum(0.0, self._top - self.cap) + weight
+        likeliest = np.argmax(logsumexp(told, axis=0))
+        which, k = np.arange(weight.size), self.what.which.size
+        pair = np.maximum(varies, varies[likeliest])
+        beside = logsumexp(self._ratios(np.full_like(which, likeliest), pair), axis=0)
+        named = self._ratios(which, pair) - beside + weight
+        probability = np.exp(logsumexp(named, axis=0) - logsumexp(named))
+        start = int(self.starts[np.argmax(logsumexp(named, axis=1))])
+        return Alarm(float(logsumexp(told)), start, probability[:k], probability[k:])

@@ -12,11 +12,12 @@ import pandas as pd
 import pytest
 
 from calibration.errors import CalibrationError, HorizonError, NotEnoughDataError
-from calibration.monitoring.monitor import Monitoring, MonitorSettings, monitor
+from calibration.monitoring.monitor import Monitoring, MonitorSettings, _with_windows, monitor
 from mpc.reports.monitoring import monitoring_verdict, write_monitoring
 from thermal.case.case import Case
 from thermal.data import load_bundled_case
 from thermal.errors import EffectError
+from thermal.inputs.normalisation import fit_normalisation
 from thermal.pilot.twin import TwinRanges, TwinSettings, generate_twin
 
 DAYS, REFERENCE, CHANGED = 42, 21, 31
@@ -95,6 +96,21 @@ def test_days_without_a_run_are_told(quiet: Case) -> None:
     missed = watched["days_without_a_run"]
     expected = f"Nothing has changed in {watched['days']} days that were watched. {missed} days more had no usable run."
     assert monitoring_verdict(result) == expected
+
+
+def test_open_windows_lose_air_of_the_season(quiet: Case) -> None:
+    """A zone that is 5 K warmer later loses as much more through a window; a day alone says nothing of itself."""
+    frame, names = quiet.telemetry.frame.copy(), list(quiet.building.zone_names)
+    late = frame.index >= frame.index[0].normalize() + pd.DateOffset(days=CHANGED)
+    columns = [f"VAV_{zone}/zone_air_temperature_sensor" for zone in names]
+    frame.loc[late, columns] += 5.0
+    warmer = Case(quiet.building, replace(quiet.telemetry, frame=frame))
+    reference = fit_normalisation(quiet, [(quiet.stamps[0], quiet.stamps[0] + pd.Timedelta(days=REFERENCE))])
+    cold = [_with_windows(case, reference).through_windows for case in (quiet, warmer)]
+    day = np.asarray((quiet.stamps - quiet.stamps[0].normalize()).days)
+    assert cold[1][day <= CHANGED - 1] == pytest.approx(cold[0][day <= CHANGED - 1])
+    assert cold[1][day == CHANGED] == pytest.approx(cold[0][day == CHANGED])
+    assert (cold[1][day > CHANGED + 8] < cold[0][day > CHANGED + 8] - 5.0 * 0.05).all()  # 0.05 m/s in still air at 0 K
 
 
 def test_what_is_in_the_model_is_watched(quiet: Case) -> None:

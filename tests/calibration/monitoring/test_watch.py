@@ -11,6 +11,7 @@ from calibration.monitoring.course import NAMING_DAYS, follow
 from calibration.monitoring.days import ONSET, Column, Days
 from calibration.monitoring.filter import DayFilter, noise_of
 from calibration.monitoring.watch import Dispersion, Watch, sought
+from thermal._types import FloatArray
 
 N_ERROR, REFERENCE = 6, 30
 
@@ -189,3 +190,40 @@ def test_days_that_show_nothing_are_refused() -> None:
     days.errors[5:REFERENCE] = np.nan
     with pytest.raises(NotEnoughDataError, match="30 reference days"):
         follow(days, REFERENCE)
+
+
+class Uneven(Dispersion):
+    """The days before varied three times as much in the direction of the second change."""
+
+    def at(self, day: int) -> FloatArray:
+        """Ratio of the variances."""
+        return np.array([1.0, 3.0])
+
+
+def test_names_are_told_apart_by_one_noise() -> None:
+    """Two changes that do the same to the errors are as likely, whatever the days before were like."""
+    days = made(4, 12, 2.0, start=6)
+    days.slopes[:, :, 1] = days.slopes[:, :, 0]
+    filtered, what = DayFilter(days, 0.25 * np.eye(N_ERROR)), sought(days.columns)
+    state = filtered.start()
+    watch = Watch(what, state.mean.size, Uneven(len(days), what.which.size))
+    for day in range(len(days)):
+        state, innovation = filtered.step(state, day)
+        assert innovation is not None
+        alarm = watch.take(day, days, innovation)
+    assert watch.log_ratio[6, 0] > watch.log_ratio[6, 1] + 1.0
+    assert alarm.share == pytest.approx([0.5, 0.5])
+
+
+def test_what_may_jump_does_not_age() -> None:
+    """Its changes are sought; a filter that lets it age takes a well-seen one for age within days."""
+    days = made(5, 40)
+    days.errors[1:] = np.nan
+    filtered = DayFilter(days, 0.25 * np.eye(N_ERROR))
+    state, _ = filtered.step(filtered.start(), 0)
+    first = np.diag(state.covariance)[:3]
+    for day in range(1, 40):
+        state, _ = filtered.step(state, day)
+    grown = np.diag(state.covariance)[:3] - first
+    assert grown[:2] == pytest.approx([0.0, 0.0])
+    assert grown[2] == pytest.approx(39 * (0.1 * 0.3) ** 2 / 365.0)
