@@ -8,6 +8,7 @@ from typing import Any
 
 import pandas as pd
 
+from calibration.diagnosis.baseline import fit_baseline
 from calibration.diagnosis.correction import CORRECTED, Correction, correct
 from calibration.diagnosis.decide.verdict import Verdict, chance_of, doubted, gains_of, judge
 from calibration.diagnosis.decide.where import DriftCurve, Where, drift_of, where_it_lies
@@ -325,7 +326,7 @@ def diagnose(
     untestable = models.untestable()
     untestable |= reasons_of(known, ruled_out, untestable)
     effects: dict[str, tuple[str, ...]] = {name: () for name in known}
-    baseline = models.fit(effects, [{}])
+    models, baseline = fit_baseline(models, effects, progress)
     first = errors = held_out(models, baseline)
     turns = elsewhere(baseline, first) and models.alternate(baseline.built.inputs)
     if turns:
@@ -394,5 +395,4 @@ def baseline_gap(
     CalibrationError
         When an interval has no usable run.
     """
-    models = ModelComparison(case, ModelSettings(dx=dx), tune, hold_out, horizon)
-    return float(held_out(models, models.fit({}, [{}])).mae)
+    return float(held_out(*fit_baseline(ModelComparison(case, ModelSettings(dx=dx), tune, hold_out, horizon), {})).mae)

@@ -80,6 +80,33 @@ def climb(drawn: FittedCase, began: float, progress: Progress | None = None) -> 
     return replace(kept.result(began, progress), rungs=rungs, uncalibrated=drawn.uncalibrated(progress))
 
 
+def emitter_of(fitted: Fitted, given: Tuned, progress: Progress | None = None) -> Unknown:
+    """Find what a building as drawn is best taken to give its heat by, where the case does not say it.
+
+    Parameters
+    ----------
+    fitted : Fitted
+        As drawn, with all of that heat in the air.
+    given : Tuned
+        The case and its days.
+    progress : callable, optional
+        Called with stage, done, total.
+    """
+    ladder = _Ladder(given, progress, replace(given.calibration, starts=1))
+    if is_large(given.case.building.zone_names) or not ladder.guesses:
+        return "air"
+    looked = [ladder.look("drawn", fitted)]
+    looked += ladder.emitters(fitted, looked[0].left.mae)
+    best = looked[_best(looked, ADVANCE)]
+    if best.fit is None:
+        return "air"
+    # a drawing that is wrong altogether is better with anything slow
+    source = telemetry_inputs(given.case)
+    lumped = ladder.solve(replace(ladder.base, structure=Structure(lumped=True, sun=source.measured(IRRADIANCE))))
+    wrong = ladder.look("lumped", lumped.best).left.mae < best.left.mae
+    return "air" if wrong else best.fit.settings.structure.emitter
+
+
 class Tuned(Protocol):
     """A case with the days that tune, those that judge, and the settings of a fit."""
 
@@ -108,8 +135,9 @@ def climb_from(
     With heat that radiates, or that floors give, where the case does not say what heaters give it by; with outside
     films that follow the wind, and with slabs and furniture by zone, unless a lumped model halves the drawing's error;
     lumped, where the sun is a part of it if irradiance is measured; lumped, with a gain that recurs from day to day,
-    which is linear, so that a few Newton steps from the lumped estimate tell whether it is worth a fit; and where one
-    of these is kept, with floors that are heated, if nobody tried them, and with heat and weather moved in time.
+    which is linear, so that a few Newton steps from the lumped estimate tell whether it is worth a fit; lumped with
+    floors that are heated, where that alone is better than any drawing; and where one of these is kept, with heat and
+    weather moved in time.
 
     Parameters
     ----------
@@ -141,10 +169,9 @@ def climb_from(
         best = _best(looked, advance)
         if (found := looked[best].fit) is not None:
             base, fitted = found.settings, found.best
-    structure = Structure(lumped=True, sun=source.measured(IRRADIANCE), emitter=base.structure.emitter)
-    lumped = ladder.solve(replace(base, structure=structure))
-    beside = ladder.look("lumped", lumped.best, lumped)
-    drawn = beside.left.mae >= _WRONG * looked[best].left.mae
+    structure = Structure(lumped=True, sun=source.measured(IRRADIANCE), emitter=ladder.base.structure.emitter)
+    free = ladder.lumped(structure, looked[best].left.mae)
+    drawn = free[0].left.mae >= _WRONG * looked[best].left.mae
     if plain and drawn and source.gives("wind"):
         follows = replace(base, structure=replace(base.structure, wind_films=True))
         wind = _begun(given, follows, fitted)
@@ -155,9 +182,10 @@ def climb_from(
     if scopes and plain and drawn and not base.scopes and len(fitted.model.network.zones) > 1:
         zoned = ladder.solve(replace(base, scopes={**base.scopes, **scopes}), fitted)
         looked.append(ladder.look("zoned", zoned.best, zoned))
-    looked.append(beside)
-    recurring = replace(base, structure=replace(structure, recurring=True))
-    if days_of(given.tuned) >= _WEEK:
+    looked += free
+    lumped = free[_best(free, ADVANCE)].fit
+    if lumped is not None and days_of(given.tuned) >= _WEEK:
+        recurring = replace(lumped.settings, structure=replace(lumped.settings.structure, recurring=True))
         begun["recurring"] = recurring, lumped.best
         looked.append(ladder.look("recurring", _begun(given, *begun["recurring"])))
     best = _best(looked, advance)
@@ -166,7 +194,9 @@ def climb_from(
         looked[best] = ladder.look(looked[best].name, found.best, found)
     kept = looked[best]
     if kept.fit is not None and kept.fit.settings.structure.lumped and not kept.fit.settings.effects:
-        kept = ladder.further(looked, kept, kept.fit)
+        moved = replace(kept.fit.settings, effects={CLOCK: ()})
+        looked.append(ladder.tried("shifted", moved, kept.fit.best, _MOVED, kept.left.mae))
+        kept = kept if looked[-1].fit is None else looked[-1]
     rungs = tuple(Rung(each.name, each.left.mae, each.parameters, each is kept) for each in looked)
     return rungs, None if kept.fit is None else replace(kept.fit, left=kept.left), kept.left
 
@@ -237,18 +267,14 @@ class _Ladder:
         seen = [self.tried(kind, change, fitted, _PROMISED, error) for kind, change in changes]
         return [each for each in seen if each.fit is not None]
 
-    def further(self, looked: list[_Looked], kept: _Looked, fit: FittedCase) -> _Looked:
-        """Go on from a lumped model: with floors that are heated, and with heat and weather moved in time."""
-        if self.guesses and fit.settings.structure.emitter == "air":
-            floors = replace(fit.settings, structure=replace(fit.settings.structure, emitter="floor"))
-            seen = self.tried("lumped floor", floors, fit.best, _PROMISED, kept.left.mae)
-            if seen.fit is not None:
-                looked.append(seen)
-                if seen.left.mae < (1.0 - ADVANCE) * kept.left.mae:
-                    kept, fit = seen, seen.fit
-        seen = self.tried("shifted", replace(fit.settings, effects={CLOCK: ()}), fit.best, _MOVED, kept.left.mae)
-        looked.append(seen)
-        return kept if seen.fit is None else seen
+    def lumped(self, structure: Structure, error: float) -> list[_Looked]:
+        """Fit a lumped model, and another with heated floors if they promise anything and no drawing is as good."""
+        found = self.solve(replace(self.base, structure=structure))
+        looked = [self.look("lumped", found.best, found)]
+        if self.guesses and looked[0].left.mae < error:
+            floors = replace(found.settings, structure=replace(structure, emitter="floor"))
+            looked.append(self.tried("lumped floor", floors, found.best, _PROMISED, looked[0].left.mae))
+        return [each for each in looked if each.fit is not None]
 
 
 def _begun(given: Tuned, settings: CalibrationSettings, known: Fitted) -> Known:

@@ -31,11 +31,15 @@ class Emitter:
         What they give it by, if not to the air.
     devices
         Their positions in `Building.devices`.
+    share
+        Part of the zone's heat that is taken for theirs where nothing but that is known of it [-]: equal parts of its
+        heaters, none where air brings heat too, which nobody could tell from it.
     """
 
     zone: str
     kind: Kind
     devices: tuple[int, ...]
+    share: float = 1.0
 
     @property
     def sides(self) -> tuple[str, ...]:
@@ -84,7 +88,12 @@ def emitters_of(building: Building, unknown: Unknown = "air") -> tuple[Emitter, 
         kind = device.emitter or f"unknown_{unknown}"
         if is_heater(device) and not kind.endswith("air"):
             found.setdefault((str(device.zone), kind), []).append(number)
-    return tuple(Emitter(zone, cast(Kind, kind), tuple(own)) for (zone, kind), own in found.items())
+    made = []
+    for (zone, kind), own in found.items():
+        beside = building.devices_of(zone)
+        share = len(own) / len(beside) if all(map(is_heater, beside)) else 0.0
+        made.append(Emitter(zone, cast(Kind, kind), tuple(own), share))
+    return tuple(made)
 
 
 def power_by_device(building: Building, frame: pd.DataFrame, power: pd.DataFrame) -> pd.DataFrame:

@@ -117,6 +117,7 @@ def add_emitters(graph: GraphBuilder, emitters: Sequence[Emitter]) -> None:
             emitter.devices,
             Signal.made(name, "W", _emitted, "emitted", given=given),
             Signal.made(f"change of {name}", "W/h", _emitted_rate, "emitted_rate", given=given),
+            emitter.share,
             tuple(parts),
         )
         graph.anatomy.rooms[room.name] = replace(room, emitted=(*room.emitted, emission))

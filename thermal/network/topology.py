@@ -120,6 +120,8 @@ class Emission:
         Their positions in the building's devices.
     signal, rate : Signal
         Their heat [W], and its change [W/h].
+    share_of_zone : float
+        Their part of the zone's heat where that alone is known [-].
     parts : tuple of (casadi.SX, ndarray of int, ndarray)
         Share of it, nodes, and their weights in it [-]: what surfaces and layers get, and the air the less; sums to 0.
     """
@@ -127,6 +129,7 @@ class Emission:
     devices: tuple[int, ...]
     signal: Signal
     rate: Signal
+    share_of_zone: float
     parts: tuple[tuple[ca.SX, IntArray, FloatArray], ...]
 
 

@@ -17,6 +17,8 @@ from thermal import Building, SymbolicModel, ThermalNetwork, ZoneTable, build_ne
 from thermal.case.building import Commanded, Device, Layer, Location, Surface, ZoneEntry
 from thermal.effects.catalogue import chosen
 from thermal.inputs.provider import InputProvider
+from thermal.model.modal import modal_model
+from thermal.model.reduce import reduced_model
 from thermal.network.emitters import pipes_at, shared_at
 from thermal.network.structure import Structure
 from thermal.units import air_density
@@ -226,3 +228,19 @@ def test_priors_are_as_wide_as_the_geometry_leaves_them() -> None:
     assert {p.member for p in zoned.parameters if p.base == "screed_heat_capacity_multiplier"} == {"room", "hall"}
     key = next(c for c in zoned.capacities if c.name == "screed@hall")
     assert ca.depends_on(key.value, zoned.symbols)
+
+
+def test_planned_heat_reaches_the_layer_too() -> None:
+    """Modes that a controller predicts with: heat of zones and the signals that follow from it are one matrix."""
+    network = build_network(house("floor"), effects=chosen({"flow_gain": ()}))
+    grid = SymbolicModel(network)
+    matrices = reduced_model(grid, [network.start()]).matrices(network.start())
+    modes, heat = modal_model(matrices), np.array([700.0, 300.0])
+    signals = network.emitted @ heat
+    assert signals.tolist() == [700.0, 300.0, 0.0, 0.0]
+    apart = modes.heating @ heat + modes.boundary[:, len(network.boundaries) :] @ signals
+    assert np.abs(modes.heated_by_devices @ heat - apart).max() < 1e-9 * np.abs(apart).max()
+    assert modes.uniform @ modes.heated_by_devices == pytest.approx([1.0, 1.0], abs=1e-9)
+    shared = house("floor")
+    beside = replace(shared, devices=(*shared.devices, Device(name="V", type="vav", zone="room")))
+    assert build_network(beside).emitted.tolist() == [[0.0, 0.0], [0.0, 1.0]]
