@@ -73,7 +73,7 @@ def _devices_of_zones(building: Building) -> FloatArray:
     for number, device in enumerate(building.devices):
         if is_heater(device):
             parts[building.zone_names.index(str(device.zone)), number] = 1.0
-    return parts / np.maximum(parts.sum(axis=1, keepdims=True), 1.0)
+    return np.asarray(parts / np.maximum(parts.sum(axis=1, keepdims=True), 1.0))
 
 
 class EffectSignals:

@@ -75,7 +75,7 @@ class ForecastSignals:
         """
         n, inputs = len(forecast.table), self._inputs(forecast)
         values = np.zeros((n, len(self.network.signals)))
-        unknown, planned = [], self.network.emitted.any(axis=1)
+        unknown, planned = [], np.asarray(self.network.emitted.any(axis=1))
         for k, signal in enumerate(self.network.signals):
             if planned[k]:
                 continue
