@@ -40,6 +40,9 @@ _WRONG = 0.5
 #: electric heaters up to 0.05 (house trials, nulls of seeds 0, 1, 8, 15 and 20).
 _PROMISED = 0.05
 
+#: What heaters of which nobody says it may give their heat by beside the air, that with most parameters first.
+_EMITTERS: tuple[Unknown, Unknown] = ("floor", "radiator")
+
 #: Tuning days from which a gain that recurs from day to day is looked for [days]: it has to recur.
 _WEEK = 7.0
 
@@ -261,11 +264,17 @@ class _Ladder:
         return self.look(name, found.best, found)
 
     def emitters(self, fitted: Fitted, error: float) -> list[_Looked]:
-        """Look at heat that radiates in part, and at heat of floors, as far as they promise anything."""
-        kinds: tuple[Unknown, ...] = ("radiator", "floor")
-        changes = [(kind, replace(self.base, structure=replace(self.base.structure, emitter=kind))) for kind in kinds]
-        seen = [self.tried(kind, change, fitted, _PROMISED, error) for kind, change in changes]
-        return [each for each in seen if each.fit is not None]
+        """Look at heat that floors give and radiators too, as far as it promises anything; then at radiators alone."""
+        floor, radiator = (
+            replace(self.base, structure=replace(self.base.structure, emitter=kind)) for kind in _EMITTERS
+        )
+        seen = self.tried("floor", floor, fitted, _PROMISED, error)
+        if seen.fit is None:
+            return []
+        if seen.left.mae >= (1.0 - ADVANCE) * error:
+            return [seen]
+        simpler = self.solve(radiator)
+        return [self.look("radiator", simpler.best, simpler), seen]
 
     def lumped(self, structure: Structure, error: float) -> list[_Looked]:
         """Fit a lumped model, and another with heated floors if they promise anything and no drawing is as good."""
