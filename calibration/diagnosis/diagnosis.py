@@ -8,6 +8,7 @@ from typing import Any
 
 import pandas as pd
 
+from calibration.diagnosis.baseline import fit_baseline
 from calibration.diagnosis.correction import CORRECTED, Correction, correct
 from calibration.diagnosis.decide.verdict import Verdict, chance_of
 from calibration.diagnosis.decide.where import DriftCurve, Where, drift_of, where_it_lies
@@ -359,5 +360,4 @@ def baseline_gap(
     CalibrationError
         When an interval has no usable run.
     """
-    models = ModelComparison(case, ModelSettings(dx=dx), tune, hold_out, horizon)
-    return float(held_out(models, models.fit({}, [{}])).mae)
+    return float(held_out(*fit_baseline(ModelComparison(case, ModelSettings(dx=dx), tune, hold_out, horizon), {})).mae)

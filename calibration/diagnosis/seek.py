@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
+from calibration.diagnosis.baseline import fit_baseline
 from calibration.diagnosis.decide.verdict import Verdict, doubted, gains_of, judge
 from calibration.diagnosis.faults import Fault, mend, with_faults
 from calibration.diagnosis.free import Free, drawing_fails, search_free, with_recurring
@@ -170,7 +171,7 @@ def seek(
     untestable = models.untestable()
     untestable |= reasons_of(known, ruled_out, untestable)
     effects: dict[str, tuple[str, ...]] = {name: () for name in known}
-    baseline = models.fit(effects, [{}])
+    models, baseline = fit_baseline(models, effects, progress)
     first = errors = held_out(models, baseline)
     turns = elsewhere(baseline, first) and models.alternate(baseline.built.inputs)
     if turns:

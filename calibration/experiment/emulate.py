@@ -16,6 +16,7 @@ from calibration.experiment.members import Member
 from calibration.experiment.schedule import STATIC_PRESSURE, SUPPLY_AIR, Schedule
 from thermal._types import FloatArray
 from thermal.case.commands import air_column
+from thermal.case.emitters import is_heater
 from thermal.case.points import HEATING_POWER, SUPPLY_FLOW
 from thermal.inputs.provider import HVAC_INPUTS, InputProvider, telemetry_inputs
 from thermal.inputs.signals import signal_values
@@ -189,15 +190,19 @@ class Emulator:
         states, boundary = states - _REFERENCE * matrices.uniform[:, None], inputs.boundary - _REFERENCE
         stepper, n = Stepper(matrices, inputs.step, fit.settings.stepping), len(self.zones)
         unit = np.hstack([np.zeros((n, 1)), np.eye(n)])
+        emitted = fit.built.network.emitted  # goes with the heat, which is to be found
+        first_signal = boundary.shape[1] - len(emitted)
+        boundary[:, first_signal:][:, emitted.any(axis=1)] = 0.0
         low, high = self.capacity
         moved = np.isfinite(asked[:, :, 0])
         still = np.array([z not in self.movable for z in self.zones])
         zone, heat = np.empty((len(asked), n)), np.empty((len(asked), n))
         for k in range(len(asked)):
             row = first + k
-            columns = np.repeat(states, n + 1, axis=1)
+            columns, outside = np.repeat(states, n + 1, axis=1), np.repeat(boundary[row][:, None], n + 1, axis=1)
+            outside[first_signal:, 1:] += 1000.0 * emitted
             ends, means, _, _ = stepper.advance(
-                columns, np.repeat(boundary[row][:, None], n + 1, axis=1), 1000.0 * unit,
+                columns, outside, 1000.0 * unit,
                 np.repeat(inputs.airflow[row][:, None], n + 1, axis=1) if inputs.airflow.shape[1] else None,
             )  # fmt: skip
             seen = np.asarray(matrices.output @ ends) + _REFERENCE
@@ -259,6 +264,13 @@ class Emulator:
         names = ("heat", "supply_flow", "supply_heat", "airflow")
         made = {name: base.series[name].copy() for name in names}
         made["heat"][rows] = heat
+        if "emitted" in base.series:
+            made["emitted"] = base.series["emitted"].copy()
+            for number, device in enumerate(building.devices):
+                if is_heater(device) and device.zone not in self.flows:
+                    i = building.zone_names.index(str(device.zone))
+                    beside = len(building.devices_of(str(device.zone)))
+                    made["emitted"][rows, number] += (heat[:, i] - self.heat[rows, i]) / beside
         for i, name in enumerate(self.zones):
             if name in self.flows:
                 own = made["supply_flow"][rows, i].copy()

@@ -1,5 +1,7 @@
 """Ladder of structures, from as drawn to lumped with a factor for every zone and pair; left-out tuning days choose."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
@@ -13,6 +15,7 @@ from calibration.fit.left_out import Fitted, Known, LeftOut, begin_at, left_out
 from calibration.fit.problem import tuning_problem
 from calibration.fit.result import CalibrationResult, Rung
 from thermal.case.case import Case
+from thermal.case.emitters import Unknown, unknown_heaters
 from thermal.inputs.provider import IRRADIANCE, telemetry_inputs
 from thermal.model.reduce import reduced_model
 from thermal.network.structure import BASELINE, Structure
@@ -31,6 +34,14 @@ CLOCK, _MOVED = "clock_shift", 0.05
 
 #: Share of the drawing's error on left-out days below which a lumped model's says that more than masses is wrong [-].
 _WRONG = 0.5
+
+#: Share by which Newton steps from another structure's estimate must promise to predict left-out days better, for what
+#: heat is given by to be fitted [-]: simulated houses with heated floors promise 0.1 to 0.7, those with radiators and
+#: electric heaters up to 0.05 (house trials, nulls of seeds 0, 1, 8, 15 and 20).
+_PROMISED = 0.05
+
+#: What heaters of which nobody says it may give their heat by beside the air, that with most parameters first.
+_EMITTERS: tuple[Unknown, Unknown] = ("floor", "radiator")
 
 #: Tuning days from which a gain that recurs from day to day is looked for [days]: it has to recur.
 _WEEK = 7.0
@@ -72,6 +83,33 @@ def climb(drawn: FittedCase, began: float, progress: Progress | None = None) -> 
     return replace(kept.result(began, progress), rungs=rungs, uncalibrated=drawn.uncalibrated(progress))
 
 
+def emitter_of(fitted: Fitted, given: Tuned, progress: Progress | None = None) -> Unknown:
+    """Find what a building as drawn is best taken to give its heat by, where the case does not say it.
+
+    Parameters
+    ----------
+    fitted : Fitted
+        As drawn, with all of that heat in the air.
+    given : Tuned
+        The case and its days.
+    progress : callable, optional
+        Called with stage, done, total.
+    """
+    ladder = _Ladder(given, progress, replace(given.calibration, starts=1))
+    if is_large(given.case.building.zone_names) or not ladder.guesses:
+        return "air"
+    looked = [ladder.look("drawn", fitted)]
+    looked += ladder.emitters(fitted, looked[0].left.mae)
+    best = looked[_best(looked, ADVANCE)]
+    if best.fit is None:
+        return "air"
+    # a drawing that is wrong altogether is better with anything slow
+    source = telemetry_inputs(given.case)
+    lumped = ladder.solve(replace(ladder.base, structure=Structure(lumped=True, sun=source.measured(IRRADIANCE))))
+    wrong = ladder.look("lumped", lumped.best).left.mae < best.left.mae
+    return "air" if wrong else best.fit.settings.structure.emitter
+
+
 class Tuned(Protocol):
     """A case with the days that tune, those that judge, and the settings of a fit."""
 
@@ -97,10 +135,11 @@ def climb_from(
 ) -> tuple[tuple[Rung, ...], FittedCase | None, LeftOut]:
     """Fit further structures beside a fitted model; the simplest is kept that predicts left-out days about best.
 
-    With outside films that follow the wind, and with slabs and furniture by zone, unless a lumped model halves the
-    drawing's error; lumped, where the sun is a part
-    of it if irradiance is measured; lumped, with a gain that recurs from day to day, which is linear, so that a few
-    Newton steps from the lumped estimate tell whether it is worth a fit; and where one of these is kept, with heat and
+    With heat that radiates, or that floors give, where the case does not say what heaters give it by; with outside
+    films that follow the wind, and with slabs and furniture by zone, unless a lumped model halves the drawing's error;
+    lumped, where the sun is a part of it if irradiance is measured; lumped, with a gain that recurs from day to day,
+    which is linear, so that a few Newton steps from the lumped estimate tell whether it is worth a fit; lumped with
+    floors that are heated, where that alone is better than any drawing; and where one of these is kept, with heat and
     weather moved in time.
 
     Parameters
@@ -121,57 +160,59 @@ def climb_from(
     tuple
         The rungs; what is kept, or None where that is the fitted model; and the days left out by what is kept.
     """
-    base, spin_up = replace(given.calibration, starts=1), given.calibration.spin_up_seconds
-
-    def look(name: str, found: Fitted, fit: FittedCase | None = None) -> _Looked:
-        return _Looked(name, left_out(found, given.tuned, spin_up), len(found.problem.free), fit)
-
-    def solve(settings: CalibrationSettings, known: Fitted | None = None) -> FittedCase:
-        found = fit_case(given.case, given.tuned, given.judged, settings, progress, known)
-        found.raise_if_interrupted()
-        return found
-
+    ladder = _Ladder(given, progress, replace(given.calibration, starts=1))
+    base = ladder.base
     begun: dict[str, tuple[CalibrationSettings, Fitted]] = {}  # structures that are looked at before they are fitted
     source = telemetry_inputs(given.case)
-    structure = Structure(lumped=True, sun=source.measured(IRRADIANCE))
-    lumped = solve(replace(base, structure=structure))
-    looked, beside = [look(name, fitted)], look("lumped", lumped.best, lumped)
     parameters = fitted.problem.grid.network.parameters
-    plain, drawn = all(p.effect is None for p in parameters), beside.left.mae >= _WRONG * looked[0].left.mae
+    plain = all(p.effect is None for p in parameters)
+    looked, best = [ladder.look(name, fitted)], 0
+    if plain and ladder.guesses:
+        looked += ladder.emitters(fitted, looked[0].left.mae)
+        best = _best(looked, advance)
+        if (found := looked[best].fit) is not None:
+            base, fitted = found.settings, found.best
+    structure = Structure(lumped=True, sun=source.measured(IRRADIANCE), emitter=ladder.base.structure.emitter)
+    free = ladder.lumped(structure, looked[best].left.mae)
+    drawn = free[0].left.mae >= _WRONG * looked[best].left.mae
     if plain and drawn and source.gives("wind"):
         follows = replace(base, structure=replace(base.structure, wind_films=True))
         wind = _begun(given, follows, fitted)
-        if (seen := look("wind", wind)).left.mae < looked[0].left.mae:
+        if (seen := ladder.look("wind", wind)).left.mae < looked[best].left.mae:
             looked.append(seen)
             begun["wind"], base, fitted = (follows, fitted), follows, wind
     scopes: dict[str, Scope] = {p.base: "zone" for p in parameters if p.base in MASSES}
     if scopes and plain and drawn and not base.scopes and len(fitted.model.network.zones) > 1:
-        zoned = solve(replace(base, scopes={**base.scopes, **scopes}), fitted)
-        looked.append(look("zoned", zoned.best, zoned))
-    looked.append(beside)
-    recurring = replace(base, structure=replace(structure, recurring=True))
-    if days_of(given.tuned) >= _WEEK:
+        zoned = ladder.solve(replace(base, scopes={**base.scopes, **scopes}), fitted)
+        looked.append(ladder.look("zoned", zoned.best, zoned))
+    looked += free
+    lumped = free[_best(free, ADVANCE)].fit
+    if lumped is not None and days_of(given.tuned) >= _WEEK:
+        recurring = replace(lumped.settings, structure=replace(lumped.settings.structure, recurring=True))
         begun["recurring"] = recurring, lumped.best
-        looked.append(look("recurring", _begun(given, *begun["recurring"])))
+        looked.append(ladder.look("recurring", _begun(given, *begun["recurring"])))
+    best = _best(looked, advance)
+    if looked[best].name in begun:
+        found = ladder.solve(*begun[looked[best].name])
+        looked[best] = ladder.look(looked[best].name, found.best, found)
+    kept = looked[best]
+    if kept.fit is not None and kept.fit.settings.structure.lumped and not kept.fit.settings.effects:
+        moved = replace(kept.fit.settings, effects={CLOCK: ()})
+        looked.append(ladder.tried("shifted", moved, kept.fit.best, _MOVED, kept.left.mae))
+        kept = kept if looked[-1].fit is None else looked[-1]
+    rungs = tuple(Rung(each.name, each.left.mae, each.parameters, each is kept) for each in looked)
+    return rungs, None if kept.fit is None else replace(kept.fit, left=kept.left), kept.left
+
+
+def _best(looked: Sequence[_Looked], advance: float) -> int:
+    """Which of some structures, the simplest first, predicts left-out days so much better that it is kept."""
     best = 0
     for number, other in enumerate(looked):
         # films that follow the wind have no more parameters
         least = 0.0 if other.name == "wind" else ADVANCE if best else advance
         if other.left.mae < (1.0 - least) * looked[best].left.mae:
             best = number
-    if looked[best].name in begun:
-        found = solve(*begun[looked[best].name])
-        looked[best] = look(looked[best].name, found.best, found)
-    kept = looked[best]
-    if kept.fit is not None and kept.fit.settings.structure.lumped and not kept.fit.settings.effects:
-        follows = replace(kept.fit.settings, effects={CLOCK: ()})
-        seen = look("shifted", _begun(given, follows, kept.fit.best))
-        if seen.left.mae < (1.0 - _MOVED) * kept.left.mae:
-            found = solve(follows, kept.fit.best)
-            seen = kept = look("shifted", found.best, found)
-        looked.append(seen)
-    rungs = tuple(Rung(each.name, each.left.mae, each.parameters, each is kept) for each in looked)
-    return rungs, None if kept.fit is None else replace(kept.fit, left=kept.left), kept.left
+    return best
 
 
 @dataclass(frozen=True)
@@ -182,6 +223,67 @@ class _Looked:
     left: LeftOut
     parameters: int
     fit: FittedCase | None
+
+
+@dataclass(frozen=True)
+class _Ladder:
+    """What structures are fitted to and looked at with."""
+
+    given: Tuned
+    progress: Progress | None
+    base: CalibrationSettings
+
+    def look(self, name: str, found: Fitted, fit: FittedCase | None = None) -> _Looked:
+        """Leave days out."""
+        left = left_out(found, self.given.tuned, self.base.spin_up_seconds)
+        return _Looked(name, left, len(found.problem.free), fit)
+
+    def solve(self, settings: CalibrationSettings, known: Fitted | None = None) -> FittedCase:
+        """Fit a structure."""
+        given = self.given
+        found = fit_case(given.case, given.tuned, given.judged, settings, self.progress, known)
+        found.raise_if_interrupted()
+        return found
+
+    @property
+    def guesses(self) -> bool:
+        """Whether there are plain heaters of which nobody says what they give their heat by."""
+        case = self.given.case
+        return self.base.structure.emitter == "air" and bool(unknown_heaters(case.building, case.telemetry.frame))
+
+    def tried(self, name: str, settings: CalibrationSettings, known: Fitted, least: float, error: float) -> _Looked:
+        """Look at a structure as it begins, and fit it where that promises to be better by a share.
+
+        Where heat goes elsewhere what is known of other parameters is wrong, so such a fit begins anew: from the
+        estimate with all heat in the air that of a house with heated floors ended at five times the error.
+        """
+        seen = self.look(name, _begun(self.given, settings, known))
+        if seen.left.mae >= (1.0 - least) * error:
+            return seen
+        found = self.solve(settings, known if settings.effects else None)
+        return self.look(name, found.best, found)
+
+    def emitters(self, fitted: Fitted, error: float) -> list[_Looked]:
+        """Look at heat that floors give and radiators too, as far as it promises anything; then at radiators alone."""
+        floor, radiator = (
+            replace(self.base, structure=replace(self.base.structure, emitter=kind)) for kind in _EMITTERS
+        )
+        seen = self.tried("floor", floor, fitted, _PROMISED, error)
+        if seen.fit is None:
+            return []
+        if seen.left.mae >= (1.0 - ADVANCE) * error:
+            return [seen]
+        simpler = self.solve(radiator)
+        return [self.look("radiator", simpler.best, simpler), seen]
+
+    def lumped(self, structure: Structure, error: float) -> list[_Looked]:
+        """Fit a lumped model, and another with heated floors if they promise anything and no drawing is as good."""
+        found = self.solve(replace(self.base, structure=structure))
+        looked = [self.look("lumped", found.best, found)]
+        if self.guesses and looked[0].left.mae < error:
+            floors = replace(found.settings, structure=replace(structure, emitter="floor"))
+            looked.append(self.tried("lumped floor", floors, found.best, _PROMISED, looked[0].left.mae))
+        return [each for each in looked if each.fit is not None]
 
 
 def _begun(given: Tuned, settings: CalibrationSettings, known: Fitted) -> Known:

@@ -227,4 +227,4 @@ def zone_response(model: BuildingModel, heat: FloatArray) -> FloatArray:
     none, signals = np.zeros(len(heat)), np.zeros(len(network.signals))
     model.reset(np.full(len(heat), REFERENCE_TEMPERATURE), boundary, signals)
     free = model.begin(none, boundary, signals)
-    return np.maximum((model.finish(heat, signals).reading - free) / heat, 1e-9)
+    return np.maximum((model.finish(heat, signals + network.emitted @ heat).reading - free) / heat, 1e-9)

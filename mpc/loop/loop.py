@@ -82,6 +82,9 @@ class PlantLoop:
         radiant = [f"{RADIANT}{zone}" for zone in scenario.zones]
         radiates = "radiant_heat" in system.heating and set(radiant) <= set(signals)
         self._radiant = [signals.index(name) for name in radiant] if radiates else []
+        rooms = model.network.anatomy.rooms
+        # where the case says what heaters give their heat by the model knows what becomes of it
+        self._unsaid = np.array([not rooms[zone].emitted for zone in scenario.zones])
         self._offset = sensor_offset(model)
         self._biased = bool(self._offset.any())
         self._reading = np.zeros(len(scenario.zones))
@@ -148,10 +151,12 @@ class PlantLoop:
         set_back = self._schedule.set_back[k]
         self._state, done = self.hvac.step(self._state, conditions, actions, self._seconds, set_back)
         heat = self.hvac.heat(done)
-        signals = effects.at(k, done.results[self._terminals].airflow, heat)
+        terminals = done.results[self._terminals]
+        by_heaters = heat - self.hvac.system.by_zone(terminals.heat)
+        signals = effects.at(k, terminals.airflow, heat, by_heaters)
         if self._radiant:
             signals = signals.copy()
-            signals[self._radiant] += self.hvac.heat(done, "radiant_heat")
+            signals[self._radiant] += self._unsaid * self.hvac.heat(done, "radiant_heat")
         mean, self._reading = self._model.finish(heat, signals)
         self._local.learn(self._reading)
         return PlantStep(k, conditions, actions, done, mean, self.air if self._biased else self._reading)

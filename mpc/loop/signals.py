@@ -10,6 +10,8 @@ from mpc.errors import PlantError
 from mpc.loop.building import BuildingModel
 from mpc.scenario.scenario import Scenario
 from thermal._types import FloatArray
+from thermal.case.building import Building
+from thermal.case.emitters import is_heater
 from thermal.case.points import OUTDOOR_TEMPERATURE
 from thermal.effects.effect import Chosen
 from thermal.inputs.live import LiveInputs
@@ -65,6 +67,15 @@ def _most_heat(system: HvacSystem) -> FloatArray:
     return np.asarray(AIR_HEAT_CAPACITY * flow * np.maximum(reached - _ROOM, 0.0))
 
 
+def _devices_of_zones(building: Building) -> FloatArray:
+    """Part of the heat of a zone's heaters that each gives, in equal parts, shape (n_zone, n_device) [-]."""
+    parts = np.zeros((len(building.zone_names), len(building.devices)))
+    for number, device in enumerate(building.devices):
+        if is_heater(device):
+            parts[building.zone_names.index(str(device.zone)), number] = 1.0
+    return np.asarray(parts / np.maximum(parts.sum(axis=1, keepdims=True), 1.0))
+
+
 class EffectSignals:
     """Signals of a network's effects, step by step.
 
@@ -97,8 +108,9 @@ class EffectSignals:
         if not counted.flow:
             counted = replace(counted, flow=flow, heat=heat, peak_flow=flow)
         self._now = LiveInputs(scenario.building, scenario.grid.step, counted)
+        self._by_device = _devices_of_zones(scenario.building)
         nothing = np.zeros(len(network.zones))
-        self._put(0, nothing, nothing)
+        self._put(0, nothing, nothing, nothing)
         for k, signal in enumerate(network.signals):
             if HVAC_INPUTS.isdisjoint(signal.inputs):
                 self._ahead.need(*signal.inputs)
@@ -109,11 +121,12 @@ class EffectSignals:
                 PlantError.unless(not lacking, "effects of the plant", expected, found, "leave that effect out")
                 self._live.append((k, signal))
 
-    def _put(self, k: int, flow: FloatArray, heat: FloatArray) -> None:
+    def _put(self, k: int, flow: FloatArray, heat: FloatArray, by_heaters: FloatArray) -> None:
         """Set what is known of a step while the loop runs."""
         row = {name: values[k : k + 1] for name, values in self._ahead.series.items()}
         brought = heat[None]
         row |= {"supply_flow": flow[None], "supply_heat": brought, "heat": brought}
+        row["emitted"] = by_heaters[None] @ self._by_device
         row["commanded"] = np.zeros((1, len(self._now.building.commanded)))  # all heat is the plant's own
         self._now.put(self._ahead.stamps[k : k + 1], row)
 
@@ -128,7 +141,7 @@ class EffectSignals:
         row: FloatArray = self._values[k]
         return row
 
-    def at(self, k: int, airflow: FloatArray, heat: FloatArray) -> FloatArray:
+    def at(self, k: int, airflow: FloatArray, heat: FloatArray, by_heaters: FloatArray) -> FloatArray:
         """Give the signals of a step, shape (n_signal,) [signal unit].
 
         Parameters
@@ -137,13 +150,13 @@ class EffectSignals:
             Number of the step.
         airflow : ndarray, shape (n_terminal,)
             Supply air of the terminals [kg/s].
-        heat : ndarray, shape (n_zone,)
-            That it brings to the zones [W].
+        heat, by_heaters : ndarray, shape (n_zone,)
+            That it brings to the zones, and the part of it that does not come with air [W].
         """
         row: FloatArray = self._values[k]
         if self._live:
             row = row.copy()
-            self._put(k, self._system.by_zone(airflow), heat)
+            self._put(k, self._system.by_zone(airflow), heat, by_heaters)
             for position, signal in self._live:
                 row[position] = signal.of(self._now)[0]
         return row

@@ -131,13 +131,27 @@ def _structure_sentences(result: CalibrationResult) -> list[str]:
     errors = ", ".join(f"{rung.name} {kelvin(rung.left_out_mae)} K" for rung in result.rungs)
     taken = evaluation.structure_words(result.rungs)
     how = "the simplest that predicts left-out tuning days within a tenth of the best"
-    sentences = [f"The building is taken {taken}, {how} ({errors})."]
+    sentences = [f"The building is taken {taken}, {how} ({errors}).", *_emitter_sentences(result)]
     far = result.against_drawing()
     named = [f"{in_words(f['what'])} ({f['factor']:.2g})" for f in far[:_MOST_FAR]]
     if named:
         rest = f" and {len(far) - len(named)} more" if len(far) > len(named) else ""
         sentences.append(f"Farthest from the drawing, as factors on it: {', '.join(named)}{rest}.")
     return sentences
+
+
+def _emitter_sentences(result: CalibrationResult) -> list[str]:
+    """Say what heaters give their heat by, where the case does not say it and the data do."""
+    if result.settings.structure.emitter == "air":
+        return []
+    values = {p.name: p.value for p in result.parameters}
+    floors = [name.partition("@")[2] for name, v in values.items() if name.startswith("floor_heat_share@") and v > 0.5]
+    radiant = f"{values['radiator_radiant_share']:.0%} of it radiates" if "radiator_radiant_share" in values else ""
+    if not floors:
+        return [f"Metered heat behaves as if radiators gave it: {radiant}."] if radiant else []
+    rest = len(floors) < sum(name.startswith("floor_heat_share@") for name in values)
+    other = f"; in the others as if radiators gave it ({radiant})" if rest and radiant else ""
+    return [f"Metered heat behaves as if the floor were heated in {', '.join(floors)}{other}."]
 
 
 def _change(before: float, after: float) -> str:

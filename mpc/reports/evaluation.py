@@ -125,11 +125,14 @@ def carried_sentence(carried: Carried | None) -> str:
 
 #: Structures in words.
 _STRUCTURES = {
+    "radiator": "as drawn, with heat that radiates in part",
+    "floor": "as drawn, with heat that floors give",
     "wind": "as drawn, with outside films that follow the wind",
     "zoned": "as drawn, with slabs and furniture of each zone's own",
     "lumped": "lumped into air and mass a zone",
     "recurring": "lumped into air and mass a zone, with a gain that recurs from day to day",
     "corrected": "with heat of unknown cause",
+    "lumped floor": "lumped into air, one mass and a heated floor a zone",
     "shifted": "lumped into air and mass a zone, with heat and weather moved in time",
 }
 

@@ -18,6 +18,9 @@ GeometryQuality = Literal["surveyed", "approximate", "generic"]
 FACADES = ("north", "east", "south", "west")
 DEVICE_TYPES = ("vav", "fan_coil", "electric_heater", "radiator", "supply_air_terminal", "ahu", "boiler", "chiller")
 
+#: What a device gives its heat by.
+Emitting = Literal["air", "radiator", "baseboard", "floor", "ceiling"]
+
 
 class Entry(BaseModel):
     """Base of the models: what is not named is refused, and nothing changes afterwards."""
@@ -57,12 +60,15 @@ class Device(Entry):
         The zone it serves; None for an air handler, a boiler.
     fed_by
         Devices that it gets air, water or steam from, such as the air handler and the boiler of a VAV terminal.
+    emitter
+        What it gives its heat by; None where that is not known.
     """
 
     name: Text
     type: Text
     zone: Text | None = None
     fed_by: tuple[Text, ...] = ()
+    emitter: Emitting | None = None
 
 
 class Airflow(Entry):

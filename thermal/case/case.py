@@ -12,6 +12,7 @@ import pandas as pd
 
 from thermal.case.building import OUTDOOR, Building
 from thermal.case.commands import command_signals, commanded_devices
+from thermal.case.emitters import power_by_device
 from thermal.case.estimated import Estimated, estimate_remarks, estimate_temperatures, like_others, long_gaps
 from thermal.case.metered_heat import estimate_parts, heat_parts, total_heat
 from thermal.case.points import OUTDOOR_TEMPERATURE, SUPPLY_FLOW, ZONE_TEMPERATURE
@@ -235,6 +236,16 @@ class Case:
         """Temperatures of the zones, estimated where a sensor is dead or stuck for long, (n_time, n_zone) [K]."""
         return self._estimated_temperatures[0].copy()
 
+    def heating_power_estimated(self) -> pd.DataFrame:
+        """Heat that each device reports as power, estimated as in `zone_heat_estimated`, of which it is a part.
+
+        Returns
+        -------
+        DataFrame
+            Shape (n_time, n_device) [W], columns 0..n-1 in the order of `building.devices`; 0 without such a report.
+        """
+        return self._estimated[2].copy()
+
     def heat_is_estimated(self) -> pd.DataFrame:
         """Whether the heat of each zone is an estimate, shape (n_time, n_zone)."""
         return self._estimated[0].notna() & self._zone_heat.isna()
@@ -249,7 +260,7 @@ class Case:
         return estimate_temperatures(self._zone_temperatures, self.step)
 
     @cached_property
-    def _estimated(self) -> tuple[pd.DataFrame, tuple[Estimated, ...]]:
+    def _estimated(self) -> tuple[pd.DataFrame, tuple[Estimated, ...], pd.DataFrame]:
         temperatures, found = self._estimated_temperatures
         parts = heat_parts(self.building, self.usable, temperatures)
         filled, lacking = estimate_parts(self.building, self.usable, parts, self.step)
@@ -261,7 +272,7 @@ class Case:
             for i in own
             if g.loc[i.start : i.end, i.zone].any()
         ]
-        return stages[-1], tuple(kept)
+        return stages[-1], tuple(kept), power_by_device(self.building, self.usable, filled[1])
 
     def boundary_temperatures(self) -> pd.DataFrame:
         """Temperatures that the zones look out on.

@@ -81,7 +81,8 @@ def migrate(content: Mapping[str, Any], file: str) -> dict[str, Any]:
     listed = content.get("devices")
     devices = listed if isinstance(listed, list) and all(isinstance(device, dict) for device in listed) else []
     later = ["geometry_quality"] if "geometry_quality" in content else []
-    later += [f"devices[{i}].fed_by" for i, device in enumerate(devices) if "fed_by" in device]
+    of_devices = ("fed_by", "emitter")
+    later += [f"devices[{i}].{key}" for i, device in enumerate(devices) for key in of_devices if key in device]
     if later:
         expected, advice = "a key of the file's own format", f"write 'format: {FORMAT}'"
         raise CaseError(f"{file}: {later[0]}", expected, repr(later[0].rpartition(".")[2]), advice)

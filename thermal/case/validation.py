@@ -21,6 +21,7 @@ from thermal.case.building import (
     ZoneTable,
 )
 from thermal.case.commands import air_column, commanded_devices
+from thermal.case.emitters import is_heater
 from thermal.case.plan import check_plan, facade_areas
 from thermal.case.telemetry import Telemetry
 from thermal.components.registry import device_types
@@ -143,6 +144,10 @@ def _check_devices(building: Building, file: str) -> None:
     for i, device in enumerate(building.devices):
         if device.zone is not None:
             CaseError.unless_known(device.zone, zones, f"{file}: devices[{i}] ({device.name}): zone", _ZONE)
+        if device.emitter not in (None, "air") and not is_heater(device):
+            found = f"{device.emitter!r} of a device of type {device.type!r}{'' if device.zone else ' without a zone'}"
+            where, expected = f"{file}: devices[{i}] ({device.name}): emitter", "'air', or a heater that serves a zone"
+            raise CaseError(where, expected, found, "drop the emitter")
     _check_feeders(building.devices, file)
 
 

@@ -14,7 +14,7 @@ from thermal.errors import EffectError, nearest
 from thermal.inputs.provider import InputProvider
 from thermal.inputs.signals import Signal
 from thermal.network.graph import GraphBuilder
-from thermal.network.topology import Anatomy, Room
+from thermal.network.topology import Anatomy, Emission, Room
 from thermal.parameters import Parameter
 
 _Part = tuple[IntArray, FloatArray]
@@ -213,6 +213,29 @@ class EffectBuilder:
             Geometry, such as an area [m2].
         """
         self.graph.source(self._shared(value), value, room.air, signal, weight * room.share)
+
+    def heat_like_meter(
+        self, room: Room, value: ca.SX, signal: Signal, moved: Callable[[Emission], Signal], weight: float = 1.0
+    ) -> None:
+        """Give a zone heat, ``value weight s`` [W], where its devices give theirs.
+
+        Parameters
+        ----------
+        room : Room
+            The zone.
+        value : casadi.SX
+            Heat per unit of weight and signal [W per both].
+        signal : Signal
+            What drives it.
+        moved : callable
+            What drives the part of the heat that emitters do not give to the air.
+        weight : float
+            What it is multiplied by [-].
+        """
+        self.heat_air(room, value, signal, weight)
+        for emission in room.emitted:
+            for share, node, part in emission.parts:
+                self.graph.source(self.key(room.name), value * share, node, moved(emission), weight * part)
 
     def heat_surfaces(self, room: Room, value: ca.SX, signal: Signal, weight: float) -> None:
         """Give heat to a zone's surfaces by its radiant node; to its air where it has none.

@@ -1,5 +1,6 @@
 """What sensors, meters and terminals get wrong: bias, lag, flow gain, duct loss, limits, leaks and clocks."""
 
+from functools import partial
 from operator import attrgetter
 
 import casadi as ca
@@ -9,6 +10,7 @@ from thermal._types import FloatArray
 from thermal.effects.effect import EffectBuilder, described, hat
 from thermal.inputs.provider import InputProvider
 from thermal.inputs.signals import CONSTANT, Signal, of_zone, zone_signal
+from thermal.network.topology import Emission
 from thermal.units import AIR_HEAT_CAPACITY
 
 #: Heat that a sensor takes up in a minute over that of the zone's air [-]: too little to cool the zone, and enough for
@@ -38,6 +40,13 @@ def _duct(inputs: InputProvider, zone: str, exponent: float) -> FloatArray:
 def _over(inputs: InputProvider, zone: str, lost: float) -> FloatArray:
     heat, most = of_zone(inputs, "heat", zone), inputs.normalisation.heat.get(zone, 0.0)
     return np.asarray(np.sign(heat) * np.maximum(np.abs(heat) - (1.0 - lost) * most, 0.0))
+
+
+def _over_emitted(inputs: InputProvider, zone: str, lost: float, devices: tuple[int, ...]) -> FloatArray:
+    """Part of the heat over a limit that some of the zone's devices gave: their share of the heat."""
+    heat, own = of_zone(inputs, "heat", zone), inputs.emitted[:, list(devices)].sum(axis=1)
+    share = np.divide(own, heat, out=np.zeros_like(own), where=heat != 0.0)
+    return np.asarray(share * _over(inputs, zone, lost))
 
 
 def _running(inputs: InputProvider, zone: str) -> FloatArray:
@@ -76,7 +85,8 @@ def _build_lag(builder: EffectBuilder) -> None:
 def _build_gain(builder: EffectBuilder) -> None:
     for room in builder.rooms:
         signal = zone_signal(f"heat of {room.name}", "W", "heat", room.name)
-        builder.heat_air(room, builder.parameter("flow_gain", zone=room.name), signal, 1.0)
+        gain = builder.parameter("flow_gain", zone=room.name)
+        builder.heat_like_meter(room, gain, signal, lambda emission: emission.signal)
 
 
 def _build_duct(builder: EffectBuilder) -> None:
@@ -96,7 +106,13 @@ def _build_limit(builder: EffectBuilder) -> None:
         for number, knot in enumerate(_LOST[1:], 1):
             name = f"heat of {room.name} over {1.0 - knot:.0%}"
             signal = Signal.made(name, "W", _over, "heat", given={"zone": room.name, "lost": knot})
-            builder.heat_air(room, -hat(lost, _LOST, number, signed=True), signal, 1.0)
+            moved = partial(_limited, name, given={"zone": room.name, "lost": knot})
+            builder.heat_like_meter(room, -hat(lost, _LOST, number, signed=True), signal, moved)
+
+
+def _limited(name: str, emission: Emission, given: dict[str, object]) -> Signal:
+    own = {**given, "devices": emission.devices}
+    return Signal.made(f"{name}, {emission.signal.name}", "W", _over_emitted, "heat", "emitted", given=own)
 
 
 def _build_leak(builder: EffectBuilder) -> None:
@@ -109,7 +125,7 @@ def _build_shift(builder: EffectBuilder) -> None:
     heat, weather = builder.parameter("heat_clock_shift"), builder.parameter("weather_clock_shift")
     for room in builder.rooms:
         signal = zone_signal(f"change of heat in {room.name}", "W/h", "heat_rate", room.name)
-        builder.heat_air(room, heat, signal, -1.0)
+        builder.heat_like_meter(room, heat, signal, lambda emission: emission.rate, -1.0)
     outdoor = Signal("change of outdoor temperature", "K/h", attrgetter("outdoor_rate"), ("outdoor_rate",))
     for value, _, node, weight in builder.graph.touching(np.array([builder.graph.boundary("outdoor")])):
         builder.graph.source(builder.key(), -weather * value, node, outdoor, weight)

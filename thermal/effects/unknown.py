@@ -107,8 +107,11 @@ def _heat(effect: str, room: Room) -> list[tuple[Signal, float]]:
 
 
 def _give(builder: EffectBuilder, effect: str, room: Room, value: ca.SX, signal: Signal, area: float) -> None:
-    """Give heat to a zone: the sun's to what it falls on, by the surfaces, all other to the air."""
-    (builder.heat_surfaces if effect == SUN else builder.heat_air)(room, value, signal, area)
+    """Give heat to a zone: the sun's to the surfaces, what answers to meters where devices give it, else to air."""
+    if effect == METERED:
+        builder.heat_like_meter(room, value, signal, lambda emission: emission.signal, area)
+    else:
+        (builder.heat_surfaces if effect == SUN else builder.heat_air)(room, value, signal, area)
 
 
 def _build(builder: EffectBuilder) -> None:

@@ -15,6 +15,7 @@ import pandas as pd
 from thermal._types import FloatArray
 from thermal.case.building import Building
 from thermal.case.case import Case
+from thermal.case.emitters import is_heater
 from thermal.errors import EffectError, describe, nearest
 from thermal.inputs.normalisation import (
     WIND,
@@ -49,11 +50,13 @@ INPUTS: dict[str, str] = {
     "outdoor": "K", "wind": "m/s", "sky": "W/m^2", "sun": "W/m^2", "occupancy": "1", "at_home": "1", "usual": "K",
     "openings": "1", "through_windows": "K*m/s", "heat": "W", "airflow": "kg/s", "supply_flow": "kg/s",
     "supply_heat": "W", "radiant_gains": "W", "outdoor_rate": "K/h", "occupancy_rate": "1/h", "heat_rate": "W/h",
-    "commanded": "1",
+    "commanded": "1", "emitted": "W", "emitted_rate": "W/h",
 }  # fmt: skip
 
 #: Inputs that depend on what the HVAC system does: telemetry and a running plant know them, nobody else.
-HVAC_INPUTS = frozenset({"heat", "airflow", "supply_flow", "supply_heat", "heat_rate", "commanded"})
+HVAC_INPUTS = frozenset(
+    {"heat", "airflow", "supply_flow", "supply_heat", "heat_rate", "commanded", "emitted", "emitted_rate"}
+)
 
 #: Series that inputs are made of where these are not of the same name.
 _SERIES: dict[str, tuple[str, ...]] = {
@@ -90,7 +93,8 @@ class InputProvider:
     series : mapping of str to ndarray
         What the source knows, of shape (n_time,) or (n_time, n_zone): points of the weather station; ``outdoor``,
         ``people`` in the building, ``heat``, ``airflow``, ``supply_flow``, ``supply_heat``, ``radiant_gains`` [units
-        of `INPUTS`]; ``commanded``, shape (n_time, n_commanded), [units of `thermal.case.commands.command_signals`].
+        of `INPUTS`]; ``commanded``, shape (n_time, n_commanded), [units of `thermal.case.commands.command_signals`];
+        ``emitted``, shape (n_time, n_device) [W].
     normalisation : Normalisation
         Constants that some inputs are counted by.
     source : str
@@ -331,6 +335,8 @@ class InputProvider:
     outdoor_rate = _input("outdoor_rate", "Change of the outdoor temperature, shape (n_time,) [K/h].")
     occupancy_rate = _input("occupancy_rate", "Change of the presence of people, shape (n_time,) [1/h].")
     heat_rate = _input("heat_rate", "Change of the metered heat of the zones, shape (n_time, n_zone) [W/h].")
+    emitted = _input("emitted", "Heat that devices report as power, part of `heat`, shape (n_time, n_device) [W].")
+    emitted_rate = _input("emitted_rate", "Change of the heat of the devices, shape (n_time, n_device) [W/h].")
 
 
 def telemetry_inputs(case: Case, normalisation: Normalisation | None = None) -> InputProvider:
@@ -355,6 +361,8 @@ def telemetry_inputs(case: Case, normalisation: Normalisation | None = None) -> 
     series |= {"supply_flow": flow.to_numpy(), "supply_heat": supplied.to_numpy()}
     if people is not None:
         series["people"] = filled(people)
+    if any(is_heater(device) for device in case.building.devices):
+        series["emitted"] = filled(case.heating_power_estimated())
     if case.building.commanded:
         series["commanded"] = filled(case.command_signals())
     return InputProvider(case.building, case.stamps, case.step, series, normalisation or fit_normalisation(case))

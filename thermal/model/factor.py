@@ -58,6 +58,8 @@ class Pencil:
         How many of the boundary columns, the last ones, are signals of effects.
     airflows : tuple of (int, int)
         Source and target zone of each directed airflow, which is no part of K.
+    emitted : ndarray, shape (n_signal, n_zone), optional
+        Signals by the heat of the zones that devices give, where that alone is known [W/W].
     """
 
     capacity: Matrix
@@ -70,6 +72,7 @@ class Pencil:
     reading: Matrix = None
     n_signal: int = 0
     airflows: tuple[tuple[int, int], ...] = ()
+    emitted: FloatArray | None = None
 
     @property
     def n(self) -> int:

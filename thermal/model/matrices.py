@@ -86,6 +86,7 @@ class SymbolicModel:
             reading = None if reading is None else reading @ v
         self.n_state = uniform.size
         outside = partial(Matrices, n_signal=len(network.signals), airflows=network.airflows)
+        outside = partial(outside, emitted=network.emitted)
         self._at_any = partial(outside, heating=heating, observation=observation, uniform=uniform, reading=reading)
 
     def __repr__(self) -> str:

@@ -69,6 +69,8 @@ class ModalModel:
         What the zones' sensors read where these lag behind [(K/W)^0.5]; see `output`.
     n_signal : int
         How many of the columns of B, the last ones, are signals of effects.
+    emitted : ndarray, shape (n_signal, n_zone), optional
+        Signals by the heat of the zones that devices give [W/W].
 
     Examples
     --------
@@ -91,6 +93,7 @@ class ModalModel:
     coordinates: FloatArray
     reading: FloatArray | None = None
     n_signal: int = 0
+    emitted: FloatArray | None = None
 
     def __repr__(self) -> str:
         slowest = self.time_constants.max() / 3600.0
@@ -100,6 +103,13 @@ class ModalModel:
     def output(self) -> FloatArray:
         """What is compared with telemetry, shape (n_zone, r): the sensors' readings, or the zone means."""
         return self.observation if self.reading is None else self.reading
+
+    @property
+    def heated_by_devices(self) -> FloatArray:
+        """Distribution of the heat that devices give, layers and surfaces included, shape (r, n_zone) [(K/W)^0.5]."""
+        if self.emitted is None or not self.emitted.any():
+            return self.heating
+        return np.asarray(self.heating + self.boundary[:, self.boundary.shape[1] - self.n_signal :] @ self.emitted)
 
     @property
     def conductance(self) -> FloatArray:
@@ -193,6 +203,7 @@ def modal_model(matrices: Pencil) -> ModalModel:
         coordinates=states.T @ stiffness,
         reading=None if matrices.reading is None else matrices.reading @ states,
         n_signal=matrices.n_signal,
+        emitted=matrices.emitted,
     )
 
 

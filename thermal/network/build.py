@@ -10,9 +10,11 @@ from numpy.typing import NDArray
 
 from thermal._types import FloatArray, IntArray
 from thermal.case.building import Building, FloorPlans, ZoneTable
+from thermal.case.emitters import emitters_of
 from thermal.case.plan import facade_areas, zone_floor_areas
 from thermal.errors import ModelError
 from thermal.network.commands import add_commanded
+from thermal.network.emitters import add_emitters
 from thermal.network.films import add_films
 from thermal.network.floor import Floor, Zone
 from thermal.network.graph import GraphBuilder
@@ -162,7 +164,8 @@ def _lumped(building: Building, dx: float | None, structure: Structure) -> Bluep
     drawn = replace(structure, lumped=False, sun=False, recurring=False, wind_films=False, natural_films=False)
     detailed = build_network(replace(building, commanded=()), dx, structure=drawn)
     graph, air = lump(detailed, building.geometry_quality, structure)
-    add_commanded(graph, building.commanded)
+    add_emitters(graph, emitters_of(building, structure.emitter))
+    add_commanded(graph, building)
     ones = np.ones(air.size)
     return Blueprint(graph, air, np.arange(air.size), ones, ones)
 
@@ -210,7 +213,8 @@ def blueprint(
     baseline = _drawn(building, dx, reach, scopes, diffusers, mean_shuffle, structure)
     if structure.follows_weather:
         add_films(baseline.graph, structure)
-    add_commanded(baseline.graph, building.commanded)
+    add_emitters(baseline.graph, emitters_of(building, structure.emitter))
+    add_commanded(baseline.graph, building)
     return baseline
 
 
@@ -226,6 +230,8 @@ def _drawn(
     """Build the baseline as it is drawn."""
     boundaries = ("outdoor", *building.measured_boundaries)
     graph, plans = GraphBuilder(building.zone_names, boundaries, scopes or {}, structure), building.geometry
+    graph.quality = building.geometry_quality
+    graph.anatomy.heated = {(e.zone, side): [] for e in emitters_of(building, structure.emitter) for side in e.sides}
     graph.anatomy.air_heat_capacity = air_density(building.location.elevation) * AIR_HEAT_CAPACITY
     place = graph.zones.index
     graph.anatomy.airflows = tuple((place(a.source), place(a.target)) for a in building.airflows)

@@ -6,7 +6,7 @@ import casadi as ca
 import numpy as np
 
 from thermal._types import FloatArray
-from thermal.case.building import Commanded
+from thermal.case.building import Building, Commanded
 from thermal.case.commands import GAS
 from thermal.inputs.provider import InputProvider
 from thermal.inputs.signals import Signal
@@ -17,7 +17,7 @@ from thermal.parameters import PARAMETERS
 _OF_KIND = {"damper": ("damper_airflow", "J/kg"), "valve": ("valve_heat", "1")}
 
 
-def add_commanded(graph: GraphBuilder, commanded: Sequence[Commanded]) -> None:
+def add_commanded(graph: GraphBuilder, building: Building) -> None:
     """Give the zones of a complete baseline the heat that follows from commands and counters.
 
     A damper brings air in proportion to its opening, a valve heat. What a counter counts warms the water and the metal
@@ -28,19 +28,24 @@ def add_commanded(graph: GraphBuilder, commanded: Sequence[Commanded]) -> None:
     ----------
     graph : GraphBuilder
         The baseline without effects.
-    commanded : sequence of Commanded
-        `Building.commanded`.
+    building : Building
+        Its `commanded` devices; those that emit elsewhere than to the air are known to the graph's rooms.
     """
+    commanded = building.commanded
     systems: dict[str, list[Commanded]] = {}
-    for number, own in enumerate(commanded):
+    for place, own in enumerate(commanded):
         if own.kind == "counter":
             systems.setdefault(own.columns[0], []).append(own)
             continue
         name, unit = _OF_KIND[own.kind]
         room = graph.anatomy.rooms[own.zone]
         value = graph.own(PARAMETERS[name].of("zone", own.device))
-        signal = _signal(f"{own.kind} of {own.device}", unit, number)
+        signal = _signal(f"{own.kind} of {own.device}", unit, place)
         graph.source(f"{own.kind} {own.device}", value, room.air, signal, room.floor_area * room.share)
+        number = next((n for n, device in enumerate(building.devices) if device.name == own.device), -1)
+        for emission in (e for e in room.emitted if number in e.devices):
+            for part, (share, node, weight) in enumerate(emission.parts):
+                graph.source(f"{own.kind} {own.device} {part}", value * share, node, signal, room.floor_area * weight)
     for column, fed in systems.items():
         rooms = [graph.anatomy.rooms[own.zone] for own in fed]
         feeder, area = column.partition("/")[0], sum(room.floor_area for room in rooms)

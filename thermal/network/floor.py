@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from thermal._types import FloatArray, IntArray
 from thermal.case.building import FloorPlan
 from thermal.errors import ModelError
+from thermal.network.emitters import LAYER, layer_parameter
 from thermal.network.graph import GraphBuilder
 from thermal.network.grid import FACADES, FloorGrid
 from thermal.network.structure import (
@@ -17,7 +18,7 @@ from thermal.network.structure import (
     series,
     surface_mesh,
 )
-from thermal.network.topology import VERTICAL, OuterFaces, Outlook, Pane, Room
+from thermal.network.topology import VERTICAL, Heated, OuterFaces, Outlook, Pane, Room
 from thermal.shuffle.equivalent import choose_equivalent, effective_diffusivity, exchange_rate, mean_square_reach
 
 #: Parameters of the inside films with a radiant node, and of the one film without.
@@ -154,6 +155,29 @@ class Zone:
         near, far = nodes[:, :-1].ravel(), nodes[:, 1:].ravel()
         graph.face(graph.key("slab-slab", self.name, "slab_coupling"), layers * coupling, near, far, area)
 
+    def lay_heated(self, area: float) -> None:
+        """Give emitters a layer of floor or ceiling where the drawing has none; in a slab the nodes at its surface.
+
+        Parameters
+        ----------
+        area
+            Floor area [m2].
+        """
+        graph = self.graph
+        for side, slab in (("floor", self._floor), ("ceiling", self._ceiling)):
+            found = graph.anatomy.heated.get((self.name, side))
+            if found is None or found:
+                continue
+            node = np.array(slab[:1], dtype=np.int64)
+            if not slab:
+                names = "screed_heat_capacity_multiplier", "screed_conductivity_multiplier"
+                heat, scale = (layer_parameter(graph, name, self.name) for name in names)
+                capacity, conductance = LAYER[side]
+                node = graph.volumes("slab", self.number)
+                graph.capacity(graph.key(f"{side} screed", self.name, names[0]), capacity * heat, node, area)
+                self.surface(f"{side} screed", conductance * scale, node, area, depends=names[1:])
+            found.append(Heated(node, np.ones(1), area))
+
     def furniture(self, floor_area: float) -> None:
         """Furniture: one node, coupled to air and radiant node in the ratio of the films [floor_area: m2].
 
@@ -258,6 +282,7 @@ class Floor:
         if air.size > 1:
             self._air(zone, area, heat, reach, mean_shuffle)
         zone.slabs(area)
+        zone.lay_heated(area)
         zone.furniture(area)
         return zone
 

@@ -12,6 +12,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from thermal._types import FloatArray, IntArray
+from thermal.case.building import GeometryQuality
 from thermal.errors import ModelError
 from thermal.inputs.signals import Signal
 from thermal.network.network import CapacityClass, ConductanceClass, ThermalNetwork
@@ -48,6 +49,7 @@ class GraphBuilder:
         _check_scopes(scopes, zones)
         self.zones, self.boundaries, self.scopes, self.structure = zones, boundaries, dict(scopes), structure
         self.anatomy = Anatomy()
+        self.quality: GeometryQuality = "approximate"
         self.nominal: dict[str, tuple[float, str]] = {}
         self._signals: dict[str, Signal] = {}
         self._numbers: dict[str, int] = {}

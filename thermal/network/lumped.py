@@ -6,6 +6,7 @@ detailed network's at its start, times a multiplier whose prior is as wide as th
 (Bacher and Madsen 2011, doi:10.1016/j.enbuild.2011.02.005, for one zone.)
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import casadi as ca
@@ -19,7 +20,7 @@ from thermal.inputs.signals import CONSTANT, Signal, on_plane, waves_of_day
 from thermal.network.graph import GraphBuilder
 from thermal.network.network import ThermalNetwork
 from thermal.network.structure import Structure
-from thermal.network.topology import UPWARD, VERTICAL, Pane, Room, direction_of
+from thermal.network.topology import UPWARD, VERTICAL, Heated, Pane, Room, direction_of
 from thermal.parameters import PARAMETERS
 
 #: Factor that the drawing's sums are within, 95 times in a hundred [-]: what surveys, drawings and guesses are off by.
@@ -34,6 +35,9 @@ _LEAST = 0.1
 
 #: Share of it that is enough where the drawing tells which zones lie outside [-].
 _KNOWN = 0.1
+
+#: Share of a heated layer's conductance that counts as none [-].
+_NEGLIGIBLE = 1e-3
 
 #: Directions that the sun is taken from [deg]: azimuth and tilt of the compass's points and of a roof.
 _PLANES = {**{name: (90.0 * number, VERTICAL) for number, name in enumerate(FACADES)}, "roof": (0.0, UPWARD)}
@@ -59,6 +63,9 @@ class _Drawn:
         Conductances from the air to what is not air [W/K].
     air, mass : ndarray, shape (n_zone,)
         Heat capacities of the air and of the rest, as far as it follows the zone's temperature [J/K].
+    heated : dict
+        Of each layer that emitters warm: conductances from its pipes to the air of the zones (n_zone,) and to the
+        boundaries (n_boundary,) [W/K], and the heat capacity that follows it [J/K].
     """
 
     direct: FloatArray
@@ -67,6 +74,7 @@ class _Drawn:
     inner: FloatArray
     air: FloatArray
     mass: FloatArray
+    heated: dict[tuple[str, str], tuple[FloatArray, FloatArray, float]]
 
 
 def lump(network: ThermalNetwork, quality: GeometryQuality, structure: Structure) -> tuple[GraphBuilder, IntArray]:
@@ -88,7 +96,7 @@ def lump(network: ThermalNetwork, quality: GeometryQuality, structure: Structure
     """
     drawn, old = _drawn(network), network.anatomy
     graph = GraphBuilder(network.zones, network.boundaries, {}, structure)
-    graph.anatomy = replace(old.copy(), outer=[], ground_faces=[], rooms={})
+    graph.anatomy = replace(old.copy(), outer=[], ground_faces=[], rooms={}, heated={})
     count, deviation = len(network.zones), float(np.log(_WITHIN[quality])) / 2.0
     area = np.array([old.rooms[z].floor_area for z in network.zones])
     air, mass = graph.volumes("air", np.arange(count)), graph.volumes("mass", np.arange(count))
@@ -120,8 +128,30 @@ def lump(network: ThermalNetwork, quality: GeometryQuality, structure: Structure
         graph.anatomy.rooms[zone] = Room(
             zone, i, air[i : i + 1], np.ones(1), int(air[i]), -1, (), (), int(mass[i]), room.floor_area, room.volume
         )
+        _add_heated(graph, drawn, i, air, multiplier)
         _add_gains(graph, graph.anatomy.rooms[zone], [p for p in old.panes if p.zone == zone], quality, structure)
     return graph, air
+
+
+def _add_heated(
+    graph: GraphBuilder, drawn: _Drawn, number: int, air: IntArray, multiplier: Callable[[str, str], ca.SX]
+) -> None:
+    """Add the layers of a zone that emitters warm: a node each, whose heat goes where the drawing lets it."""
+    zone = graph.zones[number]
+    for (name, side), (to_air, outward, capacity) in drawn.heated.items():
+        if name != zone:
+            continue
+        node = graph.volumes("screed", number)
+        heat = multiplier("screed_heat_capacity_multiplier", zone)
+        scale = multiplier("screed_conductivity_multiplier", zone)
+        graph.capacity(f"screed {zone} {side}", heat, node, capacity)
+        least = _NEGLIGIBLE * (to_air.sum() + outward.sum())
+        there, beyond = np.flatnonzero(to_air > least), np.flatnonzero(outward > least)
+        graph.face(f"screed-air {zone} {side}", scale, node, air[there], to_air[there])
+        codes = np.array([graph.boundary(graph.boundaries[j]) for j in beyond], dtype=np.int64)
+        if codes.size:
+            graph.face(f"screed-boundary {zone} {side}", scale, node, codes, outward[beyond])
+        graph.anatomy.heated[zone, side] = [Heated(node, np.ones(1), graph.anatomy.rooms[zone].floor_area)]
 
 
 def _add_gains(
@@ -171,13 +201,24 @@ def _drawn(network: ThermalNetwork) -> _Drawn:
     beside = (member @ joined[:n, :n] @ member.T).toarray()
     inner = laplacian[rest][:, rest] + 1e-9 * sp.eye(rest.size)
     outer = joined[:n][rest][:, n:].toarray()
-    follows = sla.splu(inner.tocsc()).solve(np.hstack([to_rest.T, outer]))
+    solve = sla.splu(inner.tocsc()).solve
+    follows = solve(np.hstack([to_rest.T, outer]))
     steady = to_rest @ follows
     pairs = beside + steady[:, :count]
     np.fill_diagonal(pairs, 0.0)
     shares, coupled, through = follows[:, :count], to_rest.sum(axis=1), steady[:, count:]
     # behind the coupling of air and mass, so that both in series are the drawing's
     behind = coupled / np.maximum(coupled - through.sum(axis=1), 0.1 * coupled)
+    heated, place = {}, np.full(n, -1)
+    place[rest] = np.arange(rest.size)
+    for key, layers in network.anatomy.heated.items():
+        given = np.zeros(rest.size)
+        area = sum(layer.area for layer in layers)
+        for layer in layers:
+            np.add.at(given, place[layer.node], layer.share * layer.area / area)
+        warmed = solve(given)
+        pipes = float(given @ warmed)
+        heated[key] = (to_rest @ warmed / pipes, outer.T @ warmed / pipes, float(capacity[rest] @ warmed) / pipes)
     return _Drawn(
         direct=direct,
         slow=through * behind[:, None],
@@ -185,4 +226,5 @@ def _drawn(network: ThermalNetwork) -> _Drawn:
         inner=coupled,
         air=member @ capacity,
         mass=shares.T @ capacity[rest],
+        heated=heated,
     )

@@ -151,6 +151,16 @@ class ThermalNetwork:
             rows[zone, node] = 1.0
         return rows.tocsr()
 
+    @cached_property
+    def emitted(self) -> FloatArray:
+        """Signals of emitters by the heat of the zones, where that alone is known, shape (n_signal, n_zone) [W/W]."""
+        found = np.zeros((len(self.signals), len(self.zones)))
+        numbers = {signal.name: number for number, signal in enumerate(self.signals)}
+        for room in self.anatomy.rooms.values():
+            for emission in room.emitted:
+                found[numbers[emission.signal.name], room.number] = emission.share_of_zone
+        return found
+
     @property
     def groups(self) -> dict[str, tuple[int, ...]]:
         """Positions in θ of the parameters that are one quantity of several facades or zones, by its name.

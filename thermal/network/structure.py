@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, get_args
 
+from thermal.case.emitters import Unknown
 from thermal.errors import ModelError
 
 #: Molecular conductivity of air at 20 degC [W/m/K] (Incropera, Fundamentals of Heat and Mass Transfer, Table A.4).
@@ -106,6 +107,9 @@ class Structure:
     natural_films : bool
         Inside films that follow the temperature difference to outdoors, of a model with a radiant node that is not
         lumped.
+    emitter : {"air", "radiator", "floor"}
+        What plain heaters of which a case does not say it give their heat by: the air alone, surfaces too, or floors
+        too, each zone's by a share that is fitted.
 
     Raises
     ------
@@ -128,6 +132,7 @@ class Structure:
     recurring: bool = False
     wind_films: bool = False
     natural_films: bool = False
+    emitter: Unknown = "air"
 
     @property
     def follows_weather(self) -> bool:
@@ -138,6 +143,8 @@ class Structure:
         for name in ("furniture", "radiant", "lumped", "sun", "recurring", "wind_films", "natural_films"):
             if not isinstance(getattr(self, name), bool):
                 raise ModelError(f"structure.{name}: expected true or false, got {getattr(self, name)!r}")
+        if self.emitter not in get_args(Unknown):
+            raise ModelError(f"structure.emitter: expected one of {get_args(Unknown)}, got {self.emitter!r}")
         for name, least in (("slab_nodes", 0), ("wall_nodes", 1)):
             value = getattr(self, name)
             if name == "wall_nodes" and value is None:

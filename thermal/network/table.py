@@ -7,10 +7,12 @@ from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
+from numpy.typing import NDArray
 
 from thermal._types import FloatArray, IntArray
 from thermal.case.building import Layer, Surface, ZoneTable
 from thermal.errors import ModelError
+from thermal.network.emitters import layer_parameter, pipes_at, shared_at
 from thermal.network.floor import Zone
 from thermal.network.graph import GraphBuilder
 from thermal.network.structure import (
@@ -20,7 +22,17 @@ from thermal.network.structure import (
     WINDOW_RATED_FILM,
     series,
 )
-from thermal.network.topology import DOWNWARD, UPWARD, VERTICAL, GroundFace, OuterFaces, Outlook, Pane, direction_of
+from thermal.network.topology import (
+    DOWNWARD,
+    UPWARD,
+    VERTICAL,
+    GroundFace,
+    Heated,
+    OuterFaces,
+    Outlook,
+    Pane,
+    direction_of,
+)
 
 #: Time that a sublayer must resolve [s]: its thickness is at most sqrt(diffusivity x this), a Fourier number of one.
 SUBLAYER_TIME = 1800.0
@@ -127,6 +139,7 @@ def add_table(graph: GraphBuilder, table: ZoneTable) -> IntArray:
     for surface in table.surfaces:
         _add_surface(graph, zones, surface, table)
     for entry in table.zones:
+        zones[entry.name].lay_heated(entry.floor_area)
         zones[entry.name].room(entry.floor_area, entry.volume)
     return np.concatenate([zones[z].air for z in graph.zones])
 
@@ -149,6 +162,12 @@ def _add_surface(graph: GraphBuilder, zones: Mapping[str, Zone], surface: Surfac
         _add_window(graph, zones, surface)
     else:
         _add_layers(graph, zones, surface, table.constructions[str(surface.construction)])
+
+
+def _group(surface: Surface) -> str:
+    """Group of surfaces whose layers have multipliers in common."""
+    upright = "exterior_wall" if surface.other == "outdoor" else "interior_wall"
+    return "slab" if surface.kind in _HORIZONTAL else upright
 
 
 def _facade(graph: GraphBuilder, surface: Surface) -> str | None:
@@ -182,45 +201,92 @@ def _azimuth(surface: Surface) -> float:
     return float(surface.azimuth or 0.0) % 360.0
 
 
+@dataclass(frozen=True)
+class _Part:
+    """Nodes of a chain whose properties have a multiplier each for conduction and for heat capacity."""
+
+    zone: str | None
+    name: str
+    conductivity: str
+    heat_capacity: str
+    scale: ca.SX
+    heat: ca.SX
+
+
+def _parts(
+    graph: GraphBuilder, surface: Surface, layers: tuple[Layer, ...], wall: Chain, nodes: IntArray
+) -> tuple[_Part, _Part, NDArray[np.bool_]]:
+    """Give the parts of a chain, that between a room and the pipes in it second, and which nodes belong to that."""
+    group, facade = _group(surface), _facade(graph, surface)
+    names = f"{group}_conductivity_multiplier", f"{group}_heat_capacity_multiplier"
+    plain = _Part(None, group, *names, *(graph.parameter(name, facade=facade) for name in names))
+    place = wall.near + np.concatenate([[0.0], np.cumsum(wall.between)])
+    seen: list[tuple[str, str, tuple[Layer, ...], IntArray, FloatArray]]
+    seen = [(surface.zone, surface.kind, layers, nodes, place)]
+    if surface.other in graph.zones and surface.kind in _HORIZONTAL:
+        back = "floor" if surface.kind == "ceiling" else "ceiling"
+        behind = (wall.near + wall.far + float(np.sum(wall.between)) - place)[::-1]
+        seen.append((surface.other, back, layers[::-1], nodes[::-1], behind))
+    for zone, side, own, chain, at in seen:
+        if (zone, side) in graph.anatomy.heated:
+            pipes = pipes_at(own)
+            graph.anatomy.heated[zone, side].append(Heated(*shared_at(pipes, chain, at), surface.area))
+            names = "screed_conductivity_multiplier", "screed_heat_capacity_multiplier"
+            warm = _Part(zone, "screed", *names, *(layer_parameter(graph, name, zone) for name in names))
+            return plain, warm, np.isin(nodes, chain[at <= pipes * (1.0 + 1e-9)])
+    return plain, plain, np.zeros(nodes.size, dtype=bool)
+
+
 def _add_layers(graph: GraphBuilder, zones: Mapping[str, Zone], surface: Surface, layers: tuple[Layer, ...]) -> None:
     """Add a chain of nodes from the zone to what lies behind, scaled by its group's multipliers."""
-    upright = "exterior_wall" if surface.other == "outdoor" else "interior_wall"
-    group, facade = "slab" if surface.kind in ("floor", "ceiling") else upright, _facade(graph, surface)
-    conductivity, heat_capacity = f"{group}_conductivity_multiplier", f"{group}_heat_capacity_multiplier"
-    scale = graph.parameter(conductivity, facade=facade)
-    heat = graph.parameter(heat_capacity, facade=facade)
-    wall = Chain.of(layers, graph.structure.wall_nodes)
+    facade, wall = _facade(graph, surface), Chain.of(layers, graph.structure.wall_nodes)
+    group = _group(surface)
     nodes = graph.volumes(group, np.full(wall.capacity.size, graph.zones.index(surface.zone)))
-    graph.capacity(graph.key(group, None, heat_capacity, facade=facade), heat, nodes, wall.capacity * surface.area)
-    between = graph.key(f"{group}-{group}", None, conductivity, facade=facade)
-    graph.face(between, scale, nodes[:-1], nodes[1:], surface.area * (1.0 / wall.between))
+    plain, warm, heated = _parts(graph, surface, layers, wall, nodes)
+    both = heated[:-1] & heated[1:]
+    for part, own, joined in ((plain, ~heated, ~both), (warm, heated, both)):
+        if own.any():
+            key = graph.key(part.name, part.zone, part.heat_capacity, facade=facade)
+            graph.capacity(key, part.heat, nodes[own], wall.capacity[own] * surface.area)
+        if joined.any():
+            key = graph.key(f"{part.name}-{part.name}", part.zone, part.conductivity, facade=facade)
+            weight = surface.area * (1.0 / wall.between[joined])
+            graph.face(key, part.scale, nodes[:-1][joined], nodes[1:][joined], weight)
+        if part is warm:
+            break
 
-    def room_side(zone: Zone, resistance: float, node: int) -> None:  # equal resistances share a class
-        kind = f"{group} r={2.0 * resistance:.6g}"
-        zone.surface(kind, scale / resistance, node, surface.area, depends=(conductivity,), facade=facade)
+    def room_side(zone: Zone, resistance: float, end: int) -> None:  # equal resistances share a class
+        part = warm if heated[end] else plain
+        kind, node = f"{part.name} r={2.0 * resistance:.6g}", int(nodes[end])
+        zone.surface(kind, part.scale / resistance, node, surface.area, depends=(part.conductivity,), facade=facade)
 
-    room_side(zones[surface.zone], wall.near, int(nodes[0]))
+    room_side(zones[surface.zone], wall.near, 0)
     if surface.other in zones:
-        room_side(zones[surface.other], wall.far, int(nodes[-1]))
+        room_side(zones[surface.other], wall.far, -1)
         if surface.kind == "wall" and surface.other != surface.zone:
             pair = (min(surface.zone, surface.other), max(surface.zone, surface.other))
             graph.anatomy.partitions[pair] = graph.anatomy.partitions.get(pair, 0.0) + surface.area
     elif surface.other == "ground":
-        face = GroundFace(surface.zone, int(nodes[-1]), surface.area, scale / wall.far)
+        face = GroundFace(surface.zone, int(nodes[-1]), surface.area, plain.scale / wall.far)
         graph.anatomy.ground_faces.append(face)
     else:
-        place, film = "boundary", ca.SX(1.0 / BOUNDARY_FILM_RESISTANCE)
-        if surface.other == "outdoor":
-            place, film = "outdoor", graph.parameter("exterior_convection_coefficient", facade=facade)
-        depends = (conductivity, "exterior_convection_coefficient")
-        key = graph.key(f"{group}-{place} r={2.0 * wall.far:.6g}", None, *depends, facade=facade)
-        value = series(film, scale / wall.far)
-        graph.face(key, value, int(nodes[-1]), graph.boundary(surface.other), surface.area)
-        if surface.other == "outdoor":
-            tilt = {"wall": VERTICAL, "ceiling": UPWARD, "floor": DOWNWARD}[surface.kind]
-            outlook = Outlook(_azimuth(surface), tilt, film, glass=False)
-            outer = OuterFaces(value, nodes[-1:], np.array([float(surface.area)]), outlook)
-            graph.anatomy.outer.append(outer)
+        _outer_side(graph, surface, plain, wall.far, nodes[-1:])
+
+
+def _outer_side(graph: GraphBuilder, surface: Surface, part: _Part, resistance: float, node: IntArray) -> None:
+    """Join the last node of a chain to outdoor, or to a measured space."""
+    facade = _facade(graph, surface)
+    place, film = "boundary", ca.SX(1.0 / BOUNDARY_FILM_RESISTANCE)
+    if surface.other == "outdoor":
+        place, film = "outdoor", graph.parameter("exterior_convection_coefficient", facade=facade)
+    depends = (part.conductivity, "exterior_convection_coefficient")
+    key = graph.key(f"{part.name}-{place} r={2.0 * resistance:.6g}", None, *depends, facade=facade)
+    value = series(film, part.scale / resistance)
+    graph.face(key, value, int(node[0]), graph.boundary(surface.other), surface.area)
+    if surface.other == "outdoor":
+        tilt = {"wall": VERTICAL, "ceiling": UPWARD, "floor": DOWNWARD}[surface.kind]
+        outlook = Outlook(_azimuth(surface), tilt, film, glass=False)
+        graph.anatomy.outer.append(OuterFaces(value, node, np.array([float(surface.area)]), outlook))
 
 
 def facade_of(surface: Surface) -> str | None:

@@ -11,6 +11,7 @@ import numpy as np
 
 from thermal._types import FloatArray, IntArray
 from thermal.case.building import FACADES, FloorPlan, FloorPlans
+from thermal.inputs.signals import Signal
 
 #: Tilt of a vertical, an upward and a downward face [deg].
 VERTICAL, UPWARD, DOWNWARD = 90.0, 0.0, 180.0
@@ -110,6 +111,48 @@ class Pane:
 
 
 @dataclass(frozen=True)
+class Emission:
+    """Heat of devices of a zone that does not all go to its air.
+
+    Parameters
+    ----------
+    devices : tuple of int
+        Their positions in the building's devices.
+    signal, rate : Signal
+        Their heat [W], and its change [W/h].
+    share_of_zone : float
+        Their part of the zone's heat where that alone is known [-].
+    parts : tuple of (casadi.SX, ndarray of int, ndarray)
+        Share of it, nodes, and their weights in it [-]: what surfaces and layers get, and the air the less; sums to 0.
+    """
+
+    devices: tuple[int, ...]
+    signal: Signal
+    rate: Signal
+    share_of_zone: float
+    parts: tuple[tuple[ca.SX, IntArray, FloatArray], ...]
+
+
+@dataclass(frozen=True)
+class Heated:
+    """A layer of a floor or a ceiling that emitters warm.
+
+    Parameters
+    ----------
+    node : ndarray of int, shape (n,)
+        Nodes about the pipes.
+    share : ndarray, shape (n,)
+        Their shares of the heat, which sum to 1 [-].
+    area : float
+        Area [m2].
+    """
+
+    node: IntArray
+    share: FloatArray
+    area: float
+
+
+@dataclass(frozen=True)
 class Room:
     """A zone with what is in it.
 
@@ -133,6 +176,8 @@ class Room:
         Node of the furniture; -1 without.
     floor_area, volume : float
         [m2] and [m3].
+    emitted : tuple of Emission
+        Heat of its devices that does not all go to the air.
     """
 
     name: str
@@ -146,6 +191,7 @@ class Room:
     furniture: int
     floor_area: float
     volume: float
+    emitted: tuple[Emission, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -192,6 +238,8 @@ class Anatomy:
         Area of a zone with nothing above, or of one on the lowest floor [m2].
     ground_faces : list of GroundFace
         Of a zone table.
+    heated : dict
+        Layers that emitters warm, by zone and side (``floor`` or ``ceiling``).
     facades : dict
         Area of exterior wall, windows included, by zone and azimuth [m2].
     air_heat_capacity : float
@@ -209,6 +257,7 @@ class Anatomy:
     under_roof: dict[str, float] = field(default_factory=dict)
     on_ground: dict[str, float] = field(default_factory=dict)
     ground_faces: list[GroundFace] = field(default_factory=list)
+    heated: dict[tuple[str, str], list[Heated]] = field(default_factory=dict)
     facades: dict[tuple[str, float], float] = field(default_factory=dict)
     air_heat_capacity: float = 0.0
     airflows: tuple[tuple[int, int], ...] = ()

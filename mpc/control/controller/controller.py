@@ -143,7 +143,8 @@ class MpcController:
             read = self.points.read(measured, self._system)
             boundary, seen = np.concatenate([[outdoor], other]), np.isfinite(read.zone)
             if started:
-                self.observer.update(read.zone, np.nan_to_num(read.heat) + gains, boundary)
+                heat = np.nan_to_num(read.heat)
+                self.observer.update(read.zone, heat + gains, self.observer.with_emitted(boundary, heat))
             elif seen.any():
                 self.observer.start(np.where(seen, read.zone, read.zone[seen].mean()), boundary)
                 started = True
@@ -216,7 +217,8 @@ class MpcController:
         restart = not known.started
         if known.started:
             gains, planned = (np.zeros_like(heat) if h is None else h for h in (known.gains, known.heat))
-            innovation = self.observer.update(zone, np.where(np.isfinite(heat), heat, planned) + gains, before)
+            given = np.where(np.isfinite(heat), heat, planned)
+            innovation = self.observer.update(zone, given + gains, self.observer.with_emitted(before, given))
             restart = self._far.update(innovation, reasons)
         if restart:
             self.observer.start(likely, before)

@@ -59,6 +59,23 @@ class Observer:
         self.state = np.zeros(self.kalman.whole.n)
         self.state[: self.order] = at_rest * (outside + modes.heating @ np.linalg.solve(gain, missing))
 
+    def with_emitted(self, boundary: FloatArray, heat: FloatArray) -> FloatArray:
+        """Boundary temperatures and signals with those of emitters, which follow from the heat of devices.
+
+        Parameters
+        ----------
+        boundary : ndarray, shape (n_boundary,)
+            As in `start` [signal unit].
+        heat : ndarray, shape (n_zone,)
+            Heat that devices give to the zones [W].
+        """
+        emitted = self.modes.emitted
+        if emitted is None or not emitted.any():
+            return boundary
+        found = np.array(boundary, dtype=float)
+        found[found.size - self.modes.n_signal :] += emitted @ heat
+        return found
+
     def update(self, zone: FloatArray, heat: FloatArray, boundary: FloatArray) -> FloatArray:
         """Take in a step that has ended.
 

@@ -20,8 +20,9 @@ class ForecastSignals:
     """Boundaries beside the outdoor air and signals of effects over a horizon, as `MpcController` asks for them.
 
     Signals of heat and air (`flow_gain`, `duct_loss`, `capacity_limit`, `valve_leak`) are not foreseen: they are taken
-    as none, and what they do is found by the observer as unmeasured heat. `left_out` names them. Usual temperatures are
-    those of the network's normalisation, or else the middles of the forecast's comfort bands.
+    as none, and what they do is found by the observer as unmeasured heat. `left_out` names them. What emitters
+    give elsewhere than to the air follows from the heat that is planned (`ModalModel.heated_by_devices`). Usual
+    temperatures are those of the network's normalisation, or else the middles of the forecast's comfort bands.
 
     Parameters
     ----------
@@ -74,8 +75,10 @@ class ForecastSignals:
         """
         n, inputs = len(forecast.table), self._inputs(forecast)
         values = np.zeros((n, len(self.network.signals)))
-        unknown = []
+        unknown, planned = [], np.asarray(self.network.emitted.any(axis=1))
         for k, signal in enumerate(self.network.signals):
+            if planned[k]:
+                continue
             if not HVAC_INPUTS.isdisjoint(signal.inputs):
                 unknown.append(signal.name)
                 continue

@@ -153,7 +153,9 @@ class Predictor:
         self._output = np.ascontiguousarray(modes.output)
         parts = {dt: modes.propagator(float(dt), scheme) for dt in np.unique(horizon.steps)}
         self._end = {dt: p.end for dt, p in parts.items()}
-        self._push = {dt: np.ascontiguousarray(p.end_gain[:, None] * modes.heating) for dt, p in parts.items()}
+        emitted = modes.heated_by_devices
+        self._push = {dt: np.ascontiguousarray(p.end_gain[:, None] * emitted) for dt, p in parts.items()}
+        self._gain = {dt: p.end_gain[:, None] * modes.heating for dt, p in parts.items()}
         self._drive = {dt: p.end_gain[:, None] * modes.boundary for dt, p in parts.items()}
         self._response = {dt: np.ascontiguousarray(self._output @ push) for dt, push in self._push.items()}
         self._own = {dt: np.ascontiguousarray(np.diag(response)) for dt, response in self._response.items()}
@@ -202,7 +204,7 @@ class Predictor:
         outside = data.boundary.copy()
         outside[:, : outside.shape[1] - self.modes.n_signal] -= REFERENCE_TEMPERATURE
         steps = zip(self.horizon.steps, outside, free, strict=True)
-        return np.stack([self._drive[dt] @ o + self._push[dt] @ f for dt, o, f in steps])
+        return np.stack([self._drive[dt] @ o + self._gain[dt] @ f for dt, o, f in steps])
 
     def inputs(self, plan: FloatArray) -> FloatArray:
         """Spread a plan over the steps, shape (N, n_input) [K or Pa]; states and schedules are left for the roll-out.

@@ -28,7 +28,7 @@ def test_what_the_weather_drives_is_known_in_advance(
     network = build_network(building, dx=1.0, effects=effects)
     signals = EffectSignals(network, sc, system)
     expected = signal_values(network.signals, scenario_inputs(sc))
-    found = [signals.at(k, np.ones(12), np.ones(12)) for k in (0, 100, 150)]
+    found = [signals.at(k, np.ones(12), np.ones(12), np.zeros(12)) for k in (0, 100, 150)]
     np.testing.assert_array_equal(found, expected[[0, 100, 150]])
 
 
@@ -41,12 +41,12 @@ def test_what_the_air_drives_is_of_the_step(
     network = build_network(building, dx=1.0, effects=effects)
     signals = EffectSignals(network, scenario(), system)
     by_name = dict(
-        zip([s.name for s in network.signals], signals.at(9, np.full(12, 0.2), np.full(12, 700.0)), strict=True)
+        zip([s.name for s in network.signals], signals.at(9, np.full(12, 0.2), np.full(12, 700.0), np.zeros(12)), strict=True)
     )
     assert by_name[f"heat of {zone}"] == 700.0
     assert by_name[f"supply air of {zone}"] == pytest.approx(0.2 * AIR_HEAT_CAPACITY)
     assert sorted(by_name.values())[0] == 1.0
-    still = signals.at(9, np.zeros(12), np.zeros(12))
+    still = signals.at(9, np.zeros(12), np.zeros(12), np.zeros(12))
     assert np.count_nonzero(still) <= 1  # what is constant stays
 
 
@@ -88,4 +88,4 @@ def test_a_plant_gives_its_heat_itself_where_a_case_has_only_valves(
     network = build_network(told, dx=1.0)
     signals = EffectSignals(network, replace(scenario(), building=told), system)
     assert [s.name for s in network.signals] == ["valve of RAD"]
-    assert signals.at(9, np.full(12, 0.2), np.full(12, 700.0)).tolist() == [0.0]
+    assert signals.at(9, np.full(12, 0.2), np.full(12, 700.0), np.zeros(12)).tolist() == [0.0]

@@ -298,7 +298,7 @@ def test_settings_without_structure_are_those_of_the_baseline(tmp_path: Path) ->
 @pytest.mark.parametrize(
     ("settings", "message"),
     [
-        ({"structure": "paper"}, r"settings\.structure: expected a mapping with keys among \['furniture'.*'paper'"),
+        ({"structure": "paper"}, r"settings\.structure: expected a mapping with keys among \['emitter', 'furniture'.*'paper'"),
         ({"structure": {"furnitur": True}}, r"settings\.structure: expected a mapping .*furnitur"),
         ({"structure": {"wall_nodes": 0}}, r"settings\.structure\.wall_nodes: expected a whole number from 1 to 100"),
         ({"structure": {"radiant": "no"}}, r"settings\.structure\.radiant: expected true or false, got 'no'"),

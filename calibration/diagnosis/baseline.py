@@ -1,0 +1,38 @@
+"""The baseline of a diagnosis: as drawn, with what heaters give their heat by where the case does not say it."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+from calibration.diagnosis.refit.comparison import Fit, ModelComparison
+from calibration.evaluation.n_step import Progress
+from calibration.fit.ladder import emitter_of
+from calibration.fit.left_out import Known
+
+
+def fit_baseline(
+    models: ModelComparison, effects: Mapping[str, Sequence[str]], progress: Progress | None = None
+) -> tuple[ModelComparison, Fit]:
+    """Fit the baseline, with heated floors or radiators if left-out tuning days say so.
+
+    Parameters
+    ----------
+    models : ModelComparison
+        The case and its days.
+    effects : mapping of str to sequence of str
+        What is known to be there.
+    progress : callable, optional
+        Called with stage, done, total.
+
+    Returns
+    -------
+    tuple
+        The case with the structure that was chosen, and its fit.
+    """
+    known = {name: tuple(zones) for name, zones in effects.items()}
+    found = models.fit(known, [{}])
+    emitter = emitter_of(Known(found.weighed, found.model, found.point), models, progress)
+    if emitter == "air":
+        return models, found
+    structure = replace(models.settings.structure, emitter=emitter)
+    models = replace(models, settings=replace(models.settings, structure=structure))
+    return models, models.fit(known, [{}])
