@@ -20,6 +20,7 @@ from thermal.case.load import FORMAT, NAME, load_case
 from thermal.case.points import POINT_TYPES, split_column
 from thermal.case.telemetry import Telemetry
 from thermal.errors import CaseError
+from thermal.folders import check_writable
 from thermal.units import QUANTITIES, from_si
 
 TELEMETRY_FILE = "telemetry.parquet"
@@ -100,8 +101,10 @@ def check_target(target: Path, overwrite: bool) -> None:
     Raises
     ------
     CaseError
-        There is a file, or a folder that holds something and may not, or no case, to be replaced.
+        There is a file, or a folder that holds something and may not, or no case, to be replaced; or it cannot be
+        written to.
     """
+    check_writable(target if target.is_dir() else target.parent, CaseError)
     if not target.exists():
         return
     CaseError.unless(target.is_dir(), str(target), "a folder to make", "a file", "choose another path")

@@ -183,3 +183,11 @@ def test_telemetry_without_a_time_zone_is_not_saved(tmp_path: Path) -> None:
     assert not (tmp_path / "case").exists()
     with pytest.raises(CaseError):
         Telemetry.from_frame(frame)
+
+
+@pytest.mark.skipif(not Path("/proc/self").is_dir(), reason="needs a file system that is not for files")
+def test_a_place_that_cannot_be_written_to_is_named(plan_draft: Any) -> None:
+    case = load_case(plan_draft.write())
+    for target in ("/proc/case", "/proc/deep/case"):
+        with pytest.raises(CaseError, match="expected a place that can be written to, found /proc: "):
+            save_case(case, target)
