@@ -1,14 +1,16 @@
 """The point types of the case format: what each measures, and which values a sensor of it can report at all."""
 
 import csv
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from thermal._types import BoolArray
+from thermal._types import BoolArray, FloatArray
 from thermal.errors import CaseError
 from thermal.units import QUANTITIES, from_si
 
@@ -158,3 +160,21 @@ def possible_values(table: pd.DataFrame) -> pd.DataFrame:
     """
     kinds = {column: POINT_TYPES.get(str(column).rpartition("/")[2]) for column in table}
     return table.apply(lambda c: c if (kind := kinds[c.name]) is None else c.where(kind.possible(c)))
+
+
+def numbers(values: Iterable[Any]) -> FloatArray:
+    """Make numbers of readings, of the same length [as given]; NaN where one is missing or no number.
+
+    Parameters
+    ----------
+    values
+        As a building's automation has them.
+    """
+    return np.array([_number(value) for value in values], dtype=float)
+
+
+def _number(value: Any) -> float:
+    try:
+        return float(value)
+    except (TypeError, ValueError, OverflowError):
+        return np.nan

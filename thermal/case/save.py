@@ -109,7 +109,7 @@ def check_target(target: Path, overwrite: bool) -> None:
         return
     CaseError.unless(target.is_dir(), str(target), "a folder to make", "a file", "choose another path")
     if any(target.iterdir()):
-        advice = "choose another folder or pass overwrite=True"
+        advice = "choose another folder, or --force (overwrite=True)"
         CaseError.unless(overwrite, str(target), "no folder or an empty one", "a folder that holds files", advice)
         if not (target / NAME).is_file():
             raise CaseError(str(target), "a case to overwrite", f"a folder without {NAME}", "choose another folder")

@@ -27,6 +27,7 @@ from thermal.case.points import (
     POINT_TYPES,
     SUPPLY_FLOW,
     ZONE_TEMPERATURE,
+    numbers,
     possible_values,
 )
 from thermal.system.smooth import SmoothHvac
@@ -240,17 +241,6 @@ def values_of(measurements: Mapping[str, float], entities: Sequence[str], point:
     found = numbers([measurements[c] if c in measurements else np.nan for c in columns])
     kinds = [POINT_TYPES.get(column.rpartition("/")[2]) for column in columns]
     return np.array([v if k is None or k.possible(v) else np.nan for k, v in zip(kinds, found, strict=True)])
-
-
-def numbers(values: Sequence[object]) -> FloatArray:
-    """Make numbers of readings, of the same length [as given]; NaN where one is missing or no number.
-
-    Parameters
-    ----------
-    values : sequence
-        As a building's automation has them.
-    """
-    return pd.to_numeric(pd.Series(values, dtype=object), errors="coerce").to_numpy(dtype=float)
 
 
 @dataclass(frozen=True)

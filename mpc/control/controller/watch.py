@@ -6,13 +6,12 @@ import numpy as np
 import pandas as pd
 from scipy.special import ndtr
 
-from mpc.control.controller.site import numbers
 from mpc.control.problem.horizon import HorizonData
 from mpc.control.problem.problem import ControlProblem
 from mpc.control.solvers.solution import Solution
 from mpc.errors import ControlError
 from thermal._types import BoolArray, FloatArray
-from thermal.case.points import POINT_TYPES
+from thermal.case.points import POINT_TYPES, numbers
 
 _RATE_SECONDS = 300.0  # s: over less time a rate says nothing, sensors lag and means jump
 _SAME = 1e-6  # K: readings that differ by less are one and the same

@@ -91,7 +91,7 @@ def test_slice_saves_with_what_it_holds(plan_draft: Any, tmp_path: Path) -> None
 def test_folder_that_holds_something_is_refused(plan_draft: Any, tmp_path: Path) -> None:
     case = load_case(plan_draft.write())
     before = {path.name: path.read_bytes() for path in plan_draft.folder.iterdir()}
-    with pytest.raises(CaseError, match=r"expected no folder or an empty one.*pass overwrite=True"):
+    with pytest.raises(CaseError, match=r"expected no folder or an empty one.*--force"):
         save_case(case, plan_draft.folder)
     assert {path.name: path.read_bytes() for path in plan_draft.folder.iterdir()} == before
     (tmp_path / "empty").mkdir()

@@ -244,7 +244,10 @@ def parse_draft(content: Any, where: str) -> Draft:
 
 
 def _check_runs(floor: DraftFloor, where: str) -> None:
-    runs = np.asarray(floor.runs, dtype=np.float64)  # an integer of any size
+    try:
+        runs = np.asarray(floor.runs, dtype=np.float64)  # an integer of any size
+    except OverflowError as error:
+        raise LabelError(where, "runs of all cells, within the legend", "an integer of over 300 digits") from error
     if floor.rows * floor.columns > _MOST_CELLS:
         raise LabelError(where, f"at most {_MOST_CELLS} cells", f"{floor.rows} x {floor.columns}")
     if floor.legend[: len(BASIC)] != BASIC or len(set(floor.legend)) < len(floor.legend):

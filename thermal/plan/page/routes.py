@@ -248,7 +248,8 @@ async def _malformed(request: Request, error: Exception) -> Response:
     first = error.errors()[0] if isinstance(error, RequestValidationError) else {}
     where = ".".join(str(part) for part in first.get("loc", ("request",)))
     found = repr(first.get("input"))[:80]
-    return await _named(request, LabelError(where, str(first.get("msg", "a valid value")), found))
+    expected = str(first.get("msg", "a valid value")).removeprefix("Input should be ")
+    return await _named(request, LabelError(where, expected, found))
 
 
 def _parse_json(body: bytes) -> Any:

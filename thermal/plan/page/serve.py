@@ -127,7 +127,7 @@ def serve_page(desk: LabelDesk, *, port: int = 0, ready: Callable[[str], None] |
     MissingExtraError
         The extra ``[pages]`` is not installed.
     """
-    uvicorn = extra("uvicorn", "pages", "labelling page")
+    uvicorn = extra("uvicorn", "pages,plan", "labelling page")
     token = secrets.token_urlsafe(24)
     try:
         app = create_app(desk, token)
@@ -164,7 +164,7 @@ def create_app(desk: LabelDesk, token: str) -> ASGIApp:
     MissingExtraError
         The extra ``[pages]`` is not installed.
     """
-    extra("fastapi", "pages", "labelling page")
+    extra("fastapi", "pages,plan", "labelling page")
     from thermal.plan.page.routes import routes_of
 
     return Gate(routes_of(desk), token)
