@@ -266,7 +266,7 @@ export function showFinding(finding) {
     const at = page.draft.floors.findIndex((floor) => floor.name === finding.name);
     if (at >= 0) { page.floor = at; tell("all"); }
     showTab("building");
-  }
+  } else showTab("building"); // of the case as a whole, such as its windows
 }
 
 function problemsPanel() {
