@@ -77,8 +77,8 @@ class PointType:
 # a pump that starts brings at once; 200 W/m2 for the sky when a cloud comes.
 _ROWS = csv.reader((Path(__file__).parents[1] / "data" / "points.csv").read_text(encoding="utf-8").splitlines()[1:])
 POINT_TYPES: dict[str, PointType] = {
-    name: PointType(name, quantity, *map(float, numbers), meaning)
-    for name, quantity, *numbers, meaning in _ROWS
+    name: PointType(name, quantity, float(lowest), float(highest), float(rate), meaning)
+    for name, quantity, lowest, highest, rate, meaning in _ROWS
 }
 
 ZONE_TEMPERATURE = "zone_air_temperature_sensor"
@@ -158,8 +158,13 @@ def possible_values(table: pd.DataFrame) -> pd.DataFrame:
     table
         Shape (n_time, n_column); columns end in the name of their point; in the library's units.
     """
-    kinds = {column: POINT_TYPES.get(str(column).rpartition("/")[2]) for column in table}
-    return table.apply(lambda c: c if (kind := kinds[c.name]) is None else c.where(kind.possible(c)))
+    kept = table.copy()
+    for position, column in enumerate(table.columns):
+        kind = POINT_TYPES.get(str(column).rpartition("/")[2])
+        if kind is not None:
+            values = table.iloc[:, position]
+            kept.isetitem(position, values.where(kind.possible(values)))
+    return kept
 
 
 def numbers(values: Iterable[Any]) -> FloatArray:

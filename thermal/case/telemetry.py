@@ -119,7 +119,7 @@ def _checked_index(index: pd.Index, where: str) -> pd.DatetimeIndex:
 
 
 def _check_years(index: pd.DatetimeIndex, where: str) -> None:
-    wrong = np.flatnonzero(~within_years(index) & ~index.isna())
+    wrong = np.flatnonzero(~within_years(index) & ~np.asarray(index.isna()))
     if wrong.size:
         raise CaseError(f"{where}: data row {wrong[0] + 1}", EXPECTED, shown(index, wrong[0]), "correct the stamp")
 

@@ -14,7 +14,15 @@ from hypothesis import strategies as st
 from thermal import Building, ZoneTable
 from thermal.case.building import Location, ZoneEntry
 from thermal.errors import LabelError
-from thermal.plan.page.draft import Draft, building_of_draft, draft_of, encode_floor, glazed_areas, parse_draft, zones_of
+from thermal.plan.page.draft import (
+    Draft,
+    building_of_draft,
+    draft_of,
+    encode_floor,
+    glazed_areas,
+    parse_draft,
+    zones_of,
+)
 
 
 @given(
