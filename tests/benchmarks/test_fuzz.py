@@ -18,6 +18,7 @@ pytest.importorskip("httpx", reason="needs httpx, which the test extra has")
 def fuzz(script: Callable[[str], ModuleType]) -> ModuleType:
     script("_table")
     script("_fuzz_inputs")
+    script("_fuzz_targets")
     return script("fuzz")
 
 
