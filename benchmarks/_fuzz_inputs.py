@@ -114,7 +114,7 @@ def spoil_frame(frame: pd.DataFrame, rng: np.random.Generator) -> pd.DataFrame:
         elif kind < 0.45 and frame.shape[1]:
             try:
                 frame.isetitem(column, frame.iloc[:, column].astype(str(rng.choice(_KINDS))))
-            except (TypeError, ValueError):
+            except (TypeError, ValueError, OverflowError):
                 continue
         elif kind < 0.6 and frame.shape[1]:
             names = list(frame.columns)

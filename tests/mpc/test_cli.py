@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import yaml
 from typer.testing import CliRunner
 
 from mpc.cli.app import app, main
@@ -167,6 +168,21 @@ def test_a_command_is_not_told_of_python(tmp_path: Path) -> None:
 def test_an_effect_is_found_by_what_it_means(tmp_path: Path) -> None:
     answer = run("calibrate", CASE, "--out", tmp_path / "out", "--effects", "sun")
     assert answer.exit_code == 2 and "it may be solar_gain (sun through the windows)" in answer.stderr
+
+
+def test_a_building_without_windows_is_said_loudly_before_it_is_calibrated(tmp_path: Path, capsys: Any) -> None:
+    from mpc.cli.options import open_case
+
+    folder = tmp_path / "dark"
+    shutil.copytree(CASE, folder)
+    content = yaml.safe_load((folder / "building.yaml").read_text(encoding="utf-8"))
+    assert open_case(folder, None, False) and capsys.readouterr().err == ""
+    (folder / "building.yaml").write_text(yaml.safe_dump(content | {"glazing": {}}), encoding="utf-8")
+    open_case(folder, None, False)
+    told = capsys.readouterr().err
+    assert told.startswith("warning: the building has no windows") and f"buildingmpc label {folder}" in told
+    answer = run("check", folder)
+    assert answer.exit_code == 0 and "the building has no windows" in answer.stdout
 
 
 def test_what_a_base_install_lacks_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:

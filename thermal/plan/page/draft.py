@@ -164,7 +164,7 @@ class Draft(Entry):
     name: Name
     site: Site = Site()
     orientation: Finite = 0.0
-    cell_size: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 0.5
+    cell_size: Annotated[float, Field(gt=0, le=100, allow_inf_nan=False)] = 0.5
     floors: Annotated[tuple[DraftFloor, ...], Field(max_length=_MOST_FLOORS)] = ()
     devices: Annotated[tuple[DraftDevice, ...], Field(max_length=_MOST_DEVICES)] = ()
     glazing: dict[Name, dict[Name, Finite]] = Field(default_factory=dict)
