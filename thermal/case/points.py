@@ -163,7 +163,7 @@ def possible_values(table: pd.DataFrame) -> pd.DataFrame:
         kind = POINT_TYPES.get(str(column).rpartition("/")[2])
         if kind is not None:
             values = table.iloc[:, position]
-            kept.isetitem(position, values.where(kind.possible(values)))
+            kept.isetitem(position, values.where(kind.possible(values)).to_numpy())
     return kept
 
 
